@@ -4,14 +4,16 @@ Exit codes: 0 fine; 1 the run failed; 2 the input or the call is wrong. Errors
 go to stderr as sentences; a traceback is a bug.
 """
 
+import codecs
 import importlib
+import io
 import sys
+import unicodedata
 from typing import NoReturn
 
 import click
 
 import masrel
-from masrel.cli._encodings import accept_any_text
 from masrel.errors import (
     ConvergenceError,
     DeviceError,
@@ -38,6 +40,7 @@ GROUPS = {
     "Its conduct": {
         "train": "Teach a rater on models of known grade, until a test is passed.",
         "run": "Present a schedule's models and record every grade.",
+        "serve": "Pages for the rater's tablet and the coordinator's screen.",
         "sheet": "Sheets to print for raters who grade on paper.",
         "enter": "Bring in a sheet that was filled in on paper.",
         "status": "How far a study is, and what to do next.",
@@ -117,7 +120,7 @@ def cli() -> None:
 
 def main() -> None:
     """Run the command line and exit with its code."""
-    accept_any_text()
+    _accept_any_letter()
     try:
         cli()
     except (DeviceError, ConvergenceError, SessionStoppedError) as error:
@@ -134,3 +137,53 @@ def main() -> None:
 def _fail(error: object, code: int) -> NoReturn:
     click.echo(f"masrel: {error}", err=True)
     sys.exit(code)
+
+
+_USUAL_ERRORS = ("strict", "surrogateescape", "backslashreplace")
+
+_SIGNS = {
+    "−": "-",
+    "–": "-",
+    "—": "-",
+    "·": ".",
+    "×": "x",
+    "±": "+-",
+    "²": "^2",
+    "³": "^3",
+    "°": "deg",
+    "∞": "inf",
+    "≤": "<=",
+    "≥": ">=",
+    "√": "sqrt",
+    "…": "...",
+    "‘": "'",
+    "’": "'",
+    "“": '"',
+    "”": '"',
+}
+
+
+def _accept_any_letter() -> None:
+    # stdout and stderr write what they cannot encode, on Windows' cp1252 say, in others
+    codecs.register_error("masrel", _in_other_letters)
+    for stream in (sys.stdout, sys.stderr):
+        # One that somebody has told what to do with such letters goes on doing it.
+        if isinstance(stream, io.TextIOWrapper) and stream.errors in _USUAL_ERRORS:
+            stream.reconfigure(errors="masrel")
+
+
+def _in_other_letters(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    letters = error.object[error.start : error.end]
+    return "".join(map(_spelled, letters)), error.end
+
+
+def _spelled(letter: str) -> str:
+    # A name of somebody stays what it is, in escapes.
+    if letter in _SIGNS:
+        return _SIGNS[letter]
+    words = unicodedata.name(letter, "").split()
+    if words[:1] == ["GREEK"] and words[2:3] == ["LETTER"] and len(words) == 4:
+        return words[3].lower() if words[1] == "SMALL" else words[3].capitalize()
+    return letter.encode("ascii", "backslashreplace").decode("ascii")

@@ -1,6 +1,7 @@
 """Options that several verbs have, as one argument each, and what verbs print."""
 
 import json
+import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -12,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from masrel._files import write_file
-from masrel.cli._encodings import is_encodable
 from masrel.cli._paths import InputFile, OutputFile, note_inputs
 from masrel.errors import MasrelWarning, ParameterError
 
@@ -94,7 +94,7 @@ class OutputOptions:
     raw_csv: bool = False  # whether cells of CSV are as they are
     latex: bool = False
     sentence: bool = False  # whether sentences are printed instead of a table
-    quiet: bool = False  # whether there is no progress bar
+    quiet: bool = False  # without progress: to tqdm `or None`, terminals alone
 
     def __post_init__(self) -> None:
         forms = {
@@ -116,11 +116,6 @@ class OutputOptions:
         if self.figure is not None:
             check_folder("--figure", self.figure)
             figure_form(self.figure)
-
-    @property
-    def hides_progress(self) -> bool | None:
-        """What ``tqdm`` takes: True hides a bar, None shows it at a terminal alone."""
-        return self.quiet or None
 
 
 _FORMAT = 1  # of what verbs write as JSON
@@ -234,9 +229,18 @@ def write_json(document: dict[str, object], file: Path) -> None:
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     if file == STDOUT:
         # escapes of JSON where the screen cannot show the letters
-        click.echo(text if is_encodable(text) else json.dumps(document, indent=1))
+        click.echo(text if _is_encodable(text) else json.dumps(document, indent=1))
         return
     write_file(file, text + "\n")
+
+
+def _is_encodable(text: str) -> bool:
+    # whether stdout can write a text as it is
+    try:
+        text.encode(sys.stdout.encoding or "utf-8")
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _verb() -> str:

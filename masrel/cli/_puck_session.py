@@ -104,7 +104,7 @@ class PuckSession:
     @contextmanager
     def progress(self, total: int) -> Iterator[Callable[[], None]]:
         """Show a bar of steps on a terminal."""
-        hidden = self.output.json_file == STDOUT or self.output.hides_progress
+        hidden = self.output.json_file == STDOUT or self.output.quiet or None
         with tqdm(total=total, unit="", leave=False, disable=hidden) as bar:
 
             def step() -> None:

@@ -34,6 +34,8 @@ def joint_of_kind(kind: str, settings: Sequence[str]) -> "JointModel":
     values: dict[str, float] = {}
     for setting in settings:
         key, _, text = setting.partition("=")
+        if key in values:
+            raise ParameterError(f"--parameter {key}: needs one value, got two")
         try:
             values[key] = float(text)
         except ValueError as error:

@@ -82,7 +82,7 @@ def _simulate(study: StudyPaths, output: OutputOptions) -> None:
         total=n_presentations,
         desc="presentations",
         unit="",
-        disable=output.hides_progress,
+        disable=output.quiet or None,
     ) as bar:
         for session, rater in occasions:
             run_session(
@@ -137,7 +137,7 @@ def _report(
         study.analysis_file if is_simulated else study.root / "analysis-published.json",
     )
     with tqdm(
-        desc=destination.name, unit=" files", disable=output.hides_progress
+        desc=destination.name, unit=" files", disable=output.quiet or None
     ) as bar:
         write_report(
             data.protocol,

@@ -52,7 +52,7 @@ def export(
     refuse_record(folder)
     paths = StudyPaths(study)
     protocol = read_protocol(paths.protocol)
-    with tqdm(desc="export", unit=" files", disable=output.hides_progress) as bar:
+    with tqdm(desc="export", unit=" files", disable=output.quiet or None) as bar:
         left_out = export_study(
             paths,
             protocol,

@@ -161,7 +161,7 @@ def fit(
             recordings,
             *names,
             of_device=of_device,
-            hides_progress=output.hides_progress,
+            quiet=output.quiet,
         )
         if of_device:
             from masrel.elbow.identification import fit_friction
@@ -204,14 +204,14 @@ def _read(
     units: dict[str, str],
     *,
     of_device: bool,
-    hides_progress: bool | None,
+    quiet: bool,
 ) -> "list[Movement]":
     from tqdm import tqdm
 
     from masrel.elbow.identification import read_movement
 
     with tqdm(
-        paths, desc="reading", unit="file", disable=hides_progress, delay=1.0
+        paths, desc="reading", unit="file", disable=quiet or None, delay=1.0
     ) as bar:
         return [
             read_movement(path, columns=columns, units=units, of_device=of_device)

@@ -1,220 +1,28 @@
 """``masrel plan``: how large a study must be, and what a study can show."""
 
-import itertools
-from dataclasses import dataclass, replace
+import time
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli._options import OutputOptions, grouped, output_options, write_output
-from masrel.cli._paths import InputFile, OutputFile
-from masrel.cli._progress import progress
+from masrel.cli._options import OutputOptions, output_options, write_output
+from masrel.cli._paths import InputFile
+from masrel.cli._planning_options import PlanningOptions, planning_options
+from masrel.cli._progress import Progress, duration_words, progress
+from masrel.cli._study_plans import study_plans
 from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
     from masrel.planning import Plan
-    from masrel.protocol import EstimatePlan, Protocol
 
-_USUAL_VALUES = [0.4, 0.6, 0.8]
-
-
-class _Range(click.ParamType):  # type: ignore[type-arg]
-    """Numbers separated by commas, or first:last:step."""
-
-    def __init__(self, number: type) -> None:
-        self._number = number
-        self.name = "numbers"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> list[float]:
-        if isinstance(value, list):
-            return value
-        try:
-            return self._numbers(value)
-        except ValueError:
-            self.fail(f"needs numbers as 10,20 or 10:50:10, got {value!r}", param, ctx)
-
-    def _numbers(self, text: str) -> list[float]:
-        if ":" not in text:
-            return [self._number(part) for part in text.split(",")]
-        first, last, step = (self._number(part) for part in text.split(":"))
-        n_steps = int((last - first) / step + 1e-9) if step > 0 else -1
-        if n_steps < 0:
-            raise ValueError
-        return [self._number(round(first + k * step, 12)) for k in range(n_steps + 1)]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PlanningOptions:
-    """What is planned."""
-
-    coefficient: str
-    pilot: Path | None
-    value: list[float] | None
-    items: list[int] | None
-    raters: list[int] | None
-    categories: int | None
-    prevalences: str | None
-    weights: str
-    model: str | None
-    target: Literal["items", "raters", "both"] | None
-    p_missing: float
-    level: float
-    sides: int
-    half_width: float | None
-    lower: float | None
-    upper: float | None
-    null: float | None
-    power: float | None
-    assurance: float | None
-    max_cost: float | None
-    prices: list[float]
-    interval: str
-    method: str
-    seed: int
-    n_studies: int
-    executor: Literal["processes", "dask"] | None
-    scheduler: str | None
-    resume: Path | None
-
-    @property
-    def shares(self) -> object:
-        """Prevalences: of the categories, several, or a table of two raters."""
-        if self.prevalences is None:
-            return None
-        try:
-            rows = [
-                [float(part) for part in row.split(",")]
-                for row in self.prevalences.split(";")
-            ]
-        except ValueError:
-            raise ParameterError(
-                "--prevalences: needs numbers as 0.7,0.3, rows of them separated by "
-                f'";", got {self.prevalences!r}'
-            ) from None
-        return rows if len(rows) > 1 else rows[0]
-
-    def common(self) -> dict[str, Any]:
-        """Return the arguments that every plan takes."""
-        if self.target is None:
-            raise ParameterError(
-                "--target: needs items, raters or both: what a new study draws anew"
-            )
-        if len(self.prices) != 3:
-            raise ParameterError(
-                f"--prices: needs three, of an item, a rater and a rating, got "
-                f"{len(self.prices)}"
-            )
-        return {
-            "weights": self.weights,
-            "categories": self.categories,
-            "prevalences": self.shares,
-            "model": self.model,
-            "target": self.target,
-            "p_missing": self.p_missing,
-            "level": self.level,
-            "sides": self.sides,
-            "half_width": self.half_width,
-            "lower": self.lower,
-            "upper": self.upper,
-            "null": self.null,
-            "prices": tuple(self.prices),
-            "interval": self.interval,
-            "rng": self.seed,
-        }
-
-
-_NUMBERS, _WHOLE = _Range(float), _Range(int)
-
-_options = grouped(
-    "options",
-    PlanningOptions,
-    click.option("--coefficient", default="fleiss_kappa", show_default=True),
-    click.option(
-        "--pilot",
-        metavar="FILE",
-        type=InputFile(path_type=Path),
-        help="Ratings of which value, prevalences and missing share are taken, unless "
-        "they are given.",
-    ),
-    click.option("--value", type=_NUMBERS, help="True coefficient, or several."),
-    click.option("--items", type=_WHOLE, help="How many, as 30, 20,40 or 20:60:10."),
-    click.option("--raters", type=_WHOLE, help="The same; one of both is solved for."),
-    click.option("--categories", type=int, help="How many, each as frequent."),
-    click.option(
-        "--prevalences",
-        metavar="SHARES",
-        help="Of the categories, as 0.7,0.3; several with ;, or the rows of a table.",
-    ),
-    click.option("--weights", default="identity", show_default=True),
-    click.option(
-        "--model",
-        type=click.Choice(["mixture", "dirichlet-multinomial", "latent", "table"]),
-        help="How the ratings of an item come about.",
-    ),
-    click.option(
-        "--target",
-        type=click.Choice(["items", "raters", "both"]),
-        help="What a new study would draw anew.",
-    ),
-    click.option(
-        "--missing", "p_missing", default=0.0, help="Share of ratings missing."
-    ),
-    click.option("--level", default=0.95, show_default=True),
-    click.option("--sides", default=2, show_default=True),
-    click.option("--half-width", type=float, help="Aim: half the interval's width."),
-    click.option("--lower", type=float, help="Aim: no end below this."),
-    click.option("--upper", type=float, help="Aim: no end above this."),
-    click.option("--null", type=float, help="Aim: this is excluded, with --power."),
-    click.option("--power", type=float),
-    click.option("--assurance", type=float, help="Chance to reach the aim."),
-    click.option("--max-cost", type=float),
-    click.option(
-        "--prices",
-        type=_NUMBERS,
-        default="0,0,1",
-        show_default=True,
-        help="Of an item, a rater, a rating.",
-    ),
-    click.option(
-        "--interval",
-        type=click.Choice(["auto", "t", "normal"]),
-        default="auto",
-        show_default=True,
-    ),
-    click.option(
-        "--method",
-        type=click.Choice(["auto", "exact", "simulation", "wald", "goodness-of-fit"]),
-        default="auto",
-        show_default=True,
-    ),
-    click.option("--seed", default=0, show_default=True),
-    click.option(
-        "--studies",
-        "n_studies",
-        default=20_000,
-        show_default=True,
-        help="Of each cell of a grid that is simulated.",
-    ),
-    click.option(
-        "--executor",
-        type=click.Choice(["processes", "dask"]),
-        help="Who runs a grid, in place of this process.",
-    ),
-    click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster."),
-    click.option(
-        "--resume",
-        type=OutputFile(path_type=Path, dir_okay=False),
-        help="File of the tasks of a grid that are done: they are not run again.",
-    ),
-)
+_SHORT_S = 2.0  # what takes no longer is not told beforehand
 
 
 @click.command("plan")
 @click.argument("study", required=False, type=InputFile(path_type=Path))
-@_options
+@planning_options
 @click.option("--toml", is_flag=True, help="Print lines for a protocol instead.")
 @output_options(
     json="Write every number here; - prints them, and nothing else, on stdout.",
@@ -230,20 +38,18 @@ def plan(
     """Say how large a study must be, or what STUDY can show.
 
     With --items or --raters alone, the other is solved for; with both, a study of that
-    size is described; ranges make a grid. STUDY is a folder with a protocol: each line
-    of its plan is described at its size.
+    size is described; with --prices and neither, the cheapest is solved for. Ranges
+    make a grid. STUDY is a folder with a protocol: each line of its plan is described
+    at its size.
     """
     output.check_files()
-    options = _with_pilot(options)
-    labels: tuple[str, ...] = ()
-    if study is not None:
-        labels, plans = _of_study(study, options, is_quiet=output.quiet)
-    elif _is_grid(options):
-        plans = _grid(options, is_quiet=output.quiet)
-    else:
-        plans = (_single(options),)
-    if output.figure is not None and len({p.n_items for p in plans}) < 2:
-        raise ParameterError("--figure: needs several --items, as 20:60:10")
+    if study is None:
+        options = _with_pilot(options)
+    labels, plans = _plans(study, options, is_quiet=output.quiet)
+    if toml and len(set(labels)) < len(labels):
+        raise ParameterError("--toml: needs one --value for each line of a study")
+    if output.figure is not None:
+        _check_curve(plans)
     from masrel.report._planning_tables import (
         planning_curves,
         planning_document,
@@ -252,18 +58,70 @@ def plan(
         planning_toml,
     )
 
+    lines = labels or (None,) * len(plans)
     write_output(
         output,
         document=lambda: planning_document(plans),
         text=lambda: (
-            "\n\n".join(map(planning_toml, plans))
+            "\n\n".join(
+                planning_toml(one, line=line)
+                for one, line in zip(plans, lines, strict=True)
+            )
             if toml
             else "\n".join(map(planning_sentence, plans))
             if output.sentence
             else planning_table(plans, labels=labels)
         ),
-        figure=lambda: planning_curves(plans),
+        figure=lambda: planning_curves(
+            plans, power=options.power, assurance=options.assurance
+        ),
     )
+
+
+def _plans(
+    study: Path | None, options: PlanningOptions, *, is_quiet: bool
+) -> "tuple[tuple[str, ...], tuple[Plan, ...]]":
+    # with the lines of a study's plan that they are of
+    if study is None and options.is_grid:
+        return (), _grid(options, is_quiet=is_quiet)
+    options.refuse(("executor", "scheduler", "resume"), "is of grids")
+    with progress("planning", "studies", is_quiet=is_quiet) as bar:
+        is_solved = study is None and None in (options.items, options.raters)
+        unit = " a size" if is_solved else ""
+        count = _StudyCount(bar, unit, is_quiet=is_quiet)
+        if study is not None:
+            return study_plans(study, options, count.of_plans)
+        return (), (_single(options, count),)
+
+
+class _StudyCount:
+    """Studies that are drawn, over simulations of which the number is not known."""
+
+    def __init__(self, bar: Progress, unit: str, *, is_quiet: bool) -> None:
+        self._bar, self._unit, self._is_quiet = bar, unit, is_quiet
+        self._start = time.monotonic()
+        self._n_plans = 1  # that are still to come
+        self._before = self._n_drawn = 0  # by earlier simulations, and by this one
+
+    def of_plans(self, n_plans: int) -> "_StudyCount":
+        """Expect so many more plans that are alike."""
+        self._n_plans = n_plans
+        return self
+
+    def __call__(self, n_drawn: int, n_expected: int) -> None:
+        if n_drawn <= self._n_drawn:
+            self._before, self._n_drawn = self._before + self._n_drawn, 0
+        self._bar.expect(self._before + n_expected * self._n_plans)
+        self._bar.update(n_drawn - self._n_drawn)
+        if self._before == self._n_drawn == 0 and not self._is_quiet:
+            self._announce(n_expected * self._n_plans / n_drawn - 1.0)
+        self._n_drawn = n_drawn
+
+    def _announce(self, n_times: float) -> None:
+        # how long it takes, once the first studies are drawn
+        left = (time.monotonic() - self._start) * n_times
+        if left > _SHORT_S:
+            click.echo(f"planning: {duration_words(left)}{self._unit}", err=True)
 
 
 def _with_pilot(options: PlanningOptions) -> PlanningOptions:
@@ -281,58 +139,40 @@ def _with_pilot(options: PlanningOptions) -> PlanningOptions:
             f"{len(file.parts)}"
         )
     made = pilot(
-        options.coefficient,
+        options.what,
         file.parts[0].ratings,
         target=target,
-        weights=options.weights,
-        level=options.level,
+        weights=options.weights or "identity",
+        level=options.common()["level"],
     )
     click.echo(f"pilot {options.pilot}: {made.estimate}", err=True)
     shares = ",".join(map(repr, made.prevalences))
-    is_normal = options.coefficient.startswith("icc")
+    is_normal = options.what.startswith("icc")
     return replace(
         options,
         value=options.value or [made.estimate.value],
+        categories=options.categories or (None if is_normal else made.categories),
         prevalences=options.prevalences or (None if is_normal else shares),
-        p_missing=options.p_missing or made.p_missing,
+        p_missing=options.p_missing or (0.0 if is_normal else made.p_missing),
     )
 
 
-def _is_grid(options: PlanningOptions) -> bool:
-    sizes = (options.items, options.raters)
-    several = any(values is not None and len(values) > 1 for values in sizes)
-    is_many = options.value is not None and len(options.value) > 1
-    if (several or is_many) and None in sizes:
-        raise ParameterError(
-            "--items, --raters: a grid needs both, since none is solved for"
-        )
-    return several or is_many or options.executor is not None
-
-
-def _value(options: PlanningOptions) -> float | None:
-    return None if options.value is None else options.value[0]
-
-
-def _single(options: PlanningOptions) -> "Plan":
+def _single(options: PlanningOptions, count: _StudyCount) -> "Plan":
     from masrel.planning import precision, sample_size
 
     common = {
         **options.common(),
-        "value": _value(options),
+        "value": None if options.value is None else options.value[0],
         "method": options.method,
         "n_items": None if options.items is None else options.items[0],
         "n_raters": None if options.raters is None else options.raters[0],
+        "progress": count,
     }
     if options.items is not None and options.raters is not None:
-        for name in ("power", "assurance", "max_cost"):
-            if getattr(options, name) is not None:
-                raise ParameterError(
-                    f"--{name.replace('_', '-')}: needs --items or --raters to be left "
-                    "out, to be solved for"
-                )
-        return precision(options.coefficient, **common)
+        options.refuse(("max_cost",), "needs --items or --raters to be left out")
+        return precision(options.what, **common)
     return sample_size(
-        options.coefficient,
+        options.what,
         **common,
         power=options.power,
         assurance=options.assurance,
@@ -343,6 +183,11 @@ def _single(options: PlanningOptions) -> "Plan":
 def _grid(options: PlanningOptions, *, is_quiet: bool) -> "tuple[Plan, ...]":
     from masrel.planning import plan_grid
 
+    options.refuse(("max_cost",), "is not of a grid, whose rows have their costs")
+    if options.method != "auto":
+        raise ParameterError(
+            f"--method: a grid is by auto, exact where it can be; got {options.method}"
+        )
     with progress("planning", "tasks", is_quiet=is_quiet) as bar:
 
         def step(_done: int, n_tasks: int) -> None:
@@ -350,11 +195,13 @@ def _grid(options: PlanningOptions, *, is_quiet: bool) -> "tuple[Plan, ...]":
             bar.update(1)
 
         return plan_grid(
-            options.coefficient,
+            options.what,
             **options.common(),
             value=options.value,
-            n_items=options.items or [],
-            n_raters=options.raters or [],
+            power=options.power,
+            assurance=options.assurance,
+            n_items=options.items,
+            n_raters=options.raters,
             n_studies=options.n_studies,
             executor=options.executor,
             scheduler=options.scheduler,
@@ -363,52 +210,6 @@ def _grid(options: PlanningOptions, *, is_quiet: bool) -> "tuple[Plan, ...]":
         )
 
 
-def _of_study(
-    study: Path, options: PlanningOptions, *, is_quiet: bool
-) -> "tuple[tuple[str, ...], tuple[Plan, ...]]":
-    # every line of a protocol's plan, at its size
-    from masrel.protocol import StudyPaths, read_protocol
-
-    protocol = read_protocol(StudyPaths(study).protocol)
-    lines, values = protocol.analysis.estimates, options.value or _USUAL_VALUES
-    labels: list[str] = []
-    plans: list[Plan] = []
-    with progress("planning", "plans", is_quiet=is_quiet) as bar:
-        bar.expect(len(lines) * len(values))
-        for line, value in itertools.product(lines, values):
-            try:
-                plans.append(_of_line(protocol, line, value, options))
-            except ParameterError as error:
-                click.echo(f"note: {line.id}: {error}", err=True)
-            else:
-                labels.append(line.id)
-            bar.update(1)
-    if not plans:
-        raise ParameterError(
-            f"{study}: needs a line of [[analysis.estimates]] that can be planned for"
-        )
-    return tuple(labels), tuple(plans)
-
-
-def _of_line(
-    protocol: "Protocol", line: "EstimatePlan", value: float, options: PlanningOptions
-) -> "Plan":
-    from masrel.planning import precision
-
-    models = [m for m in protocol.models if line.models in ("all", m.role)]
-    is_normal = line.coefficient.startswith("icc")
-    return precision(
-        line.coefficient,
-        n_items=len(models),
-        n_raters=len(protocol.raters),
-        value=value,
-        weights=line.weights,
-        categories=len(protocol.scale.grades) if options.shares is None else None,
-        prevalences=options.shares,
-        model=None if is_normal else options.model or "dirichlet-multinomial",
-        target=line.target,
-        level=protocol.analysis.level,
-        half_width=options.half_width,
-        null=options.null,
-        rng=options.seed,
-    )
+def _check_curve(plans: "tuple[Plan, ...]") -> None:
+    if len({one.n_items for one in plans}) < 2 > len({one.n_raters for one in plans}):
+        raise ParameterError("--figure: needs several --items or --raters, as 20:60:10")

@@ -249,8 +249,13 @@ class _Making:
                 answers=data.answers,
                 excluded=data.excluded,
             )
-        with tqdm(
-            desc="report", unit=" parts", disable=self.output.hides_progress
+
+        # The bar's thread would keep figures from being drawn by several processes.
+        class Bar(tqdm):  # type: ignore[type-arg]
+            monitor_interval = 0
+
+        with Bar(
+            desc="report", unit=" parts", disable=self.output.quiet or None
         ) as bar:
 
             def progress(part: str) -> None:

@@ -292,8 +292,7 @@ def trace(
     output.check_files()
     if output.figure is not None:
         check_view(scenes, view or SCENE_VIEWS[0])
-    bar = tqdm(scenes, desc="scenes", delay=1.0, disable=output.hides_progress)
-    documents = [scene_document(scene, quantities) for scene in bar]
+    documents = _documents(scenes, quantities, quiet=output.quiet)
     if csv_file is not None:
         rate = 1000.0 if rate_hz is None else rate_hz
         write_samples(csv_file, rate, scenes, documents, quiet=output.quiet)
@@ -306,6 +305,20 @@ def trace(
     else:
         document, text = {"scenes": documents}, lambda: scenes_text(documents)
     write_output(output, document=lambda: document, text=text)
+
+
+def _documents(
+    scenes: Sequence[Scene], quantities: Quantities, *, quiet: bool
+) -> list[dict[str, object]]:
+    documents = []
+    for scene in tqdm(scenes, desc="scenes", delay=1.0, disable=quiet or None):
+        try:
+            documents.append(scene_document(scene, quantities))
+        except ParameterError as error:
+            if len(scenes) == 1:
+                raise
+            raise ParameterError(f"{scene.title}: {error}") from error
+    return documents
 
 
 def _check_plain(
@@ -361,6 +374,8 @@ def _scenes(
 
 
 def _joints_of(names: _JointOptions, law: _LawOptions) -> dict[str, "JointModel"]:
+    from masrel.elbow import STANDARD_MODELS
+
     if not names.models and not names.kinds:
         raise click.UsageError("Missing option '--model' or '--kind'.")
     if names.parameters and len(names.kinds) != 1:
@@ -372,7 +387,10 @@ def _joints_of(names: _JointOptions, law: _LawOptions) -> dict[str, "JointModel"
             raise ParameterError(
                 f"--model: needs models whose names differ, got two called {name}"
             )
-        joints[name] = _joint_of(model, names.study)
+        if names.study is None and model in STANDARD_MODELS:
+            joints[name] = STANDARD_MODELS[model]
+        else:
+            joints[name] = _joint_of_file(model, names.study)
     for kind in dict.fromkeys(names.kinds):
         joints[kind] = joint_of_kind(kind, names.parameters)
     if law != _LawOptions():
@@ -380,29 +398,25 @@ def _joints_of(names: _JointOptions, law: _LawOptions) -> dict[str, "JointModel"
     return joints
 
 
-def _joint_of(model: str, study: Path | None) -> "JointModel":
+def _joint_of_file(model: str, study: Path | None) -> "JointModel":
+    # a model file, or a model of a study's protocol
     from masrel.elbow import STANDARD_MODELS
+    from masrel.protocol import StudyPaths, joint_model, read_model_file, read_protocol
 
-    if model.endswith(".toml"):
-        from masrel.protocol import read_model_file
-
-        if study is not None:
-            raise ParameterError(
-                f"--model: needs a model of --study, got the file {model}; without "
-                "--study it is read with the usual constants"
-            )
-        note_inputs(Path(model))
-        return read_model_file(Path(model))
+    if study is not None and model.endswith(".toml"):
+        raise ParameterError(
+            f"--model: needs a model of --study, got the file {model}; without "
+            "--study it is read with the usual constants"
+        )
     if study is not None:
-        from masrel.protocol import StudyPaths, joint_model, read_protocol
-
         return joint_model(read_protocol(StudyPaths(study).protocol), model)
-    if model not in STANDARD_MODELS:
+    if not model.endswith(".toml"):
         raise ParameterError(
             f"--model: needs one of {', '.join(STANDARD_MODELS)}, or a model file "
             f"(.toml), or --study to name a study's own, got {model!r}"
         )
-    return STANDARD_MODELS[model]
+    note_inputs(Path(model))
+    return read_model_file(Path(model))
 
 
 def _motion_of(

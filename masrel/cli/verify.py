@@ -75,8 +75,11 @@ def _anchored(
         )
     if file.exists():
         return anchor_findings(study, read_anchors(file))
-    write_anchors(anchors, file)
-    click.echo(f"anchors: {file}", err=True)
+    if anchors:
+        write_anchors(anchors, file)
+        click.echo(f"anchors: {file}", err=True)
+    else:
+        click.echo(f"no log to anchor yet: {file} is not written", err=True)
     return ()
 
 

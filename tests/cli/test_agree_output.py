@@ -201,7 +201,7 @@ def test_latex_compiles(masrel: Caller, tmp_path: Path) -> None:
 
 # After the end of a line LaTeX reads [ and * as its own; > and | are other letters in
 # its fonts.
-GROUPS = ["[0, 1)", "*", "a>b|c", "José", "Łukasz"]
+GROUPS = ["[0, 1)", "*", "a>b|c", "José", "Łukasz", "θ\u0307, ẋ, ē, ω\u0302"]
 
 
 def test_latex_of_many_groups_is_a_table_of_pages(
@@ -215,7 +215,8 @@ def test_latex_of_many_groups_is_a_table_of_pages(
     assert "lualatex" not in out
     begun = re.findall(r"\\begin\{(\w+)\}", out)
     assert begun == re.findall(r"\\end\{(\w+)\}", out)[::-1] == ["longtable"]
-    for name in ("{[}0, 1) &", "{*} &", "a$>$b$|$c &"):
+    marked = r"$\dot{\theta}$, \.{x}, \={e}, $\hat{\omega}$ &"
+    for name in ("{[}0, 1) &", "{*} &", "a$>$b$|$c &", marked):
         assert out.count(f"\n{name}") == 2
     assert out.count("\\toprule") == 2  # on the first page, and on all others
 
@@ -239,10 +240,10 @@ def test_latex_names_letters_that_pdflatex_lacks(
     path = written(tmp_path, "item,Ωμ,名\n1,a,b\n2,b,b\n3,a,a\n")
     call = ("agree", path, "--latex", "--by", "ward")
     assert "lualatex" not in masrel("agree", path, "--latex").out
-    text = "ward,item,A,B\n" + "".join(f"名η,{i},{i % 2},{i // 2}\n" for i in range(4))
+    text = "ward,item,A,B\n" + "".join(f"名ά,{i},{i % 2},{i // 2}\n" for i in range(4))
     path.write_text(text, encoding="utf-8")
     second = masrel(*call).out.splitlines()[1]
-    assert second == "% needs lualatex and a font with 名"
+    assert second == "% needs lualatex and a font with ά 名"
 
 
 # Notes below a table.

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from masrel.protocol import copy_template
+from masrel.recording import RECORDING_COLUMNS
 from tests.cli.process import Caller, Done
 
 
@@ -202,7 +203,8 @@ def test_deep_and_long_values_of_a_log(study: Path, masrel: Caller) -> None:
 
 
 def test_deep_facts_of_a_recording(tmp_path: Path, masrel: Caller) -> None:
-    (tmp_path / "a.npz").write_bytes(b"")
+    columns = {name: np.zeros(60) for name in RECORDING_COLUMNS}
+    np.savez(tmp_path / "a.npz", **columns)
     (tmp_path / "a.json").write_text("[" * 100_000)
     motion = ("--motion", "recording", "--recording", tmp_path / "a.npz")
     refused(masrel("trace", "--model", "HM1", *motion), "nested too deep")

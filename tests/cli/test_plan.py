@@ -3,6 +3,7 @@
 import json
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -30,8 +31,14 @@ def test_a_sentence_for_a_protocol(masrel: Caller) -> None:
     assert done.out.startswith(
         "With 30 items and 2 raters, the 95 % interval of Fleiss' κ for other items "
         "has an expected half-width of 0.331 (0.254 to 0.916), with coverage 0.923, if "
-        "the coefficient is 0.6 (mixture model; summed over all studies"
+        "the coefficient is 0.6 (mixture model with prevalences 0.7, 0.3; summed over"
     )
+
+
+def test_equal_prevalences_are_called_so(masrel: Caller) -> None:
+    size = ("--raters", "2", "--items", "30", "--prevalences", "0.5,0.5")
+    done = masrel(*KAPPA, *size, "--sentence")
+    assert "(mixture model with prevalences all 2 equal; summed over" in done.out
 
 
 def test_lines_for_a_protocol_are_toml(masrel: Caller) -> None:
@@ -52,16 +59,169 @@ def test_a_grid_has_a_curve(masrel: Caller, tmp_path: Path) -> None:
     ]
 
 
-def test_a_study_says_what_its_plan_can_show(
-    masrel: Caller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def plans_of(masrel: Caller, *options: object) -> list[dict[str, Any]]:
+    done = masrel(*options, "--json", "-")
+    assert done.code == 0, done.err
+    plans: list[dict[str, Any]] = json.loads(done.out)["plans"]
+    return plans
+
+
+def test_one_size_is_solved_for_in_every_cell_of_a_grid(masrel: Caller) -> None:
+    aim = ("--null", "0.2", "--power", "0.8")
+    plans = plans_of(masrel, *KAPPA, "--raters", "2,3", *aim)
+    assert [plan["n_raters"] for plan in plans] == [2, 3]
+    assert plans[0]["n_items"] > plans[1]["n_items"]
+    assert all(plan["reaches_aim"] and plan["power"] >= 0.8 for plan in plans)
+
+
+def test_a_grid_says_which_sizes_reach_the_aim_and_which_is_cheapest(
+    masrel: Caller,
 ) -> None:
-    monkeypatch.setattr("masrel.planning._tasks.TASK", 10)  # each line takes seconds
+    sizes = ("--raters", "2,3", "--items", "40,60,80")
+    aim = ("--half-width", "0.2", "--assurance", "0.8", "--prices", "5,20,1")
+    done = masrel(*KAPPA, *sizes, *aim)
+    rows = [line.split() for line in done.out.splitlines() if line.startswith("   0.6")]
+    yes = {(row[1], row[2]): row[9] for row in rows}
+    assert yes["40", "3"] == "no"
+    assert yes["60", "3"] == "yes"
+    assert "the cheapest of these that reaches the aim: 60 items and 3 raters" in (
+        done.out
+    )
+
+
+def test_an_aim_at_a_known_size_says_whether_it_is_reached(masrel: Caller) -> None:
+    size = ("--items", "40", "--raters", "3", "--null", "0.4")
+    (plan,) = plans_of(masrel, *KAPPA, *size, "--power", "0.9")
+    assert plan["reaches_aim"] is False
+
+
+def test_with_prices_the_cheapest_of_both_is_solved_for(masrel: Caller) -> None:
+    aim = ("--half-width", "0.35", "--prices", "5,20,1")
+    (plan,) = plans_of(masrel, *KAPPA, *aim)
+    assert plan["expected_half_width"] <= 0.35
+    done = masrel(*KAPPA, *aim, "--max-cost", "150")
+    assert done.code == 2
+    assert "max_cost: a half-width of 0.35 is not reached for 150; the" in done.err
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few studies, since only where plans come from is looked at."""
+    monkeypatch.setattr("masrel.planning._tasks.TASK", 20)
     monkeypatch.setattr("masrel.planning._tasks._CHOSEN_TASK", 5)
     monkeypatch.setattr("masrel.planning._tasks._RELATIVE", 1.0)
+    monkeypatch.setattr("masrel.planning._tasks._SHARE", 1.0)
+
+
+@pytest.fixture
+def study(masrel: Caller, tmp_path: Path) -> Path:
+    """Four models, two raters, a line with an interval and one without."""
     assert masrel("init", tmp_path / "study").code == 0
-    done = masrel("plan", tmp_path / "study", "--value", "0.6", "--csv")
+    return tmp_path / "study"
+
+
+def changed(study: Path, *changes: tuple[str, str]) -> None:
+    protocol = study / "protocol.toml"
+    text = protocol.read_text("utf-8")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    protocol.write_text(text, "utf-8")
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_study_says_what_its_plan_can_show(masrel: Caller, study: Path) -> None:
+    done = masrel("plan", study, "--value", "0.6", "--csv")
     assert done.code == 0
-    assert done.out.startswith("line,value,n_items,n_raters,")
+    assert done.out.startswith("line,interval,target,value,n_items,n_raters,")
+    assert "note: percent: has no interval to be planned for" in done.err
+
+
+@pytest.mark.usefixtures("quick")
+def test_lines_are_planned_with_their_methods_targets_and_repeats(
+    masrel: Caller, study: Path
+) -> None:
+    retest = """
+[[analysis.estimates]]
+id = "again"
+kind = "test-retest"
+coefficient = "pooled_kappa"
+sessions = ["test", "later"]
+target = "items"
+interval = "jackknife"
+
+[report]
+"""
+    changed(
+        study,
+        ("repeats = 1", "repeats = 3"),
+        ('id = "R2"\n', 'id = "R2"\n\n[[raters]]\nid = "R3"\n'),
+        (
+            'id = "test"\nraters = ["R1", "R2"]\n',
+            'id = "test"\nraters = ["R1", "R2", "R3"]\n\n[[sessions]]\nid = "later"\n'
+            'raters = ["R1"]\n',
+        ),
+        (
+            'target = "items"\ninterval = "auto"',
+            'target = "raters"\ninterval = "jackknife"',
+        ),
+        ('interval = "none"', 'interval = "posterior"'),
+        ("[report]\n", retest),
+    )
+    plans = plans_of(masrel, "plan", study, "--value", "0.6")
+    keys = ("target", "interval", "n_items", "n_raters")
+    assert [tuple(plan[key] for key in keys) for plan in plans] == [
+        ("raters", "jackknife", 12, 3),
+        ("items", "posterior", 12, 3),
+        ("items", "jackknife", 12, 1),
+    ]
+
+
+@pytest.mark.usefixtures("quick")
+def test_what_the_protocol_says_of_its_size_is_taken(
+    masrel: Caller, study: Path
+) -> None:
+    lines = masrel("plan", study, "--value", "0.7", "--interval", "t", "--toml")
+    assert lines.code == 0
+    protocol = study / "protocol.toml"
+    made = lines.out.replace("n_items = 4", "n_items = 5", 1)
+    text = protocol.read_text("utf-8").replace("[report]\n", f"{made}\n[report]\n")
+    protocol.write_text(text, "utf-8")
+    assert masrel("check", study).code == 0
+    done = masrel("plan", study, "--json", "-")
+    (plan,) = json.loads(done.out)["plans"]
+    assert (plan["value"], plan["interval"]) == (0.7, "auto")
+    assert "note: kappa: 5 items were planned for, the study has 4" in done.err
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--items", "30"), "--items: is not of a study"),
+        (("--coefficient", "cohen_kappa"), "--coefficient: is not of a study"),
+        (("--power", "0.8"), "--power: is not of a study"),
+        (("--toml", "--interval", "t"), "--toml: needs one --value"),
+        (("--value", "2"), "needs a line of [[analysis.estimates]] that can be"),
+    ],
+)
+@pytest.mark.usefixtures("quick")
+def test_a_study_has_its_own_plan(
+    masrel: Caller, study: Path, options: tuple[str, ...], words: str
+) -> None:
+    done = masrel("plan", study, *options)
+    assert done.code == 2
+    assert words in done.err
+
+
+def test_how_long_it_takes_is_told_once_some_studies_are_drawn(
+    masrel: Caller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("masrel.planning._tasks.TASK", 1_000)
+    monkeypatch.setattr("masrel.cli.plan._SHORT_S", 0.0)
+    sizes = ("--raters", "4", "--items", "20", "--prevalences", "0.4,0.3,0.3")
+    loud = [option for option in KAPPA if option != "--quiet"]
+    assert "planning: about 1 s\n" in masrel(*loud, *sizes).err
+    assert "planning" not in masrel(*KAPPA, *sizes).err
 
 
 @pytest.mark.parametrize(
@@ -71,11 +231,37 @@ def test_a_study_says_what_its_plan_can_show(
         (("--raters", "5:1:1"), "needs numbers as 10,20"),
         (("--raters", "2"), "half_width: needs an aim"),
         ((), "n_items, n_raters: needs exactly one of them"),
-        (("--items", "5,6"), "a grid needs both"),
+        (("--items", "5,6"), "half_width: needs an aim, where one of the sizes is"),
+        (("--value", "0.4,0.6"), "n_items, n_raters: a grid needs one of them"),
         (("--items", "0", "--raters", "2"), "n_items: needs a whole number above 0"),
         (("--raters", "2", "--prevalences", "a"), "--prevalences: needs numbers as"),
         (("--raters", "2", "--prices", "1"), "--prices: needs three"),
-        (("--raters", "2", "--items", "9", "--power", ".8"), "--power: needs --items"),
+        (
+            ("--raters", "2", "--items", "9", "--power", ".8"),
+            "power: needs null, lower",
+        ),
+        (
+            ("--raters", "2", "--items", "9", "--max-cost", "8"),
+            "--max-cost: needs --it",
+        ),
+        (("--raters", "2", "--items", "9,8", "--max-cost", "8"), "--max-cost: is not"),
+        (
+            ("--raters", "2", "--items", "9,8", "--method", "wald"),
+            "--method: a grid is",
+        ),
+        (
+            ("--raters", "2", "--items", "9", "--resume", "x.json"),
+            "--resume: is of grids",
+        ),
+        (
+            ("--items", "9,8", "--resume", "x", "--half-width", ".2"),
+            "file: is of grids",
+        ),
+        (("--prices", "1,1,1"), "half_width: needs an aim"),
+        (
+            ("--prices", "0,1,0", "--half-width", ".2"),
+            "prices: needs a price of an item",
+        ),
         (("--raters", "2", "--items", "9", "--figure", "x.png"), "--figure: needs sev"),
     ],
 )

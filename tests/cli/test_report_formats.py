@@ -2,8 +2,10 @@
 
 import os
 import shutil
+import stat
 import subprocess
 import sys
+import sysconfig
 import zipfile
 from pathlib import Path
 
@@ -11,9 +13,12 @@ import docx
 import msgspec
 import pytest
 
+import masrel
 from masrel.protocol import copy_template
 from tests.cli.process import Caller
 
+SETPRIV = shutil.which("setpriv")
+W = "{http://schemas.openxmlformats.org/wordprocessingml/2006/main}"
 FORMATS = ("html", "markdown", "latex", "docx")
 
 
@@ -62,7 +67,7 @@ def test_a_word_document_has_headings_captions_and_texts_for_pictures(
 ) -> None:
     word = docx.Document(str(folder / "report.docx"))
     styles = [paragraph.style.name for paragraph in word.paragraphs]
-    assert styles.count("Heading 1") == 4
+    assert styles.count("Heading 1") == 5
     captions = [p.text for p in word.paragraphs if p.style.name == "Caption"]
     assert len(captions) == len(word.tables) + len(word.inline_shapes)
     assert captions[0].startswith("Table 1. ")
@@ -73,6 +78,50 @@ def test_a_word_document_has_headings_captions_and_texts_for_pictures(
     assert word.core_properties.title == "κ & 5 % of A_b #1 ± [x] {y} ~ ^"
     with zipfile.ZipFile(folder / "report.docx") as archive:
         assert {entry.date_time[:3] for entry in archive.infolist()} == {(1980, 1, 1)}
+
+
+def test_contents_of_a_word_document_are_there_before_they_are_updated(
+    folder: Path,
+) -> None:
+    word = docx.Document(str(folder / "report.docx"))
+    headings = [p for p in word.paragraphs if p.style.name == "Heading 1"]
+    entries = [p for p in word.paragraphs if p.style.name == "toc 1"]
+    links = [link for entry in entries for link in entry.hyperlinks]
+    assert headings[0].text == "Contents"
+    assert [link.text for link in links] == [p.text for p in headings[1:]]
+    marks = [p._p.find(f"{W}bookmarkStart").get(f"{W}name") for p in headings[1:]]
+    assert [link.fragment for link in links] == marks
+    assert len(set(marks)) == len(marks) == len(entries)
+    # one field around all entries
+    body = word.element.body
+    kinds = [each.get(f"{W}fldCharType") for each in body.iter(f"{W}fldChar")]
+    assert kinds == ["begin", "separate", "end"]
+    assert [t.text.split()[0] for t in body.iter(f"{W}instrText")] == ["TOC"]
+    order = [e.tag for e in body.iter(f"{W}fldChar", f"{W}hyperlink")]
+    assert order == [f"{W}fldChar"] * 2 + [f"{W}hyperlink"] * len(links) + order[:1]
+
+
+def test_docx_without_python_docx_is_refused_in_a_sentence(
+    study: Path, tmp_path: Path
+) -> None:
+    # an interpreter whose packages are all but python-docx
+    packages = tmp_path / "packages"
+    packages.mkdir()
+    for entry in Path(sysconfig.get_path("purelib")).iterdir():
+        if not entry.name.startswith(("docx", "python_docx")):
+            (packages / entry.name).symlink_to(entry)
+    root = Path(masrel.__file__).parents[1]
+    call = ["-S", "-m", "masrel", "report", str(study), "-o", str(tmp_path / "out")]
+    done = subprocess.run(
+        [sys.executable, *call],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (root, packages)))},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr == (
+        "masrel: docx: needs python-docx; install it with: pip install 'masrel[docx]'\n"
+    )
+    assert not (tmp_path / "out").exists()
 
 
 def test_text_of_a_study_is_escaped_in_latex(folder: Path) -> None:
@@ -113,10 +162,48 @@ def test_a_foreign_environment_gives_the_same_bytes(
         "PYTHONHASHSEED": "7",
     }
     build(study, tmp_path / "other", variables)
-    names = sorted(p.relative_to(folder) for p in folder.rglob("*") if p.is_file())
-    assert len(names) > 8
-    for name in names:
-        assert (tmp_path / "other" / name).read_bytes() == (folder / name).read_bytes()
+    same_files(tmp_path / "other", folder)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(SETPRIV is None, reason="nothing here takes root's privileges")
+@pytest.mark.parametrize("umask", ["000", "077"])
+def test_nothing_is_written_beside_the_packages_and_no_umask_changes_a_byte(
+    study: Path, folder: Path, tmp_path: Path, umask: str
+) -> None:
+    package = tmp_path / "site" / "masrel"
+    shutil.copytree(
+        Path(masrel.__file__).parent, package, ignore=shutil.ignore_patterns("*.pyc")
+    )
+    for path in (package.parent, *package.parent.rglob("*")):
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    # root itself may write anywhere but without this capability
+    bare = [str(SETPRIV), "--bounding-set=-dac_override", "--inh-caps=-dac_override"]
+    probe = subprocess.run([*bare, "touch", package / "written"], check=False)
+    assert probe.returncode != 0
+    call = ["-P", "-m", "masrel", "report", str(study), "-o", str(tmp_path / "other")]
+    call += ["--cache", str(tmp_path / "cache")]
+    environment = {**os.environ, "PYTHONPATH": str(package.parent)}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    subprocess.run(
+        [*bare, "sh", "-c", f'umask {umask}; exec "$@"', "sh", sys.executable, *call],
+        env=environment, check=True, capture_output=True,
+    )  # fmt: skip
+    same_files(tmp_path / "other", folder)
+    page = (tmp_path / "other" / "report.html").stat()
+    assert stat.S_IMODE(page.st_mode) == 0o666 & ~int(umask, 8)
+
+
+def same_files(one: Path, other: Path) -> None:
+    """Check that two reports have the same bytes, file by file."""
+    names = [
+        sorted(path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
+        for folder in (one, other)
+    ]
+    assert names[0] == names[1]
+    assert len(names[0]) > 8
+    for name in names[0]:
+        assert (one / name).read_bytes() == (other / name).read_bytes()
 
 
 def test_a_format_that_is_not_made_again_goes(

@@ -220,9 +220,16 @@ def test_it_is_a_table_on_the_screen() -> None:
         (("--speed-deg-s", 9), "--speed-deg-s: needs V1, V2 and V3 with --tardieu"),
         (
             ("--speed-deg-s", 9, "--speed-deg-s", 8, "--speed-deg-s", 7),
-            "speeds: need three above 0",
+            "speeds: need three above 0 deg/s, .*, got 9, 8, 7",
         ),
-        (("--from-deg", 150), "start_angle: needs 0 to less than"),
+        (
+            ("--from-deg", 150),
+            "start_angle: needs 0 to less than 146 degrees, .*, got 150 degrees",
+        ),
+        (
+            ("--kind", "clonus", *("--parameter", "beat_rate_hz=5") * 2),
+            "--parameter beat_rate_hz: needs one value, got two",
+        ),
     ],
 )
 def test_what_tardieu_cannot_say_is_refused(

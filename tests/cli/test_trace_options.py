@@ -264,7 +264,11 @@ def test_lines_of_a_figure_have_as_many_points_as_pixels(tmp_path: Path) -> None
         (["--repeat", 1001], "--repeat: needs 1 to 1000, got 1001"),
         (["--catch-rise-s", 1], "catch_rise: needs 0 to peak_duration"),
         (["--inertia-kg-m2", -1], "inertia: needs 0 or more"),
-        (["--at-s", 9], "times: need 0 to 1.26087 s"),
+        (
+            ["--speed-deg-s", 120, "--at-s", 1],
+            "HM3, constant 120 deg/s: times: need 0 to 0.966667 s, the end of the "
+            "stretch, got 1 s",
+        ),
         (["--at-deg", 170], "angles: need ones that the motion reaches, got 170"),
         (["--figure", "x.gif"], "--figure: needs a name that ends in .png"),
         (["--figure", "x.png", "--view", "catch"], "needs two or more speeds, got 1"),

@@ -325,6 +325,15 @@ def test_the_verb_says_every_session_and_ends_with_2_when_broken(
     assert document["findings"][0]["weight"] == "broken"
 
 
+def test_a_study_without_logs_leaves_no_file_of_anchors(tmp_path: Path) -> None:
+    study, file = tmp_path / "study", tmp_path / "anchors.txt"
+    run("init", str(study), "--study", "small")
+    for _ in range(2):  # a file without anchors would be refused by the second
+        out = run("verify", str(study), "--anchor", str(file))
+        assert "no log to anchor yet" in out
+        assert not file.exists()
+
+
 def test_an_anchor_within_the_study_is_refused(study: StudyPaths) -> None:
     from masrel.errors import ParameterError
 
