@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from masrel.planning import LatentModel, Plan, precision, sample_size
-from masrel.planning._aims import RATER_SHARE, Aim, pose_question
+from masrel.planning._aims import Aim
+from masrel.planning._plan_question import RATER_SHARE, pose_question
 from masrel.planning._studies import StudyMaker, StudySums
 
 DOCS = Path(__file__).parents[1]
