@@ -1,5 +1,6 @@
-"""Settings of property tests: the same examples in every run, no time limit."""
+"""Settings of property tests and of signals: the same in every run, no time limit."""
 
+import signal
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -10,6 +11,10 @@ from tests.faults import Faults
 # derandomize: a failure repeats; 50 examples a property; a slow machine is no failure.
 settings.register_profile("masrel", derandomize=True, deadline=None, max_examples=50)
 settings.load_profile("masrel")
+
+# What a shell starts in the background ignores Ctrl-C, which tests send.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture
