@@ -5,7 +5,7 @@ from playwright.sync_api import Browser
 from masrel.protocol import StudyPaths
 from masrel.run import Event, read_log
 from tests.serve.browser.serving import Server
-from tests.serve.browser.visitors import Coordinator, Rater, Visitor
+from tests.serve.browser.visitors import LOST, Coordinator, Rater, Visitor
 
 TABLET = {"width": 820, "height": 1180}
 LAPTOP = {"width": 1366, "height": 768}
@@ -32,7 +32,9 @@ class Stage:
     def enter(self, rater: str) -> None:
         """Begin a flow with a rater."""
         self.rater = rater
+        self.coordinator.tolerated = LOST  # what the flow before left on its way
         self.coordinator.page.reload()
+        self.coordinator.tolerated = None
 
     def leave(self) -> list[str]:
         """End a flow: leave its session, close its pages -> what went wrong."""
@@ -47,7 +49,6 @@ class Stage:
             visitor.context.close()
         self._visitors.clear()
         self.coordinator.problems.clear()
-        self.coordinator.tolerated = None
         return problems
 
     def close(self) -> None:

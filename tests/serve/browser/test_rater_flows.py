@@ -97,13 +97,13 @@ def test_a_tablet_without_network_says_so_and_goes_on_by_itself(stage: Stage) ->
         seen.append(shown)
         rater.context.set_offline(True)
         rater.page.get_by_text("No connection to the laptop").wait_for()
-        heading = rater.page.query_selector("#screen h1")
-        if shown != "presenting":
-            rater.act()  # what is tapped now is sent when the network is back
-        rater.page.wait_for_timeout(10_000 if shown == "grade" else 300)
-        assert heading.evaluate("it => it.isConnected"), "it cannot have been answered"
-        rater.context.set_offline(False)
-        rater.page.wait_for_function("shown => !shown.isConnected", arg=heading)
+        with rater.shown_anew():
+            heading = rater.page.query_selector("#screen h1")
+            if shown != "presenting":
+                rater.act()  # what is tapped now is sent when the network is back
+            rater.page.wait_for_timeout(10_000 if shown == "grade" else 300)
+            assert heading.evaluate("it => it.isConnected"), "nobody can have answered"
+            rater.context.set_offline(False)
         rater.page.get_by_text("No connection to the laptop").wait_for(state="detached")
     assert set(seen) == set(ALL) - {"over"}
     assert stage.is_complete()
@@ -178,7 +178,8 @@ def test_an_emergency_stop_ends_a_presentation_at_once(
         rater.page.keyboard.press("Escape")
     rater.wait_for("fault")
     assert "stopped by the emergency stop" in rater.text
-    rater.tap("Present it again")
+    with rater.shown_anew():
+        rater.tap("Present it again")
     rater.go_until("grade")
     kinds = [each.kind for each in slow_stage.log()]
     assert kinds == ["session", "presented", "fault", "presented"]
@@ -244,10 +245,9 @@ def test_a_session_goes_on_after_its_server_was_killed(stage: Stage) -> None:
     stage.server.kill()
     rater.page.get_by_text("No connection to the laptop").wait_for()
     rater.choose("3")
-    heading = rater.page.query_selector("h1")
-    rater.tap("Save")  # which nobody takes
-    start_again(stage)
-    rater.page.wait_for_function("shown => !shown.isConnected", arg=heading)
+    with rater.shown_anew():
+        rater.tap("Save")  # which nobody takes
+        start_again(stage)
     rater.go_until("over")
     assert stage.is_complete()
 
@@ -318,9 +318,8 @@ def test_a_session_by_the_keyboard_alone(stage: Stage) -> None:
         if shown == "presenting":
             rater.wait_for("grade")
             continue
-        heading = rater.page.query_selector("#screen h1")
-        by_keyboard(rater, shown)
-        rater.page.wait_for_function("shown => !shown.isConnected", arg=heading)
+        with rater.shown_anew():
+            by_keyboard(rater, shown)
         assert rater.page.evaluate("document.activeElement.tagName") == "H1"
     press("Tab")
     assert stage.is_complete()

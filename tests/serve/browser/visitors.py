@@ -1,6 +1,8 @@
 """Browsers at the pages of a study: a rater's tablet, a coordinator's screen."""
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from playwright.sync_api import BrowserContext, ConsoleMessage, Request
@@ -131,8 +133,14 @@ class Rater(Visitor):
 
     def answer(self) -> None:
         """Answer what is asked now, and return when something else is shown."""
+        with self.shown_anew():
+            self.act()
+
+    @contextmanager
+    def shown_anew(self) -> Iterator[None]:
+        """Wait at the end of a block until another screen is shown than before it."""
         heading = self.page.query_selector("#screen h1")
-        self.act()
+        yield
         self.page.wait_for_function("shown => !shown.isConnected", arg=heading)
 
     def act(self) -> None:
