@@ -37,7 +37,8 @@ class SessionProgress:
     last_event, last_time_utc : str or None
         What happened last in it, and when; None before it has begun.
     grades_from : str or None
-        Where its grades come from; None before it has begun.
+        Where its grades come from, the last of them where it went on with another
+        source; None before it has begun.
     simulated : bool
         Whether grades or device are simulated.
     problem : str or None
@@ -125,7 +126,7 @@ def _progress(
         n_answers=counts["answered"],
         last_event=events[-1].kind if events else None,
         last_time_utc=events[-1].time_utc if events else None,
-        grades_from=str(state.header["grades"]) if state.header else None,
+        grades_from=state.source,
         simulated=bool(state.header.get("simulated"))
         or any(event.fields["simulated"] for event in presented),
         problem=problem,

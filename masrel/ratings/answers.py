@@ -98,9 +98,7 @@ def answers_from_logs(study: StudyPaths, protocol: Protocol) -> tuple[GivenAnswe
         for (session, rater), state in begun.items()
         for answer in _of_session(study, protocol, session, rater, state)
     ]
-    sources = {
-        rater: str(state.header["grades"]) for (_, rater), state in begun.items()
-    }
+    sources = {rater: str(state.source) for (_, rater), state in begun.items()}
     return (*of_sessions, *_of_study(study, protocol, sources))
 
 
@@ -163,7 +161,7 @@ def _of_session(
         *((each, (None, None, None)) for each in questions_of(protocol, "session")),
     )
     for (questionnaire, question), (code, model, repeat) in asked_of:
-        answer = state.answers.get((questionnaire.id, question.id, code))
+        key = questionnaire.id, question.id, code
         yield GivenAnswer(
             session=session,
             rater=rater,
@@ -171,8 +169,8 @@ def _of_session(
             question=question.id,
             model=model,
             repeat=repeat,
-            answer=answer,
-            grades_from=str(state.header["grades"]),
+            answer=state.answers.get(key),
+            grades_from=state.answered_from.get(key, str(state.source)),
         )
 
 

@@ -100,7 +100,6 @@ def _rows(
         "session": session,
         "rater": rater,
         "source": "simulated" if _is_simulated(state) else "recorded",
-        "grades_from": str(state.header["grades"]),
         "device": _device(state),
     }
     for shown in schedule.presentations:
@@ -112,6 +111,7 @@ def _rows(
             )
         yield {
             **of_session,
+            "grades_from": state.graded_from.get(shown.code, state.source),
             "model": shown.model,
             "repeat": shown.repeat,
             "grade": grade,
@@ -134,7 +134,7 @@ def _n_attempts(state: SessionState, code: str) -> int | None:
 def _graded_at(state: SessionState, code: str, log: Path) -> str | None:
     # of a simulated grade it is when a computer came to it: it differs from run to run
     time = state.graded_at.get(code)
-    if time is None or state.header["grades"] not in FROM_PERSONS:
+    if time is None or state.graded_from[code] not in FROM_PERSONS:
         return None
     if not _is_utc(time):
         raise RatingsError(f"{log}: grade of {code}: {_NEEDED_TIME}, got {time!r}")

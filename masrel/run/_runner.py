@@ -26,7 +26,7 @@ from masrel.run._presenter import CLOCKS, ClockName, Presenter
 from masrel.run._questionnaires import ask_questions
 from masrel.run._rehearsal import RehearsalPaths
 from masrel.run._settings import moves_hardware
-from masrel.run._state import FORMAT, SessionState, replay
+from masrel.run._state import FORMAT, SessionState, may_go_on, replay
 from masrel.schedule import Presentation, Schedule
 
 
@@ -148,15 +148,15 @@ class SessionRunner:
         for name in ("grades", *same):  # which says most comes first
             value = same[name]
             begun = header.get(name, False)  # there once were no rehearsals
-            if begun != value:
+            if begun != value and not (name == "grades" and may_go_on(begun, value)):
                 raise SessionLogError(
                     f"{self._log.path}: begun with {name} = {begun}: needed "
                     f"the same to go on, got {value}"
                 )
         if not self._state.is_complete:
             kind = "restarted" if self._begins_anew() else "resumed"
-            n_graded = len(self._state.grades)
-            self._log.append(kind, {**provenance, "n_graded": n_graded})
+            provenance["n_graded"] = len(self._state.grades)
+            self._log.append(kind, {**provenance, "grades": self._grades.name})
             self._state = replay(self._log.path, self._log.events)
 
     def _interval(self) -> dict[str, _Fact] | None:

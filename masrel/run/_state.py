@@ -23,7 +23,11 @@ FELT: tuple[Felt, ...] = get_args(Felt)
 FROM_PAPER = "paper"
 """The source of grades that were written on a sheet."""
 
-FROM_PERSONS = ("console", "browser", FROM_PAPER)
+AT_THE_DEVICE = ("console", "browser")
+"""Where a person grades while models are presented: a session begun at one goes on at
+the other."""
+
+FROM_PERSONS = (*AT_THE_DEVICE, FROM_PAPER)
 """Sources of grades, by the names that logs have them by, that are a person's."""
 
 FORMAT = 2
@@ -50,6 +54,8 @@ _PRESENTED = (
     "r2_deg",
 )
 
+_RESUMED = ("protocol_sha256", "n_graded", "clock", "masrel_version", "grades")
+
 EVENTS: dict[str, tuple[str, ...]] = {
     "session": (
         "format",
@@ -66,7 +72,7 @@ EVENTS: dict[str, tuple[str, ...]] = {
         "masrel_version",
         "rehearsal",
     ),
-    "resumed": ("protocol_sha256", "n_graded", "clock", "masrel_version"),
+    "resumed": _RESUMED,
     "presented": _PRESENTED,
     "fault": (
         "code",
@@ -95,7 +101,7 @@ EVENTS: dict[str, tuple[str, ...]] = {
         "why",
     ),
     "aged": ("last_event_utc", "days", "resume", "restart"),
-    "restarted": ("protocol_sha256", "n_graded", "clock", "masrel_version"),
+    "restarted": _RESUMED,
     "entered": ("code", "position", "grade", *_TYPED),
     "reentered": ("code", "column", "value", *_TYPED),
     "held": ("on",),
@@ -119,9 +125,12 @@ _LATER = {
     },
     "grade": {"stretch"},
     "session": {"rehearsal"},
+    "resumed": {"grades"},
+    "restarted": {"grades"},
 }
 """Fields that events had not when every presentation was one stretch, none was
-rehearsed, and only the columns of a recording were hashed."""
+rehearsed, only the columns of a recording were hashed, and a session went on with the
+source of grades that it was begun with."""
 
 
 # Of practice the same can follow as of the presentations that are rated.
@@ -131,7 +140,10 @@ _OF_PRACTICE = {
     "practice-skipped": "skipped",
 }
 
-_TEXTS = ("code", "grade", "who", "why", "questionnaire", "question", "column", "file")
+_TEXTS = (
+    *("code", "grade", "grades", "who", "why"),
+    *("questionnaire", "question", "column", "file"),
+)
 """Fields that hold text or null, whatever the event."""
 
 _AFTER_COMPLETE = ("correction", "answer-correction", "reentered")
@@ -150,6 +162,8 @@ class CodesState:
     first_grades: dict[str, str] = field(default_factory=dict)
     # time of day of each of these, in UTC
     graded_at: dict[str, str] = field(default_factory=dict)
+    # source of each of these
+    graded_from: dict[str, str] = field(default_factory=dict)
     # grade of each code that has one, with corrections
     grades: dict[str, str] = field(default_factory=dict)
     # why each skipped code has no grade of the session
@@ -173,6 +187,8 @@ class SessionState(CodesState):
     # after how many presentations there were breaks
     breaks: set[object] = field(default_factory=set)
     answers: "dict[AnswerKey, Answer]" = field(default_factory=dict)  # with corrections
+    answered_from: dict[AnswerKey, str] = field(default_factory=dict)
+    source: str | None = None  # where grades and answers come from now
     # the last second entry of each column of each code, or of the session
     reentered: dict[tuple[str | None, str], Event] = field(default_factory=dict)
     # presentations, also for practice, and how many grades were set aside
@@ -227,6 +243,8 @@ def _contradiction(state: SessionState, event: Event) -> str | None:
         return "needed the event session once, before all others"
     if state.is_complete and event.kind not in _AFTER_COMPLETE:
         return "needed no event but a correction after complete"
+    if event.kind in ("resumed", "restarted"):
+        return _contradiction_of_source(state, event)
     if "question" in event.fields:
         return _contradiction_of_answer(state, event)
     if "file_sha256" in event.fields:
@@ -286,6 +304,18 @@ def _answer_key(event: Event) -> AnswerKey:
     )
 
 
+def may_go_on(begun: object, source: object) -> bool:
+    """Return whether a session begun with one source of grades goes on with another."""
+    return begun == source or (begun in AT_THE_DEVICE and source in AT_THE_DEVICE)
+
+
+def _contradiction_of_source(state: SessionState, event: Event) -> str | None:
+    begun, source = state.header["grades"], event.fields.get("grades")
+    if source is not None and not may_go_on(begun, source):
+        return f"needed a session that goes on with {begun}, got {source}"
+    return None
+
+
 def _contradiction_of_answer(state: SessionState, event: Event) -> str | None:
     key = _answer_key(event)
     name, code = f"{key[0]}.{key[1]}", key[2]
@@ -329,6 +359,11 @@ def _contradiction_of_code(state: CodesState, event: Event) -> str | None:
 
 
 def _apply(state: SessionState, event: Event) -> None:
+    if event.kind == "restarted":
+        _set_aside(state)
+    if event.kind in ("session", "resumed", "restarted"):
+        source = event.fields.get("grades")
+        state.source = state.source if source is None else str(source)
     if event.kind == "session":
         state.header = event.fields
     elif event.kind == "complete":
@@ -339,23 +374,24 @@ def _apply(state: SessionState, event: Event) -> None:
         state.is_instructed = True
     elif event.kind == "break":
         state.breaks.add(event.fields["after"])
-    elif event.kind == "restarted":
-        _set_aside(state)
     elif "question" in event.fields:
         # no list, or the event would have been refused
-        state.answers[_answer_key(event)] = cast("Answer", event.fields["answer"])
+        key = _answer_key(event)
+        state.answers[key] = cast("Answer", event.fields["answer"])
+        state.answered_from.setdefault(key, str(state.source))
     elif event.kind == "reentered":
         code = event.fields["code"]
-        key = (None if code is None else str(code), str(event.fields["column"]))
-        state.reentered[key] = event
+        of = (None if code is None else str(code), str(event.fields["column"]))
+        state.reentered[of] = event
     else:
-        _apply_to_code(*_part(state, event))
+        _apply_to_code(*_part(state, event), str(state.source))
 
 
 def _set_aside(state: SessionState) -> None:
     # what was before the session begins anew: it stays in the log, and counts no more
     fresh = SessionState(
         header=state.header,
+        source=state.source,
         set_aside=state.all_presented,
         n_set_aside=state.n_set_aside + len(state.grades),
     )
@@ -363,7 +399,7 @@ def _set_aside(state: SessionState) -> None:
         setattr(state, each.name, getattr(fresh, each.name))
 
 
-def _apply_to_code(state: CodesState, event: Event) -> None:
+def _apply_to_code(state: CodesState, event: Event, source: str) -> None:
     code, grade = str(event.fields.get("code")), event.fields.get("grade")
     if event.kind in ("grade", "skipped", "correction", "entered"):
         state.settled.add(code)
@@ -376,6 +412,7 @@ def _apply_to_code(state: CodesState, event: Event) -> None:
     elif event.kind == "grade":
         state.first_grades[code] = state.grades[code] = str(grade)
         state.graded_at[code] = event.time_utc
+        state.graded_from[code] = source
         stretch = event.fields.get("stretch")
         if isinstance(stretch, int):
             state.graded_stretches[code] = stretch

@@ -88,9 +88,9 @@ def run_session(
         If the schedule is missing, damaged, foreign, or stale.
     SessionLogError
         If the log is damaged, of another schedule or protocol, was begun with
-        another source of grades or device, was left on another day and may not be
-        gone on with, or is open elsewhere, or if there are recordings of the session
-        that it does not name.
+        another device or source of grades (console and browser go on with one
+        another's), was left on another day and may not be gone on with, or is open
+        elsewhere, or if there are recordings of the session that it does not name.
     ProtocolError
         If a model asks for more torque than the device may send.
     ParameterError

@@ -1,16 +1,20 @@
-"""A session by the browser leaves the events of one at the console."""
+"""A session by the browser leaves the events of one at the console, and the two go on
+with one another's."""
 
 import io
 import re
 import shutil
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import permutations
 from pathlib import Path
 
 import pytest
 
 from masrel.errors import SessionStoppedError
 from masrel.protocol import StudyPaths, read_protocol, scale_of
+from masrel.ratings import answers_from_logs, ratings_from_logs
 from masrel.run import ConsoleGrades, read_log, run_session
 from masrel.serve._desk import Desk
 from tests.serve.desks import OCCASIONS, Page, at, small_study
@@ -40,7 +44,7 @@ WHY = "the arm slipped"
 def study(tmp_path: Path) -> StudyPaths:
     """One with every occasion; the hand is too fast for the device in one."""
     return small_study(
-        tmp_path / "console",
+        tmp_path / "drawn",
         OCCASIONS.replace("HM1", "HM3") + QUESTIONS,
         ("stretches = 1\n", "stretches = 2\n"),
         ("speed_limit_deg_s = 400.0", "speed_limit_deg_s = 120.0"),
@@ -92,8 +96,9 @@ class Typist(io.StringIO):
         return f"{self._meant(shown)}\n"
 
 
-def at_the_console(study: StudyPaths) -> None:
-    rater, protocol = Rater(), read_protocol(study.protocol)
+def at_the_console(study: StudyPaths, rater: Rater) -> None:
+    """Go on until the session is left, or over."""
+    protocol = read_protocol(study.protocol)
 
     def meant(shown: str) -> str:
         if begins := re.search(r"code (\w+).*Enter to begin", shown):
@@ -107,18 +112,15 @@ def at_the_console(study: StudyPaths) -> None:
         typed = {"Present it": f"skip {WHY}", "How real?": "60", "Sure?": "yes"}
         return next((typed[words] for words in typed if words in shown), "")
 
-    def run() -> None:
-        typist = Typist(meant)
-        grades = ConsoleGrades(scale_of(protocol), answers=typist, questions=typist)
+    typist = Typist(meant)
+    grades = ConsoleGrades(scale_of(protocol), answers=typist, questions=typist)
+    with suppress(SessionStoppedError):
         run_session(study, protocol, "R1", "test", grades=grades, clock="simulated")
 
-    with pytest.raises(SessionStoppedError):
-        run()
-    run()
 
-
-def by_the_browser(study: StudyPaths) -> None:
-    rater, answers = Rater(), {"How real?": 60, "Sure?": "yes", "Why?": None}
+def by_the_browser(study: StudyPaths, rater: Rater) -> None:
+    """Go on until the session is left, or over."""
+    answers = {"How real?": 60, "Sure?": "yes", "Why?": None}
 
     async def act(desk: Desk) -> None:
         page = Page(desk, fault={"skip": WHY})
@@ -127,7 +129,6 @@ def by_the_browser(study: StudyPaths) -> None:
             screen, code = state["screen"], state["code"]
             if screen == "break" and rater.leaves():
                 await desk.leave()
-                await desk.start("R1", "test")
                 continue
             if screen == "ready" and (wrong := rater.corrects(code)):
                 why = {"who": "R1", "why": WHY}
@@ -149,21 +150,40 @@ ASKED = ("ready", "grade", "break", "question", "over")
 def facts(study: StudyPaths) -> list[tuple[str, dict[str, object]]]:
     # all but times and source
     log = read_log(study.log_file("R1", "test"))
-    events = [(event.kind, dict(event.fields)) for event in log]
-    assert events[0][1].pop("grades") in ("console", "browser")
-    return events
+    return [
+        (
+            event.kind,
+            {key: event.fields[key] for key in event.fields if key != "grades"},
+        )
+        for event in log
+    ]
+
+
+SOURCES = {"console": at_the_console, "browser": by_the_browser}
+
+
+def graded(study: StudyPaths, *sources: str) -> list[tuple[str, dict[str, object]]]:
+    # in a copy of the study, by one source until it is left, and then by the other
+    copy = StudyPaths(study.root.with_name("-".join(sources)))
+    shutil.copytree(study.root, copy.root)
+    rater = Rater()
+    for source in sources:
+        SOURCES[source](copy, rater)
+    log = read_log(copy.log_file("R1", "test"))
+    assert tuple(e.fields["grades"] for e in log if "grades" in e.fields) == sources
+    table = ratings_from_logs(copy, read_protocol(copy.protocol)).table
+    by_position = table.sort_values("position")["grades_from"].tolist()
+    assert by_position == [sources[0]] * 2 + [sources[1]] * 2  # left at a break
+    answers = answers_from_logs(copy, read_protocol(copy.protocol))
+    assert {each.grades_from for each in answers} == set(sources)
+    return facts(copy)
 
 
 @pytest.mark.slow
-def test_events_are_equal_but_for_source_and_times(
-    study: StudyPaths, tmp_path: Path
-) -> None:
-    copy = StudyPaths(tmp_path / "browser")
-    shutil.copytree(study.root, copy.root)
-    at_the_console(study)
-    by_the_browser(copy)
-    console = facts(study)
-    assert facts(copy) == console
+def test_events_are_equal_but_for_source_and_times(study: StudyPaths) -> None:
+    console = graded(study, "console", "console")
+    for sources in (("browser", "browser"), *permutations(SOURCES)):
+        assert graded(study, *sources) == console, sources
     assert {kind for kind, _ in console} == {
         *("session", "instructed", "practised", "practice-grade", "presented", "grade"),
         *("fault", "skipped", "break", "answered", "correction", "stopped", "resumed"),

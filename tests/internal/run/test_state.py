@@ -29,6 +29,7 @@ B_SHOWN, B_GRADED = step("presented", code="B"), step("grade", code="B", grade="
 FAULT = step("presented", code="A", fault="too fast")
 CORRECTED = step("correction", code="A", grade="3")
 TAKEN, SKIPPED = step("correction", code="A"), step("skipped", code="A")
+OTHER_SOURCE = step("resumed", grades="script")
 RECOVERED, DONE = step("recovered"), step("complete")
 
 
@@ -78,6 +79,10 @@ def test_no_events_are_no_session() -> None:
         ([BEGUN, A_SHOWN, A_GRADED, A_GRADED], "line 4: grade: needed one grade"),
         ([BEGUN, A_SHOWN, A_GRADED, A_SHOWN], "line 4: presented: .* neither gr"),
         ([BEGUN, CORRECTED], "line 2: correction: needed a code that was presented"),
+        (
+            [step("session", format=2, grades="console"), A_SHOWN, OTHER_SOURCE],
+            "line 3: resumed: needed a session that goes on with console, got script",
+        ),
         ([BEGUN, A_SHOWN, TAKEN], "line 3: correction: needed a code that has a gra"),
         ([BEGUN, FAULT, SKIPPED, TAKEN], "line 4: correction: needed a code that has"),
         ([BEGUN, SKIPPED], "line 2: skipped: needed a presentation of A that a fault"),
