@@ -14,6 +14,8 @@ from masrel.report._tables import Column, Table, page_cells
 
 _ROWS_OF_A_PAGE = 40
 _APART = "\N{ZERO WIDTH SPACE}"
+_MAY_BREAK = "\N{BREAK PERMITTED HERE}"
+_LONG_WORD = re.compile(r"\S{20,}")  # such as an address: it may break after "/"
 
 # Widths in letters of ten points: of a line, of what a column takes beside its letters,
 # and from which on a column of text may be broken into lines; how many more letters
@@ -42,9 +44,10 @@ _ESCAPES = str.maketrans(
         "_": r"\_",
         "{": r"\{",
         "}": r"\}",
-        "~": r"\textasciitilde{}",
+        "~": r"$\sim$",
         "^": r"\textasciicircum{}",
         _APART: "{}",
+        _MAY_BREAK: r"\allowbreak{}",
         "−": "$-$",
         "–": "--",
         "±": r"$\pm$",
@@ -234,7 +237,8 @@ def _figure(drawing: Drawing, file: str, tag: str) -> str:
 def _table(table: Table) -> str:
     columns, body = page_cells(table)
     size, letters, is_shrunk = _layout(columns, body)
-    caption = rf"\caption{{{_text(table.labelled_caption)}}}"
+    tag = rf"\textbf{{{_text(table.tag)}}} " if table.tag else ""
+    caption = rf"\caption{{{tag}{_text(table.caption)}}}"
     label = rf"\label{{tab:{table.name}}}"
     heading = [r"\toprule", _line([c.heading for c in columns]), r"\midrule"]
     sizes = [size] if size else []
@@ -291,12 +295,17 @@ def _line(cells: Sequence[str]) -> str:
 
 def _text(text: str) -> str:
     # symbols of the model are set as such; all else is escaped
-    parts = SYMBOL.split(unicodedata.normalize("NFC", text))
+    text = _LONG_WORD.sub(_breakable, unicodedata.normalize("NFC", text))
+    parts = SYMBOL.split(text)
     shown = [_escape(parts[0])]
     for letters, index, after in zip(*(parts[k::3] for k in (1, 2, 3)), strict=True):
         symbol = _escape(letters).replace("$", " ").strip()
         shown += [rf"${symbol}_{{\mathrm{{{index}}}}}$", _escape(after)]
     return "".join(shown)
+
+
+def _breakable(word: re.Match[str]) -> str:
+    return word[0].replace("/", f"/{_MAY_BREAK}")
 
 
 def _escape(text: str) -> str:

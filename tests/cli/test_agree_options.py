@@ -263,10 +263,7 @@ def test_latex_is_one_balanced_table_of_escaped_text(
     for line in set(out.splitlines()) - set(lines):
         assert lacking_escape(line) == ""
     assert r"a\_b\&c\% & Percent agreement & " in out
-    assert (
-        r"50\textasciitilde{}\textasciicircum{}\$\#\{\}\textbackslash{} & Fleiss'"
-        in out
-    )
+    assert r"50$\sim$\textasciicircum{}\$\#\{\}\textbackslash{} & Fleiss'" in out
     assert r"Fleiss' $\kappa$ & $-$" in out
 
 

@@ -145,7 +145,7 @@ def test_a_column_may_be_of_the_page_or_of_the_csv_alone() -> None:
 
 def test_letters_that_latex_reads_as_its_own_are_escaped() -> None:
     text = as_latex(example("simulated"))
-    assert r"\caption{SIMULATED DATA. Values by model}" in text
+    assert r"\caption{\textbf{Simulated data.} Values by model}" in text
     assert "HM3 & -- \\\\" in text
 
 
