@@ -105,6 +105,54 @@ export function cues(rules, nOver = null) {
   return h("ol", { className: "cues", id: "cues" }, ...items);
 }
 
+const HELD_MS = 400; // after which a button that is held down goes on by itself
+const EVERY_MS = 80;
+
+/** A whole number: typed, or by a tap on less and more. */
+export function wholeNumber({ text, range: [low, high] }, needed) {
+  const input = h("input", { type: "number", id: "answer", min: low, max: high, step: 1 });
+  if (low >= 0) input.inputMode = "numeric"; // such keys have no minus
+  input.setAttribute("aria-describedby", "answer-needed");
+  const said = h("span", { className: "unseen", role: "status" });
+  const nearest = (value) => Math.min(high, Math.max(low, value));
+  const step = (by) => {
+    input.value = nearest(input.value ? Math.trunc(Number(input.value)) + by : 0);
+    said.textContent = input.value;
+  };
+  return h(
+    "div",
+    { className: "field" },
+    h("label", { htmlFor: "answer" }, text),
+    h("p", { id: "answer-needed", className: "faint" }, needed),
+    h("div", { className: "stepper" }, stepButton("−", w("less"), () => step(-1)), input, stepButton("+", w("more"), () => step(1))),
+    said,
+  );
+}
+
+/** A button that does something once at a tap, and again and again while it is held. */
+function stepButton(sign, words, step) {
+  let timer = null;
+  let isHeld = false;
+  const release = () => clearInterval(timer);
+  // not in the order of tabs: at the number itself the arrow keys do the same
+  const button = h("button", { type: "button", tabIndex: -1, "aria-label": words }, sign);
+  button.addEventListener("pointerdown", () => {
+    release();
+    isHeld = false;
+    timer = setTimeout(() => {
+      isHeld = true;
+      timer = setInterval(() => (button.isConnected ? step() : release()), EVERY_MS);
+    }, HELD_MS);
+  });
+  for (const kind of ["pointerup", "pointerleave", "pointercancel"]) button.addEventListener(kind, release);
+  button.addEventListener("contextmenu", (event) => event.preventDefault());
+  button.addEventListener("click", ({ detail }) => {
+    if (!isHeld || !detail) step(); // without detail it was no pointer
+    isHeld = false;
+  });
+  return button;
+}
+
 /** A visual-analogue scale: nothing is marked until the rater marks it. */
 export function analogue(question) {
   const [low, high] = question.range;

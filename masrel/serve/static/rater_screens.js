@@ -19,6 +19,7 @@ import {
   number,
   submit,
   w,
+  wholeNumber,
   writing,
   written,
 } from "/static/rater_parts.js";
@@ -248,11 +249,9 @@ const fields = {
   whole: (state) => {
     const [low, high] = state.range;
     const needed = w("needed_whole", { low: number(low), high: number(high) });
-    const input = h("input", { type: "number", id: "answer", min: low, max: high, step: 1, inputMode: "numeric" });
-    input.setAttribute("aria-describedby", "answer-needed");
-    const hint = paragraph(needed, { id: "answer-needed", className: "faint" });
-    const label = h("label", { htmlFor: "answer" }, state.text);
-    const part = h("div", { className: "field" }, label, hint, input, ...ends(state));
+    const part = wholeNumber(state, needed);
+    const input = part.querySelector("input");
+    part.append(...ends(state));
     return { part, answer: () => (input.value && input.checkValidity() ? Number(input.value) : null), missing: needed };
   },
 
