@@ -1,4 +1,4 @@
-"""What a coordinator does next: one command."""
+"""What a coordinator does next: one verb."""
 
 import shlex
 from collections.abc import Sequence
@@ -19,10 +19,17 @@ class NextStep:
         The command.
     why : str
         What it is for.
+    verb : str
+        The verb of the command: ``"run"``, say.
+    rater, session : str or None
+        Whose session the verb is about; None where it is about the study.
     """
 
     command: str
     why: str
+    verb: str
+    rater: str | None = None
+    session: str | None = None
 
 
 def next_step(
@@ -54,25 +61,33 @@ def next_step(
     if "unreadable" in by_stage:
         session = by_stage["unreadable"]
         why = f"the log of {session.rater} in session {session.session} is damaged"
-        return NextStep(command=f"masrel verify {root}", why=why)
+        return _of_study("verify", root, why)
     if "not drawn" in by_stage and "begun" not in by_stage:
         n_absent = sum(session.stage == "not drawn" for session in open_)
         why = f"{n_absent} of {len(sessions)} schedules are not drawn"
-        return NextStep(command=f"masrel schedule {root}", why=why)
+        return _of_study("schedule", root, why)
     for stage in ("begun", "drawn"):
         if stage in by_stage:
             return _to_run(root, by_stage[stage])
     return _to_make(study, root)
 
 
+def _of_study(verb: str, root: str, why: str) -> NextStep:
+    return NextStep(command=f"masrel {verb} {root}", why=why, verb=verb)
+
+
 def _to_run(root: str, session: SessionProgress) -> NextStep:
     place = f"--rater {session.rater} --session {session.session}"
-    done = f"{session.n_graded} of {session.n_presentations} graded"
+    verb, command = "run", f"masrel run {root} {place}"
     if session.grades_from == "paper":
-        command = f"masrel enter {root} FILE {place} --who WHO"
-    else:
-        command = f"masrel run {root} {place}"
-    return NextStep(command=command, why=done)
+        verb, command = "enter", f"masrel enter {root} FILE {place} --who WHO"
+    return NextStep(
+        command=command,
+        why=f"{session.n_graded} of {session.n_presentations} graded",
+        verb=verb,
+        rater=session.rater,
+        session=session.session,
+    )
 
 
 def _to_make(study: StudyPaths, root: str) -> NextStep:
@@ -85,6 +100,6 @@ def _to_make(study: StudyPaths, root: str) -> NextStep:
         if made < newest:
             why = f"all sessions are complete; {file.name} is "
             why += "not there yet" if made < 0 else "older than the logs"
-            return NextStep(command=f"masrel {verb} {root}", why=why)
+            return _of_study(verb, root, why)
     why = "all sessions are complete, and their report is written"
-    return NextStep(command=f"masrel verify {root}", why=why)
+    return _of_study("verify", root, why)

@@ -51,6 +51,13 @@ def begin_rehearsal(
             return paths, schedule, checksum
 
 
+def last_rehearsal(study: StudyPaths, rater: str, session: str) -> Path | None:
+    """Return the log that a rehearsal was last written to; None without one."""
+    name = RehearsalPaths(study.root, 1).log_file(rater, session).name
+    logs = study.rehearsals.glob(f"*/{name}")
+    return max(logs, key=lambda log: log.stat().st_mtime_ns, default=None)
+
+
 def drawn_rehearsal(
     paths: RehearsalPaths, protocol: Protocol, rater: str, session: str
 ) -> tuple[Schedule, str] | None:

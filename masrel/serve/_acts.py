@@ -41,37 +41,19 @@ def _note(study: StudyPaths, protocol: Protocol, fields: Fields) -> str:
 
 
 def _answer(study: StudyPaths, protocol: Protocol, fields: Fields) -> str:
-    answer: str | float | None = text(fields, "answer")
     question = needed(fields, "question")
-    if isinstance(answer, str) and _is_number(protocol, question):
-        answer = _number(answer)
     record_answer(
         study,
         protocol,
         needed(fields, "rater"),
         needed(fields, "session"),
         question=question,
-        answer=answer,
+        answer=text(fields, "answer"),
         code=text(fields, "code"),
         who=needed(fields, "who"),
         why=needed(fields, "why"),
     )
     return f"The answer to {question} is corrected; what it was stays in the log."
-
-
-def _is_number(protocol: Protocol, question: str) -> bool:
-    return any(
-        f"{each.id}.{one.id}" == question and one.range is not None
-        for each in protocol.questionnaires
-        for one in each.questions
-    )
-
-
-def _number(words: str) -> float:
-    try:
-        return float(words)
-    except ValueError:
-        raise ParameterError(f"answer: needed a number, got {words!r}") from None
 
 
 def _skip(study: StudyPaths, protocol: Protocol, fields: Fields) -> str:  # noqa: ARG001 - as all

@@ -18,6 +18,7 @@ from masrel._event_log import read_log
 from masrel.errors import MasrelError, ParameterError
 from masrel.protocol import StudyPaths, read_protocol
 from masrel.recording import PHASES
+from masrel.run._rehearsal import last_rehearsal
 from masrel.serve._access import Access
 from masrel.serve._acts import ACTS, needed, text
 from masrel.serve._addresses import qr_svg
@@ -82,8 +83,8 @@ class _CoordinatorPages:
 
     def _log(self) -> list[dict[str, Any]]:
         # what is in the log of the session that runs: kinds, codes and times
-        running = self._desk.running
-        if running is None or running[2]:  # a rehearsal is in a folder of its own
+        file = self._log_file()
+        if file is None:
             return []
         with contextlib.suppress(MasrelError, OSError):
             return [
@@ -92,9 +93,19 @@ class _CoordinatorPages:
                     "time_utc": event.time_utc,
                     **_shown(event.fields),
                 }
-                for event in read_log(self._study.log_file(*running[:2]))[-_N_LOG:]
+                for event in read_log(file)[-_N_LOG:]
             ]
         return []
+
+    def _log_file(self) -> Path | None:
+        if self._desk.running is None:
+            return None
+        rater, session, is_rehearsal = self._desk.running
+        if not is_rehearsal:
+            return self._study.log_file(rater, session)
+        if self._desk.state()["screen"] == "starting":
+            return None  # the last one is another rehearsal's
+        return last_rehearsal(self._study, rater, session)
 
     async def events(self, request: Request) -> Response:  # noqa: ARG002 - as all
         """Answer with all that is shown, each time it changes, and the live view."""

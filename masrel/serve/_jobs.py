@@ -12,7 +12,7 @@ from typing import Any
 from masrel.errors import ParameterError
 from masrel.protocol import StudyPaths
 
-JOBS = ("report", "verify", "check", "plan")
+JOBS = ("ratings", "report", "verify", "check", "plan")
 """The verbs that a coordinator can start from the page."""
 
 _N_LINES = 60

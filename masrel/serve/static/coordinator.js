@@ -74,7 +74,10 @@ function showDesk() {
   const { desk, overview } = state;
   if (!desk || !overview) return;
   at("stop").disabled = !desk.session;
+  const isRehearsal = Boolean(desk.session?.rehearsal);
+  at("log-title").textContent = isRehearsal ? "Log of this rehearsal: nothing of it counts" : "Log of this session";
   const parts = [h("p", { className: "now" }, nowWords(desk))];
+  if (isRehearsal) parts.unshift(h("p", { className: "label" }, "Rehearsal: nothing of it counts"));
   if (desk.screen === "fault") parts.push(h("p", {}, desk.why));
   for (const note of desk.notes) parts.push(h("p", { className: "faint" }, `Note: ${note}.`));
   at("now").replaceChildren(...parts);
@@ -119,7 +122,8 @@ function startForm(overview, said) {
     tell(said, await act("start", { rater, session, rehearsal: rehearsal.checked }));
     button.disabled = false;
   });
-  if (!overview.sessions.some((each) => each.stage === "not drawn")) return form;
+  const isNext = overview.next?.verb === "schedule"; // and has its button there
+  if (isNext || !overview.sessions.some((each) => each.stage === "not drawn")) return form;
   const draw = h("button", { type: "button" }, "Draw the missing schedules");
   draw.addEventListener("click", async () => tell(said, await act("draw", {})));
   return h("div", {}, form, h("div", { className: "row" }, draw));
@@ -160,7 +164,7 @@ function showStudy() {
       ]),
     ),
   );
-  at("next").textContent = overview.problem ?? (overview.next ? `Next: ${overview.next.why} (${overview.next.command})` : "");
+  showNext();
   at("events").replaceChildren(
     overview.events.length
       ? table(
@@ -198,9 +202,50 @@ function showDevice({ device, n_torque_problems: n }) {
   at("device").replaceChildren(table(["Setting", "Value"], rows), problem);
 }
 
+// --- what comes next ------------------------------------------------------------------
+
+const nextSaid = outcome();
+
+/** What to press for the next step; null where this page has no act for it. */
+function nextAct({ verb, rater, session }, stage) {
+  if (verb === "run") return [stage === "begun" ? "Go on with it" : "Start it", "start", { rater, session }];
+  if (verb === "schedule") return ["Draw the missing schedules", "draw", {}];
+  return verb in jobWords ? [jobWords[verb], "job", { verb }] : null;
+}
+
+function showNext() {
+  const { desk, overview } = state;
+  if (!desk || !overview) return;
+  const { next, problem } = overview;
+  const isRunning = Boolean(desk.session) && next?.verb === "run"; // nothing else can be started
+  const its = (each) => each.rater === next?.rater && each.session === next?.session;
+  const stage = overview.sessions.find(its)?.stage;
+  const which = JSON.stringify([next, problem, isRunning, stage]);
+  if (at("next").dataset.which === which) return;
+  at("next").dataset.which = which;
+  nextSaid.textContent = "";
+  if (problem || !next || isRunning) return at("next").replaceChildren(problem ?? "");
+  const of = next.session ? `session ${next.session} of ${next.rater}, ` : "";
+  const text = h("p", {}, `Next: ${of}${next.why}.`);
+  const chosen = nextAct(next, stage);
+  if (!chosen) text.append(" At a terminal: ", h("code", {}, next.command));
+  const row = h("div", { className: "row" }, text, chosen ? nextButton(...chosen) : null);
+  at("next").replaceChildren(row, nextSaid);
+}
+
+function nextButton(words, name, fields) {
+  const button = h("button", { type: "button" }, words);
+  button.addEventListener("click", async () => {
+    button.disabled = true;
+    tell(nextSaid, await act(name, fields));
+    button.disabled = false;
+  });
+  return button;
+}
+
 // --- long work ------------------------------------------------------------------------
 
-const jobWords = { report: "Build the report", verify: "Verify the record", check: "Check the study", plan: "Plan the size" };
+const jobWords = { ratings: "Write the ratings", report: "Build the report", verify: "Verify the record", check: "Check the study", plan: "Plan the size" };
 
 const jobsSaid = outcome();
 const jobLines = h("div", {});
@@ -422,7 +467,7 @@ function shadePhases(g, x, height) {
       if (right - left > 50) {
         g.fillStyle = css("--faint");
         g.textAlign = "left";
-        g.fillText(phases[live.phase[from]], left + 4, height / 2 + 4);
+        g.fillText(phases[live.phase[from]], left + 4, height / 2 + 1);
       }
     }
     from = to;
@@ -469,6 +514,7 @@ listen(
     desk: (desk) => {
       state.desk = desk;
       showDesk();
+      showNext();
     },
     overview: (overview) => {
       state.overview = overview;
