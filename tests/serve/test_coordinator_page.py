@@ -2,15 +2,12 @@
 
 import asyncio
 import re
-import shutil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from masrel.cli import cli
 from masrel.conduct import read_conduct
 from masrel.protocol import StudyPaths
 from masrel.recording import read_recording
@@ -37,55 +34,10 @@ def events_of(study: StudyPaths) -> list[tuple[str, dict[str, Any]]]:
     return [(event.kind, dict(event.fields)) for event in read_conduct(study)]
 
 
-def verb(*words: object) -> None:
-    result = CliRunner().invoke(cli, [str(word) for word in words])
-    assert result.exit_code == 0, result.output
-
-
 async def done(page: Tablet, act: str, **fields: Any) -> dict[str, Any]:
     status, body = await page.post(act, **fields)
     assert status == 200, body
     return body
-
-
-BESIDE: dict[str, tuple[dict[str, str], tuple[str, ...]]] = {
-    "note": (
-        {
-            **{"text": "wrist hurts", "who": "Kim", "kind": "adverse-event"},
-            **{"severity": "mild", "rater": "R1", "session": "test"},
-            **{"action": "a break", "outcome": ""},
-        },
-        (
-            *("note", "wrist hurts", "--who", "Kim", "--kind", "adverse-event"),
-            *("--severity", "mild", "--rater", "R1", "--session", "test"),
-            *("--action", "a break"),
-        ),
-    ),
-    "withdraw": (
-        {"rater": "R2", **BY},
-        ("withdraw", "--rater", "R2", "--who", "Kim", "--why", "asked to"),
-    ),
-    "unblind": (
-        {"code": "CODE", "rater": "R1", **BY},
-        *[("unblind", "CODE", "--rater", "R1", "--who", "Kim", "--why", "asked to")],
-    ),
-}
-
-
-@pytest.mark.parametrize("act", BESIDE)
-def test_an_act_leaves_the_event_of_its_verb(study: StudyPaths, act: str) -> None:
-    fields, words = BESIDE[act]
-    code = codes(study)[0]
-    fields = {key: code if text == "CODE" else text for key, text in fields.items()}
-    other = StudyPaths(shutil.copytree(study.root, study.root.with_name("other")))
-
-    async def run(_: Desk, page: Tablet) -> None:
-        await done(page, act, **fields)
-
-    with_tablets(study, run, coordinated=True)
-    name, *rest = (code if word == "CODE" else word for word in words)
-    verb(name, other.root, *rest)
-    assert events_of(study) == events_of(other) != []
 
 
 def test_what_is_sent_twice_is_done_once(study: StudyPaths) -> None:
@@ -110,7 +62,7 @@ def test_what_is_sent_twice_is_done_once(study: StudyPaths) -> None:
         ("withdraw", {"rater": "R9", **BY}, "rater: needed one of"),
         ("unblind", {"code": "XX", **BY}, "needed one of a drawn schedule"),
         ("skip", {"rater": "R1", "session": "test", "code": "1", **BY}, "no such"),
-        ("job", {"verb": "demo"}, "job: needed one of report"),
+        ("job", {"verb": "demo"}, "job: needed one of ratings"),
         ("tablet", {"rater": "R9"}, "rater: needed one of R1, R2"),
         (
             "answer",
