@@ -8,7 +8,6 @@ import sys
 from math import degrees, radians
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -16,6 +15,7 @@ from tqdm import tqdm
 
 from masrel.hess import HandTraits
 from masrel.recording import PHASES
+from masrel.report.figures._style import GREY, VERMILLION, finished, house_style
 from tests.hess.held import (
     FREE_END_DEG,
     PRE_CATCH,
@@ -30,20 +30,18 @@ from tests.hess.held import (
 
 FIGURE = Path(__file__).parents[1] / "figures" / "driver_hands.png"
 HANDS = {600.0: ("#0072B2", "-"), 60.0: ("#009E73", "--"), 12.0: ("#E69F00", "-.")}
-VERMILLION, GREY = "#D55E00", "#6B6B6B"
 N_DRAWN = 200  # hands in the right half
 
 
 def draw(path: Path) -> None:
     """Draw speeds through a catch, and how much of a loose arm's loss is lost."""
-    mpl.rcParams.update({"font.size": 9, "axes.spines.top": False})
-    mpl.rcParams.update({"axes.spines.right": False, "savefig.dpi": 200})
-    figure = Figure(figsize=(7.2, 3.4), layout="constrained")
-    speeds, losses = figure.subplots(1, 2)
-    _draw_speeds(speeds)
-    _draw_losses(losses)
-    speeds.set_title("SIMULATED DATA", loc="left", color=GREY, fontsize=7)
-    figure.savefig(path)
+    with house_style():
+        figure = Figure(figsize=(7.2, 3.2))
+        speeds, losses = figure.subplots(1, 2)
+        _draw_speeds(speeds)
+        _draw_losses(losses)
+        files = finished(figure, stamp="SIMULATED DATA", forms=("png",))
+    path.write_bytes(files["png"])
 
 
 def _draw_speeds(axes: Axes) -> None:
@@ -55,8 +53,8 @@ def _draw_speeds(axes: Axes) -> None:
         _draw_speed(axes, person, None, f"{stiffness:g} N·m/rad", colour, line)
     _draw_speed(axes, person, 0.02, "lets go after 20 ms", VERMILLION, ":")
     axes.set(
-        xlabel="time from the catch of HM4, ms",
-        ylabel="speed, deg/s",
+        xlabel="time from the catch of HM4 (ms)",
+        ylabel="speed (deg/s)",
         xlim=(-50.0, 150.0),
         ylim=(-60.0, 125.0),
     )
@@ -102,10 +100,10 @@ def _draw_losses(axes: Axes) -> None:
     axes.hist(loose, bins, color=VERMILLION)
     axes.axvline(0.6, color=GREY, linestyle="--", linewidth=1.0)
     axes.set(
-        xlabel="speed lost in 5 ms, as a share of a loose arm's",
+        xlabel="speed lost in 5 ms,\nas a share of a loose arm's",
         ylabel=f"of {N_DRAWN} hands",
     )
-    axes.text(0.61, 20.0, "grip lost\nfrom here on", color=GREY, fontsize=8)
+    axes.text(0.58, 60.0, "grip lost\nfrom here on", color=GREY, fontsize=8, ha="right")
     axes.text(0.2, 35.0, "held", color=HANDS[600.0][0])
     axes.text(1.06, 40.0, "let go", color=VERMILLION)
 

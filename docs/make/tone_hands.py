@@ -8,37 +8,43 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from masrel.hess import HandTraits
+from masrel.report.figures._style import (
+    BLUE,
+    SHADES,
+    VERMILLION,
+    finished,
+    house_style,
+)
 from tests.hess.tone_held import HEAD, KINDS, SEEDS, outcome, presented, raters, row
 
 FIGURE = Path(__file__).parents[1] / "figures" / "tone_held.png"
-BLUE, VERMILLION, GREY = "#0072B2", "#D55E00", "#6B6B6B"
 
 
 def draw(path: Path) -> None:
     """Draw angle and torque of one presentation of clonus."""
-    mpl.rcParams.update({"font.size": 9, "axes.spines.top": False})
-    mpl.rcParams.update({"axes.spines.right": False, "savefig.dpi": 200})
     (rater,) = raters("clonus", [5])
     soft = HandTraits(stiffness=40.0, damping=2.0)
     columns = presented(replace(rater, traits=soft)).recording.columns
-    figure = Figure(figsize=(7.2, 4.0), layout="constrained")
-    angle, torque = figure.subplots(2, 1, sharex=True)
-    for axes, name, colour in (
-        (angle, "angle_deg", BLUE),
-        (torque, "model_torque_nm", VERMILLION),
-    ):
-        for number in range(1, int(columns["stretch"].max()) + 1):
-            on = columns["time_s"][columns["stretch"] == number]
-            axes.axvspan(on[0], on[-1], color=GREY, alpha=0.15, linewidth=0)
-        axes.plot(columns["time_s"], columns[name], color=colour, linewidth=1.0)
-    angle.set_ylabel("angle, deg")
-    angle.set_title("SIMULATED DATA", loc="left", color=GREY, fontsize=7)
-    torque.set(ylabel="torque, N·m", xlabel="time, s", ylim=(0.0, None))
-    figure.savefig(path)
+    with house_style():
+        figure = Figure(figsize=(7.2, 4.0))
+        angle, torque = figure.subplots(2, 1, sharex=True)
+        for axes, name, colour in (
+            (angle, "angle_deg", BLUE),
+            (torque, "model_torque_nm", VERMILLION),
+        ):
+            for number in range(1, int(columns["stretch"].max()) + 1):
+                on = columns["time_s"][columns["stretch"] == number]
+                axes.axvspan(on[0], on[-1], color=SHADES["catch"], linewidth=0)
+            axes.plot(columns["time_s"], columns[name], color=colour, linewidth=1.0)
+            axes.margins(x=0.01)
+        angle.set_ylabel("angle (deg)")
+        torque.set(ylabel="torque (N·m)", xlabel="time (s)", ylim=(0.0, None))
+        figure.align_ylabels([angle, torque])
+        files = finished(figure, stamp="SIMULATED DATA", forms=("png",))
+    path.write_bytes(files["png"])
 
 
 if __name__ == "__main__":

@@ -96,9 +96,15 @@ def draw(
         Each form's file.
     """
     with house_style():
-        figure = _figure(content)
-        arrange(figure, _stamp(figure, stamp) if stamp else None)
-        return files_of(figure, forms)
+        return finished(_figure(content), stamp=stamp, forms=forms)
+
+
+def finished(
+    figure: Figure, *, stamp: str, forms: Sequence[data.Form] = ("png", "svg")
+) -> dict[data.Form, bytes]:
+    """Return the files of a figure of the house style, under its stamp."""
+    arrange(figure, _stamp(figure, stamp) if stamp else None)
+    return files_of(figure, forms)
 
 
 def _stamp(figure: Figure, text: str) -> Text:
