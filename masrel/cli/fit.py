@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _Term = float | Literal["off", "fitted"]
 
 
-class _TermType(click.ParamType[Any]):
+class _TermType(click.ParamType):  # type: ignore[type-arg]
     name = "off|fitted|number"
 
     def convert(
