@@ -281,7 +281,7 @@ def _layout(
         (each for each in _SIZES.items() if needed <= room * each[1]), _SMALLEST
     )
     for place, width in long.items():  # what the others leave, by their lengths
-        left = max(room * factor - short, _LONG_TEXT * len(long))
+        left = max(0.97 * room * factor - short, _LONG_TEXT * len(long))
         share = min(left * width / sum(long.values()), width) / factor / _LINE
         part = "." + str(min(int(1000 * share), 999)).zfill(3)  # of a line
         plain[place] = rf">{{\raggedright\arraybackslash}}p{{{part}\linewidth}}"

@@ -173,18 +173,37 @@ def test_a_table_of_many_columns_turns_its_page_in_a_word_document(
     assert before.getnext().xpath("w:pPr/w:pStyle/@w:val") == ["Heading1"]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ["pdflatex", "lualatex"])
-def test_latex_compiles(folder: Path, tmp_path: Path, engine: str) -> None:
+def compiled(folder: Path, engine: str) -> str:
+    """What an engine says of a report's LaTeX."""
     if shutil.which(engine) is None:
         pytest.skip(f"{engine} is not installed")
-    shutil.copytree(folder, tmp_path / "copy")
     done = subprocess.run(
         [engine, "-halt-on-error", "-interaction=nonstopmode", "report.tex"],
-        cwd=tmp_path / "copy", capture_output=True, check=False,
+        cwd=folder, capture_output=True, check=False,
     )  # fmt: skip
     log = done.stdout.decode("utf-8", "replace")
     assert done.returncode == 0, log[-2000:]
+    return log
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["pdflatex", "lualatex"])
+def test_latex_compiles(folder: Path, tmp_path: Path, engine: str) -> None:
+    log = compiled(shutil.copytree(folder, tmp_path / "copy"), engine)
+    assert "Overfull" not in log
+    assert "Missing character" not in log
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["pdflatex", "lualatex"])
+def test_latex_of_every_section_fits_its_page(tmp_path: Path, engine: str) -> None:
+    root = tmp_path / "study"
+    copy_template("hess2012", root)
+    call = ["report", str(root), "--format", "latex", "--quiet"]
+    subprocess.run(
+        [sys.executable, "-m", "masrel", *call], check=True, capture_output=True
+    )
+    log = compiled(root / "report", engine)
     assert "Overfull" not in log
     assert "Missing character" not in log
 
