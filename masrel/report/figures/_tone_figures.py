@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 
 from masrel.report._figure_data import ToneView
 from masrel.report.figures._style import BLACK, BLUE, GREY, ORANGE, SHADES, VERMILLION
@@ -87,6 +88,7 @@ def _event_letters(axes: Axes, view: ToneView) -> None:
         axes.annotate(
             letter, (time, height), (-3, 4), textcoords="offset points", ha="right",
             va="bottom", fontsize=8, zorder=5,
+            path_effects=[withStroke(linewidth=2.0, foreground="white")],
         )  # fmt: skip
 
 
