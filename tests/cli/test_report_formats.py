@@ -19,6 +19,7 @@ from masrel.protocol import copy_template
 from tests.cli.process import Caller
 
 SETPRIV = shutil.which("setpriv")
+OFFICE, TEXT_OF_PDF = shutil.which("soffice"), shutil.which("pdftotext")
 W = "{http://schemas.openxmlformats.org/wordprocessingml/2006/main}"
 FORMATS = ("html", "markdown", "latex", "docx")
 
@@ -43,11 +44,13 @@ def folder(study: Path) -> Path:
     return study / "report"
 
 
-def build(study: Path, folder: Path, variables: dict[str, str]) -> None:
+def build(study: Path, folder: Path, variables: dict[str, str], *options: str) -> None:
     call = [sys.executable, "-m", "masrel", "report", str(study), "-o", str(folder)]
     cache = ["--cache", f"{folder}-cache"]
     environment = {**os.environ, **variables}
-    subprocess.run([*call, *cache], env=environment, check=True, capture_output=True)
+    subprocess.run(
+        [*call, *cache, *options], env=environment, check=True, capture_output=True
+    )
 
 
 def test_every_format_has_the_same_tables_and_figures(folder: Path) -> None:
@@ -159,11 +162,8 @@ def test_a_table_of_many_columns_turns_its_page_in_a_word_document(
         for nth, name in enumerate(names, start=1):
             text = re.sub(rf"\bR{nth}\b", name.replace(" ", "_"), text)
         (root / file).write_text(text, encoding="utf-8")
-    call = ["report", str(root), "--format", "docx", "--only", "grades", "--quiet"]
-    subprocess.run(
-        [sys.executable, "-m", "masrel", *call], check=True, capture_output=True
-    )
-    word = docx.Document(str(root / "report" / "report.docx"))
+    build(root, tmp_path / "report", {}, "--format", "docx", "--only", "grades")
+    word = docx.Document(str(tmp_path / "report" / "report.docx"))
     first, turned, *_ = word.sections
     assert first.page_width < first.page_height
     assert turned.page_width > turned.page_height
@@ -171,6 +171,33 @@ def test_a_table_of_many_columns_turns_its_page_in_a_word_document(
     (before, *_) = word.element.body.xpath("w:p[w:pPr/w:sectPr]")
     assert before.xpath("w:r")
     assert before.getnext().xpath("w:pPr/w:pStyle/@w:val") == ["Heading1"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(None in (OFFICE, TEXT_OF_PDF), reason="LibreOffice, pdftotext")
+def test_a_word_processor_keeps_captions_with_their_tables(tmp_path: Path) -> None:
+    root = tmp_path / "study"
+    copy_template("hess2012", root)
+    build(root, tmp_path / "report", {}, "--format", "docx")
+    file = tmp_path / "report" / "report.docx"
+    office = [str(OFFICE), f"-env:UserInstallation=file://{tmp_path}/office"]
+    convert = [*office, "--headless", "--convert-to", "pdf", "--outdir", str(tmp_path)]
+    for call in (
+        [*convert, str(file)],
+        [str(TEXT_OF_PDF), str(tmp_path / "report.pdf")],
+    ):
+        subprocess.run(call, check=True, capture_output=True)
+    pages = (tmp_path / "report.txt").read_text(encoding="utf-8").split("\f")
+    word = docx.Document(str(file))
+    for nth, table in enumerate(word.tables, start=1):
+        (page,) = [page for page in pages if f"Table {nth}. " in page]
+        below = page.partition(f"Table {nth}. ")[2].split()
+        for cells in table.rows[0].cells, table.rows[1].cells:
+            words = " ".join(cell.text for cell in cells).split()
+            assert not [word for word in words if "-" not in word and word not in below]
+    # what is laid out has the contents that were written
+    contents = [p.text for p in word.paragraphs if p.style.name == "toc 1"]
+    assert "\n".join(contents) in pages[0]
 
 
 def compiled(folder: Path, engine: str) -> str:
@@ -199,11 +226,8 @@ def test_latex_compiles(folder: Path, tmp_path: Path, engine: str) -> None:
 def test_latex_of_every_section_fits_its_page(tmp_path: Path, engine: str) -> None:
     root = tmp_path / "study"
     copy_template("hess2012", root)
-    call = ["report", str(root), "--format", "latex", "--quiet"]
-    subprocess.run(
-        [sys.executable, "-m", "masrel", *call], check=True, capture_output=True
-    )
-    log = compiled(root / "report", engine)
+    build(root, tmp_path / "report", {}, "--format", "latex")
+    log = compiled(tmp_path / "report", engine)
     assert "Overfull" not in log
     assert "Missing character" not in log
 
