@@ -39,7 +39,7 @@ def asking_stage(make_stage: MakeStage) -> Stage:
     return make_stage(
         n_raters=N_RATERS,
         n_models=2,
-        simulated_raters={"mean_speed_deg_s": 30.0},
+        simulated_raters={"mean_speed_deg_s": 45.0},
         questionnaires=[YEARS],
     )
 
