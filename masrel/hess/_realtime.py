@@ -1,4 +1,4 @@
-"""What makes a loop prompt: its scheduling, locked memory, timers, no collector."""
+"""What makes a loop prompt: its scheduling, its processor, locked memory, timers."""
 
 import contextlib
 import ctypes
@@ -29,7 +29,10 @@ def scheduled(clock: Clock) -> Iterator[str | None]:
 
 @contextmanager
 def real_time() -> Iterator[str]:
-    """Ask for SCHED_FIFO, locked memory and prompt timers until the block ends."""
+    """Ask for SCHED_FIFO, locked memory and prompt timers until the block ends.
+
+    What has SCHED_FIFO stays on one processor.
+    """
     # Only Linux has all three; elsewhere nothing is requested. The process may ask for
     # SCHED_FIFO and locked memory as root, or within ``ulimit -r`` and ``ulimit -l``.
     if sys.platform != "linux":
@@ -53,7 +56,57 @@ def _fifo(granted: contextlib.ExitStack) -> str:
     except OSError as error:
         return f"no SCHED_FIFO ({error.strerror})"
     granted.callback(os.sched_setscheduler, 0, policy, parameters)
-    return f"SCHED_FIFO {_PRIORITY}"
+    return f"SCHED_FIFO {_PRIORITY}{_alone(granted)}"
+
+
+def _alone(granted: contextlib.ExitStack) -> str:
+    # Only with SCHED_FIFO: an ordinary thread may have to go where there is room
+    allowed = os.sched_getaffinity(0)
+    processor = _of_loop(allowed)
+    if processor is None or not _moved({processor}):
+        return ""
+    granted.callback(_moved, allowed)
+    return f" on processor {processor}"
+
+
+@contextmanager
+def off_the_loop() -> Iterator[list[int]]:
+    """Keep this thread and what it starts off the processor of a loop.
+
+    Gives the processors that the process of a loop is to have; none where all stays as
+    it was.
+    """
+    allowed = os.sched_getaffinity(0) if sys.platform == "linux" else set()
+    processor = _of_loop(allowed)
+    if processor is None or not _moved(allowed - {processor}):
+        yield []
+        return
+    try:
+        yield sorted(allowed)
+    finally:
+        _moved(allowed)
+
+
+def may_use(processors: list[int]) -> None:
+    """Let this thread and what it starts have these processors, if there are any."""
+    if processors:
+        _moved(set(processors))
+
+
+def _of_loop(allowed: set[int]) -> int | None:
+    # The last one, for the first takes most interrupts; none where it is the only one
+    return max(allowed) if len(allowed) > 1 else None
+
+
+def _moved(processors: set[int]) -> bool:
+    # Whether the system let this thread have these processors and no others
+    if sys.platform != "linux":
+        return False
+    try:
+        os.sched_setaffinity(0, processors)
+    except OSError:
+        return False
+    return True
 
 
 def _locked(granted: contextlib.ExitStack, library: ctypes.CDLL) -> str:

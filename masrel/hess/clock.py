@@ -5,6 +5,8 @@ from typing import Protocol
 
 from masrel.errors import ParameterError
 
+_AWAKE_NS = 200_000  # the end of a sleep: a processor that rests wakes up late
+
 
 class Clock(Protocol):
     """What the loop and the simulated device ask of a clock."""
@@ -55,16 +57,18 @@ class RealClock:
         return time.monotonic_ns()
 
     def sleep_until_ns(self, deadline_ns: int) -> None:
-        """Sleep until an absolute time.
+        """Sleep until an absolute time, the last 0.2 ms of it looking at the clock.
 
         Parameters
         ----------
         deadline_ns : int
             When to return, ns on this clock.
         """
-        # Again in a loop: a sleep may return a little before its time.
-        while (left_ns := deadline_ns - time.monotonic_ns()) > 0:
-            time.sleep(left_ns * 1e-9)
+        left_ns = deadline_ns - time.monotonic_ns()
+        if left_ns > _AWAKE_NS:
+            time.sleep((left_ns - _AWAKE_NS) * 1e-9)
+        while time.monotonic_ns() < deadline_ns:
+            pass
 
 
 class SimulatedClock:

@@ -97,11 +97,14 @@ class Desk:
         Where the study is.
     version : int
         Grows with everything that pages should see.
+    processors : list of int
+        Those of the process of a session; if empty, those of this process.
     """
 
     def __init__(self, study: StudyPaths, *, clock: ClockName = "real") -> None:
         self.study = study
         self.version = 1
+        self.processors: list[int] = []
         self._id = secrets.token_hex(4)  # by which pages know that it is another one
         self._clock = clock
         self._running: _Running | None = None
@@ -145,6 +148,7 @@ class Desk:
             "session": session,
             "rehearsal": rehearsal,
             "clock": self._clock,
+            "processors": self.processors,
         }
         with theirs:
             process = await asyncio.create_subprocess_exec(

@@ -19,6 +19,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from masrel._files import make_folder
 from masrel.errors import ParameterError
+from masrel.hess._realtime import off_the_loop
 from masrel.protocol import StudyPaths
 from masrel.serve._access import Access
 from masrel.serve._app import make_app
@@ -208,7 +209,7 @@ async def serve(
     app = make_app(desk, access)
     server = _Server(_configured(app, context))
     logging.getLogger("uvicorn.error").setLevel(logging.ERROR)
-    with _signals() as signals, _enter(show):
+    with off_the_loop() as desk.processors, _signals() as signals, _enter(show):
         show()  # whoever reads it may send a signal
         serving = asyncio.ensure_future(server.serve([listener]))
         await _first(serving, signals.get())

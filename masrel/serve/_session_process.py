@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from masrel.errors import MasrelError, SessionLogInUseError, SessionStoppedError
+from masrel.hess._realtime import may_use
 from masrel.protocol import StudyPaths, read_protocol, scale_of
 from masrel.run import SessionSummary, run_session
 from masrel.serve._channel import Channel, Message
@@ -23,6 +24,7 @@ _OTHER_ENDS_S = 10.0  # within this a process ends whose server is gone
 def main(arguments: list[str]) -> None:
     """Run a session, and say how it ended."""
     order = json.loads(arguments[0])
+    may_use(order["processors"])
     channel = Channel(socket.socket(fileno=order["socket"]))
 
     def note(message: Warning | str, *_: object) -> None:

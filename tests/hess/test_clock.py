@@ -14,6 +14,13 @@ def test_the_real_clock_does_not_return_before_its_deadline() -> None:
         assert clock.now_ns() >= deadline
 
 
+def test_the_real_clock_sleeps_but_for_the_end_of_a_wait() -> None:
+    clock = RealClock()
+    began = time.thread_time()
+    clock.sleep_until_ns(clock.now_ns() + 200_000_000)
+    assert time.thread_time() - began < 0.05
+
+
 def test_the_real_clock_returns_at_once_when_the_deadline_has_passed() -> None:
     clock = RealClock()
     before = time.monotonic()

@@ -70,18 +70,23 @@ class Served:
 
     def sessions(self) -> list[int]:
         """Processes of sessions of this study."""
-        name = str(self.study.root).encode()
-        return [
-            int(folder.name)
-            for folder in Path("/proc").glob("[0-9]*")
-            if _is_session(folder / "cmdline", name)
-        ]
+        return sessions_of(self.study)
 
     def close(self) -> None:
         """End the last server, and let no more start."""
         if self._process is not None:
             self.kill(self._process)
         self._forks.communicate()
+
+
+def sessions_of(study: StudyPaths) -> list[int]:
+    """Processes of sessions of a study that is served."""
+    name = str(study.root).encode()
+    return [
+        int(folder.name)
+        for folder in Path("/proc").glob("[0-9]*")
+        if _is_session(folder / "cmdline", name)
+    ]
 
 
 def _is_session(cmdline: Path, name: bytes) -> bool:

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from masrel.hess._realtime import real_time
+from masrel.hess._realtime import off_the_loop, real_time
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="scheduling and locked memory as Linux has them"
@@ -21,8 +21,10 @@ for limit in (resource.RLIMIT_RTPRIO, resource.RLIMIT_MEMLOCK):
     resource.setrlimit(limit, (0, 0))
 if os.getuid() == 0:
     os.setgroups([]); os.setgid(65534); os.setuid(65534)
+before = os.sched_getaffinity(0)
 with real_time() as granted:
     print(granted)
+    assert os.sched_getaffinity(0) == before
 """
 
 
@@ -34,15 +36,20 @@ def locked_kb() -> int:
 
 def test_it_says_of_each_whether_it_was_granted_and_gives_it_back() -> None:
     policy, locked = os.sched_getscheduler(0), locked_kb()
+    allowed = os.sched_getaffinity(0)
+    last = max(allowed)
+    where = f" on processor {last}" if len(allowed) > 1 else ""
     with real_time() as granted:
         scheduling, memory, timers = granted.split(", ")
         is_fifo = os.sched_getscheduler(0) == os.SCHED_FIFO
-        assert is_fifo is (scheduling == "SCHED_FIFO 80")
+        assert is_fifo is (scheduling == f"SCHED_FIFO 80{where}")
+        assert os.sched_getaffinity(0) == ({last} if is_fifo else allowed)
         assert (locked_kb() > locked) is (memory == "locked memory")
         assert timers == "prompt timers"  # needs no privilege
         if not is_fifo:
             assert scheduling.startswith("no SCHED_FIFO (")
     assert os.sched_getscheduler(0) == policy
+    assert os.sched_getaffinity(0) == allowed
     assert locked_kb() == locked
 
 
@@ -55,6 +62,20 @@ def test_without_privileges_it_says_so_and_goes_on() -> None:
         "no SCHED_FIFO (Operation not permitted), "
         "no locked memory (Operation not permitted), prompt timers"
     )
+
+
+def test_a_single_processor_is_shared_by_all() -> None:
+    allowed = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(allowed)})
+    try:
+        with off_the_loop() as processors:
+            assert processors == []
+            assert os.sched_getaffinity(0) == {min(allowed)}
+        with real_time() as granted:
+            assert "on processor" not in granted
+            assert os.sched_getaffinity(0) == {min(allowed)}
+    finally:
+        os.sched_setaffinity(0, allowed)
 
 
 def test_an_exception_gives_it_back_too() -> None:
