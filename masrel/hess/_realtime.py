@@ -31,7 +31,7 @@ def scheduled(clock: Clock) -> Iterator[str | None]:
 def real_time() -> Iterator[str]:
     """Ask for SCHED_FIFO, locked memory and prompt timers until the block ends.
 
-    What has SCHED_FIFO stays on one processor.
+    What has SCHED_FIFO begins on the processor that `off_the_loop` leaves to it.
     """
     # Only Linux has all three; elsewhere nothing is requested. The process may ask for
     # SCHED_FIFO and locked memory as root, or within ``ulimit -r`` and ``ulimit -l``.
@@ -56,16 +56,17 @@ def _fifo(granted: contextlib.ExitStack) -> str:
     except OSError as error:
         return f"no SCHED_FIFO ({error.strerror})"
     granted.callback(os.sched_setscheduler, 0, policy, parameters)
-    return f"SCHED_FIFO {_PRIORITY}{_alone(granted)}"
+    return f"SCHED_FIFO {_PRIORITY}{_placed()}"
 
 
-def _alone(granted: contextlib.ExitStack) -> str:
-    # Only with SCHED_FIFO: an ordinary thread may have to go where there is room
+def _placed() -> str:
+    # With SCHED_FIFO a thread stays where it is, unless another one needs the place:
+    # then it may go, or two loops would be in each other's way
     allowed = os.sched_getaffinity(0)
     processor = _of_loop(allowed)
     if processor is None or not _moved({processor}):
         return ""
-    granted.callback(_moved, allowed)
+    _moved(allowed)
     return f" on processor {processor}"
 
 

@@ -14,6 +14,7 @@ import sys
 from collections.abc import Callable
 
 from masrel.errors import DeviceError
+from masrel.hess._realtime import off_the_loop
 
 _FAILED, _IDLED = 1, 3
 _TRIES = 5  # a bus that fails once may work a moment later
@@ -30,13 +31,18 @@ def main(arguments: list[str]) -> int:
         with contextlib.suppress(OSError):  # not permitted: as it is, then
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
     timeout_s, module, *idle_arguments = arguments
+    with off_the_loop():
+        return _hold(float(timeout_s), module, idle_arguments)
+
+
+def _hold(timeout_s: float, module: str, idle_arguments: list[str]) -> int:
     try:
         idle: Callable[[], None] = importlib.import_module(module).prepare(
             *idle_arguments
         )
         sys.stdout.write("ready\n")
         sys.stdout.flush()
-        return watch(0, float(timeout_s), idle)
+        return watch(0, timeout_s, idle)
     except DeviceError as error:
         sys.stderr.write(f"watchdog: {error}\n")
         return _FAILED

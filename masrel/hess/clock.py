@@ -5,7 +5,7 @@ from typing import Protocol
 
 from masrel.errors import ParameterError
 
-_AWAKE_NS = 200_000  # the end of a sleep: a processor that rests wakes up late
+_AWAKE_NS = 400_000  # the end of a sleep: a processor that rests wakes up late
 
 
 class Clock(Protocol):
@@ -57,7 +57,7 @@ class RealClock:
         return time.monotonic_ns()
 
     def sleep_until_ns(self, deadline_ns: int) -> None:
-        """Sleep until an absolute time, the last 0.2 ms of it looking at the clock.
+        """Sleep until an absolute time, the last 0.4 ms of it looking at the clock.
 
         Parameters
         ----------

@@ -37,10 +37,10 @@ Values = NDArray[np.float64]
 
 @dataclass
 class Lateness:
-    """How late ticks came, s, and how many did not come at all."""
+    """How late ticks came, s, and how many did not come at all, second by second."""
 
     late: list[Values] = field(default_factory=list)
-    n_missed: int = 0
+    missed: list[int] = field(default_factory=list)
 
     def add(self, study: StudyPaths) -> None:
         """Take in every recording of a study."""
@@ -49,13 +49,34 @@ class Lateness:
             time_s = recording.columns["time_s"][: recording.n_presented]
             tick = np.floor(time_s / PERIOD_S + 1e-9)
             # each tick is due when the one that came before it is over
-            self.late.append(time_s[1:] - (tick[:-1] + 1.0) * PERIOD_S)
-            self.n_missed += int(recording.facts["n_missed_ticks"] or 0)
+            late = time_s[1:] - (tick[:-1] + 1.0) * PERIOD_S
+            n_missed = np.diff(tick) - 1.0
+            starts = np.flatnonzero(np.diff(np.floor(time_s[1:]), prepend=0.0))
+            self.late += np.split(late, starts)
+            self.missed += [int(part.sum()) for part in np.split(n_missed, starts)]
 
     @property
     def all(self) -> Values:
         """Of every tick, s."""
         return np.concatenate(self.late)
+
+    def resampled(
+        self, share: float, rng: np.random.Generator, n: int = 1000
+    ) -> tuple[Values, Values]:
+        """Draw the seconds anew -> a quantile, s, and missed ticks of each draw."""
+        # by seconds, for late ticks come in bursts -> (n,), (n,)
+        n_seconds, late = len(self.late), self.all
+        order = np.argsort(late)
+        second = np.repeat(np.arange(n_seconds), [part.size for part in self.late])
+        late, second = late[order], second[order]
+        quantiles, missed = np.empty(n), np.empty(n)
+        for draw in range(n):
+            drawn = rng.integers(n_seconds, size=n_seconds)
+            times = np.bincount(drawn, minlength=n_seconds)
+            below = np.cumsum(times[second])
+            quantiles[draw] = late[np.searchsorted(below, share * below[-1])]
+            missed[draw] = times @ self.missed
+        return quantiles, missed
 
 
 def long_study(root: Path, seconds: float) -> StudyPaths:
@@ -121,7 +142,7 @@ class Tablet:
             body = {"ask": state["ask"], "answer": answers[state["screen"]]}
             state = self.tap("/rater/answer", body)
         if state["how"] != "complete":
-            raise SystemExit(state["text"])
+            raise SystemExit(f"the session is over: {state['how']}")
 
 
 @contextmanager
@@ -240,11 +261,11 @@ class Stops:
     def __call__(self, tablet: Tablet) -> None:
         """Tap a stop where samples are taken, and wait until all is over."""
         for partial in self._study.sessions.glob("*/*.partial"):
-            with contextlib.suppress(FileNotFoundError):  # it is being allocated
+            with contextlib.suppress(FileNotFoundError, ValueError):  # being allocated
                 self._stop(tablet, partial)
 
     def _stop(self, tablet: Tablet, partial: Path) -> None:
-        with SampleTail(partial) as tail:
+        with closing(SampleTail(partial)) as tail:
             # when the loop began, by the clock of this process: no row is read before
             # it is written
             began_s, until_s = np.inf, time.monotonic() + TAPPED_AFTER_S

@@ -21,10 +21,8 @@ for limit in (resource.RLIMIT_RTPRIO, resource.RLIMIT_MEMLOCK):
     resource.setrlimit(limit, (0, 0))
 if os.getuid() == 0:
     os.setgroups([]); os.setgid(65534); os.setuid(65534)
-before = os.sched_getaffinity(0)
 with real_time() as granted:
     print(granted)
-    assert os.sched_getaffinity(0) == before
 """
 
 
@@ -43,7 +41,7 @@ def test_it_says_of_each_whether_it_was_granted_and_gives_it_back() -> None:
         scheduling, memory, timers = granted.split(", ")
         is_fifo = os.sched_getscheduler(0) == os.SCHED_FIFO
         assert is_fifo is (scheduling == f"SCHED_FIFO 80{where}")
-        assert os.sched_getaffinity(0) == ({last} if is_fifo else allowed)
+        assert os.sched_getaffinity(0) == allowed
         assert (locked_kb() > locked) is (memory == "locked memory")
         assert timers == "prompt timers"  # needs no privilege
         if not is_fifo:
