@@ -122,11 +122,13 @@ def test_the_next_step_is_one_command(small: Small) -> None:
     stop_after(small, "R2", 1)
     assert step(small).command == f"masrel run {root} --rater R2 --session test"
     assert step(small).why == "1 of 3 graded"
+    assert (step(small).verb, step(small).rater) == ("run", "R2")
     record_standing(study, protocol, "R2", "withdrawn", **BY)
     run(small, "R1")
     assert step(small).command == f"masrel run {root} --rater R1 --session retest"
     study.schedule_file("R1", "retest").unlink()
     assert step(small).command == f"masrel schedule {root}"
+    assert (step(small).verb, step(small).session) == ("schedule", None)
     write_schedules(protocol, study)
     run(small, "R1", "retest")
     assert step(small).command == f"masrel ratings {root}"

@@ -198,6 +198,24 @@ def test_long_work_runs_once_at_a_time_and_can_be_stopped(study: StudyPaths) -> 
     with_tablets(study, run, coordinated=True)
 
 
+def test_the_log_of_a_rehearsal_is_shown_while_it_runs(study: StudyPaths) -> None:
+    async def run(_: Desk, page: Tablet, tablet: Tablet) -> None:
+        for is_rehearsal in (False, True):
+            where = {"rater": "R1", "session": "test", "rehearsal": is_rehearsal}
+            await done(page, "start", **where)
+            await tablet.until("instructions")
+            state = await page.state()
+            assert [each["event"] for each in state["log"]] == ["session"]
+            assert state["desk"]["session"]["rehearsal"] is is_rehearsal
+            await tablet.until("ready")
+            log = (await page.state())["log"]
+            assert [each["event"] for each in log] == ["session", "instructed"]
+            await done(page, "leave")
+            assert (await page.state())["log"] == []
+
+    with_tablets(study, run, "R1", coordinated=True)
+
+
 def test_missing_schedules_are_drawn(study: StudyPaths) -> None:
     file = study.schedule_file("R2", "test")
     before = file.read_bytes()
