@@ -6,6 +6,7 @@ import msgspec
 
 from masrel.protocol import Occasions, PresentationRules
 from masrel.protocol._kinds import DEFAULT_KIND, all_values
+from masrel.report._figure_data import MANY_RATERS
 from masrel.report._material import Material, Paragraph, Section
 from masrel.report._tables import (
     Column,
@@ -275,17 +276,29 @@ def _by_rater(table: "pd.DataFrame", key: str) -> str | None:
     return "; ".join(f"{value}: {', '.join(who)}" for value, who in raters.items())
 
 
+def _without_ratings(material: Material, graded: "pd.DataFrame") -> list[str]:
+    # graded: the rows of the ratings that have a grade
+    notes = []
+    sessions, rated = set(graded["session"]), set(graded["model"])
+    absent = [each.id for each in material.protocol.sessions if each.id not in sessions]
+    if absent:
+        notes.append(f"No ratings in these data: session {', '.join(absent)}.")
+    unrated = [each.id for each in material.protocol.models if each.id not in rated]
+    if unrated and rated:
+        notes.append(f"Models without ratings in these data: {', '.join(unrated)}.")
+    return notes
+
+
 def _sessions(material: Material) -> Table:
     protocol, table = material.protocol, material.ratings.table
     graded = table[table["grade"].notna()]
-    rated = set(graded["model"])
     # known of ratings from session logs
     origins = {
         key: heading
         for key, heading in (("grades_from", "Grades from"), ("device", "Device"))
         if table[key].notna().any()
     }
-    rows, absent = [], []
+    rows, shown = [], []
     for session in protocol.sessions:
         n_raters = len(session.raters)
         n_planned = n_raters * len(protocol.models) * protocol.schedule.repeats
@@ -296,14 +309,11 @@ def _sessions(material: Material) -> Table:
         ]
         note = session.note or None
         rows.append((session.id, n_raters, names, n_planned, n_given, *facts, note))
-        if n_given == 0:
-            absent.append(session.id)
-    notes = []
-    if absent:
-        notes.append(f"No ratings in these data: session {', '.join(absent)}.")
-    unrated = [model.id for model in protocol.models if model.id not in rated]
-    if unrated and rated:
-        notes.append(f"Models without ratings in these data: {', '.join(unrated)}.")
+        if n_raters > MANY_RATERS:
+            names = ", ".join([*session.raters[:2], "…", session.raters[-1]])
+        shown.append((session.id, n_raters, names, n_planned, n_given, *facts, note))
+    notes = [] if shown == rows else ["The file names all raters."]
+    notes += _without_ratings(material, graded)
     return Table(
         name="sessions",
         caption="Sessions, their raters, and the ratings there are",
@@ -317,6 +327,7 @@ def _sessions(material: Material) -> Table:
             Column(key="note", heading="Note", align="left"),
         ),
         rows=tuple(rows),
+        page_rows=tuple(shown),
         notes=tuple(notes),
         data=material.data,
     )

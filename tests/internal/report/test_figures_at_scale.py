@@ -205,6 +205,9 @@ def test_the_page_of_many_raters_shows_a_few_and_the_files_have_all(
         head, *rows = file.read_text(encoding="utf-8").splitlines()
         assert len(rows) == n_rows
         assert head.count(",") + 1 == n_columns
+    (sessions,) = folder.glob("sessions-*.csv")
+    assert "R031, R032" in sessions.read_text(encoding="utf-8")
+    assert "R001, R002, …, R032<" in page
     assert "(lower quartile)" in page
     assert ">R017<" not in page
 
