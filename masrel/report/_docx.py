@@ -194,6 +194,7 @@ def _set_page(document: "WordDocument", header: str) -> None:
 def _set_styles(document: "WordDocument") -> None:
     """Set the fonts, sizes and distances of a manuscript."""
     from docx.enum.style import WD_STYLE_TYPE
+    from docx.oxml.ns import qn
     from docx.shared import Pt, RGBColor
 
     styles = document.styles
@@ -214,6 +215,10 @@ def _set_styles(document: "WordDocument") -> None:
     for element in styles["Title"].element.xpath("w:pPr/w:pBdr"):
         element.getparent().remove(element)
     add_table_styles(document)
+    # the template is Word 2010's, and newer ones say so in the title of the window
+    mode = '//w:compatSetting[@w:name="compatibilityMode"]'
+    for setting in document.settings.element.xpath(mode):
+        setting.set(qn("w:val"), "15")
 
 
 def _add(document: "WordDocument", part: Part, *, is_turned: bool) -> None:
