@@ -8,7 +8,6 @@ what floats leave in doubt there, and every other motion, goes through piece by 
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import MISSING, dataclass, field, fields
-from itertools import chain
 from operator import attrgetter
 from types import SimpleNamespace
 from typing import Any
@@ -22,7 +21,7 @@ from masrel.elbow._polynomials import Number
 from masrel.elbow._single_stretches import PIECES, SingleStretches, Which
 from masrel.elbow._torque import loads
 from masrel.elbow.motions import ConstantSpeed, MinimumJerk, Trapezoid
-from masrel.elbow.parameters import ElbowParameters
+from masrel.elbow.parameters import READINGS, ElbowParameters
 from masrel.errors import ParameterError
 
 __all__ = ["EVENTS", "LOADS", "Columns", "SceneTable", "evaluate"]
@@ -387,9 +386,24 @@ def _joint_columns(
     if isinstance(joints, Columns):
         p = SimpleNamespace(**_taken(joints, rows))
     else:
-        p = SimpleNamespace(**_read(*_distinct(joints, rows), _FIELDS[ElbowParameters]))
+        packed = b"".join(map(attrgetter("_packed"), _chosen_of(joints, rows)))
+        names = _FIELDS[ElbowParameters]
+        p = SimpleNamespace(**_unpacked(np.frombuffer(packed), names))
     p.rest_angle = math.nan if p.rest_angle is None else p.rest_angle
     return p
+
+
+def _unpacked(numbers: Floats, names: tuple[str, ...]) -> dict[str, Any]:
+    # fields by name: a column each, or the one value that all have
+    table = numbers.reshape(-1, len(names))
+    is_same = (table == table[0]).all(axis=0).tolist()
+    columns: dict[str, Any] = {}
+    for name, column, same in zip(names, table.T, is_same, strict=True):
+        values: Any = column[0].item() if same else column.copy()
+        if name in READINGS:
+            values = np.array(READINGS[name])[np.asarray(values, dtype=int)]
+        columns[name] = values
+    return columns
 
 
 def _motion_columns(
@@ -399,10 +413,12 @@ def _motion_columns(
     if isinstance(moves, Columns):
         taken = _taken(moves, rows)
     else:
-        taken = _read(_chosen_of(moves, rows), None, _FIELDS[kind])
-    return SimpleNamespace(
-        **{k: c if np.ndim(c) else np.full(n, c) for k, c in taken.items()}
-    )
+        chosen = _chosen_of(moves, rows)
+        taken = {
+            name: np.fromiter(map(attrgetter(name), chosen), float, len(chosen))
+            for name in _FIELDS[kind]
+        }
+    return SimpleNamespace(**{k: np.broadcast_to(c, n) for k, c in taken.items()})
 
 
 def _taken(items: Columns, rows: Which) -> dict[str, Any]:
@@ -417,33 +433,3 @@ def _chosen_of(items: Sequence[Any], rows: Which) -> Sequence[Any]:
     if len(items) == 1:
         return items
     return items[rows] if isinstance(rows, slice) else [items[i] for i in rows.tolist()]
-
-
-def _distinct(
-    items: Sequence[Any], rows: Which
-) -> tuple[Sequence[Any], NDArray[np.intp] | None]:
-    # objects, each once, and which of them is in each row; None as they come
-    chosen = _chosen_of(items, rows)
-    once = dict(zip(map(id, chosen), chosen, strict=True))
-    if len(once) in (1, len(chosen)):
-        return list(once.values()), None
-    places = dict(zip(once, range(len(once)), strict=True))
-    index = np.fromiter(map(places.__getitem__, map(id, chosen)), dtype=np.intp)
-    return list(once.values()), index
-
-
-def _read(
-    items: Sequence[Any], index: NDArray[np.intp] | None, names: tuple[str, ...]
-) -> dict[str, Any]:
-    # fields by name: a column each, or the one value that all have
-    every = list(chain.from_iterable(map(attrgetter(*names), items)))
-    columns: dict[str, Any] = {}
-    for i, name in enumerate(names):
-        column = every[i :: len(names)]
-        first, last = column[0], column[-1]
-        if first == last and column.count(first) == len(column):
-            columns[name] = first
-        else:  # None, no rest angle, becomes nan
-            values = np.array(column, dtype=None if isinstance(first, str) else float)
-            columns[name] = values if index is None else values[index]
-    return columns

@@ -5,9 +5,11 @@ https://doi.org/10.1109/TNSRE.2012.2195330, equations (1)-(6) and Table III.
 """
 
 import math
+import struct
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from functools import partial
+from typing import Any, ClassVar, Literal
 
 from masrel.elbow import _law
 from masrel.elbow.sampled import SampledJoint
@@ -50,14 +52,23 @@ _RANGES: tuple[tuple[str, Callable[[float], bool], tuple[str, ...]], ...] = (
     ),
 )
 
-_READINGS = {
+READINGS = {
     "post_catch": ("continuous", "additive"),
     "residual_reading": ("residual", "decrease"),
 }
 
 
+class _Packed:
+    """Fields as bytes too, of which `evaluate` reads thousands fast."""
+
+    __slots__ = ("_packed",)  # no field: it is of no account to ==, hash and repr
+
+    def __reduce__(self) -> tuple[Any, ...]:  # a copy is made anew, and packed
+        return partial(type(self), **{k: getattr(self, k) for k in self.__slots__}), ()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ElbowParameters:
+class ElbowParameters(_Packed):
     """Parameters of the joint model, in SI units (angles in rad).
 
     Angle 0 is full flexion and grows with extension.
@@ -131,26 +142,30 @@ class ElbowParameters:
     catch_rise: float = 0.0
 
     def __post_init__(self) -> None:
+        numbers: list[float] = []  # nan for no rest angle, the place of a reading
         for name in self.__slots__:
             value = getattr(self, name)
-            if isinstance(value, int | float) and not math.isfinite(value):
+            if name in READINGS:
+                if value not in (two := READINGS[name]):
+                    raise ParameterError(
+                        f'{name}: needs "{two[0]}" or "{two[1]}", got {value!r}'
+                    )
+                value = two.index(value)
+            elif isinstance(value, int | float) and not math.isfinite(value):
                 raise ParameterError(f"{name}: needs a finite number, got {value}")
+            numbers.append(math.nan if value is None else value)
         for needed, is_met, names in _RANGES:
             for name in names:
                 value = getattr(self, name)
                 if not is_met(value):
                     raise ParameterError(f"{name}: needs {needed.format(value)}")
-        for name, (one, other) in _READINGS.items():
-            value = getattr(self, name)
-            if value not in (one, other):
-                raise ParameterError(
-                    f'{name}: needs "{one}" or "{other}", got {value!r}'
-                )
         if not 0.0 <= self.catch_rise <= self.peak_duration:
             raise ParameterError(
                 f"catch_rise: needs 0 to peak_duration, {self.peak_duration:g} s, "
                 f"got {self.catch_rise:g} s"
             )
+        packed = struct.pack(f"{len(numbers)}d", *numbers)
+        object.__setattr__(self, "_packed", packed)
 
     @property
     def fastest_mean_speed(self) -> float:
