@@ -1,7 +1,7 @@
 """Sessions by the browser: what a server costs the control loop, and how soon it acts.
 
 ``python -m docs.make.benchmarks.serving [--quick]`` writes its part of
-``docs/benchmarks.md``, in about 17 minutes. It needs a machine that does nothing else.
+``docs/benchmarks.md``, in about 18 minutes. It needs a machine that does nothing else.
 """
 
 import argparse
@@ -128,7 +128,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="small sizes, no page")
     quick = parser.parse_args().quick
-    lengths_s = (12.0,) if quick else (*(12.0,) * 6, 60.0)
+    lengths_s = (12.0,) if quick else (*(12.0,) * 7, 60.0)
     turns, n_grades, n_stops = (1, 2, 2) if quick else (2, 26, 14)
     with real_time() as granted:
         pass  # what a loop would be granted here
