@@ -2,8 +2,8 @@
 
 import math
 import statistics
-from collections.abc import Hashable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
+from operator import attrgetter
 
 from masrel.analysis._results import (
     InPersonAgreement,
@@ -17,7 +17,7 @@ from masrel.analysis._results import (
 )
 from masrel.errors import RatingsError
 from masrel.protocol import Protocol
-from masrel.ratings import InPerson, InPersonRow, Ratings
+from masrel.ratings import InPerson, InPersonRow, Rating, Ratings
 
 
 def intended_agreement(
@@ -27,13 +27,13 @@ def intended_agreement(
     # [1] Park, H.-S., Kim, J., Damiano, D. L. (2012). Development of a Haptic Elbow
     # Spasticity Simulator (HESS). IEEE TNSRE, 20(3), 361-370, section IV.B.
     # https://doi.org/10.1109/TNSRE.2012.2195330
-    table = ratings.table[ratings.table["session"] == session]
+    rows = [row for row in ratings.rows if row.session == session]
     models = []
     for model in protocol.models if session is not None else ():
         if model.role != "standard" or model.intended_grade is None:
             continue
-        rows = (table["model"] == model.id) & table["grade"].notna()
-        grades = table.loc[rows, "grade"].tolist()
+        of_model = [row.grade for row in rows if row.model == model.id]
+        grades = [grade for grade in of_model if grade is not None]
         n_agree = grades.count(model.intended_grade)
         models.append(
             ModelAgreement(
@@ -100,12 +100,12 @@ def _entries(
 ) -> list[tuple[InPersonRow, str | None]]:
     # Every in-person entry with its haptic grade: the one printed beside it in the
     # same file, or, where the file has none, the one in the ratings.
-    table = ratings.table
-    graded = table[(table["session"] == session) & table["grade"].notna()]
+    graded = [
+        row for row in ratings.rows if row.session == session and row.grade is not None
+    ]
     # Last to first: of repeated presentations the first one counts.
-    graded = graded.sort_values("repeat", ascending=False, kind="stable")
-    keys = zip(graded["rater"], graded["model"], strict=True)
-    haptic = dict(zip(keys, graded["grade"], strict=True))
+    graded.sort(key=attrgetter("repeat"), reverse=True)
+    haptic = {(row.rater, row.model): row.grade for row in graded}
     rows = in_person.rows
     printed = {row.source_table for row in rows if row.haptic_grade is not None}
     if not printed:
@@ -124,10 +124,8 @@ def _entries(
 
 def stretching_speeds(protocol: Protocol, ratings: Ratings) -> Speeds:
     """Return the mean speeds of the stretches, and summaries of them."""
-    known = ratings.table[ratings.table["mean_speed_deg_s"].notna()]
-    values = tuple(
-        speed for row in known.to_dict("records") for speed in _speeds_of(row)
-    )
+    known = [row for row in ratings.rows if not math.isnan(row.mean_speed_deg_s)]
+    values = tuple(speed for row in known for speed in _speeds_of(row))
     by_model: dict[tuple[str, str], list[float]] = {}
     by_rater: dict[tuple[str, str], list[float]] = {}
     for value in values:
@@ -141,38 +139,37 @@ def stretching_speeds(protocol: Protocol, ratings: Ratings) -> Speeds:
         values=values,
         by_model=_summaries(by_model, sessions, models),
         by_rater=_summaries(by_rater, sessions, raters),
-        n_missing=len(ratings.table) - len(known),
+        n_missing=len(ratings.rows) - len(known),
         reason=None if values else "no rating comes with a stretching speed",
     )
 
 
-def _speeds_of(row: Mapping[Hashable, Any]) -> Iterator[Speed]:
+def _speeds_of(row: Rating) -> Iterator[Speed]:
     # of each stretch that has one; of all together where the ratings say no more
-    made: dict[int | None, Any] = {None: row["mean_speed_deg_s"]}
-    if row["speeds_deg_s"] is not None:
-        made = {**dict(enumerate(row["speeds_deg_s"], start=1))}
+    made: dict[int | None, float | None] = {None: row.mean_speed_deg_s}
+    if row.speeds_deg_s is not None:
+        made = {**dict(enumerate(row.speeds_deg_s, start=1))}
     for stretch, speed in made.items():
         if speed is not None:
             yield Speed(
-                session=row["session"],
-                rater=row["rater"],
-                model=row["model"],
+                session=row.session,
+                rater=row.rater,
+                model=row.model,
                 mean_speed_deg_s=float(speed),
                 stretch=stretch,
-                is_graded=stretch is not None and stretch == row["graded_stretch"],
+                is_graded=stretch is not None and stretch == row.graded_stretch,
             )
 
 
 def presentations(ratings: Ratings) -> Presentations | None:
     """Count stretches, and presentations in which nothing could be felt."""
-    table = ratings.table
-    known = table[table["n_stretches"].notna()]
-    if known.empty:
+    known = [row for row in ratings.rows if row.n_stretches is not None]
+    if not known:
         return None
-    felt = known["felt"].tolist()
+    felt = [row.felt for row in known]
     return Presentations(
         n_presentations=len(known),
-        n_stretches=int(known["n_stretches"].sum()),
+        n_stretches=sum(row.n_stretches or 0 for row in known),
         n_felt=felt.count("felt"),
         n_below_threshold=felt.count("below-threshold"),
         n_no_catch=felt.count("no-catch"),

@@ -8,10 +8,8 @@ from masrel.ratings import InPerson, Ratings
 
 def analysed_ratings(ratings: Ratings, excluded: Collection[str]) -> Ratings:
     """Return the ratings of all other raters."""
-    is_left = ~ratings.table["rater"].isin(list(excluded))
-    return dataclasses.replace(
-        ratings, table=ratings.table[is_left].reset_index(drop=True)
-    )
+    rows = tuple(row for row in ratings.rows if row.rater not in excluded)
+    return dataclasses.replace(ratings, rows=rows)
 
 
 def analysed_in_person(

@@ -33,17 +33,15 @@ def given_grades(
 ) -> tuple[str | None, tuple[GivenGrades, ...]]:
     """Return the first session that has ratings, and its grades by intended ones."""
     intended = {model.id: model.intended_grade for model in protocol.models}
-    table = ratings.table[ratings.table["grade"].notna()]
-    present = set(table["session"])
+    graded = [row for row in ratings.rows if row.grade is not None]
+    present = {row.session for row in graded}
     session = next((s.id for s in protocol.sessions if s.id in present), None)
-    table = table[table["session"] == session]
     # how often each rater met each intended grade with each grade
     met: dict[str, Counter[tuple[str, str]]] = {}
-    for rater, model, grade in zip(
-        table["rater"], table["model"], table["grade"], strict=True
-    ):
-        if (aim := intended[model]) is not None:
-            met.setdefault(aim, Counter())[rater, grade] += 1
+    for row in graded:
+        aim = intended[row.model]
+        if row.session == session and row.grade is not None and aim is not None:
+            met.setdefault(aim, Counter())[row.rater, row.grade] += 1
     grades = ratings.scale.grades
     return session, tuple(
         _of_aim(aim, met[aim], grades, level) for aim in grades if aim in met

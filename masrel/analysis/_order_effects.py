@@ -11,8 +11,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-import pandas as pd
-
 from masrel.agreement import limits_of_agreement
 from masrel.errors import MasrelWarning
 from masrel.protocol import Protocol
@@ -128,20 +126,17 @@ def _rated(protocol: Protocol, ratings: Ratings) -> list[_Rated]:
     # every grade, sessions in the protocol's order
     steps = {grade: step for step, grade in enumerate(ratings.scale.grades)}
     order = {session.id: place for place, session in enumerate(protocol.sessions)}
-    table = ratings.table[ratings.table["grade"].notna()]
-    keys = ("session", "rater", "model", "repeat", "position", "grade")
     rated = [
         _Rated(
-            session=session,
-            rater=rater,
-            model=model,
-            repeat=int(repeat),
-            position=None if pd.isna(position) else int(position),
-            step=steps[grade],
+            session=row.session,
+            rater=row.rater,
+            model=row.model,
+            repeat=row.repeat,
+            position=row.position,
+            step=steps[row.grade],
         )
-        for session, rater, model, repeat, position, grade in zip(
-            *(table[key] for key in keys), strict=True
-        )
+        for row in ratings.rows
+        if row.grade is not None
     ]
     return sorted(rated, key=lambda each: order[each.session])
 

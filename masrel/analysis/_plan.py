@@ -101,7 +101,7 @@ def analyze(
         answers = [each for each in answers if each.rater not in excluded]
     sections = set(report_sections(protocol))
     # descriptions of grades speak of the first session that has ratings
-    present = set(ratings.table["session"])
+    present = {row.session for row in ratings.rows}
     session = next((s.id for s in protocol.sessions if s.id in present), None)
     return Analysis(
         study=protocol.study.id,
@@ -143,7 +143,8 @@ def _check_known(protocol: Protocol, ratings: Ratings) -> None:
     where = "the ratings" if ratings.source_path is None else str(ratings.source_path)
     problems = []
     for column, ids in known.items():
-        strange = dict.fromkeys(x for x in ratings.table[column] if x not in ids)
+        names = (getattr(row, column) for row in ratings.rows)
+        strange = dict.fromkeys(name for name in names if name not in ids)
         problems += [
             f"{where}: column {column!r}: needed one of the protocol's, "
             f"{', '.join(ids)}, got {got!r}"
@@ -227,16 +228,16 @@ def _rated_models(
     line: EstimatePlan, protocol: Protocol, ratings: Ratings
 ) -> tuple[tuple[str, ...], str | None]:
     # the models a line uses, rated in each of its sessions; or why there are none
-    present = set(ratings.table["session"])
+    present = {row.session for row in ratings.rows}
     lost = [session for session in line.sessions if session not in present]
     if lost:
         return (), f"there are no ratings of session {' or '.join(lost)}"
     planned = [m for m in protocol.models if line.models in ("all", m.role)]
     if not planned:
         return (), f"the study has no {line.models} models"
-    graded = ratings.table[ratings.table["grade"].notna()]
+    graded = {(row.session, row.model) for row in ratings.rows if row.grade is not None}
     rated = set.intersection(
-        *(set(graded.loc[graded["session"] == s, "model"]) for s in line.sessions)
+        *({model for of, model in graded if of == s} for s in line.sessions)
     )
     # A role without any rating was not part of these data: an estimate over the
     # rest would carry the name of more than it holds.

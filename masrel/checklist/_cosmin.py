@@ -57,8 +57,8 @@ def _stability(facts: StudyFacts) -> tuple[str, ...]:
 def _flaws(facts: StudyFacts) -> tuple[str, ...]:
     n_missing = "There are no ratings yet."
     if facts.ratings is not None:
-        count = int(facts.ratings.table["grade"].isna().sum())
-        n_missing = f"{counted(count, 'grade')} missing of {len(facts.ratings.table)}."
+        n_absent = counted(facts.ratings.n_missing, "grade")
+        n_missing = f"{n_absent} missing of {len(facts.ratings.rows)}."
     open_sessions = [s for s in facts.sessions if not s.is_complete]
     n_faults = sum(session.n_faults for session in facts.sessions)
     return (

@@ -18,6 +18,7 @@ from masrel.checklist._conditions import (
 from masrel.checklist._facts import StudyFacts
 from masrel.checklist._items import ChecklistItem
 from masrel.checklist._rater_facts import rater_characteristics, rater_flow
+from masrel.ratings import Rating
 from masrel.report._design import beside_presentations, stretches_asked_for
 from masrel.report._estimate_words import TARGETS, coefficient_name, sentence
 from masrel.report._sample_size import size_sentence
@@ -152,12 +153,15 @@ def _analysis(facts: StudyFacts) -> tuple[str, ...]:
 def _actual(facts: StudyFacts) -> tuple[str, ...]:
     if facts.ratings is None:
         return ()
-    table = facts.ratings.table
+    sessions: dict[str, list[Rating]] = {}
+    for row in facts.ratings.rows:
+        sessions.setdefault(row.session, []).append(row)
     lines = tuple(
-        f"Session {session}: {counted(rows['rater'].nunique(), 'rater')}, "
-        f"{counted(rows['model'].nunique(), 'model')}, {counted(len(rows), 'rating')}, "
-        f"{int(rows['grade'].isna().sum())} missing."
-        for session, rows in table.groupby("session", sort=False)
+        f"Session {session}: {counted(len({row.rater for row in rows}), 'rater')}, "
+        f"{counted(len({row.model for row in rows}), 'model')}, "
+        f"{counted(len(rows), 'rating')}, "
+        f"{sum(row.grade is None for row in rows)} missing."
+        for session, rows in sessions.items()
     )
     flow = (rater_flow(facts),) if facts.sessions else ()
     return (*flow, *lines, *facts.remarks)

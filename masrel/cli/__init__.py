@@ -4,7 +4,9 @@ Exit codes: 0 fine; 1 the run failed; 2 the input or the call is wrong. Errors
 go to stderr as sentences; a traceback is a bug.
 """
 
+import atexit
 import codecs
+import gc
 import importlib
 import io
 import sys
@@ -120,6 +122,8 @@ def cli() -> None:
 
 def main() -> None:
     """Run the command line and exit with its code."""
+    # What is left at the end goes with the process: no collector need look through it
+    atexit.register(gc.freeze)
     _accept_any_letter()
     try:
         cli()

@@ -45,8 +45,7 @@ def ratings(study: Path, output: Path | None) -> None:
     write_ratings(ratings, destination, within=None if output else study)
     if output is None:
         write_file(paths.raters_file, raters_text(paths, protocol), within=study)
-    n_rows = len(ratings.table)
-    n_missing = int(ratings.table["grade"].isna().sum())
+    n_rows, n_missing = len(ratings.rows), ratings.n_missing
     label = " (simulated)" if ratings.simulated else ""
     if ratings.n_from_persons == n_rows and label:
         label = " (simulated device)"
@@ -61,6 +60,6 @@ def ratings(study: Path, output: Path | None) -> None:
         write_answers(answers, beside, within=None if output else study)
         n_open = sum(each.answer is None for each in answers)
         click.echo(f"{len(answers) - n_open} answers, {n_open} missing: {beside}")
-    n_slow = int(ratings.table["felt"].isin(["below-threshold", "no-catch"]).sum())
+    n_slow = sum(row.felt in ("below-threshold", "no-catch") for row in ratings.rows)
     if n_slow:
         click.echo(f"{n_slow} after stretches too slow to feel the catch: column felt")

@@ -83,11 +83,11 @@ def read_study_data(
     if file is None and study.logs():
         ratings = ratings_from_logs(study, protocol)
         _refuse_other_table(study.ratings_file, ratings)
-        read = f"{len(ratings.table)} ratings from the logs in {study.sessions}"
+        read = f"{len(ratings.rows)} ratings from the logs in {study.sessions}"
     else:
         source = file or _file_of(study)
         ratings = read_study_ratings(source, scale_of(protocol))
-        read = f"{len(ratings.table)} ratings from {source}"
+        read = f"{len(ratings.rows)} ratings from {source}"
     return StudyData(
         paths=study,
         protocol=protocol,

@@ -5,6 +5,7 @@ import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from masrel.ratings.table import (
     DEFAULT_SESSION,
     RATING_COLUMNS,
     SOURCES,
+    Rating,
     Ratings,
     _assemble,
     _is_utc,
@@ -126,7 +128,7 @@ def read_study_ratings(path: Path | str, scale: Scale) -> Ratings:
     ...     path = Path(folder) / "ratings.csv"
     ...     _ = path.write_text("rater,model,grade\nR1,HM2,1+\nR2,HM2,NA\n")
     ...     ratings = read_study_ratings(path, MODIFIED_ASHWORTH)
-    >>> ratings.table["grade"].tolist()
+    >>> [row.grade for row in ratings.rows]
     ['1+', None]
     """
     rows = _read_rows(Path(path))
@@ -143,8 +145,8 @@ def read_study_ratings(path: Path | str, scale: Scale) -> Ratings:
     _check_cells(cells, scale, problems)
     if problems:
         raise _refusal(rows.path, problems)
-    values = {n: [getattr(cell, n) for cell in cells] for n in RATING_COLUMNS}
-    return _assemble(values, scale, rows.path)
+    taken = attrgetter(*RATING_COLUMNS)
+    return _assemble((Rating(*taken(cell)) for cell in cells), scale, rows.path)
 
 
 def _long_cells(

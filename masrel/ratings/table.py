@@ -7,9 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from masrel._cells import safe_cell
 from masrel._files import write_file
@@ -17,32 +15,80 @@ from masrel.errors import RatingsError
 from masrel.run._state import FELT, FROM_PERSONS
 from masrel.scales import Scale
 
-RATING_COLUMNS = (
-    "session",  # text
-    "rater",  # text
-    "model",  # text: the haptic model, or the item of a foreign table
-    "repeat",  # whole number from 1: which presentation of the model in the session
-    "grade",  # text, a grade of the scale; None when missing
-    "mean_speed_deg_s",  # mean speed before the catch, deg/s; nan when unknown
-    "source",  # one of SOURCES
-    # what a table that is not of session logs may lack; of the stretches before the
-    # grade:
-    "n_stretches",  # whole number; None when unknown
-    "min_speed_deg_s",  # slowest and fastest mean speed of a stretch; nan when unknown
-    "max_speed_deg_s",
-    "speeds_deg_s",  # mean speed of each, in order, None where it has none; or None
-    "graded_stretch",  # number of the one that the grade rests on; None when not said
-    "felt",  # one of masrel.run's FELT; None when unknown
-    # and of its session:
-    "grades_from",  # name of the source of its grades; None when unknown
-    "device",  # name of the device, "simulated" with others before it; or None
-    # and of the presentation; None when unknown:
-    "position",  # whole number from 1: its place in the session
-    "code",  # text: the blinded code the rater knew it by
-    "n_attempts",  # whole number from 0: how often it was presented
-    "first_grade",  # text: what the rater gave; other than grade when corrected
-    "graded_at",  # time in UTC, ISO 8601, when a person gave the first grade
-)
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class Rating(NamedTuple):
+    """One rating: a row of a study's table, which has a column for each field.
+
+    Attributes
+    ----------
+    session : str
+        The session.
+    rater : str
+        Who rated.
+    model : str
+        The haptic model, or the item of a foreign table.
+    repeat : int
+        Which presentation of the model in the session, from 1.
+    grade : str or None
+        A grade of the scale; None when missing.
+    mean_speed_deg_s : float
+        Mean speed before the catch, deg/s; nan when unknown.
+    source : {"published", "recorded", "simulated", "foreign"}
+        Where it comes from.
+    n_stretches : int or None
+        How many stretches were made before the grade; None when unknown.
+    min_speed_deg_s, max_speed_deg_s : float
+        Slowest and fastest mean speed of a stretch, deg/s; nan when unknown.
+    speeds_deg_s : tuple of (float or None), or None
+        Mean speed of each stretch, in order, None where it has none.
+    graded_stretch : int or None
+        Number of the stretch that the grade rests on; None when not said.
+    felt : str or None
+        What could be felt, one of `masrel.run.FELT`; None when unknown.
+    grades_from : str or None
+        Name of the source of the session's grades; None when unknown.
+    device : str or None
+        Name of the session's device, "simulated" with others before it; None when
+        unknown.
+    position : int or None
+        Its place in the session, from 1; None when unknown.
+    code : str or None
+        The blinded code the rater knew the model by; None when unknown.
+    n_attempts : int or None
+        How often it was presented; None when unknown.
+    first_grade : str or None
+        What the rater gave; other than `grade` when corrected.
+    graded_at : str or None
+        Time in UTC, ISO 8601, when a person gave the first grade; None when unknown.
+    """
+
+    session: str
+    rater: str
+    model: str
+    repeat: int = 1
+    grade: str | None = None
+    mean_speed_deg_s: float = math.nan
+    source: str = "foreign"
+    n_stretches: int | None = None
+    min_speed_deg_s: float = math.nan
+    max_speed_deg_s: float = math.nan
+    speeds_deg_s: tuple[float | None, ...] | None = None
+    graded_stretch: int | None = None
+    felt: str | None = None
+    grades_from: str | None = None
+    device: str | None = None
+    position: int | None = None
+    code: str | None = None
+    n_attempts: int | None = None
+    first_grade: str | None = None
+    graded_at: str | None = None
+
+
+RATING_COLUMNS = Rating._fields
+"""Columns of a table of ratings."""
 
 _N_ALWAYS = 7
 """Columns that every table has."""
@@ -56,6 +102,10 @@ _N_FORMERLY = 15
 SOURCES = ("published", "recorded", "simulated", "foreign")
 """Where a rating comes from; "foreign" is a file that does not say."""
 
+_FLOATS = ("mean_speed_deg_s", "min_speed_deg_s", "max_speed_deg_s")
+_TYPES = {"repeat": "int64", **dict.fromkeys(_FLOATS, "float64")}
+"""Of columns that are no objects."""
+
 DEFAULT_SESSION = "test"
 """Session of ratings that do not name one."""
 
@@ -68,9 +118,8 @@ class Ratings:
 
     Attributes
     ----------
-    table : DataFrame, shape (n_ratings, 20)
-        One row a rating, columns `RATING_COLUMNS`; session, rater, model and repeat
-        together are unique; a missing grade is None.
+    rows : tuple of Rating
+        The ratings; session, rater, model and repeat together are unique.
     scale : Scale
         The grades a rater may give, in order.
     source_path : Path or None
@@ -79,7 +128,7 @@ class Ratings:
         Whether any rating is simulated: its grade, or the device, or both.
     """
 
-    table: pd.DataFrame = field(compare=False, repr=False)
+    rows: tuple[Rating, ...] = field(compare=False, repr=False)
     scale: Scale
     source_path: Path | None = None
     simulated: bool
@@ -87,7 +136,25 @@ class Ratings:
     @property
     def n_from_persons(self) -> int:
         """How many ratings are of sessions in which a person gave the grades."""
-        return int(self.table["grades_from"].isin(FROM_PERSONS).sum())
+        return sum(row.grades_from in FROM_PERSONS for row in self.rows)
+
+    @property
+    def n_missing(self) -> int:
+        """How many ratings have no grade."""
+        return sum(row.grade is None for row in self.rows)
+
+    @property
+    def table(self) -> "pd.DataFrame":
+        """The ratings as a data frame, made anew: a row each, columns of `Rating`."""
+        import pandas as pd  # which takes longer to load than a study to read
+
+        columns = list(zip(*self.rows, strict=True)) or [()] * len(RATING_COLUMNS)
+        return pd.DataFrame(
+            {
+                name: pd.Series(list(column), dtype=_TYPES.get(name, "object"))
+                for name, column in zip(RATING_COLUMNS, columns, strict=True)
+            }
+        )
 
 
 def ratings_from_rows(
@@ -126,10 +193,10 @@ def ratings_from_rows(
     >>> ratings = ratings_from_rows(
     ...     [{"rater": "R1", "model": "HM2", "grade": "1+"}], MODIFIED_ASHWORTH
     ... )
-    >>> ratings.table["grade"].tolist()
-    ['1+']
+    >>> ratings.rows[0].grade
+    '1+'
     """
-    complete = [{**_DEFAULTS, **row} for row in rows]
+    complete: list[dict[str, Any]] = [{**_DEFAULTS, **row} for row in rows]
     problems = [
         f"row {number}: {problem}"
         for number, row in enumerate(complete, start=1)
@@ -142,49 +209,25 @@ def ratings_from_rows(
             problems.append(f"row {number}: {key} is in row {seen[key]} already")
     if problems:
         raise RatingsError("\n".join(problems))
-    columns = {name: [row[name] for row in complete] for name in RATING_COLUMNS}
-    return _assemble(columns, scale, source_path)
+    for row in complete:
+        row |= {name: float(row[name]) for name in _FLOATS}
+    return _assemble([Rating(**row) for row in complete], scale, source_path)
 
 
 def _assemble(
-    columns: Mapping[str, list[Any]], scale: Scale, source_path: Path | None
+    rows: Iterable[Rating], scale: Scale, source_path: Path | None
 ) -> Ratings:
-    """Return the table of columns that have been checked."""
-    types = dict.fromkeys(RATING_COLUMNS, "object")
-    types["repeat"] = "int64"
-    for name in ("mean_speed_deg_s", "min_speed_deg_s", "max_speed_deg_s"):
-        types[name] = "float64"
-    table = pd.DataFrame(
-        {name: pd.Series(columns[name], dtype=types[name]) for name in RATING_COLUMNS}
-    )
+    """Return the table of rows that have been checked."""
+    rows = tuple(rows)
     return Ratings(
-        table=table,
+        rows=rows,
         scale=scale,
         source_path=source_path,
-        simulated="simulated" in columns["source"],
+        simulated=any(row.source == "simulated" for row in rows),
     )
 
 
-_DEFAULTS: dict[str, object] = {
-    "session": DEFAULT_SESSION,
-    "repeat": 1,
-    "grade": None,
-    "mean_speed_deg_s": math.nan,
-    "source": "foreign",
-    "n_stretches": None,
-    "min_speed_deg_s": math.nan,
-    "max_speed_deg_s": math.nan,
-    "speeds_deg_s": None,
-    "graded_stretch": None,
-    "felt": None,
-    "grades_from": None,
-    "device": None,
-    "position": None,
-    "code": None,
-    "n_attempts": None,
-    "first_grade": None,
-    "graded_at": None,
-}
+_DEFAULTS: dict[str, object] = {"session": DEFAULT_SESSION, **Rating._field_defaults}
 
 
 def _problems(row: Mapping[str, object], scale: Scale) -> list[str]:
@@ -424,20 +467,15 @@ def retest_pairs(
 
 
 def _of_session(ratings: Ratings, session: str) -> dict[_Key, str | None]:
-    table = ratings.table[ratings.table["session"] == session]
-    if table.empty:
-        known = ", ".join(dict.fromkeys(ratings.table["session"])) or "none"
-        raise RatingsError(f"needed ratings of session {session!r}, there are {known}")
-    return {
-        (rater, model, repeat): grade if isinstance(grade, str) else None
-        for rater, model, repeat, grade in zip(
-            table["rater"],
-            table["model"],
-            table["repeat"].tolist(),
-            table["grade"],
-            strict=True,
-        )
+    grades = {
+        (row.rater, row.model, row.repeat): row.grade
+        for row in ratings.rows
+        if row.session == session
     }
+    if not grades:
+        known = ", ".join(dict.fromkeys(row.session for row in ratings.rows)) or "none"
+        raise RatingsError(f"needed ratings of session {session!r}, there are {known}")
+    return grades
 
 
 def _items(
@@ -479,7 +517,7 @@ def write_ratings(ratings: Ratings, path: Path, *, within: Path | None = None) -
     OSError
         If the file cannot be written; what was there is then there still.
     """
-    names_models = ratings.table["code"].notna().any()
+    names_models = any(row.code is not None for row in ratings.rows)
     mode = 0o600 if names_models else None
     write_file(path, ratings_csv(ratings), within=within, mode=mode)
 
@@ -497,8 +535,9 @@ def ratings_csv(ratings: Ratings) -> str:
     str
         What `write_ratings` writes.
     """
-    table = ratings.table
-    has_more = table[list(RATING_COLUMNS[_N_ALWAYS:])].notna().any(axis=None)
+    has_more = any(
+        not _is_unknown(value) for row in ratings.rows for value in row[_N_ALWAYS:]
+    )
     names = RATING_COLUMNS if has_more else RATING_COLUMNS[:_N_ALWAYS]
     return f"{_head(ratings)}# format: {_FORMAT}\n{_body(ratings, names)}"
 
@@ -508,7 +547,9 @@ def _texts(ratings: Ratings) -> Iterator[str]:
     yield ratings_csv(ratings)
     head = _head(ratings)
     yield head + _body(ratings, RATING_COLUMNS[:_N_FORMERLY])
-    if ratings.table["felt"].isna().all():  # of logs that say nothing of stretches
+    if all(
+        row.felt is None for row in ratings.rows
+    ):  # of logs that say nothing of stretches
         yield head + _body(ratings, RATING_COLUMNS[:_N_ALWAYS])
 
 
@@ -523,14 +564,17 @@ def _body(ratings: Ratings, names: Sequence[str]) -> str:
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(names)
-    columns = (ratings.table[name].tolist() for name in names)
-    for row in zip(*columns, strict=True):
-        writer.writerow([_csv_cell(value) for value in row])
+    for row in ratings.rows:
+        writer.writerow([_csv_cell(value) for value in row[: len(names)]])
     return text.getvalue()
 
 
+def _is_unknown(value: object) -> bool:
+    return value is None or (isinstance(value, float) and math.isnan(value))
+
+
 def _csv_cell(value: object) -> str:
-    if value is None or (isinstance(value, float) and math.isnan(value)):
+    if _is_unknown(value):
         return "NA"
     if isinstance(value, tuple):
         return ";".join(_csv_cell(part) for part in value)

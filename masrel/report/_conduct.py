@@ -163,11 +163,12 @@ def _happened(material: Material, conduct: StudyConduct) -> tuple[Content, ...]:
 
 def _analysed(material: Material, session: str | None = None) -> set[str]:
     # raters with a grade that is analysed
-    table = material.ratings.table
-    graded = table[table["grade"].notna()]
-    if session is not None:
-        graded = graded[graded["session"] == session]
-    return set(graded["rater"]) - set(material.analysis.excluded)
+    graded = {
+        row.rater
+        for row in material.ratings.rows
+        if row.grade is not None and session in (None, row.session)
+    }
+    return graded - set(material.analysis.excluded)
 
 
 def _flow_table(material: Material, conduct: StudyConduct) -> Table:

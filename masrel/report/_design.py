@@ -1,11 +1,13 @@
 """Section `design`: what was presented to whom, with the constants of the joints."""
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import msgspec
 
 from masrel.protocol import Occasions, PresentationRules
 from masrel.protocol._kinds import DEFAULT_KIND, all_values
+from masrel.ratings import Rating
 from masrel.report._figure_data import MANY_RATERS
 from masrel.report._material import Material, Paragraph, Section
 from masrel.report._tables import (
@@ -16,9 +18,6 @@ from masrel.report._tables import (
     counted,
 )
 from masrel.schedule._orders import orders_in_words
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _PARAMETERS = (
     ("catch_angle_constant_deg", "L (deg)"),
@@ -95,7 +94,7 @@ def design_section(material: Material) -> Section:
         texts.append(study.notes)
     if study.source and material.data != "published":  # else it is in the head
         texts.append(f"The study follows {study.source}.")
-    n_simulated = len(material.ratings.table) - material.ratings.n_from_persons
+    n_simulated = len(material.ratings.rows) - material.ratings.n_from_persons
     if material.ratings.simulated and n_simulated:
         texts.append(
             "The grades are simulated: every simulated rater gives the intended grade "
@@ -265,21 +264,21 @@ def _other_kinds(material: Material) -> list[Table]:
     ]
 
 
-def _by_rater(table: "pd.DataFrame", key: str) -> str | None:
+def _by_rater(ratings: Sequence[Rating], key: str) -> str | None:
     # the value of a column, with the raters who have it where it is not everybody's
     raters: dict[str, dict[str, None]] = {}
-    for value, rater in zip(table[key], table["rater"], strict=True):
-        if value is not None:
-            raters.setdefault(value, {})[rater] = None
+    for row in ratings:
+        if (value := getattr(row, key)) is not None:
+            raters.setdefault(value, {})[row.rater] = None
     if len(raters) < 2:
         return next(iter(raters), None)
     return "; ".join(f"{value}: {', '.join(who)}" for value, who in raters.items())
 
 
-def _without_ratings(material: Material, graded: "pd.DataFrame") -> list[str]:
-    # graded: the rows of the ratings that have a grade
+def _without_ratings(material: Material, graded: Sequence[Rating]) -> list[str]:
     notes = []
-    sessions, rated = set(graded["session"]), set(graded["model"])
+    sessions = {row.session for row in graded}
+    rated = {row.model for row in graded}
     absent = [each.id for each in material.protocol.sessions if each.id not in sessions]
     if absent:
         notes.append(f"No ratings in these data: session {', '.join(absent)}.")
@@ -290,23 +289,22 @@ def _without_ratings(material: Material, graded: "pd.DataFrame") -> list[str]:
 
 
 def _sessions(material: Material) -> Table:
-    protocol, table = material.protocol, material.ratings.table
-    graded = table[table["grade"].notna()]
+    protocol, ratings = material.protocol, material.ratings.rows
+    graded = [row for row in ratings if row.grade is not None]
     # known of ratings from session logs
     origins = {
         key: heading
         for key, heading in (("grades_from", "Grades from"), ("device", "Device"))
-        if table[key].notna().any()
+        if any(getattr(row, key) is not None for row in ratings)
     }
     rows, shown = [], []
     for session in protocol.sessions:
         n_raters = len(session.raters)
         n_planned = n_raters * len(protocol.models) * protocol.schedule.repeats
-        n_given = int((graded["session"] == session.id).sum())
+        n_given = sum(row.session == session.id for row in graded)
         names = ", ".join(session.raters)
-        facts = [
-            _by_rater(table[table["session"] == session.id], key) for key in origins
-        ]
+        here = [row for row in ratings if row.session == session.id]
+        facts = [_by_rater(here, key) for key in origins]
         note = session.note or None
         rows.append((session.id, n_raters, names, n_planned, n_given, *facts, note))
         if n_raters > MANY_RATERS:

@@ -1,6 +1,7 @@
 """Sections `grades`, `intended` and `in-person`: every grade, and what it should be."""
 
 from collections import Counter
+from operator import attrgetter
 
 from masrel.report._figure_data import MANY_RATERS, GradeCounts, GradeGrid
 from masrel.report._material import (
@@ -49,14 +50,13 @@ def felt_sentences(material: Material) -> str:
 
 
 def _grid(material: Material, session: str) -> GradeGrid:
-    table = material.ratings.table
-    rows = table[table["session"] == session].sort_values("repeat", kind="stable")
+    rows = [row for row in material.ratings.rows if row.session == session]
     grades: dict[tuple[str, str], tuple[str, ...]] = {}
-    columns = (rows["model"], rows["rater"], rows["grade"])
-    for model, rater, grade in zip(*columns, strict=True):
-        if isinstance(grade, str):
-            grades[model, rater] = (*grades.get((model, rater), ()), grade)
-    with_rows, with_columns = set(rows["model"]), set(rows["rater"])
+    for row in sorted(rows, key=attrgetter("repeat")):
+        if row.grade is not None:
+            key = row.model, row.rater
+            grades[key] = (*grades.get(key, ()), row.grade)
+    with_rows, with_columns = {row.model for row in rows}, {row.rater for row in rows}
     models = [model for model in material.protocol.models if model.id in with_rows]
     raters = [r.id for r in material.protocol.raters if r.id in with_columns]
     return GradeGrid(

@@ -54,8 +54,7 @@ def gather(
     claims: tuple[Claim, ...] = (),
 ) -> Material:
     """Return ratings and their analysis with what every section says of them."""
-    table = ratings.table
-    sources = sorted(set(table["source"]))
+    sources = sorted({row.source for row in ratings.rows})
     if ratings.simulated and "simulated" not in sources:
         sources.append("simulated")
     data = "+".join(sources) or "foreign"
@@ -65,7 +64,7 @@ def gather(
     if ratings.simulated:
         banner, provenance = SIMULATED_GRADES
         stamp = trace_stamp = SIMULATED
-        if ratings.n_from_persons == len(table):
+        if ratings.n_from_persons == len(ratings.rows):
             data = data.replace("simulated", "simulated device")
             how_many = "none" if sources == ["simulated"] else "not all"
             banner, provenance = _on_simulated_device(how_many)
@@ -77,7 +76,8 @@ def gather(
         stamp = f"Published data: {study.source}".rstrip(": ")
         trace_stamp = "Model reconstruction at published mean speeds, not a measurement"
         trace_stamp = f"{trace_stamp}: {study.source}".rstrip(": ")
-    sessions, raters = set(table["session"]), set(table["rater"])
+    sessions = {row.session for row in ratings.rows}
+    raters = {row.rater for row in ratings.rows}
     return Material(
         protocol=protocol,
         ratings=ratings,

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from importlib.metadata import version
+from importlib import import_module
 
 from masrel.analysis import PlannedEstimate
 from masrel.estimates import Estimate, Interval
@@ -98,7 +98,7 @@ def _statistics(material: Material, used: list[str]) -> Iterator[str]:
         "methods",
         "software",
         masrel=analysis.masrel_version,
-        libraries=", ".join(f"{name} {version(name)}" for name in names),
+        libraries=", ".join(f"{n} {import_module(n).__version__}" for n in names),
     )
 
 

@@ -3,7 +3,6 @@
 import dataclasses
 import math
 
-import pandas as pd
 import pytest
 
 from masrel.analysis import InPersonAgreement, IntendedAgreement, analyze
@@ -89,8 +88,7 @@ def test_of_repeated_presentations_the_first_is_paired() -> None:
     second, first = (
         ratings(row, repeat=n) for row, n in zip(repeated, (2, 1), strict=True)
     )
-    table = pd.concat([second.table, first.table], ignore_index=True)
-    both = dataclasses.replace(first, table=table)
+    both = dataclasses.replace(first, rows=(*second.rows, *first.rows))
     (pair,) = paired(both, without_haptic_grades()).pairs
     assert pair.haptic == "1"
 

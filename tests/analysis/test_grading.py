@@ -1,5 +1,6 @@
 """Ordered regression of grades against other implementations and made-up truths."""
 
+import dataclasses
 import math
 from pathlib import Path
 
@@ -172,14 +173,16 @@ def test_q_is_the_residual_whichever_way_a_model_reads_it(tmp_path: Path) -> Non
 
 def test_a_constant_predictor_is_named(tmp_path: Path) -> None:
     protocol, ratings = made_up(tmp_path)
-    ratings.table["mean_speed_deg_s"] = 80.0
+    rows = tuple(row._replace(mean_speed_deg_s=80.0) for row in ratings.rows)
+    ratings = dataclasses.replace(ratings, rows=rows)
     found = grade_regression(protocol, ratings, predictors=("speed", "H"))
     assert found.dropped == (("speed", "it is the same in all ratings"),)
 
 
 def test_ratings_without_a_speed_are_counted(tmp_path: Path) -> None:
     protocol, ratings = made_up(tmp_path)
-    ratings.table.loc[:4, "mean_speed_deg_s"] = math.nan
+    slow = tuple(row._replace(mean_speed_deg_s=math.nan) for row in ratings.rows[:5])
+    ratings = dataclasses.replace(ratings, rows=(*slow, *ratings.rows[5:]))
     found = grade_regression(protocol, ratings, predictors=("speed", "H"))
     assert (found.n_missing, found.n_ratings) == (5, 115)
 

@@ -1,5 +1,6 @@
 """The first paragraph: sentences of one file, numbers of the analysis, or why none."""
 
+import dataclasses
 import re
 import tomllib
 from pathlib import Path
@@ -134,8 +135,8 @@ def test_what_there_is_not_is_told_with_its_reason(
 def test_raters_alone_are_told_by_the_least_and_the_most(tmp_path: Path) -> None:
     line = msgspec.structs.replace(AGAIN, coefficient="cohen_kappa")
     rows = simulated_ratings()
-    grades = rows.table["grade"].tolist()
-    rows.table["grade"] = [grade or "2" for grade in grades]
+    graded = tuple(row._replace(grade=row.grade or "2") for row in rows.rows)
+    rows = dataclasses.replace(rows, rows=graded)
     text, analysis = result_of(rows, tmp_path, plan(), line)
     (entry,) = (e for e in analysis.estimates if e.line.id == "again")
     values = sorted(rater.estimate.value for rater in entry.by_rater)

@@ -30,6 +30,9 @@ ALARM = "#A63C00"  # darker, so that letters in it can be read on white
 DASHES = (0, (4, 3))
 """Line style of what is a reference, not data."""
 
+_NO_STYLE = ("backend", "backend_fallback")
+"""What says how figures are shown, not how they look."""
+
 SHADES = {"pre-catch": "#FFFFFF", "catch": "#D9D9D9", "post-catch": "#F0F0F0"}
 """Background of each phase of a stretch."""
 
@@ -67,11 +70,17 @@ def short_name(name: str) -> str:
     return f"{name[:half]}…{name[-half:]}"
 
 
+_DEFAULTS = {
+    key: value for key, value in mpl.rcParamsDefault.items() if key not in _NO_STYLE
+}
+
+
 @contextmanager
 def house_style() -> Iterator[None]:
     """Draw in the house style alone: a reader's own matplotlibrc changes nothing."""
     with mpl.rc_context():
-        mpl.rcdefaults()
+        # not mpl.rcdefaults, which reads every style that matplotlib has
+        mpl.rcParams.update(_DEFAULTS)
         mpl.rcParams.update(STYLE)
         yield
 

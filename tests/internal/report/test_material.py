@@ -4,7 +4,6 @@ import dataclasses
 from pathlib import Path
 
 import msgspec
-import pandas as pd
 import pytest
 
 from masrel.analysis import analyze
@@ -59,8 +58,8 @@ def test_the_source_is_said(
 
 def test_one_simulated_rating_makes_all_of_it_simulated() -> None:
     first, second = of_source("recorded"), of_source("simulated", "R2")
-    table = pd.concat([first.table, second.table], ignore_index=True)
-    mixed = material(dataclasses.replace(second, table=table))
+    rows = (*first.rows, *second.rows)
+    mixed = material(dataclasses.replace(second, rows=rows))
     assert mixed.data == "recorded+simulated"
     assert mixed.stamp == "SIMULATED DATA"
 
@@ -84,7 +83,7 @@ def test_a_source_without_a_name_leaves_no_colon() -> None:
 def test_speeds_that_are_not_known_are_counted() -> None:
     known = ratings(*of_session("test", R1=("1",)), mean_speed_deg_s=80.0)
     lost = ratings(*of_session("test", R2=("1",)))
-    both = dataclasses.replace(known, table=pd.concat([known.table, lost.table]))
+    both = dataclasses.replace(known, rows=(*known.rows, *lost.rows))
     (section,) = build_sections(material(both, "speeds"))
     about = section.blocks[0]
     assert isinstance(about, Paragraph)

@@ -4,7 +4,6 @@ import dataclasses
 from math import radians
 
 import msgspec
-import pandas as pd
 import pytest
 
 from masrel.analysis import analyze
@@ -106,8 +105,7 @@ def test_a_model_without_an_intended_grade_is_shown_as_such() -> None:
 def test_repeated_presentations_are_all_shown_in_their_order() -> None:
     rows = ratings(*of_session("test", R1=("1", "2")), repeat=2)
     first = ratings(*of_session("test", R1=("1+", None)), repeat=1)
-    table = pd.concat([rows.table, first.table], ignore_index=True)
-    both = dataclasses.replace(rows, table=table)
+    both = dataclasses.replace(rows, rows=(*rows.rows, *first.rows))
     (section,) = build_sections(material(both, "grades"))
     shown, drawing = section.blocks
     assert isinstance(shown, Table)
@@ -230,7 +228,7 @@ def test_a_speed_that_is_no_stretch_is_said_and_not_drawn() -> None:
     still = ratings(*of_session("test", R1=("1",)), mean_speed_deg_s=0.0)
     assert said(still, "traces") == ["Not in these data: every speed is below 1 deg/s."]
     moved = ratings(*of_session("test", R2=("2",)), mean_speed_deg_s=80.0)
-    both = dataclasses.replace(still, table=pd.concat([still.table, moved.table]))
+    both = dataclasses.replace(still, rows=(*still.rows, *moved.rows))
     (about,) = said(both, "traces")
     assert about.endswith("Speeds below 1 deg/s, which are not drawn: 1.")
     assert "from 30° to 146°" in about
@@ -239,7 +237,7 @@ def test_a_speed_that_is_no_stretch_is_said_and_not_drawn() -> None:
 def test_of_repeated_presentations_every_speed_counts() -> None:
     first = ratings(*of_session("test", R1=("1",)), mean_speed_deg_s=120.0)
     again = ratings(*of_session("test", R1=("1",)), mean_speed_deg_s=80.0, repeat=2)
-    both = dataclasses.replace(first, table=pd.concat([first.table, again.table]))
+    both = dataclasses.replace(first, rows=(*first.rows, *again.rows))
     made = material(both, "traces", "speeds")
     traces, speeds = build_sections(made)
     *_, peaks = traces.blocks
