@@ -23,7 +23,7 @@ def _draw(study: StudyPaths, protocol: Protocol, fields: Fields) -> str:  # noqa
 
 
 def _note(study: StudyPaths, protocol: Protocol, fields: Fields) -> str:
-    kind: Any = fields.get("kind") or "note"
+    kind: Any = text(fields, "kind") or "note"
     severity: Any = text(fields, "severity")
     record_note(
         study,

@@ -2,7 +2,9 @@
 
 import asyncio
 import contextlib
+import os
 import re
+import signal
 import sys
 from collections import deque
 from collections.abc import Callable
@@ -35,19 +37,23 @@ class Jobs:
         self._study, self._changed = study, changed
         self._jobs: dict[str, _Job] = {}
         self._following: set[asyncio.Task[None]] = set()
+        self._starting = asyncio.Lock()
 
     async def start(self, verb: str) -> None:
         """Start a verb; nothing where it runs already."""
-        if verb not in JOBS:
-            raise ParameterError(f"job: needed one of {', '.join(JOBS)}, got {verb!r}")
-        if verb in self._jobs and self._jobs[verb].code is None:
-            return
+        _check_verb(verb)
+        async with self._starting:  # two screens may ask at once
+            if verb not in self._jobs or self._jobs[verb].code is not None:
+                await self._start(verb)
+
+    async def _start(self, verb: str) -> None:
         process = await asyncio.create_subprocess_exec(
             *(sys.executable, "-m", "masrel", verb, str(self._study.root)),
             stdin=asyncio.subprocess.DEVNULL,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.STDOUT,
-            start_new_session=True,  # Ctrl-C is for the server
+            # Ctrl-C is for the server, and it has a process group that `cancel` ends
+            start_new_session=True,
         )
         self._jobs[verb] = job = _Job(process)
         task = asyncio.create_task(self._follow(job))
@@ -70,12 +76,13 @@ class Jobs:
         self._changed()
 
     def cancel(self, verb: str) -> None:
-        """Stop a verb that runs."""
+        """Stop a verb that runs, and the processes that it has started."""
+        _check_verb(verb)
         job = self._jobs.get(verb)
         if job is not None and job.code is None:
             job.is_cancelled = True
             with contextlib.suppress(ProcessLookupError):
-                job.process.terminate()
+                os.killpg(job.process.pid, signal.SIGTERM)
 
     def state(self) -> dict[str, dict[str, Any]]:
         """Return of each verb how it stands."""
@@ -92,6 +99,11 @@ class Jobs:
         for verb in self._jobs:
             self.cancel(verb)
         await asyncio.gather(*self._following, return_exceptions=True)
+
+
+def _check_verb(verb: str) -> None:
+    if verb not in JOBS:
+        raise ParameterError(f"job: needed one of {', '.join(JOBS)}, got {verb!r}")
 
 
 def _status(job: _Job) -> str:

@@ -57,12 +57,14 @@ def test_what_is_sent_twice_is_done_once(study: StudyPaths) -> None:
     [
         ("note", {"text": "x"}, "who: needed text, got none"),
         ("note", {"text": "x", "who": "K", "kind": "joke"}, "kind: needed one of"),
+        ("note", {"text": "x", "who": "K", "kind": {}}, "kind: needed text, got {}"),
         ("start", {"rater": "R9", "session": "test"}, "rater: needed one of"),
         ("start", {"rater": 7, "session": "test"}, "rater: needed text, got 7"),
         ("withdraw", {"rater": "R9", **BY}, "rater: needed one of"),
         ("unblind", {"code": "XX", **BY}, "needed one of a drawn schedule"),
         ("skip", {"rater": "R1", "session": "test", "code": "1", **BY}, "no such"),
         ("job", {"verb": "demo"}, "job: needed one of ratings"),
+        ("job", {"verb": "demo", "cancel": True}, "job: needed one of ratings"),
         ("tablet", {"rater": "R9"}, "rater: needed one of R1, R2"),
         (
             "answer",
@@ -194,6 +196,46 @@ def test_long_work_runs_once_at_a_time_and_can_be_stopped(study: StudyPaths) -> 
             while (await page.state())["jobs"]["report"]["status"] == "running":
                 await asyncio.sleep(0.05)
         assert (await page.state())["jobs"]["report"]["status"] == "cancelled"
+
+    with_tablets(study, run, coordinated=True)
+
+
+def test_two_screens_that_start_the_same_work_at_once_start_it_once(
+    study: StudyPaths,
+) -> None:
+    async def run(_: Desk, page: Tablet) -> None:
+        await asyncio.gather(*(done(page, "job", verb="report") for _ in range(2)))
+        assert len(_processes_of(study)) == 1
+        await done(page, "job", verb="report", cancel=True)
+
+    with_tablets(study, run, coordinated=True)
+
+
+def _processes_of(study: StudyPaths) -> list[Path]:
+    # those that are a verb about this study
+    name = str(study.root).encode()
+    files = Path("/proc").glob("[0-9]*/cmdline")
+    words = {file: _words(file) for file in files}
+    return [file for file in words if b"masrel" in words[file] and name in words[file]]
+
+
+def _words(file: Path) -> list[bytes]:
+    try:
+        return file.read_bytes().split(b"\0")
+    except OSError:  # it ended meanwhile
+        return []
+
+
+def test_a_protocol_that_is_being_edited_leaves_the_page_its_stream(
+    study: StudyPaths,
+) -> None:
+    async def run(_: Desk, page: Tablet) -> None:
+        text = study.protocol.read_text()
+        study.protocol.write_text("[study\n")
+        status, body = await page.post("draw")
+        assert status == 422
+        assert "protocol.toml" in body["why"]
+        study.protocol.write_text(text)
 
     with_tablets(study, run, coordinated=True)
 
