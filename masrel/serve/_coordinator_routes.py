@@ -58,6 +58,7 @@ class _CoordinatorPages:
         desk.at_close(self.jobs.close)
         # what came of each act, by the id that its page gave it
         self._acts: OrderedDict[str, asyncio.Task[dict[str, Any]]] = OrderedDict()
+        self._overview: dict[str, Any] = {}  # the last one that could be read
 
     async def page(self, request: Request) -> Response:
         """Answer with the page itself."""
@@ -78,8 +79,18 @@ class _CoordinatorPages:
             "desk": {**self._desk.state(), "notes": self._desk.notes},
             "jobs": self.jobs.state(),
             "log": await asyncio.to_thread(self._log),
-            "overview": await asyncio.to_thread(overview, self._study),
+            "overview": await self._read_overview(),
         }
+
+    async def _read_overview(self) -> dict[str, Any]:
+        # a protocol that is being edited ends no stream of a session that runs
+        try:
+            self._overview = await asyncio.to_thread(overview, self._study)
+        except (MasrelError, OSError) as error:
+            if not self._overview:
+                raise
+            return {**self._overview, "problem": str(error)}
+        return self._overview
 
     def _log(self) -> list[dict[str, Any]]:
         # what is in the log of the session that runs: kinds, codes and times
@@ -109,6 +120,8 @@ class _CoordinatorPages:
 
     async def events(self, request: Request) -> Response:  # noqa: ARG002 - as all
         """Answer with all that is shown, each time it changes, and the live view."""
+        if not self._overview:
+            await self._read_overview()  # what cannot be read is refused in a sentence
         return StreamingResponse(self._changes(), media_type="text/event-stream")
 
     async def _changes(self) -> AsyncIterator[str]:

@@ -229,13 +229,19 @@ def _words(file: Path) -> list[bytes]:
 def test_a_protocol_that_is_being_edited_leaves_the_page_its_stream(
     study: StudyPaths,
 ) -> None:
-    async def run(_: Desk, page: Tablet) -> None:
-        text = study.protocol.read_text()
-        study.protocol.write_text("[study\n")
-        status, body = await page.post("draw")
-        assert status == 422
-        assert "protocol.toml" in body["why"]
-        study.protocol.write_text(text)
+    async def run(desk: Desk, page: Tablet) -> None:
+        async with page.listening() as events, asyncio.timeout(30.0):
+            while "overview" not in dict(events):
+                await asyncio.sleep(0.01)
+            before = dict(events)["overview"]
+            study.protocol.write_text("[study\n")
+            desk.note_change()
+            while dict(events)["overview"] == before:
+                await asyncio.sleep(0.01)
+            after = dict(events)["overview"]
+        assert before["problem"] is None
+        assert "protocol.toml" in after["problem"]
+        assert after["sessions"] == before["sessions"]
 
     with_tablets(study, run, coordinated=True)
 
