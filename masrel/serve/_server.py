@@ -121,6 +121,10 @@ def encryption(certificate: Path, key: Path) -> ssl.SSLContext:
         raise ParameterError(
             f"{where} a certificate and its key as PEM files, got others"
         ) from None
+    except OSError as error:  # which names neither of them
+        raise ParameterError(
+            f"{where} files that can be read, got: {error.strerror}"
+        ) from None
     return context
 
 

@@ -264,6 +264,17 @@ def test_what_is_no_certificate_with_its_key_is_said(
         encryption(DATA / certificate, DATA / key)
 
 
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root reads any")
+def test_a_key_that_may_not_be_read_is_said(tmp_path: Path) -> None:
+    key = tmp_path / "key.pem"
+    key.write_bytes((DATA / "key.pem").read_bytes())
+    key.chmod(0)
+    with pytest.raises(
+        ParameterError, match=r"key\.pem: needed files that can be read"
+    ):
+        encryption(DATA / "cert.pem", key)
+
+
 @pytest.mark.parametrize("host", ["", "nosuch.invalid", "a" * 300, "8.8.8.8"])
 def test_a_host_that_is_none_of_this_computers_is_said(host: str) -> None:
     with pytest.raises(ParameterError, match="--host: needed"):
