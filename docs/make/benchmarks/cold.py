@@ -93,8 +93,8 @@ def main() -> None:
         "`masrel report STUDY` as a process of its own, imports and all, no cache; "
         f"medians of {TURNS} turns of processor time, ± is half the range of the "
         "ratios. Before: layout by constraints, each figure drawn for each of its "
-        "files. Many figures are drawn by several processes, whose processor time "
-        "counts. The report has more sections now than before.",
+        "files. Figures are drawn by as many processes as there are cores, whose "
+        "processor time counts. The report has more sections now than before.",
         "",
         f"{platform.machine()}, Python {platform.python_version()}; "
         f"masrel {masrel.__version__}, matplotlib {mpl.__version__}.",

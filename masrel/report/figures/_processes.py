@@ -1,4 +1,4 @@
-"""The figures of a report; many are drawn at a time, by processes on several cores.
+"""The figures of a report, drawn at a time by as many processes as there are cores.
 
 Processes are forked, so that none loads matplotlib again. Each takes the next figure
 that nobody has taken; what a process that failed leaves, the first one draws.
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 _Drawn = dict[int, dict[Form, bytes]]
 
 _PLACE = 4  # bytes of a figure's place, which a pipe hands to one process as a whole
-_WORTH = 8  # figures a process draws at least; one more takes the time of two or three
 _MOST = 1000  # figures of which the places fit into a pipe
 
 
@@ -35,9 +34,8 @@ def draw_all(
     drawings : sequence of Drawing
         What is drawn, and the line below which it stands.
     processes : int, optional
-        How many processes draw; without it one for every eight figures, and no more
-        than there are cores. There is one where other threads run, or the system
-        cannot fork.
+        How many processes draw, at most; without it as many as there are cores. There
+        is one where other threads run, or the system cannot fork.
 
     Returns
     -------
@@ -45,7 +43,8 @@ def draw_all(
         The files of each drawing: its PNG and its SVG; the same ones however many
         processes there are.
     """
-    n = processes or min(_cores(), len(drawings) // _WORTH)
+    # a process pays if it has two figures to draw
+    n = min(_cores() if processes is None else processes, (len(drawings) + 1) // 2)
     if n < 2 or len(drawings) > _MOST or not _can_fork():
         drawn: _Drawn = {}
     else:

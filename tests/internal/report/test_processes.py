@@ -82,11 +82,6 @@ def test_nothing_is_forked_beside_another_thread(
         thread.join()
 
 
-def test_few_figures_are_drawn_by_one_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(os, "fork", None)  # called, it would raise
-    assert len(draw_all(drawings(5))) == 5
-
-
 def test_a_png_says_its_size_and_resolution_as_its_svg_does() -> None:
     picture = draw_all(drawings(1))[0]
     with Image.open(io.BytesIO(picture["png"])) as image:
