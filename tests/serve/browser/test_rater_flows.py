@@ -98,7 +98,7 @@ def test_of_two_tablets_one_answers_and_the_other_sees_it(stage: Stage) -> None:
         "**/rater/answer",
         lambda route: (
             first.tap("Save"),
-            first.page.wait_for_timeout(500),
+            first.wait_for("ready"),
             route.continue_(),
         ),
     )
@@ -167,7 +167,8 @@ def test_an_emergency_stop_between_presentations_ends_the_session(stage: Stage) 
     rater.page.locator("#stop").tap()
     rater.wait_for("over")
     assert "it can go on where it was" in rater.text
-    stage.coordinator.start(stage.rater)
+    with rater.shown_anew():
+        stage.coordinator.start(stage.rater)
     rater.go_until("grade")
 
 

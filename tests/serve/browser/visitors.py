@@ -15,6 +15,11 @@ LOST = re.compile(r"net::ERR_|status of 503")
 # ... and where an answer is refused
 REFUSED = re.compile(r"status of 4(01|03|09|22)")
 
+SHOWN = """screens => {
+    const { screen } = document.getElementById("screen").dataset;
+    return screens.includes(screen) && screen;
+}"""
+
 POST = """async ([path, fields]) => {
     fields.id = crypto.randomUUID();  // of the act
     const csrf = document.querySelector('meta[name="csrf"]').content;
@@ -114,11 +119,7 @@ class Rater(Visitor):
 
     def wait_for(self, *screens: str) -> str:
         """Wait until one of these screens is shown -> it."""
-        shown = self.page.locator(
-            ",".join(f'#screen[data-screen="{screen}"]' for screen in screens)
-        )
-        shown.wait_for()
-        return self.screen
+        return str(self.page.wait_for_function(SHOWN, arg=screens).json_value())
 
     def tap(self, name: str | re.Pattern[str]) -> None:
         """Tap a button."""
