@@ -162,7 +162,7 @@ class CodesState:
     first_grades: dict[str, str] = field(default_factory=dict)
     # time of day of each of these, in UTC
     graded_at: dict[str, str] = field(default_factory=dict)
-    # source of each of these
+    # source of each of these, and of what was skipped
     graded_from: dict[str, str] = field(default_factory=dict)
     # grade of each code that has one, with corrections
     grades: dict[str, str] = field(default_factory=dict)
@@ -423,3 +423,4 @@ def _apply_to_code(state: CodesState, event: Event, source: str) -> None:
         state.graded_stretches.pop(code, None)  # what was felt was another grade's
     elif event.kind == "skipped":
         state.skipped[code] = event
+        state.graded_from[code] = source
