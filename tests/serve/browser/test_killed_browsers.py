@@ -39,9 +39,13 @@ class Mortal:
         while not port.exists() or "\n" not in port.read_text():
             time.sleep(0.02)
         number = port.read_text().split("\n")[0]
-        self.browser = playwright.chromium.connect_over_cdp(
-            f"http://127.0.0.1:{number}"
-        )
+        try:
+            self.browser = playwright.chromium.connect_over_cdp(
+                f"http://127.0.0.1:{number}"
+            )
+        except Error:
+            self.kill()
+            raise
 
     def kill(self) -> None:
         """Kill it as a tablet dies whose battery is empty."""
@@ -86,7 +90,10 @@ def go_through(
         while not is_over(stage):
             shutil.rmtree(folder, ignore_errors=True)
             folder.mkdir()
-            mortal = Mortal(playwright, folder)
+            try:
+                mortal = Mortal(playwright, folder)
+            except Error:  # too busy a machine for it to come up
+                continue
             context = mortal.browser.new_context(viewport=TABLET, has_touch=True)
             rater = Rater(context, stage.server.new_address("rater"))
             death = threading.Timer(moments.uniform(0.0, 2.5), mortal.kill)
