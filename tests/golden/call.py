@@ -130,6 +130,8 @@ def masrel(*arguments: object) -> dict:
 def without_paths(text: str) -> str:
     """A text in which the folders of this machine have names."""
     for path, name in ((str(STUDIES), "STUDIES"), (str(Path.cwd()), "FOLDER")):
-        for shown in (path, path.replace("_", r"\_")):  # as it is, and in LaTeX
+        latex = path.replace("_", r"\_")
+        # as it is, and as LaTeX has it and may break it
+        for shown in (path, latex, latex.replace("/", r"/\allowbreak{}")):
             text = text.replace(shown, name)
     return text
