@@ -18,6 +18,7 @@ PATIENT = {
     "stale_limit_ms": 50.0,
     "watchdog_ms": 100.0,
     "torque_rate_limit_nm_s": 100_000.0,
+    "end_ramp_ms": 20.0,
 }
 QUICK = {"mean_speed_deg_s": 150.0, "speed_sd_deg_s": 0.0}
 
@@ -85,7 +86,7 @@ def make_study(
     ]
     protocol["device"] |= PATIENT
     protocol["simulated_raters"] |= QUICK
-    protocol["stretch"] = {"start_deg": 90.0, "end_deg": 146.0}
+    protocol["stretch"] = {"start_deg": 120.0, "end_deg": 146.0}
     protocol["presentation"] = {"stretches": 1}
     for name, table in changes.items():
         kept = protocol.get(name)
