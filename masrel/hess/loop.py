@@ -172,7 +172,10 @@ def run_presentation(
             ended, fault = run_to_the_end(ticks)
         columns = samples.columns()
     if n_missed := ticks.overruns.n_missed:
-        message = f"the control loop missed {n_missed} ticks; they were skipped"
+        missed = (
+            "1 tick, which was" if n_missed == 1 else f"{n_missed} ticks, which were"
+        )
+        message = f"the control loop missed {missed} skipped"
         warnings.warn(message, OverrunWarning, stacklevel=2)
     presented = as_presented(
         columns,
