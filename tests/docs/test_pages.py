@@ -28,8 +28,13 @@ PAGES = {str(page.relative_to(ROOT)): page for page in pages()}
 TEXTS = {name: page.read_text(encoding="utf-8") for name, page in PAGES.items()}
 BLOCKS = [block for name, text in TEXTS.items() for block in read(text, name)]
 
-# The latent-trait model takes half a minute.
-SLOW = {"docs/coordinating.md", "docs/latent_trait.md"}
+# They take from four seconds to half a minute.
+SLOW = {
+    "docs/coordinating.md",
+    "docs/identification.md",
+    "docs/latent_trait.md",
+    "docs/training.md",
+}
 
 # Every block that is not run, and why. A new one has to be entered here.
 NOT_RUN = [
