@@ -37,7 +37,7 @@ def plan(**options: Any) -> Plan:
         ({"value": None}, "value: needs the true coefficient"),
         ({"prevalences": [0.7, 0.4]}, "prevalences: needs numbers of at least 0 with"),
         ({"prevalences": ["a", "b"]}, "prevalences: needs numbers"),
-        ({"prevalences": None}, "categories: needs these or prevalences"),
+        ({"prevalences": None}, "categories, prevalences: need one of both"),
         ({"categories": 3}, "prevalences: needs one of each of 3 categories"),
         ({"n_raters": 0}, "n_raters: needs a whole number above 0, got 0"),
         ({"n_raters": 1}, "n_raters: Fleiss' κ for other items needs 2 or more"),
