@@ -43,6 +43,7 @@ def test_on_many_pairs_of_alike_raters_it_is_stratified_kappa() -> None:
     assert result.standard_deviation.value < 0.1
 
 
+@pytest.mark.slow
 def test_raters_who_differ_are_told_apart_and_pulled_together() -> None:
     rng = np.random.default_rng(12)
     kappas = np.array([0.3, 0.5, 0.7, 0.9] * 2)

@@ -410,6 +410,7 @@ def _categories_met(ratings: Table, **_: object) -> float:
     return 1.0 / len({grade for row in ratings for grade in row})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("value", "check"),
     [

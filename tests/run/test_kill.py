@@ -80,8 +80,9 @@ def killed_at(root: Path, line: int, n_bytes: int) -> None:
     assert died.returncode == -signal.SIGKILL, died.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.faults
-@pytest.mark.parametrize("n_bytes", [pytest.param(0, marks=pytest.mark.slow), 60])
+@pytest.mark.parametrize("n_bytes", [0, 60])
 def test_killed_at_each_line_and_gone_on_with_it_is_as_if_never_killed(
     new_study: Callable[..., Small], tmp_path: Path, n_bytes: int, faults: Faults
 ) -> None:

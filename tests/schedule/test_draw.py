@@ -111,6 +111,7 @@ def test_every_order_is_equally_likely_over_raters() -> None:
     assert sum((count - 200) ** 2 / 200 for count in counts.values()) < 30.9
 
 
+@pytest.mark.slow
 def test_a_code_says_nothing_about_model_or_place() -> None:
     # Over 2000 raters, the rank of a model's code among the four of a session is
     # uniform: mean 2.5 with standard error sqrt(1.25 / 2000) = 0.025. Eight means,
