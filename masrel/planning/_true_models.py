@@ -102,7 +102,9 @@ def _scale(categories: int | Sequence[Label] | None, q: int) -> tuple[Label, ...
 def _n_categories(categories: int | Sequence[Label] | None, prevalences: object) -> int:
     if categories is None:
         if prevalences is None:
-            raise ParameterError("categories, prevalences: need one of both, got neither")
+            raise ParameterError(
+                "categories, prevalences: need one of both, got neither"
+            )
         return len(_numbers(prevalences))
     q = int(categories) if isinstance(categories, int) else len(categories)
     if q < 2:
