@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import json
 import math
 import secrets
 from collections import OrderedDict
@@ -56,7 +57,7 @@ class _CoordinatorPages:
         self._study = desk.study
         self.jobs = Jobs(desk.study, desk.note_change)
         desk.at_close(self.jobs.close)
-        # what came of each act, by the id that its page gave it
+        # what came of each act, by its name and all that its page sent, an id with it
         self._acts: OrderedDict[str, asyncio.Task[dict[str, Any]]] = OrderedDict()
         self._overview: dict[str, Any] = {}  # the last one that could be read
 
@@ -153,19 +154,20 @@ class _CoordinatorPages:
         return JSONResponse({"text": "The emergency stop is pressed."})
 
     async def act(self, request: Request) -> Response:
-        """Do what the page asks, once for each id."""
+        """Do what the page asks, once however often it sends the same."""
         fields = await request.json()
-        name, number = request.path_params["act"], fields.get("id")
+        name = request.path_params["act"]
         if name not in (*_OWN, *ACTS):
             raise HTTPException(404)
-        if not isinstance(number, str):  # from no page, which would send it again
-            number = secrets.token_hex(8)
-        if number not in self._acts:
-            self._acts[number] = asyncio.create_task(self._done(name, fields))
+        if not isinstance(fields.get("id"), str):  # from no page that sends it again
+            fields["id"] = secrets.token_hex(8)
+        sent = json.dumps([name, fields], sort_keys=True)
+        if sent not in self._acts:
+            self._acts[sent] = asyncio.create_task(self._done(name, fields))
             if len(self._acts) > _N_ACTS:
                 self._acts.popitem(last=False)
         try:
-            return JSONResponse(await asyncio.shield(self._acts[number]))
+            return JSONResponse(await asyncio.shield(self._acts[sent]))
         except MasrelError as error:
             return JSONResponse({"why": str(error)}, status_code=422)
 

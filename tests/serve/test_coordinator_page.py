@@ -1,6 +1,7 @@
 """The coordinator's page: each act is the verb's, and no model is named too early."""
 
 import asyncio
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -47,9 +48,12 @@ def test_what_is_sent_twice_is_done_once(study: StudyPaths) -> None:
         first, second = await asyncio.gather(*both)
         assert first == second == await done(page, "note", id="0123456789ab", **note)
         await done(page, "note", id="another-one", **note)
+        # what was changed before it was sent again is another act
+        await done(page, "note", id="another-one", **note | {"text": "very late"})
 
     with_tablets(study, run, coordinated=True)
-    assert len(events_of(study)) == 2
+    texts = [fields["text"] for _, fields in events_of(study)]
+    assert texts == ["late", "late", "very late"]
 
 
 @pytest.mark.parametrize(
@@ -207,18 +211,26 @@ def test_two_screens_that_start_the_same_work_at_once_start_it_once(
 ) -> None:
     async def run(_: Desk, page: Tablet) -> None:
         await asyncio.gather(*(done(page, "job", verb="report") for _ in range(2)))
-        assert len(_processes_of(study)) == 1
+        assert len(_verbs_of(study)) == 1
         await done(page, "job", verb="report", cancel=True)
 
     with_tablets(study, run, coordinated=True)
 
 
-def _processes_of(study: StudyPaths) -> list[Path]:
-    # those that are a verb about this study
+def _verbs_of(study: StudyPaths) -> list[Path]:
+    # processes that are a verb about this study, without those that draw for them
     name = str(study.root).encode()
     files = Path("/proc").glob("[0-9]*/cmdline")
     words = {file: _words(file) for file in files}
-    return [file for file in words if b"masrel" in words[file] and name in words[file]]
+    verbs = [file for file in words if b"masrel" in words[file] and name in words[file]]
+    return [file for file in verbs if _parent(file.parent) == os.getpid()]
+
+
+def _parent(process: Path) -> int | None:
+    try:
+        return int((process / "stat").read_text().rpartition(")")[2].split()[1])
+    except OSError:  # it ended meanwhile
+        return None
 
 
 def _words(file: Path) -> list[bytes]:
