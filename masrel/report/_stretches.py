@@ -102,7 +102,7 @@ def _few_of(
     return tuple(shown), (f"{note} all.",)
 
 
-def _speed_drawing(material: Material, speeds: Speeds) -> Drawing:
+def _speed_columns(material: Material, speeds: Speeds) -> tuple[SpeedColumn, ...]:
     known: dict[tuple[str, str, str], tuple[float, ...]] = {}
     graded: dict[tuple[str, str, str], tuple[float, ...]] = {}
     for value in speeds.values:
@@ -110,7 +110,7 @@ def _speed_drawing(material: Material, speeds: Speeds) -> Drawing:
         known[key] = (*known.get(key, ()), value.mean_speed_deg_s)
         if value.is_graded:
             graded[key] = (*graded.get(key, ()), value.mean_speed_deg_s)
-    columns = [
+    return tuple(
         SpeedColumn(
             model=s.name,
             session=s.session,
@@ -123,38 +123,42 @@ def _speed_drawing(material: Material, speeds: Speeds) -> Drawing:
             ),
         )
         for s in speeds.by_model
-    ]
+    )
+
+
+def _speed_drawing(material: Material, speeds: Speeds) -> Drawing:
     text = "; ".join(
         f"{s.name} in {s.session}: mean {number(s.mean, 0)}, "
         f"{number(s.least, 0)} to {number(s.most, 0)} deg/s"
         for s in speeds.by_model
     )
-    of = "rater for every model, and the mean over raters"
-    if has_many(speeds.values):
-        of = "stretch of every rater for every model, and the mean over stretches"
-    caption = (
-        f"Mean stretching speed of every {of} (bar). Dashed: ν_L, below which the "
-        "catch angle stays the same."
-    )
-    if len(material.raters) > MANY_RATERS:
-        caption = (
-            f"Mean stretching speeds of {len(material.raters)} raters for every model: "
-            "the middle 50 % (broad), the middle 90 % (thin) and the mean (bar). "
-            "Dashed: ν_L, below which the catch angle stays the same."
-        )
-    elif graded:
-        caption += " Ringed: the stretch that the rater said the grade rests on."
     return Drawing(
         name="speeds",
-        caption=caption,
+        caption=_speed_caption(len(material.raters), speeds.values),
         alt=f"Dot plot of speeds. {text}.",
         content=SpeedDots(
-            columns=tuple(columns),
+            columns=_speed_columns(material, speeds),
             raters=material.raters,
             slowest=material.protocol.elbow.slowest_mean_speed_deg_s,
         ),
         stamp=material.stamp,
     )
+
+
+def _speed_caption(n_raters: int, speeds: Sequence[Speed]) -> str:
+    dashed = "Dashed: ν_L, below which the catch angle stays the same."
+    if n_raters > MANY_RATERS:
+        return (
+            f"Mean stretching speeds of {n_raters} raters for every model: the middle "
+            f"50 % (broad), the middle 90 % (thin) and the mean (bar). {dashed}"
+        )
+    of = "rater for every model, and the mean over raters"
+    if has_many(speeds):
+        of = "stretch of every rater for every model, and the mean over stretches"
+    caption = f"Mean stretching speed of every {of} (bar). {dashed}"
+    if any(speed.is_graded for speed in speeds):
+        caption += " Ringed: the stretch that the rater said the grade rests on."
+    return caption
 
 
 def has_many(speeds: Sequence[Speed]) -> bool:

@@ -31,14 +31,12 @@ def tone_document(scene: "Scene", quantities: "Quantities") -> dict[str, object]
         raise ParameterError(f"--output: needs spastic elbows, got {scene.joint.kind}")
     import numpy as np
 
-    from masrel.elbow import times_at
-
     joint, motion = _tone_of(scene), scene.motion
     events = joint.events(motion)
     caught = [event for event in events if event.name == joint.catch_event]
     line = tone_line(scene)
     at_events = joint.torque(motion, [event.time for event in events])
-    document: dict[str, object] = {
+    return {
         "model": scene.model,
         "kind": joint.kind,
         "motion": scene.kind,
@@ -67,7 +65,15 @@ def tone_document(scene: "Scene", quantities: "Quantities") -> dict[str, object]
             }
             for event in events
         ],
+        **_torques_at(scene, quantities),
     }
+
+
+def _torques_at(scene: "Scene", quantities: "Quantities") -> dict[str, object]:
+    from masrel.elbow import times_at
+
+    joint, motion = _tone_of(scene), scene.motion
+    requested: dict[str, object] = {}
     if times := quantities.times:
         late = [time for time in times if not 0.0 <= time <= motion.duration]
         if late:
@@ -76,12 +82,12 @@ def tone_document(scene: "Scene", quantities: "Quantities") -> dict[str, object]
                 f"{significant(motion.duration)} s, got {significant(late[0])}"
             )
         torques = joint.torque(motion, list(times))
-        document["torque_at_s"] = torque_rows("time_s", times, torques)
+        requested["torque_at_s"] = torque_rows("time_s", times, torques)
     if angles := quantities.angles:
         reached = times_at(motion, [math.radians(angle) for angle in angles])
         torques = joint.torque(motion, reached)
-        document["torque_at_deg"] = torque_rows("angle_deg", angles, torques)
-    return document
+        requested["torque_at_deg"] = torque_rows("angle_deg", angles, torques)
+    return requested
 
 
 def torque_rows(

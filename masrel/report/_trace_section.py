@@ -90,23 +90,7 @@ def traces_section(material: Material) -> Section:
     end_deg = min(protocol.stretch.end_deg, protocol.elbow.range_end_deg)
     values = [value for value in moved if value.session == session]
     models = _models(protocol, values, end_deg)
-    kind = {
-        "published": "published mean speeds",
-        "simulated": "mean speeds of the simulated hands",
-        "simulated device": "mean speeds of the simulated hands",
-    }.get(material.data, "recorded mean speeds")
-    each = "stretch" if has_many(values) else "rater"
-    most = max(Counter(value.model for value in values).values())
-    of_many = f", or a few of more than {MANY_STRETCHES}" * (most > MANY_STRETCHES)
-    text = (
-        "These traces are reconstructions, not measurements: each model is stretched "
-        f"at constant speed from {as_entered(protocol.stretch.start_deg)}° to "
-        f"{as_entered(end_deg)}°, at the {kind} of session "
-        f"{session}, one line a {each}{of_many}. Torque resists extension; the arm's "
-        "own inertia is not in it."
-    )
-    if any(value.is_graded for value in values):
-        text += " A thicker line is the stretch that the rater said the grade rests on."
+    text = _traces_text(material, values, end_deg)
     n_still = sum(v.session == session for v in speeds.values) - len(values)
     if n_still:
         text += f" Speeds {_TOO_SLOW}, which are not drawn: {n_still}."
@@ -122,6 +106,29 @@ def traces_section(material: Material) -> Section:
         title=title,
         blocks=(Paragraph(text=text), *drawings, table, *measured_blocks(material)),
     )
+
+
+def _traces_text(material: Material, values: Sequence[Speed], end_deg: float) -> str:
+    # the values are of one session
+    session, start_deg = values[0].session, material.protocol.stretch.start_deg
+    kind = {
+        "published": "published mean speeds",
+        "simulated": "mean speeds of the simulated hands",
+        "simulated device": "mean speeds of the simulated hands",
+    }.get(material.data, "recorded mean speeds")
+    each = "stretch" if has_many(values) else "rater"
+    most = max(Counter(value.model for value in values).values())
+    of_many = f", or a few of more than {MANY_STRETCHES}" * (most > MANY_STRETCHES)
+    text = (
+        "These traces are reconstructions, not measurements: each model is stretched "
+        f"at constant speed from {as_entered(start_deg)}° to "
+        f"{as_entered(end_deg)}°, at the {kind} of session "
+        f"{session}, one line a {each}{of_many}. Torque resists extension; the arm's "
+        "own inertia is not in it."
+    )
+    if any(value.is_graded for value in values):
+        text += " A thicker line is the stretch that the rater said the grade rests on."
+    return text
 
 
 def _models(
@@ -275,43 +282,45 @@ def _of_other_kinds(material: Material) -> set[str]:
     return {m.id for m in material.protocol.models if m.kind != DEFAULT_KIND}
 
 
-def _peak_table(material: Material, models: Sequence[_Model], session: str) -> Table:
-    present = {stretch.speed.rater for model in models for stretch in model.stretches}
-    raters = [rater for rater in material.raters if rater in present]
+def _peak_notes(
+    material: Material, models: Sequence[_Model], raters: Sequence[str]
+) -> list[str]:
     notes = [
         "The largest torque of all phases, be it in the catch or at the end of the "
         "stretch, computed from the exact events of the motion, not from the samples."
     ]
-    rows: list[tuple[Value, ...]] = []
-    has_repeats = has_several = False
-    for model in models:
-        made = model.stretches
-        peaks: dict[str, float] = {}
-        for stretch in made:
-            rater = stretch.speed.rater
-            peaks[rater] = max(stretch.peak, peaks.get(rater, stretch.peak))
-        has_repeats = has_repeats or len(peaks) < len(made)
-        has_several = has_several or has_many([stretch.speed for stretch in made])
-        of_raters = [peaks.get(rater) for rater in raters]
-        middle = float(np.median(list(peaks.values())))
-        ends = min(peaks.values()), middle, max(peaks.values())
-        rows.append((model.id, *of_raters, *ends))
     others = [m.id for m in models if m.id in _of_other_kinds(material)]
     if others:
         notes.append(f"Of {', '.join(others)} it is the largest sample.")
-    if has_several:
+    made = [stretch.speed for model in models for stretch in model.stretches]
+    if has_many(made):
         notes.append("Of several stretches the largest peak is given.")
-    elif has_repeats:
+    elif len({(speed.model, speed.rater) for speed in made}) < len(made):
         notes.append("Of repeated presentations the largest peak is given.")
-    is_long = len(raters) > MANY_RATERS
-    if is_long:
+    if len(raters) > MANY_RATERS:
         notes.append(f"The file has the peaks of all {len(raters)} raters.")
-    by_rater: Sequence[Column] = [
+    return notes
+
+
+def _peak_row(model: _Model, raters: Sequence[str]) -> tuple[Value, ...]:
+    peaks: dict[str, float] = {}
+    for stretch in model.stretches:
+        rater = stretch.speed.rater
+        peaks[rater] = max(stretch.peak, peaks.get(rater, stretch.peak))
+    median = float(np.median(list(peaks.values())))
+    ends = min(peaks.values()), median, max(peaks.values())
+    return (model.id, *(peaks.get(rater) for rater in raters), *ends)
+
+
+def _peak_table(material: Material, models: Sequence[_Model], session: str) -> Table:
+    present = {stretch.speed.rater for model in models for stretch in model.stretches}
+    raters = [rater for rater in material.raters if rater in present]
+    by_rater = [
         Column(
             key=f"{rater}_nm",
             heading=rater,
             digits=2,
-            where="csv" if is_long else "everywhere",
+            where="csv" if len(raters) > MANY_RATERS else "everywhere",
         )
         for rater in raters
     ]
@@ -327,7 +336,7 @@ def _peak_table(material: Material, models: Sequence[_Model], session: str) -> T
             Column(key="median_nm", heading="Median", digits=2),
             Column(key="most_nm", heading="Most", digits=2),
         ),
-        rows=tuple(rows),
-        notes=tuple(notes),
+        rows=tuple(_peak_row(model, raters) for model in models),
+        notes=tuple(_peak_notes(material, models, raters)),
         data=material.data,
     )
