@@ -150,6 +150,7 @@ class Search:
                 f"method: {self.question.method} solves for items, not for raters: it "
                 "needs n_raters"
             )
+        self._check_has_formula()
         design = self._design(20)
         z = critical(self.question.level, self.question.sides)
         if self.question.is_icc:
@@ -157,6 +158,17 @@ class Search:
         if self.question.method == "wald":
             return self._wald_formula(design, z)
         return self._fit_formula(design, z)
+
+    def _check_has_formula(self) -> None:
+        aim, method = self.question.aim, self.question.method
+        is_of_one_limit = self.question.is_icc and aim.upper is None
+        if not aim.is_chance or aim.null is not None or is_of_one_limit:
+            return
+        name = "assurance" if aim.power is None else "power"
+        raise ParameterError(
+            f"{name}: method {method} has no formula of it for this aim; it needs "
+            '"auto", "exact" or "simulation"'
+        )
 
     def _wald_formula(self, design: StudyDesign, z: float) -> int:
         aim, value = self.question.aim, self.question.value

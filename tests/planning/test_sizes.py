@@ -24,6 +24,13 @@ NORMAL: dict[str, Any] = {
     "target": "both",
 }
 
+BETWEEN: dict[str, Any] = {
+    "half_width": None,
+    "lower": 0.3,
+    "upper": 0.7,
+    "power": 0.8,
+}
+
 
 def plan(**options: Any) -> Plan:
     return sample_size(**{**KAPPA, "n_raters": 2, **options})
@@ -59,6 +66,13 @@ def plan(**options: Any) -> Plan:
         ({"model": "table"}, "prevalences: a table needs the joint"),
         ({"target": "all"}, "target: needs one of items, raters, both"),
         ({"method": "guess"}, "method: needs one of auto, wald"),
+        ({"method": "wald", "assurance": 0.8}, "assurance: method wald has no formula"),
+        ({**BETWEEN, "method": "wald"}, "power: method wald has no formula"),
+        (
+            {**BETWEEN, "method": "goodness-of-fit"},
+            "power: method goodness-of-fit has no formula",
+        ),
+        ({**NORMAL, **BETWEEN, "method": "wald"}, "power: method wald has no formula"),
         ({"interval": "normal", "target": "both"}, "interval: "),
         ({"sides": 3}, "sides: needs one of 1, 2"),
         ({"level": 95}, "level: needs (0, 1), got 95"),
