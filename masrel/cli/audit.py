@@ -177,6 +177,13 @@ _OPTIONS = {
 }
 """Options that are not called as the parameter."""
 
+_BESIDE = {
+    "level": "interval",
+    "agreement_weights": "agreement",
+    "kappa_weights": "kappa",
+}
+"""Options that say nothing without another."""
+
 
 def _of_options(printed: _Printed) -> "Claim":
     from masrel.audit import Claim
@@ -185,4 +192,7 @@ def _of_options(printed: _Printed) -> "Claim":
     for name in ("n_items", "n_categories"):
         if name not in values:
             raise ParameterError(f"{name}: needed without a SOURCE, got none")
+    for name, other in _BESIDE.items():
+        if getattr(printed, name) is not None and getattr(printed, other) is None:
+            raise ParameterError(f"{name}: needs --{other} beside it, got none")
     return Claim(**values)  # type: ignore[arg-type]

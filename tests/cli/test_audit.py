@@ -58,6 +58,15 @@ BAD = [
     (("--kappa", "0.5", "--interval", "0", "x"), "--interval: needs a number"),
     (("--kappa", "0.5", "--margins-1", "3 x"), "--margins-1: needs a whole number"),
     (("--kappa", "0.5", "--agreement", "101"), "--agreement: needs a number from 0"),
+    (("--kappa", "0.5", "--level", "0.9"), "--level: needs --interval beside it"),
+    (
+        ("--kappa", "0.5", "--agreement-weights", "linear"),
+        "--agreement-weights: needs --agreement beside it",
+    ),
+    (
+        ("--agreement", "85", "--kappa-weights", "linear"),
+        "--kappa-weights: needs --kappa beside it",
+    ),
     ((), "--agreement, --kappa: needs at least one of them"),
 ]
 
