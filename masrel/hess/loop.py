@@ -143,9 +143,12 @@ def run_presentation(
     _check(device, controller, limits, rate_hz, max_duration_s, end_angle)
     n_ticks = math.ceil(max_duration_s * rate_hz)
     capacity = n_samples(n_ticks, rate_hz, limits)
-    facts: dict[str, _Fact] = {"simulated": device.simulated, "device": device.name}
-    facts["rate_hz"] = rate_hz
-    facts["speed_threshold_deg_s"] = math.degrees(controller.speed_threshold)
+    facts: dict[str, _Fact] = {
+        "simulated": device.simulated,
+        "device": device.name,
+        "rate_hz": rate_hz,
+        "speed_threshold_deg_s": math.degrees(controller.speed_threshold),
+    }
     course = Course(
         rules,
         limits,
@@ -171,12 +174,6 @@ def run_presentation(
         with scheduled(clock) as facts["scheduling"], collector_off():
             ended, fault = run_to_the_end(ticks)
         columns = samples.columns()
-    if n_missed := ticks.overruns.n_missed:
-        missed = (
-            "1 tick, which was" if n_missed == 1 else f"{n_missed} ticks, which were"
-        )
-        message = f"the control loop missed {missed} skipped"
-        warnings.warn(message, OverrunWarning, stacklevel=2)
     presented = as_presented(
         columns,
         facts,
@@ -184,13 +181,24 @@ def run_presentation(
         ended=ended,
         fault=fault,
         grip_lost=controller.grip_lost,
-        n_missed_ticks=n_missed,
+        n_missed_ticks=ticks.overruns.n_missed,
         n_missed_replies=ticks.guard.dropouts.n_missed,
     )
+    _warn(device.name, presented)
+    return presented
+
+
+def _warn(device: str, presented: Presented) -> None:
+    # of ticks and of channels, at the line that asked for the presentation
+    if n_missed := presented.n_missed_ticks:
+        missed = (
+            "1 tick, which was" if n_missed == 1 else f"{n_missed} ticks, which were"
+        )
+        message = f"the control loop missed {missed} skipped"
+        warnings.warn(message, OverrunWarning, stacklevel=3)
     silent = presented.recording.facts.get("channel_faults")
     if silent is not None:
-        warnings.warn(f"{device.name}: {silent}", RecordingWarning, stacklevel=2)
-    return presented
+        warnings.warn(f"{device}: {silent}", RecordingWarning, stacklevel=3)
 
 
 def _longest_s(rules: StretchRules) -> float:
