@@ -170,14 +170,7 @@ def plan_grid(
     >>> [round(plan.expected_half_width, 3) for plan in plans]
     [0.383, 0.274]
     """
-    if executor not in (None, "processes", "dask"):
-        raise ParameterError(
-            f"executor: needs one of processes, dask, got {executor!r}"
-        )
-    if scheduler is not None and executor != "dask":
-        raise ParameterError(
-            f'scheduler: is of executor "dask" alone, got {executor!r}'
-        )
+    _check_executor(executor, scheduler)
     if n_studies < 1:
         raise ParameterError(f"n_studies: needs at least 1, got {n_studies}")
     is_solved = _check_sizes(n_items, n_raters, file)
@@ -190,9 +183,10 @@ def plan_grid(
         assurance=assurance,
     ).checked(needs_chance=is_solved or power is not None or assurance is not None)
     questions: list[Question] = []
-    for truth, shares in itertools.product(
+    truths = itertools.product(
         _several(value), _several_prevalences(prevalences, model)
-    ):
+    )
+    for truth, shares in truths:
         question = pose_question(
             coefficient=coefficient,
             value=truth,
@@ -220,6 +214,17 @@ def plan_grid(
         )
     cells = [(question, question.design(n or 0, r or 0)) for question, n, r in sizes]
     return _described(cells, n_studies, executor, scheduler, file, progress)
+
+
+def _check_executor(executor: str | None, scheduler: str | None) -> None:
+    if executor not in (None, "processes", "dask"):
+        raise ParameterError(
+            f"executor: needs one of processes, dask, got {executor!r}"
+        )
+    if scheduler is not None and executor != "dask":
+        raise ParameterError(
+            f'scheduler: is of executor "dask" alone, got {executor!r}'
+        )
 
 
 def _check_sizes(n_items: object, n_raters: object, file: Path | None) -> bool:

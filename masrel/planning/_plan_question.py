@@ -187,20 +187,10 @@ def pose_question(
 ) -> Question:
     """Check the arguments of a plan."""
     entry = _entry(coefficient)
-    check_level(level)
-    _check_choice("sides", sides, (1, 2))
-    _check_choice("target", target, get_args(Target))
     _check_choice("method", method, _METHODS)
-    _check_choice("interval", interval, _INTERVALS)
-    if sides == 1 and level <= 0.5:
-        raise ParameterError(f"level: needs more than 0.5 with one side, got {level:g}")
+    _check_interval(interval, target, level, sides)
     if not 0.0 <= checked_number("p_missing", p_missing) < 1.0:
         raise ParameterError(f"p_missing: needs [0, 1), got {p_missing:g}")
-    if (interval, target) not in _PLANNED:
-        raise ParameterError(
-            f'interval: "{interval}" is not of target "{target}", where "auto" and '
-            '"jackknife" are'
-        )
     _check_costs(prices, max_cost)
     if value is not None and not -1.0 <= checked_number("value", value) <= 1.0:
         raise ParameterError(f"value: needs [-1, 1], got {value:g}")
@@ -232,6 +222,20 @@ def pose_question(
         prior=prior,
         progress=progress,
     )
+
+
+def _check_interval(interval: str, target: Target, level: float, sides: int) -> None:
+    check_level(level)
+    _check_choice("sides", sides, (1, 2))
+    _check_choice("target", target, get_args(Target))
+    _check_choice("interval", interval, _INTERVALS)
+    if sides == 1 and level <= 0.5:
+        raise ParameterError(f"level: needs more than 0.5 with one side, got {level:g}")
+    if (interval, target) not in _PLANNED:
+        raise ParameterError(
+            f'interval: "{interval}" is not of target "{target}", where "auto" and '
+            '"jackknife" are'
+        )
 
 
 def _check_costs(prices: tuple[float, float, float], max_cost: float | None) -> None:

@@ -141,16 +141,8 @@ def sample_size(
     (154, 'exact')
     """
     is_cheapest = n_items is None and n_raters is None and prices is not None
-    if (n_items is None) == (n_raters is None) and not is_cheapest:
-        got = (
-            "both"
-            if n_items is not None
-            else "none, and no prices by which to find the cheapest of both"
-        )
-        raise ParameterError(
-            f"n_items, n_raters: needs exactly one of them, since the other is solved "
-            f"for; got {got}"
-        )
+    if not is_cheapest:
+        _check_one_size(n_items, n_raters)
     aim = Aim(
         half_width=half_width,
         lower=lower,
@@ -187,6 +179,20 @@ def sample_size(
     if is_cheapest:
         return cheapest_plan(question)
     return Search(question, n_items=n_items, n_raters=n_raters).plan()
+
+
+def _check_one_size(n_items: int | None, n_raters: int | None) -> None:
+    if (n_items is None) != (n_raters is None):
+        return
+    got = (
+        "both"
+        if n_items is not None
+        else "none, and no prices by which to find the cheapest of both"
+    )
+    raise ParameterError(
+        f"n_items, n_raters: needs exactly one of them, since the other is solved for; "
+        f"got {got}"
+    )
 
 
 def precision(
