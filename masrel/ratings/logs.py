@@ -87,15 +87,11 @@ def _rows(
             "grades are no ratings of the study: move it away"
         )
     schedule = _schedule(study, protocol, state, log)
-    codes = {shown.code for shown in schedule.presentations}
-    for code, events in state.presented.items():
-        if code not in codes:
-            line = f"line {events[0].line}: " if events else ""
-            raise RatingsError(
-                f"{log}: {line}needed a code of the schedule, got {code!r}"
-            )
-        for event in events if check_recordings else ():
-            _check_recording(study, log, event)
+    _check_codes(schedule, state, log)
+    if check_recordings:
+        for events in state.presented.values():
+            for event in events:
+                _check_recording(study, log, event)
     of_session = {
         "session": session,
         "rater": rater,
@@ -123,6 +119,16 @@ def _rows(
             "graded_at": _graded_at(state, shown.code, log),
             **_of_stretches(state.presented.get(shown.code, [])),
         }
+
+
+def _check_codes(schedule: Schedule, state: SessionState, log: Path) -> None:
+    codes = {shown.code for shown in schedule.presentations}
+    for code, events in state.presented.items():
+        if code not in codes:
+            line = f"line {events[0].line}: " if events else ""
+            raise RatingsError(
+                f"{log}: {line}needed a code of the schedule, got {code!r}"
+            )
 
 
 def _n_attempts(state: SessionState, code: str) -> int | None:
