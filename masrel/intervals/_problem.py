@@ -249,12 +249,7 @@ def pose_problem(
         coded = _of_counted(ratings, target, categories)
     else:
         coded = entry.code(ratings, categories)
-    fewest, most = entry.n_raters
-    n_raters = coded.codes.shape[1]
-    if most is not None and n_raters > most:
-        n_raters = coded.n_raters  # those without any rating are none
-    if entry.shape == "ratings" and not fewest <= n_raters <= (most or n_raters):
-        _refuse_raters(entry, n_raters)
+    _check_raters(entry, coded)
     kernel = entry.kernel or _refuse_coefficient(entry)
     made = (
         declared_weights(weights, coded.categories, declared=coded.declared)
@@ -404,8 +399,13 @@ def find_entry(statistic: Statistic, metric: Metric | None = None) -> Coefficien
     return entry if metric is None else entry.by_metric(metric)
 
 
-def _refuse_raters(entry: Coefficient, n_raters: int) -> NoReturn:
+def _check_raters(entry: Coefficient, coded: CodedRatings) -> None:
     fewest, most = entry.n_raters
+    n_raters = coded.codes.shape[1]
+    if most is not None and n_raters > most:
+        n_raters = coded.n_raters  # those without any rating are none
+    if entry.shape != "ratings" or fewest <= n_raters <= (most or n_raters):
+        return
     needed = f"{fewest}" if most == fewest else f"at least {fewest}"
     raise ParameterError(f"{entry.title} needs {needed} raters, got {n_raters}")
 

@@ -266,13 +266,6 @@ def _compare(
         variance_of = _dependent if design == "dependent" else _independent
         variance, df = variance_of(*problems)
     one, other = (problem.entry(problem.coded, weights=weights) for problem in problems)
-    reason = one.reason or other.reason
-    if reason is None and math.isnan(variance):
-        reason = f"with one {unit.removesuffix('s')} left out an estimate is undefined"
-    elif reason is None and variance == 0.0:
-        reason = (
-            f"leaving out any {unit.removesuffix('s')} leaves the difference as it is"
-        )
     return _Compared(
         problems=problems,
         one=one,
@@ -280,10 +273,19 @@ def _compare(
         value=one.value - other.value,
         variance=variance,
         df=df,
-        reason=reason,
+        reason=one.reason or other.reason or _no_variance(variance, unit),
         unit=unit,
         n_units=n_units,
     )
+
+
+def _no_variance(variance: float, unit: Unit) -> str | None:
+    left_out = unit.removesuffix("s")
+    if math.isnan(variance):
+        return f"with one {left_out} left out an estimate is undefined"
+    if variance == 0.0:
+        return f"leaving out any {left_out} leaves the difference as it is"
+    return None
 
 
 def _of_clusters(
