@@ -10,7 +10,7 @@ from masrel.cli._options import OutputOptions, output_options, warnings_as_notes
 from masrel.protocol import Protocol, StudyPaths, read_protocol, scale_of
 
 if TYPE_CHECKING:
-    from masrel.run import GradeSource
+    from masrel.run import GradeSource, SessionSummary
 
 
 @click.command("run")
@@ -224,21 +224,24 @@ def _run(
             progress=lambda _: bar.update(),
         )
     if not quiet:
-        what = "simulated" if grades == "simulated" else "simulated device"
-        label = f" ({what})" if done.simulated else ""
-        n_missing = done.n_presentations - done.n_graded
-        without = f", {n_missing} missing," if n_missing else ""
-        what = "the rehearsal of session" if done.rehearsal else "session"
-        click.echo(
-            f"{what} {done.session} of {done.rater} is complete: "
-            f"{done.n_graded} grades{label}{without} in {done.log_file}"
-            + ("; none is a rating of the study" if done.rehearsal else "")
-            + (
-                f"; {done.n_set_aside} from before count no more"
-                if done.n_set_aside
-                else ""
-            )
-        )
+        click.echo(_completed(done, grades))
+
+
+def _completed(done: "SessionSummary", grades: Literal["console", "simulated"]) -> str:
+    made = "simulated" if grades == "simulated" else "simulated device"
+    label = f" ({made})" if done.simulated else ""
+    n_missing = done.n_presentations - done.n_graded
+    without = f", {n_missing} missing," if n_missing else ""
+    what = "the rehearsal of session" if done.rehearsal else "session"
+    text = (
+        f"{what} {done.session} of {done.rater} is complete: "
+        f"{done.n_graded} grades{label}{without} in {done.log_file}"
+    )
+    if done.rehearsal:
+        text += "; none is a rating of the study"
+    if done.n_set_aside:
+        text += f"; {done.n_set_aside} from before count no more"
+    return text
 
 
 def _source(

@@ -278,9 +278,7 @@ def trace(
     if csv_file is not None or rate_hz is not None:
         check_samples(csv_file, rate_hz)
     joints = _joints_of(names, law)
-    if speed_range is not None:
-        low, high, n = speed_range
-        speeds = (*speeds, *(low + (high - low) * i / (n - 1) for i in range(n)))
+    speeds = (*speeds, *_speeds_in(speed_range))
     if tardieu:
         _check_plain(stretch, quantities, output, csv_file)
         start = START_DEG if stretch.start is None else stretch.start
@@ -300,6 +298,21 @@ def trace(
         form = figure_form(output.figure)
         picture = scenes_figure(scenes, view or SCENE_VIEWS[0], form=form)
         write_file(output.figure, picture)
+    _write_documents(output, scenes, documents)
+
+
+def _speeds_in(speed_range: tuple[float, float, int] | None) -> tuple[float, ...]:
+    if speed_range is None:
+        return ()
+    low, high, n = speed_range
+    return tuple(low + (high - low) * i / (n - 1) for i in range(n))
+
+
+def _write_documents(
+    output: OutputOptions,
+    scenes: Sequence[Scene],
+    documents: Sequence[dict[str, object]],
+) -> None:
     if len(documents) == 1:
         document, text = documents[0], lambda: scene_text(documents[0], scenes[0].title)
     else:
