@@ -1,6 +1,7 @@
 """Sections `grades`, `intended` and `in-person`: every grade, and what it should be."""
 
 from collections import Counter
+from collections.abc import Iterator
 from operator import attrgetter
 
 from masrel.report._figure_data import MANY_RATERS, GradeCounts, GradeGrid
@@ -74,18 +75,13 @@ def _grid(material: Material, session: str) -> GradeGrid:
 def _grid_blocks(
     material: Material, session: str, grid: GradeGrid
 ) -> tuple[Table, Drawing]:
-    table_rows: list[tuple[Value, ...]] = []
-    listed, n_missing = [], 0
-    by_model = zip(grid.models, grid.intended, grid.grades, strict=True)
-    for model, intended, cells in by_model:
-        table_rows.append(
-            (model, intended, *(", ".join(grades) or None for grades in cells))
+    table_rows: list[tuple[Value, ...]] = [
+        (model, intended, *(", ".join(grades) or None for grades in cells))
+        for model, intended, cells in zip(
+            grid.models, grid.intended, grid.grades, strict=True
         )
-        n_missing += sum(not grades for grades in cells)
-        counts = Counter(grade for grades in cells for grade in grades)
-        text = ", ".join(f"{n} of grade {grade}" for grade, n in counts.items())
-        aim = "" if intended is None else f" (intended {intended})"
-        listed.append(f"{model}{aim}: {text or 'no grades'}")
+    ]
+    n_missing = sum(not grades for cells in grid.grades for grades in cells)
     notes = [f"{counted(n_missing, 'rating')} missing, shown as –."] * bool(n_missing)
     excluded = [r for r in grid.raters if r in material.analysis.excluded]
     if excluded:
@@ -112,11 +108,20 @@ def _grid_blocks(
     drawing = Drawing(
         name=f"grades_{session}",
         caption=f"{caption}.",
-        alt=f"Grid of grades. {'; '.join(listed)}.",
+        alt=f"Grid of grades. {'; '.join(_grades_by_model(grid))}.",
         content=grid,
         stamp=material.stamp,
     )
     return table, drawing
+
+
+def _grades_by_model(grid: GradeGrid) -> Iterator[str]:
+    by_model = zip(grid.models, grid.intended, grid.grades, strict=True)
+    for model, intended, cells in by_model:
+        counts = Counter(grade for grades in cells for grade in grades)
+        text = ", ".join(f"{n} of grade {grade}" for grade, n in counts.items())
+        aim = "" if intended is None else f" (intended {intended})"
+        yield f"{model}{aim}: {text or 'no grades'}"
 
 
 def _counted_blocks(
