@@ -70,7 +70,7 @@ class PlanningOptions:
     interval: str | None
     method: str
     seed: int
-    n_studies: int
+    n_studies: int | None
     executor: Literal["processes", "dask"] | None
     scheduler: str | None
     resume: Path | None
@@ -149,7 +149,8 @@ class PlanningOptions:
         """Refuse options that were given where they mean nothing."""
         for name in names:
             if getattr(self, name) not in (None, ()):
-                option = {"p_missing": "missing"}.get(name, name.replace("_", "-"))
+                renamed = {"p_missing": "missing", "n_studies": "studies"}
+                option = renamed.get(name, name.replace("_", "-"))
                 raise ParameterError(f"--{option}: {why}")
 
 
@@ -225,9 +226,8 @@ planning_options = grouped(
     click.option(
         "--studies",
         "n_studies",
-        default=20_000,
-        show_default=True,
-        help="Of each cell of a grid that is simulated.",
+        type=click.IntRange(min=1),
+        help="Of each cell of a grid that is simulated.  [default: 20000]",
     ),
     click.option(
         "--executor",

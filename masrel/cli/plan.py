@@ -84,7 +84,7 @@ def _plans(
     # with the lines of a study's plan that they are of
     if study is None and options.is_grid:
         return (), _grid(options, is_quiet=is_quiet)
-    options.refuse(("executor", "scheduler", "resume"), "is of grids")
+    options.refuse(("executor", "scheduler", "resume", "n_studies"), "is of grids")
     with progress("planning", "studies", is_quiet=is_quiet) as bar:
         is_solved = study is None and None in (options.items, options.raters)
         unit = " a size" if is_solved else ""
@@ -202,7 +202,7 @@ def _grid(options: PlanningOptions, *, is_quiet: bool) -> "tuple[Plan, ...]":
             assurance=options.assurance,
             n_items=options.items,
             n_raters=options.raters,
-            n_studies=options.n_studies,
+            n_studies=options.n_studies or 20_000,
             executor=options.executor,
             scheduler=options.scheduler,
             file=options.resume,

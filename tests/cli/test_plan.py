@@ -253,6 +253,7 @@ def test_how_long_it_takes_is_told_once_some_studies_are_drawn(
             ("--raters", "2", "--items", "9", "--resume", "x.json"),
             "--resume: is of grids",
         ),
+        (("--raters", "2", "--items", "9", "--studies", "9"), "--studies: is of grids"),
         (
             ("--items", "9,8", "--resume", "x", "--half-width", ".2"),
             "file: is of grids",
