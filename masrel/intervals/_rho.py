@@ -166,7 +166,7 @@ def prior_notes(
     elif ((counts > 0).sum(axis=1) <= 1).all():
         what = "agreement is perfect in these data"
     elif n_items < FEW_ITEMS:
-        what = f"{n_items} items are few"
+        what = "1 item is few" if n_items == 1 else f"{n_items} items are few"
     else:
         return ()
     moved, other, ends = 0.0, prior, (low, high)

@@ -21,6 +21,7 @@ from masrel.intervals._problem import (
 )
 
 _UNITS = {"items": ("items",), "raters": ("raters",), "both": ("items", "raters")}
+_ROUNDING = 1e-12  # of an estimate: what moves it by no more has left it as it is
 
 
 def jackknife(
@@ -225,7 +226,9 @@ def _variance_of(replicates: Floats, freq: Integers, n: int) -> float:
     # single ratings move the mean of chance by little, and there 1 would do as well.
     if n < 2:  # nothing is left
         return math.nan
-    moved = replicates - replicates[0]  # so that no change at all is exactly 0
+    moved = replicates - replicates[0]
+    if np.abs(moved).max() <= _ROUNDING * np.abs(replicates).max():
+        return 0.0  # no change at all
     deviations = moved - freq @ moved / freq.sum()
     return float((n - 1) / n * (freq @ deviations**2))
 

@@ -92,6 +92,7 @@ def test_the_density_says_its_prior_and_has_the_ends_as_quantiles() -> None:
         ([["a"] * 3] * 12, "all ratings are in one category"),
         ([["a"] * 3, ["b"] * 3] * 6, "agreement is perfect in these data"),
         ([["a", "b", "b"], ["b"] * 3], "2 items are few"),
+        ([["a", "b", "b"]], "1 item is few"),
     ],
 )
 def test_where_the_prior_weighs_another_stands_beside(

@@ -149,6 +149,9 @@ def test_few_raters_and_items_are_warned_of() -> None:
         ([["a", "a", "a"]] * 3, "items", "the estimate itself is undefined"),
         ([["a", "a", "a"], ["b", "b", "b"]], "items", "left out the estimate is"),
         ([["a", "a", "a"], ["b", "b", "b"]], "raters", "leaves the estimate as it is"),
+        # κ of one item is −1/(raters − 1), whatever they say: only rounding moves it
+        ([["a"] * 6 + ["b"] * 2], "raters", "leaves the estimate as it is"),
+        ([["a", "b", "c", "a", "b"]], "raters", "leaves the estimate as it is"),
         ([["a", "b", "a"]], "items", "left out the estimate is undefined"),
     ],
 )
