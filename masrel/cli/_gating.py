@@ -12,6 +12,7 @@ from masrel._files import no_follow, write_file
 from masrel._input import read_regular
 from masrel.cli._options import Decorator, grouped
 from masrel.cli._paths import OutputFile
+from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
     from masrel.analysis import Analysis, GateResult
@@ -116,6 +117,12 @@ def _is_text_of(file: Path, text: str) -> bool:
 
 
 def _append(file: Path, text: str) -> None:
-    with open(file, "ab", opener=no_follow) as out:
-        # whole letters: a cut may go through one
-        out.write(text.encode()[:_LARGEST_SUMMARY].decode(errors="ignore").encode())
+    # whole letters: a cut may go through one
+    data = text.encode()[:_LARGEST_SUMMARY].decode(errors="ignore").encode()
+    try:
+        with open(file, "ab", opener=no_follow) as out:
+            out.write(data)
+    except OSError as error:
+        raise ParameterError(
+            f"GITHUB_STEP_SUMMARY: {file}: {error.strerror or error}"
+        ) from error

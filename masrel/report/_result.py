@@ -85,7 +85,7 @@ def _intended(result: IntendedAgreement) -> str:
     rated = [model for model in result.models if model.n_ratings]
     return sentence(
         "result",
-        "intended",
+        "intended_one" if len(rated) == 1 else "intended",
         models=counted(len(rated), "standard model"),
         percent=number(result.mean, 1),
     )

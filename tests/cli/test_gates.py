@@ -155,14 +155,21 @@ def test_a_reason_is_one_line(masrel: Caller, study: Path, why: str) -> None:
     assert "report.gates[0].why: needed one line without control" in done.err
 
 
+@pytest.mark.parametrize("place", ["none/summary.md", "."])
 def test_a_summary_that_cannot_be_written_hides_no_gate(
-    masrel: Caller, study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    masrel: Caller,
+    study: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    place: str,
 ) -> None:
-    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path / "none" / "summary.md"))
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path / place))
     done = masrel("analyze", study, "--require", "kappa.std.n > 4")
     assert done.code == 2
     assert "--require: kappa.std.n > 4 fails: 4" in done.err
-    assert done.err.splitlines()[-1].startswith(f"masrel: {tmp_path / 'none'}")
+    assert done.err.splitlines()[-1].startswith(
+        f"masrel: GITHUB_STEP_SUMMARY: {tmp_path / place}: "
+    )
 
 
 def test_junit_and_the_summary_of_a_job_have_every_estimate_and_gate(

@@ -3,6 +3,7 @@
 import dataclasses
 import re
 import tomllib
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -94,6 +95,15 @@ def test_the_published_result_is_told_in_sentences_of_the_file(tmp_path: Path) -
     )
     told = re.findall(r"\d+(?:\.\d+)?", text.replace("32 grades", ""))
     assert set(told) <= known
+
+
+def test_of_one_model_no_average_is_told(tmp_path: Path) -> None:
+    rows = ratings(*of_session("test", R1=("1",), R2=("1",)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        text, _ = result_of(rows, tmp_path, plan(coefficient="percent_agreement"))
+    assert "Of the grades of 1 standard model, 100.0 % were as intended." in text
+    assert of_the_file(text)
 
 
 def test_raters_who_grade_again_and_missing_grades_are_told(tmp_path: Path) -> None:
