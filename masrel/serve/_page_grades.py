@@ -121,7 +121,8 @@ class PageGrades:
         if not isinstance(grade, str) or grade not in self._scale.grades:
             needed = ", ".join(self._scale.grades)
             raise ParameterError(f"grade: needed one of {needed}, got {grade!r}")
-        if stretch is not None and stretch not in range(1, request.n_stretches + 1):
+        numbers = range(1, request.n_stretches + 1)
+        if stretch is not None and (type(stretch) is not int or stretch not in numbers):
             raise ParameterError(
                 f"stretch: needed one of {request.n_stretches}, from 1, got {stretch!r}"
             )

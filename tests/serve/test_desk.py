@@ -69,7 +69,8 @@ def test_what_cannot_be_is_refused_and_asked_still(study: StudyPaths) -> None:
         page = Page(desk)
         await desk.start("R1", "test")
         state = await page.until("grade")
-        for wrong in ({"grade": "7"}, {"grade": "2", "stretch": 5}, {}):
+        stretches = [{"grade": "2", "stretch": which} for which in (5, True, 1.0)]
+        for wrong in ({"grade": "7"}, *stretches, {}):
             with pytest.raises(AnswerRefusedError, match=r"needed one of|got"):
                 await desk.answer(state["ask"], wrong)
         await desk.answer(state["ask"], {"grade": "1+"})
