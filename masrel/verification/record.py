@@ -193,6 +193,14 @@ def _unnamed(
         if of_log.record.stage == "unreadable"
         for path in of_log.files
     }
+    # where a process may have died, or is, between a recording and the log
+    going_on = {
+        path.with_suffix("")
+        for of_log in checked
+        if of_log.record.stage == "begun"
+        for path in of_log.files
+        if path.suffix == ".jsonl"
+    }
     there = (
         f"{parent}{os.sep}{name}"
         for parent, folders, files in os.walk(folder)
@@ -206,7 +214,12 @@ def _unnamed(
         if path.name.endswith(".jsonl.torn") and str(path.with_suffix("")) in named:
             yield doubt(path, "bytes of a line that was not finished; the log says so")
         elif path.suffix == ".partial":
-            yield doubt(path, "a presentation that was cut off; going on recovers it")
+            yield doubt(
+                path,
+                "a presentation that goes on, or was cut off; going on recovers it",
+            )
+        elif path.parent in going_on and path.with_suffix(".partial").exists():
+            yield doubt(path, "is not in its log yet; going on with it logs it")
         elif path.suffix == ".jsonl":
             yield broken(path, f"is the log of no {whose} of the protocol")
         elif path.suffix in {".npz", ".json"}:

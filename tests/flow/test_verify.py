@@ -250,6 +250,44 @@ def test_a_forgery_that_leaves_the_chain_is_found(
     assert any(path == place or path.is_relative_to(place) for path in broken)
 
 
+def killed_before_the_log(study: StudyPaths) -> Path:
+    """Take a log back to where its first presentation is recorded, and not logged."""
+    log = logs(study)[0]
+    path = log.parent / next(
+        str(e["fields"]["recording"]) for e in events(log) if e["event"] == "presented"
+    )
+    lines = log.read_bytes().splitlines(keepends=True)
+    log.write_bytes(b"".join(lines[:1]))
+    for other in log.with_suffix("").iterdir():
+        if other.stem != path.stem:
+            other.unlink()
+    path.with_suffix(".partial").write_bytes(b"")
+    for file in (study.ratings_file, study.answers_file, study.raters_file):
+        file.unlink(missing_ok=True)
+    study.analysis_file.unlink(missing_ok=True)
+    shutil.rmtree(study.report, ignore_errors=True)
+    return path
+
+
+def test_a_kill_between_a_recording_and_the_log_breaks_no_study(
+    study: StudyPaths,
+) -> None:
+    path = killed_before_the_log(study)
+    verification = verify_study(study)
+    assert verification.is_whole
+    doubted = {finding.path for finding in verification.findings}
+    assert doubted == {path, path.with_suffix(".json"), path.with_suffix(".partial")}
+
+
+def test_samples_left_beside_it_excuse_no_recording_of_a_complete_session(
+    study: StudyPaths,
+) -> None:
+    path = a_recording_nobody_logged(study)
+    path.with_suffix(".partial").write_bytes(b"")
+    broken = [f.path for f in verify_study(study).findings if f.weight == "broken"]
+    assert broken == [path]
+
+
 def test_of_a_broken_chain_nothing_but_the_chain_is_said(study: StudyPaths) -> None:
     log = a_line_changed(study)
     broken = [f.path for f in verify_study(study).findings if f.weight == "broken"]
