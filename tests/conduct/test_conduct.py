@@ -1,6 +1,7 @@
 """Withdrawals and unblindings are events of a chain, and nothing happens without."""
 
 import json
+import os
 
 import pytest
 
@@ -38,6 +39,13 @@ def test_events_are_a_chain_with_a_head(small: Small) -> None:
         "who": "MK",
         "why": "moved away",
     }
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such permissions")
+def test_what_happened_is_its_owners_alone(small: Small) -> None:
+    study, protocol = small
+    record_standing(study, protocol, "R2", "withdrawn", **BY)
+    assert study.conduct_file.stat().st_mode & 0o077 == 0
 
 
 def test_a_changed_line_is_found(small: Small) -> None:
