@@ -21,7 +21,7 @@ from masrel.intervals._problem import (
 )
 
 _UNITS = {"items": ("items",), "raters": ("raters",), "both": ("items", "raters")}
-_ROUNDING = 1e-12  # of an estimate: what moves it by no more has left it as it is
+_ROUNDING = 1e-12  # of 1, or of an estimate that has a unit
 
 
 def jackknife(
@@ -174,7 +174,7 @@ def _jackknife_variance(problem: IntervalProblem) -> _JackknifeVariance:
         # Satterthwaite's degrees for a sum would lie above the fewer ones.
         df = min(df, n - 1)
         notes += warn_small(n, 10 if unit == "items" else 5, unit, int(freq.sum()))
-    if not variance > 0.0:
+    if not is_moved(problem, variance):
         reason = (
             f"leaving out any of the {' or '.join(units)} leaves the estimate as it "
             "is, so the jackknife cannot say how uncertain it is"
@@ -195,7 +195,7 @@ def _cluster_variance(problem: IntervalProblem, codes: Integers) -> _JackknifeVa
         return _JackknifeVariance(variance=math.nan, df=math.nan, reason=reason)
     notes = warn_small(n, 10, "clusters", len(replicates))
     variance = _variance_of(replicates, np.ones(len(replicates), dtype=np.int64), n)
-    if not variance > 0.0:
+    if not is_moved(problem, variance):
         reason = (
             "leaving out any of the clusters leaves the estimate as it is, so the "
             "jackknife cannot say how uncertain it is"
@@ -219,6 +219,12 @@ def _logit_interval(problem: IntervalProblem, codes: Integers) -> Interval:
     )
 
 
+def is_moved(problem: IntervalProblem, variance: float) -> bool:
+    """Say whether a jackknife variance is of more than rounding."""
+    scale = abs(problem.value) if problem.entry.in_units else 1.0
+    return math.sqrt(variance) > _ROUNDING * scale
+
+
 def _variance_of(replicates: Floats, freq: Integers, n: int) -> float:
     """Return (n - 1)/n Σ (θ_i - mean)² of estimates with one left out [1]_."""
     # Takes replicates (n_distinct,), freq (n_distinct,); n are those with a pair. What
@@ -226,9 +232,7 @@ def _variance_of(replicates: Floats, freq: Integers, n: int) -> float:
     # single ratings move the mean of chance by little, and there 1 would do as well.
     if n < 2:  # nothing is left
         return math.nan
-    moved = replicates - replicates[0]
-    if np.abs(moved).max() <= _ROUNDING * np.abs(replicates).max():
-        return 0.0  # no change at all
+    moved = replicates - replicates[0]  # so that no change at all is exactly 0
     deviations = moved - freq @ moved / freq.sum()
     return float((n - 1) / n * (freq @ deviations**2))
 

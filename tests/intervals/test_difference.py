@@ -303,6 +303,17 @@ def test_the_same_ratings_do_not_differ_and_it_says_so() -> None:
     assert "leaves the difference as it is" in (found.interval.reason or "")
 
 
+def test_what_only_rounding_sets_apart_does_not_differ() -> None:
+    # Conger's κ of the same ratings in another order of the raters
+    first, _ = two(20)
+    second = [row[::-1] for row in first]
+    with pytest.warns(UndefinedStatisticWarning, match="leaves the difference as it"):
+        found = difference(
+            "conger_kappa", first, second, design="dependent", categories=CATEGORIES
+        )
+    assert found.standard_error == 0.0
+
+
 def test_what_both_have_in_common_cancels() -> None:
     first, second = two(40)
     errors = [

@@ -152,6 +152,15 @@ def test_few_raters_and_items_are_warned_of() -> None:
         # κ of one item is −1/(raters − 1), whatever they say: only rounding moves it
         ([["a"] * 6 + ["b"] * 2], "raters", "leaves the estimate as it is"),
         ([["a", "b", "c", "a", "b"]], "raters", "leaves the estimate as it is"),
+        # any two of these four agree on a third of the items, as chance does: κ is 0
+        (
+            [
+                list(item)
+                for item in "aaaa abbc accb babb bbca bcac cacc cbab ccba".split()
+            ],
+            "raters",
+            "leaves the estimate as it is",
+        ),
         ([["a", "b", "a"]], "items", "left out the estimate is undefined"),
     ],
 )
