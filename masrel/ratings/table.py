@@ -547,9 +547,8 @@ def _texts(ratings: Ratings) -> Iterator[str]:
     yield ratings_csv(ratings)
     head = _head(ratings)
     yield head + _body(ratings, RATING_COLUMNS[:_N_FORMERLY])
-    if all(
-        row.felt is None for row in ratings.rows
-    ):  # of logs that say nothing of stretches
+    says_felt = any(row.felt is not None for row in ratings.rows)
+    if not says_felt:  # of logs that say nothing of stretches
         yield head + _body(ratings, RATING_COLUMNS[:_N_ALWAYS])
 
 
