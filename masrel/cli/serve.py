@@ -49,6 +49,10 @@ def serve(study: Path, port: int, host: str, tls: tuple[Path, Path] | None) -> N
     ones. A session by the browser leaves the same log as one by masrel run. Ctrl-C
     stops what runs and then the server; a second one does not wait.
     """
+    if sys.platform == "win32":  # a session takes over a socket of the server
+        raise ParameterError(
+            "serve: needs Linux or macOS, got Windows; there is masrel run"
+        )
     for name in _LIBRARIES:
         if importlib.util.find_spec(name) is None:
             raise ParameterError(

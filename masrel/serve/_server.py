@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import errno
+import fcntl
 import logging
 import os
 import signal
@@ -25,9 +26,6 @@ from masrel.serve._access import Access
 from masrel.serve._app import make_app
 from masrel.serve._desk import Desk
 from masrel.serve._middleware import Middleware
-
-if sys.platform != "win32":
-    import fcntl
 
 _REQUEST_S = 10.0  # in which a request must have come in whole
 _IDLE_S = 30  # that a connection may wait for its next request
@@ -145,10 +143,8 @@ def listen(host: str, port: int) -> socket.socket:
     family, kind, number, _, address = known[0]
     listener = socket.socket(family, kind, number)
     try:
-        if sys.platform == "win32":
-            listener.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
-        else:  # the port of a server that has just stopped
-            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        # the port of a server that has just stopped
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind(address)
         listener.listen(128)
     except OSError as error:
@@ -179,9 +175,6 @@ def alone(study: StudyPaths) -> Iterator[None]:
     ParameterError
         If another process serves it.
     """
-    if sys.platform == "win32":
-        yield
-        return
     # Released by the system when the process ends, killed or not.
     folder = study.serve_key_file.parent
     make_folder(folder, mode=0o700)

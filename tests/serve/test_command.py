@@ -40,6 +40,18 @@ def test_no_such_study(masrel: Caller, tmp_path: Path) -> None:
     assert re.fullmatch(r"masrel: \S+protocol.toml: needed a protocol .*\n", done.err)
 
 
+def test_windows_is_told_what_it_has_instead(
+    masrel: Caller, study: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "platform", "win32")
+    done = masrel("serve", study)
+    assert (done.code, done.out) == (2, "")
+    assert (
+        done.err
+        == "masrel: serve: needs Linux or macOS, got Windows; there is masrel run\n"
+    )
+
+
 def test_a_protocol_that_cannot_be_read(masrel: Caller, study: Path) -> None:
     (study / "protocol.toml").write_text("models = 3")
     done = masrel("serve", study)
