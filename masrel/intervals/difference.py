@@ -23,7 +23,7 @@ from masrel.intervals._problem import (
     pose_problem,
     warn_small,
 )
-from masrel.intervals.jackknife import _variance_of, is_moved
+from masrel.intervals.jackknife import _is_moved, _variance_of
 
 _Design = Literal["dependent", "independent"]
 """Whether both sets of ratings are of the same items, row by row."""
@@ -265,7 +265,7 @@ def _compare(
     else:
         variance_of = _dependent if design == "dependent" else _independent
         variance, df = variance_of(*problems)
-    if variance > 0.0 and not is_moved(problems[0], variance):
+    if variance > 0.0 and not _is_moved(problems[0], variance):
         variance = 0.0
     one, other = (problem.entry(problem.coded, weights=weights) for problem in problems)
     return _Compared(

@@ -174,7 +174,7 @@ def _jackknife_variance(problem: IntervalProblem) -> _JackknifeVariance:
         # Satterthwaite's degrees for a sum would lie above the fewer ones.
         df = min(df, n - 1)
         notes += warn_small(n, 10 if unit == "items" else 5, unit, int(freq.sum()))
-    if not is_moved(problem, variance):
+    if not _is_moved(problem, variance):
         reason = (
             f"leaving out any of the {' or '.join(units)} leaves the estimate as it "
             "is, so the jackknife cannot say how uncertain it is"
@@ -195,7 +195,7 @@ def _cluster_variance(problem: IntervalProblem, codes: Integers) -> _JackknifeVa
         return _JackknifeVariance(variance=math.nan, df=math.nan, reason=reason)
     notes = warn_small(n, 10, "clusters", len(replicates))
     variance = _variance_of(replicates, np.ones(len(replicates), dtype=np.int64), n)
-    if not is_moved(problem, variance):
+    if not _is_moved(problem, variance):
         reason = (
             "leaving out any of the clusters leaves the estimate as it is, so the "
             "jackknife cannot say how uncertain it is"
@@ -219,7 +219,7 @@ def _logit_interval(problem: IntervalProblem, codes: Integers) -> Interval:
     )
 
 
-def is_moved(problem: IntervalProblem, variance: float) -> bool:
+def _is_moved(problem: IntervalProblem, variance: float) -> bool:
     """Say whether a jackknife variance is of more than rounding."""
     scale = abs(problem.value) if problem.entry.in_units else 1.0
     return math.sqrt(variance) > _ROUNDING * scale
