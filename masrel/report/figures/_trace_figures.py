@@ -144,7 +144,7 @@ def _draw_panel(axes: Axes, panel: TracePanel, which: int) -> None:
 
 
 def _draw_band(axes: Axes, panel: TracePanel, which: int) -> None:
-    # the outer pair of ends, and the inner one before it; names where the catch is
+    # the outer pair of ends, and the inner one before it
     if panel.band is None:
         return
     ends = panel.band.torque if which == _TORQUE else panel.band.angle
@@ -153,13 +153,25 @@ def _draw_band(axes: Axes, panel: TracePanel, which: int) -> None:
         axes.fill_between(
             panel.band.time, low, high, color=shade, linewidth=0, zorder=0.5
         )
-    for name, stretch in zip(panel.names, panel.stretches, strict=True):
-        if which == _TORQUE:
-            at = int(np.argmax(stretch[3] == _CATCH)) or -1  # or the end without one
-            axes.annotate(
-                short_name(name), (stretch[0][at], stretch[which][at]), (0, 3),
-                textcoords="offset points", fontsize=6, color=GREY,
-            )  # fmt: skip
+    if which == _TORQUE:
+        _name_stretches(axes, panel)
+
+
+def _name_stretches(axes: Axes, panel: TracePanel) -> None:
+    # where the catch is, or at the end without one; out of each other's way
+    places = []
+    for name, (time, _, torque, phase) in zip(
+        panel.names, panel.stretches, strict=True
+    ):
+        at = int(np.argmax(phase == _CATCH)) or -1
+        places.append((time[at], torque[at], short_name(name)))
+    sides = ["right", *["center"] * len(places[1:-1]), "left"]
+    for (time, torque, name), side in zip(sorted(places), sides, strict=False):
+        axes.annotate(
+            name, (time, torque), (0, 3), textcoords="offset points", ha=side,
+            fontsize=6, color=GREY, zorder=5,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.3},
+        )  # fmt: skip
 
 
 def _draw_phase(
