@@ -18,7 +18,6 @@ from masrel.elbow._polynomials import (
     Polynomial,
     derivative,
     first_above,
-    refined,
     shifted,
     split_at_roots,
     value,
@@ -29,7 +28,7 @@ from masrel.recording import PHASES, Phase
 
 __all__ = ["Events", "PhaseSpan", "StretchEvents", "events"]
 
-_PRE_CATCH, _CATCH, _POST_CATCH = range(3)  # positions in PHASES
+_PRE_CATCH, CATCH, _POST_CATCH = range(3)  # positions in PHASES
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -175,30 +174,13 @@ def events(parameters: ElbowParameters, motion: Motion) -> Events:
         for (code, start, _), until in zip(line.changes, ends, strict=True)
         if until.time > start.time  # one of no length is left out
     ]
-    stretches = [rounded(stretch, origin, end) for stretch in line.stretches]
-    reached = {}
-    if line.first is not None:
-        first = stretches[line.stretches.index(line.first)]
-        reached = {name: getattr(first, name) for name in _REACHED}
+    reached = [{n: getattr(stretch, n) for n in _REACHED} for stretch in line.stretches]
+    first = {} if line.first is None else reached[line.stretches.index(line.first)]
     return Events(
-        **reached, stretches=tuple(stretches), end=end.time, phases=tuple(phases)
-    )
-
-
-def rounded(stretch: "Stretch", origin: float, end: "State") -> StretchEvents:
-    """Return what the API says of a stretch."""
-    if stretch.catch is None:
-        return StretchEvents(onset=stretch.onset.time)
-    left, slowed = stretch.catch_end, stretch.post_catch_end
-    return StretchEvents(
-        onset=stretch.onset.time,
-        catch=stretch.catch.time,
-        catch_angle=origin + stretch.catch.angle,
-        catch_speed=stretch.catch_speed,
-        mean_speed=stretch.mean_speed,
-        peak_end=min(stretch.peak_end, (end if left is None else left).time),
-        catch_end=None if left is None else left.time,
-        post_catch_end=None if slowed is None else slowed.time,
+        **first,
+        stretches=tuple([StretchEvents(**names) for names in reached]),
+        end=end.time,
+        phases=tuple(phases),
     )
 
 
@@ -213,15 +195,17 @@ class State(NamedTuple):
 class Stretch:
     """A movement in extension that reached ν_th, as far as it has got."""
 
-    onset: State
-    catch: State | None = None
-    catch_speed: float = 0.0  # v_c of (3)
-    mean_speed: float = 0.0  # v̄ of (2)
+    onset_angle: float  # rad from the motion's origin
+    onset: float  # this and the next as of `StretchEvents`
+    catch: float | None = None
+    catch_angle: float | None = None
+    catch_speed: float | None = None
+    mean_speed: float | None = None
+    peak_end: float | None = None
+    catch_end: float | None = None
+    post_catch_end: float | None = None
     pre_end: float = 0.0  # τ_pre_end of (3)
     rise: float = 0.0  # H·v_c of (3)
-    peak_end: float = 0.0  # s; the catch may end before
-    catch_end: State | None = None  # by the angle travelled, or as the arm is flexed
-    post_catch_end: State | None = None
 
 
 class Change(NamedTuple):
@@ -255,18 +239,23 @@ def timeline(p: ElbowParameters, motion: Motion) -> Timeline:
     for start, length, angle, slowest, fastest in motion.pieces():
         if not machine.changes:
             machine.changes.append(Change(_PRE_CATCH, State(0.0, angle[0])))
-        last, end = None, value(angle, length)
-        if (end if slowest >= 0.0 else angle[0] + fastest * length) > near:
-            last = first_above([angle[0] - limit, *angle[1:]], 0.0, length)
-        until = length if last is None else last
+        highest = angle[0] + fastest * length if slowest < 0.0 else value(angle, length)
+        beyond = None
+        if highest > near:
+            beyond = first_above(angle, 0.0, length, level=limit)
+        until = length if beyond is None else beyond
         if until > 0.0:
             machine.piece(start, angle, until, slowest, fastest)
-        if last is not None:
+        if beyond is not None:
+            end = State(start + beyond, limit)
             break
-    end = State(motion.duration, motion.end - motion.origin)
-    if last is not None:
-        end = State(start + last, limit)
+    else:
+        end = State(motion.duration, motion.end - motion.origin)
     stretches = machine.stretches
+    for stretch in stretches:
+        if stretch.peak_end is not None:  # the catch may end before
+            left = end.time if stretch.catch_end is None else stretch.catch_end
+            stretch.peak_end = min(stretch.peak_end, left)
     caught = [stretch for stretch in stretches if stretch.catch is not None]
     first = next(iter(caught or stretches), None)
     return Timeline(machine.law, machine.changes, stretches, first, end)
@@ -276,11 +265,11 @@ class _PhaseMachine:
     """The state machine of Fig. 7, led from piece to piece instead of sampled."""
 
     def __init__(self, p: ElbowParameters, motion: Motion) -> None:
-        self.p = p
+        self.p, self.origin = p, motion.origin
         rest = motion.start if p.rest_angle is None else p.rest_angle
-        self.law = _law.pre_catch(p, rest - motion.origin)
-        self.constant = p.catch_angle_constant - motion.origin  # L
-        smallest, largest = _law.catch_bounds(p, motion.origin)
+        self.law = _law.pre_catch(p, rest - self.origin)
+        self.constant = p.catch_angle_constant - self.origin  # L
+        smallest, largest = _law.catch_bounds(p, self.origin)
         # θ_catch jumps at ν_H where ν_L is above that
         self.jumps = smallest > largest
         self.lowest, self.highest = sorted((smallest, largest))
@@ -326,10 +315,10 @@ class _PhaseMachine:
         # the stretch is over, and the next may catch
         phase, _, stretch = self.changes[-1]
         if stretch is not None:
-            if phase == _CATCH:
-                stretch.catch_end = state
+            if phase == CATCH:
+                stretch.catch_end = state.time
             else:
-                stretch.post_catch_end = state
+                stretch.post_catch_end = state.time
             self.changes.append(Change(_PRE_CATCH, state))
         self.is_armed, self.since = True, None
 
@@ -337,13 +326,13 @@ class _PhaseMachine:
         self, start: float, angle: Polynomial, low: float, high: float, fastest: float
     ) -> None:
         if (
-            self.changes[-1].phase == _CATCH
+            self.changes[-1].phase == CATCH
             and value(angle, low) + fastest * (high - low) > self.goal
         ):
             low = self.leave_catch(start, angle, low, high, grows=False)
         if self.changes[-1].phase == _POST_CATCH:  # ends below ν_th, Fig. 7
             state = State(start + low, value(angle, low))
-            self.stretches[-1].post_catch_end = state
+            self.stretches[-1].post_catch_end = state.time
             self.changes.append(Change(_PRE_CATCH, state))
         self.since = None
 
@@ -354,7 +343,7 @@ class _PhaseMachine:
         if self.changes[-1].phase == _PRE_CATCH:
             if self.since is None:
                 self.since = 0.0
-                self.stretches.append(Stretch(State(start, angle[0])))
+                self.stretches.append(Stretch(angle[0], start))
             place = None
             if may_catch and self.is_armed:
                 place = self.catch_place(angle, length)
@@ -363,7 +352,7 @@ class _PhaseMachine:
                 return
             self.catch(start, angle, place)
             at = place
-        if self.changes[-1].phase == _CATCH:
+        if self.changes[-1].phase == CATCH:
             self.leave_catch(start, angle, at, length, grows=True)
 
     def catch_place(self, angle: Polynomial, length: float) -> float | None:
@@ -371,7 +360,7 @@ class _PhaseMachine:
         end = value(angle, length)
         if end <= self.lowest:
             return None
-        p, onset = self.p, self.stretches[-1].onset.angle
+        p, onset = self.p, self.stretches[-1].onset_angle
         way, since = angle[1:], [1.0]  # both over the time, in the piece of the onset
         if self.since:
             top = end + p.catch_slope * (end - onset) / self.since
@@ -384,10 +373,11 @@ class _PhaseMachine:
             line = _law.catch_line(p, self.constant, angle, way, since)
         place = first_above(line, 0.0, length)
         if place is not None and value(angle, place) < self.lowest:
-            least = _reach(angle, self.lowest, place, length)
-            place = first_above(line, least, length)
+            place = first_above(angle, place, length, level=self.lowest, grows=True)
+            if place is not None:
+                place = first_above(line, place, length)
         if end > self.highest and (place is None or value(angle, place) > self.highest):
-            place = _reach(angle, self.highest, 0.0, length)
+            place = first_above(angle, 0.0, length, level=self.highest, grows=True)
         is_tie = place is not None and length - place <= TIE * length
         return None if is_tie else place
 
@@ -396,11 +386,12 @@ class _PhaseMachine:
         speeds = derivative(angle)
         state, speed = State(start + at, value(angle, at)), value(speeds, at)
         if self.since:
-            way = state.angle - stretch.onset.angle
+            way = state.angle - stretch.onset_angle
             stretch.mean_speed = way / (self.since + at)
         else:
             stretch.mean_speed = value(angle[1:], at)
-        stretch.catch, stretch.catch_speed = state, speed
+        stretch.catch, stretch.catch_speed = state.time, speed
+        stretch.catch_angle = self.origin + state.angle
         stretch.pre_end = self.law.commanded(state.angle, speed)
         if p.inertia:
             stretch.pre_end += p.inertia * value(derivative(speeds), at)
@@ -408,33 +399,17 @@ class _PhaseMachine:
         stretch.peak_end = state.time + p.peak_duration
         self.goal = state.angle + p.catch_travel
         self.is_armed, self.since = False, None
-        self.changes.append(Change(_CATCH, state, stretch))
+        self.changes.append(Change(CATCH, state, stretch))
 
     def leave_catch(
         self, start: float, angle: Polynomial, low: float, high: float, *, grows: bool
     ) -> float:
         # (4): the catch ends when the angle travelled exceeds D
-        place: float | None
-        if grows:
-            if value(angle, high) <= self.goal:
-                return low
-            place = _reach(angle, self.goal, low, high)
-        else:
-            place = first_above([angle[0] - self.goal, *angle[1:]], low, high)
+        place = first_above(angle, low, high, level=self.goal, grows=grows)
         if place is None or high - place <= TIE * high:
             return low
         state = State(start + place, value(angle, place))
         stretch = self.stretches[-1]
-        stretch.catch_end = state
+        stretch.catch_end = state.time
         self.changes.append(Change(_POST_CATCH, state, stretch))
         return place
-
-
-def _reach(angle: Polynomial, goal: float, low: float, high: float) -> float:
-    # where a growing angle reaches a goal that its end is beyond
-    left = goal - value(angle, low)
-    if left <= 0.0:
-        return low
-    share = left / (left + value(angle, high) - goal)
-    line = [angle[0] - goal, *angle[1:]]
-    return refined(line, low, high, guess=low + share * (high - low))

@@ -41,12 +41,6 @@ class TorqueLaw(NamedTuple):
         )
         return level + stiffness * (angle - origin) + damping * velocity
 
-    @property
-    def is_level(self) -> bool:
-        """Whether the torque does not depend on what the arm does."""
-        terms = (self.stiffness, self.damping, self.inertia)
-        return all(isinstance(term, float) and term == 0.0 for term in terms)
-
     def along(self, angle: Polynomial, since: Number) -> Polynomial:
         """Return the torque along an angle that begins so long after the law, s."""
         if self.onset is not None:
@@ -55,7 +49,8 @@ class TorqueLaw(NamedTuple):
             square, last = product(y, y), [3.0 - 2.0 * y[0], -2.0 * y[1]]
             first, *later = product(square, last)  # `onset_share`
             return [self.level + rise * first, *[rise * c for c in later]]
-        if self.is_level:
+        terms = (self.stiffness, self.damping, self.inertia)
+        if all(isinstance(term, float) and term == 0.0 for term in terms):
             return [self.level]
         speed = [*derivative(angle), 0.0]
         acceleration = [*derivative(speed), 0.0]

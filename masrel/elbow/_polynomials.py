@@ -26,8 +26,9 @@ _SHARES = [[1.0 / comb(n, j) for j in range(n + 1)] for n in range(12)]
 
 def value(p: Polynomial, x: Number) -> Number:
     """Return the value at x, by Horner's rule."""
-    total = p[-1]
-    for c in p[-2::-1]:
+    others = reversed(p)
+    total = next(others)
+    for c in others:
         total = total * x + c
     return total
 
@@ -78,22 +79,38 @@ def bernstein(p: Polynomial, width: Number) -> list[Number]:
     return b
 
 
-def first_above(p: Polynomial, low: float, high: float) -> float | None:
-    """Return where a polynomial is first above 0, between two places; None if never.
+def first_above(
+    p: Polynomial, low: float, high: float, *, level: float = 0.0, grows: bool = False
+) -> float | None:
+    """Return where a polynomial is first above a level between two places; None if not.
 
-    A place nearer to high than a tie is none.
+    A place nearer to high than a tie is none. One that only grows is searched faster.
     """
     width = high - low
-    if width <= 0.0:
+    if width <= 0.0 or (grows and value(p, high) <= level):
         return None
-    if len(p) == 2 and p[1] > 0.0:  # a line that rises
+    if level:
+        p = [p[0] - level, *p[1:]]
+    x: float | None
+    if len(p) == 2 and p[1] > 0.0:
         x = max(-p[0] / p[1], low)
-        return None if x > high - TIE * width else x
-    b = bernstein(shifted(p, low) if low else p, width)
-    if (most := max(b)) <= 0.0:
-        return None
-    x = _first_rise(p, b, low, high, NOTHING * max(most, -min(b)), TIE * width)
+    elif grows:
+        x = _only_rise(p, low, high)
+    else:
+        b = bernstein(shifted(p, low) if low else p, width)
+        if (most := max(b)) <= 0.0:
+            return None
+        x = _first_rise(p, b, low, high, NOTHING * max(most, -min(b)), TIE * width)
     return None if x is None or x > high - TIE * width else x
+
+
+def _only_rise(p: Polynomial, low: float, high: float) -> float:
+    # the end is above 0
+    left = -value(p, low)
+    if left <= 0.0:
+        return low
+    share = left / (left + value(p, high))
+    return _refined(p, low, high, guess=low + share * (high - low))
 
 
 def _first_rise(
@@ -105,7 +122,7 @@ def _first_rise(
     if signs[0]:
         return low
     if False not in signs[signs.index(True) :]:  # below, then above
-        return refined(p, low, high, guess=_guess(b, low, high))
+        return _refined(p, low, high, guess=_guess(b, low, high))
     if high - low <= tie:
         return None  # touches 0, or is above it for less than a tie
     middle, (one, other) = 0.5 * (low + high), _halves(b)
@@ -152,7 +169,7 @@ def _sign_changes(
         return []
     if n_changes == 1:
         guess = _guess(b, low, high)
-        return [refined(p, low, high, rises=signs[-1], guess=guess)]
+        return [_refined(p, low, high, rises=signs[-1], guess=guess)]
     if high - low <= tie:
         return []  # touches 0
     middle, (one, other) = 0.5 * (low + high), _halves(b)
@@ -173,7 +190,7 @@ def _guess(b: list[float], low: float, high: float) -> float:
     return low + min(max(share, 0.02), 0.98) * (high - low)
 
 
-def refined(
+def _refined(
     p: Polynomial, low: float, high: float, *, guess: float, rises: bool = True
 ) -> float:
     """Return the one place between two where a polynomial changes sign.
@@ -224,7 +241,7 @@ def _of_square(p: Polynomial, *, rises: bool) -> float:
 
 
 def refined_columns(p: Polynomial, low: Number, high: Number) -> Number:
-    """Return the places, one a row, where polynomials rise through 0; as `refined`."""
+    """Return the places, one a row, where polynomials rise through 0; as `_refined`."""
     if len(p) == 2:
         return np.minimum(np.maximum(-p[0] / p[1], low), high)
     x, slopes, near = 0.5 * (low + high), derivative(p), 1e-7 * (high - low)

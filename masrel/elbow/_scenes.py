@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel.elbow._events import rounded, timeline
+from masrel.elbow._events import timeline
 from masrel.elbow._motion import Floats, Motion
 from masrel.elbow._polynomials import Number
 from masrel.elbow._single_stretches import PIECES, SingleStretches, Which
@@ -269,9 +269,6 @@ def _alone(
     joint: ElbowParameters, motion: Motion, outputs: tuple[str, ...]
 ) -> list[float]:
     line = timeline(joint, motion)
-    events = None
-    if line.first is not None:
-        events = rounded(line.first, motion.origin, line.end)
     row = []
     for name in outputs:
         if name in LOADS:
@@ -279,7 +276,7 @@ def _alone(
         elif name == "end":
             row.append(line.end.time)
         else:
-            number = None if events is None else getattr(events, name)
+            number = None if line.first is None else getattr(line.first, name)
             row.append(math.nan if number is None else number)
     return row
 

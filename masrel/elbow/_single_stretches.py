@@ -300,14 +300,12 @@ class SingleStretches:
                     yield Section(np.maximum(until - low, 0.0), part, torque)
 
     def _peak(self) -> Floats:
-        best, moving = np.full(self.end.shape, -math.inf), []
-        for segment in self._segments():
-            if segment.law.is_level:
-                lasts = segment.end > segment.start
-                best = np.where(lasts, np.maximum(best, _last_level(segment)), best)
-            else:
-                moving.append(segment)
-        for segment in moving[::-1]:
+        before, *levels, after, slowed = self._segments()
+        best = np.full(self.end.shape, -math.inf)
+        for segment in levels:  # of the catch
+            lasts = segment.end > segment.start
+            best = np.where(lasts, np.maximum(best, _last_level(segment)), best)
+        for segment in (slowed, after, before):
             for start, length, angle in self.pieces:
                 low = np.maximum(segment.start - start, 0.0)
                 high = np.minimum(segment.end - start, length)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from masrel.elbow import _law
-from masrel.elbow._events import Timeline, timeline
+from masrel.elbow._events import CATCH, Timeline, timeline
 from masrel.elbow._law import TorqueLaw
 from masrel.elbow._motion import Floats, Motion
 from masrel.elbow._polynomials import (
@@ -331,14 +331,14 @@ def segments(p: ElbowParameters, line: Timeline) -> list[TorqueSegment]:
     """Return the laws of a motion in order, without those that hold for no time."""
     ends = [state.time for _, state, _ in line.changes[1:]] + [line.end.time]
     laid = []
-    for (_, state, stretch), end in zip(line.changes, ends, strict=True):
+    for (phase, state, stretch), end in zip(line.changes, ends, strict=True):
         start = state.time
         if stretch is None:
             laid.append(TorqueSegment(start, end, line.law))
-        elif state is stretch.catch:
+        elif phase == CATCH:
             peak, residual = _law.catch(p, stretch.pre_end, stretch.rise)
             risen = min(start + p.catch_rise, end)
-            fallen = min(stretch.peak_end, end)
+            fallen = min(start + p.peak_duration, end)
             onset = TorqueLaw(stretch.pre_end, onset=(stretch.rise, p.catch_rise))
             laid += [
                 TorqueSegment(start, risen, onset),
