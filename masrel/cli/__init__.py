@@ -86,12 +86,6 @@ class _Verbs(click.Group):
         command: click.Command = getattr(module, cmd_name)
         return command
 
-    def invoke(self, ctx: click.Context) -> object:
-        try:
-            return super().invoke(ctx)
-        except KeyboardInterrupt:  # click would say "Aborted!"
-            _fail("stopped by Ctrl-C", 1)
-
     def format_commands(
         self,
         ctx: click.Context,  # noqa: ARG002 - click's signature
@@ -111,22 +105,31 @@ def _refuse_verb(ctx: click.Context, name: str) -> NoReturn:
     ctx.fail(f"No such command '{name}'.{hint}")
 
 
-@click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(masrel.__version__, prog_name="masrel")
-def cli() -> None:
-    """Agreement of any file of ratings, and studies on a simulator of spasticity.
-
-    To begin, with a file of ratings: masrel agree FILE --target items
-    """
+cli = click.version_option(masrel.__version__, prog_name="masrel")(
+    _Verbs(
+        context_settings={"help_option_names": ["-h", "--help"]},
+        help="Agreement of any file of ratings, and studies on a simulator of "
+        "spasticity.\n\n"
+        "To begin, with a file of ratings: masrel agree FILE --target items",
+    )
+)
 
 
 def main() -> None:
     """Run the command line and exit with its code."""
     # What is left at the end goes with the process: no collector need look through it
     atexit.register(gc.freeze)
-    _accept_any_letter()
+    for stream in (sys.stdout, sys.stderr):
+        # One that somebody has told what to do with letters it lacks goes on doing it
+        if isinstance(stream, io.TextIOWrapper) and stream.errors in _USUAL_ERRORS:
+            stream.reconfigure(errors="masrel")
     try:
-        cli()
+        sys.exit(cli.main(standalone_mode=False) or 0)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(error.exit_code)
+    except click.Abort:
+        _fail("stopped by Ctrl-C", 1)
     except (DeviceError, ConvergenceError, SessionStoppedError) as error:
         _fail(error, 1)
     except MasrelError as error:
@@ -167,16 +170,8 @@ _SIGNS = {
 }
 
 
-def _accept_any_letter() -> None:
-    # stdout and stderr write what they cannot encode, on Windows' cp1252 say, in others
-    codecs.register_error("masrel", _in_other_letters)
-    for stream in (sys.stdout, sys.stderr):
-        # One that somebody has told what to do with such letters goes on doing it.
-        if isinstance(stream, io.TextIOWrapper) and stream.errors in _USUAL_ERRORS:
-            stream.reconfigure(errors="masrel")
-
-
 def _in_other_letters(error: UnicodeError) -> tuple[str, int]:
+    # what stdout and stderr cannot encode, on Windows' cp1252 say, they write in others
     if not isinstance(error, UnicodeEncodeError):
         raise error
     letters = error.object[error.start : error.end]
@@ -191,3 +186,6 @@ def _spelled(letter: str) -> str:
     if words[:1] == ["GREEK"] and words[2:3] == ["LETTER"] and len(words) == 4:
         return words[3].lower() if words[1] == "SMALL" else words[3].capitalize()
     return letter.encode("ascii", "backslashreplace").decode("ascii")
+
+
+codecs.register_error("masrel", _in_other_letters)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from masrel._files import write_file
-from masrel.cli._paths import InputFile, OutputFile, note_inputs
+from masrel.cli._paths import FileInFolder, InputFile, OutputFile, note_inputs
 from masrel.errors import MasrelWarning, ParameterError
 
 if TYPE_CHECKING:
@@ -28,6 +28,20 @@ STDOUT = Path("-")
 """What a file is called that is printed."""
 
 _FORMS: dict[str, "Form"] = {".png": "png", ".svg": "svg", ".pdf": "pdf"}
+
+
+class _FigureFile(FileInFolder):
+    """A figure's file, whose name says its form."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Path:
+        file: Path = super().convert(value, param, ctx)
+        if file.suffix.lower() not in _FORMS:
+            raise ParameterError(
+                f"--figure: needs a name that ends in .png, .svg or .pdf, got {file}"
+            )
+        return file
 
 
 def grouped(name: str, group: type, *options: Callable[..., Any]) -> Decorator:
@@ -109,14 +123,6 @@ class OutputOptions:
                 f"{' and '.join(printed)} want the same stdout: choose one"
             )
 
-    def check_files(self) -> None:
-        """Refuse files that cannot be written, before anything is computed for them."""
-        if self.json_file is not None:
-            check_folder("--json", self.json_file)
-        if self.figure is not None:
-            check_folder("--figure", self.figure)
-            figure_form(self.figure)
-
 
 _FORMAT = 1  # of what verbs write as JSON
 _RAW = "With --csv: no apostrophe before a text that a spreadsheet would run."
@@ -131,16 +137,19 @@ def output_options(
     latex: str | None = None,
     sentence: str | None = None,
     quiet: str | None = None,
+    makes_folder: bool = False,
 ) -> Decorator:
     """Return the options with these helps, as one argument `output` of a command."""
+    # makes_folder: whether the command makes a folder that JSON may go to
+    kind = OutputFile if makes_folder else FileInFolder
+    json_path = kind(path_type=Path, allow_dash=True)
     # of verbs that print no table unless asked, it is nothing by itself
     needs_csv = _needs_csv if raw_csv is None else None
     raw_csv = raw_csv or (_RAW if csv is not None else None)
-    path = OutputFile(path_type=Path, dir_okay=False)
-    json_path = OutputFile(path_type=Path, allow_dash=True)
+    figures = _FigureFile(path_type=Path, dir_okay=False)
     options = [
         (json, click.option("--json", "json_file", type=json_path, help=json)),
-        (figure, click.option("--figure", type=path, help=figure)),
+        (figure, click.option("--figure", type=figures, help=figure)),
         (csv, click.option("--csv", is_flag=True, is_eager=True, help=csv)),
         (
             raw_csv,
@@ -158,15 +167,6 @@ def _needs_csv(context: click.Context, _: click.Parameter, raw_csv: bool) -> boo
     if raw_csv and not context.params["csv"]:
         raise click.UsageError("--raw-csv: needs --csv, whose table it is about")
     return raw_csv
-
-
-def check_folder(option: str, file: Path) -> None:
-    """Refuse a file whose folder is not there."""
-    if file != STDOUT and not file.parent.is_dir():
-        raise ParameterError(
-            f"{option}: needs a folder that exists, got {file}: there is no folder "
-            f"{file.parent}"
-        )
 
 
 def write_output(
@@ -201,7 +201,7 @@ def write_output(
         # Imported here: a table loads nothing that draws.
         from masrel.report.figures import draw
 
-        form = figure_form(output.figure)
+        form = _FORMS[output.figure.suffix.lower()]
         files = draw(figure(), stamp=stamp, forms=(form,))
         write_file(output.figure, files[form])
         click.echo(f"figure: {output.figure}", err=True)
@@ -286,13 +286,3 @@ def warnings_as_notes() -> Iterator[None]:
 
 def _is_ours(warning: warnings.WarningMessage) -> bool:
     return issubclass(warning.category, MasrelWarning)
-
-
-def figure_form(file: Path) -> "Form":
-    """Return the form of a figure, which its name ends in."""
-    form = _FORMS.get(file.suffix.lower())
-    if form is None:
-        raise ParameterError(
-            f"--figure: needs a name that ends in .png, .svg or .pdf, got {file}"
-        )
-    return form

@@ -39,6 +39,24 @@ class OutputFile(click.Path):
         return path
 
 
+class FileInFolder(OutputFile):
+    """A file that is written to a folder that is there."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Any:
+        """Return the path, refused before anything is computed for it."""
+        path = super().convert(value, param, ctx)
+        folder = Path(os.fsdecode(path)).parent
+        if not folder.is_dir():
+            option = "" if param is None else f"{param.opts[0]}: "
+            raise ParameterError(
+                f"{option}needs a folder that exists, got {os.fsdecode(path)}: there "
+                f"is no folder {folder}"
+            )
+        return path
+
+
 def note_inputs(*paths: Path) -> None:
     """Refuse outputs of the call that would take the place of these files."""
     for path in paths:

@@ -139,7 +139,6 @@ def puck_command(function: Callable[..., None]) -> Callable[..., None]:
         output: OutputOptions,
         **kwargs: Any,
     ) -> None:
-        output.check_files()
         options = PuckOptions(
             interface=interface or ("virtual" if emulate else "socketcan"),
             channel=channel,

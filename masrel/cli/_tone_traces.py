@@ -71,7 +71,6 @@ def write_tardieu(
         raise ParameterError(
             f"--speed-deg-s: needs V1, V2 and V3 with --tardieu, got {len(speeds)}"
         )
-    output.check_files()
     documents = [
         tardieu_document(name, joint, start_deg, speeds)
         for name, joint in joints.items()

@@ -177,7 +177,6 @@ def agree(
     one row a rating. "-" reads standard input. What was read is shown; what could be
     read in two ways is refused with the option that decides.
     """
-    output.check_files()
     options = further.checked(options, reading.by, reading.clusters)
     if output.figure is not None and options.target is None and not further.has_figure:
         raise ParameterError(

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 @output_options(
     json="Write the analysis here; - prints it, and nothing else, on stdout.",
     csv="Print the tables as CSV.",
+    makes_folder=True,
 )
 def analyze(
     study: Path,

@@ -117,7 +117,6 @@ def audit(source: Path | None, printed: _Printed, output: OutputOptions) -> None
     study that has such a file, ratings/claims.csv. No table at all means that the
     numbers cannot belong together as they were read; it does not say why.
     """
-    output.check_files()
     claims = _claims(source, printed)
     from masrel.audit import audit_claim
     from masrel.report._claims_table import (

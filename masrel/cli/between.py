@@ -75,6 +75,7 @@ class _Between:
 )
 @output_options(
     json="Write everything as JSON here; - prints it, and nothing else, on stdout.",
+    makes_folder=True,
 )
 def between(
     models: tuple[str, ...],

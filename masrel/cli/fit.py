@@ -125,6 +125,7 @@ def _term(option: str, text: str, default: str = "off") -> Decorator:
 @output_options(
     json="Write everything as JSON here; - prints it, and nothing else, on stdout.",
     quiet="Show no progress.",
+    makes_folder=True,
 )
 def fit(
     recordings: tuple[Path, ...],

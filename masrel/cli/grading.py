@@ -55,7 +55,6 @@ def grading(
     Prints by how much one standard deviation of each multiplies the odds of a higher
     grade, the others held.
     """
-    output.check_files()
     from masrel.analysis import grade_regression
     from masrel.analysis._analysis_json import plain_fields
 

@@ -66,7 +66,6 @@ def latent(
     latent-trait model gives kappa for new raters, each rater's bias and noise, each
     item's severity, and the thresholds between grades. It takes seconds to minutes.
     """
-    output.check_files()
     if seed < 0:
         raise ParameterError(f"--seed: needs at least 0, got {seed}")
     ratings = read_file(file, replace(reading, stream=False))

@@ -42,7 +42,6 @@ def plan(
     make a grid. STUDY is a folder with a protocol: each line of its plan is described
     at its size.
     """
-    output.check_files()
     if study is None:
         options = _with_pilot(options)
     labels, plans = _plans(study, options, is_quiet=output.quiet)

@@ -101,6 +101,7 @@ _OTHER_OPTIONS = (
     "nothing else, on stdout.",
     raw_csv="No apostrophe before a text that a spreadsheet would run.",
     quiet="No progress bar.",
+    makes_folder=True,
 )
 def report(
     study: Path,

@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING
 import click
 from tqdm import tqdm
 
-from masrel._files import write_file
 from masrel.cli._options import (
     OutputOptions,
-    figure_form,
     grouped,
     output_options,
     write_output,
 )
-from masrel.cli._paths import InputFile, OutputFile, note_inputs
+from masrel.cli._paths import FileInFolder, InputFile, note_inputs
 from masrel.cli._tone_traces import (
     END_DEG,
     START_DEG,
@@ -29,13 +27,14 @@ from masrel.cli._trace_samples import check_samples, write_samples
 from masrel.errors import ParameterError
 from masrel.report._traced_scenes import (
     SCENE_OUTPUTS,
+    SCENE_STAMP,
     SCENE_VIEWS,
     Quantities,
     Scene,
     check_view,
     scene_document,
     scene_text,
-    scenes_figure,
+    scenes_content,
     scenes_text,
 )
 
@@ -240,7 +239,10 @@ _joint_options = grouped(
     help="Samples a second of --csv.  [default: 1000]",
 )  # fmt: skip
 @click.option(
-    "--csv", "csv_file", type=OutputFile(path_type=Path), help="Write the samples here."
+    "--csv",
+    "csv_file",
+    type=FileInFolder(path_type=Path),
+    help="Write the samples here.",
 )
 @output_options(
     json="Write events and outputs as JSON here; - for the screen.",
@@ -278,7 +280,8 @@ def trace(
     if csv_file is not None or rate_hz is not None:
         check_samples(csv_file, rate_hz)
     joints = _joints_of(names, law)
-    speeds = (*speeds, *_speeds_in(speed_range))
+    if speed_range is not None:
+        speeds = (*speeds, *_spaced(*speed_range))
     if tardieu:
         _check_plain(stretch, quantities, output, csv_file)
         start = START_DEG if stretch.start is None else stretch.start
@@ -287,37 +290,26 @@ def trace(
     if view is not None and output.figure is None:
         raise ParameterError("--view: goes with --figure, whose contents it chooses")
     scenes = _scenes(joints, stretch, speeds)
-    output.check_files()
     if output.figure is not None:
         check_view(scenes, view or SCENE_VIEWS[0])
     documents = _documents(scenes, quantities, quiet=output.quiet)
     if csv_file is not None:
         rate = 1000.0 if rate_hz is None else rate_hz
         write_samples(csv_file, rate, scenes, documents, quiet=output.quiet)
-    if output.figure is not None:
-        form = figure_form(output.figure)
-        picture = scenes_figure(scenes, view or SCENE_VIEWS[0], form=form)
-        write_file(output.figure, picture)
-    _write_documents(output, scenes, documents)
+    one = len(scenes) == 1
+    write_output(
+        output,
+        document=lambda: documents[0] if one else {"scenes": documents},
+        text=lambda: (
+            scene_text(documents[0], scenes[0].title) if one else scenes_text(documents)
+        ),
+        figure=lambda: scenes_content(scenes, view or SCENE_VIEWS[0]),
+        stamp=SCENE_STAMP,
+    )
 
 
-def _speeds_in(speed_range: tuple[float, float, int] | None) -> tuple[float, ...]:
-    if speed_range is None:
-        return ()
-    low, high, n = speed_range
+def _spaced(low: float, high: float, n: int) -> tuple[float, ...]:
     return tuple(low + (high - low) * i / (n - 1) for i in range(n))
-
-
-def _write_documents(
-    output: OutputOptions,
-    scenes: Sequence[Scene],
-    documents: Sequence[dict[str, object]],
-) -> None:
-    if len(documents) == 1:
-        document, text = documents[0], lambda: scene_text(documents[0], scenes[0].title)
-    else:
-        document, text = {"scenes": documents}, lambda: scenes_text(documents)
-    write_output(output, document=lambda: document, text=text)
 
 
 def _documents(
@@ -372,8 +364,12 @@ def _scenes(
             motion, ends = motions[speed, end], (start, end)
             if stretch.recording is not None:
                 ends = math.degrees(motion.start), math.degrees(motion.end)
+            called = (
+                stretch.kind if speed is None else f"{stretch.kind} {speed:g} deg/s"
+            )
             scenes.append(
                 Scene(
+                    title=f"{name}, {called}",
                     model=name,
                     kind=stretch.kind,
                     speed_deg_s=speed,

@@ -73,7 +73,6 @@ def train(
     the test that [training] of the protocol sets. Nothing of a training enters the
     ratings of the study.
     """
-    output.check_files()
     paths = StudyPaths(study)
     protocol = read_protocol(paths.protocol)
     if report:

@@ -11,7 +11,6 @@ from masrel.report._figure_data import (
     CatchCurves,
     CatchSchematic,
     Content,
-    Form,
     Stretches,
     StretchLine,
     StretchPanel,
@@ -38,14 +37,20 @@ _LINES = {
     "impulse_nms": ("impulse", "N·m·s"),
 }
 
+# Where torque may be computed: a list of the document, its key of the place, and a unit
+_PLACES = (("torque_at_s", "time_s", "s"), ("torque_at_deg", "angle_deg", "deg"))
+
 _N_PIXELS = 800  # points a line has: a panel is less wide than that
-_STAMP = "computed from the joint model, not measured"
+
+SCENE_STAMP = "computed from the joint model, not measured"
+"""What figures say of their data."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
     """A joint and a motion."""
 
+    title: str
     model: str  # name of the model
     kind: str  # kind of the motion
     speed_deg_s: float | None  # its speed, if it is named after one
@@ -54,14 +59,6 @@ class Scene:
     end_deg: float
     joint: "JointModel"
     motion: "Motion"
-
-    @property
-    def title(self) -> str:
-        """Name of the scene."""
-        speed = ""
-        if self.speed_deg_s is not None:
-            speed = f" {significant(self.speed_deg_s)} deg/s"
-        return f"{self.model}, {self.kind}{speed}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,7 +157,10 @@ def scene_text(document: dict[str, Any], title: str) -> str:
     for key, (name, unit) in _LINES.items():
         if key in document:
             values.append((name, document[key], unit))
-    values += [(f"torque at {place}", t, "N·m") for place, t in _places(document)]
+    for key, place, unit in _PLACES:
+        for row in document.get(key, ()):
+            name = f"torque at {significant(row[place])} {unit}"
+            values.append((name, row["torque_nm"], "N·m"))
     lines += [
         f"{name} none: the stretch has no catch"
         if value is None
@@ -170,29 +170,22 @@ def scene_text(document: dict[str, Any], title: str) -> str:
     return "\n".join(lines)
 
 
-def _places(document: dict[str, Any]) -> list[tuple[str, float]]:
-    # where torque was computed, and what it is
-    at_times = document.get("torque_at_s", [])
-    at_angles = document.get("torque_at_deg", [])
-    return [
-        *((f"{significant(row['time_s'])} s", row["torque_nm"]) for row in at_times),
-        *(
-            (f"{significant(row['angle_deg'])} deg", row["torque_nm"])
-            for row in at_angles
-        ),
-    ]
-
-
 def scenes_text(documents: Sequence[dict[str, Any]]) -> str:
     """Return the documents of many scenes for a person, one a line."""
     keys = ["speed_deg_s", "catch_angle_deg", "mean_speed_deg_s", "peak_torque_nm"]
     keys += [key for key in _LINES if key in documents[0]]
-    places = [f"torque_nm at {place}" for place, _ in _places(documents[0])]
+    places = [
+        f"torque_nm at {significant(row[place])} {unit}"
+        for key, place, unit in _PLACES
+        for row in documents[0].get(key, ())
+    ]
     # two more spaces than there are between numbers set names off
     width = max(8, *(len(document["model"]) + 2 for document in documents))
     rows = [["model".ljust(width), *keys, *places]]
     for document in documents:
-        torques = [value for _, value in _places(document)]
+        torques = [
+            row["torque_nm"] for key, *_ in _PLACES for row in document.get(key, ())
+        ]
         cells = [*(document[key] for key in keys), *torques]
         rows.append(
             [
@@ -258,15 +251,8 @@ def _n_caught(scenes: Sequence[Scene]) -> int:
     return int(np.isfinite(outputs.column("catch")).sum())
 
 
-def scenes_figure(scenes: Sequence[Scene], view: str, *, form: Form) -> bytes:
-    """Return a figure of scenes as a file."""
-    # Imported here: a text loads nothing that draws.
-    from masrel.report.figures import draw
-
-    return draw(_content(scenes, view), stamp=_STAMP, forms=(form,))[form]
-
-
-def _content(scenes: Sequence[Scene], view: str) -> Content:
+def scenes_content(scenes: Sequence[Scene], view: str) -> Content:
+    """Return what a figure of scenes shows."""
     models = _by_model(scenes).items()
     if view == "catch":
         return CatchCurves(curves=tuple(_curve(*of_model) for of_model in models))

@@ -61,7 +61,7 @@ def test_json_stays_json_with_every_letter(table: Path) -> None:
 
 def test_letters_are_spelled_and_names_escaped() -> None:
     code = (
-        "from masrel.cli import _accept_any_letter; _accept_any_letter();"
+        "import sys, masrel.cli; sys.stdout.reconfigure(errors='masrel');"
         "print('κ = −0.5, Δ, Łucja, m²')"
     )
     done = subprocess.run(

@@ -503,7 +503,7 @@ def test_an_end_from_outside_is_one_sentence(
     path.write_text(WIDE)
     done = masrel("agree", path, *options)
     assert done.code == 1
-    assert done.err.splitlines() == [f"masrel: {words}"]
+    assert done.err.strip() == f"masrel: {words}"  # below the ^C of a terminal
 
 
 @pytest.mark.parametrize("end", ["", "1"])  # the last cell missing, or a cell too many
