@@ -28,11 +28,10 @@ from masrel.recording import PHASES, Phase
 
 __all__ = ["Events", "PhaseSpan", "StretchEvents", "events"]
 
-_PRE_CATCH, CATCH, _POST_CATCH = range(3)  # positions in PHASES
+_PRE_CATCH, CATCH, _POST_CATCH, _OVER = range(4)  # positions in PHASES, but the last
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PhaseSpan:
+class PhaseSpan(NamedTuple):
     """One phase of a motion.
 
     Attributes
@@ -161,34 +160,26 @@ def events(parameters: ElbowParameters, motion: Motion) -> Events:
     ['pre-catch', 'catch', 'post-catch']
     """
     line = timeline(parameters, motion)
-    origin, end = motion.origin, line.end
-    ends = [state for _, state, _ in line.changes[1:]] + [end]
+    origin = motion.origin
     phases = [
         PhaseSpan(
-            name=PHASES[code],
-            start=start.time,
-            end=until.time,
-            start_angle=origin + start.angle,
-            end_angle=origin + until.angle,
+            PHASES[begun.phase],
+            begun.time,
+            ended.time,
+            origin + begun.angle,
+            origin + ended.angle,
         )
-        for (code, start, _), until in zip(line.changes, ends, strict=True)
-        if until.time > start.time  # one of no length is left out
+        for begun, ended in pairwise([*line.changes, line.end])
+        if ended.time > begun.time  # one of no length is left out
     ]
     reached = [{n: getattr(stretch, n) for n in _REACHED} for stretch in line.stretches]
     first = {} if line.first is None else reached[line.stretches.index(line.first)]
     return Events(
         **first,
         stretches=tuple([StretchEvents(**names) for names in reached]),
-        end=end.time,
+        end=line.end.time,
         phases=tuple(phases),
     )
-
-
-class State(NamedTuple):
-    """An instant of a motion."""
-
-    time: float  # s
-    angle: float  # rad from the motion's origin
 
 
 @dataclass(slots=True, eq=False)
@@ -209,10 +200,11 @@ class Stretch:
 
 
 class Change(NamedTuple):
-    """The beginning of a phase."""
+    """The beginning of a phase, or the end of the last."""
 
     phase: int  # position in PHASES
-    state: State
+    time: float  # s
+    angle: float  # rad from the motion's origin
     stretch: Stretch | None = None  # whose catch or post-catch it is
 
 
@@ -223,7 +215,7 @@ class Timeline(NamedTuple):
     changes: list[Change]  # in order
     stretches: list[Stretch]
     first: Stretch | None  # that catches, or the first of all if none does
-    end: State  # of the motion, or of the range of motion
+    end: Change  # of the motion, or of the range of motion
 
 
 def timeline(p: ElbowParameters, motion: Motion) -> Timeline:
@@ -238,7 +230,7 @@ def timeline(p: ElbowParameters, motion: Motion) -> Timeline:
     near = limit + NOTHING * abs(limit)
     for start, length, angle, slowest, fastest in motion.pieces():
         if not machine.changes:
-            machine.changes.append(Change(_PRE_CATCH, State(0.0, angle[0])))
+            machine.changes.append(Change(_PRE_CATCH, 0.0, angle[0]))
         highest = angle[0] + fastest * length if slowest < 0.0 else value(angle, length)
         beyond = None
         if highest > near:
@@ -247,10 +239,10 @@ def timeline(p: ElbowParameters, motion: Motion) -> Timeline:
         if until > 0.0:
             machine.piece(start, angle, until, slowest, fastest)
         if beyond is not None:
-            end = State(start + beyond, limit)
+            end = Change(_OVER, start + beyond, limit)
             break
     else:
-        end = State(motion.duration, motion.end - motion.origin)
+        end = Change(_OVER, motion.duration, motion.end - motion.origin)
     stretches = machine.stretches
     for stretch in stretches:
         if stretch.peak_end is not None:  # the catch may end before
@@ -292,7 +284,7 @@ class _PhaseMachine:
         if slowest > threshold:
             self.fast(start, angle, length, may_catch=True)
         elif fastest <= -threshold:
-            self.flexed(State(start, angle[0]))
+            self.flexed(start, angle[0])
         elif -threshold < slowest and fastest < threshold:
             self.slow(start, angle, 0.0, length, fastest)
         else:
@@ -303,7 +295,7 @@ class _PhaseMachine:
                 if len(speed) > 1:  # no more than touched
                     middle *= 1.0 - NOTHING
                 if middle <= -threshold:
-                    self.flexed(State(start + low, value(angle, low)))
+                    self.flexed(start + low, value(angle, low))
                 elif middle < threshold:
                     self.slow(start, angle, low, high, fastest)
                 else:
@@ -311,15 +303,15 @@ class _PhaseMachine:
                     may_catch = middle > threshold
                     self.fast(start + low, part, high - low, may_catch=may_catch)
 
-    def flexed(self, state: State) -> None:
+    def flexed(self, time: float, angle: float) -> None:
         # the stretch is over, and the next may catch
-        phase, _, stretch = self.changes[-1]
+        phase, _, _, stretch = self.changes[-1]
         if stretch is not None:
             if phase == CATCH:
-                stretch.catch_end = state.time
+                stretch.catch_end = time
             else:
-                stretch.post_catch_end = state.time
-            self.changes.append(Change(_PRE_CATCH, state))
+                stretch.post_catch_end = time
+            self.changes.append(Change(_PRE_CATCH, time, angle))
         self.is_armed, self.since = True, None
 
     def slow(
@@ -331,9 +323,8 @@ class _PhaseMachine:
         ):
             low = self.leave_catch(start, angle, low, high, grows=False)
         if self.changes[-1].phase == _POST_CATCH:  # ends below ν_th, Fig. 7
-            state = State(start + low, value(angle, low))
-            self.stretches[-1].post_catch_end = state.time
-            self.changes.append(Change(_PRE_CATCH, state))
+            self.stretches[-1].post_catch_end = start + low
+            self.changes.append(Change(_PRE_CATCH, start + low, value(angle, low)))
         self.since = None
 
     def fast(
@@ -384,22 +375,21 @@ class _PhaseMachine:
     def catch(self, start: float, angle: Polynomial, at: float) -> None:
         p, stretch = self.p, self.stretches[-1]
         speeds = derivative(angle)
-        state, speed = State(start + at, value(angle, at)), value(speeds, at)
+        time, there, speed = start + at, value(angle, at), value(speeds, at)
         if self.since:
-            way = state.angle - stretch.onset_angle
-            stretch.mean_speed = way / (self.since + at)
+            stretch.mean_speed = (there - stretch.onset_angle) / (self.since + at)
         else:
             stretch.mean_speed = value(angle[1:], at)
-        stretch.catch, stretch.catch_speed = state.time, speed
-        stretch.catch_angle = self.origin + state.angle
-        stretch.pre_end = self.law.commanded(state.angle, speed)
+        stretch.catch, stretch.catch_speed = time, speed
+        stretch.catch_angle = self.origin + there
+        stretch.pre_end = self.law.commanded(there, speed)
         if p.inertia:
             stretch.pre_end += p.inertia * value(derivative(speeds), at)
         stretch.rise = p.catch_torque_constant * speed
-        stretch.peak_end = state.time + p.peak_duration
-        self.goal = state.angle + p.catch_travel
+        stretch.peak_end = time + p.peak_duration
+        self.goal = there + p.catch_travel
         self.is_armed, self.since = False, None
-        self.changes.append(Change(CATCH, state, stretch))
+        self.changes.append(Change(CATCH, time, there, stretch))
 
     def leave_catch(
         self, start: float, angle: Polynomial, low: float, high: float, *, grows: bool
@@ -408,8 +398,7 @@ class _PhaseMachine:
         place = first_above(angle, low, high, level=self.goal, grows=grows)
         if place is None or high - place <= TIE * high:
             return low
-        state = State(start + place, value(angle, place))
-        stretch = self.stretches[-1]
-        stretch.catch_end = state.time
-        self.changes.append(Change(_POST_CATCH, state, stretch))
+        time, stretch = start + place, self.stretches[-1]
+        stretch.catch_end = time
+        self.changes.append(Change(_POST_CATCH, time, value(angle, place), stretch))
         return place

@@ -182,9 +182,9 @@ def _sign_changes(
 
 def _guess(b: list[float], low: float, high: float) -> float:
     # where the control polygon first passes 0, but not at an end: that may be a root
-    share = 0.5
+    share, is_above = 0.5, b[0] > 0.0
     for i, c in enumerate(b):
-        if (c > 0.0) != (b[0] > 0.0):
+        if (c > 0.0) != is_above:
             share = (i - c / (c - b[i - 1])) / (len(b) - 1)
             break
     return low + min(max(share, 0.02), 0.98) * (high - low)

@@ -9,6 +9,7 @@ https://doi.org/10.1109/TNSRE.2012.2195330, equations (1), (3) and (5).
 import functools
 import math
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -329,10 +330,9 @@ class TorqueSegment(NamedTuple):
 
 def segments(p: ElbowParameters, line: Timeline) -> list[TorqueSegment]:
     """Return the laws of a motion in order, without those that hold for no time."""
-    ends = [state.time for _, state, _ in line.changes[1:]] + [line.end.time]
     laid = []
-    for (phase, state, stretch), end in zip(line.changes, ends, strict=True):
-        start = state.time
+    for (phase, start, angle, stretch), ended in pairwise([*line.changes, line.end]):
+        end = ended.time
         if stretch is None:
             laid.append(TorqueSegment(start, end, line.law))
         elif phase == CATCH:
@@ -346,10 +346,8 @@ def segments(p: ElbowParameters, line: Timeline) -> list[TorqueSegment]:
                 TorqueSegment(fallen, end, residual),
             ]
         else:
-            level = residual.level
-            law = _law.post_catch(
-                p, level, stretch.pre_end, state.angle, line.law.origin
-            )
+            level, rest = residual.level, line.law.origin
+            law = _law.post_catch(p, level, stretch.pre_end, angle, rest)
             laid.append(TorqueSegment(start, end, law))
     return [segment for segment in laid if segment.end > segment.start]
 

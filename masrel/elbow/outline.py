@@ -81,14 +81,14 @@ def outline(
         raise ParameterError(f"n_points: needs 2 or more, got {n_points}")
     line = timeline(parameters, motion)
     times, torques, codes = [], [], []
-    starts = [state.time for _, state, _ in line.changes]
+    starts = [change.time for change in line.changes]
     for segment in segments(parameters, line):
         low, high = segment.start, segment.end
         n = max(2, math.ceil(n_points * (high - low) / line.end.time) + 1)
         at = np.linspace(low, high, n)
         times.append(at)
         torques.append(segment_torque(segment, motion, at))
-        code = line.changes[bisect_right(starts, low) - 1][0]
+        code = line.changes[bisect_right(starts, low) - 1].phase
         codes.append(np.full(n, code, dtype=np.int8))
     time = np.concatenate(times)
     return Outline(
