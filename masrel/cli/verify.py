@@ -74,13 +74,30 @@ def _anchored(
             "the study can change it too"
         )
     if file.exists():
-        return anchor_findings(study, read_anchors(file))
+        kept = read_anchors(file)
+        _say_what_is_newer(file, kept, anchors)
+        return anchor_findings(study, kept)
     if anchors:
         write_anchors(anchors, file)
         click.echo(f"anchors: {file}", err=True)
     else:
         click.echo(f"no log to anchor yet: {file} is not written", err=True)
     return ()
+
+
+def _say_what_is_newer(
+    file: Path, kept: "tuple[Anchor, ...]", anchors: "tuple[Anchor, ...]"
+) -> None:
+    lines: dict[str, int] = {}
+    for anchor in kept:
+        lines[anchor.log] = max(anchor.line, lines.get(anchor.log, 0))
+    newer = sum(lines.get(anchor.log, 0) < anchor.line for anchor in anchors)
+    if newer:
+        click.echo(
+            f"note: {newer} of {len(anchors)} logs have lines that no anchor in {file} "
+            "covers yet; --anchor with another file keeps anchors of them too",
+            err=True,
+        )
 
 
 def _document(

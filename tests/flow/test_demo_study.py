@@ -99,7 +99,8 @@ def test_a_folder_in_use_is_refused(small_demo: Path) -> None:
         run("demo", str(small_demo))
 
 
-@pytest.mark.slow
+# One run of it is held against stored hashes by tests/golden.
+@pytest.mark.long
 def test_the_whole_published_study_repeats_byte_for_byte(tmp_path: Path) -> None:
     run("demo", str(tmp_path / "a"), "--quiet")
     run("demo", str(tmp_path / "b"), "--quiet")

@@ -347,6 +347,24 @@ def test_a_log_that_has_grown_still_fits_its_anchor(study: StudyPaths) -> None:
     assert anchors_of(study) != anchors
 
 
+def test_lines_that_no_anchor_covers_are_said(
+    study: StudyPaths, tmp_path: Path
+) -> None:
+    old, new = tmp_path / "old.txt", tmp_path / "new.txt"
+
+    def said(file: Path, code: int) -> str:
+        return run("verify", str(study.root), "--anchor", str(file), code=code)
+
+    said(old, 0)
+    assert "no anchor" not in said(old, 0)
+    corrected(study)  # the table of ratings is older now, which is broken
+    n = len(anchors_of(study))
+    assert f"note: 1 of {n} logs have lines that no anchor in {old} " in said(old, 2)
+    said(new, 2)
+    new.write_text(old.read_text() + new.read_text())
+    assert "no anchor" not in said(new, 2)
+
+
 def test_the_verb_says_every_session_and_ends_with_2_when_broken(
     study: StudyPaths, tmp_path: Path
 ) -> None:

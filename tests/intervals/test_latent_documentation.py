@@ -39,8 +39,17 @@ def ends(result: LatentTrait) -> list[float]:
     return [result.kappa.interval.low, result.kappa.interval.high]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("row", ROWS, ids=lambda row: " ".join(row[:2]))
+# New items take three times as long, and tests/golden has one study with them too.
+@pytest.mark.parametrize(
+    "row",
+    [
+        pytest.param(
+            row, marks=pytest.mark.long if "random" in row else pytest.mark.slow
+        )
+        for row in ROWS
+    ],
+    ids=lambda row: " ".join(row[:2]),
+)
 def test_the_table_of_priors_is_what_comes_out(
     row: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
