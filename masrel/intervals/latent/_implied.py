@@ -23,7 +23,7 @@ from masrel.intervals.latent._coordinates import Traits
 Items = Literal["fixed", "random"]
 """Whether kappa is for these items, or for new ones of their population."""
 
-_NOISES = np.linspace(-5.5, 5.5, 23)  # trapezoid sum over a rater's w
+_MAX_W = 5.5  # where the sum over a rater's w ends, on either side
 _STEPS = 30  # points on either side of the centre of a tanh-sinh quadrature
 _MAX_T = 2.9  # where its weights end
 _MAX_Z = 8.5  # standard deviations of an item
@@ -76,7 +76,7 @@ def agreement_on_new_items(traits: Traits) -> Agreement:
     # integrates out.
     # p_k(θ) changes within s of each threshold, however small s is. The tanh-sinh rule
     # between neighbouring thresholds has points so close to both ends that it follows
-    # [1]_: κ is within 1e-6 for η < 1 and ρ < 0.99, and within 1e-4 everywhere.
+    # [1]_: κ is within 1e-6 for ρ < 0.99, and within 1e-5 beyond.
     # [1] Takahasi, H., Mori, M. (1974). Double exponential formulas for numerical
     # integration. Publ. RIMS, Kyoto University, 9(3), 721-741.
     # https://doi.org/10.2977/prims/1195192451
@@ -85,12 +85,15 @@ def agreement_on_new_items(traits: Traits) -> Agreement:
         total = np.sqrt(traits.item_share + deviation**2)
         below += weight * ndtr(traits.thresholds / total[:, None])
     shares = _differences(below)
-    firsts = range(0, len(shares), _CHUNK)
-    variances = [_variance(traits, shares, slice(at, at + _CHUNK)) for at in firsts]
-    return Agreement.of(shares, np.concatenate(variances))
+    # Positions of like spread together, as the widest says how many points w needs.
+    order, variance = np.argsort(traits.noise_spread), np.empty(len(shares))
+    for at in range(0, len(shares), _CHUNK):
+        rows = order[at : at + _CHUNK]
+        variance[rows] = _variance(traits, shares, rows)
+    return Agreement.of(shares, variance)
 
 
-def _variance(traits: Traits, shares: Floats, rows: slice) -> Floats:
+def _variance(traits: Traits, shares: Floats, rows: NDArray[np.intp]) -> Floats:
     # -> (rows,): ∫ Σ_k (p_k(z √ρ) - π_k)² φ(z) dz, between neighbouring thresholds
     root = np.sqrt(traits.item_share[rows])[:, None]
     tau = traits.thresholds[rows]
@@ -103,25 +106,28 @@ def _variance(traits: Traits, shares: Floats, rows: slice) -> Floats:
     weigh = (half * mass).reshape(z.shape) * np.exp(-0.5 * z**2) / np.sqrt(2.0 * np.pi)
     below = np.zeros((*z.shape, tau.shape[1]))
     away = tau[:, None, :] - (root * z)[:, :, None]
-    for deviation, weight in _perceived(traits):
-        below += weight * ndtr(away / deviation[rows, None, None])
+    for deviation, weight in _perceived(traits, rows):
+        below += weight * ndtr(away / deviation[:, None, None])
     square = ((_differences(below) - shares[rows, None]) ** 2).sum(axis=2)
     return np.asarray((square * weigh).sum(axis=1))
 
 
-def _perceived(traits: Traits) -> list[tuple[Floats, float]]:
-    # s at each point of the quadrature over w, (n,), with the point's weight
-    weight = np.exp(-0.5 * _NOISES**2)
-    weight /= weight.sum()
+def _perceived(
+    traits: Traits, rows: NDArray[np.intp] | slice = slice(None)
+) -> list[tuple[Floats, float]]:
+    # s at each point of a trapezoid sum over w, (rows,), with the point's weight. As s²
+    # is 0 at distances of π/(2 η) from the real line, the error falls as e^(-π²/(η h))
+    # with the step h, and as e^(-2 π²/h²) (Trefethen, L. N., Weideman, J. A. C. (2014).
+    # The exponentially convergent trapezoidal rule. SIAM Review 56(3), 385-458.
+    # https://doi.org/10.1137/130932132)
+    spread = traits.noise_spread[rows]
+    n = int(np.ceil(_MAX_W * max(1.0, 2.0 * spread.max(initial=0.0))))
+    points = np.linspace(-_MAX_W, _MAX_W, 2 * n + 1)
+    weights = np.exp(-0.5 * points**2)
+    bias, noise = traits.bias_variance[rows], traits.noise_variance[rows]
     return [
-        (
-            np.sqrt(
-                traits.bias_variance
-                + traits.noise_variance * np.exp(2.0 * traits.noise_spread * at)
-            ),
-            float(share),
-        )
-        for at, share in zip(_NOISES, weight, strict=True)
+        (np.sqrt(bias + noise * np.exp(2.0 * spread * w)), float(weight))
+        for w, weight in zip(points, weights / weights.sum(), strict=True)
     ]
 
 

@@ -48,6 +48,7 @@ CASES = [
     (0.1, 0.9, 0.9, [-3.0, 2.0]),
     (0.7, 0.5, 0.5, [-6.0, -0.1, 5.0, 7.0]),
     (0.97, 0.9, 1.0, [0.1]),
+    (0.8, 0.4, 1.9, [-1.1, 0.2, 0.4]),
 ]
 
 
@@ -76,7 +77,7 @@ def test_new_items_agree_with_a_fine_grid(
     case: tuple[float, float, float, list[float]],
 ) -> None:
     rho, f, eta, tau = case
-    w = np.linspace(-8, 8, 401)
+    w = np.linspace(-8, 8, 801)
     weight = stats.norm.pdf(w) / stats.norm.pdf(w).sum()
     s = np.sqrt((1 - rho) * (1 - f + f * np.exp(2 * eta * w)))
     z = np.linspace(-8.5, 8.5, 1701)
