@@ -120,13 +120,13 @@ def _perceived(
     # with the step h, and as e^(-2 π²/h²) (Trefethen, L. N., Weideman, J. A. C. (2014).
     # The exponentially convergent trapezoidal rule. SIAM Review 56(3), 385-458.
     # https://doi.org/10.1137/130932132)
-    spread = traits.noise_spread[rows]
-    n = int(np.ceil(_MAX_W * max(1.0, 2.0 * spread.max(initial=0.0))))
+    eta = traits.noise_spread[rows]
+    n = int(np.ceil(_MAX_W * max(1.0, 2.0 * eta.max(initial=0.0))))
     points = np.linspace(-_MAX_W, _MAX_W, 2 * n + 1)
     weights = np.exp(-0.5 * points**2)
     bias, noise = traits.bias_variance[rows], traits.noise_variance[rows]
     return [
-        (np.sqrt(bias + noise * np.exp(2.0 * spread * w)), float(weight))
+        (np.sqrt(bias + noise * np.exp(2.0 * eta * w)), float(weight))
         for w, weight in zip(points, weights / weights.sum(), strict=True)
     ]
 
