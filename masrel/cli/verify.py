@@ -74,9 +74,9 @@ def _anchored(
             "the study can change it too"
         )
     if file.exists():
-        kept = read_anchors(file)
-        _say_what_is_newer(file, kept, anchors)
-        return anchor_findings(study, kept)
+        old = read_anchors(file)
+        _say_what_is_newer(file, old, anchors)
+        return anchor_findings(study, old)
     if anchors:
         write_anchors(anchors, file)
         click.echo(f"anchors: {file}", err=True)
@@ -86,10 +86,10 @@ def _anchored(
 
 
 def _say_what_is_newer(
-    file: Path, kept: "tuple[Anchor, ...]", anchors: "tuple[Anchor, ...]"
+    file: Path, old: "tuple[Anchor, ...]", anchors: "tuple[Anchor, ...]"
 ) -> None:
     lines: dict[str, int] = {}
-    for anchor in kept:
+    for anchor in old:
         lines[anchor.log] = max(anchor.line, lines.get(anchor.log, 0))
     newer = sum(lines.get(anchor.log, 0) < anchor.line for anchor in anchors)
     if newer:
