@@ -170,11 +170,11 @@ def _jackknife_variance(problem: IntervalProblem) -> _JackknifeVariance:
         if np.isnan(replicates).any():
             reason = f"with one of the {unit} left out the estimate is undefined"
             return _JackknifeVariance(variance=math.nan, df=math.nan, reason=reason)
-        variance += _variance_of(replicates, freq, n)
+        variance += _variance_of(problem, replicates, freq, n)
         # Satterthwaite's degrees for a sum would lie above the fewer ones.
         df = min(df, n - 1)
         notes += warn_small(n, 10 if unit == "items" else 5, unit, int(freq.sum()))
-    if not _is_moved(problem, variance):
+    if not variance > 0.0:
         reason = (
             f"leaving out any of the {' or '.join(units)} leaves the estimate as it "
             "is, so the jackknife cannot say how uncertain it is"
@@ -194,8 +194,9 @@ def _cluster_variance(problem: IntervalProblem, codes: Integers) -> _JackknifeVa
         reason = "with one of the clusters left out the estimate is undefined"
         return _JackknifeVariance(variance=math.nan, df=math.nan, reason=reason)
     notes = warn_small(n, 10, "clusters", len(replicates))
-    variance = _variance_of(replicates, np.ones(len(replicates), dtype=np.int64), n)
-    if not _is_moved(problem, variance):
+    once = np.ones(len(replicates), dtype=np.int64)
+    variance = _variance_of(problem, replicates, once, n)
+    if not variance > 0.0:
         reason = (
             "leaving out any of the clusters leaves the estimate as it is, so the "
             "jackknife cannot say how uncertain it is"
@@ -219,13 +220,9 @@ def _logit_interval(problem: IntervalProblem, codes: Integers) -> Interval:
     )
 
 
-def _is_moved(problem: IntervalProblem, variance: float) -> bool:
-    """Say whether a jackknife variance is of more than rounding."""
-    scale = abs(problem.value) if problem.entry.in_units else 1.0
-    return math.sqrt(variance) > _ROUNDING * scale
-
-
-def _variance_of(replicates: Floats, freq: Integers, n: int) -> float:
+def _variance_of(
+    problem: IntervalProblem, replicates: Floats, freq: Integers, n: int
+) -> float:
     """Return (n - 1)/n Σ (θ_i - mean)² of estimates with one left out [1]_."""
     # Takes replicates (n_distinct,), freq (n_distinct,); n are those with a pair. What
     # is observed is a mean over these alone, whose variance this factor makes unbiased;
@@ -234,7 +231,10 @@ def _variance_of(replicates: Floats, freq: Integers, n: int) -> float:
         return math.nan
     moved = replicates - replicates[0]  # so that no change at all is exactly 0
     deviations = moved - freq @ moved / freq.sum()
-    return float((n - 1) / n * (freq @ deviations**2))
+    variance = float((n - 1) / n * (freq @ deviations**2))
+    size = abs(problem.value) if problem.entry.in_units else 1.0
+    is_rounding = math.sqrt(variance) <= _ROUNDING * size  # and nothing moves
+    return 0.0 if is_rounding else variance
 
 
 def _without_rater(problem: IntervalProblem) -> tuple[Floats, Integers]:

@@ -87,6 +87,19 @@ def test_changes_are_differences_without_the_rater(name: str) -> None:
     assert found.estimate.interval is None
 
 
+@pytest.mark.filterwarnings("ignore::masrel.errors.SmallSampleWarning")
+def test_a_change_that_is_the_same_whatever_is_left_out_has_no_interval() -> None:
+    # A and B agree throughout and C never agrees with them: without C kappa is 1,
+    # whichever item is left out, and with C every item is as good as any other, but
+    # for rounding.
+    ratings = [[0, 0, 2], [1, 1, 0], [1, 1, 0], [1, 1, 2], [2, 2, 0], [2, 2, 0]]
+    found = diagnose(ratings, target="items")
+    assert found.changes[2] == 1.0
+    assert found.change_errors[2] == 0.0
+    assert np.isnan([found.change_low[2], found.change_high[2]]).all()
+    assert found.change_low[0] < found.change_high[0] < 0.0
+
+
 def test_categories_of_two_raters_have_their_specific_agreement() -> None:
     ratings = drawn(r=2)
     ratings = ratings[~np.isnan(ratings).any(axis=1)]
