@@ -259,7 +259,7 @@ class EndpointRule:
     def ends(self, resamples: Resamples) -> Ends | str:
         """Return the ends, or why there are none."""
         values = resamples.values
-        if not (values.size and values[0] < values[-1]):
+        if not (values.size and values[-1] - values[0] > _ROUNDING):
             return "every resample gives the same value or none, so there is no spread"
         tail = 0.5 * (1.0 - self.level)
         levels, pulls = (tail, 1.0 - tail), (0.0, 0.0)

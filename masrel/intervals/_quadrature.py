@@ -24,6 +24,7 @@ TOLERANCE = 1e-12
 NEGLIGIBLE = 1e-18
 """Weight of a node that is dropped, relative to the largest."""
 
+_REACHED = 1e-6  # how far the probability of a point may be off the share
 _MAX_TAIL = 1e-14  # mass that the outermost points may hold
 _FIRST_STEPS, _MAX_STEPS = 32, 1 << 15
 _MAX_W = 9.0  # sinh 9 = 4051 scales of the logit
@@ -102,7 +103,8 @@ def solve_quantile(
 ) -> float:
     """Return where a distribution function passes a share."""
     # `at` gives the probability of at most a point and the density there. Newton's
-    # method, with a bisection where a step would leave the bracket.
+    # method, with a bisection where a step would leave the bracket, or is small only
+    # because the density is endless at one point, as that of kappa can be at 0.
     low, high = bounds
     point = start
     for _ in range(200):
@@ -111,9 +113,10 @@ def solve_quantile(
         low, high = (low, point) if excess > 0.0 else (point, high)
         ahead = point - excess / density if density > 0.0 else low
         close = tolerance * max(1.0, abs(point))
-        if density > 0.0 and abs(ahead - point) < close:
+        is_close = density > 0.0 and abs(ahead - point) < close
+        if is_close and abs(excess) < _REACHED:
             return min(max(ahead, low), high)  # rounding can put it outside
-        if not low < ahead < high:
+        if is_close or not low < ahead < high:
             ahead = 0.5 * (low + high)
         if abs(ahead - point) < close:
             return ahead

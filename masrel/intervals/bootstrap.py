@@ -213,7 +213,7 @@ def bootstrap(
     reason = None
     if math.isnan(rule.value):
         reason = "the estimate itself is undefined"
-    elif kind == "studentized" and not rule.error > 0.0:
+    elif kind == "studentized" and not rule.error > problem.rounding:
         reason = "the estimate has no standard error to studentize by"
     if reason is not None:
         return problem.undefined(reason, method=method, unit=target)
@@ -224,6 +224,8 @@ def bootstrap(
     if isinstance(ends, str):
         return problem.undefined(ends, method=method, unit=target)
     notes, distribution = (*units.notes, *resamples.notes), None
+    if ends.low == ends.high:
+        notes += ("both ends are one value, which many resamples have: no certainty",)
     if kind == "studentized":  # ratios to standard errors, no values of the coefficient
         notes += _infinite_ratios(resamples)
     else:

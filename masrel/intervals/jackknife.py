@@ -21,7 +21,6 @@ from masrel.intervals._problem import (
 )
 
 _UNITS = {"items": ("items",), "raters": ("raters",), "both": ("items", "raters")}
-_ROUNDING = 1e-12  # of 1, or of an estimate that has a unit
 
 
 def jackknife(
@@ -232,9 +231,7 @@ def _variance_of(
     moved = replicates - replicates[0]  # so that no change at all is exactly 0
     deviations = moved - freq @ moved / freq.sum()
     variance = float((n - 1) / n * (freq @ deviations**2))
-    size = abs(problem.value) if problem.entry.in_units else 1.0
-    is_rounding = math.sqrt(variance) <= _ROUNDING * size  # and nothing moves
-    return 0.0 if is_rounding else variance
+    return 0.0 if math.sqrt(variance) <= problem.rounding else variance
 
 
 def _without_rater(problem: IntervalProblem) -> tuple[Floats, Integers]:

@@ -10,7 +10,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from masrel.errors import ParameterError
+from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Interval
 from masrel.intervals import bootstrap
 from tests.intervals import textbook
@@ -90,8 +90,20 @@ def test_a_position_that_is_met_exactly_gives_the_middle() -> None:
     assert (found.low, found.high) == (0.25, 0.75)
     just_inside = exact("percent_agreement", table, level=0.49)
     assert (just_inside.low, just_inside.high) == (0.5, 0.5)
+    assert just_inside.notes[-1].startswith("both ends are one value")
+    assert not any(note.startswith("both ends") for note in found.notes)
     beyond = exact("percent_agreement", table, level=0.51)
     assert (beyond.low, beyond.high) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("kind", ["percentile", "basic", "bca", "studentized"])
+def test_where_resamples_differ_by_rounding_alone_there_is_no_spread(kind: str) -> None:
+    # of the pairs of every item a third agrees
+    table = [[2, 3, 2], [2, 0, 2], [1, 0, 1], [2, 1, 2], [3, 1, 3], [1, 3, 1]] * 2
+    with pytest.warns(UndefinedStatisticWarning, match="undefined: "):
+        found = bootstrap("percent_agreement", table, target="items", kind=kind)  # type: ignore[arg-type]
+    assert math.isnan(found.low)
+    assert found.reason is not None
 
 
 @pytest.mark.parametrize("coefficient", ["fleiss_kappa", "gwet_ac"])

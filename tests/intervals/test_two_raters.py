@@ -55,6 +55,24 @@ def table_posterior(
     )
 
 
+@pytest.mark.parametrize("n", [1, 2, 9, 50])
+@pytest.mark.parametrize("row", [0, 1])
+def test_raters_who_never_agree_are_as_uncertain_as_draws_say(n: int, row: int) -> None:
+    # κ is 0 where one rater has one category and the other the other one, and its
+    # density has no end there: no step from it leads anywhere.
+    cells = np.full((2, 2), 1.5 / 4)
+    table = np.zeros((2, 2), dtype=int)
+    table[row, 1 - row] = n
+    p = np.random.default_rng(n).dirichlet((cells + table).ravel(), 200_000)
+    p = p.reshape(-1, 2, 2)
+    chance = (p.sum(axis=1) * p.sum(axis=2)).sum(axis=1)
+    kappas = (p[:, 0, 0] + p[:, 1, 1] - chance) / (1.0 - chance)
+    found = table_posterior("cohen_kappa", table.tolist())
+    for end, share in zip(ends(found), TAILS, strict=True):
+        # five standard errors: one of 100 000 other seeds of these eight fails
+        assert (kappas <= end).mean() == pytest.approx(share, abs=1.75e-3)
+
+
 def ends(result: Interval) -> tuple[float, float]:
     return result.low, result.high
 
