@@ -10,11 +10,10 @@ import numpy as np
 from masrel.agreement._kernel import Floats
 from masrel.estimates import Distribution
 from masrel.intervals._lattice import Integers
+from masrel.intervals._problem import ROUNDING
 
 Kind = Literal["percentile", "basic", "bca", "studentized"]
 """How the ends of an interval come from resamples."""
-
-_ROUNDING = 1e-12  # values and probabilities nearer than this are the same
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +54,7 @@ class AllResamples:
             with np.errstate(invalid="ignore"):  # two infinite values are the same
                 gaps = np.diff(values)
             smaller = np.minimum(np.abs(values[1:]), np.abs(values[:-1]))
-            is_new = gaps > _ROUNDING * np.clip(smaller, 1.0, 1e300)
+            is_new = gaps > ROUNDING * np.clip(smaller, 1.0, 1e300)
             first = np.flatnonzero(np.concatenate([[True], is_new]))
             if first.size < values.size:
                 values, weights = values[first], np.add.reduceat(weights, first)
@@ -74,9 +73,9 @@ class AllResamples:
         # middle of the two, so that mirrored values have mirrored quantiles. This is
         # definition 2 of Hyndman and Fan (1996), https://doi.org/10.2307/2684934.
         last = self.values.size - 1
-        at = min(int(np.searchsorted(self.cumulative, position - _ROUNDING)), last)
+        at = min(int(np.searchsorted(self.cumulative, position - ROUNDING)), last)
         value = float(self.values[at])
-        if at < last and abs(float(self.cumulative[at]) - position) <= _ROUNDING:
+        if at < last and abs(float(self.cumulative[at]) - position) <= ROUNDING:
             return 0.5 * (value + float(self.values[at + 1]))
         return value
 
@@ -213,7 +212,7 @@ class DrawnResamples:
 
 def _around(value: float) -> tuple[float, float]:
     """Return between which numbers only rounding sets a value apart."""
-    off = _ROUNDING * max(1.0, abs(value))
+    off = ROUNDING * max(1.0, abs(value))
     return value - off, value + off
 
 
@@ -259,7 +258,7 @@ class EndpointRule:
     def ends(self, resamples: Resamples) -> Ends | str:
         """Return the ends, or why there are none."""
         values = resamples.values
-        if not (values.size and values[-1] - values[0] > _ROUNDING):
+        if not (values.size and values[-1] - values[0] > ROUNDING):
             return "every resample gives the same value or none, so there is no spread"
         tail = 0.5 * (1.0 - self.level)
         levels, pulls = (tail, 1.0 - tail), (0.0, 0.0)

@@ -50,7 +50,9 @@ _MAX_REMADE = 40  # categories up to which that metric is made anew from their p
 COLUMNS = {"ratings": 1, "pairs": 2}
 """Columns of codes that a rater has, by what a coefficient takes."""
 
-_ROUNDING = 1e-12  # of 1, or of an estimate that has a unit
+ROUNDING = 1e-12
+"""Values of a coefficient, or probabilities, nearer than this are the same."""
+
 _BLOCK = 1 << 14  # items at once: what is made of them takes more room than they do
 
 
@@ -77,7 +79,6 @@ class IntervalProblem:
     # those with a pair of ratings, which degrees of freedom and rules for few count
     n_paired_items: int
     value: float  # the estimate; ``nan`` when undefined
-    rounding: float  # as far as that may move it
     min_value: float  # where intervals are cut
     target: Target
     level: float
@@ -293,7 +294,6 @@ def pose_problem(
         n_items=int(freq.sum()),
         n_paired_items=int(freq @ paired),
         value=value,
-        rounding=_ROUNDING * (abs(value) if entry.in_units else 1.0),
         # weights, or items of a single rating, can bring a coefficient below -1
         min_value=entry.lowest if value >= entry.lowest else -math.inf,
         target=target,
@@ -329,7 +329,6 @@ def rows_problem(
         n_items=int(of_patterns.sum()),
         n_paired_items=int(of_patterns @ paired),
         value=value,
-        rounding=_ROUNDING * (abs(value) if problem.entry.in_units else 1.0),
         min_value=problem.entry.lowest if value >= problem.entry.lowest else -math.inf,
     )
 

@@ -137,6 +137,5 @@ def _irrcac_of_alpha(counts: Floats, freq: Floats, v: Floats) -> float:
 def _unconditional(problem: IntervalProblem, estimate: Estimate) -> float:
     # √(V_items + V_raters): the variance over items with these raters, and the
     # jackknife's over raters with these items
-    replicates, freq = _without_rater(problem)
-    of_raters = _variance_of(problem, replicates, freq, problem.n_paired_raters)
+    of_raters = _variance_of(*_without_rater(problem), problem.n_paired_raters)
     return math.sqrt(estimate.standard_error**2 + of_raters)

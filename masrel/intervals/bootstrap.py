@@ -24,6 +24,7 @@ from masrel.intervals._endpoints import (
     distribution_of,
 )
 from masrel.intervals._problem import (
+    ROUNDING,
     IntervalProblem,
     Statistic,
     check_rng,
@@ -213,7 +214,7 @@ def bootstrap(
     reason = None
     if math.isnan(rule.value):
         reason = "the estimate itself is undefined"
-    elif kind == "studentized" and not rule.error > problem.rounding:
+    elif kind == "studentized" and not rule.error > ROUNDING:
         reason = "the estimate has no standard error to studentize by"
     if reason is not None:
         return problem.undefined(reason, method=method, unit=target)
@@ -225,7 +226,10 @@ def bootstrap(
         return problem.undefined(ends, method=method, unit=target)
     notes, distribution = (*units.notes, *resamples.notes), None
     if ends.low == ends.high:
-        notes += ("both ends are one value, which many resamples have: no certainty",)
+        notes += (
+            "both ends are one value, which many resamples have; that does not make it "
+            "certain",
+        )
     if kind == "studentized":  # ratios to standard errors, no values of the coefficient
         notes += _infinite_ratios(resamples)
     else:

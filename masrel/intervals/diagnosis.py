@@ -367,8 +367,7 @@ def _changes(
             change = problem.values_without(of_others, others) - moved
             n = min(n_paired, _n_paired(others, rest, freq))
             matters = rows.any(axis=1) | others.any(axis=1)
-            variance = _variance_of(problem, change[matters], freq[matters], n)
-            errors[rater] = math.sqrt(variance)
+            errors[rater] = math.sqrt(_variance_of(change[matters], freq[matters], n))
             half[rater] = problem.student_t(n - 1) * errors[rater]
     changes = without - problem.value
     half[errors == 0.0] = math.nan  # leaving out any item leaves it as it is

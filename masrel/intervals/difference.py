@@ -295,12 +295,7 @@ def _of_clusters(
     if design == "independent":
         first, second = _cluster_pair(one, other, clusters)
         parts = [
-            (
-                _variance_of(
-                    problem, of.values_without(problem), _once(of.known), of.n_paired
-                ),
-                of,
-            )
+            (_variance_of(of.values_without(problem), _once(of.known), of.n_paired), of)
             for problem, of in ((one, first), (other, second))
         ]
         n = min(first.n_paired, second.n_paired)
@@ -314,7 +309,7 @@ def _of_clusters(
     first, second = ClusterSums.of(one, codes), ClusterSums.of(other, codes)
     known, n = first.known | second.known, min(first.n_paired, second.n_paired)
     moved = one.values(one.sums - first.sums) - other.values(other.sums - second.sums)
-    return _variance_of(one, moved[known], _once(known), n), float(n - 1), n
+    return _variance_of(moved[known], _once(known), n), float(n - 1), n
 
 
 def _once(known: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -365,7 +360,7 @@ def _dependent(one: IntervalProblem, other: IntervalProblem) -> tuple[float, flo
     # both coefficients without item i, from the sums less its features
     moved = one.values(one.sums - first) - other.values(other.sums - second)
     freq = np.ones(int(matters.sum()), dtype=np.int64)
-    return _variance_of(one, moved[matters], freq, n), float(n - 1)
+    return _variance_of(moved[matters], freq, n), float(n - 1)
 
 
 def _independent(one: IntervalProblem, other: IntervalProblem) -> tuple[float, float]:
@@ -373,7 +368,6 @@ def _independent(one: IntervalProblem, other: IntervalProblem) -> tuple[float, f
     parts = [
         (
             _variance_of(
-                problem,
                 problem.values_without(problem.sums, problem.rows),
                 problem.freq,
                 problem.n_paired_items,

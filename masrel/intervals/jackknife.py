@@ -13,6 +13,7 @@ from masrel.estimates import Interval, Target, Unit
 from masrel.intervals._clusters import ClusterSums, clusters_of
 from masrel.intervals._problem import (
     COLUMNS,
+    ROUNDING,
     Integers,
     IntervalProblem,
     Statistic,
@@ -169,7 +170,7 @@ def _jackknife_variance(problem: IntervalProblem) -> _JackknifeVariance:
         if np.isnan(replicates).any():
             reason = f"with one of the {unit} left out the estimate is undefined"
             return _JackknifeVariance(variance=math.nan, df=math.nan, reason=reason)
-        variance += _variance_of(problem, replicates, freq, n)
+        variance += _variance_of(replicates, freq, n)
         # Satterthwaite's degrees for a sum would lie above the fewer ones.
         df = min(df, n - 1)
         notes += warn_small(n, 10 if unit == "items" else 5, unit, int(freq.sum()))
@@ -193,8 +194,7 @@ def _cluster_variance(problem: IntervalProblem, codes: Integers) -> _JackknifeVa
         reason = "with one of the clusters left out the estimate is undefined"
         return _JackknifeVariance(variance=math.nan, df=math.nan, reason=reason)
     notes = warn_small(n, 10, "clusters", len(replicates))
-    once = np.ones(len(replicates), dtype=np.int64)
-    variance = _variance_of(problem, replicates, once, n)
+    variance = _variance_of(replicates, np.ones(len(replicates), dtype=np.int64), n)
     if not variance > 0.0:
         reason = (
             "leaving out any of the clusters leaves the estimate as it is, so the "
@@ -219,9 +219,7 @@ def _logit_interval(problem: IntervalProblem, codes: Integers) -> Interval:
     )
 
 
-def _variance_of(
-    problem: IntervalProblem, replicates: Floats, freq: Integers, n: int
-) -> float:
+def _variance_of(replicates: Floats, freq: Integers, n: int) -> float:
     """Return (n - 1)/n Σ (θ_i - mean)² of estimates with one left out [1]_."""
     # Takes replicates (n_distinct,), freq (n_distinct,); n are those with a pair. What
     # is observed is a mean over these alone, whose variance this factor makes unbiased;
@@ -231,7 +229,7 @@ def _variance_of(
     moved = replicates - replicates[0]  # so that no change at all is exactly 0
     deviations = moved - freq @ moved / freq.sum()
     variance = float((n - 1) / n * (freq @ deviations**2))
-    return 0.0 if math.sqrt(variance) <= problem.rounding else variance
+    return 0.0 if math.sqrt(variance) <= ROUNDING else variance
 
 
 def _without_rater(problem: IntervalProblem) -> tuple[Floats, Integers]:
