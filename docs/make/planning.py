@@ -267,15 +267,13 @@ def of_latent(model: LatentModel) -> float:
 
 
 def _error_figure() -> None:
-    import matplotlib as mpl
     from matplotlib.figure import Figure
 
     from masrel.report.figures._style import BLUE, VERMILLION, finished, house_style
 
     common = {**DESIGNS[5], "rng": 1}
     plan = sample_size(**common)
-    with house_style():
-        mpl.rcParams["text.parse_math"] = True  # powers of ten
+    with house_style(parse_math=True):
         figure = Figure(figsize=(5.6, 3.4))
         axes = figure.subplots()
         for label, interval, colour, mark in (

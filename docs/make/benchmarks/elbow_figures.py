@@ -35,7 +35,7 @@ _LABELS = {"sampled": ((5, 5), "left"), "solve_ivp": ((-6, -8), "right")}
 
 def draw_work(points: Sequence["Point"]) -> None:
     """Error of the events against the time that finding them takes."""
-    with house_style():
+    with house_style(parse_math=True):
         figure = Figure(figsize=(5.6, 3.6))
         axes = figure.subplots()
         for way, (label, colour, marker, size) in _WAYS.items():
@@ -55,7 +55,7 @@ def draw_work(points: Sequence["Point"]) -> None:
         axes.set_ylabel("largest error of catch\nand catch end (s)")
         axes.grid(which="major")
         axes.set_xlim(right=axes.get_xlim()[1] * 4)
-        axes.legend(fontsize=7.5, loc="center left", bbox_to_anchor=(0.0, 0.42))
+        axes.legend(fontsize=7.5, loc="lower right")
         arrange(figure, None)
         picture = files_of(figure, ["png"])["png"]
         (FIGURES / "elbow_work.png").write_bytes(picture)
@@ -63,7 +63,7 @@ def draw_work(points: Sequence["Point"]) -> None:
 
 def draw_approach(rates: Sequence[float], late: dict[str, np.ndarray]) -> None:
     """How late a sampled law sees the events, speed by speed, against the rate."""
-    with house_style():
+    with house_style(parse_math=True):
         figure = Figure(figsize=(6.2, 2.9))
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
         periods = 1e3 / np.array(rates)

@@ -39,7 +39,6 @@ SHADES = {"pre-catch": "#FFFFFF", "catch": "#D9D9D9", "post-catch": "#F0F0F0"}
 STYLE: "dict[RcKeyType, object]" = {
     "font.family": "DejaVu Sans",  # ships with matplotlib: the same everywhere
     "font.size": 9,
-    "text.parse_math": False,  # a title or a name may have any letters in it
     "axes.labelsize": 9,
     "axes.titlesize": 9.5,
     "axes.spines.top": False,
@@ -76,12 +75,14 @@ _DEFAULTS = {
 
 
 @contextmanager
-def house_style() -> Iterator[None]:
+def house_style(*, parse_math: bool = False) -> Iterator[None]:
     """Draw in the house style alone: a reader's own matplotlibrc changes nothing."""
+    # parse_math: as powers of ten need it; a title or a name may have any letters in it
     with mpl.rc_context():
         # not mpl.rcdefaults, which reads every style that matplotlib has
         mpl.rcParams.update(_DEFAULTS)
         mpl.rcParams.update(STYLE)
+        mpl.rcParams["text.parse_math"] = parse_math
         yield
 
 
