@@ -1,0 +1,251 @@
+"""Studies that version 0.1.0 ran are read, verified, merged and analysed as they were.
+
+`old_study/README.md` says what they are, and `old_study/files.csv` which files.
+"""
+
+import csv
+import gzip
+import hashlib
+import io
+import json
+import math
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.golden.call import masrel
+
+OLD = Path(__file__).parent / "old_study"
+FROZEN = OLD / "files"
+TABLE_SHA256 = "bde35326b1d624284911f813dc1c8eaf72700ace5360612ccc1937d8700ba967"
+"""Of `files.csv`, which has the mode and hash of every other file."""
+
+STUDIES = ("north", "south", "both", "adaptive", "claims", "no_repeat", "psych_ds")
+CALLED_BROKEN = {"claims/report/manifest.json"}
+"""What 0.1.0 called broken as soon as it had written it; nothing was."""
+
+ANALYSED = ("both", "claims", "psych_ds")
+LATER = {"masrel_version", "version", "Version"}
+"""Keys of JSON, and of the lines at the head of a table, that name the version."""
+
+
+def rows() -> list[dict[str, str]]:
+    with (OLD / "files.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def sha256(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+@pytest.fixture(scope="module")
+def old(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy, with the modes of the table; tests write beside its studies."""
+    root = tmp_path_factory.mktemp("old")
+    of_folders = []
+    for row in rows():
+        path = root / row["path"]
+        if row["path"].endswith("/"):
+            path.mkdir(parents=True)
+            of_folders.append((path, row["mode"]))
+        else:
+            shutil.copyfile(FROZEN / (row["same_as"] or row["path"]), path)
+            path.chmod(int(row["mode"], 8))
+    for path, mode in reversed(of_folders):
+        path.chmod(int(mode, 8))
+    return root
+
+
+def said(*arguments: object, code: int = 0) -> Any:
+    """Call the command line -> what it printed, or the JSON of it."""
+    made = masrel(*arguments)
+    assert made["code"] in (code, None if code == 0 else code), made
+    return made.get("json", made.get("out"))
+
+
+def lacking(old: Any, new: Any, where: str = "") -> list[str]:
+    """Where something is missing or other than it was; what has come is ignored."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        kept = [key for key in old if key not in LATER]
+        return [
+            place
+            for key in kept
+            for place in lacking(old[key], new.get(key, "nothing"), f"{where}.{key}")
+        ]
+    if where.endswith("notes") and isinstance(old, list):
+        old, new = sorted(old), sorted(new)  # their order may change
+    if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        pairs = enumerate(zip(old, new, strict=True))
+        return [p for n, (a, b) in pairs for p in lacking(a, b, f"{where}[{n}]")]
+    if isinstance(old, float) and isinstance(new, float):
+        is_kept = math.isclose(old, new, rel_tol=1e-12, abs_tol=1e-15)
+    else:
+        is_kept = old == new
+    return [] if is_kept else [f"{where}: {old!r} -> {new!r}"]
+
+
+def table(text: str, delimiter: str = ",") -> dict[str, Any]:
+    """Lines at the head and rows of a table, as `lacking` compares them."""
+    lines = text.splitlines(keepends=True)
+    head = [line for line in lines if line.startswith("#")]
+    named = dict(line[1:].strip().partition(":")[::2] for line in head)
+    body = io.StringIO("".join(lines[len(head) :]), newline="")
+    return {"head": named, "rows": list(csv.DictReader(body, delimiter=delimiter))}
+
+
+def content(file: Path) -> Any:
+    """A file as `lacking` compares it: JSON and tables may have grown."""
+    data = file.read_bytes()
+    if file.suffix == ".gz":
+        return gzip.decompress(data)
+    if file.suffix == ".json":
+        return json.loads(data)
+    if file.suffix == ".jsonl":
+        events = [json.loads(line) for line in data.splitlines()]
+        return [{key: e[key] for key in ("event", "fields")} for e in events]
+    if file.suffix in (".csv", ".tsv"):
+        return table(data.decode(), "\t" if file.suffix == ".tsv" else ",")
+    return data
+
+
+def files(folder: Path) -> set[str]:
+    paths = folder.rglob("*")
+    return {path.relative_to(folder).as_posix() for path in paths if path.is_file()}
+
+
+def test_no_frozen_file_has_changed() -> None:
+    stored = {
+        row["path"]: row["sha256"]
+        for row in rows()
+        if not row["path"].endswith("/") and not row["same_as"]
+    }
+    assert {name: sha256(FROZEN / name) for name in files(FROZEN)} == stored
+    assert sha256(OLD / "files.csv") == TABLE_SHA256
+
+
+@pytest.mark.parametrize("study", STUDIES)
+def test_a_study_is_read_and_whole(old: Path, study: str) -> None:
+    said("check", old / study)
+    frozen = content(old / "expected" / f"status_{study}.json")["sessions"]
+    status = said("status", old / study, "--json", "-")["sessions"]
+    assert lacking(frozen, status) == []
+    anchors = old / "expected" / "anchors" / f"{study}.txt"
+    options = ("--anchor", anchors) if anchors.exists() else ()
+    verified = masrel("verify", old / study, *options, "--json", "-")["json"]
+    broken = {of["path"] for of in verified["findings"] if of["weight"] == "broken"}
+    assert broken <= {str(old / path) for path in CALLED_BROKEN}
+
+
+def test_the_sites_are_merged_as_they_were(old: Path, tmp_path: Path) -> None:
+    both = tmp_path / "both"
+    said("merge", old / "north", old / "south", "-o", both)
+    made_later = {"ratings", "report", "analysis.json"}
+    frozen = {f for f in files(old / "both") if f.split("/")[0] not in made_later}
+    assert files(both) == frozen
+    # of the new log of conduct the times, and the hashes over them, are others
+    exact = frozen - {"conduct.jsonl"}
+    changed = [f for f in exact if sha256(both / f) != sha256(old / "both" / f)]
+    assert changed == []
+    logs = [content(folder / "conduct.jsonl") for folder in (old / "both", both)]
+    assert lacking(*logs) == []
+
+
+@pytest.mark.parametrize("study", ANALYSED)
+def test_ratings_and_analysis_are_as_they_were(
+    old: Path, study: str, tmp_path: Path
+) -> None:
+    copy = shutil.copytree(old / study, tmp_path / study)
+    shutil.rmtree(copy / "ratings")
+    said("ratings", copy)
+    for name in ("ratings.csv", "raters.csv", "answers.csv"):
+        kept, made = (folder / "ratings" / name for folder in (old / study, copy))
+        if kept.exists():
+            assert lacking(content(kept), content(made), name) == []
+    analysis = content(old / study / "analysis.json")
+    assert lacking(analysis, said("analyze", copy, "--json", "-")) == []
+
+
+@pytest.mark.parametrize(
+    ("study", "form"), [("both", "bids"), ("psych_ds", "psych_ds")]
+)
+def test_exports_are_as_they_were_and_read(
+    old: Path, study: str, form: str, tmp_path: Path
+) -> None:
+    frozen, made = old / "expected" / form, tmp_path / "export"
+    form = form.replace("_", "-")
+    said("export", old / study, "--as", form, "-o", made, "--quiet")
+    assert files(made) == files(frozen)
+    changes = {
+        name: lacking(content(frozen / name), content(made / name))
+        for name in files(frozen)
+    }
+    assert not any(changes.values()), changes
+    tables = frozen.glob("data/*ratings_data.csv")
+    options = [option for table in tables for option in ("--ratings", table)]
+    folder = frozen if options else frozen / "sourcedata"
+    read = said("analyze", folder, *options, "--json", "-")["estimates"]
+    kept = content(old / study / "analysis.json")["estimates"]
+    assert lacking(*([of["estimate"] for of in each] for each in (kept, read))) == []
+
+
+@pytest.mark.parametrize("study", ["south", "no_repeat"])
+def test_a_late_rater_is_drawn_the_same_order(
+    old: Path, study: str, tmp_path: Path
+) -> None:
+    copy = shutil.copytree(old / study, tmp_path / study)
+    text = (copy / "protocol.toml").read_text(encoding="utf-8")
+    site = 'site = "south"\n' if study == "south" else ""
+    text = text.replace(
+        "\n[[sessions]]", f'\n[[raters]]\nid = "R9"\n{site}\n[[sessions]]', 1
+    )
+    head, of_session, rest = text.partition('id = "test"\n')
+    text = head + of_session + rest.replace("]", ', "R9"]', 1)
+    (copy / "protocol.toml").write_text(text, encoding="utf-8")
+    before = {path: sha256(path) for path in (copy / "schedules").iterdir()}
+    said("schedule", copy)
+    assert {path: sha256(path) for path in before} == before
+    for file in (old / "expected" / "late" / study).iterdir():
+        drawn = copy / "schedules" / file.name
+        assert lacking(content(file), content(drawn), file.name) == []
+    listed = said("rater", "list", copy)
+    late = {line.split()[0] for line in listed.splitlines() if " yes" in line}
+    assert late == ({"R7", "R9"} if study == "south" else {"R9"})
+
+
+@pytest.mark.parametrize("study", ["north", "adaptive"])
+def test_a_training_is_told_as_it_was_and_goes_on(
+    old: Path, study: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    copy = shutil.copytree(old / study, tmp_path / study)
+    of_rater = ("train", copy, "--rater", "R1")
+    frozen = content(old / "expected" / f"training_{study}.json")
+    assert lacking(frozen, said(*of_rater, "--report", "--json", "-")) == []
+    lines = len(content(copy / "training" / "R1.jsonl"))
+    monkeypatch.setattr(sys, "stdin", io.StringIO("\n\n2\nstop\n"))
+    said(*of_rater, "--clock", "simulated", code=1)
+    events = content(copy / "training" / "R1.jsonl")[lines:]
+    assert [e["event"] for e in events] == ["resumed", "presented", "grade", "stopped"]
+    assert said("verify", copy, "--json", "-")["is_whole"] is True
+
+
+def test_a_claims_section_is_audited_as_it_was(old: Path) -> None:
+    frozen = content(old / "expected" / "claims.json")
+    assert lacking(frozen, said("audit", old / "claims", "--json", "-")) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("study", ["both", "claims"])
+def test_the_report_is_built(old: Path, study: str, tmp_path: Path) -> None:
+    """Its analysis is that of the old one; its pages may look otherwise."""
+    options = ("--quiet", "--cache", tmp_path / "cache")
+    said("report", old / study, "-o", tmp_path / "report", *options)
+    page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    assert "SIMULATED" in page
+    frozen, built = (
+        content(folder / "analysis.json")
+        for folder in (old / study / "report", tmp_path / "report")
+    )
+    assert lacking(frozen, built) == []
