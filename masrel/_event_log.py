@@ -231,7 +231,7 @@ class SessionLog:
         """
         make_folder(path.parent, mode=0o700)  # recordings in it name their models
         # that of conduct is in a folder that others may read
-        descriptor = no_follow(str(path), os.O_RDWR | os.O_CREAT, 0o600)
+        descriptor = no_follow(str(path), os.O_RDWR | os.O_CREAT)
         # It closes its descriptor once, also when the disk refuses what is recovered.
         log = cls(path, descriptor, [], _FIRST_PREVIOUS, now)
         try:

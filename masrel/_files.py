@@ -251,7 +251,7 @@ def refuse_record(path: Path) -> None:
             )
 
 
-def no_follow(path: str, flags: int, mode: int = 0o666) -> int:
+def no_follow(path: str, flags: int, mode: int = 0o600) -> int:
     """Open a file that is added to, an `opener` for ``open``; refuse a link or pipe."""
     try:
         descriptor = os.open(path, flags | _NO_FOLLOW | _NO_WAIT | _BINARY, mode)

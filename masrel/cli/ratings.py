@@ -44,7 +44,8 @@ def ratings(study: Path, output: Path | None) -> None:
     destination = output or paths.ratings_file
     write_ratings(ratings, destination, within=None if output else study)
     if output is None:
-        write_file(paths.raters_file, raters_text(paths, protocol), within=study)
+        raters = raters_text(paths, protocol)  # also with fields that are not public
+        write_file(paths.raters_file, raters, within=study, mode=0o600)
     n_rows, n_missing = len(ratings.rows), ratings.n_missing
     label = " (simulated)" if ratings.simulated else ""
     if ratings.n_from_persons == n_rows and label:

@@ -78,7 +78,8 @@ def export_study(
     dataset = gather_dataset(study, protocol, include, day or date.today())
     with new_folder(folder) as part:
         for place, content in _FORMS[form](dataset):
-            write_files({part / place: content})
+            # what is private stays its owner's alone until it is handed on
+            write_files({part / place: content}, mode=0o600 if include else None)
             if progress is not None:
                 progress(place)
     return dataset.left_out

@@ -282,10 +282,12 @@ def _merged_logs(
 
 
 def _write(merged: StudyPaths, files: dict[str, Path], protocol: bytes) -> None:
-    private = (merged.schedules, merged.sessions, merged.training, merged.rehearsals)
-    for folder in private:  # they name the models
-        if any(name.startswith(f"{folder.name}/") for name in files):
-            make_folder(folder, mode=0o700)
+    # For their owner alone from the start, however open the sources are: schedules and
+    # recordings name the models, and logs say who did what and why.
+    folders = {merged.root / parent for name in files for parent in Path(name).parents}
+    for folder in sorted(folders):
+        make_folder(folder, mode=0o700)
     for name, file in files.items():
-        write_files({merged.root / name: _content(file)}, within=merged.root)
-    write_files({merged.protocol: protocol})
+        content = {merged.root / name: _content(file)}
+        write_files(content, within=merged.root, mode=0o600)
+    write_files({merged.protocol: protocol}, mode=0o600)

@@ -77,5 +77,4 @@ def copy_for_site(
     secret = {copy.secret_file: site_secret_text(key, site).encode()}
     _check_new_folder(destination, secret | contents)
     make_folder(copy.secret_file.parent, mode=0o700)
-    write_files(secret, within=destination, mode=0o600)
-    write_files(contents, within=destination)
+    write_files(secret | contents, within=destination, mode=0o600)

@@ -8,7 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from masrel._files import make_folder, write_files
-from masrel._input import MAX_SMALL, csv_format, format_problem, not_utf8, read_regular
+from masrel._input import (
+    MAX_SMALL,
+    csv_format,
+    format_problem,
+    listed,
+    not_utf8,
+    read_regular,
+)
 from masrel._once import once
 from masrel.errors import ScheduleError
 from masrel.protocol import (
@@ -399,7 +406,8 @@ def concealment_notes(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
     -------
     tuple of str
         A sentence each for a published secret, schedules drawn from the seed alone,
-        schedules of another secret, and folders that others may read.
+        schedules of another secret, folders that others may read, and logs of conduct
+        that they may.
     """
     secret = find_secret(study)
     schedules = [
@@ -430,18 +438,30 @@ def concealment_notes(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
             "secret that is not in the study: they stay good, and cannot be drawn "
             "again for comparison"
         )
-    return (*notes, *_open_folders(study))
+    return (*notes, *_open_to_others(study))
 
 
-def _open_folders(study: StudyPaths) -> Iterator[str]:
+def _open_to_others(study: StudyPaths) -> Iterator[str]:
     if os.name != "posix":
         return
-    for folder in (study.secret_file.parent, study.schedules, study.sessions):
+    for folder in (
+        study.secret_file.parent,
+        study.schedules,
+        study.sessions,
+        study.training,
+        study.rehearsals,
+    ):
         if folder.is_dir() and folder.stat().st_mode & 0o077:
             yield (
                 f"{folder}: other users of this computer may read what names the "
                 f"models; chmod 700 {shlex.quote(str(folder))} forbids it"
             )
+    logs = [f"{log}" for log in study.conduct_logs() if log.stat().st_mode & 0o077]
+    if logs:
+        yield (
+            f"{listed(logs)}: other users of this computer may read who did what and "
+            f"why; chmod 600 {shlex.join(logs)} forbids it"
+        )
 
 
 def _every_schedule(

@@ -2,6 +2,7 @@
 
 import hmac
 import json
+import os
 from collections import Counter
 from pathlib import Path
 
@@ -276,6 +277,8 @@ def test_a_site_draws_from_its_secret_what_the_study_draws_for_it(
     copy_for_site(protocol, study, "south", copy.root)
     files = {path for path in copy.root.rglob("*") if path.is_file()}
     assert files == {copy.protocol, copy.secret_file}
+    if os.name == "posix":  # a protocol may have fields of raters that are not public
+        assert {path.stat().st_mode & 0o077 for path in files} == {0}
     assert SECRET.hex() not in copy.secret_file.read_text(encoding="utf-8")
     allot_schedules(copy, protocol, site="south")
     allot_schedules(study, protocol)

@@ -4,6 +4,7 @@ import csv
 import gzip
 import hashlib
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -163,6 +164,9 @@ def test_what_is_private_stays_unless_it_is_named(
     private = ("notes", "logs", "illness", "after.secret")
     assert export_study(*rated, form, tmp_path / "b", include=private) == ()
     everything = b"".join(data for _, data in files(tmp_path / "b"))
+    if os.name == "posix":
+        paths = [path for path in (tmp_path / "b").rglob("*") if path.is_file()]
+        assert {path.stat().st_mode & 0o077 for path in paths} == {0}
     for text in (
         b"very private",
         b"private, too",
