@@ -42,6 +42,6 @@ def rater_flow(facts: StudyFacts) -> str:
     status = Counter(rater.status for rater in facts.raters)
     parts = [f"{n} {name}" for name, n in status.items() if name != "planned"]
     n_late = sum(rater.is_late for rater in facts.raters)
-    late = f" {n_late} joined later than most." if n_late else ""
+    late = f" {n_late} joined after the first draw of schedules." if n_late else ""
     n_begun = ", ".join(parts) or "none has begun"
     return f"{counted(len(facts.raters), 'rater')} planned: {n_begun}.{late}"

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from masrel._once import read_once
 from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.errors import ParameterError
 from masrel.protocol import StudyPaths, read_protocol
@@ -94,6 +95,7 @@ def _include(study: Path, rater: str, who: str, why: str) -> None:
     json="Write the list here; - prints it, and nothing else.",
     csv="Print the list as CSV.",
 )
+@read_once()
 def _list(study: Path, output: OutputOptions) -> None:
     """List the raters of STUDY: how far each came, and what is known of him or her."""
     from masrel.progress import rater_progress, session_progress

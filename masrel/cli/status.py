@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from masrel._once import read_once
 from masrel.cli._options import STDOUT, OutputOptions, output_options, write_json
 from masrel.errors import ParameterError, SessionLogError
 from masrel.protocol import StudyPaths, read_protocol
@@ -56,6 +57,7 @@ class _Overview:
     next: "NextStep"
 
     @classmethod
+    @read_once()
     def of(cls, paths: StudyPaths) -> "_Overview":
         from masrel.conduct import read_conduct
         from masrel.progress import next_step, rater_progress, session_progress

@@ -312,7 +312,9 @@ _OF_RATERS = {
     "rater": Variable(name="rater", title="Rater"),
     "site": Variable(name="site", title="Site"),
     "status": Variable(name="status", title="What became of the rater in the study"),
-    "late": Variable(name="late", title="Joined later than most", levels=("yes", "no")),
+    "late": Variable(
+        name="late", title="Joined after the first draw", levels=("yes", "no")
+    ),
 }
 
 

@@ -2,16 +2,16 @@
 
 import csv
 import io
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from operator import itemgetter
 from typing import Literal
 
 from masrel._cells import safe_cell
 from masrel.conduct import excluded_raters, rater_values, read_conduct
 from masrel.errors import ScheduleError
-from masrel.progress._session_stages import SessionProgress, session_progress
-from masrel.protocol import Protocol, StudyPaths
+from masrel.progress._session_stages import SessionProgress, _events, session_progress
+from masrel.protocol import Protocol, StudyPaths, protocol_hash
 from masrel.protocol._rater_fields import FieldValue
 from masrel.schedule import read_schedule
 
@@ -33,8 +33,8 @@ class RaterProgress:
         Whether a session has begun, and all of them are complete; or whether the rater
         has left, or is left out of the analysis.
     is_late : bool
-        Whether the rater joined later than most: the first schedule was drawn from
-        another protocol than most of the site's.
+        Whether the rater joined after the site's first draw of schedules;
+        ``docs/conduct.md`` says how that is known.
     values : mapping of str to (str, int, float or None)
         What every field of the protocol holds; None where nothing is known.
     """
@@ -117,15 +117,47 @@ def _late_raters(study: StudyPaths, protocol: Protocol) -> set[str]:
                     drawn_from[rater] = read_schedule(file).protocol_sha256
                 except ScheduleError:
                     continue  # masrel check says so
-    sites = {rater.id: rater.site for rater in protocol.raters}
-    counts: dict[str | None, Counter[str]] = {}
-    for rater, sha256 in drawn_from.items():
-        counts.setdefault(sites[rater], Counter())[sha256] += 1
-    return {
-        rater
-        for rater, sha256 in drawn_from.items()
-        if sha256 != counts[sites[rater]].most_common(1)[0][0]
-    }
+    in_force = _protocols_in_force(study, protocol)
+    late = set()
+    for site in {rater.site for rater in protocol.raters}:
+        of_site = {rater.id for rater in protocol.raters if rater.site == site}
+        draws = {rater: drawn_from[rater] for rater in drawn_from if rater in of_site}
+        first = _first_draw(draws, [pair for pair in in_force if pair[0] in draws])
+        late |= {rater for rater, sha256 in draws.items() if sha256 != first}
+    return late
+
+
+def _protocols_in_force(study: StudyPaths, protocol: Protocol) -> list[tuple[str, str]]:
+    # raters, each with the hash of the protocol under which a session of theirs began,
+    # in order of time; then every rater with that of the protocol as it is now
+    begun: list[tuple[str, str, str]] = []
+    for session in protocol.sessions:
+        for rater in session.raters:
+            events, state, _ = _events(study.log_file(rater, session.id))
+            if "protocol_sha256" in state.header:
+                sha256 = str(state.header["protocol_sha256"])
+                begun.append((events[0].time_utc, rater, sha256))
+    begun.sort(key=itemgetter(0))
+    now = protocol_hash(protocol)
+    return [pair[1:] for pair in begun] + [(each.id, now) for each in protocol.raters]
+
+
+def _first_draw(
+    draws: Mapping[str, str], in_force: Sequence[tuple[str, str]]
+) -> str | None:
+    # the hash of the protocol from which the first schedules of a site were drawn
+    hashes = [sha256 for _, sha256 in in_force]
+
+    def is_later(sha256: str) -> bool:
+        # A schedule is drawn before its session begins: one of another protocol whose
+        # session began under this one, or earlier, was drawn before this one's.
+        return sha256 in hashes and any(
+            draws[rater] != sha256 and hashes.index(other) <= hashes.index(sha256)
+            for rater, other in in_force
+        )
+
+    # Of several that may be the first it is that of the rater who is named first.
+    return min(dict.fromkeys(draws.values()), key=is_later, default=None)
 
 
 def raters_csv(

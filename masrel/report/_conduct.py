@@ -202,8 +202,8 @@ def _flow_table(material: Material, conduct: StudyConduct) -> Table:
         ),
         rows=tuple(rows),
         notes=(
-            "study: complete in all sessions. Late: the schedule is drawn from another "
-            "protocol than most of the site's. Analysed: with a grade, not excluded.",
+            "study: complete in all sessions. Late: joined after the site's first draw "
+            "of schedules. Analysed: with a grade, not excluded.",
         ),
         data=material.data,
     )

@@ -3,6 +3,7 @@
 import dataclasses
 from typing import Any
 
+from masrel._once import read_once
 from masrel.conduct import read_conduct
 from masrel.errors import MasrelError
 from masrel.progress import next_step, rater_progress, session_progress
@@ -23,6 +24,7 @@ _DEVICE = (
 )
 
 
+@read_once()
 def overview(study: StudyPaths) -> dict[str, Any]:
     """Return sessions, raters, what happened beside them, and the device."""
     protocol = read_protocol(study.protocol)
