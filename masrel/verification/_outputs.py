@@ -215,6 +215,7 @@ def _report_findings(
     got = dict(inputs) if isinstance(inputs, dict) else {}
     got.pop("include", None)  # what is shown of the same
     of_conduct = got.pop("conduct_sha256", None)
+    of_claims = got.pop("claims_sha256", None)
     if got != _of_same_table(analysis, got, ratings).inputs:
         yield broken(
             manifest, "the report is of another protocol or of other ratings: make anew"
@@ -225,6 +226,9 @@ def _report_findings(
             "the report is not of what has happened beside the sessions, by "
             f"{study.conduct_file.name}: make anew",
         )
+    claims = study.claims_file
+    if of_claims and of_claims != (_sha256(claims) if claims.is_file() else None):
+        yield broken(manifest, f"the report is of other claims than {claims.name}")
     for name, needed in files.items():
         path = manifest.parent / name
         if not path.resolve().is_relative_to(manifest.parent.resolve()):
