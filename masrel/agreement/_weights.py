@@ -107,7 +107,8 @@ class Weights:
     @property
     def operator(self) -> Any:
         """The v_kl as a matrix, or what takes its place: `Distances`."""
-        if self.numerators is None and self.n_categories > MANY:
+        is_identity = self.numerators is None and self.reason is None
+        if is_identity and self.n_categories > MANY:
             return Differing(self.n_categories)
         return self.floats
 

@@ -11,6 +11,7 @@ from itertools import permutations
 
 import numpy as np
 
+from masrel.agreement._distances import Distances
 from masrel.agreement._kernel import Floats
 from masrel.errors import ParameterError
 from masrel.estimates import Distribution, Interval
@@ -96,7 +97,8 @@ def nothing_to_learn(problem: IntervalProblem) -> str | None:
         return "no item has ratings of two raters"
     if problem.coded.n_categories < 2:
         return "one category is declared"
-    if np.isnan(problem.v).any():
+    # distances, which stand for the matrix of many categories, are all numbers
+    if not isinstance(problem.v, Distances) and np.isnan(problem.v).any():
         return "the scale has no such weights"
     if not problem.v.any():
         return "the weights count nothing as disagreement"

@@ -16,7 +16,12 @@ from masrel.agreement import (
     fleiss_kappa,
     krippendorff_alpha,
 )
-from masrel.errors import ParameterError, RatingsError, SmallSampleWarning
+from masrel.errors import (
+    ParameterError,
+    RatingsError,
+    SmallSampleWarning,
+    UndefinedStatisticWarning,
+)
 from masrel.intervals import bootstrap, estimate, jackknife
 
 Rows = list[list[float]]
@@ -269,6 +274,42 @@ def test_what_cannot_be_left_out_has_the_delta_method() -> None:
     assert "too many different grades" in result.interval.notes[0]
     with pytest.raises(ParameterError, match='method="analytic" counts none'):
         jackknife("fleiss_kappa", codes, target="items")
+
+
+@pytest.mark.parametrize("name", [*POOLED, "cohen_kappa", "krippendorff_alpha"])
+@pytest.mark.parametrize("n_items", [60, 300])
+def test_names_that_never_agree_say_that_leaving_items_out_tells_nothing(
+    name: str, n_items: int
+) -> None:
+    ratings = [[f"a{i}", f"b{i}"] for i in range(n_items)]
+    with pytest.warns(UndefinedStatisticWarning):
+        result = estimate(name, ratings, target="items")
+    assert result.value == COEFFICIENTS[name](ratings).value <= 0.0
+    assert result.interval is not None
+    assert result.interval.reason is not None
+    assert "leaving out any of the items" in result.interval.reason
+
+
+def test_measurements_that_agree_now_and_then_have_the_jackknife() -> None:
+    # 1 000 items of two decimals: 1 350 different numbers, too few to be refused
+    rng = np.random.default_rng(4)
+    ratings = np.round(rng.normal(10.0, 2.0, (1000, 3)), 2)
+    chosen = estimate("fleiss_kappa", ratings, target="items").interval
+    left_out = jackknife("fleiss_kappa", ratings, target="items")
+    assert chosen is not None
+    assert (chosen.low, chosen.high) == (left_out.low, left_out.high)
+    assert chosen.low < chosen.high
+
+
+@pytest.mark.parametrize("n_grades", [100, 200])
+def test_weights_that_a_scale_lacks_give_no_interval(n_grades: int) -> None:
+    # ratio weights divide by sums, which of the grade 0 and itself is 0
+    ratings = [[i, 7 * i % n_grades] for i in range(n_grades)]
+    with pytest.warns(UndefinedStatisticWarning):
+        result = estimate("fleiss_kappa", ratings, target="items", weights="ratio")
+    assert math.isnan(result.value)
+    assert result.interval is not None
+    assert result.interval.reason is not None
 
 
 def test_continuous_ratings_take_a_few_times_their_room() -> None:
