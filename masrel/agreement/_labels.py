@@ -31,7 +31,13 @@ def shown(value: object) -> str:
 SET_SEPARATOR, EMPTY_SET = "; ", "∅"
 
 
-def text_of_set(labels: Set[Any]) -> str:
+class SetText(str):
+    """Text that stands for a set, in which no separator needs to be looked for."""
+
+    __slots__ = ()
+
+
+def text_of_set(labels: Set[Any]) -> SetText:
     """Return the text that stands for a set of labels: its elements in order."""
     elements = sorted(map(str, labels))
     if any(SET_SEPARATOR.strip() in element for element in elements):
@@ -39,7 +45,7 @@ def text_of_set(labels: Set[Any]) -> str:
             "ratings: labels in a set need to have no semicolon, which separates them, "
             f"got {elements}"
         )
-    return SET_SEPARATOR.join(elements) or EMPTY_SET
+    return SetText(SET_SEPARATOR.join(elements) or EMPTY_SET)
 
 
 def is_missing(label: object) -> bool:

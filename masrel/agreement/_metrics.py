@@ -5,6 +5,8 @@ it is, without a largest value.
 """
 
 import math
+import re
+from ast import literal_eval
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import Literal, get_args
@@ -15,7 +17,7 @@ from masrel.agreement._counts import CountedRatings, DistinctItems, item_counts
 from masrel.agreement._data import CodedRatings
 from masrel.agreement._distances import MAX_EXPONENT, Squared, centred
 from masrel.agreement._kernel import Floats, Kernel, divide
-from masrel.agreement._labels import EMPTY_SET, SET_SEPARATOR, Label
+from masrel.agreement._labels import EMPTY_SET, Label, SetText, shown
 from masrel.agreement._weights import (
     MANY,
     ManyWeights,
@@ -32,6 +34,17 @@ from masrel.errors import ParameterError
 
 Metric = Literal["nominal", "ordinal", "interval", "ratio", "jaccard", "masi"]
 """Names of the difference functions; the last two are of sets of labels."""
+
+_MARKS = (";", "|")  # between labels in text; that of sets is the first
+# Text or a number in a list or set as Python and JSON write them.
+_ITEM = re.compile(
+    r"""'(?:[^'\\\x00-\x1f]|\\[\\'"bfnrt]|\\u[0-9a-fA-F]{4})*'"""
+    r"""|"(?:[^"\\\x00-\x1f]|\\[\\'"bfnrt]|\\u[0-9a-fA-F]{4})*"|[+-]?\d[\d.]*"""
+)
+_ITEMS = rf"\s*(?:(?:{_ITEM.pattern})\s*(?:,\s*(?:{_ITEM.pattern})\s*)*)?"
+_LIST = re.compile(
+    rf"\[{_ITEMS}\]|(?:frozenset\()?\{{{_ITEMS}\}}\)?|(?:frozen)?set\(\)"
+)
 
 
 def check_metric(metric: str) -> None:
@@ -117,23 +130,45 @@ def _middles(counted: CountedRatings) -> list[Fraction]:
 
 
 def _of_sets(metric: str, categories: Sequence[Label]) -> Weights:
-    # labels of several elements, as "a; b", as sets
-    if not all(isinstance(label, str) for label in categories):
-        raise ParameterError(
-            f"metric: {metric} needs sets of labels, or text with semicolons between "
-            f"labels, got {next(x for x in categories if not isinstance(x, str))!r}"
-        )
-    sets = [_elements(str(label)) for label in categories]
+    # sets, and text of several labels, as "a; b"
+    mark = _mark_between(metric, categories)
+    sets = [_elements(label, mark) for label in categories]
     distance = _jaccard if metric == "jaccard" else _masi
     matrix = [[distance(a, b) for b in sets] for a in sets]
     return over_one_denominator(metric, matrix)
 
 
-def _elements(label: str) -> frozenset[str]:
-    if label == EMPTY_SET:
-        return frozenset()
-    parts = map(str.strip, label.split(SET_SEPARATOR.strip()))
-    return frozenset(part for part in parts if part)
+def _mark_between(metric: str, categories: Sequence[Label]) -> str:
+    """Return what stands between the labels of text, "" where each is a list."""
+    plain = [x for x in categories if not isinstance(x, SetText) and x != EMPTY_SET]
+    texts = [x for x in plain if isinstance(x, str)]
+    n_lists = sum(_LIST.fullmatch(text) is not None for text in texts)
+    if texts and n_lists == len(plain):
+        return ""
+    marks = {mark for mark in _MARKS for text in texts if mark in text}
+    if len(plain) < len(categories):  # beside a set, text without a mark is one label
+        marks.add(_MARKS[0])
+    if n_lists or len(texts) < len(plain) or len(marks) != 1:
+        raise ParameterError(
+            f"metric: {metric} needs sets of labels, or text that holds several in one "
+            "of these ways, x;y or x|y or ['x', 'y'], got "
+            f"{', '.join(map(shown, plain[:3]))}; where each is one label, the nominal "
+            "metric is the same"
+        )
+    return marks.pop()
+
+
+def _elements(label: Label, mark: str) -> frozenset[str]:
+    text = str(label)
+    if text == EMPTY_SET:
+        parts = []
+    elif isinstance(label, SetText) or mark:
+        parts = text.split(_MARKS[0] if isinstance(label, SetText) else mark)
+    else:  # numbers have no quotes
+        parts = [
+            x if x[0] not in "'\"" else literal_eval(x) for x in _ITEM.findall(text)
+        ]
+    return frozenset(part for part in map(str.strip, parts) if part)
 
 
 def _jaccard(a: frozenset[str], b: frozenset[str]) -> Fraction:

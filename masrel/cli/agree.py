@@ -81,7 +81,7 @@ _estimate_options = grouped(
             ["nominal", "ordinal", "interval", "ratio", "jaccard", "masi"]
         ),
         help="Krippendorff's alpha by his difference function in place of weights; "
-        "jaccard and masi take grades of several labels, as a;b.",
+        "jaccard and masi take grades of several labels: a;b, a|b or ['a', 'b'].",
     ),
     click.option(
         "--target",

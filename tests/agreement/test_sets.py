@@ -65,6 +65,63 @@ def test_sets_have_intervals() -> None:
     assert result.interval.low < result.value < result.interval.high
 
 
+# {a}, {a, b}, {b, c}, each as text
+WAYS = {
+    "semicolons": ("a", "a;b", "b; c"),
+    "bars": ("a", "b|a", "b | c"),
+    "Python lists": ("['a']", "['b', 'a']", "['b', \"c\"]"),
+    "JSON lists": ('["a"]', '["\\u0061","b"]', '["c", "b"]'),
+    "Python sets": ("{'a'}", "{'a', 'b'}", "{'b', 'c'}"),
+    "frozen sets": tuple(
+        f"frozenset({x})" for x in ("{'a'}", "{'a', 'b'}", "{'c', 'b'}")
+    ),
+    "lists of numbers": ("[1]", "[1, 2]", "[2, 3.5]"),
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("metric", ["jaccard", "masi"])
+def test_text_holds_several_labels_in_any_of_these_ways(
+    metric: Metric, way: str
+) -> None:
+    a, ab, bc = WAYS[way]
+    sets = krippendorff_alpha([[A, AB], [AB, BC], [BC, BC]], metric=metric)
+    text = krippendorff_alpha([[a, ab], [ab, bc], [bc, bc]], metric=metric)
+    assert text == sets
+
+
+@pytest.mark.parametrize(
+    ("one", "two"),
+    [
+        *(("a", "b"), ("a", "a,b"), ("a", "a b"), ("[a]", "[a, b]")),  # no way
+        *(("a;b", "a|b"), ("a", "a;b|c"), ("['a']", "a;b"), ("['a']", "a")),  # two
+        ("['a']", "['a' 'b']"),  # an array of numpy
+    ],
+)
+def test_text_that_may_be_one_label_is_not_nominal_in_silence(
+    one: str, two: str
+) -> None:
+    with pytest.raises(ParameterError, match=r"masi needs sets of labels, .* nominal"):
+        krippendorff_alpha([[one, two], [two, two]], metric="masi")
+
+
+@pytest.mark.parametrize(
+    ("ratings", "value"),
+    [
+        # (a, ab), (b, b): D_o = (2/2)/4, D_e = 2 (1/2 + 2 + 2/2)/12
+        ([["a", AB], ["b", "b"]], Fraction(4, 7)),  # text beside sets is one label
+        ([[{"a|b"}, {"a|b", "c"}], [{"c"}, {"c"}]], Fraction(4, 7)),
+        ([["[]", "['a']"], ["['a']", "['a']"]], 0),  # as with the empty set above
+        ([["set()", "{'a'}"], ["{'a'}", "{'a'}"]], 0),
+    ],
+)
+def test_sets_beside_text_and_empty_lists(
+    ratings: list[list[object]], value: Fraction
+) -> None:
+    result = krippendorff_alpha(ratings, metric="jaccard")
+    assert result.value == pytest.approx(float(value), abs=1e-15)
+
+
 def test_numbers_are_no_sets() -> None:
     with pytest.raises(ParameterError, match=r"masi needs sets of labels, .* got 1"):
         krippendorff_alpha([[1, 2], [2, 2]], metric="masi")

@@ -555,6 +555,28 @@ def test_grades_of_several_labels_are_sets(masrel: Caller, tmp_path: Path) -> No
         assert of_alpha["value"] == alpha.value
 
 
+@pytest.mark.parametrize(
+    ("one", "two", "other"),
+    [
+        # (x y, x), (y, y), (x y, x y), (y, x), as pandas and a form's export write it
+        ("x", "x|y", "y"),
+        ("['x']", "\"['x', 'y']\"", "['y']"),
+    ],
+)
+def test_several_labels_of_a_cell_are_told_apart(
+    masrel: Caller, tmp_path: Path, one: str, two: str, other: str
+) -> None:
+    path = tmp_path / "sets.csv"
+    rows = [(two, one), (other, other), (two, two), (other, one)]
+    text = "".join(f"{k},{a},{b}\n" for k, (a, b) in enumerate(rows))
+    path.write_text(f"item,Kim,Lee\n{text}", encoding="utf-8")
+    (of_alpha,) = estimates(masrel("agree", path, "--metric", "jaccard", "--json", "-"))
+    # of 8: x 2, y 3, xy 3; D_o = (1/2 + 1)/4, D_e = (6 + 6/2 + 9/2)/28
+    assert of_alpha["value"] == pytest.approx(1 - (3 / 8) / (27 / 56), rel=1e-12)
+    path.write_text("item,Kim,Lee\na,x,x\nb,y,x\n", encoding="utf-8")
+    assert "x|y" in refused(masrel("agree", path, "--metric", "jaccard"))
+
+
 def test_rows_of_a_contingency_table_name_no_items(
     tmp_path: Path, masrel: Caller
 ) -> None:
