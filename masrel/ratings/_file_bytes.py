@@ -12,7 +12,11 @@ from typing import IO
 
 from masrel.errors import ParameterError, RatingsError
 
-_MAX_UNPACKED = 256_000_000
+MAX_UNPACKED = 256_000_000
+MAX_WORKBOOK = MAX_UNPACKED // 4
+"""Bytes of XML: its cells take several times the room."""
+
+_BLOCK = 1 << 20
 
 _BOMS = (
     (codecs.BOM_UTF8, "utf-8"),
@@ -88,13 +92,26 @@ def unpacked(name: str, data: bytes, *, is_export: bool) -> tuple[str, bytes]:
 
 def _within(name: str, packed: IO[bytes] | gzip.GzipFile) -> bytes:
     # What is in a packed file, if it is not so much that it fills the memory
-    data = packed.read(_MAX_UNPACKED + 1)
-    if len(data) > _MAX_UNPACKED:
+    data = packed.read(MAX_UNPACKED + 1)
+    if len(data) > MAX_UNPACKED:
         raise RatingsError(
-            f"{name}: is more than {_MAX_UNPACKED} bytes when it is unpacked: unpack "
+            f"{name}: is more than {MAX_UNPACKED} bytes when it is unpacked: unpack "
             "it, since a large table is read piece by piece"
         )
     return data
+
+
+def unpacked_size(data: bytes, most: int) -> int:
+    """Count the bytes that an archive holds, until they are more than some."""
+    size = 0
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        for member in archive.infolist():
+            # read to its end: where that is said to be may be a lie
+            member.file_size = sys.maxsize
+            with archive.open(member) as packed:
+                while size <= most and (block := packed.read(_BLOCK)):
+                    size += len(block)
+    return size
 
 
 def decoded(name: str, data: bytes, encoding: str | None, n_before: int = 0) -> str:

@@ -6,6 +6,7 @@ import json
 import re
 import tempfile
 import zipfile
+import zlib
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -16,9 +17,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from masrel.errors import ParameterError, RatingsError
+from masrel.ratings._file_bytes import MAX_UNPACKED, MAX_WORKBOOK, unpacked_size
 from masrel.ratings._text_cells import SheetOptions, library, value_text
 
 _WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
+_OLD_WORKBOOK = b"\xd0\xcf\x11\xe0"  # how an .xls begins, in which archives may lie
 _ARROW = {".parquet": "pyarrow.parquet", ".feather": "pyarrow.feather"}
 _PYREADSTAT = {
     ".sav": "read_sav",
@@ -32,6 +35,7 @@ _PYREADSTAT = {
 _ERROR_CELL = re.compile(
     rb'<c\s[^>]*?\bt="e"[^>]*>(?:<f[^>]*?(?:/>|>[^<]*</f>))?<v>([^<]*)</v>'
 )
+_OF_ZIP = (zipfile.BadZipFile, zlib.error, EOFError)  # what reading it may raise
 _EXPORTED = (".json", ".jsonl", ".csv")
 _ENCODED = (".sav", ".zsav", ".dta", ".sas7bdat", ".xpt")  # pyreadstat takes theirs
 
@@ -56,7 +60,7 @@ def read_typed(
         return _records(name, export.frame), export.facts, export.dropped
     if suffix in _WORKBOOKS:
         records, facts["sheet"] = _workbook(name, suffix, data, options)
-        if errors := _error_cells(suffix, data):
+        if errors := _read(name, suffix, lambda: _error_cells(suffix, data), *_OF_ZIP):
             facts["errors"] = errors
         return records, facts, {}
     if suffix in (".json", ".jsonl"):
@@ -85,10 +89,19 @@ def _read(
         ) from error
 
 
+def _check_unpacked(name: str, suffix: str, data: bytes, most: int, do: str) -> None:
+    size = _read(name, suffix, lambda: unpacked_size(data, most), *_OF_ZIP)
+    if size > most:
+        raise RatingsError(f"{name}: is more than {most} bytes when unpacked: {do}")
+
+
 def _workbook(
     name: str, suffix: str, data: bytes, options: SheetOptions
 ) -> tuple[pd.DataFrame, str]:
     calamine = library(name, "python_calamine")
+    if zipfile.is_zipfile(io.BytesIO(data)) and not data.startswith(_OLD_WORKBOOK):
+        do = "save its sheet as CSV, since a large table of text is read piece by piece"
+        _check_unpacked(name, suffix, data, MAX_WORKBOOK, do)
     book = _read(
         name,
         suffix,
@@ -150,6 +163,7 @@ def _json_files(name: str, suffix: str, data: bytes) -> list[tuple[str, list[Any
     # an export's files, each by its name without the ending, "" where it is one alone
     if not data.startswith(b"PK\3\4"):  # a pipe has no name that says .zip
         return [("", _json_values(name, suffix, data))]
+    _check_unpacked(name, suffix, data, MAX_UNPACKED, "unpack it and leave files out")
     with zipfile.ZipFile(io.BytesIO(data)) as packed:
         members = [
             path

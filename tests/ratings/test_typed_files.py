@@ -488,3 +488,51 @@ def test_a_packed_file_is_read_as_what_is_in_it(tmp_path: Path) -> None:
         archive.write(inner, "r.parquet")
     (tmp_path / "r.zip").write_bytes(packed.getvalue())
     assert grades(read_ratings(tmp_path / "r.zip")) == EXPECTED
+
+
+def bomb(path: Path, n_sheets: int, declared: int | None = None) -> Path:
+    """Write a workbook of some 70 kB, the sheets of which are 65 MB of XML."""
+    workbook(path, R=WIDE)
+    rows = b"<row>" + b"<c><v>1</v></c>" * 1000 + b"</row>"
+    name = "xl/worksheets/sheet{}.xml"
+    with zipfile.ZipFile(path) as small:
+        files = {n: small.read(n) for n in small.namelist() if "/sheet1." not in n}
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as packed:
+        for file, data in files.items():
+            packed.writestr(file, data)
+        for sheet in range(1, n_sheets + 1):
+            with packed.open(name.format(sheet), "w") as member:
+                member.write(SHEET)
+                for _ in range(433 // n_sheets):
+                    member.write(10 * rows)
+                member.write(b"</sheetData></worksheet>")
+    if (
+        declared is not None
+    ):  # in the headers of the sheet: of the file, and in its list
+        data, title = path.read_bytes(), name.format(1).encode()
+        at, listed = data.index(title) - 30, data.rindex(title) - 46
+        for place in (at + 22, listed + 24):
+            data = data[:place] + declared.to_bytes(4, "little") + data[place + 4 :]
+        path.write_bytes(data)
+    return path
+
+
+SHEET = (
+    b'<worksheet xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main">'
+    b"<sheetData>"
+)
+
+
+@pytest.mark.parametrize(
+    ("ending", "n_sheets", "declared"),
+    [("xlsx", 1, None), ("xls", 9, None), ("xlsm", 1, 900), ("ods", 1, None)],
+)
+def test_a_workbook_of_more_than_fits_the_memory_is_refused(
+    tmp_path: Path, ending: str, n_sheets: int, declared: int | None
+) -> None:
+    pytest.importorskip("python_calamine")
+    path = bomb(tmp_path / "r.xlsx", n_sheets, declared)
+    assert path.stat().st_size < 250_000
+    path = path.rename(tmp_path / f"r.{ending}")
+    with pytest.raises(RatingsError, match="when unpacked: save its sheet as CSV"):
+        read_ratings(path)
