@@ -73,6 +73,7 @@ _Floats = NDArray[np.float64]
 _WINDOW = 0.06  # of the filter of speeds, s: 20.5 Hz at 1 kHz
 # Two slow trials say little of how they differ, but not nothing of b.
 _MIN_DF = 4.0
+_NOT_BELOW_0 = ("damping", "stiffness", "inertia", "arm_inertia")
 
 
 def fit(
@@ -141,8 +142,8 @@ def fit(
     RecordingError
         If a recording is not usable, they are presentations of several models, there
         is no slow stretch, the slow stretches do
-        not tell b from k, or what comes out cannot be the law: b or k below 0 or Q of 1
-        or more, by more than their error.
+        not tell b from k, or what comes out cannot be the law: b, k, m or J below 0, or
+        Q of 1 or more, by more than their error.
 
     Warns
     -----
@@ -371,12 +372,12 @@ def _check_ratio(estimates: Sequence[FittedParameter]) -> None:
                 f"more beyond its error (from {estimate.low:.3g}): the torque does not "
                 "fall from a peak to a residual"
             )
-        if estimate.name in ("damping", "stiffness") and estimate.high < 0.0:
-            symbol = QUANTITIES[estimate.name].symbol
+        if estimate.name in _NOT_BELOW_0 and estimate.high < 0.0:
+            symbol = ALL_QUANTITIES[estimate.name].symbol
             raise RecordingError(
                 f"recordings: this is not the law: {symbol} of all trials is "
                 f"{estimate.value:.4g}, below 0 by more than its error (to "
-                f"{estimate.high:.4g})"
+                f"{estimate.high:.4g}); are the signs of torque and angle right?"
             )
 
 

@@ -32,6 +32,12 @@ _LAG, _RISE = 0.005, 0.04
 # Of the right law, what is left from the catch on is what is left before it.
 _MAX_RATIO = 1.5
 
+# And it is noise: in every phase 1.5 times that at rest at most, or white, that is, a
+# quarter of it at most goes on from sample to sample. Beside the noise stands what
+# smoothing the angle leaves of a law without any, N·m, at 60 to 120 deg/s.
+_MAX_AUTOCORRELATION = 0.25
+_SMOOTHING_SD = 0.01
+
 _MIN_DF, _MIN_TRIALS = 1.0, 5  # a test with fewer says nothing
 
 STRUCTURES = {
@@ -51,6 +57,10 @@ STRUCTURES = {
     "own drifts": ("drifts that differ from trial to trial", "--drift fitted"),
 }
 """What is added to the law: in words, and the option that fits it."""
+
+
+Verdict = Literal["fits", "does not fit", "no evidence either way", "undecided"]
+"""Whether the law is that of the recordings."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,9 +118,11 @@ class LackOfFit:
 
     Attributes
     ----------
-    verdict : {"fits", "does not fit", "undecided"}
+    verdict : {"fits", "does not fit", "no evidence either way", "undecided"}
         Not if a test says so, or from the catch on 1.5 times what is left before it.
-        Undecided with so few trials that no test says anything.
+        No evidence if no test says so, but in some phase what is left is neither near
+        the noise at rest nor white. Undecided with so few trials that no test says
+        anything.
     level : float
         Of all tests together: how often the right law is called wrong.
     tests : tuple of StructureTest
@@ -126,7 +138,7 @@ class LackOfFit:
         Noise of the torque at rest, N·m; ``nan`` if no recording rests.
     """
 
-    verdict: Literal["fits", "does not fit", "undecided"]
+    verdict: Verdict
     level: float
     tests: tuple[StructureTest, ...]
     explained: float
@@ -149,10 +161,18 @@ class LackOfFit:
             )
         first = self.tests[0]
         p = f"p {p_text(first.adjusted)}"
+        nothing = (
+            f"nothing left goes with any of {len(self.tests)} structures ({p} at least)"
+        )
         if self.verdict == "fits":
+            return f"Fits: {nothing}; {share}."
+        if self.verdict == "no evidence either way":
+            most = max(_not_noise(self.phases, self.rest_sd), key=lambda left: left.sd)
             return (
-                f"Fits: nothing left goes with any of {len(self.tests)} structures "
-                f"({p} at least); {share}."
+                f"No evidence either way: {nothing}, but what is left is not noise "
+                f"({most.phase}: {most.sd:.2g} N·m, autocorrelation "
+                f"{most.autocorrelation:.2f}; at rest {_rest_text(self.rest_sd)}); "
+                f"{share}."
             )
         words, option = STRUCTURES[first.name]
         remedy = f"; try {option}" if option else ""
@@ -191,11 +211,12 @@ def lack_of_fit(
     tests = _holm([*in_common, *_own_drifts(equations)])
     phases = _phases(equations, laws)
     ratio = _after_to_before(phases)
-    verdict: Literal["fits", "does not fit", "undecided"] = "undecided"
+    verdict: Verdict = "undecided"
     if ratio > _MAX_RATIO or (tests and tests[0].adjusted < LEVEL):
         verdict = "does not fit"
     elif tests:
-        verdict = "fits"
+        is_noise = not _not_noise(phases, rest_sd)
+        verdict = "fits" if is_noise else "no evidence either way"
     return LackOfFit(
         verdict=verdict,
         level=LEVEL,
@@ -214,6 +235,21 @@ def p_text(p_value: float) -> str:
     ('= 0.012', '< 0.0001')
     """
     return "< 0.0001" if p_value < 1e-4 else f"= {p_value:.2g}"
+
+
+def _not_noise(phases: Sequence[PhaseResidual], rest_sd: float) -> list[PhaseResidual]:
+    # the phases in which what is left is neither near the noise at rest nor white
+    at_rest = 0.0 if math.isnan(rest_sd) else rest_sd
+    most = _MAX_RATIO * math.hypot(at_rest, _SMOOTHING_SD)
+    return [
+        left
+        for left in phases
+        if left.sd > most and left.autocorrelation > _MAX_AUTOCORRELATION
+    ]
+
+
+def _rest_text(rest_sd: float) -> str:
+    return "unknown" if math.isnan(rest_sd) else f"{rest_sd:.2g} N·m"
 
 
 def _explained(equations: Sequence[Equations], laws: Sequence[_Floats]) -> float:

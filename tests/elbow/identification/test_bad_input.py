@@ -4,12 +4,14 @@ Everything here is simulated, and most of it nonsense on purpose.
 """
 
 import warnings
+from typing import get_args
 
 import numpy as np
 import pytest
 
 from masrel.elbow import STANDARD_MODELS
 from masrel.elbow.identification import ElbowFit, Movement, fit
+from masrel.elbow.identification._lack_of_fit import Verdict
 from masrel.errors import MasrelError, MasrelWarning
 from tests.elbow.identification.synthesis import study
 
@@ -81,6 +83,6 @@ def test_nonsense_ends_in_numbers_with_their_caution_or_in_one_sentence(
             assert end
             assert "\n" not in end
         else:
-            assert end.lack_of_fit.verdict in ("fits", "does not fit", "undecided")
+            assert end.lack_of_fit.verdict in get_args(Verdict)
             assert end.lack_of_fit.sentence
     assert {type(end) for end in ends} == {str, ElbowFit}
