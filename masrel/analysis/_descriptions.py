@@ -174,6 +174,7 @@ def presentations(ratings: Ratings) -> Presentations | None:
         n_below_threshold=felt.count("below-threshold"),
         n_no_catch=felt.count("no-catch"),
         n_unknown=felt.count(None),
+        n_grip_lost=sum(row.grip_lost is True for row in known),
     )
 
 

@@ -238,6 +238,8 @@ class Presentations:
         Presentations in which what the model has was felt; in which no stretch reached
         ν_th; in which no catch came though the model has one at that speed; and those
         of which nobody knows.
+    n_grip_lost : int
+        Presentations in which the arm came loose and the model let it go.
     """
 
     n_presentations: int
@@ -246,6 +248,7 @@ class Presentations:
     n_below_threshold: int
     n_no_catch: int
     n_unknown: int
+    n_grip_lost: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -64,3 +64,6 @@ def ratings(study: Path, output: Path | None) -> None:
     n_slow = sum(row.felt in ("below-threshold", "no-catch") for row in ratings.rows)
     if n_slow:
         click.echo(f"{n_slow} after stretches too slow to feel the catch: column felt")
+    n_lost = sum(row.grip_lost is True for row in ratings.rows)
+    if n_lost:
+        click.echo(f"{n_lost} after a grip that was lost: column grip_lost")

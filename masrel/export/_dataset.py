@@ -268,6 +268,7 @@ _OF_RATINGS: dict[str, tuple[str, Kind, str]] = {
     "n_attempts": ("How often it was presented", "whole", ""),
     "first_grade": ("Grade as the rater gave it, before corrections", "text", ""),
     "graded_at": ("When the first grade was given, UTC", "text", ""),
+    "grip_lost": ("Whether the arm came loose and the model let go", "text", ""),
 }
 
 

@@ -3,16 +3,13 @@
 import math
 
 from masrel.errors import LimitExceededError
-from masrel.hess._velocity import speed_noise
+from masrel.hess._velocity import speed_margin
 from masrel.hess.limits import DeviceLimits
 from masrel.hess.stretching import PresentationStatus, StretchRules
 from masrel.recording import PHASES
 
 _PRE_CATCH = PHASES.index("pre-catch")
 _NEVER = math.inf
-
-# A hundred ticks at rest all lie within so many standard deviations of the speed.
-_ARRIVAL_DEVIATIONS = 5.0
 
 # An arm has been brought back that is as near to where its stretch began as this share
 # of the way that told that it had begun.
@@ -52,8 +49,8 @@ class Course:
         end_angle: float,
         speed_threshold: float,
     ) -> None:
-        noise = speed_noise(limits.encoder_noise, rate_hz)
-        self._arrival_speed = limits.arrival_speed + _ARRIVAL_DEVIATIONS * noise
+        margin = speed_margin(limits.encoder_noise, rate_hz)
+        self._arrival_speed = limits.arrival_speed + margin
         self._arrival_time = limits.arrival_time
         self._end_angle = end_angle - limits.arrival_angle
         self._resting_since = _NEVER

@@ -45,6 +45,12 @@ def speed_noise(angle_noise: float, rate_hz: float) -> float:
     return angle_noise * rate_hz * gain * math.sqrt(2.0 / (2.0 - gain))
 
 
+def speed_margin(angle_noise: float, rate_hz: float) -> float:
+    """Return how far noise of the angle may move the speed, rad/s."""
+    # A hundred ticks at rest all lie within so many standard deviations of the speed.
+    return 5.0 * speed_noise(angle_noise, rate_hz)
+
+
 def passive_damping(stiffness: float, damping: float, rate_hz: float) -> float:
     """Return the damping a device needs to render these passively, N·m·s/rad."""
     # Colgate, Schenkel (1997), J. Robot. Syst. 14(1), 37-47: at every frequency above

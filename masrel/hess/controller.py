@@ -96,6 +96,10 @@ class Controller:
         Whether it has never been stepped: one controller makes one presentation.
     rate_hz : int
         Steps a second.
+    speed_margin : float
+        What noise of the encoder may do to the estimated speed, rad/s: so much more a
+        fall of speed must be to be a lost grip. 0 unless `run_presentation` sets it,
+        from `DeviceLimits.encoder_noise`.
     speed_threshold : float
         Speed ν_th of the joint, rad/s.
 
@@ -124,10 +128,12 @@ class Controller:
         "_easing",
         "_free_end",
         "_gain",
+        "_held",
         "_joint",
         "_late_torque",
         "_loose_inertia",
         "_loose_past",
+        "_most_restored",
         "_past",
         "_post_catch_ramp",
         "_slip_speed_drop",
@@ -142,6 +148,7 @@ class Controller:
         "model_torque",
         "phase",
         "rate_hz",
+        "speed_margin",
         "speed_threshold",
     )
 
@@ -193,8 +200,12 @@ class Controller:
         n_past = max(1, round(window_s * rate_hz))
         self._past = deque([0.0] * n_past, maxlen=n_past)  # speeds, rad/s
         n_past = max(1, round(_GUARDED_WINDOW_S * rate_hz))
-        # Speeds, and what has been taken, behind the guard
-        self._loose_past = deque([(0.0, 0.0)] * n_past, maxlen=n_past)
+        # Times, speeds, and what has been taken, behind the guard
+        self._loose_past = deque([(0.0, 0.0, 0.0)] * n_past, maxlen=n_past)
+        self.speed_margin = 0.0
+        # From where a fall is counted that has to leave the noise
+        self._most_restored = -_INFINITE
+        self._held: tuple[float, float, float] | None = None
         self.speed_threshold = model.speed_threshold
         self.grip_lost = False
         self.model_torque = 0.0
@@ -233,7 +244,12 @@ class Controller:
         elif self.phase != _PRE_CATCH or self.is_easing:
             restored = velocity + _LOOSE_SHARE * self._take(time_s)
             past = self._past
-            if restored < past[0] and angle < self._free_end:
+            before = past[0]
+            if self.speed_margin:
+                before = self._most_restored = max(self._most_restored, before)
+            if angle >= self._free_end:
+                self._most_restored = -_INFINITE
+            elif restored < before - self.speed_margin:
                 joint.release()
                 self.grip_lost = True
                 self.is_easing = False
@@ -264,6 +280,7 @@ class Controller:
             self._late_torque, self._taken = self._command, 0.0
             self._time = time_s
             self._past.extend([-_INFINITE] * len(self._past))  # nothing to fall from
+            self._most_restored = -_INFINITE
         ends = self.phase != _PRE_CATCH and phase == _PRE_CATCH
         if ends and self._post_catch_ramp and not self.is_guarded:
             self._easing = iter(self._post_catch_ramp)
@@ -295,35 +312,50 @@ class Controller:
         return self._taken
 
     def _check_slip(self, time_s: float, angle: float, velocity: float) -> None:
-        past, loose_past = self._past, self._loose_past
+        past, loose_past, margin = self._past, self._loose_past, self.speed_margin
         drop = past[0] - velocity
-        before, taken_before = loose_past[0]
+        before = loose_past[0]
         taken = self._take(time_s)
         past.append(velocity)
-        loose_past.append((velocity, taken))
+        loose_past.append((time_s, velocity, taken))
+        of_loose = taken - before[2]
+        if angle >= self._free_end or abs(of_loose) <= _LEAST_LOSS:
+            self._held = None
+        else:
+            self._held = held = self._fall_from(before, taken, of_loose)
+            of_loose = taken - held[2]
+            lost = math.copysign(1.0, of_loose) * (held[1] - velocity)
+            if lost > _GUARDED_SHARE * abs(of_loose) + margin:
+                self._release_at_once(
+                    f"speed changes by at most {_GUARDED_SHARE:g} of a loose arm's "
+                    f"{math.degrees(abs(of_loose)):.0f}",
+                    time_s - held[0],
+                    lost,
+                )
         if angle >= self._free_end:
             return
-        of_loose = taken - taken_before
-        lost = before - velocity if of_loose > 0.0 else velocity - before
-        if abs(of_loose) > _LEAST_LOSS and lost > _GUARDED_SHARE * abs(of_loose):
-            self._release_at_once(
-                f"speed changes by at most {_GUARDED_SHARE:g} of a loose arm's "
-                f"{math.degrees(abs(of_loose)):.0f}",
-                _GUARDED_WINDOW_S,
-                lost,
-            )
-        if drop > self._slip_speed_drop and self.model_torque > 0.0:
+        if drop > self._slip_speed_drop + margin and self.model_torque > 0.0:
             self._release_at_once(
                 f"speed falls by at most {math.degrees(self._slip_speed_drop):g}",
                 _SLIP_WINDOW_S,
                 drop,
             )
 
+    def _fall_from(
+        self, before: tuple[float, float, float], taken: float, of_loose: float
+    ) -> tuple[float, float, float]:
+        # When the speed, with what it is allowed to lose, began to fall
+        held = self._held
+        if held is None or not self.speed_margin or (taken - held[2]) * of_loose <= 0.0:
+            return before
+        rise = before[1] - held[1] + _GUARDED_SHARE * (before[2] - held[2])
+        return before if rise * of_loose > 0.0 else held
+
     def _release_at_once(self, needs: str, window_s: float, lost: float) -> NoReturn:
         self._joint.release()
         self.grip_lost = True
         raise LimitExceededError(
-            f"slip: needs an arm whose {needs} deg/s in {window_s * 1e3:g} ms, "
+            f"slip: needs an arm whose {needs} deg/s in {window_s * 1e3:.0f} ms, "
             f"got {math.degrees(lost):.0f} deg/s",
             "slip",
         )

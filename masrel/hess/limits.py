@@ -93,7 +93,7 @@ class DeviceLimits:
         speed below this, rad/s: no arm starts like that, an encoder that drifts does.
     encoder_noise : float, optional
         Standard deviation of a reading of an arm at rest, beyond the encoder's steps,
-        rad; the arrival allows for what it does to the estimated speed.
+        rad; arrival and a lost grip allow for what it does to the estimated speed.
     arrival_angle, arrival_speed, arrival_time : float, optional
         An arm has arrived that was slower than this speed for this time, rad/s and s,
         at most this far before the end of the stretch, rad.

@@ -20,6 +20,7 @@ from masrel.hess._shutdown import run_to_the_end
 from masrel.hess._spool import Samples, Spool, n_samples
 from masrel.hess._stop import EmergencyStop
 from masrel.hess._ticks import Ticks
+from masrel.hess._velocity import speed_margin
 from masrel.hess._watchdog import NoWatchdog, Watching
 from masrel.hess.clock import Clock
 from masrel.hess.controller import Controller
@@ -143,6 +144,7 @@ def run_presentation(
     _check(device, controller, limits, rate_hz, max_duration_s, end_angle)
     n_ticks = math.ceil(max_duration_s * rate_hz)
     capacity = n_samples(n_ticks, rate_hz, limits)
+    controller.speed_margin = speed_margin(limits.encoder_noise, rate_hz)
     facts: dict[str, _Fact] = {
         "simulated": device.simulated,
         "device": device.name,

@@ -194,6 +194,7 @@ def _of_stretches(presented: list[Event]) -> dict[str, object]:
         "max_speed_deg_s": max(moved, default=math.nan),
         "speeds_deg_s": speeds,
         "felt": fields.get("felt"),
+        "grip_lost": fields.get("grip_lost"),
     }
 
 

@@ -25,6 +25,7 @@ from masrel.ratings.table import (
     DEFAULT_SESSION,
     RATING_COLUMNS,
     SOURCES,
+    YES_NO,
     Rating,
     Ratings,
     _assemble,
@@ -96,6 +97,7 @@ class _Cell:
     n_attempts: int | None
     first_grade: str | None
     graded_at: str | None
+    grip_lost: bool | None
 
 
 def read_study_ratings(path: Path | str, scale: Scale) -> Ratings:
@@ -207,10 +209,13 @@ def _extra_values(texts: Mapping[str, str], problems: _Problems) -> dict[str, An
     }
     for name in ("mean_speed_deg_s", "min_speed_deg_s", "max_speed_deg_s"):
         values[name] = _speed(name, texts.get(name, ""), problems)
-    for name, known in (("source", SOURCES), ("felt", (*FELT, None))):
+    texts_of = {"source": SOURCES, "felt": (*FELT, None), "grip_lost": (*YES_NO, None)}
+    for name, known in texts_of.items():
         if values[name] not in known:
             names = listed(text for text in known if text is not None)
             problems.append((name, f"needed one of {names}, got {values[name]!r}"))
+    if (lost := values["grip_lost"]) is not None:
+        values["grip_lost"] = lost == YES_NO[True]
     time = values["graded_at"]
     if time is not None and not _is_utc(time):
         problems.append(("graded_at", f"{_NEEDED_TIME}, got {time!r}"))
@@ -262,7 +267,10 @@ def _speeds(
     )
 
 
-_TEXTS = ("felt", "grades_from", "device", "code", "first_grade", "graded_at")
+_TEXTS = (
+    *("felt", "grades_from", "device", "code", "first_grade", "graded_at"),
+    "grip_lost",
+)
 """Columns of text that a file may lack."""
 
 

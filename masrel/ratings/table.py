@@ -63,6 +63,8 @@ class Rating(NamedTuple):
         What the rater gave; other than `grade` when corrected.
     graded_at : str or None
         Time in UTC, ISO 8601, when a person gave the first grade; None when unknown.
+    grip_lost : bool or None
+        Whether the arm came loose and the model let it go; None when unknown.
     """
 
     session: str
@@ -85,6 +87,7 @@ class Rating(NamedTuple):
     n_attempts: int | None = None
     first_grade: str | None = None
     graded_at: str | None = None
+    grip_lost: bool | None = None
 
 
 RATING_COLUMNS = Rating._fields
@@ -96,8 +99,14 @@ _N_ALWAYS = 7
 _FORMAT = 2
 """Version of the file of a study's ratings."""
 
+_N_WITHOUT_GRIP = 20
+"""Columns of a table that does not know of any grip whether it was lost."""
+
 _N_FORMERLY = 15
 """Columns of a table of format 1, which does not name its format."""
+
+YES_NO = ("no", "yes")
+"""Cells of False and True."""
 
 SOURCES = ("published", "recorded", "simulated", "foreign")
 """Where a rating comes from; "foreign" is a file that does not say."""
@@ -317,6 +326,8 @@ def _stretch_problems(row: Mapping[str, object]) -> list[str]:
         problems.append(
             f"graded_stretch: needed one of {n_known} stretches, got {graded!r}"
         )
+    if not isinstance(row["grip_lost"], bool | None):
+        problems.append(f"grip_lost: needed a bool or None, got {row['grip_lost']!r}")
     if felt is not None and felt not in FELT:
         problems.append(f"felt: needed one of {', '.join(FELT)}, got {felt!r}")
     return problems
@@ -539,6 +550,8 @@ def ratings_csv(ratings: Ratings) -> str:
         not _is_unknown(value) for row in ratings.rows for value in row[_N_ALWAYS:]
     )
     names = RATING_COLUMNS if has_more else RATING_COLUMNS[:_N_ALWAYS]
+    if all(row.grip_lost is None for row in ratings.rows):
+        names = names[:_N_WITHOUT_GRIP]
     return f"{_head(ratings)}# format: {_FORMAT}\n{_body(ratings, names)}"
 
 
@@ -575,6 +588,8 @@ def _is_unknown(value: object) -> bool:
 def _csv_cell(value: object) -> str:
     if _is_unknown(value):
         return "NA"
+    if isinstance(value, bool):
+        return YES_NO[value]
     if isinstance(value, tuple):
         return ";".join(_csv_cell(part) for part in value)
     return repr(value) if isinstance(value, float) else safe_cell(str(value))

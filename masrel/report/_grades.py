@@ -47,6 +47,12 @@ def felt_sentences(material: Material) -> str:
             f"{made.n_below_threshold}, and none came to the catch that the model has "
             f"at that speed in {made.n_no_catch}."
         )
+    if made.n_grip_lost:
+        sentences.append(
+            f"In {made.n_grip_lost} of {counted(made.n_presentations, 'presentation')} "
+            "the arm came loose and the model let it go: the grade may be of less than "
+            "the model has."
+        )
     return " ".join(sentences)
 
 

@@ -70,6 +70,9 @@ class GradeRequest:
         Whether what the model has could be felt: no stretch was fast enough, or none
         came to the catch that the model has at that speed. None before, and after a
         fault.
+    grip_lost : bool or None
+        Whether the arm came loose and the model let it go. None before, and after a
+        fault.
     ended : str or None
         What ended the presentation, as in its recording: ``"time-limit"``, say. None
         before.
@@ -98,6 +101,7 @@ class GradeRequest:
     status: "PresentationStatus | None" = None
     n_stretches: int = 0
     felt: Felt | None = None
+    grip_lost: bool | None = None
     ended: str | None = None
     may_skip: bool = False
     correct: "Callable[[GradeCorrection], None] | None" = None

@@ -92,6 +92,7 @@ class Outcome:
     simulated: bool  # whether no hardware moved
     ended: str  # how it ended, as in the recording
     made: StretchFacts  # what came of its stretches
+    grip_lost: bool | None  # whether the model let go of a loose arm; None: unknown
 
 
 def present(
@@ -287,7 +288,7 @@ def _outcome(
             time_s=float(facts["fault_time_s"] or 0.0),
             torque_nm=float(facts["fault_torque_nm"] or 0.0),
         )
-    speed = facts["mean_speed_deg_s"]
+    speed, lost = facts["mean_speed_deg_s"], facts.get("grip_lost")
     return Outcome(
         sha256=checksum,
         mean_speed_deg_s=None if speed is None else float(speed),
@@ -297,6 +298,7 @@ def _outcome(
         simulated=bool(facts["simulated"]),
         ended=str(facts["ended"]),
         made=stretch_facts(protocol, request.presentation.model, recording),
+        grip_lost=None if lost is None else bool(lost),
     )
 
 
@@ -332,6 +334,7 @@ def presented_fields(outcome: Outcome, file: Path, folder: Path) -> dict[str, _F
         "felt": made.felt if fault is None else None,
         "r1_deg": made.r1_deg,
         "r2_deg": made.r2_deg,
+        "grip_lost": outcome.grip_lost,
     }
 
 

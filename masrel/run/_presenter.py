@@ -94,6 +94,7 @@ class Presenter:
                 n_faults=n_faults,
                 n_stretches=len(made.stretches),
                 felt=made.felt if fault is None else None,
+                grip_lost=outcome.grip_lost if fault is None else None,
                 ended=outcome.ended,
             )
             answer: StretchGrade | Skip | None

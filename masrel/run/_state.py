@@ -35,6 +35,9 @@ FORMAT = 2
 
 _TYPED = ("file", "row", "file_sha256", "who")  # where it stood, and who typed it
 
+_GRIP_LOST = "grip_lost"
+"""A field that events have not of a version that did not log it."""
+
 _PRESENTED = (
     "code",
     "position",
@@ -52,6 +55,7 @@ _PRESENTED = (
     "felt",
     "r1_deg",
     "r2_deg",
+    _GRIP_LOST,
 )
 
 _RESUMED = ("protocol_sha256", "n_graded", "clock", "masrel_version", "grades")
@@ -222,8 +226,9 @@ def _misshape(event: Event) -> str | None:
         problem = format_problem(event.fields.get("format"), newest=FORMAT)
         if problem is not None:
             return problem
-    fields = set(EVENTS[event.kind])
-    if set(event.fields) not in (fields, fields - _LATER.get(event.kind, set())):
+    fields, got = set(EVENTS[event.kind]), set(event.fields)
+    absent = fields - got - {_GRIP_LOST}
+    if got - fields or absent not in (set(), _LATER.get(event.kind)):
         return (
             f"needed the fields {', '.join(EVENTS[event.kind])}, "
             f"got {', '.join(event.fields)}"

@@ -354,6 +354,8 @@ def _remarks(request: GradeRequest) -> str:
     remarks = ended.get(request.ended or "", "")
     if request.felt not in ("felt", None):
         remarks += "That was too slow to feel the catch: once more? Then say again.\n"
+    if request.grip_lost:
+        remarks += "The arm came loose, and the model let go: once more? Say again.\n"
     return remarks
 
 

@@ -97,6 +97,8 @@ class PageGrades:
         remarks = [request.ended] if request.ended in _LIMITS else []
         if request.felt not in ("felt", None):
             remarks.append("too-slow")
+        if request.grip_lost:
+            remarks.append("grip-lost")
         chosen: StretchGrade | None = self._ask(
             request,
             "grade",

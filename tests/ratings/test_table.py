@@ -45,6 +45,7 @@ PRESENTED = st.fixed_dictionaries(
         "n_attempts": st.none() | st.integers(0, 9),
         "first_grade": st.sampled_from([*MODIFIED_ASHWORTH.grades, None]),
         "graded_at": st.sampled_from([None, "2026-05-04T09:30:00.125Z"]),
+        "grip_lost": st.sampled_from([None, False, True]),
     }
 )
 
@@ -118,14 +119,19 @@ def test_what_is_known_of_stretches_is_in_the_file(tmp_path: Path) -> None:
         "first_grade": "2",
         "graded_at": "2026-05-04T09:30:00.125Z",
     }
-    rows = [{**ROW, **known}, {**ROW, "model": "HM2"}]
-    write_ratings(ratings_from_rows(rows, MODIFIED_ASHWORTH), tmp_path / "r.csv")
-    assert (tmp_path / "r.csv").read_text(encoding="utf-8").splitlines()[2:] == [
-        ",".join(RATING_COLUMNS),
+    first = (
         "test,R1,HM1,1,1+,70.5,foreign,3,60.0,81.0,60.0;NA;81.0,3,felt,console,puck,"
-        "2,K7Q,1,2,2026-05-04T09:30:00.125Z",
-        "test,R1,HM2,1,1+,NA,foreign" + 13 * ",NA",
-    ]
+        "2,K7Q,1,2,2026-05-04T09:30:00.125Z"
+    )
+    # where no log says whether a grip was lost, the table is what it always was
+    for more, cell, n_columns in (({}, "", 20), ({"grip_lost": True}, ",yes", 21)):
+        rows = [{**ROW, **known, **more}, {**ROW, "model": "HM2"}]
+        write_ratings(ratings_from_rows(rows, MODIFIED_ASHWORTH), tmp_path / "r.csv")
+        assert (tmp_path / "r.csv").read_text(encoding="utf-8").splitlines()[2:] == [
+            ",".join(RATING_COLUMNS[:n_columns]),
+            first + cell,
+            "test,R1,HM2,1,1+,NA,foreign" + (n_columns - 7) * ",NA",
+        ]
 
 
 @pytest.mark.parametrize(
@@ -135,6 +141,7 @@ def test_what_is_known_of_stretches_is_in_the_file(tmp_path: Path) -> None:
         ({"n_stretches": 2, "speeds_deg_s": (1.0,)}, "one for each of 2 stretches"),
         ({"graded_stretch": 1}, "graded_stretch: needed one of 0 stretches, got 1"),
         ({"felt": "maybe"}, "felt: needed one of felt, below-threshold, no-catch"),
+        ({"grip_lost": "yes"}, "grip_lost: needed a bool or None, got 'yes'"),
         ({"device": ""}, "device: needed text or None, got ''"),
         ({"position": 0}, "position: needed a whole number from 1, got 0"),
         ({"n_attempts": "1"}, "n_attempts: needed a whole number from 0, got '1'"),

@@ -25,7 +25,7 @@ import {
 } from "/static/rater_parts.js";
 
 const MOST_AT_A_GLANCE = 21; // numbers that are offered one by one
-const REMARKS = { "time-limit": "time_limit", "max-duration": "max_duration", "too-slow": "too_slow" };
+const REMARKS = { "time-limit": "time_limit", "max-duration": "max_duration", "too-slow": "too_slow", "grip-lost": "grip_lost" };
 
 function paragraph(text, properties = {}) {
   return h("p", properties, text);
