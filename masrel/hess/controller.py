@@ -133,7 +133,7 @@ class Controller:
         "_late_torque",
         "_loose_inertia",
         "_loose_past",
-        "_most_restored",
+        "_max_restored",
         "_past",
         "_post_catch_ramp",
         "_slip_speed_drop",
@@ -204,7 +204,7 @@ class Controller:
         self._loose_past = deque([(0.0, 0.0, 0.0)] * n_past, maxlen=n_past)
         self.speed_margin = 0.0
         # From where a fall is counted that has to leave the noise
-        self._most_restored = -_INFINITE
+        self._max_restored = -_INFINITE
         self._held: tuple[float, float, float] | None = None
         self.speed_threshold = model.speed_threshold
         self.grip_lost = False
@@ -246,9 +246,9 @@ class Controller:
             past = self._past
             before = past[0]
             if self.speed_margin:
-                before = self._most_restored = max(self._most_restored, before)
+                before = self._max_restored = max(self._max_restored, before)
             if angle >= self._free_end:
-                self._most_restored = -_INFINITE
+                self._max_restored = -_INFINITE
             elif restored < before - self.speed_margin:
                 joint.release()
                 self.grip_lost = True
@@ -280,7 +280,7 @@ class Controller:
             self._late_torque, self._taken = self._command, 0.0
             self._time = time_s
             self._past.extend([-_INFINITE] * len(self._past))  # nothing to fall from
-            self._most_restored = -_INFINITE
+            self._max_restored = -_INFINITE
         ends = self.phase != _PRE_CATCH and phase == _PRE_CATCH
         if ends and self._post_catch_ramp and not self.is_guarded:
             self._easing = iter(self._post_catch_ramp)

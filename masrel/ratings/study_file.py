@@ -22,10 +22,10 @@ from masrel.errors import RatingsError
 from masrel.ratings.table import (
     _FORMAT,
     _NEEDED_TIME,
+    _YES_NO,
     DEFAULT_SESSION,
     RATING_COLUMNS,
     SOURCES,
-    YES_NO,
     Rating,
     Ratings,
     _assemble,
@@ -209,13 +209,13 @@ def _extra_values(texts: Mapping[str, str], problems: _Problems) -> dict[str, An
     }
     for name in ("mean_speed_deg_s", "min_speed_deg_s", "max_speed_deg_s"):
         values[name] = _speed(name, texts.get(name, ""), problems)
-    texts_of = {"source": SOURCES, "felt": (*FELT, None), "grip_lost": (*YES_NO, None)}
+    texts_of = {"source": SOURCES, "felt": (*FELT, None), "grip_lost": (*_YES_NO, None)}
     for name, known in texts_of.items():
         if values[name] not in known:
             names = listed(text for text in known if text is not None)
             problems.append((name, f"needed one of {names}, got {values[name]!r}"))
     if (lost := values["grip_lost"]) is not None:
-        values["grip_lost"] = lost == YES_NO[True]
+        values["grip_lost"] = lost == _YES_NO[True]
     time = values["graded_at"]
     if time is not None and not _is_utc(time):
         problems.append(("graded_at", f"{_NEEDED_TIME}, got {time!r}"))

@@ -105,7 +105,7 @@ _N_WITHOUT_GRIP = 20
 _N_FORMERLY = 15
 """Columns of a table of format 1, which does not name its format."""
 
-YES_NO = ("no", "yes")
+_YES_NO = ("no", "yes")
 """Cells of False and True."""
 
 SOURCES = ("published", "recorded", "simulated", "foreign")
@@ -589,7 +589,7 @@ def _csv_cell(value: object) -> str:
     if _is_unknown(value):
         return "NA"
     if isinstance(value, bool):
-        return YES_NO[value]
+        return _YES_NO[value]
     if isinstance(value, tuple):
         return ";".join(_csv_cell(part) for part in value)
     return repr(value) if isinstance(value, float) else safe_cell(str(value))
