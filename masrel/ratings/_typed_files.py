@@ -8,7 +8,7 @@ import tempfile
 import zipfile
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -35,9 +35,6 @@ _PYREADSTAT = {
 _ERROR_CELL = re.compile(
     rb'<c\s[^>]*?\bt="e"[^>]*>(?:<f[^>]*?(?:/>|>[^<]*</f>))?<v>([^<]*)</v>'
 )
-# where a cell with something in it stands
-_FILLED_CELL = re.compile(rb'<c\s(?:[^>]*?\s)?r="([A-Z]{1,3})([0-9]{1,7})"[^>]*(?<!/)>')
-_MAX_AREA = 1 << 23  # cells of a sheet: each takes room, filled or not
 _OF_ZIP = (zipfile.BadZipFile, zlib.error, EOFError)  # what reading it may raise
 _EXPORTED = (".json", ".jsonl", ".csv")
 _ENCODED = (".sav", ".zsav", ".dta", ".sas7bdat", ".xpt")  # pyreadstat takes theirs
@@ -92,12 +89,10 @@ def _read(
         ) from error
 
 
-def _check_unpacked(
-    name: str, suffix: str, data: bytes, most: int, advice: str
-) -> None:
+def _check_unpacked(name: str, suffix: str, data: bytes, most: int, do: str) -> None:
     size = _read(name, suffix, lambda: unpacked_size(data, most), *_OF_ZIP)
     if size > most:
-        raise RatingsError(f"{name}: is more than {most} bytes when unpacked: {advice}")
+        raise RatingsError(f"{name}: is more than {most} bytes when unpacked: {do}")
 
 
 def _workbook(
@@ -105,17 +100,8 @@ def _workbook(
 ) -> tuple[pd.DataFrame, str]:
     calamine = library(name, "python_calamine")
     if zipfile.is_zipfile(io.BytesIO(data)) and not data.startswith(_OLD_WORKBOOK):
-        advice = (
-            "save its sheet as CSV, since a large table of text is read piece by piece"
-        )
-        _check_unpacked(name, suffix, data, MAX_WORKBOOK, advice)
-        area = _read(name, suffix, lambda: _largest_area(data), *_OF_ZIP)
-        if area > _MAX_AREA:
-            raise RatingsError(
-                f"{name}: has a sheet whose cells lie as far apart as in a table of "
-                f"{area} cells: delete those that are far from the others, or save "
-                "the table as CSV"
-            )
+        do = "save its sheet as CSV, since a large table of text is read piece by piece"
+        _check_unpacked(name, suffix, data, MAX_WORKBOOK, do)
     book = _read(
         name,
         suffix,
@@ -141,32 +127,12 @@ def _error_cells(suffix: str, data: bytes) -> dict[str, int]:
     if suffix not in (".xlsx", ".xlsm"):
         return {}
     errors: Counter[str] = Counter()
-    for sheet in _sheets_as_xml(data):
-        texts = _ERROR_CELL.findall(sheet)
-        errors.update(text.decode("utf-8", "replace") for text in texts)
-    return dict(errors)
-
-
-def _sheets_as_xml(data: bytes) -> Iterator[bytes]:
-    # of .xlsx and .xlsm
     with zipfile.ZipFile(io.BytesIO(data)) as packed:
         for member in packed.namelist():
             if member.startswith("xl/worksheets/") and member.endswith(".xml"):
-                yield packed.read(member)
-
-
-def _largest_area(data: bytes) -> int:
-    # of the sheets of a workbook: rows times columns up to the last with a cell
-    area = 0
-    for sheet in _sheets_as_xml(data):
-        columns, n_rows, n_columns = set(), 0, 0
-        for cell in _FILLED_CELL.finditer(sheet):
-            columns.add(cell[1])
-            n_rows = max(n_rows, int(cell[2]))
-        for letter in max(columns, key=lambda name: (len(name), name), default=b""):
-            n_columns = 26 * n_columns + letter - 64  # A is 1, Z is 26, AA is 27
-        area = max(area, n_rows * n_columns)
-    return area
+                texts = _ERROR_CELL.findall(packed.read(member))
+                errors.update(text.decode("utf-8", "replace") for text in texts)
+    return dict(errors)
 
 
 def _sheet_of(

@@ -536,35 +536,3 @@ def test_a_workbook_of_more_than_fits_the_memory_is_refused(
     path = path.rename(tmp_path / f"r.{ending}")
     with pytest.raises(RatingsError, match="when unpacked: save its sheet as CSV"):
         read_ratings(path)
-
-
-@pytest.mark.parametrize(
-    ("far", "is_read"),
-    [
-        ('<c r="XFD1048576"><v>1</v></c>', False),
-        ('<c s="1" r="CV1048576" t="n"><v>1</v></c>', False),
-        ('<c r="XFD1048576" s="1"/>', True),  # a format alone
-        ('<c r="CV9999"><v>1</v></c>', True),
-    ],
-)
-def test_cells_that_lie_far_apart_do_not_fill_the_memory(
-    tmp_path: Path, far: str, is_read: bool
-) -> None:
-    pytest.importorskip("python_calamine")
-    path = workbook(tmp_path / "r.xlsx", R=WIDE)
-    with zipfile.ZipFile(path) as packed:
-        files = {name: packed.read(name) for name in packed.namelist()}
-    row = f"<row>{far}</row></sheetData>".encode()
-    sheet = "xl/worksheets/sheet1.xml"
-    files[sheet] = files[sheet].replace(b"</sheetData>", row)
-    with zipfile.ZipFile(path, "w") as packed:
-        for name, data in files.items():
-            packed.writestr(name, data)
-    if not is_read:
-        with pytest.raises(RatingsError, match="far"):
-            read_ratings(path)
-    elif "<v>" in far:
-        with pytest.raises(RatingsError, match="needed a name for column 4"):
-            read_ratings(path)
-    else:
-        assert grades(read_ratings(path))["A", "Kim"] == "1"
