@@ -1,0 +1,85 @@
+"""What is refused is refused as before: by which error, and naming which place.
+
+Each row of `refusals.toml` is a call and what its refusal must be and must name. How
+the message puts it is free.
+"""
+
+import importlib
+import re
+import shlex
+import tomllib
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy
+import pandas
+import pytest
+
+from tests.golden.call import folder, masrel
+
+TABLE = tomllib.loads(Path(__file__).with_name("refusals.toml").read_text("utf-8"))
+FILES: dict[str, str] = TABLE.pop("files")
+DATA: dict[str, Any] = TABLE.pop("data")
+
+STATISTICS = ("agreement", "intervals", "ratings", "planning", "audit", "scales")
+LABORATORY = ("protocol",)
+HOMES = [f"masrel.{name}" for name in STATISTICS + LABORATORY]
+
+
+class Names(dict[str, Any]):
+    """What a row's call may use: public names of the package, and a few of Python."""
+
+    def __missing__(self, name: str) -> Any:
+        for home in map(importlib.import_module, HOMES):
+            if name in home.__all__:
+                return getattr(home, name)
+        raise KeyError(name)
+
+
+NAMES = Names(
+    DATA,
+    array=numpy.array,
+    frame=pandas.DataFrame,
+    path=Path,
+    nan=float("nan"),
+    inf=float("inf"),
+)
+
+
+def refusal(call: str) -> tuple[object, str]:
+    """The error's class and message, or the exit code and what was on stderr."""
+    if call.startswith("masrel "):
+        ended = masrel(*shlex.split(call)[1:])
+        return ended["code"], ended["err"]
+    with warnings.catch_warnings(action="ignore"):
+        try:
+            eval(call, {}, NAMES)
+        except Exception as error:  # noqa: BLE001 - which error it is, is the result
+            return type(error).__name__, str(error)
+    return None, ""
+
+
+def is_named(name: str, message: str) -> bool:
+    return re.search(rf"(?<!\w){re.escape(name)}(?!\w)", message) is not None
+
+
+@pytest.fixture(scope="module", autouse=True)
+def in_folder_of_files() -> Iterator[None]:
+    with folder():
+        for name, text in FILES.items():
+            Path(name).parent.mkdir(parents=True, exist_ok=True)
+            Path(name).write_bytes(text.encode("latin-1"))
+        yield
+
+
+@pytest.mark.parametrize("part", TABLE)
+def test_refused_as_before(part: str) -> None:
+    wrong = []
+    for call, (kind, *names) in TABLE[part].items():
+        came, message = refusal(call)
+        unnamed = [name for name in names if not is_named(name, message)]
+        if came != kind or unnamed or "Traceback" in message:
+            wrong.append(f"{call}\n  needs {kind}, {unnamed}; came {came}: {message}")
+    assert not wrong, "\n".join(wrong)
