@@ -7,6 +7,7 @@ the message puts it is free.
 import importlib
 import re
 import shlex
+import shutil
 import tomllib
 import warnings
 from collections.abc import Iterator
@@ -17,14 +18,20 @@ import numpy
 import pandas
 import pytest
 
+from masrel.scales import MODIFIED_ASHWORTH
 from tests.golden.call import folder, masrel
+from tests.protocol.documents import changed, without, write
 
 TABLE = tomllib.loads(Path(__file__).with_name("refusals.toml").read_text("utf-8"))
 FILES: dict[str, str] = TABLE.pop("files")
 DATA: dict[str, Any] = TABLE.pop("data")
+STUDIES: dict[str, list[str]] = TABLE.pop("studies")
 
 STATISTICS = ("agreement", "intervals", "ratings", "planning", "audit", "scales")
-LABORATORY = ("protocol",)
+LABORATORY = (
+    *("protocol", "schedule", "run", "recording", "elbow", "elbow.tone"),
+    *("elbow.identification", "hess", "hess.puck"),
+)
 HOMES = [f"masrel.{name}" for name in STATISTICS + LABORATORY]
 
 
@@ -33,13 +40,22 @@ class Names(dict[str, Any]):
 
     def __missing__(self, name: str) -> Any:
         for home in map(importlib.import_module, HOMES):
-            if name in home.__all__:
+            if name in getattr(home, "__all__", ()):
                 return getattr(home, name)
         raise KeyError(name)
 
 
+def protocol(where: str, *to: Any) -> Any:
+    """Read a protocol of which a key, such as "models.0.id", is changed or gone."""
+    keys = [int(key) if key.isdigit() else key for key in where.split(".")]
+    document = changed(*keys, to=to[0]) if to else without(*keys)
+    return NAMES["read_protocol"](write(document, Path()))
+
+
 NAMES = Names(
     DATA,
+    ashworth=MODIFIED_ASHWORTH,
+    protocol=protocol,
     array=numpy.array,
     frame=pandas.DataFrame,
     path=Path,
@@ -68,10 +84,25 @@ def is_named(name: str, message: str) -> bool:
 @pytest.fixture(scope="module", autouse=True)
 def in_folder_of_files() -> Iterator[None]:
     with folder():
-        for name, text in FILES.items():
-            Path(name).parent.mkdir(parents=True, exist_ok=True)
-            Path(name).write_bytes(text.encode("latin-1"))
+        make_files()
         yield
+
+
+def make_files() -> None:
+    """The files that rows name, and the studies: "p" and those that differ from it."""
+    made = [masrel("init", "p")]
+    for name, text in FILES.items():
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        Path(name).write_bytes(text.encode("latin-1"))
+    made.append(masrel("schedule", "p"))
+    run = ("--session", "test", "--grades", "simulated", "--quiet")
+    made.append(masrel("run", "p", "--rater", "R1", *run))
+    assert [call["code"] for call in made] == [0, 0, 0], made
+    for study, (name, old, new) in STUDIES.items():
+        shutil.copytree("p", study)
+        text = Path(study, name).read_text("utf-8")
+        assert old in text, study
+        Path(study, name).write_text(text.replace(old, new, 1), "utf-8")
 
 
 @pytest.mark.parametrize("part", TABLE)
