@@ -26,6 +26,7 @@ TABLE = tomllib.loads(Path(__file__).with_name("refusals.toml").read_text("utf-8
 FILES: dict[str, str] = TABLE.pop("files")
 DATA: dict[str, Any] = TABLE.pop("data")
 STUDIES: dict[str, list[str]] = TABLE.pop("studies")
+SETUP: list[str] = TABLE.pop("setup")
 
 STATISTICS = ("agreement", "intervals", "ratings", "planning", "audit", "scales")
 LABORATORY = (
@@ -103,6 +104,8 @@ def make_files() -> None:
         text = Path(study, name).read_text("utf-8")
         assert old in text, study
         Path(study, name).write_text(text.replace(old, new, 1), "utf-8")
+    for call in SETUP:
+        assert masrel(*shlex.split(call)[1:])["code"] == 0, call
 
 
 @pytest.mark.parametrize("part", TABLE)
