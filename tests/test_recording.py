@@ -1,6 +1,7 @@
 """A recording survives the disk, and damage to it is seen."""
 
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -119,6 +120,22 @@ def test_a_full_disk_leaves_no_half_of_a_recording(
     with pytest.raises(OSError, match="No space left"):
         write_recording(recording, tmp_path / "a.npz")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_recording_that_is_there_has_its_facts(
+    recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replace = os.replace
+
+    def stopped(part: Path, path: Path) -> None:
+        if any(tmp_path.glob("a.*")):
+            raise InterruptedError
+        replace(part, path)
+
+    monkeypatch.setattr(os, "replace", stopped)
+    with pytest.raises(InterruptedError):
+        write_recording(recording, tmp_path / "a.npz")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.json"]
 
 
 # Channels

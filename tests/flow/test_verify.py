@@ -146,6 +146,30 @@ def a_line_taken_away(study: StudyPaths) -> Path:
     return log
 
 
+def rewritten(study: StudyPaths, kind: str, **fields: object) -> Path:
+    """Change the first event of a kind, and compute the chain anew."""
+    documents = events(logs(study)[0])
+    next(e for e in documents if e["event"] == kind)["fields"].update(fields)
+    return chained_anew(logs(study)[0], documents)
+
+
+def another_position_in_a_chain_computed_anew(study: StudyPaths) -> Path:
+    return rewritten(study, "presented", position=99)
+
+
+def a_grade_off_the_scale_in_a_chain_computed_anew(study: StudyPaths) -> Path:
+    return rewritten(study, "grade", grade="5")
+
+
+def another_schedule_in_a_chain_computed_anew(study: StudyPaths) -> Path:
+    return rewritten(study, "session", schedule_sha256="0" * 64)
+
+
+def lines_in_another_order_in_a_chain_computed_anew(study: StudyPaths) -> Path:
+    session, presented, grade, *others = events(logs(study)[0])
+    return chained_anew(logs(study)[0], [session, grade, presented, *others])
+
+
 def a_recording(study: StudyPaths) -> Path:
     path = recording(study)
     data = path.read_bytes()
@@ -226,6 +250,10 @@ FORGERIES: list[Forgery] = [
     an_emptied_log,
     a_line_changed,
     a_line_taken_away,
+    another_position_in_a_chain_computed_anew,
+    a_grade_off_the_scale_in_a_chain_computed_anew,
+    another_schedule_in_a_chain_computed_anew,
+    lines_in_another_order_in_a_chain_computed_anew,
     a_recording,
     a_recording_taken_away,
     a_recording_nobody_logged,

@@ -79,12 +79,13 @@ def test_nothing_but_files_is_replaced(tmp_path: Path) -> None:
     assert sorted(p.name for p in tmp_path.iterdir()) == ["pipe", "to_null"]
 
 
-def test_permissions_stay(tmp_path: Path) -> None:
+@pytest.mark.parametrize("mode", [0o600, 0o666])  # less and more than a umask leaves
+def test_permissions_stay(mode: int, tmp_path: Path) -> None:
     secret = tmp_path / "secret.csv"
     secret.write_text("old")
-    secret.chmod(0o600)
+    secret.chmod(mode)
     write_file(secret, "new")
-    assert stat.S_IMODE(secret.stat().st_mode) == 0o600
+    assert stat.S_IMODE(secret.stat().st_mode) == mode
 
 
 @pytest.mark.parametrize("call", ["write", "fsync", "replace"])
@@ -106,10 +107,9 @@ def test_a_full_disk_leaves_all_as_it_was_and_names_the_file(
     assert first.read_text() == "old"
 
 
-def test_files_that_belong_together_are_all_on_disk_before_one_has_its_name(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # and each folder, also a new one, is synced after it has the name
+@pytest.fixture
+def events(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What is synced and what gets its name, in order, as it comes."""
     events: list[str] = []
     fsync, replace = os.fsync, os.replace
 
@@ -124,9 +124,24 @@ def test_files_that_belong_together_are_all_on_disk_before_one_has_its_name(
 
     monkeypatch.setattr(os, "fsync", synced)
     monkeypatch.setattr(os, "replace", named)
+    return events
+
+
+def test_files_that_belong_together_are_all_on_disk_before_one_has_its_name(
+    tmp_path: Path, events: list[str]
+) -> None:
+    # and each folder, also a new one, is synced after it has the name
     write_files({tmp_path / "new" / name: "x" for name in ("a", "b")})
     new = ["part", "part", "= a", "= b", "new"]
     assert events == [tmp_path.name, *new]
+
+
+def test_a_file_that_is_written_bit_by_bit_is_on_disk_before_it_has_its_name(
+    tmp_path: Path, events: list[str]
+) -> None:
+    with new_file(tmp_path / "a") as out:
+        out.write(b"x")
+    assert events == ["part", "= a", tmp_path.name]
 
 
 KILLED = """

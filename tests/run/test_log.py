@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import stat
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -61,6 +62,27 @@ def test_each_event_is_synced_before_append_returns(
             log.append("grade", {"code": "A"})
             assert len(synced) == number
             assert synced[-1] == log.path.stat().st_size
+
+
+def test_the_name_of_a_new_log_is_synced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[str] = []
+    fsync = os.fsync
+
+    def noted(descriptor: int) -> None:
+        fsync(descriptor)
+        synced.append(os.readlink(f"/proc/self/fd/{descriptor}"))
+
+    monkeypatch.setattr(os, "fsync", noted)
+    with SessionLog.open(tmp_path / "a.jsonl"):
+        assert synced == [str(tmp_path)]
+
+
+def test_a_log_and_its_folder_are_their_owners_alone(tmp_path: Path) -> None:
+    path = filled(tmp_path / "sessions" / "a.jsonl")
+    modes = [stat.S_IMODE(each.stat().st_mode) for each in (path.parent, path)]
+    assert modes == [0o700, 0o600]
 
 
 def test_a_reopened_log_goes_on_with_the_chain(tmp_path: Path) -> None:

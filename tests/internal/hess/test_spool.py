@@ -133,6 +133,15 @@ def test_a_disk_that_fills_while_it_is_laid_down_leaves_no_file(
     assert not path.exists()
 
 
+def test_a_link_in_its_place_is_not_followed(tmp_path: Path) -> None:
+    other, link = tmp_path / "other", tmp_path / "a.partial"
+    other.write_text("of somebody else")
+    link.symlink_to(other)
+    with pytest.raises(OSError, match="is a link"):
+        Spool(link, 10, FACTS)
+    assert other.read_text() == "of somebody else"
+
+
 @pytest.mark.parametrize("n_bytes", [0, 100, 4096, 4100, 4104, 4105, 4200])
 def test_a_file_that_was_never_laid_down_is_nothing(tmp_path, n_bytes: int) -> None:
     path = tmp_path / "a.partial"
