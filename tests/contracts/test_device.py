@@ -293,6 +293,23 @@ def test_closing_sends_zero_torque_before_it_lets_go() -> None:
     assert acts == [2.0, 0.0, "stop"]
 
 
+def test_a_device_that_takes_no_zero_torque_is_let_go_all_the_same() -> None:
+    acts = []
+
+    class Deaf(ScriptedDevice):
+        def _send(self, torque_nm: float) -> None:
+            raise DeviceError(f"deaf: does not take {torque_nm} N·m")
+
+        def _stop(self) -> None:
+            acts.append("stop")
+
+    device = Deaf(SimulatedClock())
+    device.open()
+    with pytest.raises(DeviceError, match=r"does not take 0\.0"):
+        device.close()
+    assert acts == ["stop"]
+
+
 def test_an_opening_that_fails_leaves_nothing_to_close() -> None:
     class Absent(ScriptedDevice):
         def _start(self) -> None:

@@ -215,7 +215,7 @@ def test_no_number_is_not_sent() -> None:
 
 
 @pytest.mark.parametrize("is_passive", [False, True])
-@pytest.mark.parametrize("value", [None, "1", [1.0], math.nan, -math.inf, 1j])
+@pytest.mark.parametrize("value", [None, "1", [1.0], math.nan, math.inf, -math.inf, 1j])
 def test_a_model_that_gives_no_number_is_a_fault_with_the_ramp(
     value: object, is_passive: bool
 ) -> None:
@@ -254,6 +254,23 @@ def test_a_lost_grip_is_a_fault_with_the_ramp_in_every_phase() -> None:
     after = columns["time_s"] > fault.time_s + 1e-9
     line = fault.torque_nm * (1.0 - (columns["time_s"][after] - fault.time_s) / 0.05)
     np.testing.assert_allclose(columns["command_torque_nm"][after], line, atol=1e-6)
+
+
+def test_an_arm_that_slows_down_at_once_is_a_lost_grip() -> None:
+    # by far more than 1 N·m takes off a loose arm in that time
+    clock = SimulatedClock()
+    device = ScriptedDevice(
+        clock, lambda t: START + SPEED * min(t, 0.5) + SPEED / 3.0 * max(t - 0.5, 0.0)
+    )
+    controller = Controller(Joint(lambda _t, _a, _v: 1.0), start_angle=START)
+    device.open()
+    presented = run_presentation(
+        device, controller, clock=clock, limits=LIMITS, max_duration_s=1.0
+    )
+    assert presented.fault is not None
+    assert presented.fault.kind == "slip"
+    assert 0.5 < presented.fault.time_s < 0.52
+    assert_ramps_to_zero(device, presented)
 
 
 def test_an_arm_that_is_thrown_the_way_it_is_pushed_is_a_lost_grip() -> None:

@@ -158,8 +158,11 @@ def test_both_chains_of_conduct_stay_whole(sites: Sites, tmp_path: Path) -> None
         "conduct/south.jsonl",
         "conduct.jsonl",
     ]
-    # an event taken off the end of a merged log, whose chain still holds, is found
+    # an event changed at the end of a merged log, or taken off, leaves its chain whole
     log = merged.merged_conduct / "south.jsonl"
+    log.write_bytes(log.read_bytes().replace(b'"ill"', b'"fit"'))
+    messages = [finding.message for finding in verify_study(merged).findings]
+    assert any("south.jsonl: needed 2 lines" in message for message in messages)
     log.write_bytes(b"".join(log.read_bytes().splitlines(keepends=True)[:-1]))
     messages = [finding.message for finding in verify_study(merged).findings]
     assert any("south.jsonl: needed 2 lines" in message for message in messages)

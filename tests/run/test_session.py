@@ -1,6 +1,7 @@
 """A session presents, asks and logs; stopped anywhere, it goes on there."""
 
 import csv
+import errno
 import hashlib
 import io
 import os
@@ -453,6 +454,24 @@ def test_a_recording_is_on_disk_before_the_log_names_it(
         *[".part", ".part", ".json", ".npz", ".jsonl", ".jsonl"] * 3,
         ".jsonl",
     ]
+
+
+def test_a_full_disk_between_a_recording_and_its_line_loses_neither(
+    small: Small, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write = os.write
+
+    def full(descriptor: int, data: bytes) -> int:
+        if bytes(data).startswith(b'{"event": "presented"'):
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return write(descriptor, data)
+
+    monkeypatch.setattr(os, "write", full)
+    with pytest.raises(OSError, match="No space left"):
+        run(small, ScriptGrades(["1", "1", "1"]))
+    monkeypatch.undo()
+    run(small, ScriptGrades(["1", "1", "1"]))
+    assert events(small)[:5] == ["session", "resumed", *["presented"] * 2, "grade"]
 
 
 def test_a_script_by_code_and_by_position() -> None:
