@@ -160,15 +160,13 @@ def _mark_between(metric: str, categories: Sequence[Label]) -> str:
 
 def _elements(label: Label, mark: str) -> frozenset[str]:
     text = str(label)
-    if text == EMPTY_SET:
-        parts = []
-    elif isinstance(label, SetText) or mark:
+    if isinstance(label, SetText) or mark:
         parts = text.split(_MARKS[0] if isinstance(label, SetText) else mark)
     else:  # numbers have no quotes
         parts = [
             x if x[0] not in "'\"" else literal_eval(x) for x in _ITEM.findall(text)
         ]
-    return frozenset(part for part in map(str.strip, parts) if part)
+    return frozenset(map(str.strip, parts)) - {"", EMPTY_SET}
 
 
 def _jaccard(a: frozenset[str], b: frozenset[str]) -> Fraction:

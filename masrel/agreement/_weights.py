@@ -107,8 +107,7 @@ class Weights:
     @property
     def operator(self) -> Any:
         """The v_kl as a matrix, or what takes its place: `Distances`."""
-        is_identity = self.numerators is None and self.reason is None
-        if is_identity and self.n_categories > MANY:
+        if self.numerators is None and self.n_categories > MANY:
             return Differing(self.n_categories)
         return self.floats
 

@@ -360,7 +360,7 @@ def _of_many(
     kernel: Kernel, coded: CodedRatings, made: Weights, delta: bool
 ) -> tuple[Kernel, Any]:
     # the kernel, and v of many categories as it takes it
-    takes_many = kernel.takes_many and not made.has_matrix
+    takes_many = kernel.takes_many and not made.has_matrix and made.reason is None
     if takes_many and isinstance(made.operator, Squared):
         return kernel, made.operator
     q = made.n_categories

@@ -128,7 +128,7 @@ def _irrcac_of_alpha(counts: Floats, freq: Floats, v: Floats) -> float:
     p_a = agreement + (1.0 - agreement) / (freq @ size)
     alpha = (agreement - p_e) / (1.0 - p_e)
     excess = (size - mean) / mean
-    chance = (size - counts @ (v @ p)) / mean - p_e * excess
+    chance = (size - counts @ (p @ v)) / mean - p_e * excess
     x = of_items - p_a * excess - p_e - 2.0 * (1.0 - alpha) * (chance - p_e)
     squares = freq @ (x / (1.0 - p_e) - alpha) ** 2
     return math.sqrt(squares / (m * (m - 1.0)))

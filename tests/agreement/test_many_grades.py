@@ -22,7 +22,7 @@ from masrel.errors import (
     SmallSampleWarning,
     UndefinedStatisticWarning,
 )
-from masrel.intervals import bootstrap, estimate, jackknife
+from masrel.intervals import analytic, bootstrap, estimate, jackknife
 
 Rows = list[list[float]]
 Distance = Callable[[Fraction, Fraction], Fraction]
@@ -301,12 +301,29 @@ def test_measurements_that_agree_now_and_then_have_the_jackknife() -> None:
     assert chosen.low < chosen.high
 
 
+def test_the_error_of_alpha_in_irrcac_goes_by_the_grades_met() -> None:
+    rng = np.random.default_rng(3)
+    ratings = rng.integers(0, 20, (40, 3)).tolist()
+    few, many = (
+        analytic(
+            "krippendorff_alpha",
+            ratings,
+            target="items",
+            categories=range(n_grades),
+            error="irrcac",
+        )
+        for n_grades in (20, 200)
+    )
+    assert (many.low, many.high) == pytest.approx((few.low, few.high), rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["fleiss_kappa", "cohen_kappa", "conger_kappa"])
 @pytest.mark.parametrize("n_grades", [100, 200])
-def test_weights_that_a_scale_lacks_give_no_interval(n_grades: int) -> None:
+def test_weights_that_a_scale_lacks_give_no_interval(name: str, n_grades: int) -> None:
     # ratio weights divide by sums, which of the grade 0 and itself is 0
     ratings = [[i, 7 * i % n_grades] for i in range(n_grades)]
     with pytest.warns(UndefinedStatisticWarning):
-        result = estimate("fleiss_kappa", ratings, target="items", weights="ratio")
+        result = estimate(name, ratings, target="items", weights="ratio")
     assert math.isnan(result.value)
     assert result.interval is not None
     assert result.interval.reason is not None
