@@ -522,3 +522,71 @@ def test_what_hardly_moves_holds_its_estimate() -> None:
         assert found.low == pytest.approx(value, rel=1e-12)
         assert value < 0.0
         assert found.high > 0.5
+
+
+def by_turns(n_items: int, n_raters: int, changes: dict[int, str]) -> list[list[str]]:
+    """Return items of a and b by turns, but for some."""
+    rows = [letter * n_raters for letter in "ab"] * n_items
+    return [list(changes.get(i, row)) for i, row in enumerate(rows[:n_items])]
+
+
+def one_differs(n_items: int, n_raters: int) -> list[list[str]]:
+    """Every third item is disputed by one rater, another each time."""
+    changes = {}
+    for k in range(n_items // 3):
+        row, place = "ab"[k % 2] * n_raters, k % n_raters
+        changes[3 * k] = row[:place] + "ba"[k % 2] + row[place + 1 :]
+    return by_turns(n_items, n_raters, changes)
+
+
+def half_differ(n_items: int, n_raters: int, n_disputed: int) -> list[list[str]]:
+    """Some items are disputed by half of the raters, always the same."""
+    row = "a" * (n_raters // 2) + "b" * (n_raters // 2)
+    return by_turns(n_items, n_raters, {2 * k: row for k in range(n_disputed)})
+
+
+MODEL, JACKKNIFE = "Dirichlet-multinomial posterior", "item jackknife"
+TABLE, PATTERNS = "Dirichlet posterior of the table", "Dirichlet posterior of the pat"
+# Either side of every limit of the rule: coefficient, weights, ratings, which others
+# the interval is of, and its method.
+RULE = {
+    "9 items": ("fleiss_kappa", None, one_differs(9, 3), "items", MODEL),
+    "10 items": ("fleiss_kappa", None, one_differs(10, 3), "items", JACKKNIFE),
+    "9 raters": ("fleiss_kappa", None, one_differs(9, 9), "items", MODEL),
+    "10 raters": ("fleiss_kappa", None, one_differs(9, 10), "items", JACKKNIFE),
+    "few, 2 raters": ("gwet_ac", None, one_differs(9, 2), "items", TABLE),
+    "few, 3 raters": ("gwet_ac", None, one_differs(9, 3), "items", MODEL),
+    "few, told apart": ("conger_kappa", None, one_differs(9, 3), "items", MODEL),
+    "few, weighted": ("fleiss_kappa", "linear", one_differs(9, 3), "items", PATTERNS),
+    "few, 2, weighted": ("cohen_kappa", "linear", one_differs(9, 2), "items", TABLE),
+    "few, raters": ("conger_kappa", None, MEDIUM[:9], "raters", "rater jackknife"),
+    "2000 items": ("fleiss_kappa", None, by_turns(2000, 3, {}), "items", MODEL),
+    "2001 items": ("fleiss_kappa", None, by_turns(2001, 3, {}), "items", PATTERNS),
+    "spread of .0029": ("fleiss_kappa", None, half_differ(40, 4, 4), "raters", MODEL),
+    "spread of .0036": (
+        *("fleiss_kappa", None, half_differ(60, 6, 6)),
+        *("raters", "rater jackknife"),
+    ),
+    "spread, told apart": (
+        *("conger_kappa", None, half_differ(40, 4, 4)),
+        *("raters", "rater jackknife"),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", RULE)
+def test_the_rule_chooses_on_either_side_of_its_limits(case: str) -> None:
+    name, weights, ratings, target, method = RULE[case]
+    scale = None if weights is None else ["a", "b"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MasrelWarning)
+        found = estimate(
+            name,
+            ratings,
+            target=target,  # type: ignore[arg-type]
+            weights=weights,
+            categories=scale,
+        )
+    assert found.interval is not None
+    assert found.interval.method.startswith(method)
+    assert found.interval.kind == ("confidence" if "jack" in method else "credible")

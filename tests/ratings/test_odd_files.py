@@ -387,6 +387,14 @@ RIGHT: dict[str, Any] = {
         "item;Kim;Lee\nA;1,0;1\nB;2;2,0\nC;3;1\nD;2;2\n",
         {"decimal": ","},
     ),
+    "decimal commas in every cell": (  # as many columns by commas as by semicolons
+        "A;1,0;1,0\nB;2,0;2,0\nC;3,0;1,0\nD;2,0;2,0\n",
+        {"decimal": ",", "no_header": True},
+    ),
+    "decimal commas beside bars": (
+        "A|1,0|1,0\nB|2,0|2,0\nC|3,0|1,0\nD|2,0|2,0\n",
+        {"decimal": ",", "no_header": True},
+    ),
 }
 
 WARNED: dict[str, Any] = {
@@ -487,6 +495,11 @@ WARNED: dict[str, Any] = {
 
 REFUSED: dict[str, Any] = {
     "colons": (lines(delimiter=":"), "--delimiter"),
+    "two separators, no decimal comma": (
+        "A;1,b;1,b\nB;2,b;2,b\n",
+        "line 1.*--delimiter",
+        {"no_header": True},
+    ),
     "two separators": ("item,a;Kim,b\nA,1;1,2\nB,2;2,3\n", "--delimiter"),
     "other separator below": ("item,Kim,Lee\nA;1;1\nB;2;2\n", "line 2"),
     "wrong delimiter": (BASE, "line 1.*semicolon", {"delimiter": ";"}),
