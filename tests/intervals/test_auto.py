@@ -590,3 +590,19 @@ def test_the_rule_chooses_on_either_side_of_its_limits(case: str) -> None:
     assert found.interval is not None
     assert found.interval.method.startswith(method)
     assert found.interval.kind == ("confidence" if "jack" in method else "credible")
+
+
+@pytest.mark.parametrize(
+    ("n_outside", "weights", "is_small"),
+    [(4, None, True), (5, None, False), (5, "linear", True), (29, "linear", True)],
+)
+def test_few_outside_the_commonest_category_are_warned_of(
+    n_outside: int, weights: str | None, is_small: bool
+) -> None:
+    ratings = np.zeros((60, 3), dtype=int)
+    ratings[:n_outside, :2] = 1
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        estimate("fleiss_kappa", ratings, target="items", weights=weights)
+    said = [w for w in caught if issubclass(w.category, SmallSampleWarning)]
+    assert (len(said) > 0) == is_small

@@ -23,7 +23,8 @@ from tests.mutants import ROOT, Fault, faults
 
 WORKERS = 2
 TIMEOUT_S = 120
-RESULTS = {0: "survived", 1: "killed", 2: "does not run", 124: "no end in time"}
+RESULTS = {0: "passed", 1: "failed", 2: "does not run", 124: "no end in time"}
+OF_FAULT = {"passed": "survived", "failed": "killed"}
 
 
 def copy_to(folder: Path) -> None:
@@ -62,7 +63,8 @@ def with_fault(folder: Path, fault: Fault) -> str:
     try:
         file.write_text(text.replace(fault.old, fault.new), encoding="utf-8")
         compiled.unlink(missing_ok=True)
-        return run_tests(folder, fault.tests)
+        result = run_tests(folder, fault.tests)
+        return OF_FAULT.get(result, result)
     finally:
         file.write_text(text, encoding="utf-8")
         compiled.unlink(missing_ok=True)
@@ -104,7 +106,7 @@ def main(words: list[str]) -> int:
         passed = on_copies(
             {tests: partial(run_tests, tests=tests) for tests in sound}, folders
         )
-        if any(result != "survived" for result, _ in passed.values()):
+        if any(result != "passed" for result, _ in passed.values()):
             print("These tests must pass first.")
             return 1
         results = on_copies(
