@@ -61,7 +61,7 @@ def write_faults(junit: Path) -> str:
 def write_mutants(
     results: dict[str, tuple[str, str, float]], names: Sequence[str]
 ) -> str:
-    """Write tests, result and seconds of faults; return how many were killed.
+    """Write tests, result and processor time of faults; return how many were killed.
 
     The rows of other faults of these names stay as they are.
     """
@@ -72,7 +72,10 @@ def write_mutants(
         rows[name] = f"| {name} | `{tests}` | {result} | {seconds:.0f} | {when} |"
     lines = [rows[name] for name in names if name in rows]
     killed = f"{sum(' | killed | ' in line for line in lines)} of {len(names)} killed."
-    head = ["| fault | tests | result | seconds | run |", "|---|---|---|---|---|"]
+    head = [
+        "| fault | tests | result | processor time, s | run |",
+        "|---|---|---|---|---|",
+    ]
     _put(PAGE, MUTANTS, "\n".join([killed, "", *head, *lines]) + "\n")
     return killed
 

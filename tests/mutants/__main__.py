@@ -6,7 +6,6 @@ copies, and writes the results into ``docs/long_tests.md``.
 
 import importlib.util
 import os
-import resource
 import shutil
 import subprocess
 import sys
@@ -24,6 +23,7 @@ from tests.mutants import ROOT, Fault, faults
 WORKERS = 2
 TIMEOUT_S = 120
 RESULTS = {0: "passed", 1: "failed", 2: "does not run", 124: "no end in time"}
+Result = tuple[str, float]  # and seconds of processor time
 OF_FAULT = {"passed": "survived", "failed": "killed"}
 
 
@@ -37,25 +37,28 @@ def copy_to(folder: Path) -> None:
             shutil.copy2(ROOT / name, folder / name)
 
 
-def run_tests(folder: Path, tests: str) -> str:
+def run_tests(folder: Path, tests: str) -> Result:
     """Run tests of the copy until the first fails, and say what came of it."""
     pytest = [sys.executable, "-m", "pytest", "-x", "-q"]
     pytest += ["-p", "no:randomly", "-p", "no:cacheprovider", tests]
-    done = subprocess.run(
+    process = subprocess.Popen(
         ["timeout", "--kill-after=5", str(TIMEOUT_S), *pytest],
         cwd=folder,
         env={**os.environ, "PYTHONPATH": str(folder)},
         stdin=subprocess.DEVNULL,
-        capture_output=True,
-        check=False,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
     )
-    return RESULTS.get(done.returncode, f"ended with {done.returncode}")
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    what = RESULTS.get(process.returncode, f"ended with {process.returncode}")
+    return what, used.ru_utime + used.ru_stime
 
 
-def with_fault(folder: Path, fault: Fault) -> str:
+def with_fault(folder: Path, fault: Fault) -> Result:
     """Run a fault's tests with the fault in the copy, and put the text back."""
     if misfit := fault.misfit(folder):
-        return misfit
+        return misfit, 0.0
     file = folder / fault.file
     # Python takes compiled code for current if size and second of the source agree.
     compiled = Path(importlib.util.cache_from_source(str(file)))
@@ -63,28 +66,27 @@ def with_fault(folder: Path, fault: Fault) -> str:
     try:
         file.write_text(text.replace(fault.old, fault.new), encoding="utf-8")
         compiled.unlink(missing_ok=True)
-        result = run_tests(folder, fault.tests)
-        return OF_FAULT.get(result, result)
+        result, seconds = run_tests(folder, fault.tests)
+        return OF_FAULT.get(result, result), seconds
     finally:
         file.write_text(text, encoding="utf-8")
         compiled.unlink(missing_ok=True)
 
 
 def on_copies(
-    runs: dict[str, Callable[[Path], str]], folders: SimpleQueue[Path]
-) -> dict[str, tuple[str, float]]:
-    """Run each on a copy that is free; return results and seconds by name."""
+    runs: dict[str, Callable[[Path], Result]], folders: SimpleQueue[Path]
+) -> dict[str, Result]:
+    """Run each on a copy that is free; return results by name."""
 
-    def timed(name: str) -> tuple[str, tuple[str, float]]:
-        folder, began = folders.get(), time.monotonic()
-        result = runs[name](folder)
+    def run(name: str) -> tuple[str, Result]:
+        folder = folders.get()
+        result, seconds = runs[name](folder)
         folders.put(folder)
-        seconds = time.monotonic() - began
         print(f"{result:<12} {seconds:6.1f} s  {name}", flush=True)
         return name, (result, seconds)
 
     with ThreadPoolExecutor(WORKERS) as pool:
-        return dict(pool.map(timed, runs))
+        return dict(pool.map(run, runs))
 
 
 def main(words: list[str]) -> int:
@@ -112,11 +114,8 @@ def main(words: list[str]) -> int:
         results = on_copies(
             {fault.name: partial(with_fault, fault=fault) for fault in chosen}, folders
         )
-    of_tests = resource.getrusage(resource.RUSAGE_CHILDREN)
-    print(
-        f"{time.monotonic() - began:.0f} s on {WORKERS} cores, "
-        f"{of_tests.ru_utime + of_tests.ru_stime:.0f} s of them computing"
-    )
+    seconds = sum(seconds for _, seconds in (*passed.values(), *results.values()))
+    print(f"{seconds:.0f} s of processor time in {time.monotonic() - began:.0f} s")
     rows = {f.name: (f.tests, *results[f.name]) for f in chosen}
     print(write_mutants(rows, [fault.name for fault in faults()]))
     return int(any(result != "killed" for result, _ in results.values()))
