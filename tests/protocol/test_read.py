@@ -322,6 +322,44 @@ def test_one_wrong_value_gives_its_message(
     assert problems_of(changed(*path, to=value), tmp_path) == [problem]
 
 
+# The last value of [device] that keeps people safe, and one beyond it.
+LIMITS = {
+    "torque_limit_nm": (28, 28.1),
+    "active_torque_limit_nm": (28, 28.1),
+    "active_energy_limit_j": (100, 101),
+    "active_speed_limit_deg_s": (600, 601),
+    "speed_limit_deg_s": (600, 601),
+    "soft_stop_deg": (30, 30.1),
+    "soft_stop_torque_nm": (28, 28.1),
+    "missed_replies_limit": (20, 21),
+    "missed_replies_per_100_limit": (100, 101),
+    "stale_limit_ms": (50, 50.1),
+    "frozen_limit_ms": (100, 101),
+    "standing_limit_ms": (5000, 5001),
+    "standing_torque_nm": (28, 28.1),
+    "jump_limit_deg": (5, 5.1),
+    "watchdog_ms": (100, 101),
+    "ramp_ms": (100, 101),
+    "rate_hz": (100, 99),
+}
+
+
+@pytest.mark.parametrize("key", LIMITS)
+def test_a_limit_of_the_device_is_refused_beyond_what_is_safe(
+    key: str, tmp_path: Path
+) -> None:
+    def is_refused(value: float) -> bool:
+        try:
+            read_protocol(write(changed("device", key, to=value), tmp_path))
+        except ProtocolError as error:
+            # other keys may not go with it, which says so of their own
+            return any(f"device.{key}: needed a " in text for text in error.problems)
+        return False
+
+    last, beyond = LIMITS[key]
+    assert (is_refused(last), is_refused(beyond)) == (False, True)
+
+
 def test_a_session_too_small_for_the_plan_is_refused_where_it_is_asked_for(
     tmp_path: Path,
 ) -> None:
