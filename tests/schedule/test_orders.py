@@ -251,6 +251,22 @@ def test_every_admissible_order_is_equally_likely(
     assert sum((n - 100) ** 2 / 100 for n in freq.values()) < limit
 
 
+def test_orders_are_equally_likely_where_they_are_nearly_as_many_as_words() -> None:
+    # 6 standards among 15 dummies, C(16, 6) 6! 15! orders, 2.4 times of which are 2^64:
+    # if words beyond the second time were taken, 46 % would begin with a standard.
+    models = tuple("ABCDEFGHIJKLMNOPQRSTU")
+    protocol = protocol_of(
+        models=models, dummies=models[6:], scheme="restricted", standards_apart=True
+    )
+    drawn = [
+        order(protocol, "R1", secret=number.to_bytes(16, "big"))
+        for number in range(1000)
+    ]
+    n_first = sum(each[0] in models[:6] for each in drawn)
+    # 6/16 of them, within four standard errors: fails once in 16 000 choices of secrets
+    assert n_first == pytest.approx(375, abs=61)
+
+
 @pytest.mark.parametrize(
     "rules",
     [
