@@ -199,3 +199,27 @@ def test_an_interval_beside_its_kappa_is_of_no_table_however_many_there_are() ->
     assert {reading.n_tables for reading in audit.readings} == {0}
     touching = Claim(n_items=38, n_categories=4, kappa="0.5", low="0.5", high="0.7")
     assert not touching.excludes_kappa
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "excludes"),
+    [
+        # 0.50 may be up to 0.505, and 0.51 from there on; likewise below
+        ("0.51", "0.70", False),
+        ("0.52", "0.70", True),
+        ("0.10", "0.49", False),
+        ("0.10", "0.48", True),
+    ],
+)
+def test_an_interval_excludes_no_kappa_that_rounding_may_hold(
+    low: str, high: str, excludes: bool
+) -> None:
+    claim = Claim(n_items=38, n_categories=4, kappa="0.50", low=low, high=high)
+    assert claim.excludes_kappa == excludes
+
+
+def test_margins_may_lack_the_items_that_were_not_rated() -> None:
+    few = {"n_items": 20, "n_categories": 2, "agreement": "85.0", "n_unrated": 2}
+    assert Claim(**few, margins_1=(10, 8)).margins_1 == (10, 8)  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match="margins_1: "):
+        Claim(**few, margins_1=(10, 7))  # type: ignore[arg-type]

@@ -27,6 +27,11 @@ from tests.intervals.test_analytic import SCALE, TABLE_V
 
 MEDIUM = dirichlet_multinomial(np.random.default_rng(3), 25, 4, 0.6)
 LABELS = sorted({grade for row in MEDIUM for grade in row})
+# 35 items of which the last of 6 raters puts every other one higher
+APART = [
+    [*row[:5], min(row[5] + i % 2, 2)]
+    for i, row in enumerate(dirichlet_multinomial(np.random.default_rng(4), 35, 6, 0.6))
+]
 PERFECT = [["a", "a", "a"], ["b", "b", "b"]] * 8
 
 
@@ -121,22 +126,30 @@ def test_other_raters_leave_raters_out() -> None:
     )
 
 
-def test_both_add_the_distances_less_what_they_hold_in_common() -> None:
-    of_items, of_raters, of_cells = variances(MEDIUM)
-    kappa = fleiss_kappa(MEDIUM).value
-    t = student.ppf(0.975, 3)  # the fewer degrees of freedom, of 24 and 3
-    low, high = on_logit(kappa, t * math.sqrt(of_items), 4)
-    above = posterior("fleiss_kappa", MEDIUM, target="items", categories=LABELS).high
-    high = max(high, (high + above) / 2)
+@pytest.mark.parametrize(
+    "ratings", [MEDIUM, APART], ids=["cells hold more", "cells hold less"]
+)
+def test_both_add_the_distances_less_what_they_hold_in_common(
+    ratings: list[list[int]],
+) -> None:
+    # in common they hold the variance of a rater on an item, or less if either has less
+    of_items, of_raters, of_cells = variances(ratings)  # type: ignore[arg-type]
+    kappa, n_raters = fleiss_kappa(ratings).value, len(ratings[0])
+    t = student.ppf(0.975, n_raters - 1)  # the fewer degrees of freedom
+    low, high = on_logit(kappa, t * math.sqrt(of_items), n_raters)
+    if len(ratings) < 30:
+        model = posterior("fleiss_kappa", ratings, target="items", categories=LABELS)
+        high = max(high, (high + model.high) / 2)
     expected = []
     for distance in (kappa - low, high - kappa):
         parts = distance**2, t**2 * of_raters
         expected.append(math.sqrt(sum(parts) - min(*parts, t**2 * of_cells)))
-    found = chosen(MEDIUM, "both", categories=LABELS)
+    found = chosen(ratings, "both", categories=LABELS)
     assert found.low == pytest.approx(kappa - expected[0], rel=1e-9)
     assert found.high == pytest.approx(min(kappa + expected[1], 1.0), rel=1e-9)
     assert found.method == (
-        "item jackknife, t(3) on the logit, and rater jackknife, t(3)"
+        f"item jackknife, t({n_raters - 1}) on the logit, "
+        f"and rater jackknife, t({n_raters - 1})"
     )
 
 

@@ -269,3 +269,20 @@ def test_the_exact_interval_of_an_icc_covers_as_it_says() -> None:
         rng=1,
     )
     assert simulated.coverage == pytest.approx(0.95, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("value", "n_raters", "n_items"),
+    [
+        # Bonett (2002), eq. 3: 8 z² (1 - ρ)² (1 + (k - 1) ρ)² / (k (k - 1) w²) + 1, to
+        # which 5 ρ is added for two raters and ρ of at least 0.7
+        (0.69, 2, 107),  # 8 z² 0.31² 1.69² / 0.08 + 1 = 106.4
+        (0.70, 2, 105),  # 8 z² 0.30² 1.70² / 0.08 + 1 + 3.5 = 104.4
+        (0.70, 3, 68),  # 8 z² 0.30² 2.40² / 0.24 + 1 = 67.4
+    ],
+)
+def test_items_for_the_width_of_an_icc_by_hand(
+    value: float, n_raters: int, n_items: int
+) -> None:
+    options = {**NORMAL, "value": value, "n_raters": n_raters, "half_width": 0.1}
+    assert plan(**options, method="wald").n_items == n_items
