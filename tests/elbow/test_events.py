@@ -16,8 +16,10 @@ from masrel.elbow import (
     ConstantSpeed,
     ElbowParameters,
     Events,
+    Joined,
     MinimumJerk,
     Motion,
+    Reversed,
     events,
 )
 from masrel.errors import ParameterError
@@ -219,6 +221,13 @@ def test_a_catch_that_would_be_overtaken_again_is_found() -> None:
     assert found.catch < slow
     mean = float(motion.angle(slow) - motion.angle(found.onset)) / (slow - found.onset)
     assert float(motion.angle(slow)) < joint.catch_angle(mean)
+
+
+def test_a_second_stretch_catches_again_once_the_arm_went_back() -> None:
+    out = ConstantSpeed(start=radians(30), end=radians(140), speed=radians(92))
+    found = events(STANDARD_MODELS["HM3"], Joined([out, Reversed(motion=out), out]))
+    angles = [degrees(stretch.catch_angle or 0.0) for stretch in found.stretches]
+    assert angles == pytest.approx([82.8, 82.8], rel=1e-14)
 
 
 # Slow stretches
