@@ -21,7 +21,7 @@ from docs.make.long_tests import write_mutants
 from tests.mutants import ROOT, Fault, faults
 
 WORKERS = 2
-TIMEOUT_S = 120
+TIMEOUT_S = 300
 RESULTS = {0: "passed", 1: "failed", 2: "does not run", 124: "no end in time"}
 Result = tuple[str, float]  # and seconds of processor time
 OF_FAULT = {"passed": "survived", "failed": "killed"}
