@@ -30,7 +30,7 @@ def drawn(seed: int) -> Drawn:
     stream = Stream(f"table {seed}")
     of = (NUMBERS if seed % 2 else LABELS)[stream.below(4)]
     n_items = 1 + stream.below(40 if stream.chance(0.6) else 8)
-    shares = _shares(stream, len(of))
+    shares = shares_of(stream, len(of))
     if seed % 5 == 4:
         return Drawn(_counts(stream, n_items, shares), None, True)
     gaps = stream.uniform(0.05, 0.4) if stream.chance(0.4) else 0.0
@@ -44,14 +44,14 @@ def drawn(seed: int) -> Drawn:
     )
 
 
-def _shares(stream: Stream, n: int) -> list[float]:
+def shares_of(stream: Stream, n: int) -> list[float]:
     # how often each category is the true one; one in three tables is very uneven
     power = 6.0 if stream.chance(0.33) else 1.0
     parts = [stream.uniform(0.05, 1.0) ** power for _ in range(n)]
     return [part / sum(parts) for part in parts]
 
 
-def _pick(stream: Stream, shares: list[float]) -> int:
+def pick(stream: Stream, shares: list[float]) -> int:
     left = stream.uniform(0.0, 1.0)
     for k, share in enumerate(shares[:-1]):
         left -= share
@@ -64,10 +64,10 @@ def _row(
     stream: Stream, of: list, shares: list[float], raters: tuple[int, float, float]
 ) -> list[object]:
     n_raters, faithful, gaps = raters
-    truth = _pick(stream, shares)
+    truth = pick(stream, shares)
     row = []
     for _ in range(n_raters):
-        k = truth if stream.chance(faithful) else _pick(stream, shares)
+        k = truth if stream.chance(faithful) else pick(stream, shares)
         row.append(None if stream.chance(gaps) else of[k])
     return row
 
@@ -78,8 +78,8 @@ def _counts(stream: Stream, n_items: int, shares: list[float]) -> list[list[obje
     rows = []
     for _ in range(n_items):
         n = 1 + stream.below(n_raters) if ragged else n_raters
-        truth, row = _pick(stream, shares), [0] * len(shares)
+        truth, row = pick(stream, shares), [0] * len(shares)
         for _ in range(n):
-            row[truth if stream.chance(0.6) else _pick(stream, shares)] += 1
+            row[truth if stream.chance(0.6) else pick(stream, shares)] += 1
         rows.append(row)
     return rows

@@ -1,11 +1,14 @@
 """Store golden results anew, and say what changed and by how much.
 
 ``python -m tests.golden.make [--dry-run] [GROUP ...]``
+
+The group "numbers" takes some minutes, and is made only where it is named.
 """
 
 import sys
 from collections import defaultdict
 
+from tests.golden import numbers
 from tests.golden.cases import GROUPS
 from tests.golden.compare import Change, changes
 from tests.golden.store import load, save
@@ -17,6 +20,9 @@ def main(arguments: list[str]) -> None:
     """Make the groups named, or all; with --dry-run nothing is stored."""
     dry = "--dry-run" in arguments
     names = [name for name in arguments if name != "--dry-run"] or list(GROUPS)
+    if numbers.GROUP in names:
+        names.remove(numbers.GROUP)
+        _make_numbers(dry)
     for group in names:
         stored = load(group)
         new = {case.name: case.make() for case in GROUPS[group]}
@@ -24,6 +30,17 @@ def main(arguments: list[str]) -> None:
         print(f"{group}: {len(new)} cases{size}")
         if stored:
             print("\n".join(_report(changes(group, stored, new))))
+
+
+def _make_numbers(dry: bool) -> None:
+    stored: dict = load(numbers.GROUP)
+    if stored:
+        changed, n_drawn = numbers.compared_by_two(stored)
+        print(f"{numbers.GROUP}: {len(stored)} tables, {n_drawn} drawn ends")
+        print("\n".join(_report(changed)))
+    if not dry:
+        size = save(numbers.GROUP, numbers.freeze(stored))
+        print(f"{numbers.GROUP}: {numbers.N_TABLES} tables, {size / 1e3:.0f} kB")
 
 
 def _report(every: list[Change]) -> list[str]:
