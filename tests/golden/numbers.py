@@ -18,11 +18,14 @@ from tests.golden.call import Stream
 from tests.golden.compare import Change
 from tests.golden.drawn import pick, shares_of
 from tests.golden.may_differ import IN_FORCE, Question, differences
+from tests.golden.store import load, save
 
 N_TABLES = 2000
 
 GROUP = "numbers"
-"""Name of the file."""
+
+TENTH = range(5, N_TABLES, 10)
+"""Tables that every run of the tests computes, in a file of their own."""
 
 NAMED = (
     "identity", "linear", "quadratic", "ordinal", "radical", "ratio", "circular",
@@ -239,6 +242,21 @@ def checksum(of: Table) -> int:
     """A number that another table would not have."""
     drawn = of.rows, of.categories, of.weights, of.level, of.clusters
     return zlib.crc32(repr(drawn).encode())
+
+
+def load_tables(*, tenth_alone: bool = False) -> dict[str, dict]:
+    """Every table as stored, or the tenth; none if nothing is."""
+    tenth: dict = load(f"{GROUP}-tenth")
+    return (
+        tenth if tenth_alone else dict(sorted((tenth | load(f"{GROUP}-rest")).items()))
+    )
+
+
+def save_tables(made: dict[str, dict]) -> int:
+    """Store every table; their size in bytes."""
+    tenth = {key: of for key, of in made.items() if int(key) in TENTH}
+    rest = {key: of for key, of in made.items() if key not in tenth}
+    return save(f"{GROUP}-tenth", tenth) + save(f"{GROUP}-rest", rest)
 
 
 def freeze(stored: dict[str, dict]) -> dict[str, dict]:
