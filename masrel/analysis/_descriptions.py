@@ -167,6 +167,7 @@ def presentations(ratings: Ratings) -> Presentations | None:
     if not known:
         return None
     felt = [row.felt for row in known]
+    grips = [row.grip_lost for row in known if row.grip_lost is not None]
     return Presentations(
         n_presentations=len(known),
         n_stretches=sum(row.n_stretches or 0 for row in known),
@@ -174,7 +175,7 @@ def presentations(ratings: Ratings) -> Presentations | None:
         n_below_threshold=felt.count("below-threshold"),
         n_no_catch=felt.count("no-catch"),
         n_unknown=felt.count(None),
-        n_grip_lost=sum(row.grip_lost is True for row in known),
+        n_grip_lost=sum(grips) if grips else None,
     )
 
 

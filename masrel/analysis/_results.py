@@ -238,8 +238,9 @@ class Presentations:
         Presentations in which what the model has was felt; in which no stretch reached
         ν_th; in which no catch came though the model has one at that speed; and those
         of which nobody knows.
-    n_grip_lost : int
-        Presentations in which the arm came loose and the model let it go.
+    n_grip_lost : int or None
+        Presentations in which the arm came loose and the model let it go; None where
+        no log says so of any.
     """
 
     n_presentations: int
@@ -248,7 +249,7 @@ class Presentations:
     n_below_threshold: int
     n_no_catch: int
     n_unknown: int
-    n_grip_lost: int
+    n_grip_lost: int | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
