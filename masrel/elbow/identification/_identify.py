@@ -73,7 +73,8 @@ _Floats = NDArray[np.float64]
 _WINDOW = 0.06  # of the filter of speeds, s: 20.5 Hz at 1 kHz
 # Two slow trials say little of how they differ, but not nothing of b.
 _MIN_DF = 4.0
-_NOT_BELOW_0 = ("damping", "stiffness", "inertia", "arm_inertia")
+# So many times its error may each be below 0: a joint may have no inertia at all.
+_MAX_BELOW_0 = {"damping": 1.0, "stiffness": 1.0, "inertia": 2.0, "arm_inertia": 2.0}
 
 
 def fit(
@@ -142,8 +143,8 @@ def fit(
     RecordingError
         If a recording is not usable, they are presentations of several models, there
         is no slow stretch, the slow stretches do
-        not tell b from k, or what comes out cannot be the law: b, k, m or J below 0, or
-        Q of 1 or more, by more than their error.
+        not tell b from k, or what comes out cannot be the law: b or k below 0, or
+        Q of 1 or more, by more than their error; m or J by more than twice theirs.
 
     Warns
     -----
@@ -372,7 +373,8 @@ def _check_ratio(estimates: Sequence[FittedParameter]) -> None:
                 f"more beyond its error (from {estimate.low:.3g}): the torque does not "
                 "fall from a peak to a residual"
             )
-        if estimate.name in _NOT_BELOW_0 and estimate.high < 0.0:
+        most = _MAX_BELOW_0.get(estimate.name, math.inf)
+        if estimate.value + most * (estimate.high - estimate.value) < 0.0:
             symbol = ALL_QUANTITIES[estimate.name].symbol
             raise RecordingError(
                 f"recordings: this is not the law: {symbol} of all trials is "
