@@ -102,6 +102,15 @@ def test_below_thirty_items_the_upper_end_goes_halfway_to_a_higher_posterior() -
     assert any("halfway" in note for note in found.notes)
 
 
+@pytest.mark.parametrize("weights", ["linear", "quadratic"])
+def test_no_end_of_a_weighted_coefficient_is_lifted(weights: str) -> None:
+    found = chosen(MEDIUM, "items", categories=LABELS, weights=weights)
+    value = fleiss_kappa(MEDIUM, categories=LABELS, weights=weights).value
+    # both ends are as far away on the logit between -1 and 1
+    low, middle, high = (logit((1 + x) / 2) for x in (found.low, value, found.high))
+    assert high - middle == pytest.approx(middle - low, rel=1e-9)
+
+
 def test_a_lower_posterior_lowers_no_end() -> None:
     # 29 items of which one is disputed: the jackknife reaches further up
     rows = [[0] * 4, [1] * 4] * 14 + [[0, 0, 1, 1]]
