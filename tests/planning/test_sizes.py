@@ -286,3 +286,26 @@ def test_items_for_the_width_of_an_icc_by_hand(
 ) -> None:
     options = {**NORMAL, "value": value, "n_raters": n_raters, "half_width": 0.1}
     assert plan(**options, method="wald").n_items == n_items
+
+
+def test_a_chance_that_goes_up_and_down_holds_from_the_size_on() -> None:
+    aim: dict[str, Any] = {"value": 0.8, "null": 0.4, "interval": "normal"}
+    options = {**KAPPA, **aim, "coefficient": "scott_pi"}
+    options |= {"prevalences": [0.5, 0.5], "method": "exact", "n_raters": 2}
+    n = sample_size(**options, power=0.7).n_items
+    power = {size: precision(**options, n_items=size).power for size in range(18, 26)}
+    assert power[18] > 0.7  # a smaller one has it, too
+    assert power[n - 1] < 0.7
+    assert all(power[size] >= 0.7 for size in range(n, 26))
+
+
+@pytest.mark.parametrize(
+    ("coefficient", "n_ratings"), [("scott_pi", 40), ("stratified_kappa", 80)]
+)
+def test_every_rating_costs_its_price(coefficient: str, n_ratings: int) -> None:
+    # 20 items, 2 raters, who rate each of them twice for agreement with themselves
+    options = {**KAPPA, "coefficient": coefficient, "prevalences": [0.5, 0.5]}
+    found = precision(
+        **options, n_items=20, n_raters=2, method="wald", prices=(1, 2, 3)
+    )
+    assert found.cost == 20 + 2 * 2 + 3 * n_ratings

@@ -448,6 +448,26 @@ def test_both_limits_hold_where_dummies_have_grades_too() -> None:
     assert no_pair(lambda m: "ABCDEFGHIJKL".index(m) % 4)(drawn)
 
 
+def test_runs_are_as_long_as_allowed_where_dummies_have_grades_too() -> None:
+    protocol = protocol_of(
+        models=MODELS,
+        dummies=tuple("EFGH"),
+        grades={model: str(i % 2) for i, model in enumerate(MODELS)},
+        scheme="restricted",
+        standards_apart=True,
+        max_same_grade=2,
+    )
+    runs = Counter(
+        len(list(run))
+        for number in range(100)
+        for _, run in itertools.groupby(
+            order(protocol, "R1", secret=number.to_bytes(16, "big")),
+            key=lambda model: MODELS.index(model) % 2,
+        )
+    )
+    assert set(runs) == {1, 2}
+
+
 def test_orders_that_cannot_be_counted_or_are_not_there_are_named(
     tmp_path: Path,
 ) -> None:
