@@ -1,15 +1,14 @@
 """Agreement of ratings, and studies on a haptic simulator of elbow spasticity.
 
-The flow, each stage handing the next a file that a person can open::
+Statistics, for anybody with ratings::
 
-    protocol -> schedule -> run -> ratings -> analysis -> report
-
-and the libraries beside it, which know nothing of studies::
-
+    ratings     any file of ratings, read and checked
     agreement   coefficients of agreement, from any table of ratings
     intervals   intervals for them: analytic, jackknife, bootstrap, posterior
-    elbow       the spastic joint: events, torque, traces
-    hess        the driver of the simulator, on a simulated device by default
+    planning    how large a study must be
+    audit       whether the numbers that a paper prints can be
+
+and `masrel.lab`, the laboratory, which stands on them and which they never import.
 """
 
 import importlib
@@ -17,18 +16,7 @@ from types import ModuleType
 
 __version__ = "0.1.0"
 
-__all__ = [
-    "agreement",
-    "analysis",
-    "elbow",
-    "hess",
-    "intervals",
-    "protocol",
-    "ratings",
-    "report",
-    "run",
-    "schedule",
-]
+__all__ = ["agreement", "audit", "intervals", "lab", "planning", "ratings"]
 
 
 def __getattr__(name: str) -> ModuleType:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from masrel.errors import ParameterError, RecordingError
-from masrel.recording import (
+from masrel.lab.recording import (
     MEASURED_TORQUE,
     RECORDING_COLUMNS,
     Channel,

@@ -5,8 +5,8 @@ from math import degrees
 import numpy as np
 import pytest
 
-from masrel.elbow import STANDARD_MODELS, SampledJoint
-from masrel.recording import RECORDING_COLUMNS, Recording, Stretch, stretches
+from masrel.lab.elbow import STANDARD_MODELS, SampledJoint
+from masrel.lab.recording import RECORDING_COLUMNS, Recording, Stretch, stretches
 from tests.hess.rig import START, present
 
 THRESHOLD = {"speed_threshold_deg_s": 20.0}

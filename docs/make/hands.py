@@ -13,9 +13,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
-from masrel.hess import HandTraits
-from masrel.recording import PHASES
-from masrel.report.figures._style import GREY, VERMILLION, finished, house_style
+from masrel.lab.hess import HandTraits
+from masrel.lab.recording import PHASES
+from masrel.plots._style import GREY, VERMILLION, finished, house_style
 from tests.hess.held import (
     FREE_END_DEG,
     PRE_CATCH,

@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from masrel.elbow import STANDARD_MODELS, fit, fit_friction
-from masrel.elbow.identification._quantities import QUANTITIES
-from masrel.report._figure_data import FrictionView, JointFitView
-from masrel.report.figures import draw
+from masrel.lab.elbow import STANDARD_MODELS, fit, fit_friction
+from masrel.lab.elbow.identification._quantities import QUANTITIES
+from masrel.lab.report._figure_data import FrictionView, JointFitView
+from masrel.plots import draw
 from tests.elbow.identification.synthesis import Scatter, recording, study
 from tests.elbow.identification.test_friction import backdriven
 from tests.elbow.identification.test_lack_of_fit import (

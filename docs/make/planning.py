@@ -269,7 +269,7 @@ def of_latent(model: LatentModel) -> float:
 def _error_figure() -> None:
     from matplotlib.figure import Figure
 
-    from masrel.report.figures._style import BLUE, VERMILLION, finished, house_style
+    from masrel.plots._style import BLUE, VERMILLION, finished, house_style
 
     common = {**DESIGNS[5], "rng": 1}
     plan = sample_size(**common)

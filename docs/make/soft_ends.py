@@ -10,8 +10,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from masrel.elbow import STANDARD_MODELS
-from masrel.hess import (
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.hess import (
     Controller,
     DeviceLimits,
     SimulatedClock,
@@ -20,7 +20,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.recording import Recording
+from masrel.lab.recording import Recording
 
 FIGURE = Path(__file__).parents[1] / "figures" / "soft_ends.png"
 START = math.radians(30.0)

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from masrel.elbow import Hold, Joined, MinimumJerk, Reversed
-from masrel.elbow.tone import (
+from masrel.lab.elbow import Hold, Joined, MinimumJerk, Reversed
+from masrel.lab.elbow.tone import (
     ClaspKnife,
     Clonus,
     Cogwheel,
@@ -20,9 +20,9 @@ from masrel.elbow.tone import (
     ThresholdReflex,
     ToneModel,
 )
-from masrel.hess import Rendering, render
-from masrel.report._figure_data import ToneLine, ToneView
-from masrel.report.figures import draw
+from masrel.lab.hess import Rendering, render
+from masrel.lab.report._figure_data import ToneLine, ToneView
+from masrel.plots import draw
 
 FIGURES = Path(__file__).parents[1] / "figures"
 START = math.radians(30.0)

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from masrel.hess import HandTraits
-from masrel.report.figures._style import (
+from masrel.lab.hess import HandTraits
+from masrel.plots._style import (
     BLUE,
     SHADES,
     VERMILLION,

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.intervals import estimate
-from masrel.protocol import Training
-from masrel.training import Calibration, Criterion, calibrate, confusion
-from masrel.training._trainees import (
+from masrel.lab.protocol import Training
+from masrel.lab.training import Calibration, Criterion, calibrate, confusion
+from masrel.lab.training._trainees import (
     SKILLS,
     adaptive_weights,
     confusion_with_kappa,

@@ -68,7 +68,10 @@ GROUPS = {
 """Verbs with their summaries, as --help shows them."""
 
 VERBS = {verb: text for verbs in GROUPS.values() for verb, text in verbs.items()}
-"""Verb to summary. The verb ``x`` is the command ``x`` of ``masrel.cli.x``."""
+"""Verb to summary. The verb ``x`` is the command ``x`` of the module ``x``."""
+
+_STATISTICS = ("agree", "audit", "latent", "plan")
+"""Verbs that need no study; the modules of the others are in the laboratory."""
 
 
 class _Verbs(click.Group):
@@ -82,7 +85,8 @@ class _Verbs(click.Group):
             if not ctx.resilient_parsing:  # as it is where a shell completes names
                 _refuse_verb(ctx, cmd_name)
             return None
-        module = importlib.import_module(f"masrel.cli.{cmd_name}")
+        package = "masrel.cli" if cmd_name in _STATISTICS else "masrel.lab.cli"
+        module = importlib.import_module(f"{package}.{cmd_name}")
         command: click.Command = getattr(module, cmd_name)
         return command
 

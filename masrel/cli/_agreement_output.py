@@ -15,10 +15,10 @@ from masrel.cli._options import OutputOptions, echo_notes, write_output
 from masrel.cli._reading import ReadingOptions, what_was_read
 
 if TYPE_CHECKING:
+    from masrel.plots._drawn_values import Content
     from masrel.ratings import RatingsFile
-    from masrel.report._figure_data import Content
-    from masrel.report._further_tables import FurtherTable
-    from masrel.report._tables import Table
+    from masrel.tables._further_tables import FurtherTable
+    from masrel.tables._tables import Table
 
 
 _WIDTHS = (88, 100)
@@ -76,7 +76,7 @@ class FileAgreement:
     def tables(self, *, in_sentences: bool) -> "list[Table]":
         """Return the table of the estimates and those below it."""
         # in_sentences: whether sentences take the place of the first
-        from masrel.report._agreement_table import agreement_table
+        from masrel.tables._agreement_table import agreement_table
 
         read, notes = tuple(what_was_read(self.ratings)), self.notes()
         more = [other.table for other in self.further]
@@ -98,14 +98,14 @@ class FileAgreement:
 
     def sentences(self) -> str:
         """Return a sentence for every estimate."""
-        from masrel.report._agreement_table import agreement_sentences
+        from masrel.tables._agreement_table import agreement_sentences
 
         words = self.options.words
         return agreement_sentences(self.rows, by=self.by, bands=words, data=self.data)
 
     def record(self) -> dict[str, object]:
         """Return everything for JSON."""
-        from masrel.report._agreement_table import agreement_record
+        from masrel.tables._agreement_table import agreement_record
 
         read = self.ratings.read
         record = agreement_record(
@@ -126,7 +126,7 @@ class FileAgreement:
 
     def figure(self) -> "Callable[[], Content] | None":
         """Return what makes the figure: that of a table, else of the estimates."""
-        from masrel.report._agreement_table import agreement_forest
+        from masrel.tables._agreement_table import agreement_forest
 
         for other in self.further:
             if other.figure is not None:
@@ -152,7 +152,7 @@ class FileAgreement:
 
 def write_agreement(agreement: FileAgreement, output: OutputOptions) -> None:
     """Print and write estimates in the forms that were chosen."""
-    from masrel.report._tables import SIMULATED
+    from masrel.tables._tables import SIMULATED
 
     ratings, is_sentence = agreement.ratings, output.sentence and bool(agreement.rows)
     table, *more = agreement.tables(in_sentences=output.sentence)

@@ -17,7 +17,7 @@ from masrel.errors import MasrelWarning, ParameterError
 
 if TYPE_CHECKING:
     from masrel.ratings import RatingsFile
-    from masrel.report._further_tables import FurtherTable
+    from masrel.tables._further_tables import FurtherTable
 
 _PAIRS = ("stratified_kappa", "pooled_kappa")
 """Coefficients of each rater's grades of two sessions."""
@@ -226,7 +226,7 @@ def further_tables(
         # Every note is in a result, and so below its table or in the JSON.
         warnings.simplefilter("ignore", MasrelWarning)
         if further.retest or further.each_category:
-            from masrel.report._further_tables import category_table, retest_table
+            from masrel.tables._further_tables import category_table, retest_table
 
             if further.retest:
                 tables.append(retest_table(file, options, explain=explain))
@@ -235,12 +235,12 @@ def further_tables(
         if further.diagnose:
             tables += _diagnosis(file, further, options)
         if further.symmetry or further.indices:
-            from masrel.report._two_rater_tables import index_table, symmetry_table
+            from masrel.tables._two_rater_tables import index_table, symmetry_table
 
             tables += [symmetry_table(others)] if further.symmetry else []
             tables += [index_table(others)] if further.indices else []
         if further.limits_of_agreement:
-            from masrel.report._limits_table import limits_table
+            from masrel.tables._limits_table import limits_table
 
             tables.append(limits_table(others, level=options.level, unit=further.unit))
         between = further.between_raters(others, options)
@@ -254,7 +254,7 @@ def _diagnosis(
     further: FurtherOptions,
     options: EstimateOptions,
 ) -> "list[FurtherTable]":
-    from masrel.report._diagnosis_tables import diagnosis_tables
+    from masrel.tables._diagnosis_tables import diagnosis_tables
 
     if options.takes_all or (options.coefficients is None and options.metric is None):
         options = replace(options, coefficients=["fleiss_kappa"])
@@ -269,7 +269,7 @@ def _diagnosis(
 
 
 def _comparisons(file: "RatingsFile", options: EstimateOptions) -> "list[FurtherTable]":
-    from masrel.report._comparison_tables import difference_table, equality_table
+    from masrel.tables._comparison_tables import difference_table, equality_table
 
     n_raters = max(len(part.raters) for part in file.parts) or file.read["n_raters"]
     of_all = entries(options, n_raters, file.scale, file.is_ordered)

@@ -13,13 +13,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from masrel._files import write_file
-from masrel.cli._paths import FileInFolder, InputFile, OutputFile, note_inputs
+from masrel.cli._paths import FileInFolder, OutputFile
 from masrel.errors import MasrelWarning, ParameterError
 
 if TYPE_CHECKING:
-    from masrel.ratings import StudyData
-    from masrel.report._figure_data import Content, Form
-    from masrel.report._tables import Table
+    from masrel.plots._drawn_values import Content, Form
+    from masrel.tables._tables import Table
 
 Command = Callable[..., None]
 Decorator = Callable[[Command], Command]
@@ -66,35 +65,6 @@ def grouped(name: str, group: type, *options: Callable[..., Any]) -> Decorator:
 def split_commas(text: str) -> list[str]:
     """Return the parts of an option's value between its commas."""
     return [part.strip() for part in text.split(",")]
-
-
-ratings_option = click.option(
-    "--ratings",
-    "ratings_file",
-    type=InputFile(path_type=Path),
-    help="File of ratings to use whatever the session logs say; default: what they "
-    "say, and without logs the study's ratings.csv, else published.csv.",
-)
-
-
-def read_study(root: Path, ratings_file: Path | None) -> "StudyData":
-    """Return a study's protocol and its ratings; say what must be known beside."""
-    from masrel.protocol import StudyPaths, read_protocol
-    from masrel.ratings import read_study_data, study_remarks
-
-    paths = StudyPaths(root)
-    protocol = read_protocol(paths.protocol)
-    models = [paths.root / model.file for model in protocol.models if model.file]
-    tables = (paths.ratings_file, paths.published_file, paths.in_person_file)
-    note_inputs(*tables, *models)
-    # Said first: it may be why the ratings are refused.
-    echo_remarks(study_remarks(paths, protocol, file=ratings_file))
-    return read_study_data(paths, protocol, file=ratings_file)
-
-
-def echo_remarks(remarks: Sequence[str]) -> None:
-    """Print on stderr what a reader of a study's ratings must know beside them."""
-    echo_notes(tuple(f"note: {remark}" for remark in remarks))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -199,7 +169,7 @@ def write_output(
         write_json(document(), output.json_file)
     if figure is not None and output.figure is not None:
         # Imported here: a table loads nothing that draws.
-        from masrel.report.figures import draw
+        from masrel.plots import draw
 
         form = _FORMS[output.figure.suffix.lower()]
         files = draw(figure(), stamp=stamp, forms=(form,))
@@ -208,8 +178,8 @@ def write_output(
 
 
 def _print_table(table: "Table", output: OutputOptions, width: int | None) -> None:
-    from masrel.report._latex import as_latex
-    from masrel.report._tables import as_csv, as_text
+    from masrel.tables._latex import as_latex
+    from masrel.tables._tables import as_csv, as_text
 
     if output.csv:
         shown = as_csv(table, raw=output.raw_csv)

@@ -180,7 +180,7 @@ table_options = [
 
 def what_was_read(file: "RatingsFile") -> list[str]:
     """Return the lines that say what was read, above a table."""
-    from masrel.report._tables import counted
+    from masrel.tables._tables import counted
 
     read = file.read
     form = [read["format"], read.get("delimiter"), read.get("encoding")]

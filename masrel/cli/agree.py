@@ -114,7 +114,7 @@ _estimate_options = grouped(
 
 def _register() -> str:
     from masrel.agreement import COEFFICIENTS
-    from masrel.report._tables import aligned
+    from masrel.tables._tables import aligned
 
     lines = [("name", "title", "raters", "weights", "also called")]
     for entry in COEFFICIENTS.values():

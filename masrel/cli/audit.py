@@ -18,7 +18,7 @@ from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
     from masrel.audit import Claim
-    from masrel.report._tables import Table
+    from masrel.tables._tables import Table
 
 _WIDTH = 88  # of notes below a table
 _WEIGHTS = click.Choice(["identity", "linear", "quadratic", "any"])
@@ -119,7 +119,7 @@ def audit(source: Path | None, printed: _Printed, output: OutputOptions) -> None
     """
     claims = _claims(source, printed)
     from masrel.audit import audit_claim
-    from masrel.report._claims_table import (
+    from masrel.tables._claims_table import (
         claims_document,
         claims_table,
         readings_table,
@@ -144,7 +144,6 @@ def audit(source: Path | None, printed: _Printed, output: OutputOptions) -> None
 
 def _claims(source: Path | None, printed: _Printed) -> "tuple[Claim, ...]":
     from masrel.audit import read_claims
-    from masrel.protocol import StudyPaths
 
     if source is None:
         try:
@@ -157,7 +156,11 @@ def _claims(source: Path | None, printed: _Printed) -> "tuple[Claim, ...]":
         raise ParameterError(
             f"{source}: has claims of its own, so it needs no option that has one"
         )
-    file = StudyPaths(source).claims_file if source.is_dir() else source
+    file = source
+    if source.is_dir():
+        from masrel.lab.protocol import StudyPaths
+
+        file = StudyPaths(source).claims_file
     if source.is_dir() and not file.exists():
         raise ParameterError(
             f"{source}: needs a file of claims, ratings/claims.csv, got none"

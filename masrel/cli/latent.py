@@ -84,12 +84,12 @@ def latent(
         compare=not one_prior,
         is_quiet=output.quiet,
     )
-    from masrel.report._latent_trait import (
+    from masrel.tables._latent_trait import (
         latent_document,
         latent_scale,
         latent_table,
     )
-    from masrel.report._tables import SIMULATED
+    from masrel.tables._tables import SIMULATED
 
     grades, simulated = ratings.scale.grades, ratings.simulated
     write_output(

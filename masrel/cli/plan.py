@@ -11,7 +11,6 @@ from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.cli._paths import InputFile
 from masrel.cli._planning_options import PlanningOptions, planning_options
 from masrel.cli._progress import Progress, duration_words, progress
-from masrel.cli._study_plans import study_plans
 from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -49,7 +48,7 @@ def plan(
         raise ParameterError("--toml: needs one --value for each line of a study")
     if output.figure is not None:
         _check_curve(plans)
-    from masrel.report._planning_tables import (
+    from masrel.tables._planning_tables import (
         planning_curves,
         planning_document,
         planning_sentence,
@@ -89,6 +88,8 @@ def _plans(
         unit = " a size" if is_solved else ""
         count = _StudyCount(bar, unit, is_quiet=is_quiet)
         if study is not None:
+            from masrel.lab.cli._study_plans import study_plans
+
             return study_plans(study, options, count.of_plans)
         return (), (_single(options, count),)
 

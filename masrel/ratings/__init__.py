@@ -1,125 +1,17 @@
-"""Tables of ratings: where they come from, and how statistics take them.
-
-In: session logs, a study's table, or any file of ratings. Out: a checked table, the
-item by rater matrix of one session, and the pairs of two.
-"""
+"""Ratings from any file: what was read, checked and put together item by rater."""
 
 import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from masrel.ratings._parts import RatingsPart, Repeated
-    from masrel.ratings.answers import (
-        RECONSTRUCTED,
-        GivenAnswer,
-        answers_csv,
-        answers_from_logs,
-        answers_of,
-        read_answers,
-        write_answers,
-    )
-    from masrel.ratings.completeness import (
-        Correction,
-        corrections_of,
-        study_remarks,
-    )
-    from masrel.ratings.in_person import InPerson, InPersonRow, read_in_person
-    from masrel.ratings.logs import ratings_from_logs
     from masrel.ratings.reader import RatingsFile, read_ratings
-    from masrel.ratings.study_data import (
-        StudyData,
-        in_person_of,
-        read_study_data,
-        table_differences,
-    )
-    from masrel.ratings.study_file import read_study_ratings
-    from masrel.ratings.table import (
-        DEFAULT_SESSION,
-        RATING_COLUMNS,
-        SOURCES,
-        Rating,
-        RatingMatrix,
-        Ratings,
-        RetestPairs,
-        rating_matrix,
-        ratings_csv,
-        ratings_from_rows,
-        retest_pairs,
-        write_ratings,
-    )
 
-__all__ = [
-    "DEFAULT_SESSION",
-    "RATING_COLUMNS",
-    "RECONSTRUCTED",
-    "SOURCES",
-    "Correction",
-    "GivenAnswer",
-    "InPerson",
-    "InPersonRow",
-    "Rating",
-    "RatingMatrix",
-    "Ratings",
-    "RatingsFile",
-    "RatingsPart",
-    "Repeated",
-    "RetestPairs",
-    "StudyData",
-    "answers_csv",
-    "answers_from_logs",
-    "answers_of",
-    "corrections_of",
-    "in_person_of",
-    "rating_matrix",
-    "ratings_csv",
-    "ratings_from_logs",
-    "ratings_from_rows",
-    "read_answers",
-    "read_in_person",
-    "read_ratings",
-    "read_study_data",
-    "read_study_ratings",
-    "retest_pairs",
-    "study_remarks",
-    "table_differences",
-    "write_answers",
-    "write_ratings",
-]
-
-_HOMES = {
-    "answers": (
-        "RECONSTRUCTED",
-        "GivenAnswer",
-        "answers_csv",
-        "answers_from_logs",
-        "answers_of",
-        "read_answers",
-        "write_answers",
-    ),
-    "completeness": (
-        "Correction",
-        "corrections_of",
-        "study_remarks",
-    ),
-    "in_person": ("InPerson", "InPersonRow", "read_in_person"),
-    "logs": ("ratings_from_logs",),
-    "_parts": ("RatingsPart", "Repeated"),
-    "reader": ("RatingsFile", "read_ratings"),
-    "study_data": (
-        "StudyData",
-        "in_person_of",
-        "read_study_data",
-        "table_differences",
-    ),
-    "study_file": ("read_study_ratings",),
-}
-"""Module to the names in it; all other names are of `table`."""
+__all__ = ["RatingsFile", "RatingsPart", "Repeated", "read_ratings"]
 
 
 def __getattr__(name: str) -> object:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    home = next((home for home, names in _HOMES.items() if name in names), "table")
-    value = getattr(importlib.import_module(f"masrel.ratings.{home}"), name)
-    globals()[name] = value  # the next use finds it without coming here
-    return value
+    home = "reader" if name in ("RatingsFile", "read_ratings") else "_parts"
+    return getattr(importlib.import_module(f"masrel.ratings.{home}"), name)

@@ -5,9 +5,9 @@ from typing import Any
 
 import msgspec
 
-from masrel.protocol import EstimatePlan, Protocol, read_protocol, scale_of
-from masrel.ratings import InPerson, Ratings, ratings_from_rows, read_in_person
-from masrel.ratings import read_study_ratings as read
+from masrel.lab.protocol import EstimatePlan, Protocol, read_protocol, scale_of
+from masrel.lab.ratings import InPerson, Ratings, ratings_from_rows, read_in_person
+from masrel.lab.ratings import read_study_ratings as read
 
 STUDY = Path(__file__).parents[2] / "studies/hess2012"
 PUBLISHED = STUDY / "ratings/published.csv"

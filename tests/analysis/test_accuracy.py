@@ -5,9 +5,9 @@ import math
 
 import pytest
 
-from masrel.analysis import InPersonAgreement, IntendedAgreement, analyze
 from masrel.errors import RatingsError
-from masrel.ratings import InPerson, Ratings
+from masrel.lab.analysis import InPersonAgreement, IntendedAgreement, analyze
+from masrel.lab.ratings import InPerson, Ratings
 from tests.analysis.studies import in_person, of_session, protocol_with, ratings
 
 

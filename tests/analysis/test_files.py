@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from masrel.analysis import Analysis, analyze, as_analysis_document, write_analysis
 from masrel.errors import UndefinedStatisticWarning
-from masrel.protocol import protocol_hash
-from masrel.ratings import ratings_csv
+from masrel.lab.analysis import Analysis, analyze, as_analysis_document, write_analysis
+from masrel.lab.protocol import protocol_hash
+from masrel.lab.ratings import ratings_csv
 from tests.analysis.studies import (
     IN_PERSON,
     PUBLISHED,

@@ -8,10 +8,10 @@ import sys
 import pytest
 
 from masrel.agreement import cohen_kappa, fleiss_kappa, icc
-from masrel.analysis import to_frame
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval
 from masrel.intervals import estimate
+from masrel.lab.analysis import to_frame
 
 RATINGS = [["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"], ["a", "a"]] * 3
 
@@ -60,7 +60,7 @@ def test_what_is_no_estimate_is_refused() -> None:
 
 def test_pandas_is_loaded_only_when_asked_for() -> None:
     code = (
-        "import sys\nfrom masrel.analysis import to_frame\n"
+        "import sys\nfrom masrel.lab.analysis import to_frame\n"
         "before = 'pandas' in sys.modules\nto_frame([])\n"
         "print(before, 'pandas' in sys.modules)"
     )

@@ -10,10 +10,10 @@ import pytest
 import statsmodels.api as sm
 from scipy.optimize import minimize
 
-from masrel.analysis import GradeRegression, grade_regression
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
-from masrel.protocol import Protocol, read_protocol, scale_of
-from masrel.ratings import Ratings, ratings_from_rows, read_study_ratings
+from masrel.lab.analysis import GradeRegression, grade_regression
+from masrel.lab.protocol import Protocol, read_protocol, scale_of
+from masrel.lab.ratings import Ratings, ratings_from_rows, read_study_ratings
 from tests.protocol.documents import VALID, write
 
 STUDY = Path(__file__).parents[2] / "studies" / "hess2012"

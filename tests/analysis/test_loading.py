@@ -4,7 +4,7 @@ from tests.architecture.test_imports import loaded_after
 
 ANALYZE = """
 from tests.analysis.studies import plan, protocol_with, table_v
-from masrel.analysis import analyze
+from masrel.lab.analysis import analyze
 analyze(protocol_with(plan(interval={interval!r})), table_v())
 import sys
 """

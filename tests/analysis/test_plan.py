@@ -10,7 +10,6 @@ import pytest
 
 from masrel import intervals
 from masrel.agreement import COEFFICIENTS
-from masrel.analysis import analyze
 from masrel.errors import (
     MasrelError,
     MasrelWarning,
@@ -19,8 +18,9 @@ from masrel.errors import (
 )
 from masrel.estimates import Estimate
 from masrel.intervals import estimate
-from masrel.protocol import EstimatePlan, ScaleDefinition, scale_of
-from masrel.ratings import Ratings, ratings_from_rows
+from masrel.lab.analysis import analyze
+from masrel.lab.protocol import EstimatePlan, ScaleDefinition, scale_of
+from masrel.lab.ratings import Ratings, ratings_from_rows
 from tests.analysis.studies import of_session, plan, protocol_with, ratings, table_v
 
 TWO = ratings(

@@ -2,9 +2,9 @@
 
 import pytest
 
-from masrel.analysis import PlannedEstimate, analyze
 from masrel.errors import UndefinedStatisticWarning
-from masrel.ratings import Ratings
+from masrel.lab.analysis import PlannedEstimate, analyze
+from masrel.lab.ratings import Ratings
 from tests.analysis.studies import of_session, plan, protocol_with, ratings
 
 # Rater by rater, HM1 to HM4. R1 repeats 3 of 4 grades, R2 all, R3 two of four.

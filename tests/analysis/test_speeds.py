@@ -2,8 +2,8 @@
 
 import math
 
-from masrel.analysis import Speeds, analyze
-from masrel.ratings import Ratings, ratings_from_rows
+from masrel.lab.analysis import Speeds, analyze
+from masrel.lab.ratings import Ratings, ratings_from_rows
 from masrel.scales import MODIFIED_ASHWORTH
 from tests.analysis.studies import protocol_with, ratings
 

@@ -16,7 +16,7 @@ import msgspec
 import pytest
 from scipy import stats
 
-from masrel.analysis import Analysis, analyze
+from masrel.lab.analysis import Analysis, analyze
 from tests.analysis.studies import (
     hess2012,
     in_person,

@@ -16,7 +16,7 @@ from docs.make.api import MODULES
 # of one line may be all (ES01), it begins on the first line (GL01), and what a function
 # returns has no name (RT02).
 PROTOCOL_PAGE = Path(__file__).parents[2] / "docs" / "protocol.md"
-MADE_BY_A_METHOD = {"masrel.run.SessionLog"}  # never called: its `open` is
+MADE_BY_A_METHOD = {"masrel.lab.run.SessionLog"}  # never called: its `open` is
 LEFT_OUT = {"EX01", "SA01", "ES01", "GL01", "GL08", "RT02"}
 
 
@@ -49,7 +49,9 @@ def faults(name: str) -> list[str]:
     if fields(thing) or getattr(thing, "_is_protocol", False) or not is_called:
         codes.pop("PR01", None)  # is of calls; fields are attributes
     listed = inspect.getdoc(thing) or ""
-    if module == "masrel.protocol":  # keys of a protocol file have a page of their own
+    if (
+        module == "masrel.lab.protocol"
+    ):  # keys of a protocol file have a page of their own
         listed += PROTOCOL_PAGE.read_text(encoding="utf-8")
     for field in fields(thing):
         if not re.search(

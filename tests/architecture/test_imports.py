@@ -60,17 +60,17 @@ def test_one_kappa_loads_numpy_alone() -> None:
 
 
 def test_an_analysis_loads_no_matplotlib() -> None:
-    loaded = loaded_after("import masrel.analysis, masrel.ratings")
+    loaded = loaded_after("import masrel.lab.analysis, masrel.ratings")
     assert loaded & {"matplotlib", "emcee", "statsmodels"} == set()
 
 
 def test_sub_packages_come_on_first_use() -> None:
-    assert "numpy" in loaded_after("import masrel\nmasrel.elbow.STANDARD_MODELS")
+    assert "numpy" in loaded_after("import masrel\nmasrel.lab.elbow.STANDARD_MODELS")
 
 
 def test_the_pages_load_their_server_only_when_they_are_served() -> None:
     libraries = {"starlette", "uvicorn", "segno", "anyio", "jinja2"}
-    code = "import masrel.serve, masrel.cli.serve\nmasrel.cli.serve.serve(['--help'])"
+    code = "from masrel.lab.cli import serve\nserve.serve(['--help'])"
     assert loaded_after(code) & (libraries | HEAVY) == set()
     # nor does the process of a session, beside whose loop nothing else runs
-    assert loaded_after("import masrel.serve._session_process") & libraries == set()
+    assert loaded_after("import masrel.lab.serve._session_process") & libraries == set()

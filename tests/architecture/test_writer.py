@@ -10,9 +10,9 @@ PACKAGE = Path(masrel.__file__).parent
 
 WRITERS = {
     "_files.py",
-    "_event_log.py",  # lines are added to a log
-    "cli/_gating.py",  # a summary that a CI system gives is added to
-    "hess/_spool.py",  # samples while they are taken
+    "lab/_event_log.py",  # lines are added to a log
+    "lab/cli/_gating.py",  # a summary that a CI system gives is added to
+    "lab/hess/_spool.py",  # samples while they are taken
     "ratings/_typed_files.py",  # a temporary file for a library that reads no bytes
 }
 

@@ -22,10 +22,10 @@ import httpx
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.protocol import StudyPaths
-from masrel.recording import RAMPS, read_recording
-from masrel.serve._access import Role
-from masrel.serve._live import SampleTail
+from masrel.lab.protocol import StudyPaths
+from masrel.lab.recording import RAMPS, read_recording
+from masrel.lab.serve._access import Role
+from masrel.lab.serve._live import SampleTail
 from tests.serve.desks import small_study
 from tests.serve.served import Served
 

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from masrel.elbow import STANDARD_MODELS
-from masrel.hess import (
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.hess import (
     Controller,
     DeviceLimits,
     SimulatedClock,
@@ -25,7 +25,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.hess._plant import Plant, PlantParameters
+from masrel.lab.hess._plant import Plant, PlantParameters
 
 START, END = radians(30.0), radians(146.0)
 ARM = PlantParameters()

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from unittest import mock
 
-from masrel.protocol import (
+from masrel.lab.protocol import (
     Protocol,
     StudyPaths,
     copy_template,
@@ -14,10 +14,10 @@ from masrel.protocol import (
     protocol_hash,
     read_protocol,
 )
-from masrel.ratings import ratings_from_logs, write_ratings
-from masrel.recording import read_recording, write_recording
-from masrel.run import SessionLog, SimulatedGrades, read_log, run_session
-from masrel.schedule import read_schedule, write_schedules
+from masrel.lab.ratings import ratings_from_logs, write_ratings
+from masrel.lab.recording import read_recording, write_recording
+from masrel.lab.run import SessionLog, SimulatedGrades, read_log, run_session
+from masrel.lab.schedule import read_schedule, write_schedules
 
 PER_RATER = 16  # four models, four times each
 

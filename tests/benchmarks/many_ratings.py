@@ -4,7 +4,7 @@ import csv
 import random
 from pathlib import Path
 
-from masrel.protocol import copy_template
+from masrel.lab.protocol import copy_template
 
 _GRADES = ("0", "1", "1+", "2", "3", "4")
 _RETESTED = 5  # every so manyth rater comes again

@@ -32,8 +32,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize, nnls
 from scipy.signal import savgol_filter
 
-from masrel.elbow import STANDARD_MODELS, ElbowParameters, SampledJoint, fit
 from masrel.errors import MasrelError
+from masrel.lab.elbow import STANDARD_MODELS, ElbowParameters, SampledJoint, fit
 
 Floats = NDArray[np.float64]
 DELAY = 0.03  # s, of the reflex

@@ -13,17 +13,17 @@ from pathlib import Path
 import docx
 import pytest
 
-from masrel.checklist import (
+from masrel.errors import ParameterError
+from masrel.lab.checklist import (
     Checklist,
     checklist_markdown,
     fill_checklist,
     write_checklist,
 )
-from masrel.conduct import record_standing
-from masrel.errors import ParameterError
-from masrel.protocol import Protocol, StudyPaths, read_protocol
-from masrel.run import ScriptGrades, record_correction, run_session
-from masrel.schedule import read_schedule
+from masrel.lab.conduct import record_standing
+from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
+from masrel.lab.run import ScriptGrades, record_correction, run_session
+from masrel.lab.schedule import read_schedule
 from tests.run.conftest import new_study, small
 
 __all__ = ["new_study", "small"]

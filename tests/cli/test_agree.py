@@ -153,7 +153,7 @@ def test_a_kappa_loads_no_interval_and_no_figure(wide: Path) -> None:
         "import sys; from masrel.cli import cli; "
         f"cli(['agree', {str(wide)!r}], standalone_mode=False); "
         "print([m for m in ('scipy', 'emcee', 'matplotlib', 'statsmodels', "
-        "'masrel.intervals', 'masrel.hess') if m in sys.modules])"
+        "'masrel.intervals', 'masrel.lab.hess') if m in sys.modules])"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from masrel.report.figures._style import STYLE
+from masrel.plots._style import STYLE
 from tests.architecture.test_imports import loaded_after
 from tests.cli.process import Caller
 

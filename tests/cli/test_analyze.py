@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from masrel.protocol import copy_template
+from masrel.lab.protocol import copy_template
 from tests.architecture.test_imports import loaded_after
 from tests.cli.process import Caller
 

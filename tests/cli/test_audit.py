@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from masrel.protocol import copy_template
+from masrel.lab.protocol import copy_template
 from tests.cli.process import Caller
 
 CLAIM = ("audit", "--items", 20, "--categories", 2, "--agreement", "85.0")

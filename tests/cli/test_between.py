@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from masrel.elbow import STANDARD_MODELS, intermediate_models
-from masrel.protocol import elbow_parameters, read_model_file, read_protocol
+from masrel.lab.elbow import STANDARD_MODELS, intermediate_models
+from masrel.lab.protocol import elbow_parameters, read_model_file, read_protocol
 from tests.cli.process import Caller, Done
 
 STANDARDS = ("HM1", "HM2", "HM3", "HM4")

@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner
 
 from masrel.cli import cli
-from masrel.protocol import StudyPaths, copy_template
+from masrel.lab.protocol import StudyPaths, copy_template
 
 FIELDS = """
 [rater_fields.years]

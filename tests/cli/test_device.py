@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from masrel.hess import puck
-from masrel.hess.puck import steady_runs
+from masrel.lab.hess import puck
+from masrel.lab.hess.puck import steady_runs
 
 from .process import Caller
 

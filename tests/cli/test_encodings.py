@@ -94,7 +94,7 @@ def test_any_backend_of_matplotlib_draws(
 @SLOW
 def test_the_backend_of_a_notebook_stays_the_one_it_has() -> None:
     code = (
-        "import os, masrel.report.figures, matplotlib as m;"
+        "import os, masrel.lab.report.figures, matplotlib as m;"
         "print(m.get_backend(), os.environ['MPLBACKEND'])"
     )
     done = subprocess.run(

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from masrel.protocol import copy_template
+from masrel.lab.protocol import copy_template
 from tests.cli.process import Caller
 
 

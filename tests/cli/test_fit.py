@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from masrel.elbow import STANDARD_MODELS
-from masrel.elbow.identification import Movement
-from masrel.protocol import elbow_parameters, read_protocol
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.elbow.identification import Movement
+from masrel.lab.protocol import elbow_parameters, read_protocol
 from tests.cli.process import Caller
 from tests.elbow.identification.synthesis import Arm, study
 from tests.elbow.identification.test_friction import backdriven

@@ -7,8 +7,8 @@ from xml.etree import ElementTree
 import pytest
 
 from masrel.agreement import fleiss_kappa, p_value
-from masrel.protocol import StudyPaths, protocol_hash, read_protocol
-from masrel.ratings import rating_matrix, read_study_data
+from masrel.lab.protocol import StudyPaths, protocol_hash, read_protocol
+from masrel.lab.ratings import rating_matrix, read_study_data
 from tests.cli.process import Caller
 
 STUDY = Path("studies/hess2012")

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from masrel.analysis import grade_regression
-from masrel.protocol import read_protocol, scale_of
-from masrel.ratings import read_study_ratings
+from masrel.lab.analysis import grade_regression
+from masrel.lab.protocol import read_protocol, scale_of
+from masrel.lab.ratings import read_study_ratings
 from tests.cli.process import Caller
 
 STUDY = Path(__file__).parents[2] / "studies/hess2012"

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from masrel.protocol import copy_template
-from masrel.recording import RECORDING_COLUMNS
+from masrel.lab.protocol import copy_template
+from masrel.lab.recording import RECORDING_COLUMNS
 from tests.cli.process import Caller, Done
 
 

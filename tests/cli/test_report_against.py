@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from masrel.cli import cli
-from masrel.protocol import copy_template
+from masrel.lab.protocol import copy_template
 from tests.cli.process import Caller
 
 LINE = """

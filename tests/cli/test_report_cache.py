@@ -11,13 +11,14 @@ from typing import Any
 import pytest
 
 import masrel
-import masrel.report.figures
-from masrel import _cache, intervals
+import masrel.lab.report.figures
+from masrel import intervals
 from masrel.cli import cli
-from masrel.cli import report as verb
 from masrel.estimates import Estimate
-from masrel.protocol import copy_template
-from masrel.report import figures
+from masrel.lab import _cache
+from masrel.lab.cli import report as verb
+from masrel.lab.protocol import copy_template
+from masrel.lab.report import figures
 from tests.architecture.test_imports import HEAVY, loaded_after
 from tests.cli.process import Caller
 
@@ -92,7 +93,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         names.extend(drawing.name for drawing in drawings)
         return draw_all(drawings, **options)
 
-    monkeypatch.setattr(masrel.report.figures, "draw_all", counted)
+    monkeypatch.setattr(masrel.lab.report.figures, "draw_all", counted)
     return names
 
 

@@ -15,7 +15,7 @@ import msgspec
 import pytest
 
 import masrel
-from masrel.protocol import copy_template
+from masrel.lab.protocol import copy_template
 from tests.cli.process import Caller
 
 SETPRIV = shutil.which("setpriv")

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from masrel.protocol import StudyPaths
-from masrel.schedule import read_schedule
+from masrel.lab.protocol import StudyPaths
+from masrel.lab.schedule import read_schedule
 from tests.cli.process import Caller
 from tests.protocol.documents import VALID, changed, write
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from masrel.elbow import STANDARD_MODELS, MinimumJerk, events, peak_torque
+from masrel.lab.elbow import STANDARD_MODELS, MinimumJerk, events, peak_torque
 
 STUDIES = Path(__file__).parents[2] / "studies"
 

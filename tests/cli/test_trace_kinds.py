@@ -11,9 +11,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 from masrel.cli import cli
-from masrel.elbow import MODELS, ConstantSpeed
-from masrel.elbow.tone import ClaspKnife, Contracture, ToneModel
 from masrel.errors import MasrelError
+from masrel.lab.elbow import MODELS, ConstantSpeed
+from masrel.lab.elbow.tone import ClaspKnife, Contracture, ToneModel
 
 KINDS = [kind for kind, law in MODELS.items() if issubclass(law, ToneModel)]
 

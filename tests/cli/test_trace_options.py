@@ -10,7 +10,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from masrel.cli import cli
-from masrel.elbow import (
+from masrel.errors import MasrelError
+from masrel.lab.elbow import (
     STANDARD_MODELS,
     Trapezoid,
     evaluate,
@@ -20,8 +21,7 @@ from masrel.elbow import (
     torque,
     work,
 )
-from masrel.elbow.identification import as_toml, model_document
-from masrel.errors import MasrelError
+from masrel.lab.elbow.identification import as_toml, model_document
 from tests.elbow.stretches import constant, minimum_jerk
 
 HM3 = STANDARD_MODELS["HM3"]

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from masrel.agreement import cohen_kappa
-from masrel.protocol import StudyPaths, copy_template, read_protocol
-from masrel.ratings import ratings_from_logs
-from masrel.run import SimulatedGrades, read_log, run_session
-from masrel.schedule import write_schedules
-from masrel.training import (
+from masrel.lab.protocol import StudyPaths, copy_template, read_protocol
+from masrel.lab.ratings import ratings_from_logs
+from masrel.lab.run import SimulatedGrades, read_log, run_session
+from masrel.lab.schedule import write_schedules
+from masrel.lab.training import (
     SimulatedTrainee,
     TrainingRecord,
     read_training,

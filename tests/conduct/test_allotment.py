@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from masrel.conduct import allot_schedules, record_standing
 from masrel.errors import ParameterError, ScheduleError, SessionLogError
-from masrel.protocol import Protocol, StudyPaths
-from masrel.schedule import (
+from masrel.lab.conduct import allot_schedules, record_standing
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.schedule import (
     concealment_notes,
     copy_for_site,
     draw_schedule,
@@ -19,7 +19,7 @@ from masrel.schedule import (
     schedule_problems,
     write_schedules,
 )
-from masrel.verification import verify_sessions
+from masrel.lab.verification import verify_sessions
 from tests.schedule.studies import SECRET, protocol_of, with_secret
 
 SITES = {"R1": "north", "R2": "south", "R3": "north", "R4": "south"}
@@ -218,7 +218,7 @@ def test_another_row_than_the_log_has_is_found(study: StudyPaths) -> None:
 
 def rewritten(study: StudyPaths, change: dict[str, object]) -> None:
     """Write the log anew, its chain whole, with a changed last event."""
-    from masrel._event_log import SessionLog, read_log
+    from masrel.lab._event_log import SessionLog, read_log
 
     events = read_log(study.conduct_file)
     study.conduct_file.unlink()

@@ -5,11 +5,11 @@ import os
 
 import pytest
 
-from masrel.conduct import read_conduct, record_standing, record_unblinding
 from masrel.errors import ParameterError, ScheduleError, SessionLogError
-from masrel.protocol import Protocol, StudyPaths
-from masrel.run import ScriptGrades, record_correction, run_session
-from masrel.schedule import read_schedule
+from masrel.lab.conduct import read_conduct, record_standing, record_unblinding
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.run import ScriptGrades, record_correction, run_session
+from masrel.lab.schedule import read_schedule
 
 Small = tuple[StudyPaths, Protocol]
 BY = {"who": " MK ", "why": "moved away"}

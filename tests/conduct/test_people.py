@@ -6,7 +6,8 @@ from datetime import UTC, datetime
 
 import pytest
 
-from masrel.conduct import (
+from masrel.errors import ParameterError, SessionLogError
+from masrel.lab.conduct import (
     excluded_raters,
     rater_values,
     read_conduct,
@@ -14,8 +15,7 @@ from masrel.conduct import (
     record_rater_values,
     record_standing,
 )
-from masrel.errors import ParameterError, SessionLogError
-from masrel.protocol import Protocol, StudyPaths, read_protocol
+from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 
 Small = tuple[StudyPaths, Protocol]
 NewStudy = Callable[..., Small]

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from masrel import hess
-from masrel.elbow import STANDARD_MODELS
 from masrel.errors import DeviceError
-from masrel.hess import (
+from masrel.lab import hess
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.hess import (
     BackendOptions,
     Controller,
     Device,
@@ -37,7 +37,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.recording import MEASURED_TORQUE, Channel, Recording, stretches
+from masrel.lab.recording import MEASURED_TORQUE, Channel, Recording, stretches
 from tests.hess.rig import ScriptedDevice
 
 START, END = radians(30.0), radians(146.0)
@@ -161,7 +161,7 @@ def test_every_backend_that_is_written_is_registered() -> None:
     # A backend is a module with a function `build` of a setup.
     written = {
         module.name
-        for module in pkgutil.walk_packages(hess.__path__, "masrel.hess.")
+        for module in pkgutil.walk_packages(hess.__path__, "masrel.lab.hess.")
         if "\ndef build(setup: DeviceSetup)" in _source(module.name)
     }
     assert written == set(backends._BACKENDS.values())

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from masrel.protocol import StudyPaths, copy_template
-from masrel.run import read_log
+from masrel.lab.protocol import StudyPaths, copy_template
+from masrel.lab.run import read_log
 
 PAGE = Path(__file__).parents[2] / "docs" / "coordinating.md"
 SIMULATED = "--grades simulated"

@@ -12,7 +12,7 @@ import msgspec
 import pytest
 
 from docs.make.pages import ROOT, Block, PageError, pages, read, renewed
-from masrel.protocol import (
+from masrel.lab.protocol import (
     DeviceSettings,
     Model,
     Questionnaire,

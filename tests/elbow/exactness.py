@@ -6,7 +6,7 @@ from math import ulp
 import numpy as np
 from mpmath import mp, mpf
 
-from masrel.elbow import ElbowParameters, Motion, events, torque
+from masrel.lab.elbow import ElbowParameters, Motion, events, torque
 from tests.elbow.reference import Caught, Reference, solved
 
 EPS = 2.0**-52

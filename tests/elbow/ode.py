@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from masrel.elbow import ElbowParameters, Motion
+from masrel.lab.elbow import ElbowParameters, Motion
 
 State = np.ndarray
 Law = Callable[[float, State], float]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from mpmath import mp, mpf
 
-from masrel.elbow import (
+from masrel.lab.elbow import (
     ConstantSpeed,
     ElbowParameters,
     Hold,
@@ -265,7 +265,7 @@ def _root(f: Law, low: mpf, high: mpf) -> mpf:
 
 @dataclass
 class Caught:
-    """What `masrel.elbow.StretchEvents` holds, in 50 digits."""
+    """What `masrel.lab.elbow.StretchEvents` holds, in 50 digits."""
 
     onset: mpf
     onset_angle: mpf

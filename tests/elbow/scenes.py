@@ -5,7 +5,7 @@ from math import nextafter, pi, radians
 
 import numpy as np
 
-from masrel.elbow import (
+from masrel.lab.elbow import (
     STANDARD_MODELS,
     ConstantSpeed,
     ElbowParameters,

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from hypothesis import strategies as st
 
-from masrel.elbow import ConstantSpeed, ElbowParameters, MinimumJerk, Motion
-from masrel.elbow._motion import Piece
+from masrel.lab.elbow import ConstantSpeed, ElbowParameters, MinimumJerk, Motion
+from masrel.lab.elbow._motion import Piece
 
 PUBLISHED = Path(__file__).parents[2] / "studies/hess2012/ratings/published.csv"
 

@@ -10,7 +10,8 @@ from math import isnan
 import numpy as np
 import pytest
 
-from masrel.elbow import (
+from masrel.errors import ParameterError
+from masrel.lab.elbow import (
     STANDARD_MODELS,
     Columns,
     ConstantSpeed,
@@ -25,8 +26,7 @@ from masrel.elbow import (
     residual_torque,
     work,
 )
-from masrel.elbow._scenes import EVENTS, LOADS
-from masrel.errors import ParameterError
+from masrel.lab.elbow._scenes import EVENTS, LOADS
 from tests.elbow.scenes import KINDS, corner_cases, random_scene
 from tests.elbow.stretches import constant, minimum_jerk, table_v
 

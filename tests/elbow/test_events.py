@@ -11,7 +11,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 
-from masrel.elbow import (
+from masrel.errors import ParameterError
+from masrel.lab.elbow import (
     STANDARD_MODELS,
     ConstantSpeed,
     ElbowParameters,
@@ -22,7 +23,6 @@ from masrel.elbow import (
     Reversed,
     events,
 )
-from masrel.errors import ParameterError
 from tests.elbow.stretches import (
     CountedMotion,
     Published,

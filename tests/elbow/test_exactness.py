@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from masrel.elbow import ElbowParameters, Motion
+from masrel.lab.elbow import ElbowParameters, Motion
 from tests.elbow.exactness import Errors, errors
 from tests.elbow.scenes import KINDS, N_SEEDS, corner_cases, random_scene
 

@@ -7,7 +7,7 @@ from math import isnan, pi
 import numpy as np
 import pytest
 
-from masrel.elbow import (
+from masrel.lab.elbow import (
     STANDARD_MODELS,
     ElbowParameters,
     Events,

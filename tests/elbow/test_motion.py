@@ -8,8 +8,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from masrel.elbow import ConstantSpeed, MinimumJerk, Motion, times_at
 from masrel.errors import MasrelError, ParameterError
+from masrel.lab.elbow import ConstantSpeed, MinimumJerk, Motion, times_at
 from tests.elbow.stretches import constant, minimum_jerk, motions
 
 # From 0.5 to 2.5 rad at a mean of 1 rad/s: 2 rad in 2 s.

@@ -6,9 +6,9 @@ from math import radians
 import numpy as np
 import pytest
 
-from masrel.elbow import STANDARD_MODELS, Hold, Joined, MinimumJerk, outline, torque
 from masrel.errors import ParameterError
-from masrel.recording import PHASES
+from masrel.lab.elbow import STANDARD_MODELS, Hold, Joined, MinimumJerk, outline, torque
+from masrel.lab.recording import PHASES
 from tests.elbow.stretches import CountedMotion, constant, minimum_jerk
 
 HM3 = STANDARD_MODELS["HM3"]

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from masrel.elbow import STANDARD_MODELS, ElbowParameters
 from masrel.errors import MasrelError, ParameterError
+from masrel.lab.elbow import STANDARD_MODELS, ElbowParameters
 from tests.elbow.stretches import joints
 
 DEG = pi / 180

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from masrel.elbow import (
+from masrel.lab.elbow import (
     ConstantSpeed,
     ElbowParameters,
     Hold,
@@ -27,7 +27,7 @@ from masrel.elbow import (
     torque,
     work,
 )
-from masrel.recording import PHASES
+from masrel.lab.recording import PHASES
 from tests.elbow.scenes import KINDS, random_scene
 from tests.elbow.stretches import joints, motions
 

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from masrel.elbow import (
+from masrel.errors import ParameterError
+from masrel.lab.elbow import (
     STANDARD_MODELS,
     ElbowParameters,
     MinimumJerk,
@@ -19,7 +20,6 @@ from masrel.elbow import (
     torque,
     trace,
 )
-from masrel.errors import ParameterError
 from tests.elbow.stretches import (
     CountedMotion,
     constant,

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from masrel.elbow import (
+from masrel.errors import ParameterError
+from masrel.lab.elbow import (
     STANDARD_MODELS,
     ElbowParameters,
     Motion,
@@ -17,8 +18,7 @@ from masrel.elbow import (
     peak_torque,
     trace,
 )
-from masrel.errors import ParameterError
-from masrel.recording import PHASES
+from masrel.lab.recording import PHASES
 from tests.elbow.stretches import constant, joints, minimum_jerk, motions, table_v
 
 HM3 = STANDARD_MODELS["HM3"]

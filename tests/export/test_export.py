@@ -17,16 +17,16 @@ import numpy as np
 import pytest
 from rocrate.rocrate import ROCrate
 
-from masrel.analysis import analyze, as_analysis_document
-from masrel.conduct import record_standing
 from masrel.errors import ParameterError
-from masrel.export import EXPORT_FORMS, export_study
-from masrel.protocol import Protocol, StudyPaths, read_protocol
-from masrel.ratings import RATING_COLUMNS, read_study_data
-from masrel.recording import RECORDING_COLUMNS, read_recording
-from masrel.report import study_conduct, write_report
-from masrel.run import ScriptGrades, record_correction, run_session
-from masrel.schedule import read_schedule, write_schedules
+from masrel.lab.analysis import analyze, as_analysis_document
+from masrel.lab.conduct import record_standing
+from masrel.lab.export import EXPORT_FORMS, export_study
+from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
+from masrel.lab.ratings import RATING_COLUMNS, read_study_data
+from masrel.lab.recording import RECORDING_COLUMNS, read_recording
+from masrel.lab.report import study_conduct, write_report
+from masrel.lab.run import ScriptGrades, record_correction, run_session
+from masrel.lab.schedule import read_schedule, write_schedules
 from tests.run.conftest import PROTOCOL
 from tests.schedule.studies import with_secret
 

@@ -20,8 +20,8 @@ from typing import Any
 
 import pytest
 
-from masrel._cache import FOLDER
-from masrel.run import read_log
+from masrel.lab._cache import FOLDER
+from masrel.lab.run import read_log
 
 CHANGING = ("open", "write", "fsync", "replace", "unlink", "mkdir", "chmod")
 

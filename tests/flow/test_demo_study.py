@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from masrel.protocol import StudyPaths, read_protocol
-from masrel.recording import read_recording
-from masrel.run import read_log
-from masrel.schedule import read_schedule
-from masrel.verification import verify_study
+from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.recording import read_recording
+from masrel.lab.run import read_log
+from masrel.lab.schedule import read_schedule
+from masrel.lab.verification import verify_study
 from tests.flow.conftest import run
 
 TIMES_OF_DAY = re.compile(rb'"time_utc": ?"[^"]*"|"previous": ?"[^"]*"')

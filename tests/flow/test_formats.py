@@ -8,9 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from masrel.conduct import record_standing
-from masrel.protocol import StudyPaths, read_protocol
-from masrel.verification import anchors_of, read_anchors, verify_study, write_anchors
+from masrel.lab.conduct import record_standing
+from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.verification import (
+    anchors_of,
+    read_anchors,
+    verify_study,
+    write_anchors,
+)
 from tests.cli.test_train import new_study, train_simulated
 from tests.flow.conftest import run
 from tests.flow.test_verify import chained_anew, events, logs, recording

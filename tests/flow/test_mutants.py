@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from masrel.protocol import StudyPaths, read_protocol
-from masrel.ratings import ratings_csv, ratings_from_logs
+from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.ratings import ratings_csv, ratings_from_logs
 from tests.cli.process import Caller
 from tests.faults import Faults
 from tests.flow.conftest import run

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from masrel import _cache
+from masrel.lab import _cache
 from tests.cli.process import Caller, Done
 from tests.faults import Faults
 from tests.flow.conftest import run

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from masrel.errors import ProtocolError, RatingsError
-from masrel.protocol import StudyPaths, read_protocol
-from masrel.recording import PHASES, read_recording
-from masrel.run import SimulatedGrades, run_session
-from masrel.schedule import read_schedule
+from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.recording import PHASES, read_recording
+from masrel.lab.run import SimulatedGrades, run_session
+from masrel.lab.schedule import read_schedule
 from tests.flow.conftest import run
 
 RATERS = ("R1", "R2", "R3")

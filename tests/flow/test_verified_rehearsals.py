@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from masrel.protocol import StudyPaths, copy_template
-from masrel.verification import anchor_findings, anchors_of, verify_study
+from masrel.lab.protocol import StudyPaths, copy_template
+from masrel.lab.verification import anchor_findings, anchors_of, verify_study
 from tests.flow.conftest import run
 from tests.flow.test_verify import chained_anew, edited, events
 

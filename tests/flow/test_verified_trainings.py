@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from masrel.protocol import StudyPaths
-from masrel.verification import (
+from masrel.lab.protocol import StudyPaths
+from masrel.lab.verification import (
     anchor_findings,
     anchors_of,
     verify_study,

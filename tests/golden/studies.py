@@ -8,7 +8,7 @@ import re
 from functools import partial
 from pathlib import Path
 
-from masrel.protocol import copy_template
+from masrel.lab.protocol import copy_template
 from tests.golden.call import STUDIES, Case, Stream, folder, masrel, without_paths
 
 PUBLISHED = STUDIES / "hess2012" / "ratings" / "published.csv"

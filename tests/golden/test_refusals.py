@@ -31,9 +31,12 @@ SETUP: list[str] = TABLE.pop("setup")
 STATISTICS = ("agreement", "intervals", "ratings", "planning", "audit", "scales")
 LABORATORY = (
     *("protocol", "schedule", "run", "recording", "elbow", "elbow.tone"),
-    *("elbow.identification", "hess", "hess.puck"),
+    *("elbow.identification", "hess", "hess.puck", "ratings"),
 )
-HOMES = [f"masrel.{name}" for name in STATISTICS + LABORATORY]
+HOMES = [
+    *(f"masrel.{name}" for name in STATISTICS),
+    *(f"masrel.lab.{name}" for name in LABORATORY),
+]
 
 
 class Names(dict[str, Any]):

@@ -11,7 +11,7 @@ from math import radians
 from typing import ClassVar
 
 from masrel.errors import DeviceError, DeviceTimeoutError, EmergencyStopError
-from masrel.hess import Device, Reading
+from masrel.lab.hess import Device, Reading
 
 # Since the first reading: time s, the true reading -> what the loop gets
 ReadFault = Callable[[float, Reading], Reading]

@@ -13,9 +13,9 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.elbow import STANDARD_MODELS
-from masrel.elbow.trace import _stepped
-from masrel.hess import (
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.elbow.trace import _stepped
+from masrel.lab.hess import (
     Controller,
     DeviceLimits,
     HandDistribution,
@@ -27,7 +27,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.recording import PHASES
+from masrel.lab.recording import PHASES
 
 START, END = radians(30.0), radians(146.0)
 FREE_END_DEG = 143.0  # beyond it the joint itself may stop the arm

@@ -19,7 +19,7 @@ from unittest import mock
 import numpy as np
 
 from masrel.errors import OverrunWarning
-from masrel.hess import (
+from masrel.lab.hess import (
     Controller,
     Device,
     SimulatedClock,
@@ -27,12 +27,12 @@ from masrel.hess import (
     StretchRules,
     open_device,
 )
-from masrel.protocol import Protocol, StudyPaths, read_protocol
-from masrel.recording import read_recording
-from masrel.run import SimulatedGrades, model_controller, read_log, run_session
-from masrel.run import _present as presenting
-from masrel.run._presenter import CLOCKS
-from masrel.schedule import write_schedules
+from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
+from masrel.lab.recording import read_recording
+from masrel.lab.run import SimulatedGrades, model_controller, read_log, run_session
+from masrel.lab.run import _present as presenting
+from masrel.lab.run._presenter import CLOCKS
+from masrel.lab.schedule import write_schedules
 
 from . import faults as f
 

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from math import radians
 
-from masrel.elbow import (
+from masrel.lab.elbow import (
     STANDARD_MODELS,
     ElbowParameters,
     Joined,
@@ -11,7 +11,7 @@ from masrel.elbow import (
     Motion,
     Reversed,
 )
-from masrel.hess import (
+from masrel.lab.hess import (
     Controller,
     DeviceLimits,
     MotionHand,
@@ -21,7 +21,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.recording import Recording
+from masrel.lab.recording import Recording
 
 # A joint that asks for no torque at all: the device alone
 NOTHING = replace(

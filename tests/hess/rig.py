@@ -4,9 +4,9 @@ import math
 from math import radians
 from typing import ClassVar
 
-from masrel.elbow import STANDARD_MODELS
 from masrel.errors import DeviceTimeoutError
-from masrel.hess import (
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.hess import (
     Controller,
     Device,
     DeviceLimits,

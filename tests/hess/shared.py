@@ -13,8 +13,8 @@ from math import radians
 from pathlib import Path
 from typing import ClassVar
 
-from masrel.elbow import STANDARD_MODELS
-from masrel.hess import (
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.hess import (
     Controller,
     Device,
     DeviceLimits,
@@ -23,7 +23,7 @@ from masrel.hess import (
     RealClock,
     run_presentation,
 )
-from masrel.hess._watchdog import watched
+from masrel.lab.hess._watchdog import watched
 
 FORMAT = "=dqq"  # torque N·m; when it was sent or idled, ns; mode: 1 torque, 0 idle
 SIZE = struct.calcsize(FORMAT)

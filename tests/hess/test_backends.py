@@ -4,7 +4,7 @@ import sys
 import pytest
 
 from masrel.errors import DeviceError
-from masrel.hess import (
+from masrel.lab.hess import (
     BackendOptions,
     SimulatedClock,
     SimulatedHand,
@@ -39,7 +39,7 @@ def test_every_name_has_a_backend_that_says_what_it_needs(name: str) -> None:
 
 
 def test_a_backend_is_imported_when_it_is_chosen() -> None:
-    code = "import sys, masrel.hess; print('masrel.hess.puck' in sys.modules)"
+    code = "import sys, masrel.lab.hess; print('masrel.lab.hess.puck' in sys.modules)"
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )

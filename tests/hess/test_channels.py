@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from masrel.elbow import STANDARD_MODELS
 from masrel.errors import ParameterError, RecordingWarning
-from masrel.hess import (
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.hess import (
     Controller,
     DeviceLimits,
     Presented,
@@ -26,7 +26,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.recording import (
+from masrel.lab.recording import (
     MEASURED_TORQUE,
     RECORDING_COLUMNS,
     Channel,

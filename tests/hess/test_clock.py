@@ -3,7 +3,7 @@ import time
 import pytest
 
 from masrel.errors import ParameterError
-from masrel.hess import RealClock, SimulatedClock
+from masrel.lab.hess import RealClock, SimulatedClock
 
 
 def test_the_real_clock_does_not_return_before_its_deadline() -> None:

@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from masrel.elbow import (
+from masrel.errors import ParameterError
+from masrel.lab.elbow import (
     STANDARD_MODELS,
     ConstantSpeed,
     MinimumJerk,
@@ -19,9 +20,8 @@ from masrel.elbow import (
     SampledJoint,
     trace,
 )
-from masrel.errors import ParameterError
-from masrel.hess import Controller, Friction
-from masrel.recording import PHASES
+from masrel.lab.hess import Controller, Friction
+from masrel.lab.recording import PHASES
 
 from .rig import END, START, present
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from masrel.elbow import STANDARD_MODELS, MinimumJerk, trace
-from masrel.hess import DeviceLimits, Friction, device_names
-from masrel.protocol import DeviceSettings
+from masrel.lab.elbow import STANDARD_MODELS, MinimumJerk, trace
+from masrel.lab.hess import DeviceLimits, Friction, device_names
+from masrel.lab.protocol import DeviceSettings
 from tests.internal.hess.test_backdrive import felt
 
 from .rig import END, START

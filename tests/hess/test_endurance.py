@@ -7,8 +7,8 @@ from math import radians
 import numpy as np
 import pytest
 
-from masrel.elbow import STANDARD_MODELS
-from masrel.hess import (
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.hess import (
     Controller,
     DeviceLimits,
     SimulatedClock,

@@ -5,8 +5,8 @@ from math import radians
 import numpy as np
 import pytest
 
-from masrel.elbow import STANDARD_MODELS
-from masrel.hess import DeviceLimits
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.hess import DeviceLimits
 
 from .rig import START, present
 from .test_controller import table_5

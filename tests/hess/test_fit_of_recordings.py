@@ -7,10 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from masrel.elbow import STANDARD_MODELS, fit, fit_friction
-from masrel.elbow.identification import ElbowFit, read_movement
 from masrel.errors import RecordingError, RecordingWarning
-from masrel.recording import MEASURED_TORQUE, Recording, read_recording, write_recording
+from masrel.lab.elbow import STANDARD_MODELS, fit, fit_friction
+from masrel.lab.elbow.identification import ElbowFit, read_movement
+from masrel.lab.recording import (
+    MEASURED_TORQUE,
+    Recording,
+    read_recording,
+    write_recording,
+)
 from tests.hess.measured import NOTHING, measured, stretch, to_and_fro
 
 MEASURED = MEASURED_TORQUE.column

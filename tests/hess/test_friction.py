@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from masrel.errors import ParameterError
-from masrel.hess import Friction, FrictionCompensation
+from masrel.lab.hess import Friction, FrictionCompensation
 
 SPEEDS = st.floats(-6.0, 6.0)
 

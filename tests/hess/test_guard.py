@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from masrel.elbow import (
+from masrel.lab.elbow import (
     MODELS,
     STANDARD_MODELS,
     ElbowParameters,
@@ -20,7 +20,7 @@ from masrel.elbow import (
     MinimumJerk,
     Reversed,
 )
-from masrel.hess import (
+from masrel.lab.hess import (
     Controller,
     DeviceLimits,
     Friction,
@@ -31,7 +31,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.hess import render as rendered
+from masrel.lab.hess import render as rendered
 
 from .rig import LIMITS, START, ScriptedDevice, present
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from masrel.errors import ParameterError
-from masrel.hess import SimulatedHand
+from masrel.lab.hess import SimulatedHand
 
 
 def hand(**change: float) -> SimulatedHand:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from masrel.errors import ParameterError
-from masrel.hess import (
+from masrel.lab.hess import (
     HandDistribution,
     HandTraits,
     HumanHand,

@@ -3,7 +3,7 @@ import math
 import pytest
 
 from masrel.errors import ParameterError
-from masrel.hess import DeviceLimits
+from masrel.lab.hess import DeviceLimits
 
 
 @pytest.mark.parametrize(

@@ -10,14 +10,14 @@ from math import radians
 import numpy as np
 import pytest
 
-from masrel.elbow import STANDARD_MODELS
 from masrel.errors import (
     DeviceError,
     DeviceTimeoutError,
     OverrunWarning,
     ParameterError,
 )
-from masrel.hess import (
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.hess import (
     Controller,
     DeviceLimits,
     RealClock,
@@ -26,7 +26,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.recording import RECORDING_COLUMNS, write_recording
+from masrel.lab.recording import RECORDING_COLUMNS, write_recording
 
 from .rig import LIMITS, START, ScriptedDevice, present
 

@@ -15,9 +15,9 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
 
-from masrel.elbow import STANDARD_MODELS
 from masrel.errors import DeviceError, OverrunWarning
-from masrel.hess import (
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.hess import (
     Controller,
     DeviceLimits,
     EmergencyStop,
@@ -26,7 +26,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.recording import RAMPS, RECORDING_COLUMNS
+from masrel.lab.recording import RAMPS, RECORDING_COLUMNS
 
 from . import faults as f
 from .injected import Wrong

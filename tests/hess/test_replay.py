@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from masrel.elbow import STANDARD_MODELS
 from masrel.errors import DeviceError
-from masrel.hess import (
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.hess import (
     BackendOptions,
     Clock,
     Controller,
@@ -20,7 +20,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.recording import (
+from masrel.lab.recording import (
     RECORDING_COLUMNS,
     Recording,
     read_recording,

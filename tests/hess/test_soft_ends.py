@@ -8,9 +8,9 @@ from math import radians
 import numpy as np
 import pytest
 
-from masrel.elbow import STANDARD_MODELS, SampledJoint
 from masrel.errors import OverrunWarning
-from masrel.hess import (
+from masrel.lab.elbow import STANDARD_MODELS, SampledJoint
+from masrel.lab.hess import (
     Controller,
     DeviceLimits,
     EmergencyStop,
@@ -24,7 +24,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.recording import RAMPS, stretches
+from masrel.lab.recording import RAMPS, stretches
 
 from . import faults as f
 from .rig import LIMITS, START, ScriptedDevice, present

@@ -7,9 +7,9 @@ from math import radians
 import numpy as np
 import pytest
 
-from masrel.elbow import STANDARD_MODELS, SampledJoint
 from masrel.errors import ParameterError
-from masrel.hess import (
+from masrel.lab.elbow import STANDARD_MODELS, SampledJoint
+from masrel.lab.hess import (
     Controller,
     HandTraits,
     HumanHand,
@@ -22,7 +22,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.recording import stretches
+from masrel.lab.recording import stretches
 
 from .rig import END, LIMITS, START, ScriptedDevice, present
 

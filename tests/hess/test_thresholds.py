@@ -6,8 +6,8 @@ from math import radians
 import numpy as np
 import pytest
 
-from masrel.elbow import STANDARD_MODELS
-from masrel.hess import (
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.hess import (
     Controller,
     DeviceLimits,
     Hand,
@@ -20,7 +20,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.recording import PHASES
+from masrel.lab.recording import PHASES
 
 from . import faults as f
 from .rig import END, START, ScriptedDevice

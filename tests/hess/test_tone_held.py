@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from masrel.hess import HandTraits
-from masrel.recording import stretches
+from masrel.lab.hess import HandTraits
+from masrel.lab.recording import stretches
 
 from .tone_held import (
     HOLD_S,

@@ -8,7 +8,7 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.elbow.tone import (
+from masrel.lab.elbow.tone import (
     ClaspKnife,
     Clonus,
     Cogwheel,
@@ -18,8 +18,8 @@ from masrel.elbow.tone import (
     ThresholdReflex,
     ToneModel,
 )
-from masrel.elbow.trace import _stepped
-from masrel.hess import (
+from masrel.lab.elbow.trace import _stepped
+from masrel.lab.hess import (
     Controller,
     DeviceLimits,
     HandDistribution,

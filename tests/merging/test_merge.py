@@ -8,20 +8,20 @@ import pytest
 from click.testing import CliRunner
 
 from masrel.cli import cli
-from masrel.conduct import (
+from masrel.errors import MasrelError, ParameterError, ProtocolError, ScheduleError
+from masrel.lab.conduct import (
     excluded_raters,
     read_conduct,
     record_note,
     record_standing,
 )
-from masrel.errors import MasrelError, ParameterError, ProtocolError, ScheduleError
-from masrel.merging import merge_studies
-from masrel.paper import write_sheets
-from masrel.protocol import Protocol, StudyPaths, read_protocol
-from masrel.ratings import ratings_from_logs
-from masrel.run import ScriptGrades, SimulatedGrades, run_session
-from masrel.training import SimulatedTrainee, train_rater
-from masrel.verification import anchors_of, verify_study
+from masrel.lab.merging import merge_studies
+from masrel.lab.paper import write_sheets
+from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
+from masrel.lab.ratings import ratings_from_logs
+from masrel.lab.run import ScriptGrades, SimulatedGrades, run_session
+from masrel.lab.training import SimulatedTrainee, train_rater
+from masrel.lab.verification import anchors_of, verify_study
 from tests.cli.test_train import RULES
 
 NewStudy = Callable[..., tuple[StudyPaths, Protocol]]
@@ -303,7 +303,7 @@ def test_another_key_is_refused_by_name(
 def test_another_secret_is_refused(
     sites: Sites, new_study: NewStudy, tmp_path: Path
 ) -> None:
-    from masrel.schedule import write_schedules
+    from masrel.lab.schedule import write_schedules
 
     east = StudyPaths(site(new_study, "east", "R5"))
     for file in (*east.schedules.glob("*.csv"), east.secret_file):

@@ -11,9 +11,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from masrel.analysis import analyze
 from masrel.cli import cli
-from masrel.conduct._study_answers import study_answers
 from masrel.errors import (
     MasrelError,
     MasrelWarning,
@@ -21,12 +19,14 @@ from masrel.errors import (
     RatingsError,
     SessionLogError,
 )
-from masrel.paper import compare_sheet, enter_sheet, write_sheets
-from masrel.protocol import Protocol, StudyPaths
-from masrel.ratings import corrections_of, ratings_from_logs, read_study_data
-from masrel.run import read_log, record_correction
-from masrel.schedule import read_schedule
-from masrel.verification import verify_study
+from masrel.lab.analysis import analyze
+from masrel.lab.conduct._study_answers import study_answers
+from masrel.lab.paper import compare_sheet, enter_sheet, write_sheets
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.ratings import corrections_of, ratings_from_logs, read_study_data
+from masrel.lab.run import read_log, record_correction
+from masrel.lab.schedule import read_schedule
+from masrel.lab.verification import verify_study
 from tests.paper.conftest import QUESTIONS
 from tests.run.test_session import console, run
 

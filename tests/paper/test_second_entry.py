@@ -8,11 +8,11 @@ from click.testing import CliRunner
 
 from masrel.cli import cli
 from masrel.errors import ParameterError, RatingsError, SessionLogError
-from masrel.paper import SheetDifference, compare_sheet
-from masrel.protocol import Protocol, StudyPaths
-from masrel.ratings import ratings_from_logs, study_remarks
-from masrel.run import read_log, record_answer, record_correction
-from masrel.verification import verify_study
+from masrel.lab.paper import SheetDifference, compare_sheet
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.ratings import ratings_from_logs, study_remarks
+from masrel.lab.run import read_log, record_answer, record_correction
+from masrel.lab.verification import verify_study
 from tests.paper.conftest import QUESTIONS
 from tests.paper.test_entry import Rows, enter, filled, typed
 from tests.run.test_session import console, run

@@ -13,9 +13,9 @@ from click.testing import CliRunner
 
 from masrel.cli import cli
 from masrel.errors import ParameterError, ScheduleError
-from masrel.paper import write_sheets
-from masrel.protocol import Protocol, StudyPaths, read_protocol
-from masrel.schedule import read_schedule, write_schedules
+from masrel.lab.paper import write_sheets
+from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
+from masrel.lab.schedule import read_schedule, write_schedules
 from tests.paper.conftest import QUESTIONS
 
 Small = tuple[StudyPaths, Protocol]

@@ -7,20 +7,20 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from masrel._event_log import Event
 from masrel.cli import cli
-from masrel.conduct import record_note, record_standing
 from masrel.errors import ParameterError
-from masrel.progress import (
+from masrel.lab._event_log import Event
+from masrel.lab.conduct import record_note, record_standing
+from masrel.lab.progress import (
     NextStep,
     next_step,
     rater_progress,
     raters_csv,
     session_progress,
 )
-from masrel.protocol import Protocol, StudyPaths, read_protocol
-from masrel.run import ScriptGrades, _session_logs, record_correction, run_session
-from masrel.schedule import read_schedule, write_schedules
+from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
+from masrel.lab.run import ScriptGrades, _session_logs, record_correction, run_session
+from masrel.lab.schedule import read_schedule, write_schedules
 
 Small = tuple[StudyPaths, Protocol]
 BY = {"who": "MK", "why": "moved away"}

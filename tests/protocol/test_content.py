@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from masrel.elbow.parameters import STANDARD_MODELS
 from masrel.errors import ParameterError
-from masrel.protocol import elbow_parameters, read_protocol, scale_of
+from masrel.lab.elbow.parameters import STANDARD_MODELS
+from masrel.lab.protocol import elbow_parameters, read_protocol, scale_of
 from tests.protocol.documents import VALID, changed, write
 
 ELBOW = {

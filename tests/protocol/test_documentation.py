@@ -7,8 +7,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from masrel import protocol as definition
-from masrel.protocol import Protocol, read_protocol, report_sections
+from masrel.lab import protocol as definition
+from masrel.lab.protocol import Protocol, read_protocol, report_sections
 
 PAGE = (Path(__file__).parents[2] / "docs" / "protocol.md").read_text(encoding="utf-8")
 

@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from masrel.protocol import (
+from masrel.lab.protocol import (
     PresentationRules,
     presented_hash,
     protocol_hash,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from masrel.protocol import Model, Protocol, read_protocol
+from masrel.lab.protocol import Model, Protocol, read_protocol
 
 STUDY = Path(__file__).parents[2] / "studies" / "hess2012"
 

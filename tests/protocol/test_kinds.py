@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from masrel.elbow import MODELS, ElbowParameters
-from masrel.elbow.tone import Contracture, LeadPipe
 from masrel.errors import ParameterError, ProtocolError
-from masrel.protocol import (
+from masrel.lab.elbow import MODELS, ElbowParameters
+from masrel.lab.elbow.tone import Contracture, LeadPipe
+from masrel.lab.protocol import (
     elbow_parameters,
     joint_model,
     presented_hash,

@@ -8,10 +8,10 @@ from typing import Any
 import msgspec
 import pytest
 
-from masrel.elbow.identification import as_toml, model_document
-from masrel.elbow.parameters import STANDARD_MODELS
 from masrel.errors import ProtocolError
-from masrel.protocol import (
+from masrel.lab.elbow.identification import as_toml, model_document
+from masrel.lab.elbow.parameters import STANDARD_MODELS
+from masrel.lab.protocol import (
     PresentationRules,
     elbow_parameters,
     presented_hash,

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from masrel.errors import ParameterError, ProtocolError
-from masrel.protocol import Question, read_protocol
-from masrel.protocol._questions import checked_answer
+from masrel.lab.protocol import Question, read_protocol
+from masrel.lab.protocol._questions import checked_answer
 from tests.protocol.documents import changed, write
 
 WHOLE = {"id": "score", "text": "How real?", "type": "whole", "low": 1, "high": 10}

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from masrel.errors import ProtocolError
-from masrel.protocol import read_protocol
+from masrel.lab.protocol import read_protocol
 from tests.protocol.documents import VALID, changed, write
 
 STRETCHES = (

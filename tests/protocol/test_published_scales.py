@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from masrel.errors import ProtocolError
-from masrel.protocol import (
+from masrel.lab.protocol import (
     Protocol,
     presented_content,
     protocol_hash,

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from masrel.errors import MasrelError, ProtocolError
-from masrel.protocol import elbow_parameters, read_protocol
+from masrel.lab.protocol import elbow_parameters, read_protocol
 from tests.protocol.documents import VALID, changed, without, write
 
 

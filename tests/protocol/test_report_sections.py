@@ -3,7 +3,7 @@
 import msgspec
 import pytest
 
-from masrel.protocol import Protocol, protocol_hash, report_sections
+from masrel.lab.protocol import Protocol, protocol_hash, report_sections
 from tests.analysis.studies import hess2012, plan
 
 STORY = (

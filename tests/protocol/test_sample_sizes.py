@@ -7,7 +7,7 @@ import msgspec
 import pytest
 
 from masrel.errors import ProtocolError
-from masrel.protocol import presented_hash, protocol_hash, read_protocol
+from masrel.lab.protocol import presented_hash, protocol_hash, read_protocol
 from tests.protocol.documents import VALID, changed, write
 
 PATH = ("analysis", "sample_sizes")

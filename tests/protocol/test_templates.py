@@ -6,7 +6,7 @@ import pytest
 
 import masrel
 from masrel.errors import ParameterError
-from masrel.protocol import StudyPaths, copy_template, read_protocol, template_names
+from masrel.lab.protocol import StudyPaths, copy_template, read_protocol, template_names
 
 STUDIES = Path(__file__).parents[2] / "studies"
 

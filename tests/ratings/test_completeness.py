@@ -8,14 +8,10 @@ import pytest
 from click.testing import CliRunner
 
 from masrel.cli import cli
-from masrel.conduct import record_standing, record_unblinding
-from masrel.protocol import Protocol, StudyPaths, read_protocol
-from masrel.ratings import (
-    ratings_from_logs,
-    study_remarks,
-    write_ratings,
-)
-from masrel.run import SimulatedGrades, run_session
+from masrel.lab.conduct import record_standing, record_unblinding
+from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
+from masrel.lab.ratings import ratings_from_logs, study_remarks, write_ratings
+from masrel.lab.run import SimulatedGrades, run_session
 from tests.run.conftest import PROTOCOL
 from tests.schedule.studies import with_secret
 

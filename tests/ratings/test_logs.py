@@ -9,9 +9,9 @@ from datetime import UTC, datetime
 import pytest
 
 from masrel.errors import RatingsError, SessionLogError, SessionStoppedError
-from masrel.protocol import Protocol, StudyPaths
-from masrel.ratings import rating_matrix, ratings_from_logs, write_ratings
-from masrel.run import (
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.ratings import rating_matrix, ratings_from_logs, write_ratings
+from masrel.lab.run import (
     ConsoleGrades,
     ScriptGrades,
     SessionLog,
@@ -19,8 +19,8 @@ from masrel.run import (
     record_correction,
     run_session,
 )
-from masrel.run._state import _LATER, EVENTS
-from masrel.schedule import read_schedule
+from masrel.lab.run._state import _LATER, EVENTS
+from masrel.lab.schedule import read_schedule
 from tests.run.conftest import new_study, small
 
 __all__ = ["new_study", "small"]  # fixtures of the same small study

@@ -3,7 +3,7 @@
 import pytest
 
 from masrel.errors import RatingsError
-from masrel.ratings import Ratings, rating_matrix, ratings_from_rows, retest_pairs
+from masrel.lab.ratings import Ratings, rating_matrix, ratings_from_rows, retest_pairs
 from masrel.scales import MODIFIED_ASHWORTH
 
 

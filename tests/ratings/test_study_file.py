@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from masrel.errors import RatingsError
-from masrel.ratings import Ratings, read_study_ratings
+from masrel.lab.ratings import Ratings, read_study_ratings
 from masrel.scales import MODIFIED_ASHWORTH, Scale
 
 LONG = "rater,model,grade\nR1,HM1,1\nR1,HM2,1+\nR2,HM1,2\nR2,HM2,1+\n"

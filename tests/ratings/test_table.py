@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from masrel.errors import RatingsError
-from masrel.ratings import (
+from masrel.lab.ratings import (
     RATING_COLUMNS,
     SOURCES,
     ratings_csv,
@@ -16,7 +16,7 @@ from masrel.ratings import (
     read_study_ratings,
     write_ratings,
 )
-from masrel.run._state import FELT
+from masrel.lab.run._state import FELT
 from masrel.scales import MODIFIED_ASHWORTH
 
 ROW = {"rater": "R1", "model": "HM1", "grade": "1+"}

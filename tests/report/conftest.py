@@ -2,7 +2,7 @@
 
 import pytest
 
-from masrel.report import ReportFiles
+from masrel.lab.report import ReportFiles
 from tests.report.pages import published_report, simulated_report
 
 

@@ -13,7 +13,7 @@ import tempfile
 from pathlib import Path
 
 import masrel
-from masrel.protocol import copy_template
+from masrel.lab.protocol import copy_template
 
 FORMATS = ("html", "markdown", "latex", "docx")
 LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "pillow", "jinja2", "lxml")

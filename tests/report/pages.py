@@ -7,10 +7,10 @@ from pathlib import Path
 
 import msgspec
 
-from masrel.analysis import analyze
-from masrel.protocol import Protocol
-from masrel.ratings import Ratings, ratings_from_rows
-from masrel.report import ReportFiles, write_report
+from masrel.lab.analysis import analyze
+from masrel.lab.protocol import Protocol
+from masrel.lab.ratings import Ratings, ratings_from_rows
+from masrel.lab.report import ReportFiles, write_report
 from masrel.scales import MODIFIED_ASHWORTH
 from tests.analysis.studies import in_person, plan, protocol_with, table_v
 

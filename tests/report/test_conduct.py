@@ -4,19 +4,19 @@ from collections.abc import Callable
 
 import pytest
 
-from masrel.analysis import analyze
-from masrel.conduct import (
+from masrel.errors import ParameterError
+from masrel.lab.analysis import analyze
+from masrel.lab.conduct import (
     record_note,
     record_rater_values,
     record_standing,
     record_unblinding,
 )
-from masrel.errors import ParameterError
-from masrel.protocol import Protocol, StudyPaths
-from masrel.ratings import read_study_data, write_ratings
-from masrel.report import study_conduct, write_report
-from masrel.run import ScriptGrades, run_session
-from masrel.verification import verify_study
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.ratings import read_study_data, write_ratings
+from masrel.lab.report import study_conduct, write_report
+from masrel.lab.run import ScriptGrades, run_session
+from masrel.lab.verification import verify_study
 from tests.run.conftest import new_study
 
 __all__ = ["new_study"]

@@ -8,10 +8,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from masrel.analysis import analyze
-from masrel.elbow import ConstantSpeed, peak_torque
-from masrel.protocol import elbow_parameters
-from masrel.report import ReportFiles, write_report
+from masrel.lab.analysis import analyze
+from masrel.lab.elbow import ConstantSpeed, peak_torque
+from masrel.lab.protocol import elbow_parameters
+from masrel.lab.report import ReportFiles, write_report
 from tests.analysis.studies import hess2012, protocol_with, table_v
 from tests.report.pages import name_of
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from masrel.analysis import analyze
-from masrel.protocol import StudyPaths
-from masrel.report import ReportFiles, published_claims, write_report
+from masrel.lab.analysis import analyze
+from masrel.lab.protocol import StudyPaths
+from masrel.lab.report import ReportFiles, published_claims, write_report
 from tests.analysis.studies import plan, protocol_with, table_v
 from tests.report.pages import (
     ALL,

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from masrel.report import ReportFiles
+from masrel.lab.report import ReportFiles
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 WORDS = shutil.which("pdftotext")

@@ -5,15 +5,15 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from masrel.analysis import analyze
-from masrel.protocol import Protocol
-from masrel.recording import (
+from masrel.lab.analysis import analyze
+from masrel.lab.protocol import Protocol
+from masrel.lab.recording import (
     MEASURED_TORQUE,
     RECORDING_COLUMNS,
     Recording,
     write_recording,
 )
-from masrel.report import write_report
+from masrel.lab.report import write_report
 from tests.analysis.studies import protocol_with
 from tests.report.pages import simulated_ratings
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from masrel.analysis import QuestionSummary, analyze
 from masrel.errors import RatingsError
-from masrel.protocol import Occasions, Protocol, StudyPaths, read_protocol
-from masrel.ratings import (
+from masrel.lab.analysis import QuestionSummary, analyze
+from masrel.lab.protocol import Occasions, Protocol, StudyPaths, read_protocol
+from masrel.lab.ratings import (
     GivenAnswer,
     StudyData,
     answers_csv,
@@ -19,7 +19,7 @@ from masrel.ratings import (
     read_study_data,
     write_answers,
 )
-from masrel.report import write_report
+from masrel.lab.report import write_report
 from tests.protocol.documents import changed, write
 
 HESS = StudyPaths(Path(__file__).parents[2] / "studies" / "hess2012")
@@ -170,7 +170,7 @@ def asking(tmp_path: Path) -> Protocol:
 def test_choices_are_counted_analogues_are_in_tenths_and_texts_are_left_out(
     asking: Protocol,
 ) -> None:
-    from masrel.analysis._question_summaries import question_summaries
+    from masrel.lab.analysis._question_summaries import question_summaries
 
     def given(question: str, *answers: str | float) -> list[GivenAnswer]:
         like = replace(score(1), questionnaire="q", question=question)

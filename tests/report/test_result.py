@@ -10,15 +10,15 @@ from typing import Any
 import msgspec
 import pytest
 
-import masrel.report
-from masrel.analysis import Analysis, analyze, as_analysis_document
-from masrel.ratings import Ratings, ratings_from_rows
-from masrel.report import ReportFiles, write_report
+import masrel.lab.report
+from masrel.lab.analysis import Analysis, analyze, as_analysis_document
+from masrel.lab.ratings import Ratings, ratings_from_rows
+from masrel.lab.report import ReportFiles, write_report
 from masrel.scales import MODIFIED_ASHWORTH
 from tests.analysis.studies import of_session, plan, protocol_with, ratings, table_v
 from tests.report.pages import simulated_ratings
 
-FILE = Path(masrel.report.__file__).parent / "templates" / "sentences.toml"
+FILE = Path(masrel.lab.report.__file__).parent / "templates" / "sentences.toml"
 SENTENCES = tomllib.loads(FILE.read_text(encoding="utf-8"))
 AGAIN = plan(
     id="again",

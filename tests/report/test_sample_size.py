@@ -7,10 +7,10 @@ import msgspec
 import pytest
 
 import masrel.planning._studies as studies
-from masrel.analysis import analyze
-from masrel.checklist import fill_checklist
-from masrel.protocol import Protocol, SampleSize, StudyPaths, report_sections
-from masrel.report import write_report
+from masrel.lab.analysis import analyze
+from masrel.lab.checklist import fill_checklist
+from masrel.lab.protocol import Protocol, SampleSize, StudyPaths, report_sections
+from masrel.lab.report import write_report
 from tests.analysis.studies import STUDY, plan, protocol_with, table_v
 
 PLANNED: dict[str, Any] = {

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from masrel.protocol import Protocol, StudyPaths, read_protocol
-from masrel.schedule import write_schedules
+from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
+from masrel.lab.schedule import write_schedules
 from tests.schedule.studies import with_secret
 
 PROTOCOL = """

@@ -8,8 +8,8 @@ import signal
 import sys
 from pathlib import Path
 
-from masrel.protocol import StudyPaths, read_protocol
-from masrel.run import SimulatedGrades, run_session
+from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.run import SimulatedGrades, run_session
 
 
 def die_at(fatal_line: int, n_bytes: int) -> None:

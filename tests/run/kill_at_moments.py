@@ -11,10 +11,10 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from masrel.hess import SimulatedClock
-from masrel.protocol import StudyPaths, read_protocol
-from masrel.run import SimulatedGrades, run_session
-from masrel.run._presenter import CLOCKS
+from masrel.lab.hess import SimulatedClock
+from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.run import SimulatedGrades, run_session
+from masrel.lab.run._presenter import CLOCKS
 
 FILE_CALLS = ("write", "fsync", "replace", "ftruncate")
 

@@ -8,8 +8,8 @@ import pytest
 from click.testing import CliRunner
 
 from masrel.cli import main
-from masrel.protocol import Protocol, StudyPaths
-from masrel.schedule import read_schedule
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.schedule import read_schedule
 
 NAMES = (("HM1", "ZEBRA"), ("HM3", "OKAPI"), ("D1", "TAPIR"))
 

@@ -8,9 +8,9 @@ import pytest
 from click.testing import CliRunner
 
 from masrel.cli import cli
-from masrel.protocol import Protocol, StudyPaths
-from masrel.run import read_log
-from masrel.schedule import read_schedule
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.run import read_log
+from masrel.lab.schedule import read_schedule
 from tests.cli.process import Caller
 
 Small = tuple[StudyPaths, Protocol]

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from masrel.protocol import StudyPaths
-from masrel.run import read_log
+from masrel.lab.protocol import StudyPaths
+from masrel.lab.run import read_log
 from tests.hess.injected import small_study
 
 # However late a busy machine is, that shall not end the presentation.

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from docs.make.pages import read
-from masrel.run import SessionLog
+from masrel.lab.run import SessionLog
 
 PAGE = Path(__file__).parents[2] / "docs" / "session_log.md"
 

@@ -13,11 +13,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from masrel.protocol import Protocol, StudyPaths
-from masrel.ratings import ratings_from_logs
-from masrel.recording import read_recording
-from masrel.run import Event, SimulatedGrades, read_log, run_session
-from masrel.verification import verify_study
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.ratings import ratings_from_logs
+from masrel.lab.recording import read_recording
+from masrel.lab.run import Event, SimulatedGrades, read_log, run_session
+from masrel.lab.verification import verify_study
 from tests.faults import Faults
 
 Small = tuple[StudyPaths, Protocol]

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from masrel.errors import SessionLogError
-from masrel.run import SessionLog, read_log
+from masrel.lab.run import SessionLog, read_log
 
 
 def noon() -> datetime:

@@ -13,23 +13,23 @@ import pytest
 from click.testing import CliRunner
 
 from masrel.cli import cli
-from masrel.elbow import tardieu
 from masrel.errors import ParameterError, RatingsError
-from masrel.protocol import (
+from masrel.lab.elbow import tardieu
+from masrel.lab.protocol import (
     Protocol,
     StudyPaths,
     joint_model,
     presented_hash,
     read_protocol,
 )
-from masrel.ratings import (
+from masrel.lab.ratings import (
     ratings_from_logs,
     read_study_data,
     read_study_ratings,
     write_ratings,
 )
-from masrel.recording import read_recording
-from masrel.run import (
+from masrel.lab.recording import read_recording
+from masrel.lab.run import (
     Event,
     GradeRequest,
     ScriptGrades,
@@ -38,9 +38,9 @@ from masrel.run import (
     read_log,
     run_session,
 )
+from masrel.lab.schedule import read_schedule
+from masrel.lab.verification import verify_study
 from masrel.scales import MODIFIED_ASHWORTH
-from masrel.schedule import read_schedule
-from masrel.verification import verify_study
 from tests.run.test_session import console, run
 
 Small = tuple[StudyPaths, Protocol]

@@ -8,9 +8,14 @@ from click.testing import CliRunner
 
 from masrel.cli import cli
 from masrel.errors import DeviceError, SessionLogError
-from masrel.protocol import Protocol, StudyPaths
-from masrel.ratings import Correction, corrections_of, ratings_from_logs, study_remarks
-from masrel.run import (
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.ratings import (
+    Correction,
+    corrections_of,
+    ratings_from_logs,
+    study_remarks,
+)
+from masrel.lab.run import (
     ConsoleGrades,
     ScriptGrades,
     SessionSummary,
@@ -19,9 +24,9 @@ from masrel.run import (
     record_skip,
     run_session,
 )
+from masrel.lab.schedule import read_schedule
+from masrel.lab.verification import verify_study
 from masrel.scales import MODIFIED_ASHWORTH
-from masrel.schedule import read_schedule
-from masrel.verification import verify_study
 
 Small = tuple[StudyPaths, Protocol]
 

@@ -6,22 +6,22 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from masrel.conduct._study_answers import study_answers
 from masrel.errors import (
     MasrelWarning,
     ParameterError,
     SessionLogError,
     SessionStoppedError,
 )
-from masrel.protocol import Protocol, StudyPaths, scale_of
-from masrel.ratings import (
+from masrel.lab.conduct._study_answers import study_answers
+from masrel.lab.protocol import Protocol, StudyPaths, scale_of
+from masrel.lab.ratings import (
     answers_from_logs,
     ratings_from_logs,
     read_answers,
     study_remarks,
 )
-from masrel.recording import read_recording
-from masrel.run import (
+from masrel.lab.recording import read_recording
+from masrel.lab.run import (
     ConsoleGrades,
     Event,
     GradeRequest,
@@ -32,8 +32,8 @@ from masrel.run import (
     record_answer,
     run_session,
 )
-from masrel.schedule import read_schedule
-from masrel.verification import verify_study
+from masrel.lab.schedule import read_schedule
+from masrel.lab.verification import verify_study
 from tests.run.test_command import typed
 
 New = Callable[..., tuple[StudyPaths, Protocol]]

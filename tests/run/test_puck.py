@@ -8,16 +8,16 @@ from click.testing import CliRunner
 
 from masrel.cli import cli
 from masrel.errors import ParameterError
-from masrel.hess import (
+from masrel.lab.hess import (
     DeviceLimits,
     ReplayOptions,
     SimulatedClock,
     open_device,
     run_presentation,
 )
-from masrel.protocol import Protocol, StudyPaths
-from masrel.recording import read_recording
-from masrel.run import SimulatedGrades, model_controller, read_log, run_session
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.recording import read_recording
+from masrel.lab.run import SimulatedGrades, model_controller, read_log, run_session
 
 NewStudy = Callable[..., tuple[StudyPaths, Protocol]]
 

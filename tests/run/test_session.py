@@ -22,10 +22,10 @@ from masrel.errors import (
     SessionLogError,
     SessionStoppedError,
 )
-from masrel.protocol import DeviceSettings, Protocol, StudyPaths
-from masrel.ratings import ratings_from_logs
-from masrel.recording import MEASURED_TORQUE, RECORDING_COLUMNS, read_recording
-from masrel.run import (
+from masrel.lab.protocol import DeviceSettings, Protocol, StudyPaths
+from masrel.lab.ratings import ratings_from_logs
+from masrel.lab.recording import MEASURED_TORQUE, RECORDING_COLUMNS, read_recording
+from masrel.lab.run import (
     ConsoleGrades,
     GradeRequest,
     GradeSource,
@@ -36,8 +36,8 @@ from masrel.run import (
     record_correction,
     run_session,
 )
+from masrel.lab.schedule import Presentation, read_schedule
 from masrel.scales import MODIFIED_ASHWORTH
-from masrel.schedule import Presentation, read_schedule
 
 Small = tuple[StudyPaths, Protocol]
 

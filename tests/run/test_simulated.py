@@ -9,9 +9,9 @@ import msgspec
 import pytest
 
 from masrel.errors import ParameterError, ProtocolError
-from masrel.protocol import Protocol, SimulatedRaters, StudyPaths
-from masrel.run import GradeRequest, SimulatedGrades
-from masrel.schedule import Presentation
+from masrel.lab.protocol import Protocol, SimulatedRaters, StudyPaths
+from masrel.lab.run import GradeRequest, SimulatedGrades
+from masrel.lab.schedule import Presentation
 
 Made = Callable[..., tuple[StudyPaths, Protocol]]
 Small = tuple[StudyPaths, Protocol]

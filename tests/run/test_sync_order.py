@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from masrel.protocol import Protocol, StudyPaths
+from masrel.lab.protocol import Protocol, StudyPaths
 
 _CALL = re.compile(r"(?:\d+ +)?(fsync|write)\((\d+)<([^>]*)>(.*)")
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from masrel.protocol import Protocol, StudyPaths
-from masrel.recording import PHASES, Recording, read_recording
-from masrel.run import ScriptGrades, run_session
-from masrel.schedule import read_schedule
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.recording import PHASES, Recording, read_recording
+from masrel.lab.run import ScriptGrades, run_session
+from masrel.lab.schedule import read_schedule
 
 NewStudy = Callable[..., tuple[StudyPaths, Protocol]]
 

@@ -8,9 +8,9 @@ import pytest
 from click.testing import CliRunner
 
 from masrel.cli import cli
-from masrel.protocol import Protocol, StudyPaths, scale_of
-from masrel.ratings import ratings_from_logs, read_study_ratings, write_ratings
-from masrel.run import ConsoleGrades, SimulatedGrades, run_session
+from masrel.lab.protocol import Protocol, StudyPaths, scale_of
+from masrel.lab.ratings import ratings_from_logs, read_study_ratings, write_ratings
+from masrel.lab.run import ConsoleGrades, SimulatedGrades, run_session
 
 Small = tuple[StudyPaths, Protocol]
 SHORT = '[report]\nsections = ["design", "intended"]\n\n[simulated_raters]'

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from masrel.protocol import (
+from masrel.lab.protocol import (
     Model,
     Protocol,
     Rater,

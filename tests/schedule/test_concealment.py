@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from masrel.errors import ScheduleError
-from masrel.protocol import StudyPaths
-from masrel.schedule import (
+from masrel.lab.protocol import StudyPaths
+from masrel.lab.schedule import (
     Schedule,
     concealment_notes,
     draw_schedule,

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 import masrel
 from masrel.errors import ScheduleError
-from masrel.protocol import presented_hash, protocol_hash, read_protocol
-from masrel.schedule import Schedule, check_schedule, draw_schedule
+from masrel.lab.protocol import presented_hash, protocol_hash, read_protocol
+from masrel.lab.schedule import Schedule, check_schedule, draw_schedule
 from tests.internal.schedule.test_stream import words_of
 from tests.schedule.studies import protocol_of
 

@@ -8,14 +8,14 @@ import pytest
 
 import masrel
 from masrel.errors import ScheduleError
-from masrel.protocol import (
+from masrel.lab.protocol import (
     ElbowConstants,
     Protocol,
     Stretch,
     StudyPaths,
     presented_hash,
 )
-from masrel.schedule import (
+from masrel.lab.schedule import (
     draw_schedule,
     read_schedule,
     schedule_problems,

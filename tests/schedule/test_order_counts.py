@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from masrel.schedule import draw_schedule
+from masrel.lab.schedule import draw_schedule
 from tests.schedule.studies import SECRET, protocol_of
 
 PAGE = (Path(__file__).parents[2] / "docs" / "orders.md").read_text(encoding="utf-8")

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from masrel.schedule import draw_schedule
+from masrel.lab.schedule import draw_schedule
 from tests.internal.schedule.test_stream import words_from
 from tests.schedule.studies import SECRET, protocol_of
 

@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 
 from masrel.errors import ProtocolError, ScheduleError
-from masrel.protocol import (
+from masrel.lab.protocol import (
     Protocol,
     StudyPaths,
     presented_hash,
     protocol_hash,
     read_protocol,
 )
-from masrel.schedule import (
+from masrel.lab.schedule import (
     check_schedule,
     draw_schedule,
     schedule_problems,

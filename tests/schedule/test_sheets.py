@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from masrel.errors import ScheduleError
-from masrel.protocol import StudyPaths
-from masrel.schedule import draw_schedule, read_schedule, write_schedules
+from masrel.lab.protocol import StudyPaths
+from masrel.lab.schedule import draw_schedule, read_schedule, write_schedules
 from tests.schedule.studies import SECRET, protocol_of, with_secret
 
 PROTOCOL = protocol_of(models=("A", "B"))

@@ -6,11 +6,11 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
-from masrel.conduct import allot_schedules
-from masrel.protocol import StudyPaths, copy_template, read_protocol
-from masrel.run import read_log
-from masrel.run._presenter import ClockName
-from masrel.serve._desk import Desk
+from masrel.lab.conduct import allot_schedules
+from masrel.lab.protocol import StudyPaths, copy_template, read_protocol
+from masrel.lab.run import read_log
+from masrel.lab.run._presenter import ClockName
+from masrel.lab.serve._desk import Desk
 
 PATIENCE_S = 60.0
 

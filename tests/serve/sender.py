@@ -10,9 +10,9 @@ import httpx
 from starlette.responses import JSONResponse
 from starlette.types import Receive, Scope, Send
 
-from masrel.protocol import StudyPaths
-from masrel.serve._access import Access, Role
-from masrel.serve._middleware import Middleware
+from masrel.lab.protocol import StudyPaths
+from masrel.lab.serve._access import Access, Role
+from masrel.lab.serve._middleware import Middleware
 
 HOST = "127.0.0.1:8723"
 ORIGIN = f"http://{HOST}"

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import httpx
 
-from masrel.protocol import StudyPaths
-from masrel.serve._access import Role
-from masrel.serve._server import listen
+from masrel.lab.protocol import StudyPaths
+from masrel.lab.serve._access import Role
+from masrel.lab.serve._server import listen
 
 
 class Served:

@@ -10,10 +10,10 @@ import signal
 import sys
 from pathlib import Path
 
-from masrel.protocol import StudyPaths
-from masrel.serve._access import ROLES, Access
-from masrel.serve._desk import Desk
-from masrel.serve._server import alone, listen, serve
+from masrel.lab.protocol import StudyPaths
+from masrel.lab.serve._access import ROLES, Access
+from masrel.lab.serve._desk import Desk
+from masrel.lab.serve._server import alone, listen, serve
 
 
 async def serving(study: StudyPaths, port: int) -> None:

@@ -10,11 +10,11 @@ from typing import Any
 import httpx
 from starlette.types import Message
 
-from masrel.protocol import StudyPaths
-from masrel.run._presenter import ClockName
-from masrel.serve._access import Access, Role
-from masrel.serve._app import make_app
-from masrel.serve._desk import Desk
+from masrel.lab.protocol import StudyPaths
+from masrel.lab.run._presenter import ClockName
+from masrel.lab.serve._access import Access, Role
+from masrel.lab.serve._app import make_app
+from masrel.lab.serve._desk import Desk
 from tests.serve.desks import at
 from tests.serve.sender import ORIGIN, App
 

@@ -9,7 +9,7 @@ import pytest
 from starlette.types import Message, Receive, Scope, Send
 
 from masrel.errors import ParameterError
-from masrel.serve._access import LIFE_S, ROLES
+from masrel.lab.serve._access import LIFE_S, ROLES
 from tests.serve.sender import Browser, Site
 
 
@@ -316,7 +316,7 @@ def test_a_browsers_oldest_stream_ends_where_it_opens_too_many(tmp_path: Path) -
 def test_without_the_limit_all_streams_stay(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("masrel.serve._middleware._MAX_STREAMS", 1000)
+    monkeypatch.setattr("masrel.lab.serve._middleware._MAX_STREAMS", 1000)
 
     streams = Streams(tmp_path)
 

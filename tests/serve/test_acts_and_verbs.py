@@ -11,12 +11,12 @@ from click.testing import CliRunner
 
 from masrel.cli import cli
 from masrel.errors import DeviceError
-from masrel.hess import EmergencyStop
-from masrel.protocol import StudyPaths, read_protocol
-from masrel.run import GradeRequest, ScriptGrades, read_log, run_session
-from masrel.schedule import read_schedule
-from masrel.serve._acts import ACTS
-from masrel.serve._desk import Desk
+from masrel.lab.hess import EmergencyStop
+from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.run import GradeRequest, ScriptGrades, read_log, run_session
+from masrel.lab.schedule import read_schedule
+from masrel.lab.serve._acts import ACTS
+from masrel.lab.serve._desk import Desk
 from tests.serve.desks import OCCASIONS, small_study
 from tests.serve.tablets import Tablet, with_tablets
 

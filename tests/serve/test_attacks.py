@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from masrel.serve import _access, _middleware
-from masrel.serve._access import Visitor
-from masrel.serve._middleware import Middleware
+from masrel.lab.serve import _access, _middleware
+from masrel.lab.serve._access import Visitor
+from masrel.lab.serve._middleware import Middleware
 from tests.serve.sender import Site
 
 Attack = Callable[[Site], bool]

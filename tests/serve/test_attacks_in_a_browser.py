@@ -10,8 +10,8 @@ import pytest
 from starlette.responses import HTMLResponse, JSONResponse
 from starlette.types import Receive, Scope, Send
 
-from masrel.serve import _access, _middleware, _server
-from masrel.serve._middleware import Middleware
+from masrel.lab.serve import _access, _middleware, _server
+from masrel.lab.serve._middleware import Middleware
 from tests.serve.test_server import Running
 
 api = pytest.importorskip("playwright.async_api", reason="needs playwright")

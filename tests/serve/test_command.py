@@ -15,8 +15,8 @@ from pathlib import Path
 
 import pytest
 
-from masrel.protocol import copy_template
-from masrel.serve._server import listen
+from masrel.lab.protocol import copy_template
+from masrel.lab.serve._server import listen
 from tests.cli.process import Caller
 from tests.serve.test_server import CERTIFICATE, DATA, KEY
 

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from masrel.conduct import read_conduct
-from masrel.protocol import StudyPaths
-from masrel.recording import read_recording
-from masrel.run import read_log
-from masrel.schedule import read_schedule
-from masrel.serve._desk import Desk
+from masrel.lab.conduct import read_conduct
+from masrel.lab.protocol import StudyPaths
+from masrel.lab.recording import read_recording
+from masrel.lab.run import read_log
+from masrel.lab.schedule import read_schedule
+from masrel.lab.serve._desk import Desk
 from tests.serve.desks import OCCASIONS, small_study
 from tests.serve.tablets import Tablet, with_tablets
 

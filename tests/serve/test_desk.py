@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from masrel.errors import ParameterError
-from masrel.protocol import StudyPaths, read_protocol
-from masrel.ratings import ratings_from_logs
-from masrel.run import read_log
-from masrel.serve._desk import AnswerRefusedError, AskOverError, Desk
+from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.ratings import ratings_from_logs
+from masrel.lab.run import read_log
+from masrel.lab.serve._desk import AnswerRefusedError, AskOverError, Desk
 from tests.serve.desks import OCCASIONS, Page, at, kinds, n_sampled, small_study
 
 WHY = {"who": "R1", "why": "wrong button"}

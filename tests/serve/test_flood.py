@@ -11,10 +11,10 @@ import httpx
 import numpy as np
 import pytest
 
-from masrel.protocol import StudyPaths
-from masrel.run import read_log
-from masrel.serve._access import Visitor
-from masrel.serve._desk import Desk
+from masrel.lab.protocol import StudyPaths
+from masrel.lab.run import read_log
+from masrel.lab.serve._access import Visitor
+from masrel.lab.serve._desk import Desk
 from tests.serve.desks import Page, n_sampled, small_study
 from tests.serve.test_server import Running
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from masrel.protocol import StudyPaths, copy_template
-from masrel.serve._access import Access
-from masrel.serve._server import alone
+from masrel.lab.protocol import StudyPaths, copy_template
+from masrel.lab.serve._access import Access
+from masrel.lab.serve._server import alone
 from tests.cli.process import Caller
 
 pytestmark = pytest.mark.slow

@@ -12,9 +12,9 @@ import httpx
 import numpy as np
 import pytest
 
-from masrel.protocol import StudyPaths
-from masrel.recording import read_recording
-from masrel.run import Event, read_log
+from masrel.lab.protocol import StudyPaths
+from masrel.lab.recording import read_recording
+from masrel.lab.run import Event, read_log
 from tests.faults import Faults
 from tests.serve.desks import OCCASIONS, PATIENCE_S, samples_in, small_study
 from tests.serve.served import Served

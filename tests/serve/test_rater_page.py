@@ -9,20 +9,20 @@ from typing import Any, get_args, get_type_hints
 
 import pytest
 
-import masrel.serve
+import masrel.lab.serve
 from masrel.errors import MasrelError
-from masrel.protocol import StudyPaths, read_protocol
-from masrel.protocol.definition import Study
-from masrel.run import read_log
-from masrel.run._presenter import ClockName
+from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.protocol.definition import Study
+from masrel.lab.run import read_log
+from masrel.lab.run._presenter import ClockName
+from masrel.lab.serve._desk import Desk
+from masrel.lab.serve._words import words_in
 from masrel.scales import PUBLISHED_SCALES
-from masrel.serve._desk import Desk
-from masrel.serve._words import words_in
 from tests.serve.desks import OCCASIONS, kinds, small_study
 from tests.serve.tablets import Tablet, seen, with_tablets
 
 LANGUAGES = get_args(get_type_hints(Study)["language"])
-BROWSER = Path(masrel.serve.__file__).with_name("static")
+BROWSER = Path(masrel.lab.serve.__file__).with_name("static")
 
 THRICE = ("stretches = 1", "stretches = 3")
 QUESTIONS = """
@@ -160,7 +160,7 @@ def test_a_failed_session_says_nothing_of_its_model(
 def test_a_stream_says_that_it_is_there(
     study: StudyPaths, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("masrel.serve._rater_routes.BEAT_S", 0.01)
+    monkeypatch.setattr("masrel.lab.serve._rater_routes.BEAT_S", 0.01)
 
     async def act(_: Desk, tablet: Tablet) -> None:
         async with tablet.listening() as events:

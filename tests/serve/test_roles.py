@@ -11,10 +11,10 @@ import pytest
 from starlette.routing import Route
 
 from masrel.errors import MasrelError
-from masrel.schedule import read_schedule
-from masrel.serve._access import Access, Role
-from masrel.serve._app import make_app
-from masrel.serve._desk import Desk
+from masrel.lab.schedule import read_schedule
+from masrel.lab.serve._access import Access, Role
+from masrel.lab.serve._app import make_app
+from masrel.lab.serve._desk import Desk
 from tests.serve.desks import OCCASIONS, Page, small_study
 from tests.serve.sender import ORIGIN, Browser
 

@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 from masrel.errors import SessionStoppedError
-from masrel.protocol import StudyPaths, read_protocol, scale_of
-from masrel.ratings import answers_from_logs, ratings_from_logs
-from masrel.run import ConsoleGrades, read_log, run_session
-from masrel.serve._desk import Desk
+from masrel.lab.protocol import StudyPaths, read_protocol, scale_of
+from masrel.lab.ratings import answers_from_logs, ratings_from_logs
+from masrel.lab.run import ConsoleGrades, read_log, run_session
+from masrel.lab.serve._desk import Desk
 from tests.serve.desks import OCCASIONS, Page, at, small_study
 
 QUESTIONS = """

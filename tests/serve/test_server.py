@@ -12,13 +12,13 @@ import httpx
 import pytest
 
 from masrel.errors import ParameterError
-from masrel.protocol import StudyPaths, copy_template
-from masrel.run import read_log
-from masrel.serve import _server
-from masrel.serve._access import Access
-from masrel.serve._addresses import hosts, is_loopback, qr_lines, qr_svg
-from masrel.serve._desk import Desk
-from masrel.serve._server import alone, encryption, listen, serve
+from masrel.lab.protocol import StudyPaths, copy_template
+from masrel.lab.run import read_log
+from masrel.lab.serve import _server
+from masrel.lab.serve._access import Access
+from masrel.lab.serve._addresses import hosts, is_loopback, qr_lines, qr_svg
+from masrel.lab.serve._desk import Desk
+from masrel.lab.serve._server import alone, encryption, listen, serve
 from tests.serve.desks import Page, n_sampled, small_study
 
 DATA = Path(__file__).with_name("data")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from masrel.agreement import cohen_kappa
-from masrel.training import Criterion, calibrate, confusion
+from masrel.lab.training import Criterion, calibrate, confusion
 
 
 @pytest.fixture

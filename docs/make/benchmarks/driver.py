@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from docs.make.benchmarks import driver_figures
-from masrel.elbow import STANDARD_MODELS, MinimumJerk
 from masrel.errors import OverrunWarning
-from masrel.hess import (
+from masrel.lab.elbow import STANDARD_MODELS, MinimumJerk
+from masrel.lab.hess import (
     Controller,
     Device,
     DeviceLimits,
@@ -32,7 +32,7 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.hess._realtime import real_time
+from masrel.lab.hess._realtime import real_time
 from tests.benchmarks import driver_integrators
 
 START, END = radians(30.0), radians(146.0)

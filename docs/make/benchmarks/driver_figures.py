@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from masrel.elbow import STANDARD_MODELS
-from masrel.hess import (
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.hess import (
     Controller,
     DeviceLimits,
     Friction,
@@ -21,11 +21,11 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.recording import MEASURED_TORQUE, Recording
-from masrel.report._figure_data import MeasuredTorque
-from masrel.report._measured_torque import measured_panel
-from masrel.report._tables import SIMULATED
-from masrel.report.figures import draw
+from masrel.lab.recording import MEASURED_TORQUE, Recording
+from masrel.lab.report._figure_data import MeasuredTorque
+from masrel.lab.report._measured_torque import measured_panel
+from masrel.plots import draw
+from masrel.tables._tables import SIMULATED
 from tests.hess.measured import NOTHING, measured, stretch, to_and_fro
 
 START, END = radians(30.0), radians(146.0)

@@ -16,7 +16,7 @@ from mpmath import mp
 from tqdm import tqdm
 
 from docs.make.benchmarks.elbow_stepped import places, step_together
-from masrel.elbow import (
+from masrel.lab.elbow import (
     STANDARD_MODELS,
     Columns,
     ConstantSpeed,
@@ -31,7 +31,7 @@ from masrel.elbow import (
     peak_torque,
     trace,
 )
-from masrel.elbow._scenes import EVENTS
+from masrel.lab.elbow._scenes import EVENTS
 from tests.benchmarks.sidebyside import Timing, side_by_side
 from tests.elbow.ode import Ode
 from tests.elbow.reference import solved

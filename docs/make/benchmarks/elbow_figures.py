@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from masrel.report.figures._margins import arrange
-from masrel.report.figures._picture import files_of
-from masrel.report.figures._style import (
+from masrel.plots._margins import arrange
+from masrel.plots._picture import files_of
+from masrel.plots._style import (
     BLACK,
     BLUE,
     DASHES,

@@ -16,7 +16,7 @@ from pathlib import Path
 import masrel
 from docs.make.benchmarks.parts import write_part
 from docs.make.benchmarks.verification import processor_s
-from masrel.protocol import copy_template
+from masrel.lab.protocol import copy_template
 
 DOCS = Path(__file__).parents[2]
 TURNS = 21

@@ -1,7 +1,7 @@
 """Recordings of an evaluator that never were: the law, a varying hand, its sensors.
 
 Everything made here is simulated. The motion is integrated in steps of 0.25 ms and
-events are interpolated between them, apart from `masrel.elbow`, whose code this
+events are interpolated between them, apart from `masrel.lab.elbow`, whose code this
 does not use but for the parameters.
 """
 
@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from masrel.elbow.identification import Movement
-from masrel.elbow.parameters import ElbowParameters
+from masrel.lab.elbow.identification import Movement
+from masrel.lab.elbow.parameters import ElbowParameters
 
 Floats = NDArray[np.float64]
 

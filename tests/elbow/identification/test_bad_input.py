@@ -9,10 +9,10 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from masrel.elbow import STANDARD_MODELS
-from masrel.elbow.identification import ElbowFit, Movement, fit
-from masrel.elbow.identification._lack_of_fit import Verdict
 from masrel.errors import MasrelError, MasrelWarning
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.elbow.identification import ElbowFit, Movement, fit
+from masrel.lab.elbow.identification._lack_of_fit import Verdict
 from tests.elbow.identification.synthesis import study
 
 HM3 = STANDARD_MODELS["HM3"]

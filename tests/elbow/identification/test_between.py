@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from masrel.elbow import STANDARD_MODELS, intermediate_models
 from masrel.errors import ParameterError
-from masrel.protocol import elbow_parameters, read_protocol
+from masrel.lab.elbow import STANDARD_MODELS, intermediate_models
+from masrel.lab.protocol import elbow_parameters, read_protocol
 
 STUDY = Path(__file__).parents[3] / "studies" / "hess2012" / "protocol.toml"
 

@@ -7,9 +7,9 @@ import pytest
 import statsmodels.api as sm
 from scipy.ndimage import gaussian_filter1d
 
-from masrel.elbow import fit_friction
-from masrel.elbow.identification import Movement
 from masrel.errors import RecordingError, RecordingWarning
+from masrel.lab.elbow import fit_friction
+from masrel.lab.elbow.identification import Movement
 
 TRUTH = {"inertia": 0.0097, "viscous": 0.168, "coulomb": 0.189}
 

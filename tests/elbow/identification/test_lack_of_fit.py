@@ -12,9 +12,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from masrel.elbow import STANDARD_MODELS, ConstantSpeed, MinimumJerk, Trapezoid, trace
-from masrel.elbow.identification import ElbowFit, Movement, compare_fits, fit
 from masrel.errors import RecordingError, RecordingWarning
+from masrel.lab.elbow import (
+    STANDARD_MODELS,
+    ConstantSpeed,
+    MinimumJerk,
+    Trapezoid,
+    trace,
+)
+from masrel.lab.elbow.identification import ElbowFit, Movement, compare_fits, fit
 from tests.elbow.identification.synthesis import Arm, Scatter, study
 
 HM3 = STANDARD_MODELS["HM3"]

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from masrel.elbow.identification import as_toml, model_document
-from masrel.elbow.parameters import STANDARD_MODELS
 from masrel.errors import ParameterError
+from masrel.lab.elbow.identification import as_toml, model_document
+from masrel.lab.elbow.parameters import STANDARD_MODELS
 
 
 @given(

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from masrel.elbow.identification import Movement, read_movement
 from masrel.errors import ParameterError, RecordingError, RecordingWarning
-from masrel.recording import Recording, write_recording
+from masrel.lab.elbow.identification import Movement, read_movement
+from masrel.lab.recording import Recording, write_recording
 
 TIME = np.arange(400) * 2.5e-3  # s
 ANGLE = 30.0 + 100.0 * (TIME / TIME[-1]) ** 2  # deg

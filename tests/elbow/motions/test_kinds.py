@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 from scipy.interpolate import PchipInterpolator
 
-from masrel.elbow import (
+from masrel.errors import ParameterError
+from masrel.lab.elbow import (
     ConstantSpeed,
     Hold,
     Joined,
@@ -21,7 +22,6 @@ from masrel.elbow import (
     Trapezoid,
     interrupted,
 )
-from masrel.errors import ParameterError
 from tests.elbow.scenes import KINDS, random_scene
 
 LINE = ConstantSpeed(start=0.5, end=2.5, speed=1.0)

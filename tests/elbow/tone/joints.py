@@ -6,7 +6,7 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.elbow import (
+from masrel.lab.elbow import (
     ConstantSpeed,
     Hold,
     Joined,
@@ -16,7 +16,7 @@ from masrel.elbow import (
     Reversed,
     Trapezoid,
 )
-from masrel.elbow.tone import (
+from masrel.lab.elbow.tone import (
     ClaspKnife,
     Clonus,
     Cogwheel,

@@ -11,8 +11,8 @@ from math import radians
 import numpy as np
 import pytest
 
-from masrel.elbow import MinimumJerk
-from masrel.elbow.tone import (
+from masrel.lab.elbow import MinimumJerk
+from masrel.lab.elbow.tone import (
     ClaspKnife,
     Cogwheel,
     Contracture,

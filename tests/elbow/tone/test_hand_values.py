@@ -11,8 +11,8 @@ from math import degrees, exp, radians
 import numpy as np
 import pytest
 
-from masrel.elbow import ConstantSpeed, Hold, Joined, Reversed
-from masrel.elbow.tone import (
+from masrel.lab.elbow import ConstantSpeed, Hold, Joined, Reversed
+from masrel.lab.elbow.tone import (
     ClaspKnife,
     Clonus,
     Cogwheel,

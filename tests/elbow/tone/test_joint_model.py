@@ -7,7 +7,7 @@ from math import radians
 import numpy as np
 import pytest
 
-from masrel.elbow import (
+from masrel.lab.elbow import (
     MODELS,
     STANDARD_MODELS,
     ConstantSpeed,

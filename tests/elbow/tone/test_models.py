@@ -8,10 +8,10 @@ from math import inf, nan, radians
 import numpy as np
 import pytest
 
-from masrel.elbow import MODELS, ConstantSpeed, Hold, Joined, MinimumJerk, Motion
-from masrel.elbow._motion import Piece, piece_of
-from masrel.elbow.tone import Dystonia, LeadPipe, ToneModel
 from masrel.errors import ParameterError
+from masrel.lab.elbow import MODELS, ConstantSpeed, Hold, Joined, MinimumJerk, Motion
+from masrel.lab.elbow._motion import Piece, piece_of
+from masrel.lab.elbow.tone import Dystonia, LeadPipe, ToneModel
 from tests.elbow.tone.joints import (
     END,
     JOINTS,

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from masrel.elbow import MODELS
-from masrel.elbow.tone import ToneModel
+from masrel.lab.elbow import MODELS
+from masrel.lab.elbow.tone import ToneModel
 
 PAGES = Path(__file__).parents[3] / "docs" / "tone"
 LAWS = [law for law in MODELS.values() if issubclass(law, ToneModel)]

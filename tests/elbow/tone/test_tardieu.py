@@ -4,9 +4,15 @@ from math import degrees, radians
 
 import pytest
 
-from masrel.elbow import STANDARD_MODELS, SampledJoint, tardieu
-from masrel.elbow.tone import ClaspKnife, Clonus, Contracture, LeadPipe, ThresholdReflex
 from masrel.errors import ParameterError
+from masrel.lab.elbow import STANDARD_MODELS, SampledJoint, tardieu
+from masrel.lab.elbow.tone import (
+    ClaspKnife,
+    Clonus,
+    Contracture,
+    LeadPipe,
+    ThresholdReflex,
+)
 
 R1_AT_150 = {"HM1": 77.5, "HM2": 67.5, "HM3": 62.5, "HM4": 60.0}
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from itertools import count
 from math import radians
 
-from masrel.elbow import STANDARD_MODELS
-from masrel.hess import (
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.hess import (
     Controller,
     DeviceLimits,
     Hand,
@@ -19,13 +19,13 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.hess.puck import EmulatorOptions, InjectedFault, Link, PuckOptions
-from masrel.hess.puck._bus import open_link
-from masrel.hess.puck._emulator import PuckEmulator
-from masrel.hess.puck._node import PuckNode
-from masrel.hess.puck._puck_device import EmulatedPuckDevice, emulated_options
-from masrel.hess.puck._puck_options import FaultKind
-from masrel.hess.puck._transmission import Transmission
+from masrel.lab.hess.puck import EmulatorOptions, InjectedFault, Link, PuckOptions
+from masrel.lab.hess.puck._bus import open_link
+from masrel.lab.hess.puck._emulator import PuckEmulator
+from masrel.lab.hess.puck._node import PuckNode
+from masrel.lab.hess.puck._puck_device import EmulatedPuckDevice, emulated_options
+from masrel.lab.hess.puck._puck_options import FaultKind
+from masrel.lab.hess.puck._transmission import Transmission
 
 START, END = radians(30.0), radians(146.0)
 LIMITS = DeviceLimits(torque=20.0, speed=radians(400.0), missed_ticks=20)

@@ -3,8 +3,8 @@
 import pytest
 
 from masrel.errors import DeviceError
-from masrel.hess import Hand, SimulatedClock
-from masrel.hess.puck import (
+from masrel.lab.hess import Hand, SimulatedClock
+from masrel.lab.hess.puck import (
     Check,
     InjectedFault,
     NodeReport,

@@ -13,13 +13,13 @@ from masrel.errors import (
     LimitExceededError,
     ParameterError,
 )
-from masrel.hess import (
+from masrel.lab.hess import (
     BackendOptions,
     RealClock,
     SimulatedClock,
     open_device,
 )
-from masrel.hess.puck import EmulatorOptions, PuckOptions, property_table
+from masrel.lab.hess.puck import EmulatorOptions, PuckOptions, property_table
 from tests.hess.puck.rig import (
     PUCK,
     fault,

@@ -16,11 +16,11 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from masrel.errors import OverrunWarning
-from masrel.hess import Device, open_device
-from masrel.hess.puck import InjectedFault
-from masrel.recording import read_recording
-from masrel.run import SimulatedGrades, read_log, run_session
-from masrel.run import _present as presenting
+from masrel.lab.hess import Device, open_device
+from masrel.lab.hess.puck import InjectedFault
+from masrel.lab.recording import read_recording
+from masrel.lab.run import SimulatedGrades, read_log, run_session
+from masrel.lab.run import _present as presenting
 from tests.hess.injected import N_STRETCHES, later_s, small_study
 from tests.hess.puck.rig import (
     PUCK,

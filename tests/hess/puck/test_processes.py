@@ -21,9 +21,9 @@ from math import radians
 import pytest
 
 from masrel.errors import BusError
-from masrel.hess import RealClock, SimulatedClock, open_device
-from masrel.hess._watchdog import watched
-from masrel.hess.puck import EmulatorOptions, PuckOptions
+from masrel.lab.hess import RealClock, SimulatedClock, open_device
+from masrel.lab.hess._watchdog import watched
+from masrel.lab.hess.puck import EmulatorOptions, PuckOptions
 from tests.hess.puck.rig import END, PuckEmulator, loose, open_link, opened
 
 TIMEOUT_S = 0.1
@@ -34,9 +34,9 @@ LONGEST_S = 2.0
 # What is killed: a loop that beats and holds 1 N·m, bound for its next tick
 LOOP = """
 import sys, time
-from masrel.hess import RealClock, open_device
-from masrel.hess.puck import PuckOptions
-from masrel.hess._watchdog import watched
+from masrel.lab.hess import RealClock, open_device
+from masrel.lab.hess.puck import PuckOptions
+from masrel.lab.hess._watchdog import watched
 
 options = PuckOptions(interface=sys.argv[1], channel=sys.argv[2], patience_s=1.0)
 device = open_device("puck", clock=RealClock(), options=options)

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from masrel.errors import DeviceError, ParameterError
-from masrel.hess.puck import PropertyTable, property_table, read_property_table
+from masrel.lab.hess.puck import PropertyTable, property_table, read_property_table
 
 # The least that a table needs
 REQUIRED = {

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from masrel.hess import Device, open_device
+from masrel.lab.hess import Device, open_device
 from tests.hess.injected import CATCH, injections, outcome
 from tests.hess.puck.rig import EmulatedPuckDevice, FaultKind, fault
 from tests.hess.puck.test_faults import session

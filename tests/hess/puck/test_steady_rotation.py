@@ -17,7 +17,7 @@ from masrel.errors import (
     LimitExceededError,
     ParameterError,
 )
-from masrel.hess import (
+from masrel.lab.hess import (
     Device,
     EmergencyStop,
     Reading,
@@ -25,7 +25,7 @@ from masrel.hess import (
     SimulatedHand,
     open_device,
 )
-from masrel.hess.puck import SteadyRun, fit_friction, steady_runs
+from masrel.lab.hess.puck import SteadyRun, fit_friction, steady_runs
 from tests.hess.puck.rig import END, fault, loose, opened, puck_options
 from tests.hess.rig import ScriptedDevice
 

@@ -15,10 +15,10 @@ def run(code: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize(
     "code",
     [
-        "import masrel.hess.puck",
-        "import masrel.hess.puck._codec",
-        "from masrel.hess.puck import fit_friction, steady_runs",
-        "from masrel.hess.puck import PuckOptions; PuckOptions()",
+        "import masrel.lab.hess.puck",
+        "import masrel.lab.hess.puck._codec",
+        "from masrel.lab.hess.puck import fit_friction, steady_runs",
+        "from masrel.lab.hess.puck import PuckOptions; PuckOptions()",
         "from masrel.cli import cli\ntry: cli(['device', '-h'])\nexcept SystemExit: 0",
     ],
 )

@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from masrel.analysis import _fit_residuals as residuals
-from masrel.elbow import STANDARD_MODELS, fit
-from masrel.elbow.identification import ElbowFit
+from masrel.lab.analysis import _fit_residuals as residuals
+from masrel.lab.elbow import STANDARD_MODELS, fit
+from masrel.lab.elbow.identification import ElbowFit
 from tests.elbow.identification.synthesis import study
 
 

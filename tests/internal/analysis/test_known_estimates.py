@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from masrel import intervals
-from masrel._cache import Cache
 from masrel.agreement import fleiss_kappa
-from masrel.analysis._known_estimates import estimates_known, known_estimate
 from masrel.errors import UndefinedStatisticWarning
 from masrel.estimates import Distribution, Estimate, Interval
+from masrel.lab._cache import Cache
+from masrel.lab.analysis._known_estimates import estimates_known, known_estimate
 
 RATINGS = [["1", "1", "2"], ["2", "2", "2"], ["3", "1", "3"], ["1", "1", "1"]]
 

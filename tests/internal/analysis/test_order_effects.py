@@ -5,13 +5,13 @@ from typing import Any
 import pytest
 from scipy.stats import ttest_1samp
 
-from masrel.analysis._order_effects import (
+from masrel.lab.analysis._order_effects import (
     OrderEffect,
     order_effects,
     place_summaries,
 )
-from masrel.ratings import Ratings, ratings_from_rows
-from masrel.report._sentences import sentence
+from masrel.lab.ratings import Ratings, ratings_from_rows
+from masrel.lab.report._sentences import sentence
 from masrel.scales import MODIFIED_ASHWORTH
 from tests.analysis.studies import protocol_with
 

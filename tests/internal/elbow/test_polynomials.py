@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from masrel.elbow._polynomials import (
+from masrel.lab.elbow._polynomials import (
     bernstein,
     first_above,
     integral,

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from masrel.elbow import (
+from masrel.lab.elbow import (
     STANDARD_MODELS,
     ElbowParameters,
     Motion,
@@ -17,8 +17,8 @@ from masrel.elbow import (
     events,
     torque,
 )
-from masrel.elbow.sampled import CATCH, POST_CATCH, PRE_CATCH
-from masrel.recording import PHASES
+from masrel.lab.elbow.sampled import CATCH, POST_CATCH, PRE_CATCH
+from masrel.lab.recording import PHASES
 from tests.elbow.stretches import constant, joints, minimum_jerk, motions, table_v
 
 HM3 = STANDARD_MODELS["HM3"]

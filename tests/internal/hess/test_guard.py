@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from masrel.elbow import STANDARD_MODELS, MinimumJerk, trace
 from masrel.errors import LimitExceededError
-from masrel.hess import DeviceLimits
-from masrel.hess._guard import Dropouts, Guard, Overruns, SoftStops, check_silence
+from masrel.lab.elbow import STANDARD_MODELS, MinimumJerk, trace
+from masrel.lab.hess import DeviceLimits
+from masrel.lab.hess._guard import Dropouts, Guard, Overruns, SoftStops, check_silence
 
 PERIOD = 0.001
 STEP = radians(0.005)  # of the encoder

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from masrel.elbow import STANDARD_MODELS
-from masrel.hess import (
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.hess import (
     Controller,
     DeviceLimits,
     Friction,
@@ -21,8 +21,8 @@ from masrel.hess import (
     SimulatedHand,
     run_presentation,
 )
-from masrel.hess._simulated import SimulatedDevice
-from masrel.hess._velocity import VelocityEstimate, passive_damping
+from masrel.lab.hess._simulated import SimulatedDevice
+from masrel.lab.hess._velocity import VelocityEstimate, passive_damping
 
 PAGE = (Path(__file__).parents[3] / "docs" / "driver.md").read_text(encoding="utf-8")
 PERIOD = 0.001

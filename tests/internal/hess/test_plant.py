@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from masrel.elbow import STANDARD_MODELS
-from masrel.hess import (
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.hess import (
     Controller,
     DeviceLimits,
     Friction,
@@ -20,8 +20,8 @@ from masrel.hess import (
     YieldingHand,
     run_presentation,
 )
-from masrel.hess._plant import Plant, PlantParameters, propagator
-from masrel.hess._simulated import SimulatedDevice
+from masrel.lab.hess._plant import Plant, PlantParameters, propagator
+from masrel.lab.hess._simulated import SimulatedDevice
 from tests.benchmarks.driver_integrators import by_solve_ivp, chosen, commands
 from tests.hess.rig import END, START
 

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from masrel.hess._replay import recorded_angles
-from masrel.hess._velocity import VelocityEstimate
+from masrel.lab.hess._replay import recorded_angles
+from masrel.lab.hess._velocity import VelocityEstimate
 
 
 @given(

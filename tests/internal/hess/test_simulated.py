@@ -4,15 +4,15 @@ from math import radians
 import pytest
 
 from masrel.errors import DeviceError, ParameterError
-from masrel.hess import (
+from masrel.lab.hess import (
     Friction,
     HandTraits,
     HumanHand,
     SimulatedClock,
     SimulatedHand,
 )
-from masrel.hess._plant import PlantParameters
-from masrel.hess._simulated import SimulatedDevice
+from masrel.lab.hess._plant import PlantParameters
+from masrel.lab.hess._simulated import SimulatedDevice
 
 # An amplifier that gives any torque at once
 INSTANT = {"torque_step": 0.0, "lag_time": 0.0, "delay": 0.0}

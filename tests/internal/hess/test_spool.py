@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from masrel.elbow import STANDARD_MODELS
 from masrel.errors import RecordingError
-from masrel.hess import (
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.hess import (
     Controller,
     DeviceLimits,
     SimulatedClock,
@@ -20,8 +20,8 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.hess._spool import Samples, Spool, read_spool
-from masrel.recording import RECORDING_COLUMNS
+from masrel.lab.hess._spool import Samples, Spool, read_spool
+from masrel.lab.recording import RECORDING_COLUMNS
 from tests.hess.rig import END, START
 
 FACTS = {"device": "none", "rate_hz": 2000, "speed_threshold_deg_s": 17.0}

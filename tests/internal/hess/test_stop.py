@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from masrel.elbow import STANDARD_MODELS
 from masrel.errors import EmergencyStopError
-from masrel.hess import (
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.hess import (
     Controller,
     DeviceLimits,
     EmergencyStop,
@@ -25,8 +25,8 @@ from masrel.hess import (
     open_device,
     run_presentation,
 )
-from masrel.hess._stop import stop_on_key, stop_on_signals
-from masrel.run import read_log
+from masrel.lab.hess._stop import stop_on_key, stop_on_signals
+from masrel.lab.run import read_log
 from tests.hess.injected import small_study
 from tests.hess.rig import END, START
 

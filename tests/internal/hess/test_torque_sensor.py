@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from masrel.hess import Friction, SimulatedClock, SimulatedHand, TorqueSensor
-from masrel.hess._plant import PlantParameters
-from masrel.hess._simulated import SensingDevice
+from masrel.lab.hess import Friction, SimulatedClock, SimulatedHand, TorqueSensor
+from masrel.lab.hess._plant import PlantParameters
+from masrel.lab.hess._simulated import SensingDevice
 
 FRICTIONLESS = Friction(inertia=0.01, viscous=0.0, coulomb=0.0)
 INSTANT = {"torque_step": 0.0, "lag_time": 0.0, "delay": 0.0}

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from masrel.errors import DeviceError
-from masrel.hess import IdleCommand, _watchdog
-from masrel.hess._watchdog import Watchdog, watched
-from masrel.hess._watchdog_process import watch
+from masrel.lab.hess import IdleCommand, _watchdog
+from masrel.lab.hess._watchdog import Watchdog, watched
+from masrel.lab.hess._watchdog_process import watch
 from tests.hess.killed import LEAST_NM, torque_stood_ms
 from tests.hess.rig import ScriptedDevice, SimulatedClock
 from tests.hess.shared import SharedDevice, made
@@ -158,9 +158,9 @@ def test_a_watchdog_that_does_not_end_is_ended(tmp_path: Path, monkeypatch) -> N
 
 
 def test_the_process_says_in_one_line_why_it_cannot() -> None:
-    command = (sys.executable, "-m", "masrel.hess._watchdog_process", "0.05")
+    command = (sys.executable, "-m", "masrel.lab.hess._watchdog_process", "0.05")
     done = subprocess.run(
-        (*command, "masrel.hess.puck._release", "none", "x", "1", "42", "8"),
+        (*command, "masrel.lab.hess.puck._release", "none", "x", "1", "42", "8"),
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
@@ -183,7 +183,7 @@ def test_only_a_device_that_another_process_can_reach_is_watched(tmp_path) -> No
 def test_it_outlives_the_signals_that_end_its_parent(tmp_path: Path) -> None:
     path = tmp_path / "device"
     file = made(path)
-    command = (sys.executable, "-m", "masrel.hess._watchdog_process", "5.0")
+    command = (sys.executable, "-m", "masrel.lab.hess._watchdog_process", "5.0")
     process = subprocess.Popen(
         (*command, "tests.hess.shared", str(path)),
         stdin=subprocess.PIPE,

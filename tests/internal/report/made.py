@@ -1,7 +1,7 @@
 """Sections made for tests, before they are written."""
 
-from masrel.report._document import SECTIONS
-from masrel.report._material import Material, Section
+from masrel.lab.report._document import SECTIONS
+from masrel.lab.report._material import Material, Section
 
 
 def build_sections(material: Material) -> list[Section]:

@@ -8,17 +8,17 @@ from typing import Any
 
 import pytest
 
-from masrel.analysis import PlannedEstimate, RaterEstimate, analyze
 from masrel.estimates import Estimate, Interval
-from masrel.report._agreement import (
+from masrel.lab.analysis import PlannedEstimate, RaterEstimate, analyze
+from masrel.lab.report._agreement import (
     estimate_rows,
     estimate_table,
     estimates_section,
 )
-from masrel.report._estimate_words import coefficient_name, forest_row, interval_name
-from masrel.report._figure_data import Forest
-from masrel.report._material import Drawing, Paragraph, gather
-from masrel.report._tables import Table, as_csv, as_text, page_cells
+from masrel.lab.report._material import Drawing, Paragraph, gather
+from masrel.plots._drawn_values import Forest
+from masrel.tables._estimate_words import coefficient_name, forest_row, interval_name
+from masrel.tables._tables import Table, as_csv, as_text, page_cells
 from tests.analysis.studies import plan, protocol_with, table_v
 
 

@@ -9,27 +9,24 @@ import pytest
 from matplotlib.axes import Axes
 
 from masrel.estimates import Distribution, Interval
-from masrel.report._figure_data import (
-    Forest,
-    ForestRow,
+from masrel.lab.report._figure_data import (
     GradeGrid,
     GradesByAim,
     OrderDifferences,
-    PairMaps,
     PlaceDots,
-    RaterPairs,
     SpeedColumn,
     SpeedDots,
     TraceColumns,
     TracePanel,
 )
-from masrel.report.figures import draw
-from masrel.report.figures._forest import forest_figure
-from masrel.report.figures._order_differences import difference_figure
-from masrel.report.figures._rater_pairs import rater_figure
-from masrel.report.figures._study_figures import aim_figure, speed_figure
-from masrel.report.figures._style import STYLE, house_style
-from masrel.report.figures._trace_figures import trace_figure
+from masrel.lab.report.figures._order_differences import difference_figure
+from masrel.lab.report.figures._study_figures import aim_figure, speed_figure
+from masrel.lab.report.figures._trace_figures import trace_figure
+from masrel.plots import draw
+from masrel.plots._drawn_values import Forest, ForestRow, PairMaps, RaterPairs
+from masrel.plots._forest import forest_figure
+from masrel.plots._rater_pairs import rater_figure
+from masrel.plots._style import STYLE, house_style
 
 PNG = b"\x89PNG\r\n\x1a\n"
 

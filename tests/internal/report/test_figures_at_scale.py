@@ -14,13 +14,11 @@ from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 from PIL import Image
 
-from masrel.analysis import analyze
-from masrel.protocol import read_protocol
-from masrel.ratings import read_study_ratings
-from masrel.report import write_report
-from masrel.report._figure_data import (
-    Content,
-    Form,
+from masrel.lab.analysis import analyze
+from masrel.lab.protocol import read_protocol
+from masrel.lab.ratings import read_study_ratings
+from masrel.lab.report import write_report
+from masrel.lab.report._figure_data import (
     GradeCounts,
     GradeGrid,
     SpeedColumn,
@@ -29,8 +27,9 @@ from masrel.report._figure_data import (
     TraceColumns,
     TracePanel,
 )
-from masrel.report.figures import draw
-from masrel.report.figures._style import STYLE
+from masrel.plots import draw
+from masrel.plots._drawn_values import Content, Form
+from masrel.plots._style import STYLE
 from tests.benchmarks.many_ratings import many_ratings
 from tests.internal.report.test_figures import DRAWINGS
 
@@ -149,7 +148,7 @@ def test_a_small_grid_of_panels_names_what_it_shades(
 def test_a_figure_is_the_same_in_any_environment(tmp_path: Path) -> None:
     code = (
         "import hashlib\n"
-        "from masrel.report.figures import draw\n"
+        "from masrel.plots import draw\n"
         "from tests.internal.report.test_figures_at_scale import MANY\n"
         "for form, data in draw(MANY['bands'], stamp='from: é').items():\n"
         "    print(form, hashlib.sha256(data).hexdigest())\n"

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from masrel.elbow import STANDARD_MODELS, fit, fit_friction
-from masrel.elbow.identification import ElbowFit
-from masrel.report._figure_data import FrictionView, JointFitView
-from masrel.report._fits import fit_table
-from masrel.report._tables import as_text
-from masrel.report.figures import draw
+from masrel.lab.elbow import STANDARD_MODELS, fit, fit_friction
+from masrel.lab.elbow.identification import ElbowFit
+from masrel.lab.report._figure_data import FrictionView, JointFitView
+from masrel.lab.report._fits import fit_table
+from masrel.plots import draw
+from masrel.tables._tables import as_text
 from tests.elbow.identification.synthesis import Scatter, study
 from tests.elbow.identification.test_friction import backdriven
 

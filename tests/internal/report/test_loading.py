@@ -5,17 +5,17 @@ from pathlib import Path
 
 import pytest
 
-import masrel.report
+import masrel.lab.report
 from tests.architecture.test_imports import loaded_after
 
-REPORT = Path(masrel.report.__file__).parent
+REPORT = Path(masrel.lab.report.__file__).parent
 MODULES = sorted(path.relative_to(REPORT) for path in REPORT.rglob("*.py"))
 
 TABLES = """
-from masrel.analysis import analyze
-from masrel.report._document import SECTIONS
-from masrel.report._material import gather
-from masrel.report._tables import Table, as_csv, as_text
+from masrel.lab.analysis import analyze
+from masrel.lab.report._document import SECTIONS
+from masrel.lab.report._material import gather
+from masrel.tables._tables import Table, as_csv, as_text
 from tests.analysis.studies import plan, protocol_with, table_v
 protocol, ratings = protocol_with(plan(), sections=tuple(SECTIONS)), table_v()
 analysis = analyze(protocol, ratings)

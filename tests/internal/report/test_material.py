@@ -6,10 +6,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from masrel.analysis import analyze
-from masrel.ratings import Ratings
-from masrel.report import write_report
-from masrel.report._material import Material, Paragraph, gather
+from masrel.lab.analysis import analyze
+from masrel.lab.ratings import Ratings
+from masrel.lab.report import write_report
+from masrel.lab.report._material import Material, Paragraph, gather
 from tests.analysis.studies import of_session, protocol_with, ratings, table_v
 from tests.internal.report.made import build_sections
 

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from masrel.estimates import Interval
-from masrel.report._estimate_words import aside, meaning
+from masrel.tables._estimate_words import aside, meaning
 
 
 def interval(kind: str, method: str, target: str, unit: str | None = None) -> Interval:

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from masrel.analysis import analyze
 from masrel.errors import RecordingError
-from masrel.recording import MEASURED_TORQUE, RECORDING_COLUMNS, Recording
-from masrel.report._material import Drawing, Paragraph, gather
-from masrel.report._measured_torque import measured_blocks, measured_panel
+from masrel.lab.analysis import analyze
+from masrel.lab.recording import MEASURED_TORQUE, RECORDING_COLUMNS, Recording
+from masrel.lab.report._material import Drawing, Paragraph, gather
+from masrel.lab.report._measured_torque import measured_blocks, measured_panel
 from tests.report.pages import simulated_ratings
 from tests.report.test_measured_torque import recorded, with_sensor
 

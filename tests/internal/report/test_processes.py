@@ -11,9 +11,9 @@ import pytest
 from PIL import Image
 from tqdm import tqdm
 
-from masrel.report._figure_data import GradeCounts
-from masrel.report._material import Drawing
-from masrel.report.figures import _processes, draw_all
+from masrel.lab.report._figure_data import GradeCounts
+from masrel.lab.report._material import Drawing
+from masrel.lab.report.figures import _processes, draw_all
 
 
 @pytest.fixture(autouse=True)

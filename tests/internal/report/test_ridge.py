@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import StepPatch
 
 from masrel.estimates import Distribution
-from masrel.report.figures._forest import _draw_ridge, _ridge
+from masrel.plots._forest import _draw_ridge, _ridge
 
 
 def resamples(values: list[float], shares: list[float]) -> Distribution:

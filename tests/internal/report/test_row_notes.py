@@ -1,6 +1,6 @@
 """A note names its rows, unless it holds for all that it could be of."""
 
-from masrel.report._row_notes import NotedRow, row_notes
+from masrel.tables._row_notes import NotedRow, row_notes
 
 
 def row(title: str, *texts: str, interval: tuple[str, ...] | None = ()) -> NotedRow:

@@ -6,16 +6,16 @@ from math import radians
 import msgspec
 import pytest
 
-from masrel.analysis import analyze
-from masrel.elbow import ConstantSpeed, peak_torque
-from masrel.protocol import elbow_parameters
-from masrel.ratings import Ratings
-from masrel.report._document import SECTIONS
-from masrel.report._figure_data import SpeedDots, TraceColumns
-from masrel.report._material import Drawing, Material, Paragraph, gather
-from masrel.report._tables import Table, as_text
-from masrel.report.figures import draw
-from masrel.report.figures._style import STYLE
+from masrel.lab.analysis import analyze
+from masrel.lab.elbow import ConstantSpeed, peak_torque
+from masrel.lab.protocol import elbow_parameters
+from masrel.lab.ratings import Ratings
+from masrel.lab.report._document import SECTIONS
+from masrel.lab.report._figure_data import SpeedDots, TraceColumns
+from masrel.lab.report._material import Drawing, Material, Paragraph, gather
+from masrel.plots import draw
+from masrel.plots._style import STYLE
+from masrel.tables._tables import Table, as_text
 from tests.analysis.studies import (
     hess2012,
     of_session,

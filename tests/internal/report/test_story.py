@@ -9,26 +9,26 @@ import pytest
 
 import masrel
 from masrel.agreement import COEFFICIENTS
-from masrel.analysis import analyze
-from masrel.analysis._category_agreement import category_agreement
-from masrel.analysis._given_grades import GivenGrades, given_grades
 from masrel.intervals import diagnose
-from masrel.protocol import Protocol, scale_of
-from masrel.ratings import Ratings, rating_matrix, ratings_from_rows
-from masrel.report._document import SECTIONS
-from masrel.report._material import Listing, Paragraph, Section, gather
-from masrel.report._references import (
+from masrel.lab.analysis import analyze
+from masrel.lab.analysis._category_agreement import category_agreement
+from masrel.lab.analysis._given_grades import GivenGrades, given_grades
+from masrel.lab.protocol import Protocol, scale_of
+from masrel.lab.ratings import Ratings, rating_matrix, ratings_from_rows
+from masrel.lab.report._document import SECTIONS
+from masrel.lab.report._material import Listing, Paragraph, Section, gather
+from masrel.lab.report._references import (
     bibtex,
     cited,
     coefficient_references,
     scale_references,
 )
-from masrel.report._tables import Table
-from masrel.report.figures._style import ALARM, GREY
+from masrel.plots._style import ALARM, GREY
 from masrel.scales import PUBLISHED_SCALES
+from masrel.tables._tables import Table
 from tests.analysis.studies import of_session, plan, protocol_with, ratings, table_v
 
-BIB = Path(masrel.__file__).parent / "report/templates/references.bib"
+BIB = Path(masrel.__file__).parent / "lab/report/templates/references.bib"
 AUTHOR = re.compile(r"\((?:[^()]*, \d{4}(?:; )?)+\)")
 
 

@@ -7,8 +7,8 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from masrel.report._latex import as_latex
-from masrel.report._tables import (
+from masrel.tables._latex import as_latex
+from masrel.tables._tables import (
     Column,
     Table,
     aligned,

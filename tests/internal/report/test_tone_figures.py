@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from docs.make.tone import FIGURES, SCENES, view
-from masrel.elbow import MODELS
-from masrel.elbow.tone import ToneModel
-from masrel.report.figures import draw
+from masrel.lab.elbow import MODELS
+from masrel.lab.elbow.tone import ToneModel
+from masrel.plots import draw
 
 PAGES = Path(FIGURES).parent / "tone"
 

@@ -6,11 +6,11 @@ import time
 import numpy as np
 import pytest
 
-from masrel.hess import PresentationStatus
-from masrel.protocol import PresentationRules, Protocol, StudyPaths
-from masrel.recording import RECORDING_COLUMNS, Recording
-from masrel.run._stretch_facts import StatusOfHand, stretch_facts
-from masrel.run.console import _cues_shown
+from masrel.lab.hess import PresentationStatus
+from masrel.lab.protocol import PresentationRules, Protocol, StudyPaths
+from masrel.lab.recording import RECORDING_COLUMNS, Recording
+from masrel.lab.run._stretch_facts import StatusOfHand, stretch_facts
+from masrel.lab.run.console import _cues_shown
 from tests.run.conftest import new_study, small
 
 __all__ = ["new_study", "small"]  # fixtures of the same small study

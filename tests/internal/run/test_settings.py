@@ -9,10 +9,10 @@ import msgspec
 import pytest
 
 from masrel.errors import ParameterError
-from masrel.hess import DeviceLimits, SimulatedHand, SimulatedOptions, TorqueSensor
-from masrel.hess.puck import EmulatorOptions, PuckOptions, property_table
-from masrel.protocol import DeviceSettings, Protocol, copy_template, read_protocol
-from masrel.run._settings import (
+from masrel.lab.hess import DeviceLimits, SimulatedHand, SimulatedOptions, TorqueSensor
+from masrel.lab.hess.puck import EmulatorOptions, PuckOptions, property_table
+from masrel.lab.protocol import DeviceSettings, Protocol, copy_template, read_protocol
+from masrel.lab.run._settings import (
     _largest_torque,
     backend_options,
     check_backend,

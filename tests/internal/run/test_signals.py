@@ -5,9 +5,9 @@ import signal
 import pytest
 
 from masrel.errors import SessionStoppedError
-from masrel.hess import SimulatedClock
-from masrel.run import SimulatedGrades, read_log
-from masrel.run._presenter import CLOCKS
+from masrel.lab.hess import SimulatedClock
+from masrel.lab.run import SimulatedGrades, read_log
+from masrel.lab.run._presenter import CLOCKS
 from tests.run.test_session import Small, events, run
 
 

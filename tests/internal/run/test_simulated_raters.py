@@ -6,8 +6,8 @@ from collections.abc import Callable
 import msgspec
 import pytest
 
-from masrel.protocol import Model, PresentationRules, Protocol, StudyPaths
-from masrel.run._simulated_raters import intended_speeds, severity
+from masrel.lab.protocol import Model, PresentationRules, Protocol, StudyPaths
+from masrel.lab.run._simulated_raters import intended_speeds, severity
 from tests.run.test_simulated import with_settings
 
 Made = Callable[..., tuple[StudyPaths, Protocol]]

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from masrel.errors import SessionLogError
-from masrel.run import Event
-from masrel.run._state import EVENTS, SessionState, replay
+from masrel.lab.run import Event
+from masrel.lab.run._state import EVENTS, SessionState, replay
 
 Step = tuple[str, dict[str, str | int | float | bool | None]]
 

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import pytest
 
-from masrel.protocol import Protocol
-from masrel.schedule._admissible import (
+from masrel.lab.protocol import Protocol
+from masrel.lab.schedule._admissible import (
     FREE,
     LimitedRuns,
     PartedRuns,
@@ -20,7 +20,7 @@ from masrel.schedule._admissible import (
     n_arrangements,
     subset,
 )
-from masrel.schedule._orders import count_orders, order_at
+from masrel.lab.schedule._orders import count_orders, order_at
 from tests.schedule.studies import protocol_of
 
 LIMITED = [

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from masrel.protocol import Protocol, StudyPaths, read_protocol
-from masrel.schedule import draw_schedule, schedule_problems, write_schedules
-from masrel.schedule.sheets import _schedule_text as schedule_text
-from masrel.schedule.sheets import _sheet_text as sheet_text
+from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
+from masrel.lab.schedule import draw_schedule, schedule_problems, write_schedules
+from masrel.lab.schedule.sheets import _schedule_text as schedule_text
+from masrel.lab.schedule.sheets import _sheet_text as sheet_text
 
 BEFORE = Path(__file__).parent / "drawn_before_kinds"
 DRAWN = json.loads((BEFORE / "sha256.json").read_text(encoding="utf-8"))

@@ -5,9 +5,9 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from masrel.training import Lesson
-from masrel.training._syllabus import next_model
-from masrel.training._trainees import (
+from masrel.lab.training import Lesson
+from masrel.lab.training._syllabus import next_model
+from masrel.lab.training._trainees import (
     adaptive_weights,
     draw_blocks,
     draw_training,

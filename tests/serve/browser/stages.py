@@ -2,8 +2,8 @@
 
 from playwright.sync_api import Browser
 
-from masrel.protocol import StudyPaths
-from masrel.run import Event, read_log
+from masrel.lab.protocol import StudyPaths
+from masrel.lab.run import Event, read_log
 from tests.serve.browser.serving import Server
 from tests.serve.browser.visitors import LOST, Coordinator, Rater, Visitor
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import tomli_w
 
-from masrel.conduct import allot_schedules
-from masrel.protocol import StudyPaths, copy_template, read_protocol
+from masrel.lab.conduct import allot_schedules
+from masrel.lab.protocol import StudyPaths, copy_template, read_protocol
 
 # A busy machine is late, which is no fault of the pages.
 PATIENT = {

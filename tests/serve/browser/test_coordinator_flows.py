@@ -7,8 +7,8 @@ from statistics import quantiles
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from masrel._event_log import read_log
-from masrel.protocol import read_protocol
+from masrel.lab._event_log import read_log
+from masrel.lab.protocol import read_protocol
 from tests.serve.browser.stages import Stage
 from tests.serve.browser.test_rater_flows import tab_to
 from tests.serve.browser.visitors import LOST, Coordinator, Rater

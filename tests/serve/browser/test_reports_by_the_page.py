@@ -6,8 +6,8 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import expect
 
-from masrel.protocol import read_protocol
-from masrel.run import ScriptGrades, run_session
+from masrel.lab.protocol import read_protocol
+from masrel.lab.run import ScriptGrades, run_session
 from tests.serve.browser.conftest import N_RATERS, MakeStage, at_work
 from tests.serve.browser.stages import Stage
 from tests.serve.browser.test_coordinator_flows import form, now

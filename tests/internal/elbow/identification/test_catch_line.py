@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from masrel.elbow.identification._catches import Catch
-from masrel.elbow.identification._equations import line_row
-from masrel.elbow.identification._steps import fit_catch_line, on_the_line
-from masrel.elbow.parameters import STANDARD_MODELS
+from masrel.lab.elbow.identification._catches import Catch
+from masrel.lab.elbow.identification._equations import line_row
+from masrel.lab.elbow.identification._steps import fit_catch_line, on_the_line
+from masrel.lab.elbow.parameters import STANDARD_MODELS
 
 HM3 = STANDARD_MODELS["HM3"]
 LINE, SLOPE = HM3.catch_angle_constant, HM3.catch_slope

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy import stats
 from scipy.special import stdtrit
 
-from masrel.elbow.identification._travels import (
+from masrel.lab.elbow.identification._travels import (
     CensoredTravels,
     DetectionLimit,
     TravelFit,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from masrel.elbow.identification._changes import find_changes
+from masrel.lab.elbow.identification._changes import find_changes
 
 N, PEAK = 400, 50
 ANGLE = np.linspace(0.5, 2.3, N)

@@ -10,14 +10,14 @@ import statsmodels.api as sm
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from masrel.elbow.identification._clusters import (
+from masrel.lab.elbow.identification._clusters import (
     Rows,
     left_out_steps,
     partial_out,
     solve,
     triangle,
 )
-from masrel.elbow.identification._results import fitted
+from masrel.lab.elbow.identification._results import fitted
 
 
 def without_own(own: np.ndarray, design: np.ndarray, target: np.ndarray) -> Rows:

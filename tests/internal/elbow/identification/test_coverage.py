@@ -9,8 +9,8 @@ import math
 
 import pytest
 
-from masrel.elbow import STANDARD_MODELS, ElbowParameters, fit
-from masrel.elbow.identification._quantities import QUANTITIES
+from masrel.lab.elbow import STANDARD_MODELS, ElbowParameters, fit
+from masrel.lab.elbow.identification._quantities import QUANTITIES
 from tests.elbow.identification.synthesis import Scatter, study
 
 HM2, HM3 = STANDARD_MODELS["HM2"], STANDARD_MODELS["HM3"]

@@ -6,19 +6,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from masrel.elbow.identification._catches import (
+from masrel.lab.elbow.identification._catches import (
     Arm,
     PreCatchLaw,
     Trial,
     fast_trial,
 )
-from masrel.elbow.identification._clusters import triangle
-from masrel.elbow.identification._equations import Equations, Known, Spreads
-from masrel.elbow.identification._quantities import QUANTITIES
-from masrel.elbow.identification._reading import even_samples
-from masrel.elbow.identification._stretches import find_stretches
-from masrel.elbow.identification._travels import DetectionLimit, beyond
-from masrel.elbow.parameters import STANDARD_MODELS, ElbowParameters
+from masrel.lab.elbow.identification._clusters import triangle
+from masrel.lab.elbow.identification._equations import Equations, Known, Spreads
+from masrel.lab.elbow.identification._quantities import QUANTITIES
+from masrel.lab.elbow.identification._reading import even_samples
+from masrel.lab.elbow.identification._stretches import find_stretches
+from masrel.lab.elbow.identification._travels import DetectionLimit, beyond
+from masrel.lab.elbow.parameters import STANDARD_MODELS, ElbowParameters
 from tests.elbow.identification.synthesis import recording
 
 NAMES = tuple(QUANTITIES)

@@ -7,21 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from masrel.elbow import (
-    STANDARD_MODELS,
-    ConstantSpeed,
-    ElbowParameters,
-    fit,
-    trace,
-)
-from masrel.elbow.identification import ElbowFit, Movement
-from masrel.elbow.identification._quantities import QUANTITIES
 from masrel.errors import (
     ParameterError,
     RecordingError,
     RecordingWarning,
     SmallSampleWarning,
 )
+from masrel.lab.elbow import (
+    STANDARD_MODELS,
+    ConstantSpeed,
+    ElbowParameters,
+    fit,
+    trace,
+)
+from masrel.lab.elbow.identification import ElbowFit, Movement
+from masrel.lab.elbow.identification._quantities import QUANTITIES
 from tests.elbow.identification.synthesis import Scatter, recording, study
 
 HM2, HM3 = STANDARD_MODELS["HM2"], STANDARD_MODELS["HM3"]

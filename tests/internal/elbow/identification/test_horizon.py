@@ -6,11 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from masrel.elbow import STANDARD_MODELS
-from masrel.elbow.identification._catches import Catch, PreCatchLaw, Trial, fast_trial
-from masrel.elbow.identification._reading import even_samples
-from masrel.elbow.identification._stretches import Part, find_stretches
-from masrel.elbow.identification._travels import detection_limit
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.elbow.identification._catches import (
+    Catch,
+    PreCatchLaw,
+    Trial,
+    fast_trial,
+)
+from masrel.lab.elbow.identification._reading import even_samples
+from masrel.lab.elbow.identification._stretches import Part, find_stretches
+from masrel.lab.elbow.identification._travels import detection_limit
 from tests.elbow.identification.synthesis import recording
 
 HM2 = STANDARD_MODELS["HM2"]

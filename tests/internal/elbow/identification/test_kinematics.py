@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from masrel.elbow.identification._stretches import (
+from masrel.lab.elbow.identification._stretches import (
     differentiate,
     filter_alike,
     state_at_break,

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from masrel.elbow.motions.file import read_motion
 from masrel.errors import ParameterError, RecordingError
-from masrel.recording import RECORDING_COLUMNS, Recording, write_recording
+from masrel.lab.elbow.motions.file import read_motion
+from masrel.lab.recording import RECORDING_COLUMNS, Recording, write_recording
 
 
 def written(folder: Path, text: str) -> Path:

@@ -8,11 +8,11 @@ import can
 import pytest
 
 from masrel.errors import DeviceError, ParameterError
-from masrel.hess import RealClock
-from masrel.hess.puck import Frame, Link, PuckOptions, connected
-from masrel.hess.puck._bring_up import AwakePuck, set_position
-from masrel.hess.puck._codec import encode_position, encode_reply
-from masrel.hess.puck._commissioning import awake
+from masrel.lab.hess import RealClock
+from masrel.lab.hess.puck import Frame, Link, PuckOptions, connected
+from masrel.lab.hess.puck._bring_up import AwakePuck, set_position
+from masrel.lab.hess.puck._codec import encode_position, encode_reply
+from masrel.lab.hess.puck._commissioning import awake
 from tests.hess.puck.rig import bench
 
 STAT, MODE, CTS, IPNM, GRPA = 5, 8, 68, 86, 26

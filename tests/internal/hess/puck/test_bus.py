@@ -7,10 +7,10 @@ import pytest
 from can.interfaces.virtual import VirtualBus
 
 from masrel.errors import BusError
-from masrel.hess import RealClock, SimulatedClock
-from masrel.hess.puck import Frame, Link
-from masrel.hess.puck._bus import open_link
-from masrel.hess.puck._codec import reply_identifiers
+from masrel.lab.hess import RealClock, SimulatedClock
+from masrel.lab.hess.puck import Frame, Link
+from masrel.lab.hess.puck._bus import open_link
+from masrel.lab.hess.puck._codec import reply_identifiers
 
 
 @pytest.fixture

@@ -2,9 +2,9 @@
 
 import pytest
 
-from masrel.hess import SimulatedClock
-from masrel.hess.puck import connected
-from masrel.hess.puck._commissioning import awake, check_awake
+from masrel.lab.hess import SimulatedClock
+from masrel.lab.hess.puck import connected
+from masrel.lab.hess.puck._commissioning import awake, check_awake
 from tests.hess.puck.rig import END, fault, loose, puck_options
 
 

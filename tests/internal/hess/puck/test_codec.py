@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from masrel.errors import FrameError
-from masrel.hess.puck._codec import (
+from masrel.lab.hess.puck._codec import (
     POSITION_GROUP,
     PROPERTY_GROUP,
     TORQUE_GROUP,

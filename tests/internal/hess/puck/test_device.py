@@ -6,23 +6,23 @@ import can
 import numpy as np
 import pytest
 
-from masrel.elbow import STANDARD_MODELS, ConstantSpeed, trace
 from masrel.errors import DeviceError
-from masrel.hess import Controller, DeviceSetup, RealClock, SimulatedClock
-from masrel.hess.puck import PuckOptions
-from masrel.hess.puck._codec import (
+from masrel.lab.elbow import STANDARD_MODELS, ConstantSpeed, trace
+from masrel.lab.hess import Controller, DeviceSetup, RealClock, SimulatedClock
+from masrel.lab.hess.puck import PuckOptions
+from masrel.lab.hess.puck._codec import (
     decode_position,
     decode_request,
     encode_position,
     encode_set,
 )
-from masrel.hess.puck._puck_device import (
+from masrel.lab.hess.puck._puck_device import (
     EmulatedPuckDevice,
     PuckDevice,
     UnwiredPuckDevice,
     build,
 )
-from masrel.hess.puck._puck_options import FaultKind
+from masrel.lab.hess.puck._puck_options import FaultKind
 from tests.hess.puck.rig import (
     END,
     PUCK,

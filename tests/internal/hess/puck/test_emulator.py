@@ -5,8 +5,8 @@ from math import degrees, radians
 import pytest
 
 from masrel.errors import BusError, DeviceTimeoutError, FrameError, ParameterError
-from masrel.hess.puck import EmulatorOptions, Frame, InjectedFault
-from masrel.hess.puck._codec import encode_get, to_group, to_puck
+from masrel.lab.hess.puck import EmulatorOptions, Frame, InjectedFault
+from masrel.lab.hess.puck._codec import encode_get, to_group, to_puck
 from tests.hess.puck.rig import Bench, bench, fault, loose, packed_torques
 
 VERS, ROLE, STAT = 0, 1, 5

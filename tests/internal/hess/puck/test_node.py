@@ -5,11 +5,11 @@ from collections.abc import Callable
 import pytest
 
 from masrel.errors import BusError, DeviceError, DeviceTimeoutError
-from masrel.hess import SimulatedClock
-from masrel.hess.puck import Frame, Link
-from masrel.hess.puck._bus import open_link
-from masrel.hess.puck._node import PuckNode
-from masrel.hess.puck._release import release
+from masrel.lab.hess import SimulatedClock
+from masrel.lab.hess.puck import Frame, Link
+from masrel.lab.hess.puck._bus import open_link
+from masrel.lab.hess.puck._node import PuckNode
+from masrel.lab.hess.puck._release import release
 from tests.hess.puck.rig import bench
 
 T, MODE = 42, 8

@@ -1,0 +1,80 @@
+"""The estimates a study's plan asks for, and nothing else.
+
+In: a protocol, its ratings and grades given in person. Out: an `Analysis`, written
+as JSON in full precision; or a regression of the grades, or estimates as a frame.
+"""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from masrel.lab.analysis._analysis_json import (
+        as_analysis_document,
+        to_frame,
+        write_analysis,
+    )
+    from masrel.lab.analysis._gate_results import GateResult, check_gates
+    from masrel.lab.analysis._grading import Effect, GradeRegression, grade_regression
+    from masrel.lab.analysis._plan import analyze
+    from masrel.lab.analysis._results import (
+        Analysis,
+        AnswerCount,
+        InPersonAgreement,
+        InPersonPair,
+        IntendedAgreement,
+        ModelAgreement,
+        PlannedEstimate,
+        Presentations,
+        QuestionSummary,
+        RaterEstimate,
+        Speed,
+        Speeds,
+        SpeedSummary,
+    )
+
+__all__ = [
+    "Analysis",
+    "AnswerCount",
+    "Effect",
+    "GateResult",
+    "GradeRegression",
+    "InPersonAgreement",
+    "InPersonPair",
+    "IntendedAgreement",
+    "ModelAgreement",
+    "PlannedEstimate",
+    "Presentations",
+    "QuestionSummary",
+    "RaterEstimate",
+    "Speed",
+    "SpeedSummary",
+    "Speeds",
+    "analyze",
+    "as_analysis_document",
+    "check_gates",
+    "grade_regression",
+    "to_frame",
+    "write_analysis",
+]
+
+_HOMES = {
+    "Effect": "_grading",
+    "GateResult": "_gate_results",
+    "GradeRegression": "_grading",
+    "analyze": "_plan",
+    "check_gates": "_gate_results",
+    "as_analysis_document": "_analysis_json",
+    "grade_regression": "_grading",
+    "to_frame": "_analysis_json",
+    "write_analysis": "_analysis_json",
+}
+
+
+def __getattr__(name: str) -> object:
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    import importlib
+
+    home = importlib.import_module(
+        f"masrel.lab.analysis.{_HOMES.get(name, '_results')}"
+    )
+    return getattr(home, name)

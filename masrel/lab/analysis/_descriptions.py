@@ -1,0 +1,201 @@
+"""Descriptions of ratings: grades as intended and in person, and speeds."""
+
+import math
+import statistics
+from collections.abc import Iterator, Sequence
+from operator import attrgetter
+
+from masrel.errors import RatingsError
+from masrel.lab.analysis._results import (
+    InPersonAgreement,
+    InPersonPair,
+    IntendedAgreement,
+    ModelAgreement,
+    Presentations,
+    Speed,
+    Speeds,
+    SpeedSummary,
+)
+from masrel.lab.protocol import Protocol
+from masrel.lab.ratings import InPerson, InPersonRow, Rating, Ratings
+
+
+def intended_agreement(
+    protocol: Protocol, ratings: Ratings, session: str | None
+) -> IntendedAgreement:
+    """Return how many raters gave each standard model its intended grade."""
+    # [1] Park, H.-S., Kim, J., Damiano, D. L. (2012). Development of a Haptic Elbow
+    # Spasticity Simulator (HESS). IEEE TNSRE, 20(3), 361-370, section IV.B.
+    # https://doi.org/10.1109/TNSRE.2012.2195330
+    rows = [row for row in ratings.rows if row.session == session]
+    models = []
+    for model in protocol.models if session is not None else ():
+        if model.role != "standard" or model.intended_grade is None:
+            continue
+        of_model = [row.grade for row in rows if row.model == model.id]
+        grades = [grade for grade in of_model if grade is not None]
+        n_agree = grades.count(model.intended_grade)
+        models.append(
+            ModelAgreement(
+                model=model.id,
+                intended_grade=model.intended_grade,
+                n_ratings=len(grades),
+                n_agree=n_agree,
+                percent=100.0 * n_agree / len(grades) if grades else math.nan,
+            )
+        )
+    percents = [row.percent for row in models if row.n_ratings]
+    reason = None
+    if session is None:
+        reason = "no session of the protocol has ratings"
+    elif not models:
+        reason = "no standard model has an intended grade"
+    elif not percents:
+        reason = "no standard model has a rating"
+    elif len(percents) == 1:
+        reason = "one model has no standard deviation over models"
+    return IntendedAgreement(
+        session=session if models else None,
+        models=tuple(models),
+        mean=statistics.fmean(percents) if percents else math.nan,
+        sd=statistics.stdev(percents) if len(percents) > 1 else math.nan,
+        reason=reason,
+    )
+
+
+def in_person_agreement(
+    ratings: Ratings, in_person: InPerson | None, session: str | None
+) -> InPersonAgreement:
+    """Return pairs of grades given in person and the same rater's haptic grades."""
+    reason = None
+    entries: list[tuple[InPersonRow, str | None]] = []
+    if in_person is None:
+        reason = "no grades given in person belong to these ratings"
+    else:
+        entries = _entries(in_person, ratings, session)
+    pairs = tuple(
+        InPersonPair(
+            rater=row.rater,
+            model=row.model,
+            in_person=row.in_person_grade,
+            haptic=grade,
+        )
+        for row, grade in entries
+        if row.in_person_grade is not None and grade is not None
+    )
+    if in_person is not None and not pairs:
+        reason = "no rater has a grade both in person and haptic"
+    return InPersonAgreement(
+        session=session,
+        pairs=pairs,
+        n_pairs=len(pairs),
+        n_equal=sum(pair.in_person == pair.haptic for pair in pairs),
+        n_unpaired=len(entries) - len(pairs),
+        reason=reason,
+    )
+
+
+def _entries(
+    in_person: InPerson, ratings: Ratings, session: str | None
+) -> list[tuple[InPersonRow, str | None]]:
+    # Every in-person entry with its haptic grade: the one printed beside it in the
+    # same file, or, where the file has none, the one in the ratings.
+    graded = [
+        row for row in ratings.rows if row.session == session and row.grade is not None
+    ]
+    # Last to first: of repeated presentations the first one counts.
+    graded.sort(key=attrgetter("repeat"), reverse=True)
+    haptic = {(row.rater, row.model): row.grade for row in graded}
+    rows = in_person.rows
+    printed = {row.source_table for row in rows if row.haptic_grade is not None}
+    if not printed:
+        return [(row, haptic.get((row.rater, row.model))) for row in rows]
+    for row in rows:
+        rated = haptic.get((row.rater, row.model))
+        if None not in (row.haptic_grade, rated) and row.haptic_grade != rated:
+            raise RatingsError(
+                f"{in_person.source_path}: line {row.line}, column 'haptic_grade': "
+                f"the ratings hold {rated!r} for rater {row.rater}, model {row.model}, "
+                f"got {row.haptic_grade!r}"
+            )
+    # A table without any haptic grade repeats the in-person grades of another.
+    return [(row, row.haptic_grade) for row in rows if row.source_table in printed]
+
+
+def stretching_speeds(protocol: Protocol, ratings: Ratings) -> Speeds:
+    """Return the mean speeds of the stretches, and summaries of them."""
+    known = [row for row in ratings.rows if not math.isnan(row.mean_speed_deg_s)]
+    values = tuple(speed for row in known for speed in _speeds_of(row))
+    by_model: dict[tuple[str, str], list[float]] = {}
+    by_rater: dict[tuple[str, str], list[float]] = {}
+    for value in values:
+        for groups, name in ((by_model, value.model), (by_rater, value.rater)):
+            key = (value.session, name)
+            groups.setdefault(key, []).append(value.mean_speed_deg_s)
+    sessions = [session.id for session in protocol.sessions]
+    models = [model.id for model in protocol.models]
+    raters = [rater.id for rater in protocol.raters]
+    return Speeds(
+        values=values,
+        by_model=_summaries(by_model, sessions, models),
+        by_rater=_summaries(by_rater, sessions, raters),
+        n_missing=len(ratings.rows) - len(known),
+        reason=None if values else "no rating comes with a stretching speed",
+    )
+
+
+def _speeds_of(row: Rating) -> Iterator[Speed]:
+    # of each stretch that has one; of all together where the ratings say no more
+    made: dict[int | None, float | None] = {None: row.mean_speed_deg_s}
+    if row.speeds_deg_s is not None:
+        made = {**dict(enumerate(row.speeds_deg_s, start=1))}
+    for stretch, speed in made.items():
+        if speed is not None:
+            yield Speed(
+                session=row.session,
+                rater=row.rater,
+                model=row.model,
+                mean_speed_deg_s=float(speed),
+                stretch=stretch,
+                is_graded=stretch is not None and stretch == row.graded_stretch,
+            )
+
+
+def presentations(ratings: Ratings) -> Presentations | None:
+    """Count stretches, and presentations in which nothing could be felt."""
+    known = [row for row in ratings.rows if row.n_stretches is not None]
+    if not known:
+        return None
+    felt = [row.felt for row in known]
+    grips = [row.grip_lost for row in known if row.grip_lost is not None]
+    return Presentations(
+        n_presentations=len(known),
+        n_stretches=sum(row.n_stretches or 0 for row in known),
+        n_felt=felt.count("felt"),
+        n_below_threshold=felt.count("below-threshold"),
+        n_no_catch=felt.count("no-catch"),
+        n_unknown=felt.count(None),
+        n_grip_lost=sum(grips) if grips else None,
+    )
+
+
+def _summaries(
+    groups: dict[tuple[str, str], list[float]],
+    sessions: Sequence[str],
+    names: Sequence[str],
+) -> tuple[SpeedSummary, ...]:
+    # in the protocol's order
+    present = [(s, n) for s in sessions for n in names if (s, n) in groups]
+    return tuple(
+        SpeedSummary(
+            session=session,
+            name=name,
+            n=len(speeds),
+            mean=statistics.fmean(speeds),
+            sd=statistics.stdev(speeds) if len(speeds) > 1 else math.nan,
+            least=min(speeds),
+            most=max(speeds),
+        )
+        for session, name in present
+        for speeds in [groups[session, name]]
+    )

@@ -1,0 +1,405 @@
+"""What grades follow: ordered regression on a model's parameters and the speed.
+
+The source left this as future work: "whether the parameters can be used as
+quantitative measures indicating the degree of spasticity" (section V).
+"""
+
+import math
+import sys
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+from scipy.special import stdtrit
+
+from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
+from masrel.lab.analysis._exclusions import analysed_ratings
+from masrel.lab.protocol import Protocol, elbow_parameters
+from masrel.lab.ratings import Ratings
+
+PREDICTORS: dict[str, tuple[str, str]] = {
+    "L": ("catch_angle_constant_deg", "deg"),
+    "H": ("catch_torque_nms_rad", "N·m·s/rad"),
+    "Q": ("residual_ratio", "1"),
+    "D": ("catch_travel_deg", "deg"),
+    "speed": ("mean_speed_deg_s", "deg/s"),
+}
+"""Predictor to its key of a model, or column of the ratings, and its unit."""
+
+_SEPARATED = (
+    "these predictors separate some grades from others without a miss, so that the "
+    "likelihood has no maximum; fewer predictors, or more raters, may help"
+)
+
+_Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effect:
+    """What one predictor does to the grade, the others held.
+
+    Attributes
+    ----------
+    predictor : str
+        L, H, Q, D or speed.
+    per : float
+        One standard deviation of it among the ratings, in its unit: the step that
+        the odds ratio is for.
+    odds_ratio : float
+        By how much that step multiplies the odds of a higher grade; ``nan`` when
+        undefined.
+    coefficient, standard_error : float
+        Its logarithm, with an error clustered by rater.
+    low, high : float
+        Confidence interval of the odds ratio, from t with raters - 1 degrees.
+    """
+
+    predictor: str
+    per: float
+    odds_ratio: float
+    coefficient: float
+    standard_error: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GradeRegression:
+    """An ordered logistic regression of grades.
+
+    Attributes
+    ----------
+    effects : tuple of Effect
+        One a predictor that is in the regression.
+    dropped : tuple of tuple of str
+        Predictors that are not, each with the reason.
+    thresholds : tuple of float
+        Where one grade turns into the next, on the scale of the coefficients.
+    grades : tuple of str
+        The grades that were given, in order.
+    n_ratings, n_raters, n_models, n_missing : int
+        Ratings used, of how many raters and models; ratings without a grade or
+        speed, left out.
+    log_likelihood, log_likelihood_alone : float
+        Of the regression, and of the thresholds without any predictor.
+    level : float
+        Level of the intervals.
+    simulated : bool
+        Whether any rating is simulated.
+    reason : str or None
+        Why there are no values, or None.
+    """
+
+    effects: tuple[Effect, ...]
+    dropped: tuple[tuple[str, str], ...]
+    thresholds: tuple[float, ...]
+    grades: tuple[str, ...]
+    n_ratings: int
+    n_raters: int
+    n_models: int
+    n_missing: int
+    log_likelihood: float
+    log_likelihood_alone: float
+    level: float
+    simulated: bool
+    reason: str | None = None
+
+
+def grade_regression(
+    protocol: Protocol,
+    ratings: Ratings,
+    *,
+    predictors: Sequence[str] = tuple(PREDICTORS),
+    models: Literal["standard", "dummy", "all"] = "all",
+    session: str | None = None,
+    level: float = 0.95,
+    excluded: Sequence[str] = (),
+) -> GradeRegression:
+    """Regress grades on L, H, Q, D and the stretching speed.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The study, which has the models' parameters.
+    ratings : Ratings
+        Its ratings with their speeds.
+    predictors : sequence of str, optional
+        Some of L, H, Q, D and speed, in the order of
+        their claim: one that is a combination of those before it, over these
+        ratings, is dropped and named.
+    models : {"standard", "dummy", "all"}, optional
+        Which models.
+    session : str, optional
+        Which session; all unless given.
+    level : float, optional
+        Level of the intervals.
+    excluded : sequence of str, optional
+        Raters who are left out.
+
+    Returns
+    -------
+    GradeRegression
+        Odds ratios per standard deviation, errors clustered by rater.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such predictor, session or level.
+    RatingsError
+        If fewer than two grades, or ratings of two raters, are left.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If the predictors separate grades without a miss: the likelihood then has no
+        maximum, and no coefficient is a finite number.
+
+    Notes
+    -----
+    P(grade ≤ g) = 1/(1 + exp(x·β - τ_g)), by maximum likelihood (statsmodels,
+    `OrderedModel`). Whether a maximum exists is settled first, by a linear program:
+    it does not if some direction of β and τ makes no rating less likely [1]_. Models
+    on straight lines between others, as dummies are, do not help to tell L, H, Q and
+    D apart: they lie in the space of those at the ends.
+
+    References
+    ----------
+    .. [1] Albert, A., Anderson, J. A. (1984). On the existence of maximum likelihood
+       estimates in logistic regression models. Biometrika, 71(1), 1-10.
+       https://doi.org/10.1093/biomet/71.1.1
+    """
+    _check_options(protocol, predictors, session, level)
+    ratings = analysed_ratings(ratings, excluded)
+    table, n_missing = _predictor_table(protocol, ratings, predictors, models, session)
+    grades = tuple(g for g in ratings.scale.grades if (table["grade"] == g).any())
+    data, dropped, scale = _standardized(table, grades, predictors)
+    reason = None
+    if _is_separated(data):
+        reason = _SEPARATED
+        warnings.warn(reason, UndefinedStatisticWarning, stacklevel=2)
+    fit = _undefined(data) if reason else _fit(data)
+    counts = np.bincount(data.codes)
+    return GradeRegression(
+        effects=_effects(fit, scale, int(data.raters.max()) + 1, level),
+        dropped=dropped,
+        thresholds=tuple(fit.thresholds.tolist()),
+        grades=grades,
+        n_ratings=len(table),
+        n_raters=table["rater"].nunique(),
+        n_models=table["model"].nunique(),
+        n_missing=n_missing,
+        log_likelihood=fit.log_likelihood,
+        log_likelihood_alone=float((counts * np.log(counts / counts.sum())).sum()),
+        level=level,
+        simulated=ratings.simulated,
+        reason=reason,
+    )
+
+
+def _check_options(
+    protocol: Protocol, predictors: Sequence[str], session: str | None, level: float
+) -> None:
+    unknown = [name for name in predictors if name not in PREDICTORS]
+    if unknown or not predictors or len(set(predictors)) < len(predictors):
+        raise ParameterError(
+            f"predictors: need some of {', '.join(PREDICTORS)}, each once, got "
+            f"{', '.join(predictors) or 'none'}"
+        )
+    if not 0.5 < level < 1.0:
+        raise ParameterError(f"level: needs more than 0.5 and less than 1, got {level}")
+    sessions = [declared.id for declared in protocol.sessions]
+    if session is not None and session not in sessions:
+        known = ", ".join(sessions)
+        raise ParameterError(f"session: needs one of {known}, got {session!r}")
+
+
+def _predictor_table(
+    protocol: Protocol,
+    ratings: Ratings,
+    predictors: Sequence[str],
+    models: str,
+    session: str | None,
+) -> tuple[pd.DataFrame, int]:
+    # every grade with its predictors beside it, and how many ratings lack some
+    selected = {m.id: m for m in protocol.models if models in ("all", m.role)}
+    table = ratings.table[ratings.table["model"].isin(selected)].copy()
+    if session is not None:
+        table = table[table["session"] == session].copy()
+    for name in predictors:
+        key = PREDICTORS[name][0]
+        if name == "speed":
+            table[name] = table[key]
+            continue
+        of_model = {m: getattr(selected[m], key) for m in selected}
+        if name == "Q":  # one meaning, whichever way a model reads its Q
+            of_model = {
+                m: None if q is None else elbow_parameters(protocol, m).residual_share
+                for m, q in of_model.items()
+            }
+        # none of them is any of a model of another kind than the spastic elbow
+        values = [of_model[model] for model in table["model"]]
+        table[name] = np.array(values, dtype=np.float64)
+    complete = table.dropna(subset=["grade", *predictors])
+    return complete, len(table) - len(complete)
+
+
+def _standardized(
+    table: pd.DataFrame, grades: tuple[str, ...], predictors: Sequence[str]
+) -> tuple["_OrdinalData", tuple[tuple[str, str], ...], dict[str, float]]:
+    # what is regressed, what is dropped and why, and the standard deviations
+    n_raters = table["rater"].nunique()
+    if len(grades) < 2 or n_raters < 2:
+        raise RatingsError(
+            "a regression of grades needs two grades and two raters or more, got "
+            f"{len(grades)} and {n_raters} in {len(table)} ratings with every predictor"
+        )
+    names, dropped = _independent(table, predictors)
+    values = table[names].to_numpy(dtype=np.float64)
+    scale = values.std(axis=0, ddof=1)
+    data = _OrdinalData(
+        values=(values - values.mean(axis=0)) / scale,
+        codes=np.array([grades.index(g) for g in table["grade"]]),
+        raters=pd.factorize(table["rater"])[0].astype(np.int64),
+    )
+    return data, tuple(dropped), dict(zip(names, scale.tolist(), strict=True))
+
+
+def _independent(
+    table: pd.DataFrame, predictors: Sequence[str]
+) -> tuple[list[str], list[tuple[str, str]]]:
+    # the predictors that are no combination of earlier ones, and why others are out
+    names: list[str] = []
+    dropped: list[tuple[str, str]] = []
+    basis = np.ones((len(table), 1)) / math.sqrt(len(table))  # (n_ratings, n_names + 1)
+    for name in predictors:
+        column = table[name].to_numpy(dtype=np.float64)
+        centred = column - column.mean()
+        residual = column - basis @ (basis.T @ column)
+        residual = residual - basis @ (basis.T @ residual)  # again, for rounding
+        size = float(np.linalg.norm(column))
+        if np.linalg.norm(centred) <= 1e-9 * size:
+            dropped.append((name, "it is the same in all ratings"))
+        elif np.linalg.norm(residual) <= 1e-9 * size:
+            others = ", ".join(names)
+            dropped.append((name, f"it is a combination of {others} in these ratings"))
+        else:
+            names.append(name)
+            basis = np.column_stack([basis, residual / np.linalg.norm(residual)])
+    if not names:
+        raise RatingsError(f"predictors: {'; '.join(': '.join(d) for d in dropped)}")
+    return names, dropped
+
+
+def _effects(
+    fit: "_OrdinalFit", scale: Mapping[str, float], n_raters: int, level: float
+) -> tuple[Effect, ...]:
+    quantile = float(stdtrit(n_raters - 1, 0.5 + 0.5 * level))
+    errors = np.sqrt(np.diag(fit.covariance)).tolist()
+    return tuple(
+        Effect(
+            predictor=name,
+            per=per,
+            odds_ratio=_odds_ratio(value),
+            coefficient=value,
+            standard_error=error,
+            low=_odds_ratio(value - quantile * error),
+            high=_odds_ratio(value + quantile * error),
+        )
+        for (name, per), value, error in zip(
+            scale.items(), fit.coefficients.tolist(), errors, strict=True
+        )
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _OrdinalData:
+    """Grades and what they are regressed on."""
+
+    # (n_ratings, n_predictors): standardized predictors
+    values: _Floats = field(compare=False, repr=False)
+    # (n_ratings,): grades, 0 for the least that was given
+    codes: NDArray[np.int64] = field(compare=False, repr=False)
+    # (n_ratings,): who gave them, from 0 on
+    raters: NDArray[np.int64] = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _OrdinalFit:
+    """A regression of grades."""
+
+    coefficients: _Floats = field(compare=False, repr=False)  # (n_predictors,): β
+    # (n_predictors, n_predictors): of their errors, clustered by rater
+    covariance: _Floats = field(compare=False, repr=False)
+    thresholds: _Floats = field(compare=False, repr=False)  # (n_grades - 1,): τ
+    log_likelihood: float  # at the maximum
+
+
+def _is_separated(data: _OrdinalData) -> bool:
+    """Say whether the likelihood has no maximum, by a linear program."""
+    # [1] Albert, A., Anderson, J. A. (1984). On the existence of maximum likelihood
+    # estimates in logistic regression models. Biometrika, 71(1), 1-10.
+    # https://doi.org/10.1093/biomet/71.1.1
+    # A direction (β, τ) in which no rating's interval τ_(g-1) < x·β < τ_g shrinks at
+    # either end, and some end moves away: then the likelihood grows for ever.
+    n, p = data.values.shape
+    n_thresholds = int(data.codes.max())
+    upper, lower = data.codes < n_thresholds, data.codes > 0
+    rows = np.zeros((int(upper.sum() + lower.sum()), p + n_thresholds))
+    ends = int(upper.sum())
+    rows[:ends, :p] = data.values[upper]
+    rows[np.arange(ends), p + data.codes[upper]] = -1.0  # x·β ≤ τ_g
+    rows[ends:, :p] = -data.values[lower]
+    rows[np.arange(ends, rows.shape[0]), p + data.codes[lower] - 1] = 1.0
+    optimum = linprog(
+        rows.sum(axis=0),  # the smaller, the further the ends move away
+        A_ub=rows,
+        b_ub=np.zeros(rows.shape[0]),
+        bounds=(-1.0, 1.0),
+        method="highs",
+    )
+    return bool(optimum.fun < -1e-7 * n)
+
+
+def _fit(data: _OrdinalData) -> _OrdinalFit:
+    """Fit the regression by maximum likelihood."""
+    from statsmodels.miscmodels.ordinal_model import OrderedModel
+
+    model = OrderedModel(data.codes, data.values, distr="logit")
+    result = model.fit(method="bfgs", disp=False, gtol=1e-8, maxiter=1000)
+    p = data.values.shape[1]
+    inverse = np.linalg.inv(model.hessian(result.params))
+    scores = np.asarray(model.score_obs(result.params))
+    n_raters = int(data.raters.max()) + 1
+    by_rater = np.zeros((n_raters, scores.shape[1]))
+    np.add.at(by_rater, data.raters, scores)
+    meat = by_rater.T @ by_rater * n_raters / (n_raters - 1)
+    covariance = (inverse @ meat @ inverse)[:p, :p]
+    thresholds = np.asarray(model.transform_threshold_params(result.params))[1:-1]
+    return _OrdinalFit(
+        coefficients=np.asarray(result.params[:p]),
+        covariance=covariance,
+        thresholds=thresholds,
+        log_likelihood=float(result.llf),
+    )
+
+
+def _undefined(data: _OrdinalData) -> _OrdinalFit:
+    n_predictors = data.values.shape[1]
+    return _OrdinalFit(
+        coefficients=np.full(n_predictors, math.nan),
+        covariance=np.full((n_predictors, n_predictors), math.nan),
+        thresholds=np.full(int(data.codes.max()), math.nan),
+        log_likelihood=math.nan,
+    )
+
+
+def _odds_ratio(coefficient: float) -> float:
+    """Turn a coefficient into what it multiplies the odds by."""
+    if coefficient > math.log(sys.float_info.max):
+        return math.inf
+    return math.exp(coefficient)

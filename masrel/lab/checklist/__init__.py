@@ -1,0 +1,18 @@
+"""Checklists of reporting guidelines, filled from the record of a study.
+
+In: a study. Out: the items of a guideline, each with what masrel knows of it and the
+files that say so; what only the authors know is left to them.
+"""
+
+from masrel.lab.checklist._checklist_forms import checklist_markdown, write_checklist
+from masrel.lab.checklist._filling import GUIDELINES, fill_checklist
+from masrel.lab.checklist._items import Checklist, ChecklistItem
+
+__all__ = [
+    "GUIDELINES",
+    "Checklist",
+    "ChecklistItem",
+    "checklist_markdown",
+    "fill_checklist",
+    "write_checklist",
+]

@@ -1,0 +1,128 @@
+"""Options by which a verb fails when the numbers do not keep their limits."""
+
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from masrel._files import no_follow, write_file
+from masrel._input import read_regular
+from masrel.cli._options import Decorator, grouped
+from masrel.cli._paths import OutputFile
+from masrel.errors import ParameterError
+
+if TYPE_CHECKING:
+    from masrel.lab.analysis import Analysis, GateResult
+    from masrel.lab.protocol import Gate, Protocol
+
+_LARGEST_SUMMARY = 1 << 20  # GitHub takes no more of a step
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GateOptions:
+    """Gates of a call, and where what came of them is written."""
+
+    require: tuple[str, ...]
+    junit: Path | None
+
+    def gates(self, protocol: "Protocol") -> "tuple[Gate, ...]":
+        """Return the gates of the protocol and of the call, each checked."""
+        # Imported here, as below: a report that is current is told so without them.
+        from masrel.lab.protocol import gates_of, parse_gate
+
+        ids = [line.id for line in protocol.analysis.estimates]
+        of_call = (parse_gate(text, ids, where="--require") for text in self.require)
+        return (*gates_of(protocol), *of_call)
+
+
+def gate_options() -> Decorator:
+    """Return the options of gates, as one argument `gating` of a command."""
+    return grouped(
+        "gating",
+        GateOptions,
+        click.option(
+            "--require",
+            multiple=True,
+            metavar="GATE",
+            help="Exit with 1 unless a number keeps a limit, as 'kappa.low >= 0.4': "
+            "value, low, high, width, n, n_missing or p of an estimate of the plan.",
+        ),
+        click.option(
+            "--junit",
+            type=OutputFile(path_type=Path, dir_okay=False),
+            help="Write estimates and gates as a JUnit file.",
+        ),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """What came of the gates of a call, as it is said and written."""
+
+    holds: bool  # whether all of them do
+    gates: tuple[dict[str, object], ...]  # each for JSON
+    lines: tuple[str, ...]
+    junit: str
+    summary: str
+
+    def conclude(self, options: GateOptions) -> None:
+        """Write it, say which gates fail, and end with 1 if one does."""
+        if options.junit is not None and not _is_text_of(options.junit, self.junit):
+            write_file(options.junit, self.junit)
+        for line in self.lines:
+            click.echo(line, err=True)
+        summary = os.environ.get("GITHUB_STEP_SUMMARY")
+        if summary:
+            _append(Path(summary), self.summary)
+        if not self.holds:
+            click.get_current_context().exit(1)
+
+
+def verdict_of(analysis: "Analysis", gates: "tuple[Gate, ...]") -> Verdict:
+    """Hold an analysis against gates."""
+    from masrel.lab.analysis import check_gates
+    from masrel.lab.report._junit import job_summary, junit_text
+
+    results = check_gates(analysis, gates)
+    return Verdict(
+        holds=all(result.holds for result in results),
+        gates=tuple(map(_as_document, results)),
+        lines=tuple(map(str, results)),
+        junit=junit_text(analysis, results),
+        summary=job_summary(analysis, results),
+    )
+
+
+def _as_document(result: "GateResult") -> dict[str, object]:
+    gate = result.gate
+    return {
+        "gate": str(gate),
+        "why": gate.why,
+        "where": gate.where,
+        "number": result.number if math.isfinite(result.number) else None,
+        "holds": result.holds,
+        "reason": result.reason,
+    }
+
+
+def _is_text_of(file: Path, text: str) -> bool:
+    data = text.encode()
+    try:
+        return read_regular(file, most=len(data)) == data
+    except OSError:
+        return False
+
+
+def _append(file: Path, text: str) -> None:
+    # whole letters: a cut may go through one
+    data = text.encode()[:_LARGEST_SUMMARY].decode(errors="ignore").encode()
+    try:
+        with open(file, "ab", opener=no_follow) as out:
+            out.write(data)
+    except OSError as error:
+        raise ParameterError(
+            f"GITHUB_STEP_SUMMARY: {file}: {error.strerror or error}"
+        ) from error

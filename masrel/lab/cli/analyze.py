@@ -1,0 +1,99 @@
+"""``masrel analyze``: compute the agreement tables a study asks for."""
+
+import textwrap
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from masrel.cli._options import (
+    STDOUT,
+    OutputOptions,
+    output_options,
+    warnings_as_notes,
+    write_json,
+)
+from masrel.lab.cli._gating import GateOptions, gate_options, verdict_of
+from masrel.lab.cli._study_options import ratings_option, read_study
+
+if TYPE_CHECKING:
+    from masrel.lab.analysis import Analysis
+    from masrel.lab.ratings import StudyData
+
+
+@click.command("analyze")
+@click.argument("study", type=click.Path(path_type=Path))
+@ratings_option
+@gate_options()
+@output_options(
+    json="Write the analysis here; - prints it, and nothing else, on stdout.",
+    csv="Print the tables as CSV.",
+    makes_folder=True,
+)
+def analyze(
+    study: Path,
+    ratings_file: Path | None,
+    gating: GateOptions,
+    output: OutputOptions,
+) -> None:
+    """Compute what the plan of STUDY asks for.
+
+    Prints the tables and writes STUDY/analysis.json, or the file of --json.
+    """
+    from masrel.lab import analysis as library
+
+    data = read_study(study, ratings_file)
+    gates = gating.gates(data.protocol)
+    with warnings_as_notes():
+        analysis = library.analyze(
+            data.protocol,
+            data.ratings,
+            in_person=data.in_person,
+            answers=data.answers,
+            excluded=data.excluded,
+        )
+    if output.json_file == STDOUT:
+        write_json(library.as_analysis_document(analysis), STDOUT)
+        verdict_of(analysis, gates).conclude(gating)
+        return
+    destination = output.json_file or data.paths.analysis_file
+    library.write_analysis(
+        analysis, destination, within=None if output.json_file else study
+    )
+    _show(data, analysis, csv=output.csv, raw=output.raw_csv)
+    click.echo(f"read: {data.read}\nanalysis: {destination}", err=True)
+    verdict_of(analysis, gates).conclude(gating)
+
+
+def _show(data: "StudyData", analysis: "Analysis", *, csv: bool, raw: bool) -> None:
+    from masrel.lab.report._document import SECTIONS
+    from masrel.lab.report._grades import felt_sentences
+    from masrel.lab.report._material import Paragraph, gather
+    from masrel.tables._tables import Table, as_csv, as_text
+
+    material = gather(data.protocol, data.ratings, analysis, data.in_person)
+    felt = felt_sentences(material)
+    if felt:
+        click.echo(textwrap.fill(felt, 88) + "\n", err=csv)
+    for name in _computed(analysis):
+        for block in SECTIONS[name](material).blocks:
+            if isinstance(block, Table):
+                click.echo(as_csv(block, raw=raw) if csv else as_text(block) + "\n")
+            elif isinstance(block, Paragraph) and block.absent:
+                click.echo(f"{name}: {block.text}\n", err=csv)
+            elif isinstance(block, Paragraph) and not csv:
+                click.echo(textwrap.fill(block.text, 88) + "\n")
+
+
+def _computed(analysis: "Analysis") -> list[str]:
+    # Sections of the report that show what an analysis holds; a trace is not one.
+    kinds = {planned.line.kind for planned in analysis.estimates}
+    is_computed = {
+        "agreement": "inter-rater" in kinds,
+        "test-retest": "test-retest" in kinds,
+        "intended": analysis.intended is not None,
+        "in-person": analysis.in_person is not None,
+        "speeds": analysis.speeds is not None,
+        "questionnaires": bool(analysis.questionnaires),
+    }
+    return [name for name, computed in is_computed.items() if computed]

@@ -1,0 +1,169 @@
+"""``masrel check``: everything that is wrong with a study, at once."""
+
+import contextlib
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+import click
+
+from masrel.errors import MasrelError, ParameterError, ProtocolError, RatingsError
+from masrel.lab._once import read_once
+from masrel.lab.cli._study_options import echo_remarks
+from masrel.lab.protocol import Protocol, StudyPaths, read_protocol, scale_of
+from masrel.lab.ratings import study_remarks
+from masrel.lab.schedule import concealment_notes, schedule_problems
+
+
+@click.command("check")
+@click.argument("study", type=click.Path(path_type=Path))
+@read_once()
+def check(study: Path) -> None:
+    """Check protocol, schedules, record and ratings of STUDY; say every problem."""
+    problems, notes = _check_study(StudyPaths(study))
+    for problem in problems:
+        click.echo(problem, err=True)
+    echo_remarks(notes)
+    if problems:
+        click.echo(f"masrel: {study}: {_count(len(problems), 'problem')}", err=True)
+        sys.exit(2)
+    click.echo(_summary(StudyPaths(study)))
+
+
+def _check_study(study: StudyPaths) -> tuple[Sequence[str], Sequence[str]]:
+    """Gather the problems of a study from every checker, and what to know beside."""
+    try:
+        protocol = read_protocol(study.protocol)
+    except ProtocolError as error:
+        return error.problems, ()
+    problems = [
+        problem for checker in _CHECKERS for problem in checker(protocol, study)
+    ]
+    # What only may happen is for a study of which all else is right.
+    notes = [] if problems else list(_device_notes(protocol, study))
+    with contextlib.suppress(MasrelError):  # a checker has said it
+        notes += concealment_notes(protocol, study)
+    with contextlib.suppress(MasrelError):
+        notes += study_remarks(study, protocol)
+    return problems, notes
+
+
+def _plan_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
+    from masrel.agreement import coefficient  # loads numpy
+    from masrel.lab.analysis._plan import unanswered  # loads pandas
+
+    for index, line in enumerate(protocol.analysis.estimates):
+        where = f"{study.protocol}: analysis.estimates[{index}]"
+        try:
+            coefficient(line.coefficient)
+        except ParameterError as error:
+            yield f'{where}.{error} (id "{line.id}")'
+            continue
+        if (reason := unanswered(line, protocol)) is not None:
+            yield (
+                f"{where}: has no estimate even once every rating is there: {reason} "
+                f'(id "{line.id}")'
+            )
+
+
+def _device_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
+    from masrel.lab.run._settings import (  # loads numpy
+        check_backend,
+        check_button,
+        torque_problems,
+    )
+
+    try:
+        check_backend(protocol.device)
+        check_button(protocol)
+    except ParameterError as error:
+        yield f"{study.protocol}: {error}"
+    for problem in torque_problems(protocol):
+        yield f"{study.protocol}: {problem}"
+
+
+def _device_notes(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
+    from masrel.lab.run._settings import torque_notes  # loads numpy
+
+    return (f"{study.protocol}: {note}" for note in torque_notes(protocol))
+
+
+def _record_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
+    if not _has_record(study):
+        return
+    from masrel.lab.verification import verify_sessions
+
+    for finding in verify_sessions(study, protocol).findings:
+        if finding.weight == "broken":
+            yield finding.message
+
+
+def _sheet_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
+    from masrel.lab.paper._filled_form import off_scale
+
+    for session in protocol.sessions:
+        for rater in session.raters:
+            place = (rater, session.id)
+            for file in (study.sheet_file(*place), study.typed_file(*place)):
+                if file.is_file():
+                    yield from off_scale(file, protocol.scale.grades)
+
+
+def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
+    files = [f for f in (study.ratings_file, study.published_file) if f.exists()]
+    if not files:
+        return
+    from masrel.lab.ratings import read_study_ratings  # loads pandas
+
+    for path in files:
+        try:
+            read_study_ratings(path, scale_of(protocol))
+        except MasrelError as error:
+            yield str(error)
+            return
+    if study.ratings_file.exists() and study.logs():
+        yield from _table_problems(protocol, study)
+
+
+def _table_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
+    from masrel.lab.ratings.logs import _of_logs
+    from masrel.lab.ratings.study_data import _refuse_other_table
+
+    try:
+        ratings = _of_logs(study, protocol, check_recordings=False)
+    except MasrelError:
+        return  # another checker has said what is wrong with the logs
+    try:
+        _refuse_other_table(study.ratings_file, ratings)
+    except RatingsError as error:
+        yield str(error)
+
+
+def _has_record(study: StudyPaths) -> bool:
+    return study.sessions.is_dir() or bool(study.conduct_logs())
+
+
+_CHECKERS: tuple[Callable[[Protocol, StudyPaths], Iterable[str]], ...] = (
+    _plan_problems,
+    _device_problems,
+    schedule_problems,
+    _sheet_problems,
+    _record_problems,
+    _ratings_problems,
+)
+
+
+def _summary(study: StudyPaths) -> str:
+    protocol = read_protocol(study.protocol)
+    pairs = [(rater, s.id) for s in protocol.sessions for rater in s.raters]
+    n_drawn = sum(study.schedule_file(*pair).is_file() for pair in pairs)
+    return (
+        f"{study.root}: no problems. {_count(len(protocol.models), 'model')}, "
+        f"{_count(len(protocol.raters), 'rater')}, "
+        f"{_count(len(protocol.sessions), 'session')}; "
+        f"{n_drawn} of {_count(len(pairs), 'schedule')} drawn."
+    )
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" + ("" if number == 1 else "s")

@@ -1,0 +1,43 @@
+"""``masrel checklist``: a reporting guideline, filled from the record of a study."""
+
+from pathlib import Path
+
+import click
+
+from masrel.cli._options import warnings_as_notes
+from masrel.cli._paths import OutputFile
+from masrel.lab._once import read_once
+from masrel.lab.protocol import StudyPaths, read_protocol
+
+
+@click.command("checklist")
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option(
+    "--guideline",
+    required=True,
+    type=click.Choice(["grras", "cosmin"]),
+    help="GRRAS, 15 items; or the design standards of COSMIN, 6 items.",
+)
+@click.option(
+    "-o",
+    "--output",
+    type=OutputFile(path_type=Path),
+    help="File to write: .html, .md or .docx; Markdown on the screen unless given.",
+)
+@read_once()
+def checklist(study: Path, guideline: str, output: Path | None) -> None:
+    """Fill the checklist of a reporting guideline for STUDY.
+
+    Each item has what the protocol, the schedules, the logs and the analysis say of it,
+    with the files and their hashes; what only the authors know is left to them.
+    """
+    from masrel.lab.checklist import checklist_markdown, fill_checklist, write_checklist
+
+    paths = StudyPaths(study)
+    with warnings_as_notes():
+        filled = fill_checklist(paths, read_protocol(paths.protocol), guideline)
+    if output is None:
+        click.echo(checklist_markdown(filled), nl=False)
+    else:
+        write_checklist(filled, output)
+        click.echo(output)

@@ -1,0 +1,154 @@
+"""``masrel demo``: the whole flow on the simulated device, and the published report."""
+
+import warnings
+from datetime import UTC, datetime
+from pathlib import Path
+
+import click
+from tqdm import tqdm
+
+from masrel._files import write_file
+from masrel.cli._options import OutputOptions, output_options
+from masrel.errors import MasrelWarning, ParameterError
+from masrel.lab.cli._study_options import read_study
+from masrel.lab.protocol import Protocol, StudyPaths, copy_template, read_protocol
+
+
+@click.command("demo")
+@click.argument("out", type=click.Path(path_type=Path))
+@click.option(
+    "--study",
+    "template",
+    metavar="NAME",
+    help="Bundled study to run.  [default: hess2012, and tone after it]",
+)
+@output_options(quiet="No progress bars.")
+def demo(out: Path, template: str | None, output: OutputOptions) -> None:
+    """Run a complete simulated study in OUT and report it, and the published one.
+
+    After it comes a small study of other tone than spasticity.
+
+    OUT must not exist or be empty. The same seed gives the same schedules, ratings,
+    analysis and reports, byte for byte.
+    """
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise ParameterError(f"{out}: needs a new or empty folder for the demo")
+    studies = {"study": template or "hess2012"}
+    if template is None:
+        studies["tone"] = "tone"
+    pages = []
+    with warnings.catch_warnings():
+        # Every note on an interval is in its result, and so in the report.
+        warnings.simplefilter("ignore", MasrelWarning)
+        for folder, name in studies.items():
+            study = StudyPaths(out / folder)
+            copy_template(name, study.root)
+            _publish_secret(study)
+            _simulate(study, output)
+            report = "simulated" if folder == "study" else folder
+            pages.append(_report(study, study.ratings_file, report, output))
+            if study.published_file.is_file():
+                pages.append(_report(study, study.published_file, "published", output))
+    for folder in studies:
+        click.echo(f"A simulated study is in {out / folder}.")
+    click.echo("Open these in a browser:")
+    for page in pages:
+        click.echo(f"  {page}")
+
+
+def _publish_secret(study: StudyPaths) -> None:
+    # A demo hides nothing, and is the same each time.
+    from masrel.lab.schedule._secret import N_BYTES, secret_text
+
+    if not study.published_secret_file.exists():
+        write_file(study.published_secret_file, secret_text(bytes(range(N_BYTES))))
+
+
+def _simulate(study: StudyPaths, output: OutputOptions) -> None:
+    # every rater of every session, on the simulated device and clock
+    from masrel.lab.conduct import allot_schedules
+    from masrel.lab.ratings import (
+        answers_from_logs,
+        ratings_from_logs,
+        write_answers,
+        write_ratings,
+    )
+    from masrel.lab.run import SimulatedGrades, run_session
+
+    protocol = read_protocol(study.protocol)
+    allot_schedules(study, protocol)
+    occasions = [(s.id, rater) for s in protocol.sessions for rater in s.raters]
+    n_presentations = len(occasions) * len(protocol.models) * protocol.schedule.repeats
+    with tqdm(
+        total=n_presentations,
+        desc="presentations",
+        unit="",
+        disable=output.quiet or None,
+    ) as bar:
+        for session, rater in occasions:
+            run_session(
+                study,
+                protocol,
+                rater,
+                session,
+                grades=SimulatedGrades(protocol),
+                clock="simulated",
+                progress=lambda _: bar.update(),
+            )
+    _record_event(study, protocol)
+    write_ratings(ratings_from_logs(study, protocol), study.ratings_file)
+    if protocol.questionnaires:
+        write_answers(answers_from_logs(study, protocol), study.answers_file)
+
+
+def _record_event(study: StudyPaths, protocol: Protocol) -> None:
+    # as a coordinator does; on a day that is the same each time, as the report has it
+    from masrel.lab.conduct import record_note
+
+    record_note(
+        study,
+        protocol,
+        "simulated: sore wrist after the session",
+        who="demo",
+        kind="adverse-event",
+        severity="mild",
+        action="rest",
+        outcome="gone the next day",
+        rater=protocol.raters[0].id,
+        session=protocol.sessions[0].id,
+        now=lambda: datetime(2012, 1, 1, tzinfo=UTC),
+    )
+
+
+def _report(
+    study: StudyPaths, ratings_file: Path, name: str, output: OutputOptions
+) -> Path:
+    # beside the study, in a folder of this name
+    from masrel.lab.analysis import analyze, write_analysis
+    from masrel.lab.report import study_conduct, write_report
+
+    destination = study.root.parent / f"report-{name}"
+    is_simulated = ratings_file == study.ratings_file
+    data = read_study(study.root, None if is_simulated else ratings_file)
+    analysis = analyze(
+        data.protocol, data.ratings, in_person=data.in_person, answers=data.answers
+    )
+    write_analysis(
+        analysis,
+        study.analysis_file if is_simulated else study.root / "analysis-published.json",
+    )
+    with tqdm(
+        desc=destination.name, unit=" files", disable=output.quiet or None
+    ) as bar:
+        write_report(
+            data.protocol,
+            data.ratings,
+            analysis,
+            destination,
+            in_person=data.in_person,
+            conduct=study_conduct(study, data.protocol, include=["notes"])
+            if is_simulated
+            else None,
+            progress=lambda _: bar.update(),
+        )
+    return destination / "report.html"

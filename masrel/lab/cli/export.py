@@ -1,0 +1,66 @@
+"""``masrel export``: a study in a form that archives and other programs read."""
+
+from pathlib import Path
+
+import click
+from tqdm import tqdm
+
+from masrel._files import refuse_record
+from masrel.cli._options import OutputOptions, output_options
+from masrel.lab.protocol import StudyPaths, read_protocol
+
+
+@click.command("export")
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option(
+    "--as",
+    "form",
+    required=True,
+    type=click.Choice(["bids", "psych-ds", "datapackage", "ro-crate"]),
+    help="BIDS, Psych-DS, a data package of Frictionless, or an RO-Crate.",
+)
+@click.option(
+    "-o",
+    "--output",
+    "folder",
+    required=True,
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Folder to make; it must not exist, or be empty.",
+)
+@click.option(
+    "--include",
+    multiple=True,
+    metavar="NAME",
+    help="Export what is private, too: notes (on raters), logs, a field of raters or a "
+    "QUESTIONNAIRE.QUESTION that is not public. Repeatable.",
+)
+@output_options(quiet="No progress bar.")
+def export(
+    study: Path,
+    form: str,
+    folder: Path,
+    include: tuple[str, ...],
+    output: OutputOptions,
+) -> None:
+    """Write STUDY as a data set of a standard, to archive or share it.
+
+    Ratings, raters and recordings are described once, with units and levels, and
+    written in the form asked for; the protocol goes along. The models are named.
+    """
+    from masrel.lab.export import export_study
+
+    refuse_record(folder)
+    paths = StudyPaths(study)
+    protocol = read_protocol(paths.protocol)
+    with tqdm(desc="export", unit=" files", disable=output.quiet or None) as bar:
+        left_out = export_study(
+            paths,
+            protocol,
+            form,
+            folder,
+            include=include,
+            progress=lambda _: bar.update(),
+        )
+    for what in left_out:
+        click.echo(f"left out: {what}", err=True)
+    click.echo(folder)

@@ -1,0 +1,289 @@
+"""``masrel fit``: identify a joint, or a device's friction, from recordings."""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import click
+
+from masrel._files import write_file
+from masrel.cli._options import (
+    Decorator,
+    OutputOptions,
+    output_options,
+    warnings_as_notes,
+    write_output,
+)
+from masrel.cli._paths import InputFile, OutputFile
+from masrel.errors import ParameterError
+
+if TYPE_CHECKING:
+    from masrel.lab.elbow.identification import (
+        ComparedFit,
+        ElbowFit,
+        FrictionFit,
+        Movement,
+    )
+
+_Term = float | Literal["off", "fitted"]
+
+
+class _TermType(click.ParamType):  # type: ignore[type-arg]
+    name = "off|fitted|number"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> _Term:
+        if value in ("off", "fitted"):
+            return "off" if value == "off" else "fitted"
+        try:
+            return float(value)
+        except ValueError:
+            self.fail(f"needs off, fitted or a number, got {value!r}", param, ctx)
+
+
+def _term(option: str, text: str, default: str = "off") -> Decorator:
+    return click.option(
+        option, type=_TermType(), default=default, show_default=True, help=text
+    )
+
+
+@click.command("fit")
+@click.argument("recordings", nargs=-1, required=True, type=InputFile(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    "model_file",
+    type=OutputFile(path_type=Path),
+    help="Write the model file here, for a protocol to name.",
+)
+@click.option(
+    "--friction",
+    "of_device",
+    is_flag=True,
+    help="Fit (7) to recordings of backdriving.",
+)
+@click.option(
+    "--unit",
+    "units",
+    help="Unit of a column whose name has none: time=ms, angle=deg, torque=nm.",
+    metavar="QUANTITY=TEXT",
+    multiple=True,
+)
+@click.option(
+    "--column",
+    "columns",
+    help="Name of a column that is called otherwise: torque='Moment'.",
+    metavar="QUANTITY=TEXT",
+    multiple=True,
+)
+@click.option(
+    "--slow-below",
+    "slow_below",
+    type=float,
+    help="Stretches below this speed are slow, deg/s; default: 20, the threshold.",
+)
+@click.option(
+    "--inertia",
+    type=click.Choice(["zero", "fitted"]),
+    default="zero",
+    show_default=True,
+    help="Whether m of (1) is fitted.",
+)
+@click.option(
+    "--post-catch",
+    type=click.Choice(["continuous", "additive"]),
+    default="continuous",
+    show_default=True,
+    help="How (5) is read.",
+)
+@_term("--gravity", "Weight of the arm, m·g·l, N·m: adds m·g·l·sin(angle).")
+@click.option(
+    "--gravity-angle",
+    type=float,
+    default=0.0,
+    show_default=True,
+    help="Angle at which the weight has no torque, deg.",
+)
+@_term("--arm-inertia", "Inertia of the arm in every phase, kg·m².")
+@_term("--offset", "Constant torque of a trial, N·m: the sensor's zero.", "fitted")
+@_term("--drift", "What the offset gains, N·m/s; fitted for each trial.")
+@_term("--lag", "Time constant of the torque sensor, s.")
+@_term("--rise", "How long a catch takes to its peak, s.")
+@click.option(
+    "--compare",
+    is_flag=True,
+    help="Also fit with each of these, and compare by leaving trials out.",
+)
+@click.option("--level", type=float, default=0.95, show_default=True)
+@click.option(
+    "--figures",
+    "folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Draw the fit as PNG and SVG files in this folder.",
+)
+@output_options(
+    json="Write everything as JSON here; - prints it, and nothing else, on stdout.",
+    quiet="Show no progress.",
+    makes_folder=True,
+)
+def fit(
+    recordings: tuple[Path, ...],
+    model_file: Path | None,
+    of_device: bool,
+    units: tuple[str, ...],
+    columns: tuple[str, ...],
+    compare: bool,
+    level: float,
+    folder: Path | None,
+    output: OutputOptions,
+    **of_joint: Any,
+) -> None:
+    """Identify the joint behind RECORDINGS of slow and fast stretches.
+
+    A recording is a CSV file or an npz archive with time, angle and torque, the unit
+    in each column's name (time_s, angle_deg, torque_nm), or one of masrel run: then its
+    measured torque, or else the model's. Prints every parameter with its confidence
+    interval, clustered by trial, what these trials do not determine, and
+    whether the law fits them.
+    """
+    if of_device:
+        _check_device_options(model_file, {**of_joint, "compare": compare})
+    slow_below = of_joint["slow_below"]
+    if slow_below is not None and not 0.0 < slow_below < math.inf:
+        raise ParameterError(
+            f"--slow-below: needs more than 0 deg/s and finite, got {slow_below:g}"
+        )
+    names = _pairs("--column", columns), _pairs("--unit", units)
+    compared: tuple[ComparedFit, ...] = ()
+    fitted: ElbowFit | FrictionFit
+    with warnings_as_notes():
+        movements = _read(
+            recordings,
+            *names,
+            of_device=of_device,
+            quiet=output.quiet,
+        )
+        if of_device:
+            from masrel.lab.elbow.identification import fit_friction
+
+            fitted = fit_friction(movements, level=level)
+        else:
+            fitted, compared = _fit_joint(movements, of_joint, level, compare)
+    _write(fitted, compared, folder, output)
+    if model_file is not None:
+        _write_model(fitted, model_file)
+
+
+def _check_device_options(
+    model_file: Path | None, of_joint: "dict[str, object]"
+) -> None:
+    if model_file is not None:
+        raise ParameterError("--output: a model file is of a joint, not of a device")
+    source = click.get_current_context().get_parameter_source
+    for name in of_joint:
+        if source(name) is click.core.ParameterSource.COMMANDLINE:
+            raise ParameterError(
+                f"--{name.replace('_', '-')}: says something of a joint, not of a "
+                "device (--friction)"
+            )
+
+
+def _pairs(option: str, entries: tuple[str, ...]) -> dict[str, str]:
+    pairs = {}
+    for entry in entries:
+        key, sign, value = entry.partition("=")
+        if not sign or not value:
+            raise ParameterError(f"{option}: needs QUANTITY=TEXT, got {entry!r}")
+        pairs[key] = value
+    return pairs
+
+
+def _read(
+    paths: tuple[Path, ...],
+    columns: dict[str, str],
+    units: dict[str, str],
+    *,
+    of_device: bool,
+    quiet: bool,
+) -> "list[Movement]":
+    from tqdm import tqdm
+
+    from masrel.lab.elbow.identification import read_movement
+
+    with tqdm(
+        paths, desc="reading", unit="file", disable=quiet or None, delay=1.0
+    ) as bar:
+        return [
+            read_movement(path, columns=columns, units=units, of_device=of_device)
+            for path in bar
+        ]
+
+
+def _fit_joint(
+    movements: "list[Movement]", of_joint: "dict[str, Any]", level: float, compare: bool
+) -> "tuple[ElbowFit, tuple[ComparedFit, ...]]":
+    from dataclasses import replace
+
+    from masrel.lab.elbow import STANDARD_MODELS, identification
+
+    post_catch = of_joint.pop("post_catch")
+    slow_below = of_joint.pop("slow_below")
+    options = {
+        **of_joint,
+        "gravity_angle": math.radians(of_joint["gravity_angle"]),
+        "constants": replace(STANDARD_MODELS["HM1"], post_catch=post_catch),
+        "slow_below": None if slow_below is None else math.radians(slow_below),
+        "level": level,
+    }
+    if not compare:
+        return identification.fit(movements, **options), ()
+    compared = identification.compare_fits(movements, **options)
+    first = compared[0].fit
+    if first is None:  # refused, which was said
+        raise ParameterError("--compare: there is no fit to compare with")
+    return first, compared
+
+
+def _write(
+    fitted: "ElbowFit | FrictionFit",
+    compared: "tuple[ComparedFit, ...]",
+    folder: Path | None,
+    output: OutputOptions,
+) -> None:
+    from masrel.lab.report._fits import (
+        comparison_document,
+        comparison_tables,
+        fit_document,
+        fit_figures,
+        fit_table,
+        residual_tables,
+    )
+
+    if folder is not None:
+        for name, forms in fit_figures(fitted).items():
+            for form, picture in forms.items():
+                write_file(folder / f"{name}.{form}", picture)
+        click.echo(f"figures: {folder}", err=True)
+    write_output(
+        output,
+        document=lambda: fit_document(fitted) | comparison_document(compared),
+        text=lambda: fit_table(fitted),
+        more=(*residual_tables(fitted), *comparison_tables(compared)),
+    )
+
+
+def _write_model(fitted: "ElbowFit | FrictionFit", path: Path) -> None:
+    import masrel
+    from masrel.lab.elbow.identification import ElbowFit, as_toml, model_document
+
+    if not isinstance(fitted, ElbowFit):
+        raise ParameterError("--output: a model file is of a joint, not of a device")
+    document = model_document(
+        fitted.joint(),
+        simulated=fitted.simulated,
+        made_from=f"masrel fit {masrel.__version__}, {len(fitted.trials)} trials",
+        fit=fitted,
+    )
+    write_file(path, as_toml(document))
+    click.echo(f"model: {path}", err=True)

@@ -1,0 +1,116 @@
+"""``masrel grading``: what grades follow, by ordered regression."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+from masrel.cli._options import (
+    OutputOptions,
+    output_options,
+    split_commas,
+    warnings_as_notes,
+    write_output,
+)
+from masrel.lab.cli._study_options import ratings_option, read_study
+
+if TYPE_CHECKING:
+    from masrel.lab.analysis import Effect, GradeRegression
+    from masrel.tables._tables import Table
+
+
+@click.command("grading")
+@click.argument("study", type=click.Path(path_type=Path))
+@ratings_option
+@click.option(
+    "--on",
+    "predictors",
+    default="L,H,Q,D,speed",
+    show_default=True,
+    help="What grades are regressed on, in the order of their claim.",
+)
+@click.option(
+    "--models",
+    type=click.Choice(["standard", "dummy", "all"]),
+    default="all",
+    show_default=True,
+)
+@click.option("--session", help="Ratings of this session alone.")
+@click.option("--level", type=float, default=0.95, show_default=True)
+@output_options(
+    json="Write the result here; - prints it, and nothing else, on stdout.",
+)
+def grading(
+    study: Path,
+    ratings_file: Path | None,
+    predictors: str,
+    models: Literal["standard", "dummy", "all"],
+    session: str | None,
+    level: float,
+    output: OutputOptions,
+) -> None:
+    """Regress the grades of STUDY on the models' L, H, Q, D and the speed.
+
+    Prints by how much one standard deviation of each multiplies the odds of a higher
+    grade, the others held.
+    """
+    from masrel.lab.analysis import grade_regression
+    from masrel.lab.analysis._analysis_json import plain_fields
+
+    data = read_study(study, ratings_file)
+    with warnings_as_notes():
+        regression = grade_regression(
+            data.protocol,
+            data.ratings,
+            predictors=tuple(split_commas(predictors)),
+            models=models,
+            session=session,
+            level=level,
+            excluded=data.excluded,
+        )
+    write_output(
+        output,
+        document=lambda: plain_fields(regression),
+        text=lambda: _table(regression),
+    )
+
+
+def _table(regression: "GradeRegression") -> "Table":
+    from masrel.tables._tables import Column, Table
+
+    return Table(
+        name="grading",
+        caption="Odds of a higher grade, per standard deviation",
+        columns=(
+            Column(key="predictor", heading="Predictor", align="left"),
+            Column(key="per", heading="Standard deviation"),
+            Column(key="odds_ratio", heading="Odds ratio", digits=2),
+            Column(key="interval", heading=f"{100.0 * regression.level:g} % interval"),
+        ),
+        rows=tuple(_row(effect) for effect in regression.effects),
+        notes=(
+            f"{regression.n_ratings} ratings of {regression.n_models} models by "
+            f"{regression.n_raters} raters, {regression.n_missing} without a grade or "
+            "speed left out; errors are clustered by rater.",
+            *(f"{name} is left out: {why}." for name, why in regression.dropped),
+        ),
+        data="simulated" if regression.simulated else "foreign",
+    )
+
+
+def _row(effect: "Effect") -> tuple[str, str, float, str]:
+    from masrel.tables._tables import interval_text, number
+
+    return (
+        effect.predictor,
+        f"{number(effect.per, 3)} {_unit(effect.predictor)}".strip(),
+        effect.odds_ratio,
+        interval_text(effect.low, effect.high, 2),
+    )
+
+
+def _unit(predictor: str) -> str:
+    from masrel.lab.analysis._grading import PREDICTORS
+
+    unit = PREDICTORS[predictor][1]
+    return "" if unit == "1" else unit

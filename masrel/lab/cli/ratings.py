@@ -1,0 +1,69 @@
+"""``masrel ratings``: turn session logs into the table of ratings."""
+
+from pathlib import Path
+
+import click
+
+from masrel._files import write_file
+from masrel.cli._paths import OutputFile, note_inputs
+from masrel.lab._once import read_once
+from masrel.lab.cli._study_options import echo_remarks
+from masrel.lab.protocol import StudyPaths, read_protocol
+
+
+@click.command("ratings")
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    type=OutputFile(path_type=Path),
+    help="File to write; default: STUDY/ratings/ratings.csv.",
+)
+@read_once()
+def ratings(study: Path, output: Path | None) -> None:
+    """Collect the ratings of STUDY from its session logs.
+
+    Every chain of hashes is verified, and every recording that is there is held
+    against its checksum. Corrections take the place of the grades they correct. The
+    table of raters, raters.csv, is written beside STUDY/ratings/ratings.csv.
+    """
+    from masrel.lab.progress._raters import raters_text
+    from masrel.lab.ratings import (
+        answers_from_logs,
+        ratings_from_logs,
+        study_remarks,
+        write_answers,
+        write_ratings,
+    )
+
+    paths = StudyPaths(study)
+    protocol = read_protocol(paths.protocol)
+    note_inputs(*(study / model.file for model in protocol.models if model.file))
+    echo_remarks(study_remarks(paths, protocol))
+    ratings = ratings_from_logs(paths, protocol)
+    destination = output or paths.ratings_file
+    write_ratings(ratings, destination, within=None if output else study)
+    if output is None:
+        raters = raters_text(paths, protocol)  # also with fields that are not public
+        write_file(paths.raters_file, raters, within=study, mode=0o600)
+    n_rows, n_missing = len(ratings.rows), ratings.n_missing
+    label = " (simulated)" if ratings.simulated else ""
+    if ratings.n_from_persons == n_rows and label:
+        label = " (simulated device)"
+    click.echo(
+        f"{n_rows - n_missing} ratings{label}, {n_missing} missing: {destination}"
+    )
+    if protocol.questionnaires:
+        answers = answers_from_logs(paths, protocol)
+        beside = paths.answers_file
+        if output is not None:
+            beside = output.with_name(f"{output.stem}_answers.csv")
+        write_answers(answers, beside, within=None if output else study)
+        n_open = sum(each.answer is None for each in answers)
+        click.echo(f"{len(answers) - n_open} answers, {n_open} missing: {beside}")
+    n_slow = sum(row.felt in ("below-threshold", "no-catch") for row in ratings.rows)
+    if n_slow:
+        click.echo(f"{n_slow} after stretches too slow to feel the catch: column felt")
+    n_lost = sum(row.grip_lost is True for row in ratings.rows)
+    if n_lost:
+        click.echo(f"{n_lost} after a grip that was lost: column grip_lost")

@@ -1,0 +1,310 @@
+"""``masrel report``: write the report of a study."""
+
+import hashlib
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from masrel._collector import collector_off
+from masrel._files import check_inside, refuse_record
+from masrel._input import MAX_TABLE, parse_json, read_regular
+from masrel.cli._options import (
+    STDOUT,
+    OutputOptions,
+    echo_notes,
+    notes_of_call,
+    output_options,
+    warnings_as_notes,
+    write_json,
+)
+from masrel.errors import ParameterError
+from masrel.lab._cache import FOLDER, Cache
+from masrel.lab._once import read_once
+from masrel.lab.cli._comparing import CompareOptions, compare_options
+from masrel.lab.cli._gating import GateOptions, Verdict, gate_options, verdict_of
+from masrel.lab.cli._study_options import ratings_option, read_study
+from masrel.lab.report._builds import Build
+from masrel.lab.report._report_folder import (
+    MANIFEST,
+    NUMBERS,
+    changed_files,
+    replace_report,
+    stale_assets,
+    stale_pages,
+)
+
+if TYPE_CHECKING:
+    from masrel.lab.analysis import Analysis
+    from masrel.lab.protocol import Protocol
+    from masrel.lab.ratings import StudyData
+
+FORMATS = ("html", "markdown", "latex", "docx")
+# They change nothing that is made or said
+_OTHER_OPTIONS = (
+    *("cache_folder", "check", "junit", "quiet", "json_file", "against", "no_change"),
+)
+
+
+@click.command("report")
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    "destination",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Folder to write into; default: STUDY/report.",
+)
+@ratings_option
+@click.option(
+    "--only",
+    multiple=True,
+    metavar="SECTION",
+    help="Make a report of this section alone, in place of the one in the folder: its "
+    "text, tables and figures, and no others. Repeatable.",
+)
+@click.option(
+    "--format",
+    "formats",
+    multiple=True,
+    type=click.Choice(FORMATS),
+    help="Write this format, too, beside those of the protocol; docx needs the extra "
+    "masrel[docx]. Repeatable.",
+)
+@click.option(
+    "--check",
+    is_flag=True,
+    help="Write nothing; name the files that would change, and exit with 1 if there "
+    "are some.",
+)
+@gate_options()
+@click.option(
+    "--include",
+    multiple=True,
+    metavar="NAME",
+    help="Show what is private, too: who (recorded events), notes (their texts), or a "
+    "field of raters that is not public. Repeatable.",
+)
+@click.option(
+    "--cache",
+    "cache_folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Folder in which figures are kept until what they show changes; default: "
+    f"STUDY/{FOLDER}.",
+)
+@compare_options()
+@output_options(
+    json="Write here what came of gates, --check and --against; - prints it, and "
+    "nothing else, on stdout.",
+    raw_csv="No apostrophe before a text that a spreadsheet would run.",
+    quiet="No progress bar.",
+    makes_folder=True,
+)
+def report(
+    study: Path,
+    destination: Path | None,
+    ratings_file: Path | None,
+    only: tuple[str, ...],
+    formats: tuple[str, ...],
+    check: bool,
+    gating: GateOptions,
+    include: tuple[str, ...],
+    cache_folder: Path | None,
+    comparing: CompareOptions,
+    output: OutputOptions,
+) -> None:
+    """Write the report of STUDY: HTML, Markdown, tables and figures.
+
+    The analysis is computed from the protocol's plan; the same inputs give the
+    same bytes. Where nothing has changed since the last report, nothing is written.
+    """
+    if destination is None:
+        destination = study / "report"
+        check_inside(destination, study)
+    refuse_record(destination / "report.html")  # before anything is computed
+    build = Build(
+        study=study,
+        folder=destination,
+        options=_options_of_call(),
+        cache=_cache(study, cache_folder, check=check),
+    )
+    old = comparing.read(study)  # which may be what is replaced
+    making = _Making(build, ratings_file, only, formats, gating, include, output)
+    outcome = making.outcome(check=check)
+    verdict = Verdict(**outcome.shown["verdict"])
+    prints_json = output.json_file == STDOUT
+    click.echo(outcome.shown["read"], err=True)
+    names = outcome.shown["pages"]
+    pages = [destination / name for name in names if name != "report.md"]
+    for line in outcome.changes if check else pages or [destination / "report.md"]:
+        click.echo(line, err=prints_json)
+    document: dict[str, Any] = {"gates": verdict.gates}
+    if check:
+        document["check"] = outcome.changes
+    if old is not None:
+        new = parse_json(outcome.numbers)
+        document |= comparing.compare(old, new, shows=not prints_json)
+    if output.json_file is not None:
+        write_json(document, output.json_file)
+    verdict.conclude(gating)
+    if outcome.changes or (comparing.no_change and document["changes"]):
+        click.get_current_context().exit(1)
+
+
+def _options_of_call() -> dict[str, str]:
+    params = click.get_current_context().params
+    return {k: str(v) for k, v in params.items() if k not in _OTHER_OPTIONS}
+
+
+def _cache(study: Path, folder: Path | None, *, check: bool) -> Cache:
+    if folder is None:
+        folder = study / FOLDER
+        check_inside(folder, study)
+    refuse_record(folder / "any")
+    return Cache(folder, is_read_only=check)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Outcome:
+    """What a call came to, whether anything had to be made or not."""
+
+    shown: dict[str, Any]  # what is said of it
+    changes: list[str]  # what a build would change, if it was only looked at
+    numbers: bytes  # the analysis, as the report's folder has it
+
+
+@dataclass(frozen=True, slots=True)
+class _Making:
+    """What a report is made with."""
+
+    build: Build
+    ratings_file: Path | None
+    only: tuple[str, ...]
+    formats: tuple[str, ...]
+    gating: GateOptions
+    include: tuple[str, ...]
+    output: OutputOptions
+
+    def outcome(self, *, check: bool) -> _Outcome:
+        """Make the report, or see that it is current."""
+        build = self.build
+        shown = build.last()
+        if shown is not None:
+            echo_notes(shown["notes"])
+            numbers = read_regular(build.folder / NUMBERS, most=MAX_TABLE)
+            return _Outcome(shown=shown, changes=[], numbers=numbers)
+        with build.noted() as made:
+            files, shown = self._run()
+            # of what is written, not of what is there: others may write there, too
+            made["manifest"] = hashlib.sha256(files[MANIFEST]).hexdigest()
+            made["shown"] = shown
+            changes = _write_or_compare(files, build.folder, check=check)
+        return _Outcome(shown=shown, changes=changes, numbers=files[NUMBERS])
+
+    def _run(self) -> tuple[dict[str, bytes], dict[str, Any]]:
+        """Return the files of the report, and what is said of it."""
+        # most of what libraries and figures make stays in use
+        with read_once(), collector_off():
+            data = read_study(self.build.study, self.ratings_file)
+            _check_sections(self.only, data.protocol)
+            if "docx" in (*data.protocol.report.formats, *self.formats):
+                # Imported here: who has a report that is current needs none of it.
+                from masrel.lab.report._docx import check_docx
+
+                check_docx()
+            gates = self.gating.gates(data.protocol)
+            analysis, files = self._files(data)
+        return files, {
+            "notes": notes_of_call(),
+            "read": f"read: {data.read}",
+            "pages": [
+                name
+                for name in files
+                if "/" not in name and name not in (MANIFEST, NUMBERS)
+            ],
+            "verdict": asdict(verdict_of(analysis, gates)),
+        }
+
+    def _files(self, data: "StudyData") -> "tuple[Analysis, dict[str, bytes]]":
+        # Imported here: who has a report that is current needs none of it.
+        from tqdm import tqdm
+
+        from masrel.lab.analysis import analyze
+        from masrel.lab.analysis._known_estimates import estimates_known
+        from masrel.lab.report import study_conduct
+        from masrel.lab.report._document import make_report
+        from masrel.lab.report._published_numbers import published_claims
+        from masrel.lab.verification import anchors_of
+
+        conduct = study_conduct(
+            data.paths, data.protocol, file=self.ratings_file, include=self.include
+        )
+        with warnings_as_notes(), estimates_known(self.build.cache):
+            analysis = analyze(
+                data.protocol,
+                data.ratings,
+                in_person=data.in_person,
+                answers=data.answers,
+                excluded=data.excluded,
+            )
+
+        # The bar's thread would keep figures from being drawn by several processes.
+        class Bar(tqdm):  # type: ignore[type-arg]
+            monitor_interval = 0
+
+        with Bar(
+            desc="report", unit=" parts", disable=self.output.quiet or None
+        ) as bar:
+
+            def progress(part: str) -> None:
+                bar.set_postfix_str(part, refresh=False)
+                bar.update()
+
+            return analysis, make_report(
+                data.protocol,
+                data.ratings,
+                analysis,
+                in_person=data.in_person,
+                recordings=data.paths.sessions,
+                # of what is simulated none, so that it repeats byte for byte
+                anchors=() if data.ratings.simulated else anchors_of(data.paths),
+                conduct=conduct,
+                claims=published_claims(data.paths, data.protocol),
+                progress=progress,
+                raw_csv=self.output.raw_csv,
+                only=self.only,
+                formats=self.formats,
+                cache=self.build.cache,
+            )
+
+
+def _check_sections(only: Collection[str], protocol: "Protocol") -> None:
+    from masrel.lab.report._document import section_names
+
+    known = section_names(protocol)
+    for name in only:
+        if name not in known:
+            raise ParameterError(
+                f"--only: needed a section of this report, {', '.join(known)}, got "
+                f"{name!r}"
+            )
+
+
+def _write_or_compare(
+    files: Mapping[str, bytes], folder: Path, *, check: bool
+) -> list[str]:
+    # what would change if it is only looked at; else it is written
+    if check:
+        return list(_changes(files, folder))
+    replace_report(folder, files)
+    return []
+
+
+def _changes(files: Mapping[str, bytes], folder: Path) -> Iterator[str]:
+    for name in changed_files(folder, files):
+        is_there = (folder / name).exists()
+        yield f"{folder / name}: {'would change' if is_there else 'would be new'}"
+    for path in (*stale_assets(folder, files), *stale_pages(folder, files)):
+        yield f"{path}: would go"

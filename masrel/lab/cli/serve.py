@@ -1,0 +1,101 @@
+"""``masrel serve``: pages for the rater's tablet and the coordinator's screen."""
+
+import importlib.util
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from masrel.errors import ParameterError
+from masrel.lab.protocol import StudyPaths, read_protocol
+
+if TYPE_CHECKING:
+    from masrel.lab.serve._access import Access
+
+PORT = 8723
+"""The port where nothing else is said: a tablet finds the pages again."""
+
+_LIBRARIES = ("starlette", "uvicorn", "segno")
+
+
+@click.command("serve")
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65_535),
+    default=PORT,
+    show_default=True,
+    help="Port of the pages; 0 takes any free one.",
+)
+@click.option(
+    "--host",
+    default="127.0.0.1",
+    show_default=True,
+    help="Address or name of this computer under which a tablet calls it; 0.0.0.0 for "
+    "all that it has.",
+)
+@click.option(
+    "--tls",
+    nargs=2,
+    type=click.Path(path_type=Path),
+    metavar="CERT KEY",
+    help="Encrypt, with this certificate and its key, two PEM files.",
+)
+def serve(study: Path, port: int, host: str, tls: tuple[Path, Path] | None) -> None:
+    """Show STUDY in browsers: a rater's page and a coordinator's.
+
+    Two addresses are printed, each of which lets in one browser, once; Enter prints new
+    ones. A session by the browser leaves the same log as one by masrel run. Ctrl-C
+    stops what runs and then the server; a second one does not wait.
+    """
+    if sys.platform == "win32":  # a session takes over a socket of the server
+        raise ParameterError(
+            "serve: needs Linux or macOS, got Windows; there is masrel run"
+        )
+    for name in _LIBRARIES:
+        if importlib.util.find_spec(name) is None:
+            raise ParameterError(
+                f"serve: needs {name}; install it with: pip install 'masrel[serve]'"
+            )
+    import asyncio
+
+    from masrel.lab.serve._access import Access
+    from masrel.lab.serve._addresses import hosts, is_loopback
+    from masrel.lab.serve._desk import Desk
+    from masrel.lab.serve._server import alone, encryption, listen
+    from masrel.lab.serve._server import serve as serve_pages
+
+    paths = StudyPaths(study)
+    read_protocol(paths.protocol)
+    context = None if tls is None else encryption(*tls)
+    with alone(paths), listen(host, port) as listener:
+        names = hosts(listener, host, encrypted=tls is not None)
+        scheme = "http" if tls is None else "https"
+        origin = f"{scheme}://{names[0]}"
+        access = Access(paths, origin=origin, hosts=frozenset(names), say=click.echo)
+        if tls is None and not is_loopback(listener.getsockname()[0]):
+            click.echo(
+                f"masrel: --host {host} without --tls: whoever is in this network can "
+                "read the grades, and act as the rater or the coordinator",
+                err=True,
+            )
+        serving = serve_pages(
+            Desk(paths), access, listener, context, show=lambda: _show(access)
+        )
+        if not asyncio.run(serving):
+            raise KeyboardInterrupt
+
+
+def _show(access: "Access") -> None:
+    """Print addresses that nobody has opened yet."""
+    from masrel.lab.serve._access import ROLES
+    from masrel.lab.serve._addresses import qr_lines
+
+    for role in ROLES:
+        address = access.new_address(role)
+        click.echo(f"{role}: {address}")
+        if sys.stdout.isatty():
+            click.echo(qr_lines(address))
+    enter = "Enter: new ones. " if sys.stdin is not None and sys.stdin.isatty() else ""
+    click.echo(f"Each address lets in one browser, once. {enter}Ctrl-C: stop.")

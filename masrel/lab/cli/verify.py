@@ -1,0 +1,162 @@
+"""``masrel verify``: whether the record of a study is whole."""
+
+import dataclasses
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from masrel.cli._options import (
+    STDOUT,
+    OutputOptions,
+    output_options,
+    warnings_as_notes,
+    write_json,
+)
+from masrel.errors import ParameterError
+from masrel.lab._once import read_once
+from masrel.lab.protocol import StudyPaths
+
+if TYPE_CHECKING:
+    from masrel.lab.verification import Anchor, Finding, SessionRecord, Verification
+
+
+@click.command("verify")
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option(
+    "--anchor",
+    "anchor_file",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="File of hashes outside the study: made when it is not there, and else what "
+    "the logs are held against.",
+)
+@output_options(json="Write everything here as JSON; - prints it, and nothing else.")
+@read_once()
+def verify(study: Path, anchor_file: Path | None, output: OutputOptions) -> None:
+    """Verify the record of STUDY, every file against the one it was made from.
+
+    Protocol, schedules, logs and recordings of sessions, trainings and rehearsals,
+    tables, analysis and report. Prints how far each came, what is wrong, and an
+    anchor for each log: a hash that, kept elsewhere, shows that its lines were not
+    written anew.
+    Exit code 2 when something is broken.
+    """
+    from masrel.lab.verification import anchors_of, verify_study
+
+    if not study.is_dir():
+        raise ParameterError(f"{study}: needed the folder of a study, got none")
+    paths = StudyPaths(study)
+    with warnings_as_notes():
+        verification = verify_study(paths)
+    findings, anchors = list(verification.findings), anchors_of(paths)
+    findings += _anchored(paths, anchor_file, anchors)
+    is_whole = not any(finding.weight == "broken" for finding in findings)
+    if output.json_file is not None:
+        document = _document(verification, findings, anchors, is_whole=is_whole)
+        write_json(document, output.json_file)
+    if output.json_file != STDOUT:
+        _show(study, verification, findings, anchors, is_whole=is_whole)
+    if not is_whole:
+        sys.exit(2)
+
+
+def _anchored(
+    study: StudyPaths, file: Path | None, anchors: "tuple[Anchor, ...]"
+) -> "tuple[Finding, ...]":
+    from masrel.lab.verification import anchor_findings, read_anchors, write_anchors
+
+    if file is None:
+        return ()
+    if file.resolve().is_relative_to(study.root.resolve()):
+        raise ParameterError(
+            f"--anchor: needed a file outside {study.root}, got {file}: who can change "
+            "the study can change it too"
+        )
+    if file.exists():
+        old = read_anchors(file)
+        _say_what_is_newer(file, old, anchors)
+        return anchor_findings(study, old)
+    if anchors:
+        write_anchors(anchors, file)
+        click.echo(f"anchors: {file}", err=True)
+    else:
+        click.echo(f"no log to anchor yet: {file} is not written", err=True)
+    return ()
+
+
+def _say_what_is_newer(
+    file: Path, old: "tuple[Anchor, ...]", anchors: "tuple[Anchor, ...]"
+) -> None:
+    lines: dict[str, int] = {}
+    for anchor in old:
+        lines[anchor.log] = max(anchor.line, lines.get(anchor.log, 0))
+    newer = sum(lines.get(anchor.log, 0) < anchor.line for anchor in anchors)
+    if newer:
+        click.echo(
+            f"note: {newer} of {len(anchors)} logs have lines that no anchor in {file} "
+            "covers yet; --anchor with another file keeps anchors of them too",
+            err=True,
+        )
+
+
+def _document(
+    verification: "Verification",
+    findings: "list[Finding]",
+    anchors: "tuple[Anchor, ...]",
+    *,
+    is_whole: bool,
+) -> dict[str, object]:
+    return {
+        "is_whole": is_whole,
+        "sessions": [dataclasses.asdict(record) for record in verification.sessions],
+        "trainings": [dataclasses.asdict(record) for record in verification.trainings],
+        "rehearsals": [
+            dataclasses.asdict(record) for record in verification.rehearsals
+        ],
+        "findings": [
+            {**dataclasses.asdict(finding), "path": str(finding.path)}
+            for finding in findings
+        ],
+        "anchors": [dataclasses.asdict(anchor) for anchor in anchors],
+    }
+
+
+def _stage_of(record: "SessionRecord") -> str:
+    if record.stage in ("not begun", "unreadable"):
+        return record.stage
+    counts = f"{record.n_graded} of {record.n_presentations} graded"
+    skipped = f", {record.n_skipped} skipped" if record.n_skipped else ""
+    corrected = f", {record.n_corrections} corrected" if record.n_corrections else ""
+    counts += skipped + corrected
+    return f"{record.stage}, {counts}, {record.n_recordings} recordings"
+
+
+def _show(
+    study: Path,
+    verification: "Verification",
+    findings: "list[Finding]",
+    anchors: "tuple[Anchor, ...]",
+    *,
+    is_whole: bool,
+) -> None:
+    for record in (*verification.sessions, *verification.rehearsals):
+        number = record.rehearsal
+        which = "" if number is None else f"rehearsal {number} of "
+        click.echo(f"{which}{record.session} {record.rater}: {_stage_of(record)}")
+    for training in verification.trainings:
+        click.echo(
+            f"training {training.rater}: {training.stage}, {training.n_graded} graded, "
+            f"{training.n_recordings} recordings"
+        )
+    for anchor in anchors:
+        click.echo(f"anchor: {anchor}")
+    for finding in findings:
+        click.echo(f"{finding.weight}: {finding.message}", err=True)
+    n_broken = sum(finding.weight == "broken" for finding in findings)
+    n_doubts = len(findings) - n_broken
+    doubts = f", {n_doubts} in doubt" if n_doubts else ""
+    if is_whole:
+        click.echo(f"{study}: whole{doubts}.")
+    else:
+        click.echo(f"masrel: {study}: {n_broken} broken{doubts}", err=True)

@@ -1,0 +1,181 @@
+"""The log of a study: what happened beside its sessions, event after event.
+
+``conduct.jsonl`` is a chain of events as a session log is one.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from datetime import datetime
+from heapq import merge
+from itertools import accumulate
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import masrel
+from masrel._input import format_problem, listed
+from masrel.errors import ParameterError, SessionLogError
+from masrel.lab._event_log import Event, SessionLog, read_log, utc_now
+from masrel.lab.protocol import Protocol, StudyPaths
+
+if TYPE_CHECKING:
+    from masrel.lab.recording import _Fact  # loads numpy
+
+_FORMAT = 1
+
+_EVENTS = {
+    "conduct": ("format", "study", "masrel_version"),
+    "withdrawn": ("rater", "who", "why"),
+    "unblinded": ("rater", "session", "code", "who", "why"),
+    "answered": ("rater", "questionnaire", "question", "answer"),
+    "answer-correction": (
+        "rater",
+        "questionnaire",
+        "question",
+        "answer",
+        "who",
+        "why",
+    ),
+    "excluded": ("rater", "who", "why"),
+    "included": ("rater", "who", "why"),
+    "rater-set": ("rater", "field", "value", "who"),
+    "noted": (
+        "kind",
+        "text",
+        "who",
+        "rater",
+        "session",
+        "severity",
+        "action",
+        "outcome",
+    ),
+    "merged": ("name", "log", "n_lines", "sha256", "protocol_sha256"),
+    "allotted": ("rater", "session", "site", "scheme", "row"),
+    "recovered": ("line", "n_bytes", "sha256", "kept", "moved_to"),
+}
+"""Every kind of event with the fields it has."""
+
+_SHOWN = (
+    "withdrawn",
+    "unblinded",
+    "excluded",
+    "included",
+    "rater-set",
+    "noted",
+    "merged",
+)
+
+
+def read_conduct(study: StudyPaths) -> tuple[Event, ...]:
+    """Read what happened to a study beside its sessions, and verify its chains.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is. One that was merged from others has their logs too.
+
+    Returns
+    -------
+    tuple of Event
+        In order of time, with the fields that ``docs/conduct.md`` lists; None stands
+        for all, or for nothing. Empty when nothing happened.
+
+    Raises
+    ------
+    SessionLogError
+        If a log is damaged or holds what is no such event.
+    """
+    return tuple(event for event in all_events(study) if event.kind in _SHOWN)
+
+
+def conduct_hash(study: StudyPaths) -> str | None:
+    """Return a hash of what `read_conduct` returns; None where that is nothing."""
+    events = [(e.time_utc, e.kind, dict(e.fields)) for e in read_conduct(study)]
+    if not events:
+        return None
+    return hashlib.sha256(json.dumps(events, sort_keys=True).encode()).hexdigest()
+
+
+def all_events(study: StudyPaths) -> tuple[Event, ...]:
+    """Return every event of a study's logs, in order of time."""
+    return tuple(event for _, event in events_of_logs(study))
+
+
+def events_of_logs(study: StudyPaths) -> Iterator[tuple[Path, Event]]:
+    """Yield the same, each with the log that it is in."""
+    logs = [_timed(path) for path in study.conduct_logs()]
+    for _, log, event in merge(*logs, key=lambda timed: timed[0]):
+        yield log, event
+
+
+def _timed(log: Path) -> list[tuple[str, Path, Event]]:
+    # a clock that is set back changes no order within a log
+    events = _checked(log, read_log(log))
+    latest = accumulate((event.time_utc for event in events), max)
+    return [(time, log, event) for time, event in zip(latest, events, strict=True)]
+
+
+def append_event(
+    study: StudyPaths,
+    protocol: Protocol,
+    kind: str,
+    fields: "Mapping[str, _Fact]",
+    *,
+    now: Callable[[], datetime] = utc_now,
+) -> None:
+    """Append an event to the log of a study; the first one comes after a head."""
+    with open_conduct(study, protocol, now=now) as log:
+        log.append(kind, fields)
+
+
+@contextmanager
+def open_conduct(
+    study: StudyPaths, protocol: Protocol, *, now: Callable[[], datetime] = utc_now
+) -> Iterator[SessionLog]:
+    """Give the log of a study, verified and with its head, to append events to."""
+    with SessionLog.open(study.conduct_file, now=now) as log:
+        _checked(log.path, log.events)
+        if not any(event.kind == "conduct" for event in log.events):
+            head: dict[str, _Fact] = {
+                "format": _FORMAT,
+                "study": protocol.study.id,
+                "masrel_version": masrel.__version__,
+            }
+            log.append("conduct", head)
+        yield log
+
+
+def stated(**texts: str) -> dict[str, str]:
+    """Return the texts without blanks around them; refuse one that is blank."""
+    for name, text in texts.items():
+        if not text.strip():
+            raise ParameterError(f"{name}: needed text, got none")
+    return {name: text.strip() for name, text in texts.items()}
+
+
+def check_rater(protocol: Protocol, rater: str) -> None:
+    """Refuse a rater that the protocol does not have."""
+    known = [each.id for each in protocol.raters]
+    if rater not in known:
+        raise ParameterError(f"rater: needed one of {listed(known)}, got {rater!r}")
+
+
+def _checked(path: Path, events: tuple[Event, ...]) -> tuple[Event, ...]:
+    """Return the events of a log of conduct; refuse any other."""
+    for event in events:
+        where = f"{path}: line {event.line}"
+        if event.kind not in _EVENTS:
+            raise SessionLogError(
+                f"{where}: needed an event of {', '.join(_EVENTS)}, got {event.kind!r}"
+            )
+        if event.kind == "conduct":  # first: another format has other fields
+            problem = format_problem(event.fields.get("format"), newest=_FORMAT)
+            if problem is not None:
+                raise SessionLogError(f"{where}: {problem}")
+        if set(event.fields) != set(_EVENTS[event.kind]):
+            raise SessionLogError(
+                f"{where}: {event.kind}: needed the fields "
+                f"{', '.join(_EVENTS[event.kind])}, got {', '.join(event.fields)}"
+            )
+    return events

@@ -1,0 +1,100 @@
+"""The spastic elbow: events, torque and traces of a motion; SI units inside.
+
+In: the parameters of a joint and a motion. Out: exact events, torque at any time,
+what moving the arm takes, or the trace a controller would command.
+"""
+
+from typing import TYPE_CHECKING
+
+from masrel.lab.elbow._events import Events, PhaseSpan, StretchEvents, events
+from masrel.lab.elbow._motion import Motion
+from masrel.lab.elbow._scenes import Columns, SceneTable, evaluate
+from masrel.lab.elbow._torque import (
+    impulse,
+    peak_torque,
+    residual_torque,
+    times_at,
+    torque,
+    torque_at,
+    work,
+)
+from masrel.lab.elbow.joint_model import JointModel, Stepper
+from masrel.lab.elbow.laws import MODELS
+from masrel.lab.elbow.motions import (
+    ConstantSpeed,
+    Hold,
+    Joined,
+    MinimumJerk,
+    Part,
+    Recorded,
+    Reversed,
+    Trapezoid,
+    interrupted,
+)
+from masrel.lab.elbow.outline import Outline, outline
+from masrel.lab.elbow.parameters import STANDARD_MODELS, ElbowParameters
+from masrel.lab.elbow.sampled import SampledJoint
+from masrel.lab.elbow.tardieu import Tardieu, tardieu
+from masrel.lab.elbow.trace import Trace, trace
+
+if TYPE_CHECKING:
+    from masrel.lab.elbow.identification import (
+        fit,
+        fit_friction,
+        intermediate_models,
+        read_movement,
+    )
+
+__all__ = [
+    "MODELS",
+    "STANDARD_MODELS",
+    "Columns",
+    "ConstantSpeed",
+    "ElbowParameters",
+    "Events",
+    "Hold",
+    "Joined",
+    "JointModel",
+    "MinimumJerk",
+    "Motion",
+    "Outline",
+    "Part",
+    "PhaseSpan",
+    "Recorded",
+    "Reversed",
+    "SampledJoint",
+    "SceneTable",
+    "Stepper",
+    "StretchEvents",
+    "Tardieu",
+    "Trace",
+    "Trapezoid",
+    "evaluate",
+    "events",
+    "fit",
+    "fit_friction",
+    "impulse",
+    "intermediate_models",
+    "interrupted",
+    "outline",
+    "peak_torque",
+    "read_movement",
+    "residual_torque",
+    "tardieu",
+    "times_at",
+    "torque",
+    "torque_at",
+    "trace",
+    "work",
+]
+
+_IDENTIFIED = ("fit", "fit_friction", "intermediate_models", "read_movement")
+
+
+def __getattr__(name: str) -> object:
+    # identification needs scipy, which nothing else here does
+    if name not in _IDENTIFIED:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    import importlib
+
+    return getattr(importlib.import_module("masrel.lab.elbow.identification"), name)

@@ -1,0 +1,301 @@
+"""Files of joints for a protocol to name, and the joints between others."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+from masrel.errors import ParameterError
+from masrel.lab.elbow.identification._quantities import (
+    ALL_QUANTITIES,
+    DEGREES,
+    QUANTITIES,
+)
+from masrel.lab.elbow.parameters import ElbowParameters
+
+if TYPE_CHECKING:
+    from masrel.lab.elbow.identification._lack_of_fit import LackOfFit
+    from masrel.lab.elbow.identification._results import ElbowFit
+
+
+FORMAT = "masrel joint model 1"
+"""What the key ``format`` of a model file says."""
+
+
+def _keys(*names: str) -> dict[str, tuple[str, float]]:
+    return {QUANTITIES[name].key: (name, QUANTITIES[name].factor) for name in names}
+
+
+MODEL_KEYS = _keys(
+    "catch_angle_constant",  # L
+    "catch_torque_constant",  # H
+    "residual_ratio",  # Q
+    "catch_travel",  # D
+)
+"""Key of a protocol's model to the parameter and its unit in SI units."""
+
+CONSTANT_KEYS = _keys(
+    "inertia", "damping", "stiffness", "catch_slope", "post_catch_stiffness"
+)
+"""Likewise the constants that a model may have of its own."""
+
+READING_KEYS = ("post_catch", "residual_reading")
+"""How H, Q and k_post are to be read: without it the numbers are another joint."""
+
+VARIANT_KEYS = {
+    "rest_angle_deg": ("rest_angle", DEGREES),
+    "catch_rise_s": ("catch_rise", 1.0),
+}
+"""Constants that are written where they are not the default."""
+
+Document = dict[str, object]
+
+
+def model_document(
+    joint: ElbowParameters,
+    *,
+    simulated: bool,
+    made_from: str,
+    fit: "ElbowFit | None" = None,
+) -> Document:
+    """Make the content of a model file.
+
+    Parameters
+    ----------
+    joint : ElbowParameters
+        The joint.
+    simulated : bool
+        Whether it comes from simulated recordings.
+    made_from : str
+        Where it comes from, for people.
+    fit : ElbowFit, optional
+        The fit it comes from: its intervals, remarks and recordings are written
+        beside the numbers.
+
+    Returns
+    -------
+    dict
+        Tables ``model``, ``constants`` and, of a fit, ``estimates`` and
+        ``recordings``; degrees where the key says so.
+
+    Examples
+    --------
+    >>> from masrel.lab.elbow import STANDARD_MODELS
+    >>> hm1 = STANDARD_MODELS["HM1"]
+    >>> made = model_document(hm1, simulated=False, made_from="Table III")
+    >>> made["model"]["catch_torque_nms_rad"]
+    1.4
+    """
+    document: Document = {
+        "format": FORMAT,
+        "made_from": made_from,
+        "simulated": simulated,
+        "model": {
+            key: getattr(joint, name) * factor
+            for key, (name, factor) in MODEL_KEYS.items()
+        },
+        "constants": _constants(joint),
+    }
+    if fit is not None:
+        document["remarks"] = [fit.lack_of_fit.sentence, *fit.remarks]
+        document["lack_of_fit"] = _lack_of_fit(fit.lack_of_fit)
+        document["estimates"] = _estimates(fit)
+        document["recordings"] = [
+            {"name": name, **({} if sha256 is None else {"sha256": sha256})}
+            for name, sha256 in fit.sources.items()
+        ]
+    return document
+
+
+def _constants(joint: ElbowParameters) -> Document:
+    made: Document = {
+        key: getattr(joint, name) * factor
+        for key, (name, factor) in CONSTANT_KEYS.items()
+    }
+    made.update({key: getattr(joint, key) for key in READING_KEYS})
+    defaults = {field.name: field.default for field in fields(joint)}
+    for key, (name, factor) in VARIANT_KEYS.items():
+        if (value := getattr(joint, name)) != defaults[name]:
+            made[key] = value * factor
+    return made
+
+
+def _lack_of_fit(lack: "LackOfFit") -> Document:
+    document: Document = {"verdict": lack.verdict, "level": lack.level}
+    numbers = {
+        "explained": lack.explained,
+        "after_to_before": lack.after_to_before,
+        "rest_sd_nm": lack.rest_sd,
+    }
+    document |= {key: value for key, value in numbers.items() if math.isfinite(value)}
+    if lack.tests:
+        first = lack.tests[0]
+        document |= {"structure": first.name, "p_value": first.adjusted}
+    return document
+
+
+def _estimates(fit: "ElbowFit") -> list[Document]:
+    made = []
+    for estimate in fit.estimates:
+        quantity = ALL_QUANTITIES[estimate.name]
+        factor = quantity.factor
+        numbers = {
+            "value": estimate.value * factor,
+            "standard_error": estimate.standard_error * factor,
+            "low": estimate.low * factor,
+            "high": estimate.high * factor,
+            "degrees_of_freedom": estimate.df,
+        }
+        entry: Document = {"key": quantity.key, "level": estimate.level}
+        entry.update({k: v for k, v in numbers.items() if math.isfinite(v)})
+        entry["n_trials"] = estimate.n_trials
+        if estimate.reason is not None:
+            entry["reason"] = estimate.reason
+        made.append(entry)
+    return made
+
+
+def as_toml(document: Mapping[str, object]) -> str:
+    """Write a document of plain values, tables and arrays of tables as TOML.
+
+    Parameters
+    ----------
+    document : mapping
+        What `model_document` makes.
+
+    Returns
+    -------
+    str
+        TOML; numbers in full precision.
+
+    Raises
+    ------
+    ParameterError
+        If a value is none that TOML has here.
+
+    Examples
+    --------
+    >>> print(as_toml({"format": "x", "model": {"residual_ratio": 0.3}}), end="")
+    format = "x"
+    <BLANKLINE>
+    [model]
+    residual_ratio = 0.3
+    """
+    lines = [
+        f"{key} = {_value(value)}"
+        for key, value in document.items()
+        if not _is_table(value)
+    ]
+    for key, value in document.items():
+        if isinstance(value, Mapping):
+            lines += ["", f"[{key}]", *_pairs(value)]
+        elif _is_table(value) and isinstance(value, list):
+            for entry in value:
+                lines += ["", f"[[{key}]]", *_pairs(entry)]
+    return "\n".join(lines) + "\n"
+
+
+def _is_table(value: object) -> bool:
+    entries = value if isinstance(value, list) else [value]
+    return bool(entries) and all(isinstance(entry, Mapping) for entry in entries)
+
+
+def _pairs(table: Mapping[str, object]) -> list[str]:
+    return [f"{key} = {_value(value)}" for key, value in table.items()]
+
+
+def _value(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int | float) and math.isfinite(value):
+        return repr(float(value)) if isinstance(value, float) else str(value)
+    if isinstance(value, str):
+        return _text(value)
+    if isinstance(value, list):
+        return f"[{', '.join(_value(entry) for entry in value)}]"
+    raise ParameterError(f"value: needs text, a finite number or a list, got {value!r}")
+
+
+def _text(value: str) -> str:
+    # a basic string: quotes, backslashes and control characters are escaped
+    escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+    plain = "".join(
+        letter if letter.isprintable() else f"\\U{ord(letter):08X}"
+        for letter in escaped
+    )
+    return f'"{plain}"'
+
+
+def intermediate_models(
+    models: Mapping[str, ElbowParameters], n_models: int
+) -> dict[str, ElbowParameters]:
+    """Put models at even steps between neighbours.
+
+    Parameters
+    ----------
+    models : mapping of str to ElbowParameters
+        Two or more, mildest first: their order says who is whose neighbour.
+    n_models : int
+        How many to make; the same number in every gap.
+
+    Returns
+    -------
+    dict of str to ElbowParameters
+        ``D01``, ``D02`` and so on. Of n in a gap, the i-th is i/(n + 1) of the way,
+        every number interpolated linearly: L, H, Q and D, and what else differs.
+
+    Raises
+    ------
+    ParameterError
+        If there are less than two models, `n_models` does not divide evenly among
+        the gaps, or neighbours read (5) differently.
+
+    Examples
+    --------
+    The paper's design, four standards and twelve dummies, 4 in each of 3 gaps:
+
+    >>> from masrel.lab.elbow import STANDARD_MODELS
+    >>> made = intermediate_models(STANDARD_MODELS, 12)
+    >>> len(made), round(made["D01"].catch_torque_constant, 6)  # 1.4 + 0.6/5
+    (12, 1.52)
+    """
+    gaps = len(models) - 1
+    if gaps < 1:
+        raise ParameterError(f"models: need two or more, got {len(models)}")
+    if n_models < gaps or n_models % gaps:
+        raise ParameterError(
+            f"number of models: needs a multiple of {gaps}, one or more in each gap, "
+            f"got {n_models}"
+        )
+    each = n_models // gaps
+    names = list(models)
+    made = []
+    for first, second in pairwise(names):
+        _check_alike(first, models[first], second, models[second])
+        for i in range(1, each + 1):
+            made.append(_between(models[first], models[second], i, each + 1))
+    digits = max(2, int(math.log10(n_models)) + 1)
+    return {f"D{i:0{digits}}": model for i, model in enumerate(made, start=1)}
+
+
+def _between(
+    one: ElbowParameters, two: ElbowParameters, part: int, whole: int
+) -> ElbowParameters:
+    values: dict[str, Any] = {}
+    for field in fields(one):
+        a, b = getattr(one, field.name), getattr(two, field.name)
+        if isinstance(a, float) and isinstance(b, float) and a != b:
+            values[field.name] = ((whole - part) * a + part * b) / whole
+    return replace(one, **values)
+
+
+def _check_alike(
+    name: str, one: ElbowParameters, other: str, two: ElbowParameters
+) -> None:
+    for field in fields(one):
+        a, b = getattr(one, field.name), getattr(two, field.name)
+        if a != b and not (isinstance(a, float) and isinstance(b, float)):
+            raise ParameterError(
+                f"models: {name} and {other} need one {field.name}, got {a!r} and {b!r}"
+            )

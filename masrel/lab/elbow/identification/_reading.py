@@ -1,0 +1,592 @@
+"""Recordings of a spasticity evaluator: read, checked, and put on even times.
+
+In: CSV, npz, or masrel's own recordings. Out: time, angle and torque in SI units, with
+what must not be used marked.
+"""
+
+import csv
+import hashlib
+import json
+import math
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel._input import MAX_RECORDING, not_utf8, read_regular
+from masrel.errors import ParameterError, RecordingError, RecordingWarning
+from masrel.lab.recording import (
+    _FIRST_COLUMNS,
+    MEASURED_TORQUE,
+    _read_columns,
+    read_recording,
+)
+
+TorqueSource = Literal["recorded", "sensor", "model"]
+
+_Floats = NDArray[np.float64]
+
+
+_MIN_SAMPLES = 50
+"""Shorter is no stretch at any rate that is allowed."""
+
+_MIN_RATE_HZ, _MAX_RATE_HZ = 50.0, 100_000.0
+"""Below the first, nothing is left of a peak of 0.1 s; above the second, no evaluator
+works."""
+
+_ANGLE_RANGE = (math.radians(-30.0), math.radians(210.0))
+"""An elbow's range with room for a goniometer that is not zeroed, rad."""
+
+MIN_TRAVEL = math.radians(15.0)
+"""A movement of less is no stretch, rad."""
+
+_MAX_TORQUE = 100.0
+"""No manual stretch of an elbow asks for more, N·m."""
+
+_SATURATED_RUN = 10
+"""So many equal samples in a row, at the largest torque and nowhere else, are a
+sensor at the end of its range."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Movement:
+    """Angle and torque of a joint that somebody moves, as recorded.
+
+    Attributes
+    ----------
+    name : str
+        Where it is from: the file.
+    time : ndarray, shape (n_samples,)
+        Strictly increasing times, s; they need not be even.
+    angle : ndarray, shape (n_samples,)
+        Angle, 0 at full flexion, growing with extension, rad.
+    torque : ndarray, shape (n_samples,)
+        Torque that resists extension, N·m.
+    velocity : ndarray, shape (n_samples,), or None
+        Angular velocity, rad/s. It is compared with the angle's derivative, no more.
+    saturated : ndarray of bool, shape (n_samples,)
+        Samples at which the torque sensor is at the end of its range.
+    simulated : bool
+        Whether no joint and no hand was there.
+    torque_source : {"recorded", "sensor", "model"}
+        Where the torque is from: somebody's recording; in one of masrel's driver the
+        sensor of the device, or what the joint model asked for.
+    model : str or None
+        The model that was presented, in a recording of masrel's driver.
+    sha256 : str or None
+        Checksum of the file, if it is from one.
+
+    Raises
+    ------
+    RecordingError
+        If the columns differ in length, hold what is not finite, time does not
+        increase, or angle and torque cannot be what they are said to be.
+
+    Warns
+    -----
+    RecordingWarning
+        If the torque looks saturated.
+    """
+
+    name: str
+    time: _Floats = field(compare=False, repr=False)
+    angle: _Floats = field(compare=False, repr=False)
+    torque: _Floats = field(compare=False, repr=False)
+    velocity: _Floats | None = field(default=None, compare=False, repr=False)
+    saturated: NDArray[np.bool_] = field(init=False, compare=False, repr=False)
+    simulated: bool = False
+    torque_source: TorqueSource = "recorded"
+    model: str | None = None
+    sha256: str | None = None
+
+    def __post_init__(self) -> None:
+        columns = [self.time, self.angle, self.torque]
+        if self.velocity is not None:
+            columns.append(self.velocity)
+        if len({column.shape for column in columns}) != 1 or self.time.ndim != 1:
+            raise RecordingError(
+                f"{self.name}: columns need one length, got shapes "
+                f"{', '.join(str(column.shape) for column in columns)}"
+            )
+        if not all(np.isfinite(column).all() for column in columns):
+            raise RecordingError(f"{self.name}: columns need finite numbers")
+        _check_time(self.name, self.time)
+        _check_sizes(self.name, self.angle, self.torque)
+        object.__setattr__(self, "saturated", _saturated(self.name, self.torque))
+        for column in (*columns, self.saturated):
+            column.setflags(write=False)
+
+
+def _check_time(name: str, time: _Floats) -> None:
+    if time.size < _MIN_SAMPLES:
+        raise RecordingError(
+            f"{name}: needs at least {_MIN_SAMPLES} samples, got {time.size}"
+        )
+    steps = np.diff(time)
+    if not (steps > 0.0).all():
+        at = int(np.argmax(steps <= 0.0))
+        raise RecordingError(
+            f"{name}: time must increase, got {time[at + 1]:.9g} s after "
+            f"{time[at]:.9g} s (samples {at} and {at + 1}, counted from 0)"
+        )
+    rate = 1.0 / float(np.median(steps))
+    # times that were rounded as they were written may be a little off
+    if not 0.999 * _MIN_RATE_HZ <= rate <= 1.001 * _MAX_RATE_HZ:
+        raise RecordingError(
+            f"{name}: needs {_MIN_RATE_HZ:g} to {_MAX_RATE_HZ:g} samples a "
+            f"second, got {rate:.3g}; is the unit of time right?"
+        )
+
+
+def _check_sizes(name: str, angle: _Floats, torque: _Floats) -> None:
+    low, high = math.degrees(angle.min()), math.degrees(angle.max())
+    largest = float(np.abs(torque).max())
+    message = f"{name}: got angles from {low:.4g} to {high:.4g} degrees and torques "
+    message += f"to {largest:.4g} N·m"
+    if largest > _MAX_TORQUE:
+        if high - low < math.degrees(MIN_TRAVEL) or largest < 180.0:
+            raise RecordingError(
+                f"{message}; are the columns of angle and torque swapped?"
+            )
+        raise RecordingError(f"{message}; is the unit of torque right?")
+    if angle.min() < _ANGLE_RANGE[0] or angle.max() > _ANGLE_RANGE[1]:
+        raise RecordingError(f"{message}; is the unit of the angle right?")
+    if angle.max() - angle.min() < MIN_TRAVEL:
+        needed = math.degrees(MIN_TRAVEL)
+        raise RecordingError(
+            f"{message}; a stretch travels {needed:g} degrees or more. Is the unit of "
+            "the angle right, and is its column not the torque's?"
+        )
+
+
+def _saturated(name: str, torque: _Floats) -> NDArray[np.bool_]:
+    # samples of long runs at the largest or smallest torque; long runs elsewhere too
+    # mean a coarse or noise-free sensor, not a saturated one
+    starts = np.flatnonzero(np.diff(torque, prepend=np.nan) != 0.0)
+    lengths = np.diff(starts, append=torque.size)
+    long = lengths >= _SATURATED_RUN
+    extreme = np.isin(torque[starts], (torque.min(), torque.max()))
+    extreme &= np.abs(torque[starts]) >= 0.9 * np.abs(torque).max()
+    if not (long & extreme).any() or (long & ~extreme).any():
+        return np.zeros(torque.size, dtype=np.bool_)
+    marked = np.repeat(extreme, lengths)
+    limits = ", ".join(f"{value:.4g}" for value in np.unique(torque[marked]))
+    warnings.warn(
+        f"{name}: the torque stays at {limits} N·m for {int(marked.sum())} samples: "
+        "the sensor is saturated; these samples are left out, and a stretch whose "
+        "peak they cut off gives no H and Q",
+        RecordingWarning,
+        stacklevel=4,
+    )
+    return marked
+
+
+_UNITS: dict[str, dict[str, float]] = {
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
+    "angle": {"deg": math.pi / 180.0, "rad": 1.0},
+    "torque": {"nm": 1.0, "mnm": 1e-3, "ncm": 1e-2},
+    "velocity": {"deg_s": math.pi / 180.0, "rad_s": 1.0},
+}
+"""Quantity to unit to its size in SI; the velocity may be absent."""
+
+_OPTIONAL = ("velocity",)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Column:
+    """A column of a recording."""
+
+    name: str
+    factor: float
+
+
+def _find_columns(
+    names: Sequence[str],
+    *,
+    source: str,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    quantities: Iterable[str] = _UNITS,
+) -> dict[str, _Column]:
+    """Find the columns of time, angle, torque and, if there is one, velocity."""
+    columns, units = dict(columns or {}), dict(units or {})
+    _check_options(columns, units)
+    result = {}
+    for quantity in quantities:
+        column = _find(names, quantity, source, columns.get(quantity), units)
+        if column is not None:
+            result[quantity] = column
+        elif quantity not in _OPTIONAL:
+            forms = [f"{quantity}_{unit}" for unit in _UNITS[quantity]]
+            raise RecordingError(
+                f"{source}: needs a column of {quantity}: {', '.join(forms)}, or its "
+                f"name given; got {', '.join(names) or 'no columns'}"
+            )
+    return result
+
+
+def _check_options(columns: Mapping[str, str], units: Mapping[str, str]) -> None:
+    for quantity in (*columns, *units):
+        if quantity not in _UNITS:
+            raise ParameterError(
+                f"columns, units: need one of {', '.join(_UNITS)}, got {quantity!r}"
+            )
+    for quantity, unit in units.items():
+        if unit not in _UNITS[quantity]:
+            raise ParameterError(
+                f"units: {quantity} needs one of {', '.join(_UNITS[quantity])}, "
+                f"got {unit!r}"
+            )
+
+
+def _find(
+    names: Sequence[str],
+    quantity: str,
+    source: str,
+    declared: str | None,
+    units: Mapping[str, str],
+) -> _Column | None:
+    if declared is not None:
+        if declared not in names:
+            raise RecordingError(
+                f"{source}: needs the column {declared!r}, got {', '.join(names)}"
+            )
+        fitting = [declared]
+    else:
+        forms = {quantity, *(f"{quantity}_{unit}" for unit in _UNITS[quantity])}
+        fitting = [name for name in names if name.strip().lower() in forms]
+    if len(fitting) > 1:
+        raise RecordingError(
+            f"{source}: needs one column of {quantity}, got {', '.join(fitting)}"
+        )
+    if not fitting:
+        return None
+    return _with_unit(fitting[0], quantity, source, units.get(quantity))
+
+
+def _with_unit(name: str, quantity: str, source: str, requested: str | None) -> _Column:
+    suffix = name.strip().lower().removeprefix(f"{quantity}_")
+    named = suffix if suffix in _UNITS[quantity] else None
+    if named is not None and requested is not None and named != requested:
+        raise RecordingError(
+            f"{source}: column {name} says {named}, units says {requested} for "
+            f"{quantity}"
+        )
+    unit = named or requested
+    if unit is None:
+        raise RecordingError(
+            f"{source}: column {name} has no unit: name it "
+            f"{' or '.join(f'{quantity}_{u}' for u in _UNITS[quantity])}, or say the "
+            f"unit of {quantity}"
+        )
+    return _Column(name=name, factor=_UNITS[quantity][unit])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Archive:
+    path: Path
+    arrays: dict[str, NDArray[np.generic]] = field(repr=False)
+    simulated: bool
+    model: str | None = None
+
+    @property
+    def names(self) -> list[str]:
+        return list(self.arrays)
+
+    def column(self, name: str) -> _Floats:
+        array = self.arrays[name]
+        if array.ndim != 1 or array.dtype.kind not in "iuf":
+            raise RecordingError(
+                f"{self.path}: column {name} needs numbers in one dimension, got "
+                f"{array.dtype} of shape {array.shape}"
+            )
+        numbers = array.astype(np.float64)
+        if np.isinf(numbers).any():
+            place = int(np.argmax(np.isinf(numbers)))
+            raise RecordingError(
+                f"{self.path}, sample {place} (counted from 0), column {name}: needs a "
+                f"finite number, got {numbers[place]}"
+            )
+        return numbers
+
+
+def _read_archive(path: Path, content: bytes) -> _Archive:
+    arrays = _read_columns(path, content)
+    if _is_own(arrays) and path.with_suffix(".json").is_file():
+        local = read_recording(path)  # holds it to its checksum
+        simulated = local.facts.get("simulated") is True
+        shown: dict[str, NDArray[np.generic]] = {
+            name: column[: local.n_presented] for name, column in local.columns.items()
+        }
+        if faults := local.facts.get("channel_faults"):
+            warnings.warn(f"{path}: {faults}", RecordingWarning, stacklevel=4)
+        model = local.facts.get("model")
+        named = model if isinstance(model, str) else None
+        return _Archive(path=path, arrays=shown, simulated=simulated, model=named)
+    simulated = bool(np.any(arrays.pop("simulated", False)))
+    return _Archive(path=path, arrays=arrays, simulated=simulated)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Text:
+    path: Path
+    names: list[str]
+    rows: list[list[str]] = field(repr=False)
+    lines: list[int] = field(repr=False)  # where each row stands, from 1 on
+    simulated: bool
+    model: None = None
+
+    def column(self, name: str) -> _Floats:
+        place = self.names.index(name)
+        numbers = np.empty(len(self.rows))
+        for i, row in enumerate(self.rows):
+            try:
+                numbers[i] = _number(row[place])
+            except ValueError as error:
+                raise RecordingError(
+                    f"{self.path}, line {self.lines[i]}, column {name}: needs a number "
+                    f"with a decimal point, or nothing; got {row[place]!r}"
+                ) from error
+        return numbers
+
+
+def _number(cell: str) -> float:
+    if not cell.strip():
+        return math.nan
+    value = float(cell)
+    if math.isinf(value) or "_" in cell:
+        raise ValueError(cell)
+    return value
+
+
+def _read_text(path: Path, content: bytes) -> _Text:
+    try:
+        lines = content.decode("utf-8-sig").splitlines()
+    except UnicodeDecodeError as error:
+        raise RecordingError(f"{path}: {not_utf8(error)}") from error
+    remarks = 0
+    while remarks < len(lines) and (
+        lines[remarks].startswith("#") or not lines[remarks].strip()
+    ):
+        remarks += 1
+    if remarks == len(lines):
+        raise RecordingError(f"{path}: needs a line of column names, got none")
+    separator = max(",;\t", key=lines[remarks].count)
+    try:
+        rows = list(csv.reader(lines[remarks:], delimiter=separator))
+    except csv.Error as error:
+        raise RecordingError(f"{path}: needs cells of numbers ({error})") from error
+    names = [name.strip() for name in rows[0]]
+    if len(set(names)) != len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise RecordingError(f"{path}: column {twice!r} is there twice")
+    filled = _filled(path, rows[1:], len(names), remarks + 2)
+    return _Text(
+        path=path,
+        names=names,
+        rows=[row for _, row in filled],
+        lines=[line for line, _ in filled],
+        simulated=any(_is_simulated(line) for line in lines[:remarks]),
+    )
+
+
+def _filled(
+    path: Path, rows: list[list[str]], n_columns: int, first: int
+) -> list[tuple[int, list[str]]]:
+    # rows that are not blank, each with its line; `first` is the line of the first
+    filled = [(first + i, row) for i, row in enumerate(rows) if row]
+    for line, row in filled:
+        if len(row) != n_columns:
+            raise RecordingError(
+                f"{path}, line {line}: needs {n_columns} cells, got {len(row)}"
+            )
+    return filled
+
+
+def _is_simulated(remark: str) -> bool:
+    key, _, value = remark.removeprefix("#").partition(":")
+    return key.strip() == "simulated" and value.strip() == json.dumps(True)
+
+
+def _read_table(path: Path) -> tuple[_Archive | _Text, bytes]:
+    # a recording of any kind, and its bytes
+    if not path.is_file():
+        why = "a folder; needs a file" if path.is_dir() else "no such file"
+        why = "not a regular file" if path.exists() and not path.is_dir() else why
+        raise RecordingError(f"{path}: {why}")
+    content = read_regular(path, most=MAX_RECORDING)
+    read = _read_archive if path.suffix.lower() == ".npz" else _read_text
+    return read(path, content), content
+
+
+def read_angles(path: Path) -> tuple[_Floats, _Floats]:
+    """Return times, s, and angles, rad, of a recording, whatever else is in it."""
+    table, _ = _read_table(path)
+    columns = _find_columns(table.names, source=str(path), quantities=("time", "angle"))
+    time, angle = (table.column(c.name) * c.factor for c in columns.values())
+    return time, angle
+
+
+_MODEL, _COMMANDED = "model_torque_nm", "command_torque_nm"
+
+
+def _is_own(names: Iterable[str]) -> bool:
+    # Whether these are the columns of masrel's driver, with or without channels
+    return set(names) >= _FIRST_COLUMNS
+
+
+def read_movement(
+    path: Path,
+    *,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    of_device: bool = False,
+) -> Movement:
+    """Read one recording.
+
+    Parameters
+    ----------
+    path : Path
+        A CSV file with a line of names, separated by comma, semicolon or tab; or an
+        npz archive with one array a column. Lines that start with ``#`` before the
+        names are remarks, of which ``# simulated: true`` is understood; an archive
+        has an array ``simulated`` instead. A recording of masrel's driver is
+        recognized by its columns; its torque is what the device's sensor measured, and
+        without one what the joint model asked for.
+    columns : mapping of str to str, optional
+        Quantity ("time", "angle", "torque", "velocity") to the name of its column,
+        where the name does not say it.
+    units : mapping of str to str, optional
+        Quantity to unit, for columns without a unit in their name; see
+        `docs/identification.md`.
+    of_device : bool, optional
+        Whether the device is of interest and not the joint: of a recording of masrel's
+        driver the torque that was sent is then taken off the measured one.
+
+    Returns
+    -------
+    Movement
+        The recording in SI units; rows with an empty cell are left out.
+
+    Raises
+    ------
+    ParameterError
+        If `columns` or `units` names what there is not.
+    RecordingError
+        If the file is missing or not a recording, with row and column; if a unit
+        is not said; or if the values cannot be what they are said to be; or if
+        `of_device` and the driver recorded no measured torque.
+
+    Warns
+    -----
+    RecordingWarning
+        If rows are left out, the torque is saturated, or the driver says of a channel
+        that it failed.
+
+    Notes
+    -----
+    Columns that are not named here, such as EMG, are left alone.
+    """
+    table, content = _read_table(path)
+    source: TorqueSource = "recorded"
+    if _is_own(table.names) and "torque" not in (columns or {}):
+        source = "sensor" if MEASURED_TORQUE.column in table.names else "model"
+        torque = MEASURED_TORQUE.column if source == "sensor" else _MODEL
+        columns = {"torque": torque, **(columns or {})}
+        units = {"torque": "nm", **(units or {})}
+    result = _find_columns(table.names, source=str(path), columns=columns, units=units)
+    values = {key: table.column(column.name) for key, column in result.items()}
+    if of_device and source != "recorded":
+        if source == "model":
+            raise RecordingError(
+                f"{path}: needs the column {MEASURED_TORQUE.column}: what a device "
+                "does beside the torque that is sent only its sensor can tell"
+            )
+        values["torque"] = values["torque"] - table.column(_COMMANDED)
+    _check_lengths(path, {result[key].name: values[key] for key in values})
+    whole = np.isfinite(np.stack(list(values.values()))).all(axis=0)
+    if not whole.all():
+        empty = {result[key].name: int(np.isnan(values[key]).sum()) for key in values}
+        warnings.warn(
+            _left_out(path, int((~whole).sum()), empty), RecordingWarning, stacklevel=2
+        )
+    si = {key: values[key][whole] * result[key].factor for key in values}
+    return Movement(
+        name=str(path),
+        time=si["time"],
+        angle=si["angle"],
+        torque=si["torque"],
+        velocity=si.get("velocity"),
+        simulated=table.simulated,
+        torque_source=source,
+        model=table.model,
+        sha256=hashlib.sha256(content).hexdigest(),
+    )
+
+
+def _check_lengths(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> None:
+    sizes = {name: column.size for name, column in columns.items()}
+    if len(set(sizes.values())) > 1:
+        message = ", ".join(f"{name} {size}" for name, size in sizes.items())
+        raise RecordingError(f"{path}: columns need one length, got {message}")
+
+
+def _left_out(path: Path, n_rows: int, empty: Mapping[str, int]) -> str:
+    message = ", ".join(f"{name} {count}" for name, count in empty.items() if count)
+    rows = "1 row has" if n_rows == 1 else f"{n_rows} rows have"
+    left = "is" if n_rows == 1 else "are"
+    return f"{path}: {rows} an empty cell ({message}) and {left} left out"
+
+
+_LONGEST_GAP = 0.02
+"""Gaps up to this are bridged by straight lines, longer ones are left out, s."""
+
+_EVEN = 1e-3
+"""Steps that differ from the median by less than this share of it are even."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Samples:
+    """A movement at even times."""
+
+    name: str
+    period: float
+    time: _Floats = field(compare=False, repr=False)
+    angle: _Floats = field(compare=False, repr=False)
+    torque: _Floats = field(compare=False, repr=False)
+    in_gap: NDArray[np.bool_] = field(compare=False, repr=False)
+    saturated: NDArray[np.bool_] = field(compare=False, repr=False)
+
+
+def even_samples(movement: Movement) -> Samples:
+    """Put a movement on even times."""
+    time = movement.time
+    steps = np.diff(time)
+    period = float(np.median(steps))
+    if np.abs(steps - period).max() <= _EVEN * period:
+        return Samples(
+            name=movement.name,
+            period=period,
+            time=time,
+            angle=movement.angle,
+            torque=movement.torque,
+            in_gap=np.zeros(time.size, dtype=np.bool_),
+            saturated=movement.saturated,
+        )
+    even = time[0] + period * np.arange(int((time[-1] - time[0]) / period + 1e-9) + 1)
+    before = np.clip(np.searchsorted(time, even, side="right") - 1, 0, time.size - 2)
+    cut = movement.saturated
+    inside = (even > time[before]) & (even < time[before + 1])
+    return Samples(
+        name=movement.name,
+        period=period,
+        time=even,
+        angle=np.interp(even, time, movement.angle),
+        torque=np.interp(even, time, movement.torque),
+        in_gap=inside & (steps[before] > max(_LONGEST_GAP, 5.0 * period)),
+        saturated=cut[before] | (cut[before + 1] & inside),
+    )

@@ -1,0 +1,141 @@
+"""How far a presentation is: stretch by stretch, sample by sample."""
+
+import math
+
+from masrel.errors import LimitExceededError
+from masrel.lab.hess._velocity import speed_margin
+from masrel.lab.hess.limits import DeviceLimits
+from masrel.lab.hess.stretching import PresentationStatus, StretchRules
+from masrel.lab.recording import PHASES
+
+_PRE_CATCH = PHASES.index("pre-catch")
+_NEVER = math.inf
+
+# An arm has been brought back that is as near to where its stretch began as this share
+# of the way that told that it had begun.
+_BROUGHT_BACK = 0.5
+
+
+class Course:
+    """Follow the arm through its stretches, and say when the presentation is over."""
+
+    __slots__ = (
+        "_arrival_speed",
+        "_arrival_time",
+        "_back_at",
+        "_begins_after",
+        "_begun_at",
+        "_end_angle",
+        "_flexing_speed",
+        "_has_caught",
+        "_is_single",
+        "_lowest_angle",
+        "_n",
+        "_over_at",
+        "_resting_since",
+        "_stretch_limit",
+        "_time_limit",
+        "status",
+        "stretch",
+    )
+
+    def __init__(
+        self,
+        rules: StretchRules,
+        limits: DeviceLimits,
+        status: PresentationStatus,
+        *,
+        rate_hz: int,
+        end_angle: float,
+        speed_threshold: float,
+    ) -> None:
+        margin = speed_margin(limits.encoder_noise, rate_hz)
+        self._arrival_speed = limits.arrival_speed + margin
+        self._arrival_time = limits.arrival_time
+        self._end_angle = end_angle - limits.arrival_angle
+        self._resting_since = _NEVER
+        self._is_single = rules.n == 1
+        self._n = math.inf if rules.n is None else rules.n
+        self._time_limit, self._stretch_limit = rules.time_limit, rules.stretch_limit
+        self._over_at = math.inf  # when no stretch may begin any more, s
+        self._flexing_speed = -speed_threshold
+        self._begins_after = limits.arrival_angle
+        self._begun_at = 0.0  # the stretch, s
+        self._has_caught = False  # in the stretch
+        self._back_at = -math.inf  # where the arm is brought back, rad
+        self._lowest_angle = math.inf  # since the next stretch is armed, rad
+        self.stretch = 0  # the number of the one that goes on, 0 between
+        self.status = status
+        status.is_armed, status.n_stretches = True, 0
+
+    def update(self, time_s: float, angle: float, velocity: float, phase: int) -> str:
+        """Take one sample in -> why the presentation is over, empty while it is not."""
+        if self.status.is_done:
+            return "done"
+        has_arrived = False
+        if angle < self._end_angle or abs(velocity) > self._arrival_speed:
+            self._resting_since = _NEVER
+        elif self._resting_since == _NEVER:
+            self._resting_since = time_s
+        else:
+            has_arrived = time_s - self._resting_since >= self._arrival_time
+        if self._is_single:
+            if not self.stretch:
+                self._watch_for_onset(time_s, angle)
+            return "arrived" if has_arrived else ""
+        if self.stretch:
+            self._has_caught = self._has_caught or phase != _PRE_CATCH
+            return self._goes_on(time_s, angle, velocity, has_arrived)
+        if time_s >= self._over_at:
+            return "time-limit"
+        if self.status.is_armed:
+            self._watch_for_onset(time_s, angle)
+            return ""
+        return self._watch_for_return(angle, velocity)
+
+    def end(self) -> None:
+        """Let the stretch that goes on be over."""
+        if self.stretch:
+            self.status.n_stretches += 1
+            self.stretch = 0
+        self.status.is_armed = False
+
+    def _watch_for_onset(self, time_s: float, angle: float) -> None:
+        if angle < self._lowest_angle:
+            self._lowest_angle = angle
+        elif angle > self._lowest_angle + self._begins_after:
+            self.status.is_armed = False
+            self.stretch = self.status.n_stretches + 1
+            self._begun_at, self._has_caught = time_s, False
+            self._back_at = self._lowest_angle + _BROUGHT_BACK * self._begins_after
+            if self._over_at == math.inf:
+                self._over_at = time_s + self._time_limit
+
+    def _goes_on(
+        self, time_s: float, angle: float, velocity: float, has_arrived: bool
+    ) -> str:
+        if has_arrived or self._is_brought_back(angle, velocity):
+            self.end()
+            return self._watch_for_return(angle, velocity)
+        if time_s - self._begun_at > self._stretch_limit:
+            raise LimitExceededError(
+                f"stretch limit: needs a stretch that ends within "
+                f"{self._stretch_limit:g} s, number {self.stretch} has not ended",
+                "stretch-limit",
+            )
+        return ""
+
+    def _is_brought_back(self, angle: float, velocity: float) -> bool:
+        return velocity <= self._flexing_speed or angle <= self._back_at
+
+    def _watch_for_return(self, angle: float, velocity: float) -> str:
+        # Until then the last stretch is held, as every other is
+        if not self._is_brought_back(angle, velocity):
+            return ""
+        if self.status.n_stretches == self._n:
+            return "stretches"
+        # The law catches again when the arm was flexed, or if it has not caught yet
+        if velocity <= self._flexing_speed or not self._has_caught:
+            self._lowest_angle = angle
+            self.status.is_armed = True
+        return ""

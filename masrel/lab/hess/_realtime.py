@@ -1,0 +1,127 @@
+"""What makes a loop prompt: its scheduling, its processor, locked memory, timers."""
+
+import contextlib
+import ctypes
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from masrel.lab.hess.clock import Clock, RealClock
+
+_PRIORITY = 80  # of 1 to 99: above all ordinary work, below the kernel's own threads
+_LOCK_CURRENT, _LOCK_FUTURE = 1, 2  # MCL_CURRENT, MCL_FUTURE of sys/mman.h
+_SET_TIMER_SLACK = 29  # PR_SET_TIMERSLACK of sys/prctl.h
+_SLACK_NS = 1
+_USUAL_SLACK_NS = 50_000
+
+
+@contextmanager
+def scheduled(clock: Clock) -> Iterator[str | None]:
+    """Ask for real-time scheduling on a real clock -> what was granted, or None."""
+    # Only where a tick comes at a time of the day does it matter how late it comes
+    if not isinstance(clock, RealClock):
+        yield None
+        return
+    with real_time() as granted:
+        yield granted
+
+
+@contextmanager
+def real_time() -> Iterator[str]:
+    """Ask for SCHED_FIFO, locked memory and prompt timers until the block ends.
+
+    What has SCHED_FIFO begins on the processor that `off_the_loop` leaves to it.
+    """
+    # Only Linux has all three; elsewhere nothing is requested. The process may ask for
+    # SCHED_FIFO and locked memory as root, or within ``ulimit -r`` and ``ulimit -l``.
+    if sys.platform != "linux":
+        yield f"ordinary scheduling: none better is known on {sys.platform}"
+        return
+    library = ctypes.CDLL(None, use_errno=True)
+    with contextlib.ExitStack() as granted:
+        outcomes = (
+            _fifo(granted),
+            _locked(granted, library),
+            _prompt(granted, library),
+        )
+        yield ", ".join(outcomes)
+
+
+def _fifo(granted: contextlib.ExitStack) -> str:
+    policy = os.sched_getscheduler(0)
+    parameters = os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
+    except OSError as error:
+        return f"no SCHED_FIFO ({error.strerror})"
+    granted.callback(os.sched_setscheduler, 0, policy, parameters)
+    return f"SCHED_FIFO {_PRIORITY}{_placed()}"
+
+
+def _placed() -> str:
+    # With SCHED_FIFO a thread stays where it is, unless another one needs the place:
+    # then it may go, or two loops would be in each other's way
+    allowed = os.sched_getaffinity(0)
+    processor = _of_loop(allowed)
+    if processor is None or not _moved({processor}):
+        return ""
+    _moved(allowed)
+    return f" on processor {processor}"
+
+
+@contextmanager
+def off_the_loop() -> Iterator[list[int]]:
+    """Keep this thread and what it starts off the processor of a loop.
+
+    Gives the processors that the process of a loop is to have; none where all stays as
+    it was.
+    """
+    allowed = os.sched_getaffinity(0) if sys.platform == "linux" else set()
+    processor = _of_loop(allowed)
+    if processor is None or not _moved(allowed - {processor}):
+        yield []
+        return
+    try:
+        yield sorted(allowed)
+    finally:
+        _moved(allowed)
+
+
+def may_use(processors: list[int]) -> None:
+    """Let this thread and what it starts have these processors, if there are any."""
+    if processors:
+        _moved(set(processors))
+
+
+def _of_loop(allowed: set[int]) -> int | None:
+    # The last one, for the first takes most interrupts; none where it is the only one
+    return max(allowed) if len(allowed) > 1 else None
+
+
+def _moved(processors: set[int]) -> bool:
+    # Whether the system let this thread have these processors and no others
+    if sys.platform != "linux":
+        return False
+    try:
+        os.sched_setaffinity(0, processors)
+    except OSError:
+        return False
+    return True
+
+
+def _locked(granted: contextlib.ExitStack, library: ctypes.CDLL) -> str:
+    if library.mlockall(_LOCK_CURRENT | _LOCK_FUTURE) != 0:
+        return f"no locked memory ({os.strerror(ctypes.get_errno())})"
+    granted.callback(library.munlockall)
+    return "locked memory"
+
+
+def _prompt(granted: contextlib.ExitStack, library: ctypes.CDLL) -> str:
+    # The kernel may let an ordinary thread's sleep end later by its timer slack.
+    prctl = library.prctl
+    prctl.argtypes = [ctypes.c_int, *[ctypes.c_ulong] * 4]
+    if prctl(_SET_TIMER_SLACK, _SLACK_NS, 0, 0, 0) != 0:
+        return f"usual timers ({os.strerror(ctypes.get_errno())})"
+    granted.callback(prctl, _SET_TIMER_SLACK, _USUAL_SLACK_NS, 0, 0, 0)
+    return "prompt timers"

@@ -1,0 +1,155 @@
+"""A device that plays a recording back: the same readings, for any controller."""
+
+import copy
+import math
+from dataclasses import dataclass
+from typing import ClassVar, TypeAlias
+
+import numpy as np
+
+from masrel.errors import DeviceError
+from masrel.lab.hess._velocity import VelocityEstimate
+from masrel.lab.hess.clock import Clock
+from masrel.lab.hess.device import BackendOptions, Device, DeviceSetup, Reading
+from masrel.lab.recording import Recording
+
+_MAX_PATHS = 64
+
+_Path: TypeAlias = "tuple[float, _Path] | None"  # an angle, and those before it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplayOptions(BackendOptions):
+    """What `open_device` needs to play a recording back.
+
+    Attributes
+    ----------
+    recording : Recording
+        A recording of any device.
+    """
+
+    recording: Recording
+
+
+class ReplayDevice(Device):
+    """Give the readings of a recording one after the other, and take any torque."""
+
+    # Every reading puts a simulated clock forward to the time of the recorded one; on a
+    # real clock it waits for it, and the time between reading and tick is what the
+    # machine makes of it. Of a gap in the recording all ticks but one are missed again.
+    # After a fault the recording holds no readings any more, and so it ends there.
+
+    name: ClassVar[str] = "replay"
+    simulated: ClassVar[bool] = True
+
+    def __init__(self, recording: Recording, *, clock: Clock) -> None:
+        columns = recording.columns
+        n_readings = _n_readings(recording)
+        times = columns["time_s"][:n_readings]
+        if n_readings == 0 or np.any(np.diff(times) <= 0.0) or times[0] < 0.0:
+            raise DeviceError(
+                "replay: needs a recording with readings whose times grow from 0 on, "
+                f"got {n_readings} readings"
+            )
+        self._clock = clock
+        self._times_ns = [round(time * 1e9) for time in times.tolist()]
+        self._angles, self.is_exact = recorded_angles(
+            [time_ns * 1e-9 for time_ns in self._times_ns],
+            columns["angle_deg"][:n_readings].tolist(),
+            columns["velocity_deg_s"][:n_readings].tolist(),
+        )
+        self.channels = recording.channels
+        self._values = _values(recording, n_readings)
+        self._start_ns: int | None = None
+        self._next = 0
+
+    def _start(self) -> None:
+        """Nothing to take hold of."""
+
+    def _read(self) -> Reading:
+        if self._start_ns is None:
+            self._start_ns = self._clock.now_ns()
+        if self._next == len(self._angles):
+            raise DeviceError("replay: the recording has no more readings")
+        time_ns = self._start_ns + self._times_ns[self._next]
+        self._clock.sleep_until_ns(time_ns)
+        reading = Reading(time_ns, self._angles[self._next], self._values[self._next])
+        self._next += 1
+        return reading
+
+    def _send(self, torque_nm: float) -> None:
+        """Move nothing: what the arm did is recorded."""
+
+    def _stop(self) -> None:
+        """Nothing to let go of."""
+
+
+def _n_readings(recording: Recording) -> int:
+    # Rows from a fault on are the torque being taken back, without readings.
+    noticed_s = recording.facts.get("fault_time_s")
+    if not isinstance(noticed_s, float):
+        return recording.n_samples
+    return int(np.searchsorted(recording.columns["time_s"], noticed_s))
+
+
+def _values(recording: Recording, n_readings: int) -> list[tuple[float, ...]]:
+    # What the channels gave, reading by reading
+    if not recording.channels:
+        return [()] * n_readings
+    columns = [recording.columns[channel.column] for channel in recording.channels]
+    rows = (column[:n_readings].tolist() for column in columns)
+    return list(zip(*rows, strict=True))
+
+
+def build(setup: DeviceSetup) -> ReplayDevice:
+    """Make a device that plays a recording back."""
+    options = setup.options
+    if not isinstance(options, ReplayOptions):
+        got = "none" if options is None else type(options).__name__
+        raise DeviceError(f"replay: needs options of type ReplayOptions, got {got}")
+    return ReplayDevice(options.recording, clock=setup.clock)
+
+
+def recorded_angles(
+    times_s: list[float], angles_deg: list[float], velocities_deg_s: list[float]
+) -> tuple[list[float], bool]:
+    """Return the angles that were read, and whether they are so to the last bit."""
+    # A recording keeps angles in degrees, and from radians to degrees and back a float
+    # may end one last bit aside. The speed that was estimated from the angles is
+    # recorded too and tells such neighbours apart. One last bit of an angle is many of
+    # a speed over 1 ms, so few paths live long.
+    paths: list[tuple[_Path, VelocityEstimate]] = [(None, VelocityEstimate())]
+    for time_s, angle, velocity in zip(
+        times_s, angles_deg, velocities_deg_s, strict=True
+    ):
+        candidates = _radians_of(angle)
+        longer: list[tuple[_Path, VelocityEstimate]] = []
+        for path, estimate in paths:
+            for candidate in candidates:
+                updated = copy.copy(estimate)
+                if _degrees(updated.update(time_s, candidate)) == velocity:
+                    longer.append(((candidate, path), updated))
+        if not longer:
+            return [math.radians(angle) for angle in angles_deg], False
+        paths = longer[:_MAX_PATHS]
+    return _angles_of(paths[0][0]), True
+
+
+def _angles_of(path: _Path) -> list[float]:
+    angles = []
+    while path is not None:
+        angle, path = path
+        angles.append(angle)
+    return angles[::-1]
+
+
+def _radians_of(angle_deg: float) -> list[float]:
+    # Every float whose degrees are these, the nearest first: a degree is 57 of a
+    # radian, so that up to two neighbours may share them.
+    nearest = math.radians(angle_deg)
+    lower, upper = math.nextafter(nearest, -math.inf), math.nextafter(nearest, math.inf)
+    return [angle for angle in (nearest, lower, upper) if _degrees(angle) == angle_deg]
+
+
+def _degrees(angle: float) -> float:
+    return float(np.degrees(angle))  # as the recording was made

@@ -1,0 +1,361 @@
+"""The controller of Fig. 7: the joint model, friction, and loss of grip.
+
+Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
+https://doi.org/10.1109/TNSRE.2012.2195330, section III.B and Fig. 7.
+"""
+
+import math
+from collections import deque
+from collections.abc import Iterator
+from typing import NoReturn
+
+from masrel.errors import LimitExceededError, ParameterError
+from masrel.lab.elbow.joint_model import JointModel
+from masrel.lab.elbow.parameters import ElbowParameters
+from masrel.lab.hess._soft_end import raised_cosine
+from masrel.lab.hess._velocity import CUTOFF_RAD_S
+from masrel.lab.hess.friction import Friction, FrictionCompensation
+from masrel.lab.recording import PHASES
+
+_PRE_CATCH = PHASES.index("pre-catch")
+_INFINITE = math.inf
+_SLIP_WINDOW_S = 0.010  # twice the delay of the estimated speed
+_LOOSE_WINDOW_S = 0.005  # under 3 N·m a loose arm loses 18 times the speed's noise
+# Share of the speed a loose arm would lose: an arm in people's hands loses at most two
+# fifths, a loose one all but what the low-pass holds back.
+_LOOSE_SHARE = 0.6
+# Behind the guard a beat of clonus throws light hands back as well, and a hand may turn
+# the arm by itself, at up to 30 rad/s²: more counts, of what 2.8 N·m take in 6 ms.
+_GUARDED_SHARE = 0.78
+_GUARDED_WINDOW_S = 0.006
+_LEAST_LOSS = math.radians(16.0)
+_RANGE_END_MARGIN = math.radians(3.0)  # what the loop takes for arrived, too
+
+
+class Controller:
+    """Decide a torque from every sample of the motion.
+
+    Grip is lost when, in catch or post-catch, the arm loses more than 0.6 of the speed
+    within 5 ms that the torque would take off it if nobody held it. A hand that gives
+    way still pushes, and its own mass goes on. The model is then released to pre-catch
+    at once and stays there until the arm has been moved back, faster than ν_th. Within
+    3 deg of the end of range no loss counts: there it is the joint that stops the arm.
+
+    Where a catch or post-catch ends otherwise, the torque goes from where it stands to
+    that of the law within `post_catch_ramp`, along a raised cosine. A grip that is lost
+    meanwhile ends this at once.
+
+    A model that is not passive is guarded: in every phase it is a fault when the arm
+    gets within 6 ms more than 0.78 of the speed that the torque would give it if nobody
+    held it, from 2.8 N·m on, or when its speed falls by more than `slip_speed_drop`
+    within 10 ms while the model resists extension. The paper's own law has a trigger
+    too, and is released as the paper has it instead.
+
+    Parameters
+    ----------
+    model : JointModel
+        The joint model. An inertial term is not commanded: the mannequin has it.
+    start_angle : float
+        Where the stretch starts, rad.
+    friction : Friction or None, optional
+        Friction of the device; None for that of the source.
+    compensation : float, optional
+        Share of the friction that is compensated, 0 to 1. The default leaves a
+        tenth, so that B and β may be wrong by as much before friction is
+        overcompensated.
+    dead_zone, full_speed : float, optional
+        Speeds below which Coulomb friction is not compensated, and above which it
+        is, rad/s; see `FrictionCompensation`.
+    slip_speed_drop : float, optional
+        Fall of speed that means a lost grip on a guarded model, rad/s. The default,
+        40 deg/s, lies between what a held arm does and a loose one: a minimum-jerk
+        stretch at the highest mean speed of Table V, 131 deg/s, brakes by 8.5 deg/s in
+        10 ms, and 10 N·m take 95 deg/s off an arm of 0.06 kg·m² in that time.
+    loose_inertia : float, optional
+        Inertia of device and arm that nobody holds, kg·m². Too large a number takes a
+        soft hand for a lost grip, too small a one notices a lost grip late.
+    post_catch_ramp : float, optional
+        How long the end of a catch or post-catch takes, s, 0 to 1; 0 is the step of
+        Fig. 7. A guarded model has its own law there.
+    rate_hz : int, optional
+        Steps a second.
+
+    Attributes
+    ----------
+    model_torque : float
+        What the joint model alone asked for in the last step, N·m.
+    phase : int
+        Its phase, a position in `masrel.lab.recording.PHASES`.
+    grip_lost : bool
+        Whether grip has been lost since the beginning.
+    is_guarded : bool
+        Whether the model runs behind `DeviceLimits.active_energy` and `active_torque`.
+    is_easing : bool
+        Whether the last torque was on its way from the end of a catch or post-catch.
+    is_new : bool
+        Whether it has never been stepped: one controller makes one presentation.
+    rate_hz : int
+        Steps a second.
+    speed_margin : float
+        What noise of the encoder may do to the estimated speed, rad/s: so much more a
+        fall of speed must be to be a lost grip. 0 unless `run_presentation` sets it,
+        from `DeviceLimits.encoder_noise`.
+    speed_threshold : float
+        Speed ν_th of the joint, rad/s.
+
+    Raises
+    ------
+    ParameterError
+        If a value is outside its range.
+
+    References
+    ----------
+    .. [1] Park, H.-S., Kim, J., Damiano, D. L. (2012). IEEE TNSRE 20(3), 361-370,
+       Fig. 7 and section III.B. https://doi.org/10.1109/TNSRE.2012.2195330
+
+    Examples
+    --------
+    At rest where the stretch starts nothing is commanded:
+
+    >>> from masrel.lab.elbow import STANDARD_MODELS
+    >>> Controller(STANDARD_MODELS["HM2"], start_angle=0.5).step(0.0, 0.5, 0.0)
+    0.0
+    """
+
+    __slots__ = (
+        "_command",
+        "_compensation",
+        "_easing",
+        "_free_end",
+        "_gain",
+        "_held",
+        "_joint",
+        "_late_torque",
+        "_loose_inertia",
+        "_loose_past",
+        "_max_restored",
+        "_past",
+        "_post_catch_ramp",
+        "_slip_speed_drop",
+        "_steepest_fall",
+        "_stood",
+        "_taken",
+        "_time",
+        "grip_lost",
+        "is_easing",
+        "is_guarded",
+        "is_new",
+        "model_torque",
+        "phase",
+        "rate_hz",
+        "speed_margin",
+        "speed_threshold",
+    )
+
+    def __init__(
+        self,
+        model: JointModel,
+        *,
+        start_angle: float,
+        friction: Friction | None = None,
+        compensation: float = 0.9,
+        dead_zone: float = math.radians(0.1),
+        full_speed: float = math.radians(2.0),
+        slip_speed_drop: float = math.radians(40.0),
+        loose_inertia: float = 0.06,
+        post_catch_ramp: float = 0.1,
+        rate_hz: int = 1000,
+    ) -> None:
+        slips = {"slip_speed_drop": slip_speed_drop, "loose_inertia": loose_inertia}
+        for name, value in slips.items():
+            if not 0.0 < value < math.inf:
+                raise ParameterError(f"{name}: needs more than 0, got {value}")
+        if not 0.0 <= post_catch_ramp <= 1.0:
+            raise ParameterError(
+                f"post_catch_ramp: needs 0 to 1 s, got {post_catch_ramp}"
+            )
+        if rate_hz < 1:
+            raise ParameterError(f"rate_hz: needs 1 or more, got {rate_hz}")
+        self._joint = model.stepper(start_angle)
+        self.is_guarded = not (model.is_passive or isinstance(model, ElbowParameters))
+        self._compensation = FrictionCompensation(
+            friction or Friction(),
+            share=compensation,
+            dead_zone=dead_zone,
+            full_speed=full_speed,
+        )
+        self._slip_speed_drop = slip_speed_drop
+        self._loose_inertia = loose_inertia
+        self._gain = -math.expm1(-CUTOFF_RAD_S / rate_hz)
+        self._late_torque = 0.0  # that was sent, as late as the speed is, N·m
+        self._taken = 0.0  # speed that it takes off a loose arm since the catch, rad/s
+        self._time = 0.0  # up to when that has been counted, s
+        self._post_catch_ramp = raised_cosine(post_catch_ramp, rate_hz)
+        self._easing: Iterator[float] = iter(())
+        self._command = self._stood = 0.0  # the torque now, at the last such end, N·m
+        self._steepest_fall = 0.0  # of a tick under that ramp, N·m
+        self.is_easing = False
+        self._free_end = model.range_end - _RANGE_END_MARGIN
+        window_s = _SLIP_WINDOW_S if self.is_guarded else _LOOSE_WINDOW_S
+        n_past = max(1, round(window_s * rate_hz))
+        self._past = deque([0.0] * n_past, maxlen=n_past)  # speeds, rad/s
+        n_past = max(1, round(_GUARDED_WINDOW_S * rate_hz))
+        # Times, speeds, and what has been taken, behind the guard
+        self._loose_past = deque([(0.0, 0.0, 0.0)] * n_past, maxlen=n_past)
+        self.speed_margin = 0.0
+        # From where a fall is counted that has to leave the noise
+        self._max_restored = -_INFINITE
+        self._held: tuple[float, float, float] | None = None
+        self.speed_threshold = model.speed_threshold
+        self.grip_lost = False
+        self.model_torque = 0.0
+        self.phase = _PRE_CATCH
+        self.rate_hz = rate_hz
+        self.is_new = True
+
+    def step(self, time_s: float, angle: float, velocity: float) -> float:
+        """Take one sample in and decide.
+
+        Afterwards `model_torque`, `phase` and `grip_lost` belong to this sample.
+
+        Parameters
+        ----------
+        time_s : float
+            Time of the sample, s.
+        angle : float
+            Elbow angle, rad.
+        velocity : float
+            Estimated speed, rad/s.
+
+        Returns
+        -------
+        float
+            Torque to command, N·m; positive resists extension.
+
+        Raises
+        ------
+        LimitExceededError
+            If the grip on a guarded model is lost, or the model gives no number.
+        """
+        self.is_new = False
+        joint = self._joint
+        if self.is_guarded:
+            self._check_slip(time_s, angle, velocity)
+        elif self.phase != _PRE_CATCH or self.is_easing:
+            restored = velocity + _LOOSE_SHARE * self._take(time_s)
+            past = self._past
+            before = past[0]
+            if self.speed_margin:
+                before = self._max_restored = max(self._max_restored, before)
+            if angle >= self._free_end:
+                self._max_restored = -_INFINITE
+            elif restored < before - self.speed_margin:
+                joint.release()
+                self.grip_lost = True
+                self.is_easing = False
+                self.phase = _PRE_CATCH  # no end that takes its time
+            past.append(restored)
+        torque = joint.step(time_s, angle, velocity)
+        try:
+            is_number = -_INFINITE < torque < _INFINITE
+        except TypeError:
+            is_number = False
+        if not is_number:  # the recording keeps the last that was one
+            raise LimitExceededError(
+                f"model: needs a torque that is a finite number, got {torque!r}",
+                "model",
+            )
+        self.model_torque = torque
+        command = torque - self._compensation.torque(velocity)
+        phase = joint.phase
+        if self.phase != phase:
+            self._enter(phase, time_s)
+        if self.is_easing:
+            command = self._eased(command)
+        self._command = command
+        return command
+
+    def _enter(self, phase: int, time_s: float) -> None:
+        if self.phase == _PRE_CATCH and not self.is_guarded:
+            self._late_torque, self._taken = self._command, 0.0
+            self._time = time_s
+            self._past.extend([-_INFINITE] * len(self._past))  # nothing to fall from
+            self._max_restored = -_INFINITE
+        ends = self.phase != _PRE_CATCH and phase == _PRE_CATCH
+        if ends and self._post_catch_ramp and not self.is_guarded:
+            self._easing = iter(self._post_catch_ramp)
+            self._stood = self._command
+            n_ticks = len(self._post_catch_ramp)
+            self._steepest_fall = 0.5 * math.pi * abs(self._stood) / n_ticks
+            self.is_easing = True
+        self.phase = phase
+
+    def _eased(self, command: float) -> float:
+        # Between the torque that stood at the end and what the law asks for now
+        share = next(self._easing, 0.0)
+        eased = command + share * (self._stood - command)
+        # Speed, and so friction compensation, may change at once; the torque may not.
+        before, fall = self._command, self._steepest_fall
+        if before > 0.0:
+            eased = max(eased, before - fall)
+        else:
+            eased = min(eased, before + fall)
+        self.is_easing = share > 0.0 or eased != command
+        return eased
+
+    def _take(self, time_s: float) -> float:
+        # Counts what the torque takes off a loose arm -> all of it so far, rad/s
+        late = self._late_torque
+        self._late_torque = late = late + self._gain * (self._command - late)
+        self._taken += late * (time_s - self._time) / self._loose_inertia
+        self._time = time_s
+        return self._taken
+
+    def _check_slip(self, time_s: float, angle: float, velocity: float) -> None:
+        past, loose_past, margin = self._past, self._loose_past, self.speed_margin
+        drop = past[0] - velocity
+        before = loose_past[0]
+        taken = self._take(time_s)
+        past.append(velocity)
+        loose_past.append((time_s, velocity, taken))
+        of_loose = taken - before[2]
+        if angle >= self._free_end or abs(of_loose) <= _LEAST_LOSS:
+            self._held = None
+        else:
+            self._held = held = self._fall_from(before, taken, of_loose)
+            of_loose = taken - held[2]
+            lost = math.copysign(1.0, of_loose) * (held[1] - velocity)
+            if lost > _GUARDED_SHARE * abs(of_loose) + margin:
+                self._release_at_once(
+                    f"speed changes by at most {_GUARDED_SHARE:g} of a loose arm's "
+                    f"{math.degrees(abs(of_loose)):.0f}",
+                    time_s - held[0],
+                    lost,
+                )
+        if angle >= self._free_end:
+            return
+        if drop > self._slip_speed_drop + margin and self.model_torque > 0.0:
+            self._release_at_once(
+                f"speed falls by at most {math.degrees(self._slip_speed_drop):g}",
+                _SLIP_WINDOW_S,
+                drop,
+            )
+
+    def _fall_from(
+        self, before: tuple[float, float, float], taken: float, of_loose: float
+    ) -> tuple[float, float, float]:
+        # When the speed, with what it is allowed to lose, began to fall
+        held = self._held
+        if held is None or not self.speed_margin or (taken - held[2]) * of_loose <= 0.0:
+            return before
+        rise = before[1] - held[1] + _GUARDED_SHARE * (before[2] - held[2])
+        return before if rise * of_loose > 0.0 else held
+
+    def _release_at_once(self, needs: str, window_s: float, lost: float) -> NoReturn:
+        self._joint.release()
+        self.grip_lost = True
+        raise LimitExceededError(
+            f"slip: needs an arm whose {needs} deg/s in {window_s * 1e3:.0f} ms, "
+            f"got {math.degrees(lost):.0f} deg/s",
+            "slip",
+        )

@@ -1,0 +1,281 @@
+"""What a device is to the control loop, and what one is made from."""
+
+import math
+import warnings
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from types import TracebackType
+from typing import ClassVar, Literal, NamedTuple, Self
+
+from masrel.errors import DeviceError
+from masrel.lab.hess.clock import Clock
+from masrel.lab.hess.hand import Hand
+from masrel.lab.recording import Channel
+
+_State = Literal["new", "open", "closed"]
+
+
+class Reading(NamedTuple):
+    """One reading of the encoder; a named tuple because one is made per tick.
+
+    Attributes
+    ----------
+    time_ns : int
+        When it was read, on the device's clock.
+    angle : float
+        Elbow angle, rad: 0 is full flexion and grows with extension. The speed
+        is not read but estimated by the loop, the same way for every device.
+    channels : tuple of float, optional
+        One value for each of `Device.channels`, of the same time and in their units;
+        ``nan`` where none has come since the last reading, never an old one again.
+    """
+
+    time_ns: int
+    angle: float
+    channels: tuple[float, ...] = ()
+
+
+class IdleCommand(NamedTuple):
+    """How another process can idle the device when this one has died.
+
+    Attributes
+    ----------
+    module : str
+        A module with a function ``prepare(*arguments)``, which takes hold of the
+        device and returns a function without arguments that idles it.
+    arguments : tuple of str
+        What it is called with.
+    """
+
+    module: str
+    arguments: tuple[str, ...]
+
+
+class Device(ABC):
+    """A one-joint device in torque mode.
+
+    A device is opened once and closed once: what was closed, by a fault or on
+    purpose, stays closed, and going on needs a new one. Opening an open device and
+    closing a closed one do nothing. `close` sends zero torque first. A subclass
+    provides the four hooks `_start`, `_read`, `_send`, `_stop`; hardware `_check` and
+    `idle_command` too.
+
+    Attributes
+    ----------
+    name : str
+        Name of the backend, as in `open_device`.
+    simulated : bool
+        Whether no hardware moves; goes into every recording.
+    channels : tuple of Channel
+        What it measures beside the angle, with every reading; none by default. The
+        torque of its sensor is `masrel.lab.recording.MEASURED_TORQUE`.
+    """
+
+    name: ClassVar[str]
+    simulated: ClassVar[bool]
+    channels: tuple[Channel, ...] = ()
+
+    _state: _State = "new"  # on the class, so that `__del__` always finds one
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it can be read and commanded."""
+        return self._state == "open"
+
+    def open(self) -> None:
+        """Take hold of the device; do nothing when it is open already.
+
+        Raises
+        ------
+        DeviceError
+            If it was closed before, or cannot be opened.
+        """
+        if self._state == "open":
+            return
+        if self._state == "closed":
+            raise DeviceError(
+                f"{self.name}: needs a new device, this one has been closed"
+            )
+        try:
+            self._start()
+        except DeviceError:
+            raise
+        except Exception as error:
+            raise self._failure("opening", error) from error
+        self._state = "open"  # only after it has worked
+
+    def read(self) -> Reading:
+        """Read the encoder and the channels.
+
+        Returns
+        -------
+        Reading
+            Time, angle, and what each channel measures.
+
+        Raises
+        ------
+        DeviceError
+            If the device is not open or does not answer.
+        """
+        if self._state != "open":
+            raise self._not_open("read")
+        try:
+            return self._read()
+        except DeviceError:
+            raise
+        except Exception as error:
+            raise self._failure("reading", error) from error
+
+    def command(self, torque_nm: float) -> None:
+        """Send a torque, held until the next one.
+
+        Parameters
+        ----------
+        torque_nm : float
+            Torque at the elbow, N·m; positive resists extension.
+
+        Raises
+        ------
+        DeviceError
+            If the device is not open or does not take it, or the torque is not
+            finite; the one before it is then held.
+        """
+        if self._state != "open":
+            raise self._not_open("command")
+        if not math.isfinite(torque_nm):
+            raise DeviceError(f"{self.name}: needs a finite torque, got {torque_nm}")
+        try:
+            self._send(torque_nm)
+        except DeviceError:
+            raise
+        except Exception as error:
+            raise self._failure("sending a torque", error) from error
+
+    def check(self) -> None:
+        """Ask the device whether it still does what it is told.
+
+        Raises
+        ------
+        EmergencyStopError
+            If its emergency stop has been pressed.
+        DeviceError
+            If the device is not open, has been idled from outside, or says that
+            something is wrong with it.
+        """
+        if self._state != "open":
+            raise self._not_open("check")
+        try:
+            self._check()
+        except DeviceError:
+            raise
+        except Exception as error:
+            raise self._failure("asking for its state", error) from error
+
+    def idle_command(self) -> IdleCommand | None:
+        """Return how another process can idle the device, once it is open.
+
+        Returns
+        -------
+        IdleCommand or None
+            None when no other process can reach it; then no watchdog is started.
+        """
+        return None
+
+    def close(self) -> None:
+        """Send zero torque and let go; do nothing when there is nothing to close.
+
+        Raises
+        ------
+        DeviceError
+            If the device does not take the zero torque; it is let go all the same.
+        """
+        state, self._state = self._state, "closed"
+        if state == "open":
+            try:
+                try:
+                    self._send(0.0)
+                finally:
+                    self._stop()
+            except DeviceError:
+                raise
+            except Exception as error:
+                raise self._failure("letting go", error) from error
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __del__(self) -> None:
+        if self._state == "open":
+            try:
+                warnings.warn(
+                    f"{self.name}: a device was never closed",
+                    ResourceWarning,
+                    stacklevel=2,
+                    source=self,
+                )
+            finally:  # also when warnings are errors
+                self.close()
+
+    def _failure(self, act: str, error: Exception) -> DeviceError:
+        # Whatever goes wrong within a backend is a fault of the device.
+        return DeviceError(f"{self.name}: {act}: {type(error).__name__}: {error}")
+
+    def _not_open(self, wish: str) -> DeviceError:
+        return DeviceError(
+            f"{self.name}: needs an open device to {wish}, this one is {self._state}"
+        )
+
+    @abstractmethod
+    def _start(self) -> None:
+        """Take hold of the hardware; raise `DeviceError` when that fails."""
+
+    @abstractmethod
+    def _read(self) -> Reading:
+        """Read the encoder of an open device."""
+
+    @abstractmethod
+    def _send(self, torque_nm: float) -> None:
+        """Send a torque to an open device."""
+
+    @abstractmethod
+    def _stop(self) -> None:
+        """Idle the hardware and let go of it; the torque is zero already."""
+
+    def _check(self) -> None:  # noqa: B027 - a device without a state has nothing to say
+        """Ask an open device for its state; raise `DeviceError` when it is wrong."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BackendOptions:
+    """What one backend can be told beyond `DeviceSetup`; each has a subclass."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DeviceSetup:
+    """What a backend's `build` makes a device from.
+
+    Attributes
+    ----------
+    clock : Clock
+        The clock of the loop that will use it.
+    hand : Hand or None
+        The hand that moves a simulated arm.
+    range_end : float
+        Where the arm meets its end stop, rad.
+    options : BackendOptions or None
+        The backend's own options; None for its defaults.
+    """
+
+    clock: Clock
+    hand: Hand | None = None
+    range_end: float = math.radians(146.0)
+    options: BackendOptions | None = None

@@ -1,0 +1,313 @@
+"""Sheets that were filled in, brought into session logs."""
+
+import hashlib
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from datetime import date, datetime, time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import msgspec
+
+import masrel
+from masrel._files import check_inside
+from masrel.errors import ParameterError, RatingsError, SessionLogError
+from masrel.lab._event_log import SessionLog, utc_now
+from masrel.lab.conduct._study_answers import study_answers
+from masrel.lab.conduct._study_log import append_event, stated
+from masrel.lab.paper._filled_form import FilledRow, fill_form
+from masrel.lab.paper._form import Form, form_of
+from masrel.lab.paper._typed import TypedSheet, read_typed
+from masrel.lab.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
+from masrel.lab.run._days import interval_fields
+from masrel.lab.run._state import FORMAT, FROM_PAPER, SessionState, replay
+from masrel.lab.schedule.sheets import _drawn_schedule
+
+if TYPE_CHECKING:
+    from masrel.lab.recording import _Fact  # loads numpy
+
+NO_DEVICE = "none"
+"""What logs call the device where nobody says what presented the models."""
+
+_DEVICE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnteredSheet:
+    """What came of entering a sheet.
+
+    Attributes
+    ----------
+    rater, session : str
+        Whose sheet.
+    n_presentations : int
+        Presentations on it.
+    n_graded : int
+        Those that have a grade.
+    log_file : Path
+        The log it was entered into.
+    """
+
+    rater: str
+    session: str
+    n_presentations: int
+    n_graded: int
+    log_file: Path
+
+
+def enter_sheet(
+    study: StudyPaths,
+    protocol: Protocol,
+    file: Path,
+    rater: str,
+    session: str,
+    *,
+    who: str,
+    on: date | None = None,
+    device: str = NO_DEVICE,
+    now: Callable[[], datetime] = utc_now,
+) -> EnteredSheet:
+    """Bring a sheet that was filled in on paper into a session log.
+
+    The whole sheet is entered or nothing of it: a process that dies in between goes on
+    when it is called again with the same file.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is; its schedules are drawn.
+    protocol : Protocol
+        The study's protocol.
+    file : Path
+        The CSV file into which the sheet was typed.
+    rater, session : str
+        Whose sheet.
+    who : str
+        Who typed it.
+    on : date, optional
+        Day of the session, as on the sheet: from it the days between sessions are
+        counted.
+    device : str, optional
+        What presented the models, where another program ran it; "none" unless given.
+    now : callable, optional
+        Gives the time of day for the log, aware.
+
+    Returns
+    -------
+    EnteredSheet
+        How much there was on it.
+
+    Raises
+    ------
+    RatingsError
+        If the file is no such sheet, or another rater's, a code or grade or answer on
+        it is wrong, or a presentation is twice or not on it. The message lists up to
+        20 problems, each with file and row.
+    ScheduleError
+        If the schedule is missing, damaged, or stale.
+    SessionLogError
+        If the session was begun with a device, or entered before, or its log is
+        damaged.
+    ParameterError
+        If `who` is blank, `on` is a day to come, or `device` is no name or simulated.
+    OSError
+        If the log cannot be written.
+
+    Warns
+    -----
+    MasrelWarning
+        If the session was out of the order, or the interval, of the protocol.
+    """
+    reasons = stated(who=who)
+    _check_day(on, now)
+    _check_device(device)
+    sheet, rows, form = filled_sheet(study, protocol, file, rater, session)
+    _refuse_answered(study, sheet, rows, rater)
+    log_file = study.log_file(rater, session)
+    check_inside(log_file.parent, study.root)
+    with SessionLog.open(log_file, now=now) as log:
+        state = replay(log.path, log.events)
+        _begin(study, protocol, form, device, state, log)
+        if on is not None and state.held_on is None:
+            _log_day(study, protocol, form, on, log)
+        _refuse_entered(sheet, log)
+        for row in rows:
+            if row.place == "study":
+                _answer_about_study(study, protocol, row, form.rater, now)
+            else:
+                _enter(row, sheet, reasons, state, log)
+        n_presentations = len(form.codes)
+        log.append("complete", {"n_presentations": n_presentations})
+        n_graded = len(replay(log.path, log.events).grades)
+    return EnteredSheet(
+        rater=rater,
+        session=session,
+        n_presentations=n_presentations,
+        n_graded=n_graded,
+        log_file=log_file,
+    )
+
+
+def filled_sheet(
+    study: StudyPaths, protocol: Protocol, file: Path, rater: str, session: str
+) -> tuple[TypedSheet, tuple[FilledRow, ...], Form]:
+    """Return a file that a sheet was typed into, its rows, and what it asks for."""
+    schedule = _drawn_schedule(study, protocol, rater, session)
+    form, sheet = form_of(protocol, schedule), read_typed(file)
+    others = _other_forms(study, protocol, form)
+    return sheet, fill_form(sheet, form, protocol.scale.grades, others), form
+
+
+def _other_forms(study: StudyPaths, protocol: Protocol, form: Form) -> Iterator[Form]:
+    for session in protocol.sessions:
+        for rater in session.raters:
+            is_other = (rater, session.id) != (form.rater, form.session)
+            if is_other and study.schedule_file(rater, session.id).exists():
+                yield form_of(
+                    protocol, _drawn_schedule(study, protocol, rater, session.id)
+                )
+
+
+def _begin(
+    study: StudyPaths,
+    protocol: Protocol,
+    form: Form,
+    device: str,
+    state: SessionState,
+    log: SessionLog,
+) -> None:
+    schedule_file = study.schedule_file(form.rater, form.session)
+    same: dict[str, _Fact] = {
+        "format": FORMAT,
+        "study": protocol.study.id,
+        "rater": form.rater,
+        "session": form.session,
+        "presented_sha256": presented_hash(protocol),
+        "schedule_sha256": hashlib.sha256(schedule_file.read_bytes()).hexdigest(),
+        "simulated": False,
+        "grades": FROM_PAPER,
+        "device": device,
+        "rehearsal": False,
+    }
+    if not state.header:
+        provenance: dict[str, _Fact] = {
+            "protocol_sha256": protocol_hash(protocol),
+            "clock": NO_DEVICE,
+            "masrel_version": masrel.__version__,
+        }
+        log.append("session", {**same, **provenance})
+    for name in ("grades", *same) if state.header else ():  # which says most is first
+        if state.header.get(name) != same[name]:
+            raise SessionLogError(
+                f"{log.path}: begun with {name} = {state.header.get(name)}: needed "
+                f"{same[name]} to enter a sheet into it"
+            )
+
+
+def _check_day(on: date | None, now: Callable[[], datetime]) -> None:
+    today = now().astimezone().date()
+    if on is not None and on > today:
+        raise ParameterError(f"on: needed a day up to {today}, got {on}")
+
+
+def _check_device(device: str) -> None:
+    # what is simulated is run by masrel, and says so in the log
+    if not _DEVICE.fullmatch(device) or "simulated" in device.casefold():
+        raise ParameterError(
+            "device: needed a name of 1 to 32 letters, digits, '.', '_' or '-' of "
+            f"a device that is not simulated, got {device!r}"
+        )
+
+
+def _log_day(
+    study: StudyPaths, protocol: Protocol, form: Form, on: date, log: SessionLog
+) -> None:
+    log.append("held", {"on": on.isoformat()})
+    # What has happened on paper cannot be refused any more.
+    sessions = tuple(
+        msgspec.structs.replace(each, order_policy="warn") for each in protocol.sessions
+    )
+    lenient = msgspec.structs.replace(protocol, sessions=sessions)
+    noon = datetime.combine(on, time(12))
+    interval = interval_fields(study, lenient, form.rater, form.session, lambda: noon)
+    if interval is not None:
+        log.append("interval", interval)
+
+
+def _refuse_entered(sheet: TypedSheet, log: SessionLog) -> None:
+    # what the same file was entered from is gone on with, if it is not complete
+    entered = [event for event in log.events if event.kind == "entered"]
+    others = [e for e in entered if e.fields["file_sha256"] != sheet.sha256]
+    is_complete = any(event.kind == "complete" for event in log.events)
+    before = next(iter(others if not is_complete else entered), None)
+    if before is None:
+        return
+    code, positions = before.fields["code"], before.fields["position"]
+    row = next((r.number for r in sheet.rows if r["code"].upper() == code), "none")
+    raise SessionLogError(
+        f"{sheet.path}: row {row}: needed a presentation that was not entered yet, got "
+        f"position {positions}, code {code}, entered on {before.time_utc[:10]} by "
+        f"{before.fields['who']} from {before.fields['file']}, row "
+        f"{before.fields['row']}: --second compares a second entry, and masrel run "
+        "--correct corrects a grade"
+    )
+
+
+def _refuse_answered(
+    study: StudyPaths, sheet: TypedSheet, rows: Sequence[FilledRow], rater: str
+) -> None:
+    # about the study, in another session: an answer is corrected, not given twice
+    answered = study_answers(study).get(rater, {})
+    for row in rows if answered else ():
+        for column, answer in row.answers if row.place == "study" else ():
+            before = answered.get((column.questionnaire, column.question.id), answer)
+            if before != answer:
+                raise RatingsError(
+                    f"{sheet.path}: row {row.number}: {column.column}: needed "
+                    f"{before!r}, which {rater} has answered already, got {answer!r}: "
+                    "masrel run --question corrects an answer"
+                )
+
+
+def _enter(
+    row: FilledRow,
+    sheet: TypedSheet,
+    reasons: dict[str, str],
+    state: SessionState,
+    log: SessionLog,
+) -> None:
+    # state: before, when a process may have died in the middle of it
+    if row.code not in (None, *state.settled):
+        fields = {"code": row.code, "position": row.place, "grade": row.grade}
+        log.append("entered", {**fields, **typed_fields(row, sheet), **reasons})
+    for column, answer in row.answers:
+        key = (column.questionnaire, column.question.id, row.code)
+        if key not in state.answers:
+            names = dict(zip(("questionnaire", "question", "code"), key, strict=True))
+            log.append("answered", {**names, "answer": answer})
+
+
+def _answer_about_study(
+    study: StudyPaths,
+    protocol: Protocol,
+    row: FilledRow,
+    rater: str,
+    now: Callable[[], datetime],
+) -> None:
+    # in the log of the study, once
+    answered = study_answers(study).get(rater, {})
+    for column, answer in row.answers:
+        names = {"questionnaire": column.questionnaire, "question": column.question.id}
+        if tuple(names.values()) not in answered:
+            fields: dict[str, _Fact] = {"rater": rater, **names, "answer": answer}
+            append_event(study, protocol, "answered", fields, now=now)
+
+
+def typed_fields(row: FilledRow, sheet: TypedSheet) -> "dict[str, _Fact]":
+    """Return where on a sheet something stood, as a log has it."""
+    return {
+        "file": sheet.path.name,
+        "row": row.number,
+        "file_sha256": sheet.sha256,
+    }

@@ -1,0 +1,141 @@
+"""The kinds a model may be of: the keys of each, and its law in SI units.
+
+In: a kind, and numbers by keys with their units in the name. Out: a `JointModel`, or
+what is wrong with them.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from difflib import get_close_matches
+from typing import Any
+
+from masrel.errors import ParameterError
+from masrel.lab.elbow.joint_model import JointModel
+from masrel.lab.elbow.laws import MODELS
+from masrel.lab.elbow.parameters import ElbowParameters
+from masrel.lab.elbow.tone import ToneModel
+from masrel.lab.protocol._decode import got
+
+DEFAULT_KIND = ElbowParameters.kind
+"""The paper's own law, whose numbers have keys of their own."""
+
+_SUFFIXES = {
+    "": "",
+    "rad": "_deg",
+    "rad/s": "_deg_s",
+    "1/rad": "_per_rad",
+    "s": "_s",
+    "Hz": "_hz",
+    "N·m": "_nm",
+    "N·m/rad": "_nm_rad",
+    "N·m·s/rad": "_nms_rad",
+    "N·m·s/rad²": "_nms_rad2",
+    "kg": "_kg",
+    "kg·m²": "_kg_m2",
+}
+"""Unit of a parameter in Python to the end of its key; angles are degrees there."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Key:
+    """One key of `[models.parameters]`."""
+
+    parameter: str  # the parameter it sets
+    is_angle: bool  # in degrees, or degrees a second
+    default: float | None  # of the parameter in Python; None for where a stretch starts
+
+    def in_si(self, value: float) -> float:
+        """Return a value of the file as the parameter has it."""
+        return math.radians(value) if self.is_angle else float(value)
+
+
+def kind_names() -> tuple[str, ...]:
+    """Return every kind, the default one first."""
+    return (DEFAULT_KIND, *(kind for kind in MODELS if kind != DEFAULT_KIND))
+
+
+def keys_of(kind: str) -> dict[str, Key]:
+    """Return the keys of `[models.parameters]` for a kind; none for the default one."""
+    model = MODELS[kind]
+    if not issubclass(model, ToneModel):
+        return {}
+    quantities = model.quantities()
+    defaults: dict[str, Any] = {entry.name: entry.default for entry in fields(model)}
+    return {
+        name + _SUFFIXES[known.unit]: Key(
+            parameter=name,
+            is_angle=known.unit.startswith("rad"),
+            default=defaults[name],
+        )
+        for name, known in quantities.items()
+    }
+
+
+def model_of_kind(kind: str, values: Mapping[str, float]) -> JointModel:
+    """Return the law of a kind with these values, by key; defaults for the rest."""
+    keys = keys_of(kind)
+    changes = {keys[key].parameter: keys[key].in_si(v) for key, v in values.items()}
+    return MODELS[kind](**changes)
+
+
+def without_defaults(kind: str, values: Mapping[str, float]) -> dict[str, float]:
+    """Return the values that differ from what they are without their keys."""
+    keys = keys_of(kind)
+    return {
+        key: value
+        for key, value in values.items()
+        if keys[key].in_si(value) != keys[key].default
+    }
+
+
+def all_values(kind: str, values: Mapping[str, float]) -> dict[str, float | None]:
+    """Return a value for every key of a kind, those of the file and the defaults."""
+    every: dict[str, float | None] = {}
+    for key, known in keys_of(kind).items():
+        value = known.default
+        if known.is_angle and value is not None:
+            value = _round_degrees(value)
+        every[key] = values.get(key, value)
+    return every
+
+
+def _round_degrees(radians: float) -> float:
+    # what was entered in degrees comes back as it was: 115.00000000000001 is 115
+    return float(f"{math.degrees(radians):.12g}")
+
+
+def kind_problem(kind: str) -> str | None:
+    """Say what is wrong with the name of a kind; None if nothing is."""
+    names = kind_names()
+    if kind in names:
+        return None
+    near = get_close_matches(kind, names, n=1)
+    hint = f"; did you mean {near[0]}?" if near else ""
+    return f"needed one of {', '.join(names)}, got {got(kind)}{hint}"
+
+
+def value_problems(kind: str, values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+    """Yield a key, or "", and what is wrong with it, of all that is wrong."""
+    keys = keys_of(kind)
+    for key in values.keys() - keys:
+        near = get_close_matches(key, keys, n=1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        known = ", ".join(keys)
+        yield key, f"needed a key of kind {got(kind)} ({known}), got {got(key)}{hint}"
+    left = {key: value for key, value in values.items() if key in keys}
+    while True:
+        try:
+            model_of_kind(kind, left)
+        except ParameterError as error:
+            name, _, needs = str(error).partition(": needs ")
+            at_fault = [key for key in left if keys[key].parameter == name]
+            if not at_fault:
+                yield "", str(error)
+                return
+            # What is needed is in the message, what came is shown as it was entered.
+            needed = needs.partition(", got ")[0]
+            value = left.pop(at_fault[0])
+            yield at_fault[0], f"needed {needed}, got {got(value)}"
+        else:
+            return

@@ -1,0 +1,406 @@
+"""What a protocol says to others: its scale, its joints in SI units, its hashes."""
+
+import hashlib
+import math
+from typing import Any
+
+import msgspec
+
+from masrel.errors import ParameterError
+from masrel.lab._once import once
+from masrel.lab.elbow.joint_model import JointModel
+from masrel.lab.elbow.parameters import ElbowParameters
+from masrel.lab.protocol._kinds import DEFAULT_KIND, model_of_kind, without_defaults
+from masrel.lab.protocol.definition import ElbowConstants, Model, Protocol
+from masrel.scales import Scale
+
+
+def scale_of(protocol: Protocol) -> Scale:
+    """Return the rating scale of a protocol.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        A protocol.
+
+    Returns
+    -------
+    Scale
+        Name and grades, least first.
+    """
+    return Scale(name=protocol.scale.name, grades=protocol.scale.grades)
+
+
+def joint_model(protocol: Protocol, model_id: str) -> JointModel:
+    """Return the law of one haptic model, in SI units.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        A protocol; its angles are degrees.
+    model_id : str
+        Id of one of its models.
+
+    Returns
+    -------
+    JointModel
+        Of the model's kind, with its parameters; of a spastic elbow its L, H, Q and D
+        and constants, with those of ``[elbow]`` for the rest.
+
+    Raises
+    ------
+    ParameterError
+        If the protocol has no such model; the message names those there are.
+    """
+    model = _model_of(protocol, model_id)
+    if model.kind == DEFAULT_KIND:
+        return _joint_of(model, protocol.elbow)
+    return model_of_kind(model.kind, model.parameters)
+
+
+def elbow_parameters(protocol: Protocol, model_id: str) -> ElbowParameters:
+    """Return the joint parameters of one spastic elbow, in SI units.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        A protocol; its angles are degrees.
+    model_id : str
+        Id of one of its models.
+
+    Returns
+    -------
+    ElbowParameters
+        The model's L, H, Q and D and constants, with those of ``[elbow]``
+        for the rest; rad, rad/s, s.
+
+    Raises
+    ------
+    ParameterError
+        If the protocol has no such model, or it is of another kind; the message names
+        those there are.
+    """
+    model = _model_of(protocol, model_id)
+    if model.kind != DEFAULT_KIND:
+        elbows = [m.id for m in protocol.models if m.kind == DEFAULT_KIND]
+        raise ParameterError(
+            f"model: needed one of kind {DEFAULT_KIND!r} "
+            f"({', '.join(elbows) or 'there is none'}), got {model_id!r} of kind "
+            f"{model.kind!r}"
+        )
+    return _joint_of(model, protocol.elbow)
+
+
+def report_sections(protocol: Protocol) -> tuple[str, ...]:
+    """Return the sections of a protocol's report.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        A protocol.
+
+    Returns
+    -------
+    tuple of str
+        Those that ``report.sections`` names. Where it names none, all that the study
+        has something for, in the order of a paper; grades given in person, and
+        claims of a paper, are shown only where they are named.
+    """
+    if protocol.report.sections is not None:
+        return protocol.report.sections
+    has_something = {
+        "sample-size": bool(protocol.analysis.sample_sizes),
+        "test-retest": any(
+            line.kind == "test-retest" for line in protocol.analysis.estimates
+        ),
+        "confusion": any(model.intended_grade is not None for model in protocol.models),
+        "questionnaires": bool(protocol.questionnaires),
+    }
+    return tuple(name for name in _STORY if has_something.get(name, True))
+
+
+_STORY = (
+    "design",
+    "sample-size",
+    "grades",
+    "agreement",
+    "test-retest",
+    "categories",
+    "intended",
+    "confusion",
+    "order",
+    "speeds",
+    "traces",
+    "questionnaires",
+    "methods",
+)
+"""Sections in the order in which a paper tells them."""
+
+
+def _model_of(protocol: Protocol, model_id: str) -> Model:
+    models = {model.id: model for model in protocol.models}
+    if model_id not in models:
+        known = ", ".join(models)
+        raise ParameterError(f"model: needed one of {known}, got {model_id!r}")
+    return models[model_id]
+
+
+def _joint_of(model: Model, shared: ElbowConstants) -> ElbowParameters:
+    """Return the joint of one spastic elbow, in SI units."""
+    overrides = {
+        key: value
+        for key in model.constants.__struct_fields__
+        if (value := getattr(model.constants, key)) is not None
+    }
+    elbow = msgspec.structs.replace(shared, **overrides)
+    rest = elbow.rest_angle_deg
+    return ElbowParameters(
+        # none is missing in a protocol that was read
+        catch_angle_constant=math.radians(model.catch_angle_constant_deg or 0.0),
+        catch_torque_constant=model.catch_torque_nms_rad or 0.0,
+        residual_ratio=model.residual_ratio or 0.0,
+        catch_travel=math.radians(model.catch_travel_deg or 0.0),
+        inertia=elbow.inertia_kg_m2,
+        damping=elbow.damping_nms_rad,
+        stiffness=elbow.stiffness_nm_rad,
+        catch_slope=elbow.catch_slope_s,
+        peak_duration=elbow.peak_duration_s,
+        post_catch_stiffness=elbow.post_catch_stiffness_nm_rad,
+        speed_threshold=math.radians(elbow.speed_threshold_deg_s),
+        slowest_mean_speed=math.radians(elbow.slowest_mean_speed_deg_s),
+        smallest_catch_angle=math.radians(elbow.smallest_catch_angle_deg),
+        range_end=math.radians(elbow.range_end_deg),
+        rest_angle=None if rest is None else math.radians(rest),
+        post_catch=elbow.post_catch,
+        residual_reading=elbow.residual_reading,
+        catch_rise=elbow.catch_rise_s,
+    )
+
+
+_PRESENTED = (
+    "scale",
+    "elbow",
+    "models",
+    "schedule",
+    "stretch",
+    "presentation",
+    "occasions",
+    "device",
+)
+"""The tables that decide what a rater meets, besides the study's id."""
+
+_LATER: dict[str, dict[str, object]] = {
+    "study": {"language": "en"},
+    "elbow": {
+        "catch_rise_s": 0.0,
+        "residual_reading": "residual",
+        "rest_angle_deg": None,
+    },
+    "schedule": {
+        "blocks_by": "repeat",
+        "standards_apart": False,
+        "max_same_grade": None,
+        "strata": "none",
+    },
+    "stretch": {"largest_speed_deg_s": 131.0},
+    "presentation": {
+        "stretches": 1,
+        "time_limit_s": 60.0,
+        "stretch_limit_s": 20.0,
+        "slow_speed_deg_s": 10.0,
+        "fast_speed_deg_s": 120.0,
+        "done_with": "enter",
+    },
+    "occasions": {
+        "instructions": "",
+        "practice": (),
+        "break_after": None,
+        "break_minutes": 5.0,
+        "resume": "always",
+    },
+    "device": {
+        "active_torque_limit_nm": 10.0,
+        "active_energy_limit_j": 1.0,
+        "active_speed_limit_deg_s": 180.0,
+        "drift_limit_deg": 3.0,
+        "drift_speed_deg_s": 25.0,
+        "encoder_noise_deg": 0.0,
+        "arrival_deg": 3.0,
+        "arrival_speed_deg_s": 5.0,
+        "arrival_ms": 100.0,
+        "end_ramp_ms": 100.0,
+        "post_catch_ramp_ms": 100.0,
+        "loose_inertia_kg_m2": 0.06,
+        "torque_sensor": False,
+    },
+    "simulated_raters": {"hold_s": 0.0, "hand": "clamp"},
+    "analysis": {"sample_sizes": ()},
+    "report": {"gates": (), "formats": ("html", "markdown")},
+    "training": {
+        "kappa_insufficient": 0.6,
+        "kappa_sufficient": 0.8,
+        "weights": "linear",
+        "false_pass": 0.05,
+        "false_fail": 0.1,
+        "window": 60,
+        "order": "blocked",
+        "max_presentations": 120,
+        "seed": 0,
+    },
+}
+"""Keys that protocols once had not, by table, with the defaults they then had: these
+do not enter, so that no schedule drawn before turns stale."""
+
+
+_FORMER_SECTIONS = (
+    "design",
+    "grades",
+    "agreement",
+    "intended",
+    "test-retest",
+    "speeds",
+    "traces",
+)
+"""The default of ``report.sections`` when it entered: it still does, for no choice."""
+
+_LATER_ARRAYS = ("questionnaires", "rater_fields")
+"""Arrays and tables of tables that protocols once had not: empty, they do not enter."""
+
+_LATER_OF_SESSIONS: dict[str, object] = {
+    "after": None,
+    "at_least_days": None,
+    "at_most_days": None,
+    "order_policy": "refuse",
+}
+"""Keys of sessions that do not enter where they are these."""
+
+_ABSENT: dict[str, object] = {
+    "file": None,
+    "simulated": False,
+    "kind": DEFAULT_KIND,
+    "catch_angle_constant_deg": None,
+    "catch_torque_nms_rad": None,
+    "residual_ratio": None,
+    "catch_travel_deg": None,
+}
+"""Keys of models that do not enter where they are these."""
+
+
+_LATER_OF_RATERS: dict[str, object] = {"fields": {}, "site": None}
+"""The same of every rater."""
+
+
+@once
+def protocol_hash(protocol: Protocol) -> str:
+    """Hash the whole content of a protocol.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        A protocol; keys left out of the file count with their defaults.
+
+    Returns
+    -------
+    str
+        SHA-256, 64 hexadecimal digits. Comments, order of keys and layout of the
+        file do not enter. Of a model file its numbers enter, its name, and whether
+        it comes from simulated recordings.
+    """
+    return hashlib.sha256(_canonical(protocol)).hexdigest()
+
+
+@once
+def presented_hash(protocol: Protocol) -> str:
+    """Hash the part of a protocol that decides what a rater meets.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        A protocol.
+
+    Returns
+    -------
+    str
+        SHA-256, 64 hexadecimal digits, of the study's id and the tables
+        ``scale``, ``elbow``, ``models``, ``schedule``, ``stretch``, ``presentation``,
+        ``occasions`` (practice and breaks alone) and ``device``.
+
+    Notes
+    -----
+    Raters, sessions, texts, the analysis plan and the report do not enter: adding
+    a rater or wording a title better makes nobody's drawn schedule stale. Nor does
+    ``device.torque_sensor``, which no rater feels.
+    """
+    return hashlib.sha256(presented_content(protocol)).hexdigest()
+
+
+def presented_content(protocol: Protocol) -> bytes:
+    """Return the part of a protocol that decides what a rater meets, as JSON.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        A protocol.
+
+    Returns
+    -------
+    bytes
+        UTF-8, keys sorted, no spaces: what :func:`presented_hash` hashes.
+    """
+    tables = {name: getattr(protocol, name) for name in _PRESENTED}
+    tables["occasions"] = msgspec.structs.replace(
+        protocol.occasions, instructions="", resume="always"
+    )
+    tables["device"] = msgspec.structs.replace(protocol.device, torque_sensor=False)
+    content = {"study": protocol.study.id, **tables}
+    return _canonical(content, ignored=("file", "simulated"))  # numbers are felt
+
+
+def _canonical(content: object, ignored: tuple[str, ...] = ()) -> bytes:
+    # ignored: keys of models that do not enter
+    plain: dict[str, Any] = msgspec.to_builtins(content)
+    for model in plain["models"]:
+        _drop_defaults(model, plain["elbow"])
+        for key in ignored:
+            model.pop(key, None)
+    _drop_later(plain)
+    return msgspec.json.encode(plain, order="sorted")
+
+
+def _drop_later(plain: dict[str, Any]) -> None:
+    # takes out what protocols once had not, where it says nothing
+    for session in plain.get("sessions", ()):
+        _drop(session, _LATER_OF_SESSIONS)
+    for rater in plain.get("raters", ()):
+        _drop(rater, _LATER_OF_RATERS)
+    for array in _LATER_ARRAYS:
+        if not plain.get(array, True):
+            del plain[array]
+    if "report" in plain and plain["report"]["sections"] is None:
+        plain["report"]["sections"] = _FORMER_SECTIONS
+    for table, defaults in _LATER.items():
+        if not isinstance(plain.get(table), dict):  # of a study perhaps its id alone
+            continue
+        _drop(plain[table], defaults)
+        if not plain[table]:
+            del plain[table]
+
+
+def _drop(table: dict[str, Any], absent: dict[str, object]) -> None:
+    for key, value in absent.items():
+        if table[key] == value:
+            del table[key]
+
+
+def _drop_defaults(model: dict[str, Any], elbow: dict[str, Any]) -> None:
+    # takes out of a model what no protocol could say before, where nothing is said
+    constants = {k: v for k, v in model.pop("constants").items() if v is not None}
+    # what a model repeats of the shared constants does not enter twice
+    for key in ("post_catch", *_LATER["elbow"]):
+        if key in constants and constants[key] == elbow[key]:
+            del constants[key]
+    parameters = without_defaults(model["kind"], model.pop("parameters"))
+    for key, values in (("constants", constants), ("parameters", parameters)):
+        if values:
+            model[key] = values
+    _drop(model, _ABSENT)

@@ -1,0 +1,346 @@
+"""The types a protocol file decodes into; each key of the file is a field here.
+
+Every field has its unit in its name, its range in its type, and its meaning in
+``docs/protocol.md``.
+"""
+
+import re
+import sys
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from masrel.estimates import Target
+from masrel.lab.elbow.parameters import PostCatch, ResidualReading
+from masrel.lab.protocol._gates import GateKeys
+from masrel.lab.protocol._keys import _Identifier, _Table, _Text
+from masrel.lab.protocol._occasions import Occasions
+from masrel.lab.protocol._questions import Questionnaire
+from masrel.lab.protocol._sample_sizes import SampleSize
+
+# TOML has inf and nan, no key of a protocol does: every float here has its limits.
+_LARGEST = sys.float_info.max
+
+_Angle = Annotated[float, Meta(gt=0, le=180)]
+_RestAngle = Annotated[float, Meta(ge=0, le=180)]
+_Positive = Annotated[float, Meta(gt=0, le=_LARGEST)]
+_Finite = Annotated[float, Meta(ge=-_LARGEST, le=_LARGEST)]
+_NonNegative = Annotated[float, Meta(ge=0, le=_LARGEST)]
+
+
+class Study(_Table, frozen=True, kw_only=True):
+    """``[study]``: what the study is."""
+
+    id: _Identifier
+    title: _Text
+    source: str = ""
+    notes: str = ""
+    language: Literal["en", "de", "fr", "es"] = "en"
+
+
+class ScaleDefinition(_Table, frozen=True, kw_only=True):
+    """``[scale]``: the grades a rater may give, least first."""
+
+    name: _Text
+    grades: Annotated[tuple[_Text, ...], Meta(min_length=2)]
+
+
+class ElbowConstants(_Table, frozen=True, kw_only=True):
+    """``[elbow]``: the constants all models share (Table III's last column)."""
+
+    inertia_kg_m2: _NonNegative = 0.0
+    damping_nms_rad: _NonNegative = 1.26
+    stiffness_nm_rad: _NonNegative = 3.15
+    catch_slope_s: _Positive = 0.35
+    peak_duration_s: _Positive = 0.1
+    post_catch_stiffness_nm_rad: _NonNegative = 5.8
+    speed_threshold_deg_s: _Positive = 20.0
+    slowest_mean_speed_deg_s: _NonNegative = 60.0
+    smallest_catch_angle_deg: _Angle = 60.0
+    range_end_deg: _Angle = 146.0
+    rest_angle_deg: _RestAngle | None = None
+    post_catch: PostCatch = "continuous"
+    residual_reading: ResidualReading = "residual"
+    catch_rise_s: _NonNegative = 0.0
+
+
+class ModelConstants(_Table, frozen=True, kw_only=True):
+    """``[models.constants]``: what a model does not share with the others."""
+
+    inertia_kg_m2: _NonNegative | None = None
+    damping_nms_rad: _NonNegative | None = None
+    stiffness_nm_rad: _NonNegative | None = None
+    catch_slope_s: _Positive | None = None
+    post_catch_stiffness_nm_rad: _NonNegative | None = None
+    rest_angle_deg: _RestAngle | None = None
+    post_catch: PostCatch | None = None
+    residual_reading: ResidualReading | None = None
+    catch_rise_s: _NonNegative | None = None
+
+
+class Model(_Table, frozen=True, kw_only=True):
+    """``[[models]]``: one haptic model.
+
+    L, H, Q, D and `constants` are those of a spastic elbow, which has no `parameters`;
+    every other kind has these alone.
+    """
+
+    id: _Identifier
+    role: Literal["standard", "dummy"] = "standard"
+    intended_grade: str | None = None
+    kind: str = "spastic-elbow"
+    catch_angle_constant_deg: _Angle | None = None  # L
+    catch_torque_nms_rad: _NonNegative | None = None  # H
+    residual_ratio: Annotated[float, Meta(ge=0, lt=1)] | None = None  # Q
+    catch_travel_deg: _Angle | None = None  # D
+    file: _Text | None = None
+    simulated: bool = False
+    constants: ModelConstants = ModelConstants()
+    parameters: dict[str, _Finite] = {}  # noqa: RUF012 - msgspec makes each its own
+
+
+class Rater(_Table, frozen=True, kw_only=True):
+    """``[[raters]]``: one rater."""
+
+    id: _Identifier
+    note: str = ""
+    site: _Identifier | None = None
+    fields: dict[str, object] = {}  # noqa: RUF012 - msgspec makes each its own
+
+
+_FIELD_NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
+"""What a field of raters may be called: a column of a table of raters."""
+
+
+class RaterField(_Table, frozen=True, kw_only=True):
+    """``[rater_fields.NAME]``: something that is known of each rater."""
+
+    type: Literal["text", "whole", "number", "choice", "date"]
+    title: str = ""
+    unit: str = ""
+    choices: tuple[_Text, ...] = ()
+    public: bool = False
+
+
+class Session(_Table, frozen=True, kw_only=True):
+    """``[[sessions]]``: one occasion on which raters meet every model."""
+
+    id: _Identifier
+    raters: Annotated[tuple[str, ...], Meta(min_length=1)]
+    note: str = ""
+    after: str | None = None
+    at_least_days: Annotated[int, Meta(ge=0, le=36_500)] | None = None
+    at_most_days: Annotated[int, Meta(ge=0, le=36_500)] | None = None
+    order_policy: Literal["refuse", "warn"] = "refuse"
+
+
+class ScheduleScheme(_Table, frozen=True, kw_only=True):
+    """``[schedule]``: how the order of presentations is drawn."""
+
+    seed: Annotated[int, Meta(ge=0, le=2**63 - 1)]
+    scheme: Literal[
+        "random-order",
+        "williams",
+        "latin-square",
+        "blocks",
+        "no-immediate-repeat",
+        "restricted",
+    ] = "random-order"
+    repeats: Annotated[int, Meta(ge=1, le=20)] = 1
+    blocks_by: Literal["repeat", "role"] = "repeat"
+    standards_apart: bool = False
+    max_same_grade: Annotated[int, Meta(ge=1)] | None = None
+    strata: Literal["none", "site"] = "none"
+
+
+class Stretch(_Table, frozen=True, kw_only=True):
+    """``[stretch]``: the movement a rater is asked to make."""
+
+    start_deg: Annotated[float, Meta(ge=0, lt=180)] = 30.0
+    end_deg: _Angle = 146.0
+    largest_speed_deg_s: Annotated[float, Meta(gt=0, le=600)] = 131.0
+
+
+_Cue = Literal["slow", "fast"]
+"""What a rater is asked for: V1 or V3 of the Tardieu scale."""
+
+
+class PresentationRules(_Table, frozen=True, kw_only=True):
+    """``[presentation]``: how often a rater may stretch the arm, and who says done."""
+
+    stretches: (
+        Literal["free"]
+        | Annotated[int, Meta(ge=1, le=100)]
+        | Annotated[tuple[_Cue, ...], Meta(min_length=1, max_length=100)]
+    ) = 1
+    time_limit_s: Annotated[float, Meta(gt=0, le=3600)] = 60.0
+    stretch_limit_s: Annotated[float, Meta(gt=0, le=600)] = 20.0
+    slow_speed_deg_s: Annotated[float, Meta(ge=1, le=600)] = 10.0  # V1
+    fast_speed_deg_s: Annotated[float, Meta(ge=1, le=600)] = 120.0  # V3
+    done_with: Literal["enter", "button"] = "enter"
+
+
+class DeviceSettings(_Table, frozen=True, kw_only=True):
+    """``[device]``: which device, and the limits around it."""
+
+    backend: _Identifier = "simulated"
+    rate_hz: Annotated[int, Meta(ge=100, le=4000)] = 1000
+    torque_limit_nm: Annotated[float, Meta(gt=0, le=28)] = 20.0
+    torque_rate_limit_nm_s: _Positive = 12_000.0
+    active_torque_limit_nm: Annotated[float, Meta(gt=0, le=28)] = 10.0
+    active_energy_limit_j: Annotated[float, Meta(gt=0, le=100)] = 1.0
+    active_speed_limit_deg_s: Annotated[float, Meta(gt=0, le=600)] = 180.0
+    speed_limit_deg_s: Annotated[float, Meta(gt=0, le=600)] = 400.0
+    lowest_angle_deg: Annotated[float, Meta(ge=-30, lt=180)] = -5.0
+    highest_angle_deg: Annotated[float, Meta(gt=0, le=210)] = 185.0
+    soft_stop_deg: Annotated[float, Meta(gt=0, le=30)] = 5.0
+    soft_stop_torque_nm: Annotated[float, Meta(ge=0, le=28)] = 10.0
+    missed_ticks_limit: Annotated[int, Meta(ge=0)] = 20
+    missed_replies_limit: Annotated[int, Meta(ge=0, le=20)] = 2
+    missed_replies_per_100_limit: Annotated[int, Meta(ge=0, le=100)] = 10
+    stale_limit_ms: Annotated[float, Meta(gt=0, le=50)] = 5.0
+    frozen_limit_ms: Annotated[float, Meta(gt=0, le=100)] = 10.0
+    standing_limit_ms: Annotated[float, Meta(gt=0, le=5000)] = 500.0
+    standing_torque_nm: Annotated[float, Meta(gt=0, le=28)] = 2.0
+    jump_limit_deg: Annotated[float, Meta(gt=0, le=5)] = 0.3
+    drift_limit_deg: Annotated[float, Meta(gt=0, le=180)] = 3.0
+    drift_speed_deg_s: Annotated[float, Meta(gt=0, le=600)] = 25.0
+    encoder_noise_deg: Annotated[float, Meta(ge=0, le=1)] = 0.0
+    arrival_deg: Annotated[float, Meta(ge=0, le=180)] = 3.0
+    arrival_speed_deg_s: Annotated[float, Meta(gt=0, le=600)] = 5.0
+    arrival_ms: Annotated[float, Meta(gt=0, le=5000)] = 100.0
+    watchdog_ms: Annotated[float, Meta(gt=0, le=100)] = 50.0
+    ramp_ms: Annotated[float, Meta(ge=0, le=100)] = 50.0
+    end_ramp_ms: Annotated[float, Meta(ge=0, le=1000)] = 100.0
+    post_catch_ramp_ms: Annotated[float, Meta(ge=0, le=1000)] = 100.0
+    friction_compensation: Annotated[float, Meta(ge=0, le=1)] = 0.9
+    friction_viscous_nms_rad: _NonNegative = 0.168
+    friction_coulomb_nm: _NonNegative = 0.189
+    dead_zone_deg_s: _NonNegative = 0.1
+    full_speed_deg_s: _Positive = 2.0
+    slip_speed_drop_deg_s: _Positive = 40.0
+    loose_inertia_kg_m2: _Positive = 0.06
+    torque_sensor: bool = False
+    puck_interface: _Text = "socketcan"
+    puck_channel: _Text = "can0"
+    puck_node: Annotated[int, Meta(ge=1, le=7)] = 1
+    puck_direction: Literal[1, -1] = 1
+    puck_gear_ratio: _Positive = 18.8
+    puck_checks_torque: bool = True
+    puck_properties: dict[str, int] | None = None
+
+
+class SimulatedRaters(_Table, frozen=True, kw_only=True):
+    """``[simulated_raters]``: the raters of ``--grades simulated``."""
+
+    seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
+    accuracy: Annotated[float, Meta(ge=0, le=1)] = 0.84
+    retest_agreement: Annotated[float, Meta(ge=0, le=1)] = 0.85
+    mean_speed_deg_s: Annotated[float, Meta(ge=1, le=_LARGEST)] = 85.0
+    speed_sd_deg_s: _NonNegative = 15.0
+    hold_s: Annotated[float, Meta(ge=0, le=60)] = 0.0
+    hand: Literal["clamp", "person"] = "clamp"
+
+
+class Training(_Table, frozen=True, kw_only=True):
+    """``[training]``: when ``masrel train`` has taught a rater enough."""
+
+    kappa_insufficient: Annotated[float, Meta(ge=0, lt=1)] = 0.6
+    kappa_sufficient: Annotated[float, Meta(gt=0, le=1)] = 0.8
+    weights: Literal["identity", "linear", "quadratic"] = "linear"
+    false_pass: Annotated[float, Meta(ge=0.001, le=0.5)] = 0.05
+    false_fail: Annotated[float, Meta(ge=0.001, le=0.5)] = 0.1
+    window: Annotated[int, Meta(ge=2, le=500)] = 60
+    order: Literal["blocked", "adaptive"] = "blocked"
+    max_presentations: Annotated[int, Meta(ge=2, le=500)] = 120
+    seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
+
+
+class EstimatePlan(_Table, frozen=True, kw_only=True):
+    """``[[analysis.estimates]]``: one line of the analysis plan."""
+
+    id: _Identifier
+    kind: Literal["inter-rater", "test-retest"]
+    coefficient: _Text
+    weights: Literal[
+        "identity",
+        "linear",
+        "quadratic",
+        "ordinal",
+        "radical",
+        "ratio",
+        "circular",
+        "bipolar",
+    ] = "identity"
+    models: Literal["standard", "dummy", "all"] = "standard"
+    sessions: Annotated[tuple[str, ...], Meta(min_length=1, max_length=2)]
+    target: Target
+    interval: Literal[
+        "none", "auto", "analytic", "jackknife", "bootstrap", "posterior"
+    ] = "none"
+
+
+class Analysis(_Table, frozen=True, kw_only=True):
+    """``[analysis]``: the plan, written before the data."""
+
+    level: Annotated[float, Meta(gt=0.5, lt=1)] = 0.95
+    seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
+    n_resamples: Annotated[int, Meta(ge=100, le=1_000_000)] = 10_000
+    estimates: tuple[EstimatePlan, ...] = ()
+    sample_sizes: tuple[SampleSize, ...] = ()
+
+
+class Report(_Table, frozen=True, kw_only=True):
+    """``[report]``: which sections the report has, in order."""
+
+    title: str = ""
+    # None leaves them to masrel: `report_sections` says which
+    sections: (
+        tuple[
+            Literal[
+                "design",
+                "sample-size",
+                "grades",
+                "agreement",
+                "test-retest",
+                "categories",
+                "intended",
+                "confusion",
+                "in-person",
+                "order",
+                "speeds",
+                "traces",
+                "questionnaires",
+                "claims",
+                "methods",
+            ],
+            ...,
+        ]
+        | None
+    ) = None
+    gates: tuple[GateKeys, ...] = ()
+    formats: Annotated[
+        tuple[Literal["html", "markdown", "latex", "docx"], ...], Meta(min_length=1)
+    ] = ("html", "markdown")
+
+
+class Protocol(_Table, frozen=True, kw_only=True):
+    """A whole protocol file."""
+
+    study: Study
+    scale: ScaleDefinition
+    elbow: ElbowConstants = ElbowConstants()
+    models: Annotated[tuple[Model, ...], Meta(min_length=1)]
+    raters: Annotated[tuple[Rater, ...], Meta(min_length=1)]
+    rater_fields: dict[str, RaterField] = {}  # noqa: RUF012 - msgspec makes each its own
+    sessions: Annotated[tuple[Session, ...], Meta(min_length=1)]
+    schedule: ScheduleScheme
+    stretch: Stretch = Stretch()
+    presentation: PresentationRules = PresentationRules()
+    occasions: Occasions = Occasions()
+    questionnaires: tuple[Questionnaire, ...] = ()
+    device: DeviceSettings = DeviceSettings()
+    simulated_raters: SimulatedRaters = SimulatedRaters()
+    training: Training = Training()
+    analysis: Analysis = Analysis()
+    report: Report = Report()

@@ -1,0 +1,294 @@
+"""What a study's table of ratings leaves out, and what happened to the study."""
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from masrel.errors import MasrelError, SessionLogError
+from masrel.lab._event_log import Event
+from masrel.lab.conduct import excluded_raters, read_conduct
+from masrel.lab.conduct._study_answers import study_answers
+from masrel.lab.paper._differences import StudyAnswers, sheet_differences
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.run._session_logs import read_session
+from masrel.lab.run._state import SessionState
+from masrel.lab.schedule import read_schedule
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Correction:
+    """A grade that was corrected, or given late.
+
+    Attributes
+    ----------
+    session, rater : str
+        Whose grade.
+    model : str
+        The model that was presented.
+    repeat : int
+        Which of its presentations in the session, from 1.
+    first_grade : str or None
+        What the rater gave; None where that was nothing.
+    grade : str or None
+        What it should have been; None for a missing one.
+    who, why : str
+        Who corrected it, and for what reason.
+    """
+
+    session: str
+    rater: str
+    model: str
+    repeat: int
+    first_grade: str | None
+    grade: str | None
+    who: str
+    why: str
+
+
+def corrections_of(study: StudyPaths, protocol: Protocol) -> tuple[Correction, ...]:
+    """Collect the corrections of a study from its session logs.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+
+    Returns
+    -------
+    tuple of Correction
+        Sessions and raters in the protocol's order, then in order of time.
+
+    Raises
+    ------
+    SessionLogError
+        If a log is damaged, or corrects a code that its schedule has not.
+    ScheduleError
+        If the schedule of a log is missing or damaged.
+    """
+    return tuple(
+        correction
+        for session in protocol.sessions
+        for rater in session.raters
+        if study.log_file(rater, session.id).exists()
+        for correction in _corrections(study, rater, session.id)
+    )
+
+
+def _corrections(study: StudyPaths, rater: str, session: str) -> Iterator[Correction]:
+    log = study.log_file(rater, session)
+    events, state = read_session(log)
+    # those before a session began anew are set aside with what they corrected
+    anew = max((e.line for e in events if e.kind == "restarted"), default=0)
+    corrected = [e.fields for e in events if e.kind == "correction" and e.line > anew]
+    if not corrected:
+        return
+    schedule = read_schedule(study.schedule_file(rater, session))
+    shown = {each.code: each for each in schedule.presentations}
+    for fields in corrected:
+        code, grade = str(fields["code"]), fields["grade"]
+        if code not in shown:
+            raise SessionLogError(f"{log}: needed a code of the schedule, got {code!r}")
+        yield Correction(
+            session=session,
+            rater=rater,
+            model=shown[code].model,
+            repeat=shown[code].repeat,
+            first_grade=state.first_grades.get(code),
+            grade=None if grade is None else str(grade),
+            who=str(fields["who"]),
+            why=str(fields["why"]),
+        )
+
+
+def study_remarks(
+    study: StudyPaths,
+    protocol: Protocol,
+    *,
+    file: Path | None = None,
+    has_conduct: bool = True,
+    include: Collection[str] = ("who", "notes"),
+) -> tuple[str, ...]:
+    """Say everything that a reader of a study's ratings must know beside them.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+    file : Path, optional
+        A table that is used whatever the session logs say.
+    has_conduct : bool, optional
+        Whether to say what happened beside the sessions, too.
+    include : collection of str, optional
+        What is said though it is private: ``"who"`` recorded each, and ``"notes"``, the
+        reasons.
+
+    Returns
+    -------
+    tuple of str
+        A sentence each for raters who were withdrawn or are excluded, codes that were
+        unblinded, logs of no rater of the protocol, skipped presentations, sessions
+        that were begun anew, empty logs, recordings without a log, and ratings that are
+        not from the logs that there are. Empty when there is nothing to say.
+
+    Raises
+    ------
+    SessionLogError
+        If the log of the study's conduct is damaged.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from masrel.lab.protocol import read_protocol, StudyPaths
+    >>> study = StudyPaths(Path("studies/hess2012"))
+    >>> study_remarks(study, read_protocol(study.protocol))
+    ()
+    """
+    remarks = [*_of_conduct(study, include)] if has_conduct else []
+    remarks += _of_sessions(study, protocol, include)
+    if file not in (None, study.published_file) and any(study.sessions.glob("*.jsonl")):
+        remarks.append(
+            f"The ratings are from {file.name}, a file named by hand, and not from the "
+            "session logs."
+        )
+    return tuple(remarks)
+
+
+def _by_whom(event: Event, include: Collection[str]) -> str:
+    # who recorded an event and why, as far as that is said
+    who = f" by {event.fields['who']}" if "who" in include else ""
+    return who + (f": {event.fields['why']}" if "notes" in include else "")
+
+
+def _of_conduct(study: StudyPaths, include: Collection[str]) -> Iterator[str]:
+    events = read_conduct(study)
+    raters = excluded_raters(study)
+    latest = {
+        event.fields["rater"]: event
+        for event in events
+        if event.kind == "excluded" and event.fields["rater"] in raters
+    }
+    for event in events:
+        fields = event.fields
+        if "why" not in fields:
+            continue
+        by = f"on {event.time_utc[:10]}{_by_whom(event, include)}."
+        if event.kind == "withdrawn":
+            n_graded = _n_graded(study, str(fields["rater"]))
+            counted = "" if fields["rater"] in latest else " and counted"
+            yield (
+                f"Rater {fields['rater']} was withdrawn {by} Grades given before, "
+                f"{n_graded} by the logs, are kept{counted}."
+            )
+        elif event.kind == "unblinded":
+            yield _of_unblinding(event, by)
+        elif event in latest.values():
+            yield (
+                f"Rater {fields['rater']} was excluded {by} The grades are kept, and "
+                "enter no number."
+            )
+
+
+def _of_unblinding(event: Event, by: str) -> str:
+    fields = event.fields
+    where = "".join(
+        f" of {name} {fields[key]}"
+        for key, name in (("rater", "rater"), ("session", "session"))
+        if fields[key] is not None
+    )
+    what = "All codes" if fields["code"] is None else f"Code {fields['code']}"
+    verb = "were" if fields["code"] is None else "was"
+    return f"{what}{where} {verb} unblinded {by}"
+
+
+def _n_graded(study: StudyPaths, rater: str) -> int:
+    count = 0
+    for log in sorted(study.sessions.glob(f"*_{rater}.jsonl")):
+        state = _state_of(log)
+        if state.header.get("rater") == rater:
+            count += len(state.grades)
+    return count
+
+
+def _of_sessions(
+    study: StudyPaths, protocol: Protocol, include: Collection[str]
+) -> Iterator[str]:
+    expected = {
+        study.log_file(rater, session.id)
+        for session in protocol.sessions
+        for rater in session.raters
+    }
+    there = sorted(study.sessions.glob("*.jsonl"))
+    of_study = study_answers(study)
+    for log in there:
+        if log not in expected:
+            yield (
+                f"{_name(study, log)} is of no rater and session of the protocol: its "
+                "grades are not among the ratings. Put the rater back into the session "
+                "(masrel withdraw keeps the grades of one who left, and says so), or "
+                "move the log out of the study."
+            )
+        elif log.stat().st_size:
+            yield from _of_skips(study, log, include)
+            yield from _of_second_entries(study, log, of_study)
+        else:
+            yield (
+                f"{_name(study, log)} is empty: its grades, if there were any, are not "
+                "among the ratings. Put a copy of it back, or run the session."
+            )
+    for folder in sorted(path for path in study.sessions.glob("*") if path.is_dir()):
+        if folder.with_name(f"{folder.name}.jsonl") not in there:
+            yield (
+                f"{_name(study, folder)} has recordings and there is no log of them: "
+                "their grades are not among the ratings. Put a copy of the log back."
+            )
+
+
+def _of_skips(study: StudyPaths, log: Path, include: Collection[str]) -> Iterator[str]:
+    # those that did not get their grade later, and grades that count no more
+    state = _state_of(log)
+    if state.n_set_aside:
+        yield (
+            f"{_name(study, log)}: the session was begun anew; grades from before, "
+            f"which stay in the log and are not among the ratings: {state.n_set_aside}."
+        )
+    for code, event in state.skipped.items():
+        if code not in state.grades:
+            yield (
+                f"{_name(study, log)}: presentation {event.fields['position']}, code "
+                f"{code}, was skipped after a fault{_by_whom(event, include)}. Its "
+                "grade is missing."
+            )
+
+
+def _of_second_entries(
+    study: StudyPaths, log: Path, of_study: Mapping[str, StudyAnswers]
+) -> Iterator[str]:
+    state = _state_of(log)
+    of_rater = of_study.get(str(state.header.get("rater")), {})
+    for each in sheet_differences(state, of_rater):
+        code = "" if each.code is None else f" code {each.code},"
+        values = ""
+        if each.column == "grade":  # an answer is its rater's
+            values = f": the first has {each.first}, the second {each.second}"
+        yield (
+            f"{_name(study, log)}: the two entries of its sheet differ,{code} "
+            f"{each.column}{values} ({each.file}, row {each.row}). The first counts "
+            "until one is mended."
+        )
+
+
+def _state_of(log: Path) -> SessionState:
+    # of a log that cannot be read none; it is said to be damaged where it is read
+    try:
+        return read_session(log)[1]
+    except MasrelError:
+        return SessionState()
+
+
+def _name(study: StudyPaths, path: Path) -> str:
+    # below the study's folder, so that a report does not depend on where that is
+    return path.relative_to(study.root).as_posix()

@@ -1,0 +1,595 @@
+"""What a table of ratings is, how statistics take its ratings, and its bytes."""
+
+import csv
+import io
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from masrel._cells import safe_cell
+from masrel._files import write_file
+from masrel.errors import RatingsError
+from masrel.lab.run._state import FELT, FROM_PERSONS
+from masrel.scales import Scale
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class Rating(NamedTuple):
+    """One rating: a row of a study's table, which has a column for each field.
+
+    Attributes
+    ----------
+    session : str
+        The session.
+    rater : str
+        Who rated.
+    model : str
+        The haptic model, or the item of a foreign table.
+    repeat : int
+        Which presentation of the model in the session, from 1.
+    grade : str or None
+        A grade of the scale; None when missing.
+    mean_speed_deg_s : float
+        Mean speed before the catch, deg/s; nan when unknown.
+    source : {"published", "recorded", "simulated", "foreign"}
+        Where it comes from.
+    n_stretches : int or None
+        How many stretches were made before the grade; None when unknown.
+    min_speed_deg_s, max_speed_deg_s : float
+        Slowest and fastest mean speed of a stretch, deg/s; nan when unknown.
+    speeds_deg_s : tuple of (float or None), or None
+        Mean speed of each stretch, in order, None where it has none.
+    graded_stretch : int or None
+        Number of the stretch that the grade rests on; None when not said.
+    felt : str or None
+        What could be felt, one of `masrel.lab.run.FELT`; None when unknown.
+    grades_from : str or None
+        Name of the source of the session's grades; None when unknown.
+    device : str or None
+        Name of the session's device, "simulated" with others before it; None when
+        unknown.
+    position : int or None
+        Its place in the session, from 1; None when unknown.
+    code : str or None
+        The blinded code the rater knew the model by; None when unknown.
+    n_attempts : int or None
+        How often it was presented; None when unknown.
+    first_grade : str or None
+        What the rater gave; other than `grade` when corrected.
+    graded_at : str or None
+        Time in UTC, ISO 8601, when a person gave the first grade; None when unknown.
+    grip_lost : bool or None
+        Whether the arm came loose and the model let it go; None when unknown.
+    """
+
+    session: str
+    rater: str
+    model: str
+    repeat: int = 1
+    grade: str | None = None
+    mean_speed_deg_s: float = math.nan
+    source: str = "foreign"
+    n_stretches: int | None = None
+    min_speed_deg_s: float = math.nan
+    max_speed_deg_s: float = math.nan
+    speeds_deg_s: tuple[float | None, ...] | None = None
+    graded_stretch: int | None = None
+    felt: str | None = None
+    grades_from: str | None = None
+    device: str | None = None
+    position: int | None = None
+    code: str | None = None
+    n_attempts: int | None = None
+    first_grade: str | None = None
+    graded_at: str | None = None
+    grip_lost: bool | None = None
+
+
+RATING_COLUMNS = Rating._fields
+"""Columns of a table of ratings."""
+
+_N_ALWAYS = 7
+"""Columns that every table has."""
+
+_FORMAT = 2
+"""Version of the file of a study's ratings."""
+
+_N_WITHOUT_GRIP = 20
+"""Columns of a table that does not know of any grip whether it was lost."""
+
+_N_FORMERLY = 15
+"""Columns of a table of format 1, which does not name its format."""
+
+_YES_NO = ("no", "yes")
+"""Cells of False and True."""
+
+SOURCES = ("published", "recorded", "simulated", "foreign")
+"""Where a rating comes from; "foreign" is a file that does not say."""
+
+_FLOATS = ("mean_speed_deg_s", "min_speed_deg_s", "max_speed_deg_s")
+_TYPES = {"repeat": "int64", **dict.fromkeys(_FLOATS, "float64")}
+"""Of columns that are no objects."""
+
+DEFAULT_SESSION = "test"
+"""Session of ratings that do not name one."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ratings:
+    """A checked table of ratings with its scale.
+
+    Made by `read_ratings`, `ratings_from_logs` or `ratings_from_rows`, which check.
+
+    Attributes
+    ----------
+    rows : tuple of Rating
+        The ratings; session, rater, model and repeat together are unique.
+    scale : Scale
+        The grades a rater may give, in order.
+    source_path : Path or None
+        The file it was read from.
+    simulated : bool
+        Whether any rating is simulated: its grade, or the device, or both.
+    """
+
+    rows: tuple[Rating, ...] = field(compare=False, repr=False)
+    scale: Scale
+    source_path: Path | None = None
+    simulated: bool
+
+    @property
+    def n_from_persons(self) -> int:
+        """How many ratings are of sessions in which a person gave the grades."""
+        return sum(row.grades_from in FROM_PERSONS for row in self.rows)
+
+    @property
+    def n_missing(self) -> int:
+        """How many ratings have no grade."""
+        return sum(row.grade is None for row in self.rows)
+
+    @property
+    def table(self) -> "pd.DataFrame":
+        """The ratings as a data frame, made anew: a row each, columns of `Rating`."""
+        import pandas as pd  # which takes longer to load than a study to read
+
+        columns = list(zip(*self.rows, strict=True)) or [()] * len(RATING_COLUMNS)
+        return pd.DataFrame(
+            {
+                name: pd.Series(list(column), dtype=_TYPES.get(name, "object"))
+                for name, column in zip(RATING_COLUMNS, columns, strict=True)
+            }
+        )
+
+
+def ratings_from_rows(
+    rows: Iterable[Mapping[str, object]],
+    scale: Scale,
+    *,
+    source_path: Path | None = None,
+) -> Ratings:
+    """Make a table of ratings from one mapping a rating.
+
+    Parameters
+    ----------
+    rows : iterable of mapping
+        Values by column name. `rater` and `model` are needed; `grade` None or
+        absent is missing; `session` is "test", `repeat` 1, `mean_speed_deg_s`
+        unknown and `source` "foreign" unless given.
+    scale : Scale
+        The grades a rater may give.
+    source_path : Path, optional
+        The file the rows are from.
+
+    Returns
+    -------
+    Ratings
+        The table, rows in their order.
+
+    Raises
+    ------
+    RatingsError
+        If a row lacks its rater or model, has an unknown column, a grade that is
+        not of the scale, or is there twice. The message lists every problem.
+
+    Examples
+    --------
+    >>> from masrel.scales import MODIFIED_ASHWORTH
+    >>> ratings = ratings_from_rows(
+    ...     [{"rater": "R1", "model": "HM2", "grade": "1+"}], MODIFIED_ASHWORTH
+    ... )
+    >>> ratings.rows[0].grade
+    '1+'
+    """
+    complete: list[dict[str, Any]] = [{**_DEFAULTS, **row} for row in rows]
+    problems = [
+        f"row {number}: {problem}"
+        for number, row in enumerate(complete, start=1)
+        for problem in _problems(row, scale)
+    ]
+    seen: dict[tuple[object, ...], int] = {}
+    for number, row in enumerate(complete, start=1):
+        key = tuple(row.get(name) for name in RATING_COLUMNS[:4])
+        if seen.setdefault(key, number) != number:
+            problems.append(f"row {number}: {key} is in row {seen[key]} already")
+    if problems:
+        raise RatingsError("\n".join(problems))
+    for row in complete:
+        row |= {name: float(row[name]) for name in _FLOATS}
+    return _assemble([Rating(**row) for row in complete], scale, source_path)
+
+
+def _assemble(
+    rows: Iterable[Rating], scale: Scale, source_path: Path | None
+) -> Ratings:
+    """Return the table of rows that have been checked."""
+    rows = tuple(rows)
+    return Ratings(
+        rows=rows,
+        scale=scale,
+        source_path=source_path,
+        simulated=any(row.source == "simulated" for row in rows),
+    )
+
+
+_DEFAULTS: dict[str, object] = {"session": DEFAULT_SESSION, **Rating._field_defaults}
+
+
+def _problems(row: Mapping[str, object], scale: Scale) -> list[str]:
+    problems = [
+        f"{name}: needed text, got {row.get(name)!r}"
+        for name in ("session", "rater", "model")
+        if not isinstance(row.get(name), str) or not row[name]
+    ]
+    repeat, speed, grade = row["repeat"], row["mean_speed_deg_s"], row["grade"]
+    if not isinstance(repeat, int) or isinstance(repeat, bool) or repeat < 1:
+        problems.append(f"repeat: needed a whole number from 1, got {repeat!r}")
+    if not isinstance(speed, int | float) or isinstance(speed, bool):
+        problems.append(f"mean_speed_deg_s: needed a number, got {speed!r}")
+    if grade is not None and grade not in scale.grades:
+        problems.append(
+            f"grade: needed one of {', '.join(scale.grades)} or None, got {grade!r}"
+        )
+    if row["source"] not in SOURCES:
+        problems.append(
+            f"source: needed one of {', '.join(SOURCES)}, got {row['source']!r}"
+        )
+    problems += [
+        f"{name}: needed text or None, got {row[name]!r}"
+        for name in ("grades_from", "device", "code")
+        if row[name] is not None and (not isinstance(row[name], str) or not row[name])
+    ]
+    problems += _stretch_problems(row)
+    problems += _presentation_problems(row, scale)
+    unknown = sorted(set(row) - set(RATING_COLUMNS))
+    if unknown:
+        problems.append(f"unknown columns {', '.join(unknown)}")
+    return problems
+
+
+def _presentation_problems(row: Mapping[str, object], scale: Scale) -> list[str]:
+    """Return what is wrong with what a row says of its presentation."""
+    problems = []
+    for name, least in (("position", 1), ("n_attempts", 0)):
+        number = row[name]
+        if number is not None and not (isinstance(number, int) and number >= least):
+            problems.append(
+                f"{name}: needed a whole number from {least}, got {number!r}"
+            )
+    first, time = row["first_grade"], row["graded_at"]
+    if first is not None and first not in scale.grades:
+        problems.append(
+            f"first_grade: needed one of {', '.join(scale.grades)} or None, "
+            f"got {first!r}"
+        )
+    if time is not None and not (isinstance(time, str) and _is_utc(time)):
+        problems.append(f"graded_at: {_NEEDED_TIME}, got {time!r}")
+    return problems
+
+
+_NEEDED_TIME = "needed a time in UTC such as 2026-05-04T09:30:00Z"
+
+
+def _is_utc(text: str) -> bool:
+    """Return whether a text is a time in UTC as ISO 8601 writes it."""
+    try:
+        return datetime.fromisoformat(text).utcoffset() == timedelta(0)
+    except ValueError:
+        return False
+
+
+def _stretch_problems(row: Mapping[str, object]) -> list[str]:
+    """Return what is wrong with what a row says of its stretches."""
+    problems = []
+    for name in ("min_speed_deg_s", "max_speed_deg_s"):
+        if not isinstance(row[name], int | float) or isinstance(row[name], bool):
+            problems.append(f"{name}: needed a number, got {row[name]!r}")
+    n_stretches, graded = row["n_stretches"], row["graded_stretch"]
+    speeds, felt, n_known = row["speeds_deg_s"], row["felt"], 0
+    if isinstance(n_stretches, int) and n_stretches >= 0:
+        n_known = n_stretches
+    elif n_stretches is not None:
+        problems.append(
+            f"n_stretches: needed a whole number from 0, got {n_stretches!r}"
+        )
+    if speeds is not None and not (
+        isinstance(speeds, tuple) and len(speeds) == n_known
+    ):
+        problems.append(
+            f"speeds_deg_s: needed one for each of {n_known} stretches, got {speeds!r}"
+        )
+    if graded is not None and not (isinstance(graded, int) and 1 <= graded <= n_known):
+        problems.append(
+            f"graded_stretch: needed one of {n_known} stretches, got {graded!r}"
+        )
+    if not isinstance(row["grip_lost"], bool | None):
+        problems.append(f"grip_lost: needed a bool or None, got {row['grip_lost']!r}")
+    if felt is not None and felt not in FELT:
+        problems.append(f"felt: needed one of {', '.join(FELT)}, got {felt!r}")
+    return problems
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RatingMatrix:
+    """Grades of one session, item by rater.
+
+    Attributes
+    ----------
+    items : tuple of str
+        The haptic models; a second presentation of one is an item ``"HM1#2"``.
+    raters : tuple of str
+        The raters.
+    grades : list of list of (str or None), shape (n_items, n_raters)
+        None is missing.
+    n_missing : int
+        How many are None.
+    """
+
+    items: tuple[str, ...]
+    raters: tuple[str, ...]
+    grades: list[list[str | None]] = field(hash=False)
+    n_missing: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RetestPairs:
+    """Grades the same raters gave the same items in two sessions.
+
+    Attributes
+    ----------
+    raters : tuple of str
+        Raters with rows in both sessions.
+    items : tuple of str
+        The haptic models; a second presentation of one is an item ``"HM1#2"``.
+    pairs : list, shape (n_raters, n_items, 2)
+        First and second grade; None is missing.
+    n_missing : int
+        Pairs of which a side is missing.
+    """
+
+    raters: tuple[str, ...]
+    items: tuple[str, ...]
+    pairs: list[list[list[str | None]]] = field(hash=False)
+    n_missing: int
+
+
+_Key = tuple[str, str, int]  # rater, model, repeat
+
+
+def rating_matrix(
+    ratings: Ratings, *, session: str, models: Sequence[str] | None = None
+) -> RatingMatrix:
+    """Arrange the grades of one session item by rater.
+
+    Parameters
+    ----------
+    ratings : Ratings
+        The table.
+    session : str
+        The session.
+    models : sequence of str, optional
+        The models, in this order; one that nobody rated is a row of None. Every
+        model of the session, as they come, unless given.
+
+    Returns
+    -------
+    RatingMatrix
+        Raters as they come in the session, all of them.
+
+    Raises
+    ------
+    RatingsError
+        If the session has no ratings.
+
+    Examples
+    --------
+    >>> from masrel.lab.ratings import ratings_from_rows
+    >>> from masrel.scales import MODIFIED_ASHWORTH
+    >>> rows = [
+    ...     {"rater": "R1", "model": "HM1", "grade": "1"},
+    ...     {"rater": "R2", "model": "HM1", "grade": "1+"},
+    ... ]
+    >>> ratings = ratings_from_rows(rows, MODIFIED_ASHWORTH)
+    >>> rating_matrix(ratings, session="test").grades
+    [['1', '1+']]
+    """
+    grades = _of_session(ratings, session)
+    raters = tuple(dict.fromkeys(rater for rater, _, _ in grades))
+    keys, items = _items([grades], models)
+    matrix = [
+        [grades.get((rater, model, repeat)) for rater in raters]
+        for model, repeat in keys
+    ]
+    return RatingMatrix(
+        items=items,
+        raters=raters,
+        grades=matrix,
+        n_missing=sum(row.count(None) for row in matrix),
+    )
+
+
+def retest_pairs(
+    ratings: Ratings,
+    *,
+    first: str,
+    second: str,
+    models: Sequence[str] | None = None,
+) -> RetestPairs:
+    """Pair the grades raters gave in two sessions.
+
+    Parameters
+    ----------
+    ratings : Ratings
+        The table.
+    first, second : str
+        The sessions.
+    models : sequence of str, optional
+        The models, in this order. Every model of either session unless given.
+
+    Returns
+    -------
+    RetestPairs
+        Raters of both sessions, as they come in the first; none is no error.
+
+    Raises
+    ------
+    RatingsError
+        If a session has no ratings, or both are the same.
+    """
+    if first == second:
+        raise RatingsError(f"needed two different sessions, got {first!r} twice")
+    before, after = _of_session(ratings, first), _of_session(ratings, second)
+    again = {rater for rater, _, _ in after}
+    raters = tuple(dict.fromkeys(r for r, _, _ in before if r in again))
+    keys, items = _items([before, after], models)
+    pairs = [
+        [[before.get((r, *key)), after.get((r, *key))] for key in keys] for r in raters
+    ]
+    return RetestPairs(
+        raters=raters,
+        items=items,
+        pairs=pairs,
+        n_missing=sum(None in pair for of_rater in pairs for pair in of_rater),
+    )
+
+
+def _of_session(ratings: Ratings, session: str) -> dict[_Key, str | None]:
+    grades = {
+        (row.rater, row.model, row.repeat): row.grade
+        for row in ratings.rows
+        if row.session == session
+    }
+    if not grades:
+        known = ", ".join(dict.fromkeys(row.session for row in ratings.rows)) or "none"
+        raise RatingsError(f"needed ratings of session {session!r}, there are {known}")
+    return grades
+
+
+def _items(
+    sessions: Sequence[Mapping[_Key, str | None]], models: Sequence[str] | None
+) -> tuple[list[tuple[str, int]], tuple[str, ...]]:
+    # -> (model, repeat) in the order of models, a model without ratings once; names
+    n_repeats: dict[str, int] = {}
+    for grades in sessions:
+        for _, model, repeat in grades:
+            n_repeats[model] = max(n_repeats.get(model, 1), repeat)
+    keys = [
+        (model, repeat)
+        for model in (n_repeats if models is None else models)
+        for repeat in range(1, n_repeats.get(model, 1) + 1)
+    ]
+    return keys, tuple(
+        model if repeat == 1 else f"{model}#{repeat}" for model, repeat in keys
+    )
+
+
+def write_ratings(ratings: Ratings, path: Path, *, within: Path | None = None) -> None:
+    """Write a table of ratings; the same table gives the same bytes.
+
+    One that has codes says which models they stand for: it is its owner's alone.
+
+    Parameters
+    ----------
+    ratings : Ratings
+        The table.
+    path : Path
+        The CSV file; its folder is made when missing.
+    within : Path, optional
+        A folder that the file may not leave by a link, such as the study's.
+
+    Raises
+    ------
+    ParameterError
+        If `path` is the place of a study's primary record, or not within `within`.
+    OSError
+        If the file cannot be written; what was there is then there still.
+    """
+    names_models = any(row.code is not None for row in ratings.rows)
+    mode = 0o600 if names_models else None
+    write_file(path, ratings_csv(ratings), within=within, mode=mode)
+
+
+def ratings_csv(ratings: Ratings) -> str:
+    """Return a table of ratings as the text of its file.
+
+    Parameters
+    ----------
+    ratings : Ratings
+        The table.
+
+    Returns
+    -------
+    str
+        What `write_ratings` writes.
+    """
+    has_more = any(
+        not _is_unknown(value) for row in ratings.rows for value in row[_N_ALWAYS:]
+    )
+    names = RATING_COLUMNS if has_more else RATING_COLUMNS[:_N_ALWAYS]
+    if all(row.grip_lost is None for row in ratings.rows):
+        names = names[:_N_WITHOUT_GRIP]
+    return f"{_head(ratings)}# format: {_FORMAT}\n{_body(ratings, names)}"
+
+
+def _texts(ratings: Ratings) -> Iterator[str]:
+    """Yield every text that a table of these ratings of logs has ever had."""
+    yield ratings_csv(ratings)
+    head = _head(ratings)
+    yield head + _body(ratings, RATING_COLUMNS[:_N_FORMERLY])
+    says_felt = any(row.felt is not None for row in ratings.rows)
+    if not says_felt:  # of logs that say nothing of stretches
+        yield head + _body(ratings, RATING_COLUMNS[:_N_ALWAYS])
+
+
+def _head(ratings: Ratings) -> str:
+    head = "# Ratings, one row a rating; grades are text; NA is missing.\n"
+    if ratings.simulated:
+        return f"# SIMULATED: not grades of persons on hardware.\n{head}"
+    return head
+
+
+def _body(ratings: Ratings, names: Sequence[str]) -> str:
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    for row in ratings.rows:
+        writer.writerow([_csv_cell(value) for value in row[: len(names)]])
+    return text.getvalue()
+
+
+def _is_unknown(value: object) -> bool:
+    return value is None or (isinstance(value, float) and math.isnan(value))
+
+
+def _csv_cell(value: object) -> str:
+    if _is_unknown(value):
+        return "NA"
+    if isinstance(value, bool):
+        return _YES_NO[value]
+    if isinstance(value, tuple):
+        return ";".join(_csv_cell(part) for part in value)
+    return repr(value) if isinstance(value, float) else safe_cell(str(value))

@@ -1,0 +1,294 @@
+"""Sections `agreement` and `test-retest`: coefficients with their intervals.
+
+Their table is narrow on a page, and has every field in the CSV.
+"""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from operator import attrgetter
+
+from masrel.agreement import strength
+from masrel.estimates import Estimate, Interval
+from masrel.lab.analysis import PlannedEstimate
+from masrel.lab.report._figure_data import MANY_RATERS
+from masrel.lab.report._material import Drawing, Material, Paragraph, Section
+from masrel.plots._drawn_values import Forest
+from masrel.tables._estimate_words import (
+    NOT_THERE,
+    TARGETS,
+    aside,
+    coefficient_name,
+    forest_row,
+    interval_name,
+    meaning,
+)
+from masrel.tables._tables import (
+    Column,
+    Table,
+    Value,
+    at_ranks,
+    counted,
+    interval_text,
+    number,
+)
+
+_LOOKS = (
+    "confidence as lines with ends, credible as broad bars, with the posterior density "
+    "or the resamples above where there are any"
+)
+
+_AGREEMENTS = (
+    "p_o: observed agreement; p_e: agreement expected by chance, 0 where the "
+    "coefficient takes none off."
+)
+
+_LANDIS_KOCH = (
+    "Words after Landis JR, Koch GG (1977). The measurement of observer agreement "
+    "for categorical data. Biometrics 33(1), 159-174, doi 10.2307/2529310; they name "
+    "the point estimate alone."
+)
+
+_COLUMNS = (
+    Column(key="id", heading="Estimate", align="left"),
+    Column(key="coefficient", heading="Coefficient", align="left"),
+    Column(key="models_shown", heading="Models", align="left", where="page"),
+    Column(key="models", heading="Models", where="csv"),
+    Column(key="sessions", heading="Session", align="left"),
+    Column(key="n_items", heading="n models", where="csv"),
+    Column(key="n_raters", heading="Raters"),
+    Column(key="value", heading="Value", digits=3),
+    Column(key="interval_shown", heading="Interval", where="page"),
+    Column(key="low", heading="Low", digits=3, where="csv"),
+    Column(key="high", heading="High", digits=3, where="csv"),
+    Column(key="interval", heading="Interval", where="csv"),
+    Column(key="target", heading="Generalises to", where="csv"),
+    Column(key="strength", heading="Strength", align="left"),
+    Column(key="observed", heading="p_o", digits=3),
+    Column(key="chance", heading="p_e", digits=3),
+    Column(key="reason", heading="Reason", where="csv"),
+)
+
+_LETTERS = "ᵃᵇᶜᵈᵉᶠᵍʰⁱʲᵏˡᵐⁿᵒᵖʳˢᵗᵘᵛʷˣʸᶻ"  # they stand high without any markup
+
+
+# Kind of the plan's lines: name of the section, its title, and caption of its table.
+_SECTIONS = {
+    "inter-rater": (
+        "agreement",
+        "Agreement between raters",
+        "Agreement between raters",
+    ),
+    "test-retest": (
+        "test-retest",
+        "Test-retest agreement",
+        "Agreement of raters with themselves",
+    ),
+}
+
+
+def estimates_section(material: Material, kind: str) -> Section:
+    """Show the plan's estimates of a kind: between raters, or test-retest."""
+    name, title, caption = _SECTIONS[kind]
+    planned = [p for p in material.analysis.estimates if p.line.kind == kind]
+    blocks: list[Paragraph | Table | Drawing] = []
+    if not planned:
+        text = "The plan asks for no such estimate."
+        blocks.append(Paragraph(text=text, absent=True))
+    elif all(entry.estimate is None and not entry.by_rater for entry in planned):
+        texts = [f"{p.line.id} is not in these data: {p.reason}." for p in planned]
+        blocks += [Paragraph(text=text, absent=True) for text in texts]
+    else:
+        every = estimate_rows(planned)
+        rows = _few_of_many(every)
+        file = name.replace("-", "_")
+        intervals = [row.interval for row in rows if row.interval is not None]
+        meanings = dict.fromkeys(meaning(interval, "model") for interval in intervals)
+        table = estimate_table(rows, name=file, caption=caption, data=material.data)
+        if len(rows) < len(every):
+            full = estimate_table(every, name=file, caption=caption, data=material.data)
+            note = "Of many raters, five by their value; the file has all."
+            table = dataclasses.replace(
+                table, rows=full.rows, page_rows=table.rows, notes=(*table.notes, note)
+            )
+        blocks = [
+            table,
+            *(Paragraph(text=text) for text in meanings),
+            _forest(material, rows, file, caption),
+        ]
+    return Section(name=name, title=title, blocks=tuple(blocks))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EstimateRow:
+    """One row of a table or a forest: an estimate, or why there is none."""
+
+    name: str  # id of the line of the plan, and the rater if it is one rater's
+    coefficient: str  # its name for a reader
+    # models, sessions: what it was estimated from
+    models: str
+    sessions: str
+    estimate: Estimate | None
+    interval: Interval | None  # of the estimate
+    reason: str | None  # why there is none
+    single: bool  # whether it is one rater's agreement with him- or herself
+
+
+def estimate_rows(planned: Sequence[PlannedEstimate]) -> list[EstimateRow]:
+    """Return the rows of planned estimates, each followed by those of its raters."""
+    rows = []
+    for entry in planned:
+        line = entry.line
+        estimates: list[tuple[str, str, Estimate | None]] = [
+            (f"{line.id}: {r.rater}", r.estimate.coefficient, r.estimate)
+            for r in entry.by_rater
+        ]
+        if entry.estimate is not None or not entry.by_rater:
+            estimates.insert(0, (line.id, line.coefficient, entry.estimate))
+        rows += [
+            EstimateRow(
+                name=name,
+                coefficient=coefficient_name(coefficient, line.weights),
+                models=line.models,
+                sessions=" and ".join(line.sessions),
+                estimate=estimate,
+                interval=None if estimate is None else estimate.interval,
+                reason=entry.reason if name == line.id else None,
+                single=name != line.id,
+            )
+            for name, coefficient, estimate in estimates
+        ]
+    return rows
+
+
+def _few_of_many(rows: Sequence[EstimateRow]) -> list[EstimateRow]:
+    # five raters of each line of the plan that has too many to look at
+    shown: list[EstimateRow] = []
+    for single, group in groupby(rows, key=attrgetter("single")):
+        of_raters = list(group)
+        if not single or len(of_raters) <= MANY_RATERS:
+            shown += of_raters
+            continue
+        known = [
+            (row.estimate.value, row)
+            for row in of_raters
+            if row.estimate is not None and math.isfinite(row.estimate.value)
+        ]
+        ranks = at_ranks([value for value, _ in known]) if known else {}
+        shown += [
+            dataclasses.replace(known[at][1], name=f"{known[at][1].name} ({rank})")
+            for rank, at in ranks.items()
+        ]
+    return shown
+
+
+def estimate_table(
+    rows: Sequence[EstimateRow], *, name: str, caption: str, data: str
+) -> Table:
+    """Return a table of estimates."""
+    # On a page an interval is one column, marked with a letter; a note below says what
+    # each letter means: level, method, and what the interval generalises to.
+    marks: dict[str, str] = {}
+    cells: list[tuple[Value, ...]] = []
+    remarks: dict[str, list[str]] = {}  # a text to the rows it is of
+    for row in rows:
+        interval, mark = row.interval, ""
+        # what a reader must know before relying on it
+        texts = [row.reason, None if row.estimate is None else row.estimate.reason]
+        if interval is not None:
+            note = (
+                f"{interval_name(interval)}; generalises to {TARGETS[interval.target]}"
+            )
+            nth, again = len(marks) % len(_LETTERS), len(marks) // len(_LETTERS)
+            mark = marks.setdefault(note, _LETTERS[nth] * (again + 1))  # a, ..., z, aa
+            if interval.median is not None:
+                texts.append(f"posterior median {number(interval.median, 3)}")
+            texts += [*interval.notes, interval.reason]
+            if interval.n_undefined:
+                texts.append(f"undefined on {interval.n_undefined} resamples")
+        cells.append(_cells(row, mark))
+        for text in dict.fromkeys(text.rstrip(".") for text in texts if text):
+            remarks.setdefault(text, []).append(row.name)
+    notes = [
+        *(f"{mark} {note}." for note, mark in marks.items()),
+        *(f"{', '.join(names)}: {text}." for text, names in remarks.items()),
+    ]
+    if any(row.estimate is not None for row in rows):
+        notes.append(_AGREEMENTS)
+    strengths = [column.key for column in _COLUMNS].index("strength")
+    if any(row[strengths] is not None for row in cells):
+        notes.append(_LANDIS_KOCH)
+    return Table(
+        name=name,
+        caption=caption,
+        columns=_COLUMNS,
+        rows=tuple(cells),
+        notes=tuple(notes),
+        data=data,
+    )
+
+
+def _cells(row: EstimateRow, mark: str) -> tuple[Value, ...]:
+    # mark: the letter of its interval
+    estimate, interval = row.estimate, row.interval
+    head = (row.name, row.coefficient)
+    if estimate is None:
+        data = (row.models, row.models, row.sessions, None, None)
+        return (*head, *data, None, NOT_THERE, *[None] * 7, row.reason)
+    ends: tuple[Value, ...] = (None,) * 5
+    if interval is not None:
+        ends = (
+            f"{interval_text(interval.low, interval.high)} {mark}",
+            interval.low,
+            interval.high,
+            interval_name(interval),
+            TARGETS[interval.target],
+        )
+    is_kappa = estimate.coefficient.endswith("kappa")
+    return (
+        *head,
+        f"{estimate.n_items} {row.models}",
+        row.models,
+        row.sessions,
+        estimate.n_items,
+        1 if row.single else estimate.n_raters,
+        estimate.value,
+        *ends,
+        strength(estimate.value)
+        if is_kappa and math.isfinite(estimate.value)
+        else None,
+        estimate.observed,
+        estimate.chance,
+        estimate.reason,
+    )
+
+
+def _forest(
+    material: Material, rows: Sequence[EstimateRow], name: str, caption: str
+) -> Drawing:
+    lines = []
+    for row in rows:
+        # how much it rests on, and what its interval is for
+        estimate, interval = row.estimate, row.interval
+        detail = f"{row.models} models, {row.sessions}"
+        if estimate is not None:
+            raters = "twice" if row.single else counted(estimate.n_raters, "rater")
+            detail = f"{counted(estimate.n_items, 'model')}, {raters}"
+        if interval is not None:
+            looks = (interval.kind, aside(interval), TARGETS[interval.target])
+            detail += f"; {', '.join(text for text in looks if text)}"
+        label = f"{row.coefficient}, {row.name}"
+        lines.append(forest_row(label, estimate, detail=detail))
+    texts = "; ".join(f"{line.label}: {line.text}" for line in lines)
+    return Drawing(
+        name=name,
+        caption=(
+            f"{caption}: estimates (dots) and their intervals, {_LOOKS}. Dashed: what "
+            "chance gives."
+        ),
+        alt=f"Forest plot. {texts}.",
+        content=Forest(rows=tuple(lines), axis_label="agreement (1 is perfect)"),
+        stamp=material.stamp,
+    )

@@ -1,0 +1,396 @@
+"""Sections `flow` and `conduct`: what became of the raters, and what happened."""
+
+import statistics
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from masrel._input import listed
+from masrel.errors import ParameterError
+from masrel.lab._event_log import Event
+from masrel.lab.conduct import read_conduct
+from masrel.lab.conduct._study_log import conduct_hash
+from masrel.lab.progress import (
+    RaterProgress,
+    SessionProgress,
+    rater_progress,
+    session_progress,
+)
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.protocol._rater_fields import field_heading
+from masrel.lab.ratings import Correction, corrections_of, study_remarks
+from masrel.lab.report._figure_data import FlowStep, RaterFlow
+from masrel.lab.report._material import Content, Drawing, Material, Paragraph, Section
+from masrel.tables._tables import Column, Table, Value
+
+_WHO, _NOTES = "who", "notes"
+"""What `include` may name beside fields of raters."""
+
+_LISTED = ("withdrawn", "excluded", "included", "unblinded", "noted", "merged")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StudyConduct:
+    """What a report says of how a study was run.
+
+    Attributes
+    ----------
+    sessions : tuple of SessionProgress
+        Where every session stands.
+    raters : tuple of RaterProgress
+        What became of every rater.
+    events : tuple of Event
+        What happened beside the sessions, in order of time.
+    corrections : tuple of Correction
+        Grades that were corrected.
+    remarks : tuple of str
+        What a reader must know of the sessions.
+    sha256 : str or None
+        Of what happened beside the sessions; None for nothing.
+    include : frozenset of str
+        What is shown though it is private.
+    """
+
+    sessions: tuple[SessionProgress, ...]
+    raters: tuple[RaterProgress, ...]
+    events: tuple[Event, ...]
+    corrections: tuple[Correction, ...]
+    remarks: tuple[str, ...]
+    sha256: str | None
+    include: frozenset[str]
+
+    @property
+    def inputs(self) -> dict[str, str]:
+        """What the manifest of a report says of it: a hash, and what is shown."""
+        sha256 = {} if self.sha256 is None else {"conduct_sha256": self.sha256}
+        shown = {"include": " ".join(sorted(self.include))} if self.include else {}
+        return sha256 | shown
+
+
+def study_conduct(
+    study: StudyPaths,
+    protocol: Protocol,
+    *,
+    file: Path | None = None,
+    include: Collection[str] = (),
+) -> StudyConduct | None:
+    """Gather what a report says of how a study was run.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+    file : Path, optional
+        A table of ratings that is used whatever the session logs say.
+    include : collection of str, optional
+        What is shown though it is private: ``"who"`` (who recorded each event),
+        ``"notes"`` (texts and reasons), or fields of raters.
+
+    Returns
+    -------
+    StudyConduct or None
+        For `write_report`; None of a study that was not run.
+
+    Raises
+    ------
+    ParameterError
+        If `include` names anything else.
+    SessionLogError
+        If a log is damaged.
+    """
+    known = (_WHO, _NOTES, *protocol.rater_fields)
+    for name in include:
+        if name not in known:
+            raise ParameterError(
+                f"include: needed one of {', '.join(known)}, got {name!r}"
+            )
+    if not (study.sessions.is_dir() or study.conduct_logs()):
+        return None
+    sessions = session_progress(study, protocol)
+    return StudyConduct(
+        sessions=sessions,
+        raters=rater_progress(study, protocol, sessions),
+        events=tuple(e for e in read_conduct(study) if e.kind in _LISTED),
+        # a table named by hand is not the logs'
+        corrections=corrections_of(study, protocol) if file is None else (),
+        remarks=study_remarks(
+            study, protocol, file=file, has_conduct=False, include=include
+        ),
+        sha256=conduct_hash(study),
+        include=frozenset(include),
+    )
+
+
+CONDUCT_SECTIONS = ("flow", "conduct")
+"""Sections that no protocol names: they are there where there is anything to say."""
+
+
+def conduct_sections(material: Material, conduct: StudyConduct) -> list[Section]:
+    """Say what became of the raters and what happened, as far as it is known."""
+    sections = []
+    if any(session.last_event is not None for session in conduct.sessions):
+        blocks: tuple[Content, ...] = (
+            _flow_table(material, conduct),
+            _flow_figure(material, conduct),
+            *_characteristics(material, conduct),
+        )
+        sections.append(Section(name="flow", title="Flow of the raters", blocks=blocks))
+    if happened := _happened(material, conduct):
+        sections.append(Section(name="conduct", title="Conduct", blocks=happened))
+    return sections
+
+
+def _happened(material: Material, conduct: StudyConduct) -> tuple[Content, ...]:
+    blocks: list[Content] = []
+    if conduct.events:
+        blocks += _event_tables(material, conduct)
+    if conduct.corrections:
+        blocks.append(_corrections_table(material, conduct))
+    blocks += [Paragraph(text=text) for text in conduct.remarks]
+    left_out = "; ".join(_left_out(material, conduct))
+    if left_out:
+        blocks.append(
+            Paragraph(
+                text=f"Left out, as nobody asked for it: {left_out}. masrel report "
+                "--include NAME shows what is in parentheses."
+            )
+        )
+    return tuple(blocks)
+
+
+def _analysed(material: Material, session: str | None = None) -> set[str]:
+    # raters with a grade that is analysed
+    graded = {
+        row.rater
+        for row in material.ratings.rows
+        if row.grade is not None and session in (None, row.session)
+    }
+    return graded - set(material.analysis.excluded)
+
+
+def _flow_table(material: Material, conduct: StudyConduct) -> Table:
+    rows: list[tuple[Value, ...]] = []
+    for session in (*(s.id for s in material.protocol.sessions), None):
+        stages: dict[str, set[str]] = {}
+        for each in conduct.sessions:
+            if session in (None, each.session):
+                stages.setdefault(each.rater, set()).add(each.stage)
+        of_session = [rater for rater in conduct.raters if rater.rater in stages]
+        status = Counter(rater.status for rater in of_session)
+        rows.append(
+            (
+                session or "study",
+                len(stages),
+                sum(bool(s & {"begun", "complete"}) for s in stages.values()),
+                sum(s == {"complete"} for s in stages.values()),
+                status["withdrawn"],
+                status["excluded"],
+                sum(rater.is_late for rater in of_session),
+                len(_analysed(material, session)),
+            )
+        )
+    keys = ("planned", "begun", "complete", "withdrawn", "excluded", "late", "analysed")
+    return Table(
+        name="rater_flow",
+        caption="Raters, from planned to analysed",
+        columns=(
+            Column(key="session", heading="Session", align="left"),
+            *(Column(key=key, heading=key.capitalize()) for key in keys),
+        ),
+        rows=tuple(rows),
+        notes=(
+            "study: complete in all sessions. Late: joined after the site's first draw "
+            "of schedules. Analysed: with a grade, not excluded.",
+        ),
+        data=material.data,
+    )
+
+
+def _flow_figure(material: Material, conduct: StudyConduct) -> Drawing:
+    status = {rater.rater: rater.status for rater in conduct.raters}
+    stages: dict[str, set[str]] = {rater: set() for rater in status}
+    for each in conduct.sessions:
+        stages[each.rater].add(each.stage)
+    begun = [r for r, s in stages.items() if s & {"begun", "complete"}]
+    complete = [r for r, s in stages.items() if s == {"complete"}]
+    left = [r for r in status if r not in complete and status[r] == "withdrawn"]
+    late = [rater.rater for rater in conduct.raters if rater.is_late]
+    analysed = _analysed(material)
+    going_on = [r for r in begun if r not in complete and r not in left]
+    excluded = material.analysis.excluded
+    steps = (
+        FlowStep(label="Planned", n=len(status), others=_named(("Late", late))),
+        FlowStep(
+            label="Begun",
+            n=len(begun),
+            others=_named(("Not begun", [r for r in status if r not in begun])),
+        ),
+        FlowStep(
+            label="Complete",
+            n=len(complete),
+            others=_named(("Withdrawn", left), ("Not complete", going_on)),
+        ),
+        FlowStep(
+            label="Analysed", n=len(analysed), others=_named(("Excluded", excluded))
+        ),
+    )
+    shown = "; ".join(
+        f"{step.label}: {step.n}" + "".join(f", {text}" for text in step.others)
+        for step in steps
+    )
+    return Drawing(
+        name="rater_flow",
+        caption="Flow of the raters. Who began and did not complete is analysed, too.",
+        alt=f"Flow of the raters. {shown}.",
+        content=RaterFlow(steps=steps),
+        stamp=material.stamp,
+    )
+
+
+def _named(*groups: tuple[str, Collection[str]]) -> tuple[str, ...]:
+    return tuple(
+        f"{name}: {len(raters)} ({listed(raters)})" for name, raters in groups if raters
+    )
+
+
+def _characteristics(material: Material, conduct: StudyConduct) -> Iterator[Table]:
+    # of the raters who are analysed, in the fields that may be shown
+    analysed = _analysed(material)
+    raters = [rater for rater in conduct.raters if rater.rater in analysed]
+    numbers: list[tuple[Value, ...]] = []
+    counts: list[tuple[Value, ...]] = []
+    for name, field in material.protocol.rater_fields.items():
+        known = [r.values[name] for r in raters if r.values[name] is not None]
+        if not (field.public or name in conduct.include):
+            continue
+        if field.type in ("whole", "number"):
+            numbers.append((field_heading(name, field), len(known), *_summary(known)))
+        else:
+            tally = Counter(map(str, known))
+            counts += [
+                (field_heading(name, field), text, n) for text, n in tally.items()
+            ]
+    if numbers:
+        measures = ("Mean", "SD", "Median", "Least", "Most")
+        yield Table(
+            name="rater_numbers",
+            caption="What is known of the raters who are analysed: numbers",
+            columns=(
+                Column(key="field", heading="Field", align="left"),
+                Column(key="n", heading="Raters"),
+                *(Column(key=m.lower(), heading=m, digits=2) for m in measures),
+            ),
+            rows=tuple(numbers),
+            notes=("SD: n − 1.",),
+            data=material.data,
+        )
+    if counts:
+        yield Table(
+            name="rater_counts",
+            caption="What is known of the raters who are analysed",
+            columns=(
+                Column(key="field", heading="Field", align="left"),
+                Column(key="value", heading="Value", align="left"),
+                Column(key="n", heading="Raters"),
+            ),
+            rows=tuple(counts),
+            data=material.data,
+        )
+
+
+def _summary(known: Sequence[object]) -> tuple[Value, ...]:
+    numbers = [float(value) for value in known if isinstance(value, int | float)]
+    if not numbers:
+        return (None,) * 5
+    sd = statistics.stdev(numbers) if len(numbers) > 1 else None
+    middle = statistics.median(numbers)
+    return (statistics.fmean(numbers), sd, middle, min(numbers), max(numbers))
+
+
+def _event_tables(material: Material, conduct: StudyConduct) -> Iterator[Table]:
+    by = [Column(key="who", heading="By", align="left")] * (_WHO in conduct.include)
+    rows: list[tuple[Value, ...]] = []
+    for event in conduct.events:
+        fields = event.fields
+        who = [str(fields.get("who", "")) or None] * len(by)
+        kind = str(fields["kind"]) if event.kind == "noted" else event.kind
+        place = (_text(fields.get("rater")), _text(fields.get("session")))
+        details = "; ".join(_details(event, has_texts=_NOTES in conduct.include))
+        rows.append((event.time_utc[:10], kind, *place, details or None, *who))
+    yield Table(
+        name="events",
+        caption="What happened beside the sessions, in order of time",
+        columns=(
+            Column(key="date", heading="Date", align="left"),
+            Column(key="event", heading="Event", align="left"),
+            Column(key="rater", heading="Rater", align="left"),
+            Column(key="session", heading="Session", align="left"),
+            Column(key="details", heading="Details", align="left"),
+            *by,
+        ),
+        rows=tuple(rows),
+        data=material.data,
+    )
+
+
+def _details(event: Event, *, has_texts: bool) -> Iterator[str]:
+    # what else is said of an event
+    fields = event.fields
+    if event.kind == "merged":
+        yield f"the folder {fields['name']}"
+    if event.kind == "unblinded":
+        yield "all codes" if fields["code"] is None else f"code {fields['code']}"
+    if has_texts:
+        yield from (str(fields[name]) for name in ("text", "why") if name in fields)
+    for name in ("severity", *(("action", "outcome") if has_texts else ())):
+        if fields.get(name) is not None:
+            yield f"{name}: {fields[name]}"
+
+
+def _text(value: object) -> str | None:
+    return None if value is None else str(value)
+
+
+def _corrections_table(material: Material, conduct: StudyConduct) -> Table:
+    columns = [  # each is of `Correction`
+        Column(key="rater", heading="Rater", align="left"),
+        Column(key="session", heading="Session", align="left"),
+        Column(key="model", heading="Model", align="left"),
+        Column(key="repeat", heading="Repeat"),
+        Column(key="first_grade", heading="First", align="center"),
+        Column(key="grade", heading="Corrected", align="center"),
+    ]
+    if _NOTES in conduct.include:
+        columns.append(Column(key="why", heading="Reason", align="left"))
+    if _WHO in conduct.include:
+        columns.append(Column(key="who", heading="By", align="left"))
+    return Table(
+        name="corrections",
+        caption="Corrected grades",
+        columns=tuple(columns),
+        rows=tuple(
+            tuple(getattr(each, column.key) for column in columns)
+            for each in conduct.corrections
+        ),
+        notes=(
+            "Each correction in order of time, the last one of a presentation counts; "
+            "First: as the rater gave it; –: no grade.",
+        ),
+        data=material.data,
+    )
+
+
+def _left_out(material: Material, conduct: StudyConduct) -> Iterator[str]:
+    texts = [e for e in conduct.events if {"text", "why"} & {*e.fields}]
+    named = [e for e in conduct.events if "who" in e.fields]
+    if (named or conduct.corrections) and _WHO not in conduct.include:
+        yield f"who recorded events and corrections ({_WHO})"
+    if (texts or conduct.corrections) and _NOTES not in conduct.include:
+        yield f"texts of notes, deviations and adverse events, and reasons ({_NOTES})"
+    for name, field in material.protocol.rater_fields.items():
+        is_known = any(rater.values[name] is not None for rater in conduct.raters)
+        if is_known and not field.public and name not in conduct.include:
+            yield f"the field {field_heading(name, field)} of raters ({name})"

@@ -1,0 +1,374 @@
+"""The table, the JSON and the figures of an identified joint or device."""
+
+import math
+from collections.abc import Sequence
+
+from masrel.lab.elbow.identification import (
+    ComparedFit,
+    ElbowFit,
+    FittedParameter,
+    FrictionFit,
+    LackOfFit,
+)
+from masrel.lab.elbow.identification._catches import Trial
+from masrel.lab.elbow.identification._quantities import ALL_QUANTITIES, Quantity
+from masrel.lab.report._figure_data import FrictionView, JointFitView
+from masrel.plots._drawn_values import Content, Form
+from masrel.tables._tables import (
+    ABSENT,
+    SIMULATED,
+    Column,
+    Table,
+    interval_text,
+    number,
+    percent,
+)
+
+FRICTION = {
+    "inertia": Quantity(symbol="I", key="inertia_kg_m2", unit="kg·m²"),
+    "viscous": Quantity(symbol="B", key="viscous_nms_rad", unit="N·m·s/rad"),
+    "coulomb": Quantity(symbol="β", key="coulomb_nm", unit="N·m"),
+}
+"""Parameters of the friction law (7), as a reader sees them."""
+
+
+def fit_table(fit: ElbowFit | FrictionFit) -> Table:
+    """Return the table of an identified joint, or of a device's friction."""
+    return _joint_table(fit) if isinstance(fit, ElbowFit) else _friction_table(fit)
+
+
+def _joint_table(fit: ElbowFit) -> Table:
+    alone = {e.name: e for step in fit.steps for e in step.estimates}
+    rows = tuple(
+        _row(e, alone.get(e.name), ALL_QUANTITIES[e.name]) for e in fit.estimates
+    )
+    slow = sum(trial.pace == "slow" for trial in fit.trials)
+    fast = len(fit.trials) - slow
+    notes = (
+        fit.lack_of_fit.sentence,
+        f"{slow} slow and {fast} fast trials; intervals are clustered by trial.",
+        f"Slow trials differ from (1) by {number(100.0 * fit.relative_error, 1)} % of "
+        f"their mean torque; all trials from the law by {number(fit.torque_sd, 3)} N·m "
+        "(standard deviation).",
+        "The column of a step takes what earlier steps found as known.",
+        *fit.remarks,
+    )
+    return _table("joint", "Parameters of the joint", rows, notes, fit)
+
+
+def residual_tables(fit: ElbowFit | FrictionFit) -> tuple[Table, ...]:
+    """Return the table of what a fitted joint leaves of the torque, phase by phase."""
+    if not isinstance(fit, ElbowFit):
+        return ()
+    lack = fit.lack_of_fit
+    notes = [
+        "Runs of one sign over those that independent samples would have; "
+        "autocorrelation of neighbouring samples."
+    ]
+    if not math.isnan(lack.after_to_before):
+        ratio = number(lack.after_to_before, 2)
+        notes.append(f"From the catch on {ratio} times what is left before it.")
+    if not math.isnan(lack.rest_sd):
+        notes.append(f"Noise at rest {number(lack.rest_sd, 3)} N·m.")
+    table = Table(
+        name="residuals",
+        caption="What is left of the torque",
+        columns=(
+            Column(key="phase", heading="Phase", align="left"),
+            Column(key="n_samples", heading="Samples"),
+            Column(key="sd", heading="Root mean square (N·m)"),
+            Column(key="runs", heading="Runs"),
+            Column(key="autocorrelation", heading="Autocorrelation"),
+        ),
+        rows=tuple(
+            (
+                phase.phase,
+                phase.n_samples,
+                number(phase.sd, 3),
+                number(phase.runs, 2),
+                number(phase.autocorrelation, 2),
+            )
+            for phase in lack.phases
+        ),
+        notes=tuple(notes),
+        data="simulated" if fit.simulated else "recorded",
+    )
+    return (table,)
+
+
+def comparison_tables(compared: Sequence[ComparedFit]) -> tuple[Table, ...]:
+    """Return the table of a comparison of fits, if there is one."""
+    first = compared[0].fit if compared else None
+    if first is None:
+        return ()
+    rows = tuple(
+        (
+            _with_text(each),
+            number(each.error, 4) if each.fit else ABSENT,
+            number(1e3 * each.worse, 3) if each.fit else ABSENT,
+            number(1e3 * each.worse_se, 3) if each.fit else ABSENT,
+            each.fit.lack_of_fit.verdict if each.fit else "refused",
+            "chosen" if each.is_chosen else "",
+        )
+        for each in compared
+    )
+    columns = (
+        Column(key="fit", heading="Fit", align="left"),
+        Column(key="error", heading="Error (N·m)"),
+        Column(key="worse", heading="Worse (10⁻³ N²·m²)"),
+        Column(key="worse_se", heading="SE"),
+        Column(key="verdict", heading="Verdict", align="left"),
+        Column(key="chosen", heading="", align="left"),
+    )
+    notes = (
+        "Error: root mean square distance of a trial's torque from what the parameters "
+        "of all other trials give, with its own constant, peak, residual and travel.",
+        "Worse: mean square distance less that of the best fit, with its standard "
+        "error over trials; chosen is the first that is within one of the best.",
+        *(f"{_with_text(each)}: {each.reason}" for each in compared if each.reason),
+    )
+    return (
+        Table(
+            name="comparison",
+            caption="Fits compared by leaving trials out",
+            columns=columns,
+            rows=rows,
+            notes=notes,
+            data="simulated" if first.simulated else "recorded",
+        ),
+    )
+
+
+def _with_text(each: ComparedFit) -> str:
+    words = ", ".join(name.replace("_", " ") for name in each.fitted)
+    return f"with {words}" if words else "as given"
+
+
+def comparison_document(compared: Sequence[ComparedFit]) -> dict[str, object]:
+    """Return a comparison of fits as plain values for JSON; empty without one."""
+    if not compared:
+        return {}
+    return {
+        "comparison": [
+            {
+                "fitted": list(each.fitted),
+                "error_nm": _finite(each.error),
+                "worse_nm2": _finite(each.worse),
+                "worse_se_nm2": _finite(each.worse_se),
+                "chosen": each.is_chosen,
+                "verdict": each.fit.lack_of_fit.verdict if each.fit else None,
+                "reason": each.reason,
+                "estimates": [
+                    _estimate(e, ALL_QUANTITIES[e.name])
+                    for e in (each.fit.estimates if each.fit else ())
+                ],
+            }
+            for each in compared
+        ]
+    }
+
+
+def _friction_table(fit: FrictionFit) -> Table:
+    rows = tuple(_row(e, None, FRICTION[e.name]) for e in fit.estimates)
+    notes = (
+        f"{len(fit.strokes)} strokes; intervals are clustered by stroke.",
+        f"Torque differs from (7) by {number(100.0 * fit.relative_error, 1)} % of its "
+        "mean.",
+    )
+    return _table("friction", "Friction of the device", rows, notes, fit)
+
+
+def _row(
+    estimate: FittedParameter, alone: FittedParameter | None, quantity: Quantity
+) -> tuple[str, str, str, str, str, str, int]:
+    factor = quantity.factor
+    value, error = estimate.value * factor, estimate.standard_error * factor
+    digits = _digits(value, error)
+    interval, step = ABSENT, ABSENT
+    if not math.isnan(error):
+        low, high = estimate.low * factor, estimate.high * factor
+        interval = interval_text(low, high, digits)
+    if alone is not None and not math.isnan(alone.value):
+        step = number(alone.value * factor, digits)
+    return (
+        quantity.symbol,
+        quantity.unit,
+        number(value, digits),
+        number(error, digits) if not math.isnan(error) else ABSENT,
+        interval,
+        step,
+        estimate.n_trials,
+    )
+
+
+def _digits(value: float, error: float) -> int:
+    # two digits of the error, or four of the value
+    if math.isnan(value):
+        return 0
+    size, digits = (error, 1) if error > 0.0 else (abs(value), 3)
+    return max(0, digits - math.floor(math.log10(size))) if size > 0.0 else 3
+
+
+def _table(
+    name: str,
+    caption: str,
+    rows: Sequence[tuple[str | int, ...]],
+    notes: tuple[str, ...],
+    fit: ElbowFit | FrictionFit,
+) -> Table:
+    return Table(
+        name=name,
+        caption=caption,
+        columns=(
+            Column(key="parameter", heading="Parameter", align="left"),
+            Column(key="unit", heading="Unit", align="left"),
+            Column(key="value", heading="Value"),
+            Column(key="standard_error", heading="SE"),
+            Column(key="interval", heading=f"{percent(fit.level)} % interval"),
+            Column(key="step", heading="Step alone"),
+            Column(key="n_trials", heading="Trials"),
+        ),
+        rows=tuple(rows),
+        notes=notes,
+        data="simulated" if fit.simulated else "recorded",
+    )
+
+
+def fit_document(fit: ElbowFit | FrictionFit) -> dict[str, object]:
+    """Return a fit as plain values for JSON, units in the keys, ``nan`` as None."""
+    if isinstance(fit, FrictionFit):
+        return _friction_document(fit)
+    return {
+        "simulated": fit.simulated,
+        "level": fit.level,
+        "relative_error": _finite(fit.relative_error),
+        "torque_sd_nm": fit.torque_sd,
+        "lack_of_fit": _lack_of_fit(fit.lack_of_fit),
+        "arm": dict(fit.arm),
+        "estimates": [_estimate(e, ALL_QUANTITIES[e.name]) for e in fit.estimates],
+        "correlation": _matrix(fit.correlation.tolist()),
+        "steps": [
+            {
+                "name": step.name,
+                "estimates": [
+                    _estimate(e, ALL_QUANTITIES[e.name]) for e in step.estimates
+                ],
+            }
+            for step in fit.steps
+        ],
+        "trials": [
+            _trial(trial) | {"offset_nm": offset, "drift_nm_s": drift}
+            for trial, offset, drift in zip(
+                fit.trials, fit.offsets, fit.drifts, strict=True
+            )
+        ],
+        "recordings": [
+            {"name": name, "sha256": sha256} for name, sha256 in fit.sources.items()
+        ],
+        "remarks": list(fit.remarks),
+    }
+
+
+def _lack_of_fit(lack: LackOfFit) -> dict[str, object]:
+    return {
+        "verdict": lack.verdict,
+        "sentence": lack.sentence,
+        "level": lack.level,
+        "tests": [
+            {
+                "structure": test.name,
+                "t": test.t,
+                "degrees_of_freedom": test.df,
+                "p_value": test.p_value,
+                "adjusted_p_value": test.adjusted,
+            }
+            for test in lack.tests
+        ],
+        "explained": _finite(lack.explained),
+        "phases": [
+            {
+                "phase": phase.phase,
+                "n_samples": phase.n_samples,
+                "sd_nm": phase.sd,
+                "runs": phase.runs,
+                "autocorrelation": phase.autocorrelation,
+            }
+            for phase in lack.phases
+        ],
+        "after_to_before": _finite(lack.after_to_before),
+        "rest_sd_nm": _finite(lack.rest_sd),
+    }
+
+
+def _friction_document(fit: FrictionFit) -> dict[str, object]:
+    return {
+        "simulated": fit.simulated,
+        "level": fit.level,
+        "n_strokes": len(fit.strokes),
+        "relative_error": _finite(fit.relative_error),
+        "torque_sd_nm": fit.torque_sd,
+        "estimates": [_estimate(e, FRICTION[e.name]) for e in fit.estimates],
+        "correlation": _matrix(fit.correlation.tolist()),
+    }
+
+
+def _estimate(estimate: FittedParameter, quantity: Quantity) -> dict[str, object]:
+    factor = quantity.factor
+    return {
+        "key": quantity.key,
+        "value": _finite(estimate.value * factor),
+        "standard_error": _finite(estimate.standard_error * factor),
+        "degrees_of_freedom": _finite(estimate.df),
+        "low": _finite(estimate.low * factor),
+        "high": _finite(estimate.high * factor),
+        "n_trials": estimate.n_trials,
+        "reason": estimate.reason,
+    }
+
+
+def _trial(trial: Trial) -> dict[str, object]:
+    document: dict[str, object] = {
+        "name": trial.name,
+        "pace": trial.pace,
+        "start_s": trial.start,
+        "duration_s": trial.duration,
+        "peak_speed_deg_s": math.degrees(trial.peak_speed),
+        "remark": trial.remark,
+    }
+    catch = trial.catch
+    if catch is not None:
+        document |= {
+            "catch_s": catch.time,
+            "catch_angle_deg": math.degrees(catch.angle),
+            "catch_speed_deg_s": math.degrees(catch.speed),
+            "mean_speed_deg_s": math.degrees(catch.mean_speed),
+            "catch_end_s": catch.end,
+            "catch_travel_deg": math.degrees(catch.travel),
+        }
+    return document
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _matrix(rows: list[list[float]]) -> list[list[float | None]]:
+    return [[_finite(value) for value in row] for row in rows]
+
+
+def fit_figures(fit: ElbowFit | FrictionFit) -> dict[str, dict[Form, bytes]]:
+    """Return the figures of a fit by the names of their files, in every form."""
+    # Imported here: a table loads nothing that draws.
+    from masrel.plots import draw
+
+    views: dict[str, Content] = {}
+    if isinstance(fit, FrictionFit):
+        views["fit_friction"] = FrictionView(fit=fit)
+    else:
+        views["fit_slow"] = JointFitView(fit=fit, view="slow")
+        views["fit_residuals"] = JointFitView(fit=fit, view="residuals")
+        if any(trial.after is not None for trial in fit.trials):
+            views["fit_trials"] = JointFitView(fit=fit, view="fast")
+            views["fit_catches"] = JointFitView(fit=fit, view="catches")
+    stamp = SIMULATED if fit.simulated else ""
+    return {name: draw(view, stamp=stamp) for name, view in views.items()}

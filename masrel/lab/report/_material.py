@@ -1,0 +1,151 @@
+"""What a section of the report is made from, and what it is made of."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from masrel.audit import Claim
+from masrel.lab.analysis import Analysis
+from masrel.lab.protocol import Protocol
+from masrel.lab.ratings import InPerson, Ratings
+from masrel.plots import _drawn_values as figure
+from masrel.tables._tables import SIMULATED, SIMULATED_DEVICE, Table
+
+SIMULATED_GRADES = (
+    "SIMULATED DATA – no person gave these grades",
+    "The grades and speeds in this report are simulated. They show that the study "
+    "runs; they say nothing about people or about the models.",
+)
+_SIMULATED_IN_PART = (
+    "SIMULATED DATA – no person gave some of these grades",
+    "Some of the grades in this report are simulated; the table of sessions says of "
+    "which. Together they say nothing about people or about the models.",
+)
+"""Banner and sentence of a report, by who gave the grades."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Material:
+    """Everything a report is made from."""
+
+    protocol: Protocol
+    ratings: Ratings
+    analysis: Analysis
+    # grades given in person, whose notes are shown below their table
+    in_person: InPerson | None
+    # where the data come from, in one word; more than one joined by "+"
+    data: str
+    banner: str  # what every page says in large letters, if anything
+    provenance: str  # the sentence at the head of the pages
+    stamp: str  # the line every figure carries
+    trace_stamp: str  # the line a figure of reconstructed traces carries
+    # sessions, raters: those that have ratings, in the protocol's order
+    sessions: tuple[str, ...]
+    raters: tuple[str, ...]
+    recordings: Path | None = None  # the folder of the sessions' recordings, if known
+    claims: tuple[Claim, ...] = ()  # what a paper printed
+
+
+def gather(
+    protocol: Protocol,
+    ratings: Ratings,
+    analysis: Analysis,
+    in_person: InPerson | None = None,
+    recordings: Path | None = None,
+    claims: tuple[Claim, ...] = (),
+) -> Material:
+    """Return ratings and their analysis with what every section says of them."""
+    sources = sorted({row.source for row in ratings.rows})
+    if ratings.simulated and "simulated" not in sources:
+        sources.append("simulated")
+    data = "+".join(sources) or "foreign"
+    study, stamp, banner = protocol.study, "", ""
+    provenance = f"Study {study.id}, {data} ratings."
+    trace_stamp = "Model reconstruction at recorded mean speeds, not a measurement"
+    if ratings.simulated:
+        banner, provenance = SIMULATED_GRADES
+        stamp = trace_stamp = SIMULATED
+        if ratings.n_from_persons == len(ratings.rows):
+            data = data.replace("simulated", "simulated device")
+            how_many = "none" if sources == ["simulated"] else "not all"
+            banner, provenance = _on_simulated_device(how_many)
+            stamp = trace_stamp = SIMULATED_DEVICE
+        elif ratings.n_from_persons:
+            banner, provenance = _SIMULATED_IN_PART
+    elif data == "published":
+        provenance = f"Published grades and speeds: {study.source}".rstrip(": ")
+        stamp = f"Published data: {study.source}".rstrip(": ")
+        trace_stamp = "Model reconstruction at published mean speeds, not a measurement"
+        trace_stamp = f"{trace_stamp}: {study.source}".rstrip(": ")
+    sessions = {row.session for row in ratings.rows}
+    raters = {row.rater for row in ratings.rows}
+    return Material(
+        protocol=protocol,
+        ratings=ratings,
+        analysis=analysis,
+        in_person=in_person,
+        data=data,
+        banner=banner,
+        provenance=provenance,
+        stamp=stamp,
+        trace_stamp=trace_stamp,
+        sessions=tuple(s.id for s in protocol.sessions if s.id in sessions),
+        raters=tuple(r.id for r in protocol.raters if r.id in raters),
+        recordings=recordings,
+        claims=claims,
+    )
+
+
+def _on_simulated_device(how_many: str) -> tuple[str, str]:
+    # banner and sentence where persons gave all grades; how many of them on hardware
+    return (
+        f"SIMULATED DEVICE – persons gave these grades, {how_many} of them on hardware",
+        f"Persons gave the grades in this report, {how_many} of them on hardware: on "
+        "the simulated device nobody felt a model, and the speeds are those of a "
+        "simulated hand. Such grades say nothing about the models.",
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Paragraph:
+    """One paragraph of plain text."""
+
+    text: str
+    absent: bool = False  # whether it says that something planned is not in the data
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drawing:
+    """A figure that is drawn when the document is written, and not before."""
+
+    name: str  # name of its files, without extension
+    caption: str  # what it shows, understood alone
+    alt: str  # what a reader who cannot see it needs to know
+    content: figure.Content  # what is drawn
+    stamp: str  # the line that says where its data come from
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Listing:
+    """Text that is shown letter by letter, to be copied."""
+
+    title: str
+    text: str
+
+
+Content = Paragraph | Table | Drawing | Listing
+"""What a section is made of."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """One section of the report."""
+
+    name: str  # its name in the protocol's ``report.sections``
+    title: str  # its heading
+    blocks: tuple[Content, ...]  # in order
+
+
+def absent_section(name: str, title: str, reason: str | None) -> Section:
+    """Return a section whose data are not there, and why."""
+    text = f"Not in these data: {reason or 'this was not computed'}."
+    return Section(name=name, title=title, blocks=(Paragraph(text=text, absent=True),))

@@ -1,0 +1,92 @@
+"""Days between sessions, and between beginning one and coming back to it."""
+
+import warnings
+from collections.abc import Callable, Sequence
+from datetime import date, datetime
+
+from masrel.errors import MasrelWarning, ParameterError
+from masrel.lab._event_log import Event, read_log
+from masrel.lab.protocol import Protocol, Session, StudyPaths
+from masrel.lab.recording import _Fact
+
+_NOT_THE_RATERS = ("recovered", "correction", "answer-correction", "stopped")
+"""Events that do not say when a rater was there last."""
+
+
+def days_since(time_utc: str, now: Callable[[], datetime]) -> int:
+    """Return the calendar days, where the computer is, since a time of a log."""
+    return (now().astimezone().date() - _day(time_utc)).days
+
+
+def _day(time_utc: str) -> date:
+    return datetime.fromisoformat(time_utc).astimezone().date()
+
+
+def last_time(events: Sequence[Event]) -> str:
+    """Return when a rater was last there, ISO 8601 in UTC."""
+    return [e.time_utc for e in events if e.kind not in _NOT_THE_RATERS][-1]
+
+
+def is_complete(study: StudyPaths, rater: str, session: str) -> bool:
+    """Return whether a session came to its end."""
+    return _completed(study, rater, session) is not None
+
+
+def _completed(study: StudyPaths, rater: str, session: str) -> str | None:
+    # when a session came to its end
+    log = study.log_file(rater, session)
+    events = read_log(log) if log.exists() else ()
+    completed = next((e.time_utc for e in events if e.kind == "complete"), None)
+    # one on paper was on another day than the one on which it was entered
+    held = next((str(e.fields["on"]) for e in events if e.kind == "held"), None)
+    return held if completed is not None and held is not None else completed
+
+
+def interval_fields(
+    study: StudyPaths,
+    protocol: Protocol,
+    rater: str,
+    session: str,
+    now: Callable[[], datetime],
+) -> dict[str, _Fact] | None:
+    """Return what a log says of the session before; None where none has to be.
+
+    A session that begins out of order is refused, or warned of.
+    """
+    rules = next(each for each in protocol.sessions if each.id == session)
+    before = next((each for each in protocol.sessions if each.id == rules.after), None)
+    if before is None or rater not in before.raters:
+        return None
+    completed = _completed(study, rater, before.id)
+    days = None if completed is None else days_since(completed, now)
+    problem = _problem(rules, days)
+    if problem is not None:
+        message = (
+            f"{study.protocol}: sessions.{session}: needed {problem} for rater {rater}"
+        )
+        if rules.order_policy == "refuse":
+            raise ParameterError(message)
+        warnings.warn(message, MasrelWarning, stacklevel=2)
+    return {
+        "after": before.id,
+        "days": days,
+        "at_least_days": rules.at_least_days,
+        "at_most_days": rules.at_most_days,
+        "kept": problem is None,
+    }
+
+
+def _problem(rules: Session, days: int | None) -> str | None:
+    # what of the order of two sessions does not hold, or None
+    low, high = rules.at_least_days, rules.at_most_days
+    if days is None:
+        return f"session {rules.after} complete before it, got one that is not"
+    for key, limit, is_kept in (
+        ("at_least_days", low, low is None or days >= low),
+        ("at_most_days", high, high is None or days <= high),
+    ):
+        if not is_kept:
+            words = key.replace("_", " ").removesuffix(" days")
+            unit = "day" if limit == 1 else "days"
+            return f"{words} {limit} {unit} after session {rules.after}, got {days}"
+    return None

@@ -1,0 +1,328 @@
+"""What a source of grades is, and the one that reads them off a script."""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar, Protocol, cast
+
+from masrel.errors import ParameterError
+from masrel.lab.protocol import PresentationRules, Question, Questionnaire
+from masrel.lab.protocol import Protocol as StudyProtocol
+from masrel.lab.protocol._questions import Answer
+from masrel.lab.run._state import Felt
+from masrel.lab.schedule import Presentation
+
+if TYPE_CHECKING:
+    from masrel.lab.hess import EmergencyStop, PresentationStatus  # loads numpy
+
+MAX_FAULTS = 3  # in a row of one presentation; after that nobody is asked any more
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GradeCorrection:
+    """What a grade should have been.
+
+    Attributes
+    ----------
+    code : str
+        The blinded code of a presentation that has been graded.
+    grade : str or None
+        The grade; None for a missing one.
+    who, why : str
+        Who corrects it, and for what reason.
+    """
+
+    code: str
+    grade: str | None
+    who: str
+    why: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GradeRequest:
+    """One request for a grade: to whom, and of which presentation.
+
+    Attributes
+    ----------
+    rater, session : str
+        Who grades, and in which session.
+    presentation : Presentation
+        What is presented. A person is told its position and code, never the model.
+    n_presentations : int
+        Presentations in the session.
+    attempt : int
+        From 1; above 1 when it is presented again.
+    n_faults : int
+        Faults in a row so far.
+    rehearsal : bool
+        Whether nothing of this enters the study's ratings.
+    practice : bool
+        Whether it is for practice; its grade is no rating.
+    rules : PresentationRules
+        How often the arm may be stretched, and with which cues.
+    status : PresentationStatus or None
+        Of the presentation that is about to begin: whoever lets a program answer calls
+        its `done` when the rater is, from any thread. None once it is over.
+    n_stretches : int
+        Stretches that were made; 0 before.
+    felt : {"felt", "below-threshold", "no-catch"} or None
+        Whether what the model has could be felt: no stretch was fast enough, or none
+        came to the catch that the model has at that speed. None before, and after a
+        fault.
+    grip_lost : bool or None
+        Whether the arm came loose and the model let it go. None before, and after a
+        fault.
+    ended : str or None
+        What ended the presentation, as in its recording: ``"time-limit"``, say. None
+        before.
+    may_skip: bool
+        Whether the presentation can be left without a grade after a fault.
+    correct : callable or None
+        Corrects a grade of the session while it goes on; raises ParameterError or
+        SessionLogError where it cannot. None where nothing can be corrected.
+    last : tuple of str and str or None, or None
+        Code and grade of what the session graded last, as it is corrected: what a
+        rater may want to correct. None before there is one.
+    samples : Path or None
+        File that keeps every sample of the presentation while it goes on. None before
+        and after.
+    """
+
+    rater: str
+    session: str
+    presentation: Presentation
+    n_presentations: int
+    attempt: int
+    n_faults: int = 0
+    rehearsal: bool = False
+    practice: bool = False
+    rules: PresentationRules = field(default_factory=PresentationRules)
+    status: "PresentationStatus | None" = None
+    n_stretches: int = 0
+    felt: Felt | None = None
+    grip_lost: bool | None = None
+    ended: str | None = None
+    may_skip: bool = False
+    correct: "Callable[[GradeCorrection], None] | None" = None
+    last: tuple[str, str | None] | None = None
+    samples: Path | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StretchGrade:
+    """A grade, and the stretch it rests on.
+
+    Attributes
+    ----------
+    grade : str
+        A grade of the scale.
+    stretch : int or None
+        Number of the stretch, from 1; None where nobody says.
+    """
+
+    grade: str
+    stretch: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Skip:
+    """That a presentation is left without a grade after a fault.
+
+    Attributes
+    ----------
+    who, why : str
+        Who says so, and for what reason.
+    """
+
+    who: str
+    why: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class QuestionRequest:
+    """One question to a rater.
+
+    Attributes
+    ----------
+    rater, session : str
+        Who is asked, and in which session.
+    questionnaire : Questionnaire
+        The questionnaire.
+    question : Question
+        The one of its questions; its `needed` says what an answer is.
+    presentation : Presentation or None
+        What it is about; None for the session or the study. A person is told its code,
+        never the model.
+    correct : callable or None
+        As that of a `GradeRequest`.
+    """
+
+    rater: str
+    session: str
+    questionnaire: Questionnaire
+    question: Question
+    presentation: Presentation | None
+    correct: "Callable[[GradeCorrection], None] | None" = None
+
+
+class GradeSource(Protocol):
+    """A source of grades: a person, a script, or simulated raters."""
+
+    @property
+    def name(self) -> str:
+        """Name of the source, kept in the log."""
+        ...
+
+    @property
+    def simulated(self) -> bool:
+        """Whether its grades are no person's."""
+        ...
+
+    def make_ready(self, request: GradeRequest) -> None:
+        """Return when the rater is ready for the presentation."""
+        ...
+
+    def grade(self, request: GradeRequest) -> str | StretchGrade | None:
+        """Return the grade, or None to have it presented again first."""
+        ...
+
+    def present_again(self, request: GradeRequest, fault: str) -> bool | Skip:
+        """Return whether to present it again after a fault, or that it is skipped."""
+        ...
+
+
+class ListeningSource(GradeSource, Protocol):
+    """A source of grades that is listened to while a model is presented.
+
+    To any other source nobody listens but to the terminal.
+    """
+
+    def listening(
+        self, request: GradeRequest, stop: "EmergencyStop"
+    ) -> AbstractContextManager[object]:
+        """Return what lasts as long as the presentation.
+
+        It may press `stop`, or say that the rater is done by ``request.status``.
+        """
+        ...
+
+
+class OccasionSource(GradeSource, Protocol):
+    """A source of grades that has instructions, breaks and questions, too.
+
+    A protocol that has any of these needs the method that is for them.
+    """
+
+    def instruct(self, request: GradeRequest, text: str) -> None:
+        """Return when the rater has read the instructions; `request` comes next."""
+        ...
+
+    def take_break(self, request: GradeRequest, minutes: float) -> None:
+        """Return when a break is over; `request` comes next."""
+        ...
+
+    def answer(self, request: QuestionRequest) -> Answer:
+        """Return the answer, or None for none."""
+        ...
+
+    def begins_anew(self, request: GradeRequest, days: int) -> bool:
+        """Return whether a session begins anew that was left so many days ago."""
+        ...
+
+
+def with_occasions(source: GradeSource, protocol: StudyProtocol) -> OccasionSource:
+    """Return a source of grades that has the methods that a protocol needs."""
+    occasions = protocol.occasions
+    needed = {
+        "instruct": ("occasions.instructions", bool(occasions.instructions)),
+        "take_break": ("occasions.break_after", occasions.break_after is not None),
+        "begins_anew": ('occasions.resume = "ask"', occasions.resume == "ask"),
+        "answer": ("questionnaires", bool(protocol.questionnaires)),
+    }
+    for method, (key, is_needed) in needed.items():
+        if is_needed and not hasattr(source, method):
+            raise ParameterError(
+                f"grades: needed a source with a method {method}, as the protocol has "
+                f"{key}, got {type(source).__name__}"
+            )
+    return cast(OccasionSource, source)
+
+
+class ScriptGrades:
+    """Grades and answers fixed beforehand.
+
+    Parameters
+    ----------
+    grades : mapping of str to str, or sequence of str
+        Grade by code, or one grade a position.
+    practice : mapping of str to str, or sequence of str, optional
+        The same for practice.
+    answers : mapping of str to str, int, float or None, optional
+        Answer by ``questionnaire.question``, whatever it is about.
+    """
+
+    name: ClassVar[str] = "script"
+    simulated: ClassVar[bool] = True
+
+    def __init__(
+        self,
+        grades: Mapping[str, str] | Sequence[str],
+        *,
+        practice: Mapping[str, str] | Sequence[str] = (),
+        answers: Mapping[str, Answer] | None = None,
+    ) -> None:
+        self._grades = grades
+        self._practice = practice
+        self._answers = answers or {}
+
+    def make_ready(self, request: GradeRequest) -> None:
+        """Return at once."""
+
+    def grade(self, request: GradeRequest) -> str | None:
+        """Return the grade of the script.
+
+        Parameters
+        ----------
+        request : GradeRequest
+            What was presented.
+
+        Returns
+        -------
+        str
+            The grade.
+
+        Raises
+        ------
+        ParameterError
+            If the script has none for it.
+        """
+        presentation = request.presentation
+        grades = self._practice if request.practice else self._grades
+        if isinstance(grades, Mapping):
+            if presentation.code in grades:
+                return grades[presentation.code]
+        elif presentation.position <= len(grades):
+            return grades[presentation.position - 1]
+        raise ParameterError(
+            f"script: needed a grade of position {presentation.position}, "
+            f"code {presentation.code}"
+        )
+
+    def instruct(self, request: GradeRequest, text: str) -> None:
+        """Return at once."""
+
+    def take_break(self, request: GradeRequest, minutes: float) -> None:
+        """Return at once."""
+
+    def answer(self, request: QuestionRequest) -> Answer:
+        """Return the answer of the script; None where it has none."""
+        return self._answers.get(f"{request.questionnaire.id}.{request.question.id}")
+
+    def begins_anew(self, request: GradeRequest, days: int) -> bool:  # noqa: ARG002 - the interface's
+        """Return False: a script goes on."""
+        return False
+
+    def present_again(self, request: GradeRequest, fault: str) -> bool:  # noqa: ARG002 - the interface's
+        """Return whether there were fewer faults in a row than `MAX_FAULTS`."""
+        return request.n_faults < MAX_FAULTS

@@ -1,0 +1,349 @@
+"""One presentation of one model: on the device of its study, and on disk."""
+
+import contextlib
+import dataclasses
+import functools
+import hashlib
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from masrel.lab.hess import (
+    Clock,
+    DeviceLimits,
+    EmergencyStop,
+    Fault,
+    HandDistribution,
+    HumanHand,
+    PresentationStatus,
+    Presented,
+    RealClock,
+    SimulatedHand,
+    StretchRules,
+    cut_off,
+    open_device,
+    run_presentation,
+)
+from masrel.lab.hess._stop import stop_on_signals
+from masrel.lab.hess._watchdog import watched
+from masrel.lab.protocol import PresentationRules, Protocol, joint_model
+from masrel.lab.recording import (
+    RECORDING_COLUMNS,
+    Recording,
+    _Fact,
+    _Facts,
+    read_recording,
+    write_recording,
+)
+from masrel.lab.run._grade_sources import GradeRequest
+from masrel.lab.run._settings import (
+    backend_options,
+    device_limits,
+    has_simulated_hand,
+    model_controller,
+)
+from masrel.lab.run._simulated_raters import hand_seed, intended_speeds, sensor_seed
+from masrel.lab.run._stretch_facts import (
+    StatusOfHand,
+    StretchFacts,
+    stretch_facts,
+    stretch_rules,
+)
+
+Listening = Callable[
+    [GradeRequest, EmergencyStop], contextlib.AbstractContextManager[object]
+]
+"""Listens to whoever is with the rater, as long as a presentation lasts."""
+
+# After this a presentation of one stretch ends, wherever the arm is.
+_ONE_STRETCH_S = 10.0
+
+_REST_S = 0.3  # of a simulated hand between two ways
+
+# How much of the recording before a fault goes into the log
+_BEFORE_FAULT_S = 0.2
+
+_FORMATS = {
+    "time_s": "{:.6f}",
+    "angle_deg": "{:.4f}",
+    "velocity_deg_s": "{:.2f}",
+    "model_torque_nm": "{:.4f}",
+    "command_torque_nm": "{:.4f}",
+    "phase": "{:.0f}",
+    "ramp": "{:.0f}",
+    "stretch": "{:.0f}",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What a presentation left."""
+
+    sha256: str  # checksum of the recording
+    # mean speed before the catch, deg/s; None when the arm never moved
+    mean_speed_deg_s: float | None
+    n_missed_ticks: int  # ticks the loop skipped
+    fault: Fault | None  # what stopped it, or None
+    # the recording from 200 ms before the fault until the torque was zero, as CSV
+    last_200_ms: str | None
+    simulated: bool  # whether no hardware moved
+    ended: str  # how it ended, as in the recording
+    made: StretchFacts  # what came of its stretches
+    grip_lost: bool | None  # whether the model let go of a loose arm; None: unknown
+
+
+def present(
+    protocol: Protocol,
+    request: GradeRequest,
+    *,
+    clock: Clock,
+    file: Path,
+    stop: EmergencyStop,
+    listening: Listening,
+) -> Outcome:
+    """Present a model once on the protocol's device and write the recording.
+
+    What was kept while it was made stays beside it until the log names it.
+    """
+    # Signals that would end the process, and with a real clock whoever is listened to,
+    # can press the emergency stop while the device is open.
+    limits = device_limits(protocol.device)
+    status = request.status or presentation_status(protocol, request)
+    spool = spool_of(file)
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(stop_on_signals(stop))
+        if isinstance(clock, RealClock):
+            shown = dataclasses.replace(request, status=status, samples=spool)
+            stack.enter_context(listening(shown, stop))
+        presented = _on_device(protocol, request, status, clock, limits, stop, spool)
+    return _keep(presented, protocol, request, file)
+
+
+def recover(protocol: Protocol, request: GradeRequest, *, file: Path) -> Outcome | None:
+    """Return what a process left that died while presenting, as a recording."""
+    spool = spool_of(file)
+    if not spool.exists():
+        return None
+    if file.exists():  # it died between the recording and the log
+        checksum = hashlib.sha256(file.read_bytes()).hexdigest()
+        return _outcome(read_recording(file), protocol, request, checksum)
+    presented = cut_off(spool)
+    if presented is None:
+        spool.unlink()
+        return None
+    return _keep(presented, protocol, request, file)
+
+
+def spool_of(file: Path) -> Path:
+    """Return where samples are kept until the recording is logged."""
+    return file.with_suffix(".partial")
+
+
+def _on_device(
+    protocol: Protocol,
+    request: GradeRequest,
+    status: PresentationStatus,
+    clock: Clock,
+    limits: DeviceLimits,
+    stop: EmergencyStop,
+    spool: Path,
+) -> Presented:
+    settings, stretch = protocol.device, protocol.stretch
+    model = request.presentation.model
+    range_end = joint_model(protocol, model).range_end
+    start = math.radians(stretch.start_deg)
+    end = min(math.radians(stretch.end_deg), range_end)  # of a contracture sooner
+    hand, longest_s = None, 0.0
+    if speeds := _hand_speeds(protocol, request):
+        hand = _hand(protocol, request.rater, speeds, start, end)
+        # A simulated hand that means to be slow gets the time it needs.
+        longest_s = 2.0 * (end - start) / min(speeds)
+    rules = stretch_rules(protocol.presentation, longest_s)
+    with contextlib.ExitStack() as stack:
+        device = stack.enter_context(
+            open_device(
+                settings.backend,
+                clock=clock,
+                hand=hand,
+                range_end=range_end,
+                options=backend_options(
+                    settings, hand, _sensor_seed(protocol, request)
+                ),
+            )
+        )
+        watchdog = watched(device, limits.watchdog_time)
+        if watchdog is not None:
+            stack.enter_context(watchdog)
+        return run_presentation(
+            device,
+            model_controller(protocol, model),
+            clock=clock,
+            limits=limits,
+            rate_hz=settings.rate_hz,
+            max_duration_s=_max_duration_s(protocol.presentation, rules, longest_s),
+            end_angle=end,
+            stretches=rules,
+            status=status,
+            stop=stop,
+            watchdog=watchdog,
+            spool=spool,
+        )
+
+
+def presentation_status(
+    protocol: Protocol, request: GradeRequest
+) -> PresentationStatus:
+    """Return the status of a presentation that has not begun."""
+    speeds = _hand_speeds(protocol, request)
+    if not speeds or protocol.presentation.stretches != "free":
+        return PresentationStatus()
+    return StatusOfHand(len(speeds), holds=protocol.simulated_raters.hold_s > 0.0)
+
+
+def _hand_speeds(protocol: Protocol, request: GradeRequest) -> list[float]:
+    # rad/s of the simulated hand, by stretch; none when a person moves the arm
+    if not has_simulated_hand(protocol.device):
+        return []
+    presentation = request.presentation
+    speeds = intended_speeds(
+        protocol,
+        request.rater,
+        request.session,
+        presentation.model,
+        presentation.repeat,
+    )
+    return [math.radians(speed) for speed in speeds]
+
+
+def _hand(
+    protocol: Protocol, rater: str, speeds: list[float], start: float, end: float
+) -> SimulatedHand:
+    settings, (first, *again) = protocol.simulated_raters, speeds
+    make: Callable[..., SimulatedHand] = SimulatedHand
+    if settings.hand == "person":
+        rng = np.random.default_rng(hand_seed(protocol, rater))
+        make = functools.partial(HumanHand, HandDistribution().sample(rng))
+    return make(
+        start=start,
+        end=end,
+        mean_speed=first,
+        again=again,
+        rest=_REST_S + settings.hold_s,
+        # Of a number of stretches the last is over when the arm is brought back
+        returns=settings.hold_s > 0.0 or protocol.presentation.stretches != "free",
+    )
+
+
+def _sensor_seed(protocol: Protocol, request: GradeRequest) -> int:
+    presented = request.presentation
+    return sensor_seed(
+        protocol, request.rater, request.session, presented.model, presented.repeat
+    )
+
+
+def _max_duration_s(
+    protocol_rules: PresentationRules, rules: StretchRules, longest_s: float
+) -> float | None:
+    if rules.n != 1:
+        return None  # the limits of the rules
+    if protocol_rules.stretches == 1:
+        return max(_ONE_STRETCH_S, longest_s)
+    return rules.stretch_limit  # of the one that is cued
+
+
+def _keep(
+    presented: Presented, protocol: Protocol, request: GradeRequest, file: Path
+) -> Outcome:
+    presentation, recording = request.presentation, presented.recording
+    facts: dict[str, _Fact] = {
+        **recording.facts,
+        "study": protocol.study.id,
+        "rater": request.rater,
+        "session": request.session,
+        "code": presentation.code,
+        "model": presentation.model,
+        "repeat": presentation.repeat,
+        "position": presentation.position,
+        "attempt": request.attempt,
+    }
+    if request.rehearsal:
+        facts["rehearsal"] = True
+    if request.practice:
+        facts["practice"] = True
+    checksum = write_recording(dataclasses.replace(recording, facts=facts), file)
+    return _outcome(recording, protocol, request, checksum)
+
+
+def _outcome(
+    recording: Recording, protocol: Protocol, request: GradeRequest, checksum: str
+) -> Outcome:
+    facts, fault = recording.facts, None
+    if facts["fault"] is not None:
+        fault = Fault(
+            kind=str(facts["fault_kind"]),
+            message=str(facts["fault"]),
+            time_s=float(facts["fault_time_s"] or 0.0),
+            torque_nm=float(facts["fault_torque_nm"] or 0.0),
+        )
+    speed, lost = facts["mean_speed_deg_s"], facts.get("grip_lost")
+    return Outcome(
+        sha256=checksum,
+        mean_speed_deg_s=None if speed is None else float(speed),
+        n_missed_ticks=int(facts["n_missed_ticks"] or 0),
+        fault=fault,
+        last_200_ms=None if fault is None else _before(fault, recording),
+        simulated=bool(facts["simulated"]),
+        ended=str(facts["ended"]),
+        made=stretch_facts(protocol, request.presentation.model, recording),
+        grip_lost=None if lost is None else bool(lost),
+    )
+
+
+def _before(fault: Fault, recording: Recording) -> str:
+    # The rows from shortly before a fault to the end, as CSV
+    columns = recording.columns
+    first = int(np.searchsorted(columns["time_s"], fault.time_s - _BEFORE_FAULT_S))
+    lines = [",".join(RECORDING_COLUMNS)]
+    for row in range(first, recording.n_samples):
+        cells = (
+            _FORMATS[name].format(float(columns[name][row]))
+            for name in RECORDING_COLUMNS
+        )
+        lines.append(",".join(cells))
+    return "\n".join(lines) + "\n"
+
+
+def presented_fields(outcome: Outcome, file: Path, folder: Path) -> dict[str, _Facts]:
+    """Return what a log says of every presentation, whatever it is for."""
+    fault, made = outcome.fault, outcome.made
+    facts = file.with_suffix(".json").read_bytes()
+    return {
+        "recording": file.relative_to(folder).as_posix(),
+        "sha256": outcome.sha256,
+        "facts_sha256": hashlib.sha256(facts).hexdigest(),
+        "mean_speed_deg_s": outcome.mean_speed_deg_s,
+        "n_missed_ticks": outcome.n_missed_ticks,
+        "fault": None if fault is None else fault.message,
+        "simulated": outcome.simulated,
+        "stretches": made.stretches,
+        "ended": outcome.ended,
+        "n_stretches": len(made.stretches),
+        "felt": made.felt if fault is None else None,
+        "r1_deg": made.r1_deg,
+        "r2_deg": made.r2_deg,
+        "grip_lost": outcome.grip_lost,
+    }
+
+
+def fault_fields(fault: Fault, outcome: Outcome) -> dict[str, _Facts]:
+    """Return what a log says of the fault that stopped a presentation."""
+    return {
+        "kind": fault.kind,
+        "words": fault.message,
+        "time_s": fault.time_s,
+        "torque_nm": fault.torque_nm,
+        "last_200_ms": outcome.last_200_ms,
+    }

@@ -1,0 +1,203 @@
+"""Present one model until it is graded or skipped, and log each time at once.
+
+Sessions and trainings present so; their logs name what is presented by other fields.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+from typing import Literal
+
+from masrel.errors import DeviceError, ParameterError, SessionStoppedError
+from masrel.lab._event_log import SessionLog
+from masrel.lab.hess import Clock, EmergencyStop, RealClock, SimulatedClock
+from masrel.lab.protocol import Protocol
+from masrel.lab.recording import _Facts
+from masrel.lab.run._grade_sources import GradeRequest, GradeSource, Skip, StretchGrade
+from masrel.lab.run._present import (
+    Outcome,
+    fault_fields,
+    present,
+    presentation_status,
+    presented_fields,
+    recover,
+    spool_of,
+)
+from masrel.lab.run.console import _at_terminal
+
+ClockName = Literal["real", "simulated"]
+
+CLOCKS: dict[str, Callable[[], Clock]] = {
+    "real": RealClock,
+    "simulated": SimulatedClock,
+}
+"""The clocks a control loop can run on, by name."""
+
+# Emergency stops by somebody who wants the process to end; Ctrl-C may be a rater's.
+_TERMINATING = ("signal SIGTERM", "signal SIGHUP")
+
+
+class Presenter:
+    """Puts models on the device; what it does is in the log before it goes on."""
+
+    def __init__(
+        self,
+        protocol: Protocol,
+        grades: GradeSource,
+        clock: ClockName,
+        log: SessionLog,
+        *,
+        occasion: str,
+        named_by: tuple[str, ...],
+        known_by: tuple[str, ...] = (),
+        kind: Literal["presented", "practised"] = "presented",
+    ) -> None:
+        self._protocol = protocol
+        self._grades = grades
+        self._clock = clock
+        self._log = log
+        self._occasion = occasion  # what it is for, in messages
+        self._named_by = named_by  # fields of a presentation in each of its events
+        self._known_by = known_by  # and those in the event `kind` alone
+        self._kind = kind  # of event that says what was presented
+        self.n_again = 0  # presentations beyond the first
+        self.n_faults = 0
+
+    def rate(self, first: GradeRequest) -> StretchGrade | Skip:
+        """Present until the grade comes, or nobody wants it any more.
+
+        `first` is the request for the first attempt; a stop is logged.
+        """
+        try:
+            return self._until_graded(first)
+        except SessionStoppedError as error:
+            named = self._fields(first, self._named_by)
+            self._log.append("stopped", {**named, "why": str(error)})
+            raise
+
+    def _until_graded(self, first: GradeRequest) -> StretchGrade | Skip:
+        attempt, n_faults = self._attempts_before(first), 0
+        request = dataclasses.replace(first, attempt=attempt + 1)
+        attempt += self._recovered(request)
+        while True:
+            attempt += 1
+            request = dataclasses.replace(first, attempt=attempt, n_faults=n_faults)
+            status = presentation_status(self._protocol, request)
+            request = dataclasses.replace(request, status=status)
+            self._grades.make_ready(request)
+            outcome = self._present(request)
+            fault, made = outcome.fault, outcome.made
+            n_faults = 0 if fault is None else n_faults + 1
+            request = dataclasses.replace(
+                request,
+                status=None,
+                n_faults=n_faults,
+                n_stretches=len(made.stretches),
+                felt=made.felt if fault is None else None,
+                grip_lost=outcome.grip_lost if fault is None else None,
+                ended=outcome.ended,
+            )
+            answer: StretchGrade | Skip | None
+            if fault is None:
+                answer = self._checked(request, self._grades.grade(request))
+            else:
+                answer = self._after_fault(request, fault.message)
+            if answer is not None:
+                return answer
+
+    def _attempts_before(self, request: GradeRequest) -> int:
+        # how often it was presented before this process
+        named = self._fields(request, self._named_by).items()
+        before = [
+            event
+            for event in self._log.events
+            if event.kind == self._kind and named <= event.fields.items()
+        ]
+        for event in before:  # a process may have died between the log and this
+            file = self._log.path.parent / str(event.fields["recording"])
+            spool_of(file).unlink(missing_ok=True)
+        return len(before)
+
+    def _recovered(self, request: GradeRequest) -> bool:
+        # Whether a process died while it presented this, and its data are now logged
+        file = self._file(request)
+        outcome = recover(self._protocol, request, file=file)
+        if outcome is not None:
+            self._log_presented(request, outcome, file)
+        return outcome is not None
+
+    def _present(self, request: GradeRequest) -> Outcome:
+        file = self._file(request)
+        # A new one each time, so that the simulated clock starts at zero.
+        clock, stop = CLOCKS[self._clock](), EmergencyStop()
+        outcome = present(
+            self._protocol,
+            request,
+            clock=clock,
+            file=file,
+            stop=stop,
+            listening=getattr(self._grades, "listening", _at_terminal),
+        )
+        self.n_again += request.attempt > 1
+        self._log_presented(request, outcome, file)
+        if stop.reason in _TERMINATING:
+            raise SessionStoppedError(
+                f"{self._occasion} was stopped by {stop.reason} at presentation "
+                f"{request.presentation.position}; the same command goes on there"
+            )
+        return outcome
+
+    def _file(self, request: GradeRequest) -> Path:
+        again = f"-{request.attempt}" if request.attempt > 1 else ""
+        folder = self._log.path.with_suffix("")
+        return folder / f"{request.presentation.code}{again}.npz"
+
+    def _log_presented(
+        self, request: GradeRequest, outcome: Outcome, file: Path
+    ) -> None:
+        fault = outcome.fault
+        self.n_faults += fault is not None
+        fields = self._fields(request, self._named_by)
+        fields["attempt"] = request.attempt
+        known = self._fields(request, self._known_by)
+        presented = presented_fields(outcome, file, self._log.path.parent)
+        self._log.append(self._kind, {**fields, **known, **presented})
+        if fault is not None:
+            self._log.append("fault", {**fields, **fault_fields(fault, outcome)})
+        spool_of(file).unlink(missing_ok=True)  # only now is it of no use
+
+    def _fields(
+        self, request: GradeRequest, names: tuple[str, ...]
+    ) -> dict[str, _Facts]:
+        return {name: getattr(request.presentation, name) for name in names}
+
+    def _after_fault(self, request: GradeRequest, fault: str) -> Skip | None:
+        answer = self._grades.present_again(request, fault)
+        if isinstance(answer, Skip):
+            return answer
+        if not answer:
+            raise DeviceError(
+                f"{self._occasion}: presentation {request.presentation.position}, code "
+                f"{request.presentation.code}, was stopped by a fault: {fault}"
+            )
+        return None
+
+    def _checked(
+        self, request: GradeRequest, grade: str | StretchGrade | None
+    ) -> StretchGrade | None:
+        if grade is None:
+            return None
+        if isinstance(grade, str):
+            grade = StretchGrade(grade=grade)
+        grades, code = self._protocol.scale.grades, request.presentation.code
+        if grade.grade not in grades:
+            raise ParameterError(
+                f"grade of {code}: needed one of {', '.join(grades)}, "
+                f"got {grade.grade!r}"
+            )
+        stretch, n_stretches = grade.stretch, request.n_stretches
+        if stretch is not None and not 1 <= stretch <= n_stretches:
+            raise ParameterError(
+                f"stretch of {code}: needed one of {n_stretches}, from 1, got {stretch}"
+            )
+        return grade

@@ -1,0 +1,460 @@
+"""A person at the console gives the grades."""
+
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from typing import TYPE_CHECKING, ClassVar, TextIO
+
+from masrel.errors import ParameterError, SessionLogError, SessionStoppedError
+from masrel.lab.protocol import PresentationRules, Question
+from masrel.lab.protocol._questions import Answer, checked_answer
+from masrel.lab.run._grade_sources import (
+    GradeCorrection,
+    GradeRequest,
+    QuestionRequest,
+    Skip,
+    StretchGrade,
+)
+from masrel.scales import PublishedScale, Scale, published_scale
+
+if TYPE_CHECKING:
+    from masrel.lab.hess import EmergencyStop, PresentationStatus  # loads numpy
+
+_CUE_EVERY_S = 0.05  # how often it is looked whether a stretch is over
+
+
+class ConsoleGrades:
+    """A person at the console, who is told positions and blinded codes only.
+
+    The words ``again`` and ``stop`` in place of a grade present the model again and
+    stop the session; ``correct CODE GRADE WHY`` corrects a grade given before, ``NA``
+    for a missing one; a ``?`` says what the grades of a scale of the literature mean.
+    After more than one stretch, ``1+ 2`` is the grade 1+ that rests on stretch 2.
+
+    Parameters
+    ----------
+    scale : Scale
+        The grades that can be given.
+    answers : TextIO, optional
+        Where answers come from, a line each; standard input unless given.
+    questions : TextIO, optional
+        Where questions go; standard output unless given.
+    """
+
+    name: ClassVar[str] = "console"
+    simulated: ClassVar[bool] = False
+
+    def __init__(
+        self,
+        scale: Scale,
+        *,
+        answers: TextIO | None = None,
+        questions: TextIO | None = None,
+    ) -> None:
+        self._scale = scale
+        self._published = published_scale(scale)
+        self._answers = sys.stdin if answers is None else answers
+        self._questions = sys.stdout if questions is None else questions
+
+    def make_ready(self, request: GradeRequest) -> None:
+        """Wait until the rater is ready.
+
+        Parameters
+        ----------
+        request : GradeRequest
+            What comes next.
+
+        Raises
+        ------
+        SessionStoppedError
+            If the person stops, or the input ends.
+        """
+        again = "" if request.attempt == 1 else " again"
+        presentation = request.presentation
+        labels = [
+            label
+            for label, is_so in (
+                ("REHEARSAL", request.rehearsal),
+                ("PRACTICE", request.practice),
+            )
+            if is_so
+        ]
+        label = f"{', '.join(labels)}, no rating of the study. " if labels else ""
+        instruction = _instruction(request.rules)
+        answer = self._ask_or_correct(
+            request,
+            f"{label}Presentation {presentation.position} of "
+            f"{request.n_presentations}, code {presentation.code}{again}. {instruction}"
+            "Enter to begin (then any other key is an emergency stop), stop to stop: ",
+        )
+        if answer == "stop":
+            raise _stopped(request, "on request")
+
+    def _ask_or_correct(self, request: GradeRequest, question: str) -> str:
+        # the answer; before it any grade of the session can be corrected
+        while True:
+            answer = self._ask(request, question)
+            word, _, words = answer.partition(" ")
+            if word != "correct" or request.correct is None:
+                return answer
+            correction = self._correction(request.rater, words.strip())
+            if correction is None:
+                self._say("To correct a grade: correct CODE GRADE WHY.\n")
+                continue
+            try:
+                request.correct(correction)
+                self._say(f"{correction.code} is corrected in the log.\n")
+            except (ParameterError, SessionLogError) as error:
+                self._say(f"{error}.\n")
+
+    def _correction(self, rater: str, words: str) -> GradeCorrection | None:
+        code, _, rest = words.partition(" ")
+        grades = (*self._scale.grades, "NA")  # no scale has such a grade
+        begins = [grade for grade in grades if rest.startswith(f"{grade} ")]
+        grade = max(begins, key=len, default="")
+        why = rest.removeprefix(grade).strip()
+        if not grade or not why:
+            return None
+        return GradeCorrection(
+            code=code, grade=None if grade == "NA" else grade, who=rater, why=why
+        )
+
+    def grade(self, request: GradeRequest) -> str | StretchGrade | None:
+        """Ask for the grade until it is one of the scale.
+
+        Before, the rater is told if a limit of time ended the presentation, and if the
+        stretches were too slow to feel the catch.
+
+        Parameters
+        ----------
+        request : GradeRequest
+            What was presented.
+
+        Returns
+        -------
+        str, StretchGrade or None
+            The grade, with the stretch it rests on if the rater says so; None when the
+            rater wants to feel it again.
+
+        Raises
+        ------
+        SessionStoppedError
+            If the person stops, or the input ends.
+        """
+        grades, n_stretches = ", ".join(self._scale.grades), request.n_stretches
+        self._say(_remarks(request))
+        rests, meanings = (
+            "",
+            "" if self._published is None else "; ? for their meanings",
+        )
+        if n_stretches > 1:
+            rests = f", and the stretch it rests on, 1 to {n_stretches}, if any"
+        while True:
+            answer = self._ask_or_correct(
+                request,
+                f"Grade of {request.presentation.code} ({grades}{rests}; again; "
+                f"stop{meanings}): ",
+            )
+            if answer in self._scale.grades:
+                return answer
+            if answer == "again":
+                return None
+            if answer == "stop":
+                raise _stopped(request, "on request")
+            if answer == "?" and self._published is not None:
+                self._say(_meanings_in_words(self._scale, self._published))
+                continue
+            grade, _, stretch = answer.rpartition(" ")
+            if grade.strip() in self._scale.grades and stretch in map(
+                str, range(1, n_stretches + 1)
+            ):
+                return StretchGrade(grade=grade.strip(), stretch=int(stretch))
+            if answer:  # else it was an Enter too many
+                self._say(
+                    f"{answer!r} is not a grade: needed one of {grades}{rests}.\n"
+                )
+
+    def present_again(self, request: GradeRequest, fault: str) -> bool | Skip:
+        """Ask whether to present the model again after a fault.
+
+        Parameters
+        ----------
+        request : GradeRequest
+            What was presented.
+        fault : str
+            What went wrong.
+
+        Returns
+        -------
+        bool or Skip
+            Whether to present it again; `Skip` when it is to have no grade.
+
+        Raises
+        ------
+        SessionStoppedError
+            If the input ends.
+        """
+        self._say(f"The presentation was stopped: {fault}.\n")
+        choices = "yes, no, or skip and why" if request.may_skip else "yes, no"
+        while True:
+            answer = self._ask(request, f"Present it again? ({choices}): ")
+            if answer.casefold() in ("yes", "y", "no", "n"):
+                return answer[0] in "yY"
+            word, _, why = answer.partition(" ")
+            if request.may_skip and word.casefold() == "skip":
+                if why.strip():
+                    return Skip(who=request.rater, why=why.strip())
+                self._say("To skip it needs a reason: skip the motor is hot.\n")
+
+    def instruct(self, request: GradeRequest, text: str) -> None:
+        """Show the instructions, and wait until the rater has read them.
+
+        Parameters
+        ----------
+        request : GradeRequest
+            What comes next.
+        text : str
+            The instructions.
+
+        Raises
+        ------
+        SessionStoppedError
+            If the person stops, or the input ends.
+        """
+        self._wait(request, f"{text.strip()}\nEnter to go on, stop to stop: ")
+
+    def take_break(self, request: GradeRequest, minutes: float) -> None:
+        """Say that there is a break, and wait until the rater goes on.
+
+        Parameters
+        ----------
+        request : GradeRequest
+            What comes next.
+        minutes : float
+            How long the break is meant to be, min.
+
+        Raises
+        ------
+        SessionStoppedError
+            If the person stops, or the input ends.
+        """
+        unit = "minute" if minutes == 1 else "minutes"
+        self._wait(
+            request,
+            f"A break of {minutes:g} {unit}. Enter after it to go on, stop to stop: ",
+        )
+
+    def _wait(self, request: GradeRequest, text: str) -> None:
+        while answer := self._ask(request, text):
+            if answer == "stop":
+                raise _stopped(request, "on request")
+
+    def begins_anew(self, request: GradeRequest, days: int) -> bool:
+        """Ask whether a session goes on or begins anew.
+
+        Parameters
+        ----------
+        request : GradeRequest
+            What comes next if it goes on.
+        days : int
+            How many days ago it was left.
+
+        Returns
+        -------
+        bool
+            Whether it begins anew.
+
+        Raises
+        ------
+        SessionStoppedError
+            If the person stops, or the input ends.
+        """
+        when = {0: "today", 1: "yesterday"}.get(days, f"{days} days ago")
+        while True:
+            answer = self._ask(
+                request,
+                f"This session was left {when}, before presentation "
+                f"{request.presentation.position} of {request.n_presentations}. Go on, "
+                "or begin anew, and what was graded counts no more? (go on; anew; "
+                "stop): ",
+            )
+            if answer in ("go on", "anew"):
+                return answer == "anew"
+            if answer == "stop":
+                raise _stopped(request, "on request")
+
+    def answer(self, request: QuestionRequest) -> Answer:
+        """Ask a question until it is answered.
+
+        Parameters
+        ----------
+        request : QuestionRequest
+            The question.
+
+        Returns
+        -------
+        str, int, float or None
+            The answer; None where the rater gives none and none is required.
+
+        Raises
+        ------
+        SessionStoppedError
+            If the person stops, or the input ends.
+        """
+        question, shown = request.question, request.presentation
+        if question == request.questionnaire.questions[0]:
+            of = "" if shown is None else f" ({shown.code})"
+            self._say(f"{request.questionnaire.title}{of}\n")
+        text = f"{question.text} ({_possible(question)}; stop): "
+        while True:
+            answer = self._ask(request, text)
+            if answer == "stop":
+                raise _stopped(request, "on request")
+            try:
+                return checked_answer(question, answer, where="answer")
+            except ParameterError as error:
+                if answer:  # else it was an Enter too many
+                    self._say(f"{error}.\n")
+
+    def _ask(self, request: GradeRequest | QuestionRequest, question: str) -> str:
+        self._say(question)
+        try:
+            answer = self._answers.readline()
+        except KeyboardInterrupt as error:
+            raise _stopped(request, "by an interrupt") from error
+        if not answer:
+            raise _stopped(request, "by the end of its input")
+        return answer.strip()
+
+    def _say(self, text: str) -> None:
+        self._questions.write(text)
+        self._questions.flush()
+
+
+def _meanings_in_words(scale: Scale, published: PublishedScale) -> str:
+    # where the words of a scale are, and in short what each grade means
+    words = f"{published.title}. Its own words: {published.source}.\n"
+    lines = [
+        f"  {grade:3} {published.meanings[grade]}\n"
+        for grade in scale.grades
+        if grade in published.meanings
+    ]
+    return words + ("In short, in masrel's words:\n" if lines else "") + "".join(lines)
+
+
+def _remarks(request: GradeRequest) -> str:
+    # what the rater has to know of the presentation, a line each
+    limit_s = request.rules.time_limit_s
+    ended = {
+        "time-limit": "The time limit ended the presentation: no stretch begins later "
+        f"than {limit_s:g} s after the first movement.\n",
+        "max-duration": "The presentation was ended: it had gone on for too long.\n",
+    }
+    remarks = ended.get(request.ended or "", "")
+    if request.felt not in ("felt", None):
+        remarks += "That was too slow to feel the catch: once more? Then say again.\n"
+    if request.grip_lost:
+        remarks += "The arm came loose, and the model let go: once more? Say again.\n"
+    return remarks
+
+
+def _instruction(rules: PresentationRules, *, on_paper: bool = False) -> str:
+    # what the rater is asked to do, a sentence for each cue; on paper nothing says done
+    stretches = rules.stretches
+    if stretches == 1:
+        return ""
+    done = "Enter says done" if rules.done_with == "enter" else "the button says done"
+    if stretches == "free":
+        then = "" if on_paper else f", then {done}"
+        return f"Stretch the arm as often as you want{then}. "
+    if isinstance(stretches, int):
+        before = "" if on_paper else f"; {done} before"
+        return (
+            f"Stretch the arm {stretches} times and bring it back each time{before}. "
+        )
+    cues = [f"{cue}. " for cue in _cues_in_words(rules)]
+    return "".join([*cues, *(["Bring the arm back each time. "] if cues[1:] else [])])
+
+
+@contextmanager
+def _at_terminal(request: GradeRequest, stop: "EmergencyStop") -> Iterator[None]:
+    """Listen to the keys of the terminal: any but Enter is an emergency stop."""
+    from masrel.lab.hess._stop import enter_on_empty_line, stop_on_key  # loads numpy
+
+    rules, status = request.rules, request.status
+    with ExitStack() as stack:
+        enter: Callable[[], object] = lambda: None  # noqa: E731 - nothing at all
+        if status and rules.stretches != 1 and rules.done_with == "enter":
+            enter = status.done
+            stack.enter_context(enter_on_empty_line(sys.stdin, enter))
+        stack.enter_context(stop_on_key(stop, sys.stdin, enter))
+        if status:
+            stack.enter_context(_cues_shown(rules, status, sys.stdin))
+        yield
+
+
+@contextmanager
+def _cues_shown(
+    rules: PresentationRules, status: "PresentationStatus", keys: TextIO | None
+) -> Iterator[None]:
+    """Show a person at a terminal the next cue when a stretch is over."""
+    cues = _cues_in_words(rules)
+    if not cues or keys is None or not keys.isatty():
+        yield
+        return
+    is_over = threading.Event()
+
+    def show() -> None:
+        n_shown = 1  # before it began
+        while not is_over.wait(_CUE_EVERY_S):
+            if status.n_stretches >= n_shown and n_shown < len(cues):
+                sys.stdout.write(f"{cues[n_shown]}\n")
+                sys.stdout.flush()
+                n_shown += 1
+
+    thread = threading.Thread(target=show, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        is_over.set()
+        thread.join()
+
+
+def _cues_in_words(rules: PresentationRules) -> list[str]:
+    """Return what each stretch is to be like, for a rater; nothing without cues."""
+    if not isinstance(rules.stretches, tuple):
+        return []
+    words = {
+        "slow": f"slow, at most {rules.slow_speed_deg_s:g} deg/s (V1)",
+        "fast": f"fast, at least {rules.fast_speed_deg_s:g} deg/s (V3)",
+    }
+    return [
+        f"Stretch {number}: {words[cue]}"
+        for number, cue in enumerate(rules.stretches, start=1)
+    ]
+
+
+def _possible(question: Question) -> str:
+    # what can be answered, with what the ends of a range mean
+    if question.range is None:
+        words = question.needed
+    else:
+        labels = zip(
+            question.range, (question.low_label, question.high_label), strict=True
+        )
+        ends = [f"{end}: {label}" for end, label in labels if label]
+        words = "; ".join([question.needed, *ends])
+    return words if question.required else f"{words}; Enter for none"
+
+
+def _stopped(request: GradeRequest | QuestionRequest, why: str) -> SessionStoppedError:
+    where = "a question"
+    if isinstance(request, GradeRequest):
+        place, n_presentations = request.presentation.position, request.n_presentations
+        where = f"presentation {place} of {n_presentations}"
+    return SessionStoppedError(
+        f"session {request.session} of {request.rater} was stopped {why} at {where}; "
+        "the same command goes on there"
+    )

@@ -1,0 +1,262 @@
+"""What the log of a training says: its criterion, its lessons, and how it ended.
+
+The log is a chain like that of a session (``docs/session_log.md``), with events of its
+own: ``docs/training.md`` lists them.
+"""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from masrel._input import format_problem
+from masrel.errors import SessionLogError
+from masrel.lab._event_log import Event, read_log
+from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
+from masrel.lab.training._criterion import Criterion, training_criterion
+from masrel.lab.training._trainees import adaptive_weights
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+FORMAT = 1
+"""Version of the log of a training."""
+
+SETTINGS = (
+    "weights",
+    "kappa_insufficient",
+    "kappa_sufficient",
+    "false_pass",
+    "false_fail",
+    "window",
+    "order",
+    "max_presentations",
+)
+"""Keys of ``[training]`` that a training keeps to its end."""
+
+EVENTS: dict[str, tuple[str, ...]] = {
+    "training": (
+        "format",
+        "study",
+        "rater",
+        "presented_sha256",
+        *SETTINGS,
+        "boundary",
+        "calibrated_false_fail",
+        "order_seed",
+        "simulated",
+        "grades",
+        "device",
+    ),
+    "resumed": ("n_graded",),
+    "presented": ("position", "attempt", "model", "recording", "sha256", "fault"),
+    "fault": ("position", "attempt", "kind", "words"),
+    "grade": ("position", "model", "intended", "grade"),
+    "stopped": ("position", "why"),
+    "recovered": (),
+    "complete": ("passed", "n_presentations"),
+}
+"""Every kind of event with the fields that are read."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lesson:
+    """One presentation of a model whose grade is known, with the rater's grade.
+
+    Attributes
+    ----------
+    position : int
+        Place in the training, from 1.
+    model : str
+        Id of the haptic model.
+    intended, grade : str
+        The intended grade and the rater's.
+    """
+
+    position: int
+    model: str
+    intended: str
+    grade: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrainingRecord:
+    """A training, as far as it has come.
+
+    Attributes
+    ----------
+    rater : str
+        Whose training.
+    criterion : Criterion
+        What the rater must show.
+    boundary : float
+        The evidence that passes.
+    false_pass, false_fail : float
+        The largest chances of both errors, the latter as calibrated.
+    order_seed : int
+        What the order was drawn from.
+    is_weighted : bool
+        Whether presentations in adaptive order count by how likely they were; in a
+        training begun before they did, they count alike to its end.
+    lessons : tuple of Lesson
+        In order.
+    passed : bool or None
+        None while the training goes on.
+    simulated : bool
+        Whether grades or device are simulated.
+    """
+
+    rater: str
+    criterion: Criterion
+    boundary: float
+    false_pass: float
+    false_fail: float
+    order_seed: int
+    is_weighted: bool
+    lessons: tuple[Lesson, ...]
+    passed: bool | None
+    simulated: bool
+
+    def evidence(self) -> "NDArray[np.float64]":
+        """Return the evidence after each set of lessons.
+
+        Returns
+        -------
+        ndarray of float, shape (n_sets,)
+            As `Criterion.evidence` has it.
+        """
+        code = {grade: at for at, grade in enumerate(self.criterion.grades)}
+        pairs = [(code[one.intended], code[one.grade]) for one in self.lessons]
+        codes = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        weights = None
+        if self.is_weighted and self.criterion.order == "adaptive":
+            models = {one.model: None for one in self.lessons}
+            number = {model: at for at, model in enumerate(models)}
+            weights = adaptive_weights(
+                np.array([number[one.model] for one in self.lessons], dtype=np.int64),
+                codes[:, 0] != codes[:, 1],
+                self.criterion.n_models,
+            )
+        return self.criterion.evidence(codes[:, 0], codes[:, 1], weights)
+
+
+def read_training(study: StudyPaths, protocol: Protocol, rater: str) -> TrainingRecord:
+    """Read the log of a rater's training.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+    rater : str
+        Id of the rater.
+
+    Returns
+    -------
+    TrainingRecord
+        The training as far as it has come.
+
+    Raises
+    ------
+    SessionLogError
+        If there is no such log, it is damaged, or it is of models that have changed.
+    """
+    path = study.training_log_file(rater)
+    if not path.is_file():
+        raise SessionLogError(
+            f"{path}: no such log; masrel train STUDY --rater {rater} begins a training"
+        )
+    events = read_log(path)
+    check_events(path, events)
+    if not events:
+        raise SessionLogError(f"{path}: needed a training that has begun, got none")
+    return record_of(path, events, protocol)
+
+
+def check_events(path: Path, events: Sequence[Event]) -> None:
+    """Refuse events that no training leaves in this order."""
+    graded = 0
+    presented: Counter[object] = Counter()
+    for event in events:
+        fields, problem = event.fields, _problem(event)
+        if problem is not None:
+            pass
+        elif (event.kind == "training") != (event is events[0]):
+            problem = "needed the event training once, before all others"
+        elif event.kind == "presented" and fields["fault"] is None:
+            presented[fields["position"]] += 1
+        elif event.kind == "grade":
+            graded += 1
+            if fields["position"] != graded or not presented[graded]:
+                problem = f"needed the grade of presentation {graded}, after it"
+        if problem is not None:
+            raise SessionLogError(f"{path}: line {event.line}: {event.kind}: {problem}")
+
+
+def _problem(event: Event) -> str | None:
+    # why it is no event of any training, or None
+    if event.kind not in EVENTS:
+        return f"needed an event of {', '.join(EVENTS)}"
+    if event.kind == "training":  # first: another format has other fields
+        problem = format_problem(event.fields.get("format"), newest=FORMAT)
+        if problem is not None:
+            return problem
+    for name in EVENTS[event.kind]:
+        if name not in event.fields:
+            return f"needed the field {name}"
+    position = event.fields.get("position", 0)
+    if type(position) is not int:
+        return f"needed position as a number, got {position!r}"
+    return None
+
+
+def record_of(
+    path: Path, events: Sequence[Event], protocol: Protocol
+) -> TrainingRecord:
+    """Return the record of events that were checked, the first of them there."""
+    header = events[0].fields
+    if header["presented_sha256"] != presented_hash(protocol):
+        raise SessionLogError(
+            f"{path}: needed the training of the models that the protocol has now, "
+            "got one from before a change in its study id, scale, elbow, models, "
+            "schedule, stretch, presentation, occasions or device"
+        )
+    ended = [event.fields for event in events if event.kind == "complete"]
+    return TrainingRecord(
+        rater=str(header["rater"]),
+        criterion=_criterion_of(header, protocol),
+        boundary=float(str(header["boundary"])),
+        false_pass=float(str(header["false_pass"])),
+        false_fail=float(str(header["calibrated_false_fail"])),
+        order_seed=int(str(header["order_seed"])),
+        is_weighted=bool(header.get("is_weighted", False)),
+        lessons=tuple(_lesson(e) for e in events if e.kind == "grade"),
+        passed=bool(ended[-1]["passed"]) if ended else None,
+        simulated=bool(header["simulated"]),
+    )
+
+
+def _criterion_of(header: Mapping[str, object], protocol: Protocol) -> Criterion:
+    return replace(
+        training_criterion(protocol),
+        weights=str(header["weights"]),
+        insufficient=float(str(header["kappa_insufficient"])),
+        sufficient=float(str(header["kappa_sufficient"])),
+        window=int(str(header["window"])),
+        max_presentations=int(str(header["max_presentations"])),
+        order=str(header["order"]),
+    )
+
+
+def _lesson(event: Event) -> Lesson:
+    fields = event.fields
+    return Lesson(
+        position=int(str(fields["position"])),
+        model=str(fields["model"]),
+        intended=str(fields["intended"]),
+        grade=str(fields["grade"]),
+    )

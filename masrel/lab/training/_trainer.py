@@ -1,0 +1,269 @@
+"""Train a rater: present models with known grades until the criterion is met.
+
+Started again, a training goes on where its log ends, as a session does.
+"""
+
+import secrets
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from datetime import datetime
+
+import masrel
+from masrel.errors import ParameterError, ProtocolError, SessionLogError
+from masrel.lab._event_log import SessionLog, utc_now
+from masrel.lab.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
+from masrel.lab.recording import _Fact
+from masrel.lab.run._grade_sources import GradeRequest, GradeSource, Skip
+from masrel.lab.run._presenter import ClockName, Presenter
+from masrel.lab.run._settings import moves_hardware
+from masrel.lab.run.session import _check_device
+from masrel.lab.schedule import Presentation
+from masrel.lab.training._criterion import calibrate, training_criterion
+from masrel.lab.training._lessons import (
+    FORMAT,
+    SETTINGS,
+    Lesson,
+    TrainingRecord,
+    check_events,
+    record_of,
+)
+from masrel.lab.training._syllabus import next_model
+
+_SESSION = "training"  # what recordings of a training have in place of a session
+
+
+def train_rater(
+    study: StudyPaths,
+    protocol: Protocol,
+    rater: str,
+    *,
+    grades: GradeSource,
+    clock: ClockName,
+    feedback: Callable[[Lesson], object] | None = None,
+    now: Callable[[], datetime] = utc_now,
+) -> TrainingRecord:
+    """Train a rater until the criterion is met, or go on with it.
+
+    Nothing of a training enters the ratings of the study.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+    rater : str
+        Id of one of its raters.
+    grades : GradeSource
+        Where grades come from.
+    clock : {"real", "simulated"}
+        The clock of the control loop; "simulated" needs a simulated hand.
+    feedback : callable, optional
+        Called with each lesson once its grade is in the log.
+    now : callable, optional
+        Gives the time of day for the log, aware.
+
+    Returns
+    -------
+    TrainingRecord
+        The training, passed or not. One that has ended is left as it is.
+
+    Raises
+    ------
+    ParameterError
+        If the protocol has no such rater, the device or `clock` is unknown or they do
+        not fit each other, or a grade is not of the scale.
+    ProtocolError
+        If fewer than two intended grades can be taught, the test needs more
+        presentations than there may be, or a model asks for more torque than the
+        device may send.
+    SessionLogError
+        If the log is damaged, was begun with other settings, models, source of grades
+        or device, or is open elsewhere.
+    DeviceError
+        If the device cannot be used, or faults are not to be tried again.
+    SessionStoppedError
+        If the person stops; the same call goes on there.
+    OSError
+        If log or recording cannot be written.
+
+    Warns
+    -----
+    OverrunWarning
+        If the control loop missed ticks.
+    """
+    _check_device(clock, protocol)
+    _check_models(study, protocol, rater)
+    path = study.training_log_file(rater)
+    if not path.exists() and any(path.with_suffix("").glob("*.npz")):
+        raise SessionLogError(
+            f"{path}: is gone, and there are recordings in {path.with_suffix('')}: put "
+            "the log back from a copy, or move these recordings away to begin anew"
+        )
+    with SessionLog.open(path, now=now) as log:
+        check_events(path, log.events)
+        trainer = _Trainer(study, protocol, rater, grades, clock, log)
+        trainer.begin()
+        return trainer.run(feedback)
+
+
+def _check_models(study: StudyPaths, protocol: Protocol, rater: str) -> None:
+    raters = [each.id for each in protocol.raters]
+    if rater not in raters:
+        raise ParameterError(f"rater: needed one of {', '.join(raters)}, got {rater!r}")
+    criterion = training_criterion(protocol)
+    if len(set(criterion.intended)) < 2:
+        raise ProtocolError(
+            f"{study.protocol}: models: training needs two or more different intended "
+            f"grades, got {len(set(criterion.intended))}"
+        )
+    if criterion.window < criterion.n_models:
+        raise ProtocolError(
+            f"{study.protocol}: training.window: needed at least one presentation of "
+            f"each of the {criterion.n_models} models with an intended grade, got "
+            f"{criterion.window}"
+        )
+
+
+class _Trainer:
+    """One run of one training; what it does is on disk before it goes on."""
+
+    def __init__(
+        self,
+        study: StudyPaths,
+        protocol: Protocol,
+        rater: str,
+        grades: GradeSource,
+        clock: ClockName,
+        log: SessionLog,
+    ) -> None:
+        self._study = study
+        self._protocol = protocol
+        self._rater = rater
+        self._grades = grades
+        self._clock = clock
+        self._log = log
+        self._presenter = Presenter(
+            protocol,
+            grades,
+            clock,
+            log,
+            occasion=f"training of {rater}",
+            named_by=("position",),
+            known_by=("model",),  # it has no schedule that says so
+        )
+        self._intended = {
+            model.id: model.intended_grade
+            for model in protocol.models
+            if model.intended_grade is not None
+        }
+
+    def begin(self) -> None:
+        """Log which training this is; check that it is the same when it goes on."""
+        provenance: dict[str, _Fact] = {
+            "protocol_sha256": protocol_hash(self._protocol),
+            "clock": self._clock,
+            "masrel_version": masrel.__version__,
+        }
+        rules, device = self._protocol.training, self._protocol.device
+        same: dict[str, _Fact] = {
+            "format": FORMAT,
+            "study": self._protocol.study.id,
+            "rater": self._rater,
+            "presented_sha256": presented_hash(self._protocol),
+            **{name: getattr(rules, name) for name in SETTINGS},
+            "simulated": self._grades.simulated or not moves_hardware(device),
+            "grades": self._grades.name,
+            "device": device.backend,
+        }
+        events = self._log.events
+        if not events:
+            self._log.append("training", {**same, **self._calibrated(), **provenance})
+            return
+        for name, value in same.items():
+            if events[0].fields[name] != value:
+                raise SessionLogError(
+                    f"{self._log.path}: begun with {name} = {events[0].fields[name]}: "
+                    f"needed the same to go on, got {value}"
+                )
+        if not any(event.kind == "complete" for event in events):
+            n_graded = sum(event.kind == "grade" for event in events)
+            self._log.append("resumed", {"n_graded": n_graded, **provenance})
+
+    def _calibrated(self) -> dict[str, _Fact]:
+        rules = self._protocol.training
+        criterion = training_criterion(self._protocol)
+        calibration = calibrate(criterion, false_pass=rules.false_pass, rng=rules.seed)
+        if calibration.false_fail > rules.false_fail:
+            raise ProtocolError(
+                f"{self._study.protocol}: training.max_presentations: needed enough to "
+                f"fail at most {100.0 * rules.false_fail:g} % of trainees with kappa "
+                f"{rules.kappa_sufficient:g}, got {rules.max_presentations}, which "
+                f"fail {100.0 * calibration.false_fail:.1f} %; allow more, with a "
+                "longer window, or put the two kappas further apart"
+            )
+        # An order that anybody can draw again from the protocol teaches by heart.
+        seed = rules.seed if self._grades.simulated else secrets.randbits(53)
+        return {
+            "boundary": calibration.boundary,
+            "calibrated_false_fail": calibration.false_fail,
+            "order_seed": seed,
+            "is_weighted": True,
+        }
+
+    def run(self, feedback: Callable[[Lesson], object] | None) -> TrainingRecord:
+        """Teach until the criterion is met or there were enough presentations."""
+        record = record_of(self._log.path, self._log.events, self._protocol)
+        while record.passed is None:
+            passed = _has_passed(record)
+            n_presentations = len(record.lessons)
+            if passed or n_presentations >= record.criterion.max_presentations:
+                facts = {"passed": passed, "n_presentations": n_presentations}
+                self._log.append("complete", facts)
+                return replace(record, passed=passed)
+            lesson = self._teach(record)
+            if feedback is not None:
+                feedback(lesson)
+            record = replace(record, lessons=(*record.lessons, lesson))
+        return record
+
+    def _teach(self, record: TrainingRecord) -> Lesson:
+        model = next_model(
+            self._intended,
+            record.lessons,
+            order=record.criterion.order,
+            seed=record.order_seed,
+            rater=self._rater,
+        )
+        position = len(record.lessons) + 1
+        grade = self._presenter.rate(self._request(position, model))
+        if isinstance(grade, Skip):  # no training can do without a grade
+            raise ParameterError(
+                f"grade of presentation {position}: needed one, got that it is skipped"
+            )
+        lesson = Lesson(
+            position=position,
+            model=model,
+            intended=self._intended[model],
+            grade=grade.grade,
+        )
+        self._log.append("grade", asdict(lesson))
+        return lesson
+
+    def _request(self, position: int, model: str) -> GradeRequest:
+        return GradeRequest(
+            rater=self._rater,
+            session=_SESSION,
+            presentation=Presentation(
+                position=position, code=f"{position:03d}", model=model, repeat=position
+            ),
+            n_presentations=self._protocol.training.max_presentations,
+            attempt=1,
+            rules=self._protocol.presentation,
+        )
+
+
+def _has_passed(record: TrainingRecord) -> bool:
+    # looked at once a set is whole; a training that went on before could not have ended
+    evidence = record.evidence()
+    return bool(evidence.size and (evidence >= record.boundary).any())

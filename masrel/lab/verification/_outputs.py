@@ -1,0 +1,251 @@
+"""Table of ratings, analysis and report, held against what they were made from."""
+
+import hashlib
+import json
+import warnings
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import zip_longest
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from masrel._input import (
+    MAX_RECORDING,
+    MAX_TABLE,
+    csv_format,
+    format_problem,
+    parse_json,
+    read_regular,
+)
+from masrel.errors import MasrelError, MasrelWarning
+from masrel.lab.conduct import excluded_raters
+from masrel.lab.conduct._study_log import conduct_hash
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.verification._finding import Finding, broken, doubt
+
+if TYPE_CHECKING:
+    from masrel.lab.analysis import Analysis
+    from masrel.lab.ratings import Ratings
+
+REPORT_FORMAT = "masrel report 1"
+"""What the manifest of a report says its format is."""
+
+_SHOWN = 20  # differences of the table that are listed
+
+
+def output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
+    """Yield what is wrong with everything that was made from the logs."""
+    table, manifest = study.ratings_file, study.report / "manifest.json"
+    tables = (table, study.answers_file, study.raters_file)
+    outputs = (*tables, study.analysis_file, manifest)
+    files = [file for file in outputs if file.is_file()]
+    if not files:
+        return  # nothing is loaded for it
+    from masrel.lab.ratings import read_study_data
+    from masrel.lab.ratings.logs import _of_logs
+
+    try:
+        if study.logs():
+            # recordings have been held against the logs before
+            ratings = _of_logs(study, protocol, check_recordings=False)
+            yield from _table_findings(table, ratings)
+            yield from _answers_findings(study, protocol)
+            yield from _raters_findings(study, protocol)
+        else:
+            ratings = read_study_data(study, protocol).ratings
+            if table.is_file():
+                yield doubt(table, "no session log stands behind this table")
+        if not {study.analysis_file, manifest} & {*files}:
+            return
+        analysis = _analysis_of(study, protocol, ratings)
+    except MasrelError as error:
+        for path in files:
+            yield broken(path, f"cannot be held against what it is made from: {error}")
+        return
+    if study.analysis_file.is_file():
+        yield from _analysis_findings(study.analysis_file, analysis, ratings)
+    if manifest.is_file():
+        yield from _report_findings(study, manifest, analysis, ratings)
+
+
+def _analysis_of(
+    study: StudyPaths, protocol: Protocol, ratings: "Ratings"
+) -> "Analysis":
+    from masrel.lab.analysis import analyze
+    from masrel.lab.ratings import answers_of, in_person_of
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MasrelWarning)  # of statistics
+        return analyze(
+            protocol,
+            ratings,
+            in_person=in_person_of(study, ratings),
+            answers=answers_of(study, protocol),
+            excluded=excluded_raters(study),
+        )
+
+
+def _answers_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
+    from masrel.lab.ratings import answers_csv, answers_from_logs
+
+    path = study.answers_file
+    if path.is_file():
+        text = read_regular(path, most=MAX_TABLE).decode("utf-8", errors="replace")
+        if text != answers_csv(answers_from_logs(study, protocol)):
+            yield broken(
+                path, "is not what the logs say; masrel ratings writes it anew"
+            )
+
+
+def _raters_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
+    from masrel.lab.progress._raters import raters_text
+
+    path = study.raters_file
+    if not path.is_file():
+        return
+    text = read_regular(path, most=MAX_TABLE).decode("utf-8", errors="replace")
+    problem = format_problem(csv_format(text), newest=1)
+    needed = raters_text(study, protocol)
+    if problem is not None:
+        yield broken(path, problem)
+    elif text != needed:
+        lines, needed_lines = text.splitlines(), needed.splitlines()
+        pairs = zip_longest(lines, needed_lines, fillvalue="no line")
+        line, (got, row) = next(
+            (number, pair)
+            for number, pair in enumerate(pairs, start=1)
+            if pair[0] != pair[1]
+        )
+        yield broken(
+            path,
+            f"line {line}: needed {row[:80]!r}, as protocol and logs say, got "
+            f"{got[:80]!r}; masrel ratings writes it anew",
+        )
+
+
+def _table_findings(path: Path, ratings: "Ratings") -> Iterator[Finding]:
+    from masrel.lab.ratings import table_differences
+
+    differences = list(table_differences(path, ratings))
+    for difference in differences[:_SHOWN]:
+        yield broken(path, difference)
+    if len(differences) > _SHOWN:
+        yield broken(path, f"there are {len(differences) - _SHOWN} more differences")
+
+
+def _of_same_table(
+    analysis: "Analysis", inputs: object, ratings: "Ratings"
+) -> "Analysis":
+    # with the hash that was written if it is of the same table in an earlier format
+    from masrel.lab.ratings.table import _texts
+
+    sha256 = inputs.get("ratings_sha256") if isinstance(inputs, dict) else None
+    if sha256 == analysis.inputs["ratings_sha256"] or ratings.source_path is not None:
+        return analysis
+    for text in _texts(ratings):
+        if sha256 == hashlib.sha256(text.encode()).hexdigest():
+            return replace(
+                analysis, inputs={**analysis.inputs, "ratings_sha256": sha256}
+            )
+    return analysis
+
+
+def _analysis_findings(
+    path: Path, analysis: "Analysis", ratings: "Ratings"
+) -> Iterator[Finding]:
+    from masrel.lab.analysis import as_analysis_document
+    from masrel.lab.analysis._analysis_json import ANALYSIS_FORMAT
+
+    document = _document(path)
+    if document is None:
+        yield broken(path, "needed a JSON object, got none")
+        return
+    document = {"format": 1, **document}  # which was not said once
+    problem = format_problem(document["format"], newest=ANALYSIS_FORMAT)
+    if problem is not None:
+        yield broken(path, problem)
+        return
+    analysis = _of_same_table(analysis, document.get("inputs"), ratings)
+    needed = json.loads(json.dumps(as_analysis_document(analysis)))
+    version = document.get("masrel_version")
+    if version != analysis.masrel_version:
+        yield doubt(
+            path,
+            f"is of masrel {version}, this is {analysis.masrel_version}: only what it "
+            "was made from is looked at",
+        )
+        document, needed = ({"inputs": d.get("inputs")} for d in (document, needed))
+    difference = _first_difference(document, needed)
+    if difference is not None:
+        yield broken(path, f"{difference} when it is computed again")
+
+
+def _first_difference(got: object, needed: object, place: str = "") -> str | None:
+    # where two documents differ first, in words
+    if isinstance(got, dict) and isinstance(needed, dict):
+        names = [*needed, *(name for name in got if name not in needed)]
+        pairs = [(f"{place}.{n}".lstrip("."), got.get(n), needed.get(n)) for n in names]
+    elif isinstance(got, list) and isinstance(needed, list) and len(got) == len(needed):
+        both = enumerate(zip(got, needed, strict=True))
+        pairs = [(f"{place}[{index}]", *pair) for index, pair in both]
+    elif got == needed and type(got) is type(needed):
+        return None
+    else:
+        return f"{place} is {json.dumps(got):.60}, but {json.dumps(needed):.60}"
+    differences = (_first_difference(g, n, p) for p, g, n in pairs)
+    return next((difference for difference in differences if difference), None)
+
+
+def _report_findings(
+    study: StudyPaths, manifest: Path, analysis: "Analysis", ratings: "Ratings"
+) -> Iterator[Finding]:
+    # of the pages and assets that a report consists of, and what it was made from
+    document = _document(manifest)
+    files = None if document is None else document.get("files")
+    if document is None or not isinstance(files, dict):
+        yield broken(manifest, "needed the manifest of a report, got none")
+        return
+    if document.get("format") != REPORT_FORMAT:
+        yield broken(
+            manifest,
+            f"needed format {REPORT_FORMAT!r}, got {document.get('format')!r}",
+        )
+        return
+    inputs = document.get("inputs")
+    got = dict(inputs) if isinstance(inputs, dict) else {}
+    got.pop("include", None)  # what is shown of the same
+    of_conduct = got.pop("conduct_sha256", None)
+    of_claims = got.pop("claims_sha256", None)
+    if got != _of_same_table(analysis, got, ratings).inputs:
+        yield broken(
+            manifest, "the report is of another protocol or of other ratings: make anew"
+        )
+    if of_conduct != conduct_hash(study):
+        yield broken(
+            manifest,
+            "the report is not of what has happened beside the sessions, by "
+            f"{study.conduct_file.name}: make anew",
+        )
+    claims = study.claims_file
+    if of_claims and of_claims != (_sha256(claims) if claims.is_file() else None):
+        yield broken(manifest, f"the report is of other claims than {claims.name}")
+    for name, needed in files.items():
+        path = manifest.parent / name
+        if not path.resolve().is_relative_to(manifest.parent.resolve()):
+            yield broken(manifest, f"names a file outside the report, {name}")
+        elif not path.is_file():
+            yield broken(path, "needed a file of the report, got none")
+        elif _sha256(path) != needed:
+            yield broken(path, "is not the file that the report was written with")
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(read_regular(path, most=MAX_RECORDING)).hexdigest()
+
+
+def _document(path: Path) -> dict[str, object] | None:
+    try:
+        document = parse_json(read_regular(path, most=MAX_TABLE))
+    except ValueError:
+        return None
+    return document if isinstance(document, dict) else None

@@ -1,0 +1,1 @@
+"""Tables of results, in every form, and the rules of rounding."""

@@ -1,0 +1,194 @@
+"""Estimates and intervals in words: what they are, of whom, and what they promise."""
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Literal
+
+from masrel.agreement import COEFFICIENTS
+from masrel.estimates import Estimate, Interval
+from masrel.tables._tables import UNDEFINED, counted, interval_text, number, percent
+
+if TYPE_CHECKING:
+    from masrel.plots._drawn_values import ForestRow
+
+Noun = Literal["model", "item"]
+"""What is rated: a haptic model in a study, any item elsewhere."""
+
+TARGETS = {
+    "raters": "other raters",
+    "items": "other models",
+    "both": "other raters and models",
+}
+"""Target of an interval to what it generalises to."""
+
+_POPULATIONS = {
+    "raters": "the same {}s were put to other raters like these",
+    "items": "these raters graded other {}s like these",
+    "both": "other raters graded other {}s, both like these",
+}
+
+NOT_THERE = "not in these data"
+"""What is shown where a plan's estimate is not."""
+
+_WIDENED = "and the spread of raters"
+"""End of the method of a posterior that was widened by what raters differ by."""
+
+
+def coefficient_name(coefficient: str, weights: str = "identity") -> str:
+    """Return a coefficient's name for a reader."""
+    title = COEFFICIENTS[coefficient].title
+    if weights != "identity":
+        title = f"{title}, {weights} weights"
+    # A share as all others are: 1 is all, not 100.
+    return f"{title} (0–1)" if coefficient == "percent_agreement" else title
+
+
+def forest_row(
+    label: str, estimate: Estimate | None, *, detail: str = "", group: str = ""
+) -> "ForestRow":
+    """Return the row of an estimate in a forest, or one that says there is none."""
+    from masrel.plots._drawn_values import ForestRow  # a table has no figure
+
+    value = interval = None
+    text, has_zero = NOT_THERE, False
+    if estimate is not None:
+        text, interval = UNDEFINED, estimate.interval
+        if math.isfinite(estimate.value):
+            value = estimate.value
+            text = number(value, 3)
+            if interval is not None:
+                text += f" {interval_text(interval.low, interval.high)}"
+        if interval is not None and not math.isfinite(interval.high - interval.low):
+            interval = None
+        # 0 is what chance gives of an ICC and a κ; not of a share, nor of an order
+        has_zero = COEFFICIENTS[estimate.coefficient].chance_corrected
+    return ForestRow(
+        label=label,
+        detail=detail,
+        value=value,
+        interval=interval,
+        text=text,
+        has_zero=has_zero,
+        group=group,
+    )
+
+
+def interval_name(interval: Interval) -> str:
+    """Return level, kind and method of an interval."""
+    return f"{percent(interval.level)} % {interval.kind}, {interval.method}"
+
+
+def meaning(interval: Interval, noun: Noun) -> str:
+    """Return in one sentence what an interval promises and what it was made from."""
+    kind = "bound" if interval.is_one_sided else "interval"
+    name = f"{interval.kind.capitalize()} {kind}"
+    return f"{name}{origin(interval, noun)}: {promise(interval, noun)}."
+
+
+def promise(interval: Interval, noun: Noun) -> str:
+    """Return what an interval promises, and of whom."""
+    level = f"{percent(interval.level)} %"
+    # clusters are drawn anew with the items in them
+    of_whom = f"cluster of {noun}" if interval.unit == "clusters" else noun
+    population = _POPULATIONS[interval.target].replace("{}", of_whom)
+    population = population.replace(f"cluster of {noun}s", f"clusters of {noun}s")
+    if interval.kind == "confidence":
+        return (
+            f"if {population}, again and again, about {level} of the intervals made "
+            "this way would hold the value that all such studies together would give"
+        )
+    # A probability rests on the prior, and of other raters on how they differ.
+    premises = "these ratings, the prior and the model of how raters differ"
+    if interval.target == "items":
+        premises = "these ratings and the prior"
+    elif interval.method.startswith("Dirichlet-multinomial"):  # it knows of no rater
+        premises = "these ratings, the prior and raters who differ by chance alone"
+    is_one_sided = interval.is_one_sided
+    where = "above the lower end" if is_one_sided else "inside"
+    return (
+        f"given {premises}, the value that would be found if {population}, "
+        f"without end, lies {where} with probability {level}"
+    )
+
+
+def origin(interval: Interval, noun: Noun) -> str:
+    """Return in brackets what the ends of an interval came from."""
+    units = {
+        "items": f"{noun}s",
+        "raters": "raters",
+        "both": f"{noun}s and raters",
+        "clusters": f"clusters of {noun}s",
+    }
+    if interval.method.endswith(_WIDENED):
+        return " (a posterior, made wider by what raters differ by)"
+    if interval.unit is None:
+        return ""
+    if "bootstrap" in interval.method:
+        return f" (from {units[interval.unit]} drawn with replacement)"
+    if interval.unit == "both":
+        return f" (from leaving out {noun}s and raters, one at a time)"
+    if interval.unit == "clusters":
+        return f" (from leaving out one cluster of {noun}s at a time)"
+    one = units[interval.unit].removesuffix("s")
+    return f" (from leaving out one {one} at a time)"
+
+
+def aside(interval: Interval) -> str:
+    """Return in few words how the ends differ from quantiles of the distribution."""
+    if interval.is_one_sided:
+        return "one-sided"
+    if interval.method.endswith(_WIDENED):
+        return "posterior, wider by the spread of raters"
+    return ""
+
+
+def pair_words(estimate: Estimate) -> str:
+    """Return what an item needs to count among those with a pair of ratings."""
+    entry = COEFFICIENTS.get(estimate.coefficient)  # none of kappa of a category
+    is_retest = entry is not None and entry.shape == "pairs"
+    return "both ratings of a rater" if is_retest else "two ratings or more"
+
+
+def sentence(estimate: Estimate, *, word: str = "") -> str:
+    """Return an estimate of items as a sentence for a paper, in the style of APA."""
+    # word: the one that it earns, and whose it is
+    entry = COEFFICIENTS[estimate.coefficient]
+    name = entry.title
+    if entry.weighted and estimate.weights != "identity":
+        name = f"{name} ({estimate.weights} weights)"
+    items = counted(estimate.n_items, "item")
+    if estimate.n_items_paired < estimate.n_items:
+        items += f" ({estimate.n_items_paired} with {pair_words(estimate)})"
+    sizes = (items, counted(estimate.n_raters, "rater"))
+    if estimate.reason is not None:
+        return f"{name} is undefined ({estimate.reason}), {', '.join(sizes)}."
+    shown = partial(number, digits=2, in_units=True) if entry.in_units else _apa
+    uncertainty = _uncertainty(estimate, shown)
+    parts = (f"{name} = {shown(estimate.value)}", *uncertainty, word, *sizes)
+    return f"{', '.join(filter(None, parts))}."
+
+
+def _uncertainty(estimate: Estimate, shown: Callable[[float], str]) -> list[str]:
+    # the interval, or why there is none and the standard error in its place
+    interval, error = estimate.interval, estimate.standard_error
+    errors = [] if math.isnan(error) else [f"SE = {shown(error)}"]
+    if interval is None:
+        return errors
+    name = f"{percent(interval.level)} % {_SHORT_KINDS[interval.kind]}"
+    if interval.reason is not None:
+        return [*errors, f"no {name} ({interval.reason})"]
+    method = interval.method.split(",")[0]
+    if interval.is_one_sided:
+        name = f"{percent(interval.level)} % {interval.kind} lower bound"
+        return [f"{name} {shown(interval.low)} ({method})"]
+    return [f"{name} [{shown(interval.low)}, {shown(interval.high)}] ({method})"]
+
+
+_SHORT_KINDS = {"confidence": "CI", "credible": "credible interval"}
+
+
+def _apa(value: float) -> str:
+    # two decimals, no 0 before the point: none of the coefficients can exceed 1
+    text = number(value, 2)
+    return text.removeprefix("0") if value >= 0.0 else text.replace("−0.", "−.")

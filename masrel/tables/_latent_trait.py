@@ -1,0 +1,197 @@
+"""The table, the JSON and the figure of a latent-trait model of ratings."""
+
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+from masrel.estimates import as_document
+from masrel.plots._drawn_values import LatentScale, ScaleRow
+from masrel.tables._tables import (
+    Column,
+    Table,
+    Value,
+    number,
+    percent,
+    significant,
+)
+
+if TYPE_CHECKING:
+    from masrel.intervals import LatentTrait, Quantity
+
+_UNLIKELY = 0.01
+"""A p-value of the predictive check below this, or above 1 less this, is noted."""
+
+
+def latent_table(
+    result: "LatentTrait", *, caption: str, notes: tuple[str, ...], data: str
+) -> Table:
+    """Return the table of every quantity of the model with its interval."""
+    columns = [
+        Column(key="what", heading="What", align="left"),
+        Column(key="of", heading="Of", align="left"),
+        Column(key="median", heading="Median", digits=3),
+        Column(key="low", heading="Low", digits=3),
+        Column(key="high", heading="High", digits=3),
+    ]
+    if result.other is not None:
+        columns += [
+            Column(key="other_low", heading="Low, other prior", digits=3),
+            Column(key="other_high", heading="High, other prior", digits=3),
+        ]
+    return Table(
+        name="latent_trait",
+        caption=caption,
+        columns=tuple(columns),
+        rows=tuple(_rows(result)),
+        notes=(*notes, *_notes(result)),
+        data=data,
+    )
+
+
+def _parts(result: "LatentTrait") -> list[tuple[str, Iterable["Quantity"]]]:
+    return [
+        ("severity", result.items),
+        ("threshold", result.thresholds),
+        ("bias", result.raters),
+        ("noise", result.noises),
+        ("share of variance", result.shares),
+    ]
+
+
+def _rows(result: "LatentTrait") -> Iterator[tuple[Value, ...]]:
+    # the intervals under the other prior stand beside those under the first
+    other = result.other
+    interval = result.kappa.interval
+    other_interval = None if other is None else other.kappa.interval
+    if interval is not None:
+        ends = (
+            [] if other_interval is None else [other_interval.low, other_interval.high]
+        )
+        name, value = "two new raters", result.kappa.value
+        yield ("kappa", name, value, interval.low, interval.high, *ends)
+    others = [None] * 5 if other is None else [list(q) for _, q in _parts(other)]
+    for (part, quantities), beside in zip(_parts(result), others, strict=True):
+        for index, quantity in enumerate(quantities):
+            ends = []
+            if beside is not None:
+                ends = [beside[index].interval.low, beside[index].interval.high]
+            low, high = quantity.interval.low, quantity.interval.high
+            yield (part, quantity.name, quantity.value, low, high, *ends)
+
+
+def _notes(result: "LatentTrait") -> Iterator[str]:
+    yield from _meanings(result)
+    yield f"Prior: {result.prior.words}."
+    if result.other is not None:
+        yield f"Other prior: {result.other.prior.words}."
+    unlikely = _unlikely(result)
+    if unlikely:
+        yield (
+            "The model does not make ratings like these (predictive check): "
+            f"{'; '.join(unlikely)}."
+        )
+    else:
+        yield "The model makes ratings like these (predictive check)."
+    yield (
+        f"{result.n_chains} chains of {result.n_steps} steps; R-hat at most "
+        f"{number(result.r_hat, 4)}, effective size at least {number(result.ess, 0)}; "
+        f"seed {result.seed}."
+    )
+
+
+def _meanings(result: "LatentTrait") -> Iterator[str]:
+    # what the numbers are about, and their unit
+    interval = result.kappa.interval
+    if interval is not None:
+        whom = "these items" if interval.target == "raters" else "new items like these"
+        yield (
+            f"Kappa: agreement of two new raters on {whom}. Low and High: central "
+            f"{percent(interval.level)} % credible interval."
+        )
+    yield (
+        "Unit: the standard deviation of a rating; 0 is the mean severity of these "
+        "items, and for biases the mean of all raters. A rater with a positive bias "
+        "grades high; noise is how far the same item is perceived from one time to the "
+        "next."
+    )
+    thresholds = [quantity.value for quantity in result.thresholds]
+    if len(thresholds) > 1:
+        distance = (thresholds[-1] - thresholds[0]) / (len(thresholds) - 1)
+        yield (
+            f"Neighbouring thresholds are {number(distance, 2)} apart on average: a "
+            "bias of that is about one grade."
+        )
+
+
+def _unlikely(result: "LatentTrait") -> list[str]:
+    # what of the ratings the model would hardly make
+    return [
+        f"{check.name} {significant(check.observed, 3)}, expected "
+        f"{significant(check.low, 3)} to {significant(check.high, 3)}"
+        for check in result.checks
+        if not _UNLIKELY <= check.p_value <= 1.0 - _UNLIKELY
+    ]
+
+
+def latent_document(result: "LatentTrait") -> dict[str, object]:
+    """Return a result as plain values for JSON, every digit kept."""
+    parts = {
+        "items": result.items,
+        "thresholds": result.thresholds,
+        "raters": result.raters,
+        "noises": result.noises,
+        "shares": result.shares,
+        "noise_spread": (result.noise_spread,),
+    }
+    return {
+        "kappa": as_document(result.kappa),
+        **{name: list(map(_quantity, part)) for name, part in parts.items()},
+        "grades": [list(row) for row in result.grades],
+        "checks": [
+            {
+                name: getattr(check, name)
+                for name in ("name", "observed", "low", "high", "p_value")
+            }
+            for check in result.checks
+        ],
+        "prior": result.prior.words,
+        "r_hat": result.r_hat,
+        "ess": result.ess,
+        "n_chains": result.n_chains,
+        "n_steps": result.n_steps,
+        "seed": result.seed,
+        "other": None if result.other is None else latent_document(result.other),
+    }
+
+
+def _quantity(quantity: "Quantity") -> dict[str, object]:
+    return {
+        "name": quantity.name,
+        "value": quantity.value,
+        "interval": as_document(quantity.interval),
+        "r_hat": quantity.r_hat,
+        "ess": quantity.ess,
+    }
+
+
+def latent_scale(result: "LatentTrait", grades: tuple[str, ...]) -> LatentScale:
+    """Return what a figure shows: raters, items and thresholds on one scale."""
+    return LatentScale(
+        items=tuple(map(_scale_row, result.items)),
+        thresholds=tuple(map(_scale_row, result.thresholds)),
+        raters=tuple(
+            _scale_row(bias, noise.value)
+            for bias, noise in zip(result.raters, result.noises, strict=True)
+        ),
+        grades=grades,
+        level=result.items[0].interval.level,
+    )
+
+
+def _scale_row(quantity: "Quantity", noise: float | None = None) -> ScaleRow:
+    return ScaleRow(
+        label=quantity.name,
+        value=quantity.value,
+        low=quantity.interval.low,
+        high=quantity.interval.high,
+        noise=noise,
+    )

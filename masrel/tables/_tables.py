@@ -1,0 +1,272 @@
+"""Tables in every form they are read in, and the rules by which numbers are rounded.
+
+A table holds its values as they were computed. This is the only module of the report
+that rounds, and it does so when a table is shown (screen, LaTeX, HTML, Markdown); the
+CSV keeps every digit.
+"""
+
+import csv
+import io
+import math
+import re
+import textwrap
+import unicodedata
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import ROUND_HALF_UP, Decimal
+from typing import Literal
+
+from masrel._cells import safe_cell
+
+SYMBOL = re.compile(r"(?<!\w)(ΔT|k|ν|θ|p)_(peak|post|th|L|start|end|o|e)(?!\w)")
+"""Symbols of the model as they are written in plain text: an index after "_"."""
+
+ABSENT = "–"
+"""What is shown where there is nothing."""
+
+UNDEFINED = "undefined"
+"""What is shown for ``nan``."""
+
+SIMULATED = "SIMULATED DATA"
+SIMULATED_DEVICE = "SIMULATED DEVICE"
+
+
+def tag_of(data: str) -> str:
+    """Return what is said before anything made of simulated data, else nothing."""
+    if "simulated" not in data:
+        return ""
+    label = SIMULATED_DEVICE if "simulated device" in data else SIMULATED
+    return f"{label.capitalize()}."
+
+
+"""What tables and figures of simulated data carry."""
+
+Value = str | int | float | None
+"""What a cell holds: text, a number, or nothing."""
+
+Align = Literal["left", "right", "center"]
+"""How a column is set."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """One column of a table."""
+
+    key: str  # its name in the CSV, unit included
+    heading: str  # its name for a reader, unit included
+    # decimals shown of a float; None for text, whole numbers, and numbers shown with
+    # the digits they were entered with
+    digits: int | None = None
+    align: Align = "right"
+    # whether a page (or screen) and the CSV have it: a page puts in one column what a
+    # CSV keeps in several
+    where: Literal["everywhere", "page", "csv"] = "everywhere"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """A table whose first column names the rows."""
+
+    name: str  # name of its file, without extension
+    caption: str  # what it shows, understood alone
+    columns: tuple[Column, ...]
+    # values as computed: text, numbers, ``nan`` for undefined, None for absent
+    rows: tuple[tuple[Value, ...], ...]
+    # what a page shows where the rows are too many for it; the CSV has all
+    page_rows: tuple[tuple[Value, ...], ...] | None = None
+    in_units: tuple[int, ...] = ()  # rows of numbers that may be of any size
+    notes: tuple[str, ...] = ()  # what the reader must know, below the table
+    read: tuple[str, ...] = ()  # what was read for it, above the table
+    # where the data come from: "simulated", "simulated device" where persons gave the
+    # grades, "published", "reconstructed", "recorded" or "foreign"
+    data: str
+
+    @property
+    def tag(self) -> str:
+        """What is said before the caption of data that are simulated."""
+        return tag_of(self.data)
+
+    @property
+    def labelled_caption(self) -> str:
+        """The caption, after the label of simulated data where any are."""
+        return f"{self.tag.upper()} {self.caption}".strip()
+
+
+def number(value: Value, digits: int | None, *, in_units: bool = False) -> str:
+    """Return a number as shown: rounded, with a true minus sign."""
+    # in_units: whether it may be of any size, and keeps four digits where it is small
+    # Text and whole numbers are shown as they are.
+    if value is None:
+        return ABSENT
+    if not isinstance(value, float):
+        return str(value)
+    if digits is None:
+        return as_entered(value)
+    if math.isinf(value):
+        return "∞" if value > 0.0 else "−∞"
+    if math.isnan(value):
+        return UNDEFINED
+    text = fixed_or_significant(value, digits) if in_units else f"{value:.{digits}f}"
+    if float(text) == 0.0:
+        text = text.removeprefix("-")  # no "-0.000"
+    return text.replace("-", "−")
+
+
+def half_up(value: float, decimals: int) -> str:
+    """Return a number rounded as on paper: what lies in the middle goes up."""
+    # Means of a few whole numbers often lie there; a float's own format goes to even.
+    if math.isnan(value):
+        return UNDEFINED
+    unit = Decimal(1).scaleb(-decimals)
+    text = str(Decimal(repr(value)).quantize(unit, ROUND_HALF_UP))
+    return text.replace("-", "−")
+
+
+def rounded(value: float, decimals: int) -> float:
+    """Return a number with so many decimals, for a file that takes numbers."""
+    return round(value, decimals)
+
+
+def significant(value: float, digits: int = 6) -> str:
+    """Return a number with so many digits, whatever its size."""
+    return f"{value:.{digits}g}"
+
+
+def fixed_or_significant(value: float, decimals: int) -> str:
+    """Return a number with fixed decimals where they show it, else four digits."""
+    if value == 0.0 or 10.0 ** (1 - decimals) <= abs(value) < 1e7:
+        return f"{value:.{decimals}f}"
+    return significant(value, 4)
+
+
+def as_entered(value: float) -> str:
+    """Return a number that somebody chose with the digits it was entered with."""
+    if not math.isfinite(value):
+        return UNDEFINED
+    text = f"{Decimal(repr(float(value))):f}"  # no exponent
+    return text.removesuffix(".0").replace("-", "−")
+
+
+def percent(share: float) -> str:
+    """Return a share that somebody chose in percent, with the digits it has."""
+    return f"{(Decimal(repr(float(share))) * 100).normalize():f}"
+
+
+def whole_or_tenths(values: Sequence[float]) -> int:
+    """Return the decimals a column of measurements needs: 0 if all are whole."""
+    known = [value for value in values if math.isfinite(value)]
+    return 0 if all(float(value).is_integer() for value in known) else 1
+
+
+def interval_text(low: float, high: float, digits: int = 3) -> str:
+    """Return the ends of an interval in brackets."""
+    if math.isnan(low) or math.isnan(high):
+        return f"[{UNDEFINED}]"
+    return f"[{number(low, digits)}, {number(high, digits)}]"
+
+
+def p_text(p: float) -> str:
+    """Return a p-value as shown: three decimals, or below the least that they show."""
+    return "<0.001" if p < 0.0005 else number(p, 3)
+
+
+def at_ranks(values: Sequence[float]) -> dict[str, int]:
+    """Return which of many values are the least, the quartiles and the most."""
+    order = sorted(range(len(values)), key=values.__getitem__)
+    names = ("lowest", "lower quartile", "median", "upper quartile", "highest")
+    return {name: order[k * (len(order) - 1) // 4] for k, name in enumerate(names)}
+
+
+def capital(text: str) -> str:
+    """Return a text with a capital at its start."""
+    return text[:1].upper() + text[1:]
+
+
+def counted(count: int, noun: str) -> str:
+    """Return a count with its noun, in the plural unless there is one."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def in_thousands(count: int) -> str:
+    """Return a whole number with a space every three digits."""
+    return f"{count:,}".replace(",", " ")
+
+
+def page_cells(table: Table) -> tuple[list[Column], list[list[str]]]:
+    """Return the columns of a page or a screen, and its rows as shown in them."""
+    places = [(i, c) for i, c in enumerate(table.columns) if c.where != "csv"]
+    rows = [
+        [number(row[i], c.digits, in_units=at in table.in_units) for i, c in places]
+        for at, row in enumerate(
+            table.rows if table.page_rows is None else table.page_rows
+        )
+    ]
+    return [column for _, column in places], rows
+
+
+def as_csv(table: Table, *, raw: bool = False) -> str:
+    """Return a table as CSV, every digit kept, with its provenance in each row."""
+    # raw: whether texts are as they are, also such as a spreadsheet would run
+    cell = str if raw else safe_cell
+    places = [(i, c) for i, c in enumerate(table.columns) if c.where != "page"]
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow([*(cell(column.key) for _, column in places), "data"])
+    for row in table.rows:
+        cells = [row[i] for i, _ in places]
+        known = [
+            None if isinstance(c, float) and not math.isfinite(c) else c for c in cells
+        ]
+        shown = [cell(c) if isinstance(c, str) else c for c in known]
+        writer.writerow([*shown, table.data])  # None is written as nothing
+    return out.getvalue()
+
+
+def as_text(table: Table, *, width: int | None = None) -> str:
+    """Return a table for a screen of fixed-width letters, its notes wrapped."""
+    columns, body = page_cells(table)
+    head = [column.heading for column in columns]
+    lines = aligned([head, *body], [column.align for column in columns], rule=True)
+    read, notes = wrapped(table.read, width), wrapped(table.notes, width)
+    return "\n".join([table.labelled_caption, *read, *lines, *notes])
+
+
+def wrapped(notes: Sequence[str], width: int | None) -> list[str]:
+    """Return notes as lines of a width, those that go on indented; None is no width."""
+    if width is None:
+        return list(notes)
+    lines = [
+        textwrap.wrap(
+            note,
+            width,
+            subsequent_indent="  ",
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+        for note in notes
+    ]
+    return [line for note in lines for line in note]
+
+
+def aligned(
+    rows: Sequence[Sequence[str]], aligns: Sequence[Align], *, rule: bool = False
+) -> list[str]:
+    """Return rows of cells as lines that line up, with a rule below the first."""
+    # combining marks take no column of the screen
+    sizes = [
+        [sum(not unicodedata.combining(letter) for letter in cell) for cell in cells]
+        for cells in rows
+    ]
+    widths = [max(column) for column in zip(*sizes, strict=True)]
+    lines = []
+    for row in zip(rows, sizes, strict=True):
+        padded = [
+            " " * (width - size) + cell
+            if align == "right"
+            else cell + " " * (width - size)
+            for cell, size, width, align in zip(*row, widths, aligns, strict=True)
+        ]
+        lines.append("  ".join(padded).rstrip())
+    if rule:
+        lines.insert(1, "  ".join("-" * width for width in widths))
+    return lines
