@@ -41,14 +41,14 @@ def test_the_package_and_its_help_load_nothing_heavy(code: str) -> None:
     assert loaded_after(code) & (HEAVY | {"numpy"}) == set()
 
 
-@pytest.mark.parametrize("package", ["agreement", "elbow", "hess", "intervals"])
+@pytest.mark.parametrize("package", ["agreement", "intervals", "lab.elbow", "lab.hess"])
 def test_a_library_loads_numpy_at_most(package: str) -> None:
     assert loaded_after(f"import masrel.{package}") & HEAVY == set()
 
 
 @pytest.mark.parametrize("stage", ["protocol", "schedule", "run"])
 def test_a_stage_before_the_ratings_loads_no_pandas(stage: str) -> None:
-    assert loaded_after(f"import masrel.{stage}") & HEAVY == set()
+    assert loaded_after(f"import masrel.lab.{stage}") & HEAVY == set()
 
 
 def test_one_kappa_loads_numpy_alone() -> None:
