@@ -211,7 +211,7 @@ def test_an_edit_of_the_code_is_seen(study: Path, tmp_path: Path) -> None:
         return (study / "report/report.md").read_text(encoding="utf-8")
 
     before = page()
-    template = tmp_path / "code/masrel/report/templates/report.md"
+    template = tmp_path / "code/masrel/lab/report/templates/report.md"
     status = template.stat()
     edit(template, "# ", "% ")  # as long as it was
     os.utime(template, ns=(status.st_atime_ns, status.st_mtime_ns))
