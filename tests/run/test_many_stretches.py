@@ -6,6 +6,7 @@ import math
 import shutil
 import threading
 from collections.abc import Callable
+from functools import partialmethod
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from click.testing import CliRunner
 from masrel.cli import cli
 from masrel.errors import ParameterError, RatingsError
 from masrel.lab.elbow import tardieu
+from masrel.lab.hess import SimulatedHand
 from masrel.lab.protocol import (
     Protocol,
     StudyPaths,
@@ -183,6 +185,28 @@ def test_what_was_too_slow_is_counted(new_study: New) -> None:
     CliRunner().invoke(cli, ["report", root, "-o", str(out), "--quiet"])
     page = " ".join((out / "report.md").read_text(encoding="utf-8").split())
     assert r"none reached ν\_th in 3, and none came to the catch" in page
+
+
+def test_a_grip_that_was_lost_stands_in_the_table_and_the_report(
+    small: Small, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slips = partialmethod(SimulatedHand.__init__, slip_time=0.85)  # amid most catches
+    monkeypatch.setattr(SimulatedHand, "__init__", slips)
+    source, said = console("\n1\n\n2\n\n3\n")
+    run(small, source)
+    lost = [event.fields["grip_lost"] for event in shown(small)]
+    assert True in lost
+    assert said.getvalue().count("came loose, and the model let go") == sum(lost)
+    ratings = ratings_from_logs(*small)
+    assert [row.grip_lost for row in ratings.rows] == lost
+    root = small[0].root
+    called = CliRunner().invoke(cli, ["ratings", str(root)]).output
+    assert f"{sum(lost)} after a grip that was lost: column grip_lost" in called
+    table = small[0].ratings_file.read_text(encoding="utf-8").splitlines()
+    assert sum(line.endswith(",yes") for line in table) == sum(lost)
+    CliRunner().invoke(cli, ["report", str(root), "--quiet"])
+    page = " ".join((root / "report/report.md").read_text(encoding="utf-8").split())
+    assert f"In {sum(lost)} of {len(lost)} presentations the arm came loose" in page
 
 
 def test_a_grade_may_name_the_stretch_it_rests_on(new_study: New) -> None:

@@ -36,7 +36,7 @@ FORMAT = 2
 _TYPED = ("file", "row", "file_sha256", "who")  # where it stood, and who typed it
 
 _GRIP_LOST = "grip_lost"
-"""A field that events have not of a version that did not log it."""
+"""A field that logs of earlier versions lack."""
 
 _PRESENTED = (
     "code",
