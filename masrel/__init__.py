@@ -14,7 +14,7 @@ and `masrel.lab`, the laboratory, which stands on them and which they never impo
 import importlib
 from types import ModuleType
 
-__version__ = "0.1.0"
+__version__ = "0.2.0.dev0"
 
 __all__ = ["agreement", "audit", "intervals", "lab", "planning", "ratings"]
 

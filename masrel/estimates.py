@@ -2,9 +2,8 @@
 
 import dataclasses
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Generic, Literal, TypeVar
+from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     import numpy as np
@@ -14,7 +13,6 @@ __all__ = [
     "Distribution",
     "Estimate",
     "Interval",
-    "OnDemand",
     "Target",
     "Unit",
     "as_document",
@@ -114,28 +112,7 @@ class Interval:
         return _as_html(_interval_lines(self))
 
 
-_T = TypeVar("_T")
-
-
-class OnDemand(Generic[_T]):
-    """A field of a dataclass, or a call that computes it when it is first read."""
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self._name = name
-
-    def __get__(self, instance: object, owner: type) -> _T:
-        if instance is None:  # asked for a default: there is none
-            raise AttributeError(self._name)
-        value: _T | Callable[[], _T] = instance.__dict__[self._name]
-        if callable(value):
-            value = instance.__dict__[self._name] = value()
-        return value
-
-    def __set__(self, instance: object, value: _T | Callable[[], _T]) -> None:
-        instance.__dict__[self._name] = value
-
-
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
     """An agreement coefficient with what it was computed from.
 
@@ -148,8 +125,7 @@ class Estimate:
     value : float
         The coefficient; ``nan`` when undefined.
     standard_error : float
-        Delta-method standard error, items random; ``nan`` when undefined. Computed
-        when it is first read.
+        Delta-method standard error, items random; ``nan`` when undefined.
     interval : Interval or None
         Only when one was asked for.
     observed, chance : float
@@ -168,7 +144,7 @@ class Estimate:
     coefficient: str
     weights: str
     value: float
-    standard_error: OnDemand[float] = OnDemand()
+    standard_error: float
     interval: Interval | None = None
     observed: float
     chance: float

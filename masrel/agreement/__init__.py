@@ -4,11 +4,14 @@ In: item × rater labels (or counts, or a contingency table). Out: an `Estimate`
 `Significance` from a test.
 """
 
-from masrel.agreement._count_tables import count_items, count_table
-from masrel.agreement._counts import CountedRatings, count_ratings
 from masrel.agreement._data import CodedRatings, code_long, code_ratings
 from masrel.agreement._labels import Label
-from masrel.agreement._metrics import Metric
+from masrel.agreement._rows import (
+    CountedRatings,
+    count_items,
+    count_ratings,
+    count_table,
+)
 from masrel.agreement._weights import (
     WeightName,
     Weights,
@@ -17,12 +20,7 @@ from masrel.agreement._weights import (
 )
 from masrel.agreement.benchmarks import Band, BandScale, bands, benchmark, strength
 from masrel.agreement.bland_altman import LimitsOfAgreement, limits_of_agreement
-from masrel.agreement.brennan_prediger import (
-    brennan_prediger,
-    brennan_prediger_from_counts,
-)
 from masrel.agreement.category import category_kappa, fleiss_null
-from masrel.agreement.cohen import cohen_kappa, cohen_kappa_from_table
 from masrel.agreement.concordance import lin_ccc
 from masrel.agreement.conger import conger_kappa
 from masrel.agreement.contingency import (
@@ -33,8 +31,6 @@ from masrel.agreement.contingency import (
     mcnemar,
     stuart_maxwell,
 )
-from masrel.agreement.fleiss import fleiss_kappa, fleiss_kappa_from_counts
-from masrel.agreement.gwet import gwet_ac, gwet_ac_from_counts
 from masrel.agreement.icc import IccForm, icc, icc_f_test, robinson_a
 from masrel.agreement.indices import (
     bias_index,
@@ -42,16 +38,24 @@ from masrel.agreement.indices import (
     prevalence_index,
     specific_agreement,
 )
-from masrel.agreement.kendall import kendall_w, kendall_w_test
-from masrel.agreement.krippendorff import (
-    krippendorff_alpha,
-    krippendorff_alpha_from_counts,
+from masrel.agreement.kappas import (
+    brennan_prediger,
+    fleiss_kappa,
+    gwet_ac,
+    percent_agreement,
+    scott_pi,
 )
-from masrel.agreement.light import Deletion, light_kappa
+from masrel.agreement.kendall import kendall_w, kendall_w_test
+from masrel.agreement.krippendorff import Metric, krippendorff_alpha
 from masrel.agreement.measurement import ErrorKind, mdc, sem
-from masrel.agreement.percent import percent_agreement, percent_agreement_from_counts
+from masrel.agreement.pairs import (
+    Deletion,
+    cohen_kappa,
+    light_kappa,
+    pooled_kappa,
+    stratified_kappa,
+)
 from masrel.agreement.registry import COEFFICIENTS, Coefficient, Property, coefficient
-from masrel.agreement.scott import scott_pi, scott_pi_from_table
 from masrel.agreement.significance import (
     Alternative,
     Significance,
@@ -59,7 +63,6 @@ from masrel.agreement.significance import (
     holm,
     p_value,
 )
-from masrel.agreement.two_sessions import pooled_kappa, stratified_kappa
 
 __all__ = [
     "COEFFICIENTS",
@@ -87,13 +90,11 @@ __all__ = [
     "bias_index",
     "bowker",
     "brennan_prediger",
-    "brennan_prediger_from_counts",
     "category_kappa",
     "code_long",
     "code_ratings",
     "coefficient",
     "cohen_kappa",
-    "cohen_kappa_from_table",
     "conger_kappa",
     "contingency_table",
     "count_items",
@@ -102,10 +103,8 @@ __all__ = [
     "declared_weights",
     "equivalence_p_value",
     "fleiss_kappa",
-    "fleiss_kappa_from_counts",
     "fleiss_null",
     "gwet_ac",
-    "gwet_ac_from_counts",
     "holm",
     "icc",
     "icc_f_test",
@@ -113,7 +112,6 @@ __all__ = [
     "kendall_w",
     "kendall_w_test",
     "krippendorff_alpha",
-    "krippendorff_alpha_from_counts",
     "light_kappa",
     "limits_of_agreement",
     "lin_ccc",
@@ -121,12 +119,10 @@ __all__ = [
     "mdc",
     "p_value",
     "percent_agreement",
-    "percent_agreement_from_counts",
     "pooled_kappa",
     "prevalence_index",
     "robinson_a",
     "scott_pi",
-    "scott_pi_from_table",
     "sem",
     "specific_agreement",
     "stratified_kappa",

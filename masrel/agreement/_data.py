@@ -27,9 +27,7 @@ from masrel.errors import ParameterError, RatingsError
 MISSING = -1
 """Code of a rating that was not given."""
 
-FEW = 200
-"""Ratings, or counts of them, that Python goes through about as fast as numpy."""
-
+_MANY_GRADES = 128  # up to which numbers are grades, however few are alike
 _MEASURED = 0.8  # of the ratings are different numbers where those are measurements
 _FEW_LABELS = 64  # up to here a list of labels is coded faster than an array
 _FIRST = 100  # items that as a rule show every rater
@@ -122,8 +120,8 @@ def code_ratings(
     >>> code_ratings([["1", "1+"], ["2", None]], ["1", "1+", "2"]).codes.tolist()
     [[0, 1], [2, -1]]
     """
-    if hasattr(ratings, "coded"):  # ratings that are counted
-        if ratings.coded is None:
+    if hasattr(ratings, "knows_raters") and hasattr(ratings, "coded"):  # counted
+        if not ratings.knows_raters:
             raise RatingsError(
                 "ratings: needs to know who rated what, got counts of a table"
             )
@@ -219,11 +217,13 @@ def complete(coded: CodedRatings) -> CodedRatings:
     return replace(coded, codes=coded.codes[whole])
 
 
-def refuse_measurements(coded: CodedRatings) -> None:
+def refuse_measurements(ratings: Any) -> None:
     """Refuse numbers of which hardly any two are alike, where only alike ones agree."""
-    known, n_ratings = coded.categories, int((coded.codes >= 0).sum())
-    if coded.declared or isinstance(known[0], str):
+    # takes coded or counted ratings; many of a few grades are no measurements
+    known = ratings.categories
+    if ratings.declared or len(known) <= _MANY_GRADES or isinstance(known[0], str):
         return
+    n_ratings = int((ratings.codes >= 0).sum())
     if len(known) > _MEASURED * n_ratings:
         raise RatingsError(
             f"ratings: {len(known)} different numbers among {n_ratings} ratings are "
@@ -465,5 +465,5 @@ def rating_values(
             "categories: needs the declared scale in order, because the ratings are "
             f"text, such as {coded.categories[0]!r}"
         )
-    known = [float(value) for value in category_values(coded.categories)]
+    known = category_values(coded.categories)
     return np.array([*known, np.nan])[coded.codes]  # missing, -1, is the last

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from masrel.agreement._kernel import check_level, undefined
+from masrel.agreement._engine import check_level, undefined
 from masrel.agreement._labels import shown
 from masrel.agreement.significance import _why_untestable
 from masrel.errors import ParameterError
@@ -118,8 +118,8 @@ def bands(estimate: Estimate, *, scale: BandScale = "landis_koch") -> tuple[Band
 
     Examples
     --------
-    >>> from masrel.agreement import cohen_kappa_from_table
-    >>> every = bands(cohen_kappa_from_table([[20, 5], [10, 15]]))
+    >>> from masrel.agreement import cohen_kappa, count_table
+    >>> every = bands(cohen_kappa(count_table([[20, 5], [10, 15]])))
     >>> [(band.word, round(band.cumulative, 2)) for band in every[:3]]
     [('almost perfect', 0.0), ('substantial', 0.06), ('moderate', 0.5)]
     """
@@ -220,8 +220,8 @@ def benchmark(
 
     Examples
     --------
-    >>> from masrel.agreement import cohen_kappa_from_table
-    >>> benchmark(cohen_kappa_from_table([[20, 5], [10, 15]]))
+    >>> from masrel.agreement import cohen_kappa, count_table
+    >>> benchmark(cohen_kappa(count_table([[20, 5], [10, 15]])))
     'slight'
     """
     check_level(level)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement._data import complete_values
-from masrel.agreement._kernel import undefined
+from masrel.agreement._engine import undefined
 from masrel.agreement._labels import Label
 from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Interval

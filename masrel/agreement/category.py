@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement._counts import DistinctItems, count_ratings, item_counts
 from masrel.agreement._data import code_ratings, complete, raters_who_rate
-from masrel.agreement._kernel import undefined
+from masrel.agreement._engine import undefined
 from masrel.agreement._labels import Label, shown
-from masrel.agreement.fleiss import fleiss_kappa, fleiss_kappa_from_counts
+from masrel.agreement._rows import count_items, count_ratings, item_counts
+from masrel.agreement.kappas import fleiss_kappa
 from masrel.agreement.significance import Significance
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
@@ -68,14 +68,11 @@ def category_kappa(
     1.0
     """
     counted = count_ratings(ratings, categories)
-    place, items = _place(category, counted.categories), counted.items
-    rows = np.array(items.rows, np.int64).reshape(-1, items.n_categories)
-    chosen = rows[:, place]
-    two = np.column_stack([chosen, rows.sum(axis=1) - chosen])
+    place, codes = _place(category, counted.categories), counted.codes
     of_two = replace(
         counted,
+        codes=np.where(codes < 0, codes, codes != place),
         categories=(True, False),
-        items=DistinctItems.of_arrays(two, np.array(items.freq, np.int64)),
         source=None,
     )
     return replace(
@@ -141,7 +138,10 @@ def fleiss_null(
     fleiss_null: 0.9333, normal, p = 0.351
     """
     coded = complete(raters_who_rate(code_ratings(ratings, categories)))
-    counts, n_raters = item_counts(coded), coded.codes.shape[1]
+    counts, n_raters = (
+        item_counts(coded.codes, coded.n_categories),
+        coded.codes.shape[1],
+    )
     if category is not None:
         chosen = counts[:, _place(category, coded.categories)]
         counts = np.column_stack([chosen, n_raters - chosen])
@@ -154,7 +154,11 @@ def fleiss_null(
     elif (counts.sum(axis=0) > 0).sum() < 2:
         reason = undefined("fleiss_null", "0/0: all ratings are in one category")
     else:
-        statistic, p = _z(counts, n_raters)
+        from scipy.special import ndtr
+
+        value = fleiss_kappa(count_items(counts)).value
+        statistic = value / _null_error(counts, n_raters)
+        p = 2.0 * float(ndtr(-abs(statistic)))
     return Significance(
         name="fleiss_null",
         hypothesis="Fleiss' kappa is 0",
@@ -167,16 +171,13 @@ def fleiss_null(
     )
 
 
-def _z(counts: NDArray[np.int64], n_raters: int) -> tuple[float, float]:
+def _null_error(counts: NDArray[np.int64], n_raters: int) -> float:
+    """Return the standard error of Fleiss' kappa where kappa is 0."""
     # (12) of [1]: with p the shares and q = 1 - p,
     #   SE0 = √2 / (Σpq √(N n (n - 1))) · √((Σpq)² - Σ pq (q - p))
-    from scipy.special import ndtr
-
     total = counts.sum()
     p = counts.sum(axis=0) / total
     q = (total - counts.sum(axis=0)) / total
     pq = (p * q).sum()
     difference = pq**2 - (p * q * (q - p)).sum()
-    error = math.sqrt(2.0 * difference / (total * (n_raters - 1))) / pq
-    z = fleiss_kappa_from_counts(counts).value / error
-    return z, 2.0 * float(ndtr(-abs(z)))
+    return math.sqrt(2.0 * difference / (total * (n_raters - 1))) / float(pq)

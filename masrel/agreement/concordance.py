@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement._data import complete_values
-from masrel.agreement._kernel import check_level, undefined
+from masrel.agreement._engine import check_level, undefined
 from masrel.agreement._labels import Label
 from masrel.estimates import Estimate, Interval
 

@@ -7,11 +7,13 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel.agreement._count_tables import check_table
-from masrel.agreement._data import code_ratings
-from masrel.agreement._kernel import undefined
+from masrel.agreement._engine import undefined
 from masrel.agreement._labels import Label
-from masrel.agreement._pairs import pair_table, two_raters
+from masrel.agreement._rows import (
+    check_table,
+    pair_table,
+    two_raters,
+)
 from masrel.agreement.significance import Significance
 from masrel.errors import CountsError, ParameterError
 
@@ -48,8 +50,8 @@ def contingency_table(
     >>> contingency_table([["a", "a"], ["a", "b"], ["b", "b"]]).tolist()
     [[1, 1], [0, 1]]
     """
-    coded = two_raters(code_ratings(ratings, categories), "a contingency table")
-    return pair_table(coded.codes, coded.n_categories)
+    counted = two_raters(ratings, categories, "a contingency table")
+    return pair_table(counted.codes, counted.n_categories, counted.freq)
 
 
 def mcnemar(table: ArrayLike, *, kind: McnemarKind = "exact") -> Significance:

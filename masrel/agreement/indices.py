@@ -4,9 +4,9 @@ import math
 
 from numpy.typing import ArrayLike
 
-from masrel.agreement._count_tables import check_table, check_two_by_two
-from masrel.agreement._kernel import NO_PAIR, undefined
-from masrel.agreement._weights import NO_CHANCE
+from masrel.agreement._engine import undefined
+from masrel.agreement._rows import check_table, check_two_by_two
+from masrel.agreement._weights import NO_CHANCE, NO_PAIR
 
 
 def prevalence_index(table: ArrayLike) -> float:

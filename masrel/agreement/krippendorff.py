@@ -1,48 +1,154 @@
-"""Krippendorff's alpha: disagreement of pairable ratings against what chance gives."""
+"""Krippendorff's alpha, and his difference functions δ² of two grades.
 
-import math
-from collections.abc import Callable, Sequence
-from fractions import Fraction
-from functools import partial
-from operator import truediv
-from typing import Any, NamedTuple
+Sums over the n ratings of items with a pair are a, Σ_kl v_kl n_ik n_il / (n_i - 1) in
+`WHOLE` parts, and n_k: α = 1 - (n - 1) a / B with B = n'Vn.
+"""
+
+import re
+from ast import literal_eval
+from collections.abc import Sequence
+from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from masrel.agreement._count_tables import count_items
-from masrel.agreement._counts import (
-    CountedRatings,
-    DistinctItems,
-    SizeGroup,
-    bilinear,
-    count_ratings,
-    item_counts,
-)
-from masrel.agreement._data import CodedRatings
-from masrel.agreement._distances import Distances
-from masrel.agreement._kernel import (
+from masrel.agreement._distances import Line
+from masrel.agreement._engine import (
+    WHOLE,
+    Features,
     Floats,
-    Influence,
-    Kernel,
-    check_population,
+    Formula,
+    Integers,
+    disagreement_within,
     divide,
-    weighted_disagreement,
+    estimate,
 )
-from masrel.agreement._labels import Label
-from masrel.agreement._many_grades import ItemsOfManyGrades, measurements
-from masrel.agreement._metrics import Metric, metric_weights
-from masrel.agreement._pooled import ratio_estimate
+from masrel.agreement._labels import EMPTY_SET, Codes, Label, SetText, shown
+from masrel.agreement._rows import CountedRatings, count_ratings, item_counts
 from masrel.agreement._weights import (
     MANY,
-    ManyWeights,
     Weights,
     WeightsLike,
-    declared_weights,
-    named_weights,
+    category_values,
+    identity_weights,
+    positions,
+    quadratic,
+    ratio,
+    sums_to_zero,
 )
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
+
+Metric = Literal["nominal", "ordinal", "interval", "ratio", "jaccard", "masi"]
+"""Names of the difference functions; the last two are of sets of labels."""
+
+_MARKS = (";", "|")  # between labels in text; that of sets is the first
+# Text or a number in a list or set as Python and JSON write them.
+_ITEM = re.compile(
+    r"""'(?:[^'\\\x00-\x1f]|\\[\\'"bfnrt]|\\u[0-9a-fA-F]{4})*'"""
+    r"""|"(?:[^"\\\x00-\x1f]|\\[\\'"bfnrt]|\\u[0-9a-fA-F]{4})*"|[+-]?\d[\d.]*"""
+)
+_ITEMS = rf"\s*(?:(?:{_ITEM.pattern})\s*(?:,\s*(?:{_ITEM.pattern})\s*)*)?"
+_LIST = re.compile(
+    rf"\[{_ITEMS}\]|(?:frozenset\()?\{{{_ITEMS}\}}\)?|(?:frozen)?set\(\)"
+)
+
+
+def _features(codes: Codes, v: Any, repeats: Integers | None = None) -> Features:
+    chosen = np.asarray(codes >= 0 if repeats is None else repeats, dtype=np.float64)
+    size = chosen.sum(axis=1)
+    a = disagreement_within(codes, v, repeats) * (WHOLE / np.maximum(size - 1.0, 1.0))
+    chosen[size < 2] = 0.0
+    return Features(a[None], np.maximum(codes, 0), chosen, len(v))
+
+
+def _disagreements(sums: Floats, v: Any) -> tuple[Floats, Floats]:
+    a, n_k = sums[..., :1], sums[..., 1:]
+    n = n_k.sum(axis=-1, keepdims=True)
+    b = ((n_k @ v) * n_k).sum(axis=-1, keepdims=True)
+    return divide(a, WHOLE * n), divide(b, n * (n - 1.0))
+
+
+def _slope(sums: Floats, v: Any) -> Floats:
+    a, n_k = sums[..., :1], sums[..., 1:]
+    n, others = n_k.sum(axis=-1, keepdims=True), n_k @ v
+    b = (others * n_k).sum(axis=-1, keepdims=True)
+    of_n = (n - 1.0) * a / (WHOLE * b * b)
+    of_k = 2.0 * of_n * others - a / (WHOLE * b)
+    return np.concatenate([(1.0 - n) / (WHOLE * b), of_k], axis=-1)
+
+
+_ALPHA = Formula(
+    name="krippendorff_alpha",
+    title="Krippendorff's alpha",
+    features=_features,
+    disagreements=_disagreements,
+    slope=_slope,
+)
+
+# With the ordinal metric v is found in the ratings: sums are coincidences of grades,
+# o_kl = n_ik (n_il - [k = l]) / (n_i - 1), and v is made anew from every sum.
+
+
+def _ordinal_features(
+    codes: Codes, v: Any, repeats: Integers | None = None
+) -> Features:
+    counts = item_counts(codes, len(v), repeats).astype(np.float64)
+    size = counts.sum(axis=1)
+    pairs = counts[:, :, None] * counts[:, None, :]
+    k = np.arange(counts.shape[1])
+    pairs[:, k, k] -= counts
+    pairs /= np.maximum(size - 1.0, 1.0)[:, None, None]
+    pairs[size < 2] = 0.0
+    none = np.empty((len(counts), 0))
+    return Features(pairs.reshape(len(counts), -1).T, none.astype(np.int64), none, 0)
+
+
+def _coincidences(sums: Floats, v: Any) -> tuple[Floats, Floats, Floats]:
+    # coincidences o_kl, distances m_k - m_l of the middles m_k = Σ_{g<k} n_g + n_k/2,
+    # each (..., q, q), and totals n_k
+    table = sums.reshape(*sums.shape[:-1], len(v), len(v))
+    totals = table.sum(axis=-1)
+    middles = np.cumsum(totals, axis=-1) - totals / 2.0
+    return table, middles[..., :, None] - middles[..., None, :], totals
+
+
+def _ordinal_disagreements(sums: Floats, v: Any) -> tuple[Floats, Floats]:
+    table, gaps, totals = _coincidences(sums, v)
+    observed = (table * gaps**2).sum(axis=(-1, -2))[..., None]
+    expected = np.einsum("...k,...kl,...l->...", totals, gaps**2, totals)[..., None]
+    n = totals.sum(axis=-1, keepdims=True)
+    return divide(observed, n), divide(expected, n * (n - 1.0))
+
+
+def _ordinal_slope(sums: Floats, v: Any) -> Floats:
+    table, gaps, totals = _coincidences(sums, v)
+    o = (table * gaps**2).sum(axis=(-1, -2))[..., None]
+    e = np.einsum("...k,...kl,...l->...", totals, gaps**2, totals)[..., None]
+    n = totals.sum(axis=-1, keepdims=True)
+    both = table + np.swapaxes(table, -1, -2)
+    of_o = _by_middles(2.0 * (both * gaps).sum(axis=-1))
+    moved = np.einsum("...kl,...l->...k", gaps, totals)
+    of_e = _by_middles(4.0 * totals * moved)
+    of_e += 2.0 * np.einsum("...kl,...l->...k", gaps**2, totals)
+    of_k = divide((n - 1.0) * o, e * e) * of_e - divide(o + (n - 1.0) * of_o, e)
+    slope = of_k[..., None] - divide(n - 1.0, e)[..., None] * gaps**2
+    return np.asarray(slope.reshape(sums.shape))
+
+
+def _by_middles(of_middles: Floats) -> Floats:
+    # from slopes in the middles to slopes in the totals: n_k moves its own by a half,
+    # and all that follow by 1
+    later = np.flip(np.cumsum(np.flip(of_middles, axis=-1), axis=-1), axis=-1)
+    return np.asarray(later - 0.5 * of_middles)
+
+
+_ORDINAL_ALPHA = Formula(
+    name="krippendorff_alpha",
+    title="Krippendorff's alpha",
+    features=_ordinal_features,
+    disagreements=_ordinal_disagreements,
+    slope=_ordinal_slope,
+)
 
 
 def krippendorff_alpha(
@@ -115,178 +221,124 @@ def krippendorff_alpha(
     >>> round(krippendorff_alpha([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
     0.444
     """
-    counted = None
-    if type(ratings) is np.ndarray and ratings.size > _BLOCK:
-        counted = measurements(ratings, categories, metric or weights)
-    if counted is None:
-        counted = count_ratings(ratings, categories)
-    v = _disagreement(counted, weights, metric)
-    return _estimate(counted, v, population)
-
-
-def krippendorff_alpha_from_counts(
-    counts: ArrayLike,
-    *,
-    categories: Sequence[Label] | None = None,
-    weights: "WeightsLike" = None,
-    metric: Metric | None = None,
-    population: int | None = None,
-) -> Estimate:
-    """Estimate Krippendorff's alpha from how many raters chose each category.
-
-    Parameters
-    ----------
-    counts : array_like of int, shape (n_items, n_categories)
-        Raters per item and category; rows may have different sums.
-    categories, weights, metric, population : optional
-        As of `krippendorff_alpha`; categories are 1 to n_categories unless given.
-
-    Returns
-    -------
-    Estimate
-        As of `krippendorff_alpha`; `n_raters` is the largest row sum.
-
-    Raises
-    ------
-    CountsError
-        If it is not a table of counts.
-    ParameterError
-        As `krippendorff_alpha`.
-
-    Warns
-    -----
-    UndefinedStatisticWarning
-        As `krippendorff_alpha`.
-
-    Examples
-    --------
-    >>> round(krippendorff_alpha_from_counts([[2, 0], [0, 2], [1, 1]]).value, 3)
-    0.444
-    """
-    counted = count_items(counts, categories=categories)
-    v = _disagreement(counted, weights, metric)
-    return _estimate(counted, v, population)
-
-
-_BLOCK = 1 << 14  # ratings from which on numbers that differ are taken as they are
-
-
-class _Sums(NamedTuple):
-    # whole numbers; floats by weights of many categories
-    # α = 1 - (n - 1) A / B over the n ratings of items that have at least two
-    n_items: int
-    n_ratings: int
-    multiple: int  # of every n_i - 1
-    observed: Any  # A = Σ_i V_i / (n_i - 1), times `multiple`
-    totals: Any  # ratings per category
-    expected: Any  # B = Σ_kl v_kl n_k n_l
-
-
-def _sums(usable: list[SizeGroup], v: Weights) -> _Sums:
-    if len(usable) == 1:  # as a rule: everybody rated everything
-        ((size, n_items, totals, observed),) = usable
-        n_ratings, multiple = n_items * size, size - 1
-    elif isinstance(v, ManyWeights):
-        multiple = 1  # of floats
-        observed = sum([group.disagreement / (group.size - 1) for group in usable])
-        totals = sum([group.totals for group in usable], np.zeros(v.n_categories))
-        n_items, n_ratings = sum(group.n_items for group in usable), int(totals.sum())
-    else:
-        multiple = math.lcm(*[group.size - 1 for group in usable])
-        observed = sum(g.disagreement * (multiple // (g.size - 1)) for g in usable)
-        totals = list(map(sum, zip(*[g.totals for g in usable], strict=True)))
-        totals = totals or [0] * v.n_categories
-        n_items, n_ratings = sum(group.n_items for group in usable), sum(totals)
-    expected = bilinear(v, totals, totals)
-    return _Sums(n_items, n_ratings, multiple, observed, totals, expected)
-
-
-def _estimate(counted: CountedRatings, v: Weights, population: int | None) -> Estimate:
-    usable = [group for group in counted.items.sums(v).groups if group.size > 1]
-    sums = _sums(usable, v)
-    n, w = sums.n_ratings, v.denominator
-    if population is not None:
-        check_population(population, sums.n_items)
-    return ratio_estimate(
-        "krippendorff_alpha",
-        "Krippendorff's alpha",
-        v,
-        (sums.observed, n * sums.multiple * w),
-        (sums.expected, n * (n - 1) * w),
-        partial(_influence, counted.items, v, sums),
-        population,
-        sums.n_items,
-        sums.n_items,
-        counted.n_raters,
+    if weights is not None and metric is not None:
+        raise ParameterError("weights, metric: needs one of them, got both")
+    counted = count_ratings(ratings, categories)
+    made = weights if metric is None else _metric_weights(metric, counted)
+    # items with fewer than two ratings are no part of the sample
+    paired = counted.chosen(rows=counted.size > 1)
+    return estimate(
+        _ALPHA, paired, made, n_raters=counted.n_raters, population=population
     )
 
 
-def _influence(
-    items: "DistinctItems | ItemsOfManyGrades", v: Weights, sums: _Sums, exact: bool
-) -> Influence:
-    # With Q = 1 - α = (n - 1) A / B, the influence of item i among m is
-    #   u_i = m Q [2 Σ_k h_k n_ik / B - V_i / ((n_i - 1) A) - n_i / (n - 1)],
-    # h_k = Σ_l v_kl n_l.
-    exact = exact and isinstance(items, DistinctItems) and v.is_exact
-    divide: Callable[[int, int], Any] = Fraction if exact else truediv
-    m, n, w = sums.n_items, sums.n_ratings, v.denominator
-    counts, freq, size, disagreement = items.arrays(v, exact)
-    if not isinstance(size, float) and (single := size < 2).any():
-        counts, freq, size = counts[~single], freq[~single], size[~single]
-        disagreement = disagreement[~single]
-    q = divide((n - 1) * sums.observed, sums.multiple * sums.expected)
-    totals = np.array(sums.totals, dtype=object if exact else np.float64)
-    if v.n_categories > MANY:
-        between = v.dot(totals, exact=exact)
-    else:
-        between = (v.fractions if exact else v.floats).dot(totals)
-    h = between * (2 * q * divide(w, sums.expected))
-    terms = disagreement * (-m * divide((n - 1) * w, sums.expected) / (size - 1))
-    u = counts.dot(m * h - m * q * divide(1, n - 1)) + terms
-    return Influence(u, freq, terms)
+def _check_metric(metric: str) -> None:
+    """Check the name of a metric."""
+    if metric not in get_args(Metric):
+        raise ParameterError(
+            f"metric: needs one of {', '.join(get_args(Metric))}, got {metric!r}"
+        )
 
 
-def _disagreement(
-    counted: CountedRatings,
-    weights: "WeightsLike",
-    metric: Metric | None,
-) -> Weights:
-    if metric is None:
-        weights = "identity" if weights is None else weights
-        # made once for a scale
-        if isinstance(weights, str) and counted.items.n_categories <= MANY:
-            return named_weights(weights, counted.categories, counted.declared)
-        return declared_weights(weights, counted.categories, declared=counted.declared)
-    if weights is not None:
-        raise ParameterError("weights, metric: needs one of them, got both")
-    return metric_weights(metric, counted)
+def _metric_weights(metric: Metric, counted: CountedRatings) -> Weights:
+    """Return the δ² of a metric, which grow without bound."""
+    # Krippendorff (2004), Content Analysis, 2nd ed., pp. 232-236
+    _check_metric(metric)
+    categories = counted.categories
+    n = len(categories)
+    if metric == "nominal" or n == 0:  # nobody rated anything
+        return identity_weights(n, name=metric)
+    if metric in ("jaccard", "masi"):
+        return Weights(name=metric, n_categories=n, v=_of_sets(metric, categories))
+    if not counted.declared and isinstance(categories[0], str):
+        raise ParameterError(
+            f"categories: the {metric} metric needs the declared scale in order, the "
+            f"ratings are text: {', '.join(map(str, categories))}"
+        )
+    if metric == "ratio":
+        return Weights(name="ratio metric", n_categories=n, v=_ratio(categories))
+    name, values = "interval", positions(categories)
+    if metric == "ordinal":
+        name, values = "ordinal metric", _middles(counted)
+    v: Any = Line(values, square=1.0) if n > MANY else quadratic(values)
+    return Weights(name=name, n_categories=n, v=v)
 
 
-def _features(coded: CodedRatings, v: Floats) -> Floats:
-    # (n_items, 1 + n_categories): V_i / (n_i - 1), and counts of items with a pair; of
-    # many grades the number of ratings and sums of points in place of counts
-    if isinstance(v, Distances):
-        codes = coded.codes
-        size = (codes >= 0).sum(axis=1)
-        terms = v.of_items(codes) / np.maximum(size - 1, 1)
-        features = np.column_stack([terms, size, v.moments(codes)]).astype(np.float64)
-        features[size < 2] = 0.0
-        return features
-    counts = item_counts(coded).astype(np.float64)
-    counts[counts.sum(axis=1) < 2] = 0.0
-    others = np.maximum(counts.sum(axis=1) - 1.0, 1.0)
-    return np.column_stack([weighted_disagreement(counts, v) / others, counts])
+def _ratio(categories: Sequence[Label]) -> Floats:
+    values = category_values(categories)
+    if len(values) > MANY:
+        raise ParameterError(
+            "metric: ratio needs a matrix of every two categories, which is made of at "
+            f"most {MANY}, got {len(values)}; interval needs none"
+        )
+    if sums_to_zero(values, itself=False):
+        raise ParameterError(
+            "metric: ratio needs values of which no two sum to 0, got "
+            f"{', '.join(map(str, values.tolist()))}"
+        )
+    return ratio(values)
 
 
-def _value(sums: Floats, v: Floats) -> Floats:
-    # sums (..., 1 + n_categories) -> (...)
-    if isinstance(v, Distances):
-        n, moments = sums[..., 1], sums[..., 2:]
-        expected = v.between_moments(moments, n)
-        return 1.0 - divide((n - 1.0) * sums[..., 0], expected)
-    totals = sums[..., 1:]
-    expected = weighted_disagreement(totals, v)
-    return 1.0 - divide((totals.sum(axis=-1) - 1.0) * sums[..., 0], expected)
+def _middles(counted: CountedRatings) -> Floats:
+    # Σ_{g<k} n_g + n_k/2: ratings up to the middle of each grade, of items with a pair
+    is_paired = counted.size > 1
+    codes = counted.codes[is_paired] + 1  # missing is 0
+    often = np.broadcast_to(counted.freq[is_paired, None], codes.shape)
+    if counted.repeats is not None:
+        often = often * counted.repeats[is_paired]
+    n_places = counted.n_categories + 1
+    totals = np.bincount(codes.ravel(), often.ravel(), minlength=n_places)[1:]
+    return np.asarray(np.cumsum(totals) - totals / 2.0)
 
 
-_KERNEL = Kernel(features=_features, value=_value, takes_many=True)
+def _of_sets(metric: str, categories: Sequence[Label]) -> Floats:
+    # sets, and text of several labels, as "a; b"
+    mark = _mark_between(metric, categories)
+    sets = [_elements(label, mark) for label in categories]
+    distance = _jaccard if metric == "jaccard" else _masi
+    return np.array([[distance(a, b) for b in sets] for a in sets])
+
+
+def _mark_between(metric: str, categories: Sequence[Label]) -> str:
+    """Return what stands between the labels of text, "" where each is a list."""
+    plain = [x for x in categories if not isinstance(x, SetText) and x != EMPTY_SET]
+    texts = [x for x in plain if isinstance(x, str)]
+    n_lists = sum(_LIST.fullmatch(text) is not None for text in texts)
+    if texts and n_lists == len(plain):
+        return ""
+    marks = {mark for mark in _MARKS for text in texts if mark in text}
+    if len(plain) < len(categories):  # beside a set, text without a mark is one label
+        marks.add(_MARKS[0])
+    if n_lists or len(texts) < len(plain) or len(marks) != 1:
+        raise ParameterError(
+            f"metric: {metric} needs sets of labels, or text that holds several in one "
+            "of these ways, x;y or x|y or ['x', 'y'], got "
+            f"{', '.join(map(shown, plain[:3]))}; where each is one label, the nominal "
+            "metric is the same"
+        )
+    return marks.pop()
+
+
+def _elements(label: Label, mark: str) -> frozenset[str]:
+    text = str(label)
+    if isinstance(label, SetText) or mark:
+        parts = text.split(_MARKS[0] if isinstance(label, SetText) else mark)
+    else:  # numbers have no quotes
+        parts = [
+            x if x[0] not in "'\"" else literal_eval(x) for x in _ITEM.findall(text)
+        ]
+    return frozenset(map(str.strip, parts)) - {"", EMPTY_SET}
+
+
+def _jaccard(a: frozenset[str], b: frozenset[str]) -> float:
+    # 1 - |A ∩ B| / |A ∪ B|; two empty sets are the same
+    return 0.0 if a == b else 1.0 - len(a & b) / len(a | b)
+
+
+def _masi(a: frozenset[str], b: frozenset[str]) -> float:
+    # Passonneau (2006), Measuring agreement on set-valued items: 1 - J M, with M = 2/3
+    # if one set holds the other, 1/3 if each has something to itself, 0 without overlap
+    if a == b:
+        return 0.0
+    thirds = 2.0 if a <= b or b <= a else 1.0
+    return 1.0 - thirds * len(a & b) / (3.0 * len(a | b))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement._data import rated_part, rating_values
-from masrel.agreement._kernel import check_level, undefined
+from masrel.agreement._engine import check_level, undefined
 from masrel.agreement._labels import Label
 from masrel.agreement.icc import _Anova, _n_categories
 from masrel.errors import ParameterError

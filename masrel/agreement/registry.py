@@ -6,50 +6,48 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, get_args
 
-from masrel.agreement._counts import count_ratings
 from masrel.agreement._data import CodedRatings, code_pairs, code_ratings
-from masrel.agreement._kernel import Kernel
+from masrel.agreement._engine import Formula
 from masrel.agreement._labels import Label, shown
-from masrel.agreement._metrics import (
-    ORDINAL_KERNEL,
-    Metric,
-    check_metric,
-    metric_weights,
-)
-from masrel.agreement._pairs import (
-    COHEN_KERNEL,
-    LIGHT_KERNEL,
-    POOLED_PAIRS_KERNEL,
-    STRATIFIED_KERNEL,
-)
-from masrel.agreement._pooled import (
-    BRENNAN_PREDIGER,
-    FLEISS,
-    GWET,
-    PERCENT,
-    SCOTT,
-    complete_kernel,
-    pooled_kernel,
-)
+from masrel.agreement._rows import count_ratings
 from masrel.agreement._weights import Weights, WeightsLike, is_identity
-from masrel.agreement.brennan_prediger import brennan_prediger
-from masrel.agreement.cohen import cohen_kappa
 from masrel.agreement.concordance import lin_ccc
-from masrel.agreement.conger import _KERNEL as CONGER_KERNEL
-from masrel.agreement.conger import conger_kappa
-from masrel.agreement.fleiss import fleiss_kappa
-from masrel.agreement.gwet import gwet_ac
+from masrel.agreement.conger import _CONGER, conger_kappa
 from masrel.agreement.icc import _NAMES as ICC_NAMES
 from masrel.agreement.icc import _target_of as icc_target
 from masrel.agreement.icc import icc, robinson_a
+from masrel.agreement.kappas import (
+    _BRENNAN_PREDIGER,
+    _FLEISS,
+    _GWET,
+    _PERCENT,
+    _SCOTT,
+    brennan_prediger,
+    fleiss_kappa,
+    gwet_ac,
+    percent_agreement,
+    scott_pi,
+)
 from masrel.agreement.kendall import kendall_w
-from masrel.agreement.krippendorff import _KERNEL as KRIPPENDORFF_KERNEL
-from masrel.agreement.krippendorff import krippendorff_alpha
-from masrel.agreement.light import light_kappa
+from masrel.agreement.krippendorff import (
+    _ALPHA,
+    _ORDINAL_ALPHA,
+    Metric,
+    _check_metric,
+    _metric_weights,
+    krippendorff_alpha,
+)
 from masrel.agreement.measurement import ErrorKind, mdc, sem
-from masrel.agreement.percent import percent_agreement
-from masrel.agreement.scott import scott_pi
-from masrel.agreement.two_sessions import pooled_kappa, stratified_kappa
+from masrel.agreement.pairs import (
+    _COHEN,
+    _LIGHT,
+    _POOLED_PAIRS,
+    _STRATIFIED,
+    cohen_kappa,
+    light_kappa,
+    pooled_kappa,
+    stratified_kappa,
+)
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Target
 
@@ -86,7 +84,7 @@ class Coefficient:
         Other names of the same number, by which it can be asked for.
     function : callable
         The public function.
-    kernel : Kernel or None
+    formula : Formula or None
         The coefficient from sums over items, for intervals; None where it has an
         interval of its own or none.
     properties : frozenset of str
@@ -108,7 +106,7 @@ class Coefficient:
     by_name_only : bool
         Whether it is left out where all coefficients are asked for.
     code : callable
-        Ratings and categories to the codes its kernel takes.
+        Ratings and categories to the codes its formula takes.
     metric : {"nominal", "ordinal", "interval", "ratio", "jaccard", "masi"} or None
         Krippendorff's difference function by which it is computed; None for weights.
     tells_raters_apart : bool
@@ -121,7 +119,7 @@ class Coefficient:
     name: str
     title: str
     function: Callable[..., Estimate]
-    kernel: Kernel | None
+    formula: Formula | None
     aliases: tuple[str, ...] = ()
     properties: frozenset[Property] = _EVERY
     shape: Literal["ratings", "pairs"] = "ratings"
@@ -173,14 +171,14 @@ class Coefficient:
                 f"metric: is of krippendorff_alpha alone, got {metric!r} for "
                 f"{self.name}; other coefficients take weights"
             )
-        check_metric(metric)
+        _check_metric(metric)
         is_ordered = metric in ("ordinal", "interval", "ratio")
         order: frozenset[Property] = frozenset({"categories in any order"})
         return replace(
             self,
             title=f"{self.title}, {metric} metric",
             function=partial(krippendorff_alpha, metric=metric),
-            kernel=ORDINAL_KERNEL if metric == "ordinal" else self.kernel,
+            formula=_ORDINAL_ALPHA if metric == "ordinal" else self.formula,
             properties=self.properties - order if is_ordered else self.properties,
             weighted=False,
             metric=metric,
@@ -189,7 +187,7 @@ class Coefficient:
     def disagreement(self, coded: CodedRatings, weights: "WeightsLike") -> Weights:
         """Return how much two categories disagree where no weights are taken."""
         self._refuse_weights(weights)
-        return metric_weights(self.metric or "nominal", count_ratings(coded))
+        return _metric_weights(self.metric or "nominal", count_ratings(coded))
 
     def _refuse_weights(self, weights: "WeightsLike") -> None:
         if not is_identity(weights):
@@ -214,7 +212,7 @@ _ALL = (
         name="percent_agreement",
         title="Percent agreement",
         function=percent_agreement,
-        kernel=pooled_kernel(PERCENT),
+        formula=_PERCENT,
         tells_raters_apart=False,
         lowest=0.0,
         chance_corrected=False,
@@ -223,40 +221,40 @@ _ALL = (
         name="cohen_kappa",
         title="Cohen's κ",
         function=cohen_kappa,
-        kernel=COHEN_KERNEL,
+        formula=_COHEN,
         n_raters=(2, 2),
     ),
     Coefficient(
         name="conger_kappa",
         title="Conger's κ",
         function=conger_kappa,
-        kernel=CONGER_KERNEL,
+        formula=_CONGER,
     ),
     Coefficient(
         name="fleiss_kappa",
         title="Fleiss' κ",
         function=fleiss_kappa,
-        kernel=pooled_kernel(FLEISS),
+        formula=_FLEISS,
         tells_raters_apart=False,
     ),
     Coefficient(
         name="light_kappa",
         title="Light's κ",
         function=light_kappa,
-        kernel=LIGHT_KERNEL,
+        formula=_LIGHT,
     ),
     Coefficient(
         name="scott_pi",
         title="Scott's π",
         function=scott_pi,
-        kernel=complete_kernel(SCOTT),
+        formula=_SCOTT,
         n_raters=(2, 2),
     ),
     Coefficient(
         name="brennan_prediger",
         title="Brennan-Prediger",
         function=brennan_prediger,
-        kernel=pooled_kernel(BRENNAN_PREDIGER),
+        formula=_BRENNAN_PREDIGER,
         tells_raters_apart=False,
         # Bennett, Alpert and Goldstein (1954); Maxwell (1977), of two categories, which
         # Byrt, Bishop and Carlin (1993) call PABAK; Randolph (2005), of many raters
@@ -267,7 +265,7 @@ _ALL = (
         name="gwet_ac",
         title="Gwet's AC",
         function=gwet_ac,
-        kernel=pooled_kernel(GWET),
+        formula=_GWET,
         tells_raters_apart=False,
         properties=_EVERY - {"unused category"},
     ),
@@ -275,7 +273,7 @@ _ALL = (
         name="krippendorff_alpha",
         title="Krippendorff's α",
         function=krippendorff_alpha,
-        kernel=KRIPPENDORFF_KERNEL,
+        formula=_ALPHA,
         tells_raters_apart=False,
         properties=_EVERY - {"items twice"},
     ),
@@ -284,7 +282,7 @@ _ALL = (
         title="Stratified κ",
         function=stratified_kappa,
         code=code_pairs,
-        kernel=STRATIFIED_KERNEL,
+        formula=_STRATIFIED,
         shape="pairs",
         n_raters=(1, None),
     ),
@@ -293,7 +291,7 @@ _ALL = (
         title="Pooled κ",
         function=pooled_kappa,
         code=code_pairs,
-        kernel=POOLED_PAIRS_KERNEL,
+        formula=_POOLED_PAIRS,
         shape="pairs",
         n_raters=(1, None),
     ),
@@ -301,7 +299,7 @@ _ALL = (
         name="kendall_w",
         title="Kendall's W",
         function=kendall_w,
-        kernel=None,
+        formula=None,
         properties=(_RANKS - {"items twice"}) | {"perfect agreement"},
         lowest=0.0,
         chance_corrected=False,
@@ -311,7 +309,7 @@ _ALL = (
         name="robinson_a",
         title="Robinson's A",
         function=robinson_a,
-        kernel=None,
+        formula=None,
         properties=_RANKS | {"perfect agreement"},
         lowest=0.0,
         chance_corrected=False,
@@ -322,7 +320,7 @@ _ALL = (
             name=name,
             title=form,
             function=partial(icc, form=form),
-            kernel=None,
+            formula=None,
             properties=(_RANKS - {"items twice"}) | {"perfect agreement"},
             lowest=-math.inf,
             highest=math.inf if form == "ICC(A,k)" else 1.0,
@@ -335,7 +333,7 @@ _ALL = (
         name="lin_ccc",
         title="Lin's concordance",
         function=lin_ccc,
-        kernel=None,
+        formula=None,
         properties=_RANKS | {"perfect agreement"},
         weighted=False,
         interval_target="items",
@@ -346,7 +344,7 @@ _ALL = (
             name=name,
             title=title,
             function=partial(function, kind=kind),
-            kernel=None,
+            formula=None,
             properties=_RANKS - {"items twice"},
             lowest=0.0,
             highest=math.inf,

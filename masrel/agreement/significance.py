@@ -8,7 +8,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from masrel.agreement._kernel import NO_SPREAD, ONE_PAIR, undefined
+from masrel.agreement._engine import NO_SPREAD, ONE_PAIR, undefined
 from masrel.agreement._labels import is_row, shown
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
@@ -110,8 +110,8 @@ def p_value(
     --------
     Is kappa, 0.4 here, other than 0? Is it greater than 0.2?
 
-    >>> from masrel.agreement import cohen_kappa_from_table
-    >>> kappa = cohen_kappa_from_table([[20, 5], [10, 15]])
+    >>> from masrel.agreement import cohen_kappa, count_table
+    >>> kappa = cohen_kappa(count_table([[20, 5], [10, 15]]))
     >>> round(p_value(kappa), 4)
     0.003
     >>> round(p_value(kappa, null=0.2, alternative="greater"), 4)
@@ -173,8 +173,8 @@ def equivalence_p_value(estimate: Estimate, *, low: float, high: float) -> float
 
     Examples
     --------
-    >>> from masrel.agreement import cohen_kappa_from_table
-    >>> kappa = cohen_kappa_from_table([[20, 5], [10, 15]])
+    >>> from masrel.agreement import cohen_kappa, count_table
+    >>> kappa = cohen_kappa(count_table([[20, 5], [10, 15]]))
     >>> round(equivalence_p_value(kappa, low=0.1, high=0.7), 4)
     0.0117
     """

@@ -171,7 +171,7 @@ def compare_pairs(
         )
     pairs = _pairs(file)
     # one that was named is refused rather than left out
-    can = [of for of in entries if of.kernel is not None or not options.takes_all]
+    can = [of for of in entries if of.formula is not None or not options.takes_all]
     return Comparison(
         pairs=tuple(pairs),
         differences=tuple(
@@ -252,7 +252,7 @@ def compare_all(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MasrelWarning)  # the results say it
         for entry in entries:
-            if entry.kernel is not None:  # else the differences say it
+            if entry.formula is not None:  # else the differences say it
                 of_entry = tuple(on_grades(s, entry, file.scale) for s in groups.sets)
                 tests += _equality_tests(entry, replace(groups, sets=of_entry), options)
     return tests

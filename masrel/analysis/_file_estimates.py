@@ -134,7 +134,7 @@ def estimate_rows(
         # Every note is in the result, and so below the table or in the JSON.
         warnings.simplefilter("ignore", MasrelWarning)
         for entry in entries(options, n_raters, scale, is_ordered):
-            ratings = part.ratings if entry.kernel is None else part.counted
+            ratings = part.ratings if entry.formula is None else part.counted
             ratings = on_grades(ratings, entry, scale)
             row, refusal = estimate_row(entry, ratings, group, of_part)
             rows.append(row)
@@ -177,7 +177,9 @@ def estimate_row(
     except MasrelError as error:
         if not has_target or options.are_named:
             raise  # each of them must have the interval
-        none = "it is no function of sums over items" if entry.kernel is None else error
+        none = (
+            "it is no function of sums over items" if entry.formula is None else error
+        )
         notes.append(f"no interval: {none}")
         refusal, has_target = error, False
         estimate = _estimate(entry, ratings, options, options.level, has_target)
@@ -232,8 +234,8 @@ def _category_row(
             plain = replace(options, coefficients=None, weights="identity")
             of, _ = estimate_row(coefficient("fleiss_kappa"), folded, group, plain)
             row = replace(of, title=row.title)
-            estimate = changed(estimate, interval=of.estimate.interval)
-    return replace(row, estimate=changed(estimate, weights=scale.grades[place]))
+            estimate = replace(estimate, interval=of.estimate.interval)
+    return replace(row, estimate=replace(estimate, weights=scale.grades[place]))
 
 
 def _folded(part: "RatingsPart", place: int) -> "CodedRatings | None":
@@ -242,17 +244,11 @@ def _folded(part: "RatingsPart", place: int) -> "CodedRatings | None":
 
     from masrel.agreement import CodedRatings
 
-    coded = part.counted.coded
-    if coded is None:
+    if not part.counted.knows_raters:
         return None
+    coded = part.counted.coded
     codes = np.where(coded.codes < 0, -1, coded.codes != place)
     return CodedRatings(codes=codes, categories=("this", "other"))
-
-
-def changed(estimate: Estimate, **fields: object) -> Estimate:
-    """Return an estimate with other fields, and its standard error as it is."""
-    # `vars` has one that is still to be computed as that, `replace` computes it
-    return Estimate(**{**vars(estimate), **fields})
 
 
 def _estimate(

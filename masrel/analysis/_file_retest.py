@@ -15,7 +15,6 @@ from masrel.agreement import CodedRatings, coefficient
 from masrel.analysis._file_estimates import (
     AgreementRow,
     EstimateOptions,
-    changed,
     estimate_row,
 )
 from masrel.analysis._file_parts import coded_part, label, named
@@ -83,7 +82,7 @@ def _rows(
         ratings = replace(pairs, codes=pairs.codes[:, 2 * place : 2 * place + 2])
         name = label([*head, rater])
         row, _ = estimate_row(coefficient("cohen_kappa"), ratings, name, alone)
-        estimate = changed(row.estimate, n_raters=min(row.estimate.n_raters, 1))
+        estimate = replace(row.estimate, n_raters=min(row.estimate.n_raters, 1))
         rows.append(replace(row, estimate=estimate))
     of_all = ["stratified_kappa"]
     if options.takes_all or "pooled_kappa" in options.names:

@@ -11,7 +11,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement import cohen_kappa_from_table
+from masrel.agreement import cohen_kappa, count_table
 from masrel.audit._claims import Claim
 from masrel.audit._printed import PrintedNumber
 from masrel.audit._windows import (
@@ -52,7 +52,7 @@ class Uncertainty:
         printed = claim.printed()
         if not printed:
             return cls(claim, printed, np.zeros(len(tables)))
-        estimates = [cohen_kappa_from_table(t, weights=weights) for t in tables]
+        estimates = [cohen_kappa(count_table(t), weights=weights) for t in tables]
         kappa = np.array([estimate.value for estimate in estimates])
         delta = np.array([estimate.standard_error for estimate in estimates])
         n = tables.sum(axis=(1, 2)) if len(tables) else np.ones(0)

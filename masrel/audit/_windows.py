@@ -14,7 +14,6 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement import declared_weights
 from masrel.audit._printed import (
     RULES,
     PrintedNumber,
@@ -125,12 +124,8 @@ def union(windows: Mapping[Rule, Window]) -> Window:
 
 def by_distance(weights: AuditWeights, n_categories: int) -> Integers:
     """Return disagreement by the distance of two categories, in whole numbers."""
-    if weights == "identity":
-        return np.array([0] + [1] * (n_categories - 1))
-    made = declared_weights(weights, tuple(range(n_categories)))
-    if made.numerators is None:
-        raise TypeError(f"{weights} weights are whole numbers")
-    return np.array(made.numerators[0], dtype=np.int64)
+    k = np.arange(n_categories)
+    return {"identity": np.minimum(k, 1), "linear": k, "quadratic": k * k}[weights]
 
 
 def matrix_of(distances: Integers) -> Integers:

@@ -191,13 +191,13 @@ def _interval_offer(
 
     entries = [COEFFICIENTS[row.estimate.coefficient] for row in rows]
     can = [
-        entry.kernel is not None and row.estimate.reason is None
+        entry.formula is not None and row.estimate.reason is None
         for entry, row in zip(entries, rows, strict=True)
     ]
     if options.target is not None or not any(can):
         return None
     more, but = ["--target", "items"], ""
-    without = [e for e in entries if e.kernel is None and e.interval_target != "items"]
+    without = [e for e in entries if e.formula is None and e.interval_target != "items"]
     if without and not options.takes_all:  # named, they would be refused
         others = (entry.name for entry in entries if entry not in without)
         more = ["--coefficients", ",".join(dict.fromkeys(others)), *more]

@@ -46,7 +46,7 @@ def _plain_weights(name: str) -> str:
 
 def _level(_: click.Context, __: click.Parameter, value: float) -> float:
     # checked here, since nothing else looks at it where there is no interval
-    from masrel.agreement._kernel import check_level
+    from masrel.agreement._engine import check_level
 
     check_level(value)
     return value

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement._kernel import Floats
+from masrel.agreement._engine import Floats
 from masrel.agreement._labels import is_missing, is_row
 from masrel.errors import ParameterError
 from masrel.intervals._influences import sample_factor, unit_influences

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement import CodedRatings, specific_agreement
-from masrel.agreement._counts import item_counts
-from masrel.agreement._kernel import Array, Floats, Integers, divide
+from masrel.agreement._engine import Array, Floats, Integers, divide
+from masrel.agreement._rows import item_counts
 
 _BLOCK = 1 << 14  # distinct items whose categories are spread out at once
 _EXACT = 1 << 24  # whole numbers below it are exact in 32 bits
@@ -163,7 +163,7 @@ def confusion_arrays(
 def _each_category(codes: Integers, raters: Sequence[int], q: int) -> Floats:
     """Return how many of some raters chose each category, (n_rows, n_categories)."""
     coded = CodedRatings(codes=codes[:, raters], categories=tuple(range(q)))
-    return item_counts(coded).astype(np.float64)
+    return item_counts(coded.codes, coded.n_categories).astype(np.float64)
 
 
 def _each_other(counts: PairCounts, others: Sequence[int]) -> NDArray[np.bool_]:

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit, gammaln, xlogy
 
-from masrel.agreement._kernel import Floats
+from masrel.agreement._engine import Floats
 from masrel.errors import ConvergenceError
 from masrel.intervals._quadrature import log_sum_exp
 

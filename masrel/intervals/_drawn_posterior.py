@@ -12,14 +12,13 @@ from itertools import permutations
 import numpy as np
 
 from masrel.agreement._distances import Distances
-from masrel.agreement._kernel import Floats
+from masrel.agreement._engine import Floats
 from masrel.errors import ParameterError
 from masrel.estimates import Distribution, Interval
 from masrel.intervals._dirichlet_multinomial import DirichletMultinomial
-from masrel.intervals._endpoints import DrawnResamples
 from masrel.intervals._problem import IntervalProblem, recorded_generator
+from masrel.intervals._resamples import Resamples, distinct_features
 from masrel.intervals._rho import PRIOR_SHAPES, Prior, RhoPosterior
-from masrel.intervals._units import row_units
 
 MIN_DRAWS = 100
 DEFAULT_DRAWS, SEED = 2_000, 1
@@ -75,17 +74,14 @@ def patterns_interval(
     if reason is not None:
         return _undefined(problem, reason, method)
     generator, seed = recorded_generator(rng)
-    units = row_units(problem, problem.rows, problem.freq)  # equal features together
+    rows, often = distinct_features(problem.rows, problem.freq)
     added, worth = _prior_patterns(problem)
-    shapes = np.concatenate([units.freq, worth])
+    rows, shapes = np.concatenate([rows, added]), np.concatenate([often, worth])
     n_left, values, size = _checked(n_draws), [], max(1, _AT_ONCE // shapes.size)
     while n_left > 0:
         freq = generator.standard_gamma(shapes, (min(size, n_left), shapes.size))
         freq *= _WITHOUT_END / problem.n_items
-        sums = (
-            units.sums(freq[:, : units.freq.size]) + freq[:, units.freq.size :] @ added
-        )
-        values.append(problem.values(sums))
+        values.append(problem.values(freq @ rows))
         n_left -= size
     interval = _interval(problem, np.concatenate(values), method, _PRIOR, one_sided)
     return dataclasses.replace(interval, seed=seed)
@@ -180,10 +176,9 @@ def _interval(
 ) -> Interval:
     drawn = values[np.isfinite(values)]
     tail = (1.0 - problem.level) * (1.0 if one_sided else 0.5)
-    draws = DrawnResamples(drawn=drawn, values=np.sort(drawn))
+    draws = Resamples.of(drawn)
     low, high = (
-        (draws.quantile(share), draws.error(share, 0.0, 0.0))
-        for share in (tail, 1.0 - tail)
+        (draws.quantile(share), draws.error(share)) for share in (tail, 1.0 - tail)
     )
     if one_sided:
         high = (1.0, 0.0)
@@ -200,7 +195,7 @@ def _interval(
         n_undefined=values.size - drawn.size,
         monte_carlo_error=(low[1], high[1]),
         distribution=_density(
-            draws.values, f"posterior of {problem.entry.title}, prior {prior}"
+            drawn, f"posterior of {problem.entry.title}, prior {prior}"
         ),
     )
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from masrel.agreement._kernel import Floats
+from masrel.agreement._engine import Floats
 
 _RANK = 1e-12  # singular values below it, of the largest, are rounding
 _ANGLES = 1 << 13  # of a half turn

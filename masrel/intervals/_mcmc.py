@@ -7,7 +7,7 @@ import emcee
 import numpy as np
 from arviz_stats.base import array_stats
 
-from masrel.agreement._kernel import Floats
+from masrel.agreement._engine import Floats
 from masrel.errors import ConvergenceError
 
 N_ENSEMBLES = 4

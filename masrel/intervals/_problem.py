@@ -21,12 +21,12 @@ from masrel.agreement import (
     code_ratings,
     coefficient,
 )
-from masrel.agreement._count_tables import places_of
-from masrel.agreement._counts import distinct_rows, item_counts
 from masrel.agreement._data import check_scale
-from masrel.agreement._distances import Distances, Squared
-from masrel.agreement._kernel import Floats, Kernel, RaterSums, check_level
-from masrel.agreement._weights import MANY, Weights, declared_weights
+from masrel.agreement._distances import Distances
+from masrel.agreement._engine import Features, Floats, Formula, RaterSums, check_level
+from masrel.agreement._labels import Codes
+from masrel.agreement._rows import distinct_rows, item_counts
+from masrel.agreement._weights import declared_weights
 from masrel.errors import (
     ParameterError,
     SmallSampleWarning,
@@ -45,6 +45,7 @@ HELD = (
 )
 
 _MAX_PLACES = 1 << 23  # numbers of features that are held at once
+_FEW_GRADES = 128  # up to which the features of every item are held
 _MAX_REMADE = 40  # categories up to which that metric is made anew from their pairs
 
 COLUMNS = {"ratings": 1, "pairs": 2}
@@ -63,7 +64,7 @@ class IntervalProblem:
     # A coefficient is a function of sums over items of a few features of each, so that
     # a resample, or leaving an item out, changes the sums and nothing else.
     entry: Coefficient
-    kernel: Kernel
+    formula: Formula
     coded: CodedRatings  # all ratings, item by item
     used: CodedRatings  # the same of raters who matter
     distinct: CodedRatings  # the distinct rows of these, and how often each occurs
@@ -102,25 +103,32 @@ class IntervalProblem:
     def item_counts(self) -> Integers:
         """Count the raters of each category for every item that matters."""
         # -> (n_items, n_categories), equal items together
-        return item_counts(self.patterns).repeat(self.freq, axis=0)
+        counts = item_counts(self.patterns.codes, self.patterns.n_categories)
+        return counts.repeat(self.freq, axis=0)
 
     def values(self, sums: Floats) -> Floats:
         """Return the coefficient for sums of shape (..., n_features)."""
-        return self.kernel.value(sums, self.v)
+        return self.formula.value(sums, self.v)
+
+    def slopes(self, sums: Floats) -> Floats:
+        """Return the derivatives of the coefficient in sums (..., n_features)."""
+        with np.errstate(invalid="ignore", divide="ignore"):  # undefined ones
+            slope = self.formula.slope(sums, self.v)
+        return np.where(np.isfinite(slope), slope, math.nan)
 
     def values_without(self, sums: Floats, rows: Floats) -> Floats:
         """Return the coefficient for sums less each row of features, (n_rows,)."""
         if not len(rows):
             return np.empty(0)
         if len(rows) <= _BLOCK:
-            return self.kernel.value(sums - rows, self.v)
+            return self.formula.value(sums - rows, self.v)
         return np.concatenate(
             [self.values(sums - rows[block]) for block in blocks(len(rows))]
         )
 
     def features(self, coded: CodedRatings) -> Floats:
         """Return the features of items, (n_items, n_features)."""
-        return _features(self.kernel, coded, self.v)
+        return _features(self.formula, coded, self.v)
 
     def rater_sums(self) -> RaterSums:
         """Return sums of features as a function of how often each rater is taken."""
@@ -130,19 +138,19 @@ class IntervalProblem:
                 f"target: raters of {len(self.v)} different grades are left out, but "
                 "not resampled; use the jackknife"
             )
-        if self.kernel.rater_sums is None or most == fewest:
+        if self.formula.rater_sums is None or most == fewest:
             raise ParameterError(
                 f"target: raters of {self.entry.title} cannot be resampled without "
                 "pairing a rater with a copy of itself"
             )
-        return self.kernel.rater_sums(self.patterns, self.freq, self.v)
+        return self.formula.rater_sums(self.patterns.codes, self.freq, self.v)
 
     def crossed_values(self) -> Callable[[Floats, Floats], Floats]:
         """Return values by how often each pattern and each rater is taken."""
         self.rater_sums()  # or an error
-        if self.kernel.crossed_sums is None:  # whoever has one has both
+        if self.formula.crossed_sums is None:  # whoever has one has both
             raise ParameterError(f"target: none of both for {self.entry.title}")
-        sums = self.kernel.crossed_sums(self.patterns, self.v)
+        sums = self.formula.crossed_sums(self.patterns.codes, self.v)
         return lambda items, raters: self.values(sums(items, raters))
 
     def student_t(self, df: float) -> float:
@@ -253,33 +261,40 @@ def pose_problem(
     else:
         coded = entry.code(ratings, categories)
     _check_raters(entry, coded)
-    kernel = entry.kernel or _refuse_coefficient(entry)
+    formula = entry.formula or _refuse_coefficient(entry)
     made = (
         declared_weights(weights, coded.categories, declared=coded.declared)
         if entry.metric is None
         else entry.disagreement(coded, weights)
     )
-    v = made.floats if made.n_categories <= MANY else None
-    if v is None:
-        kernel, v = _of_many(kernel, coded, made, delta)
+    v = made.v
     notes: tuple[str, ...] = ()
     if entry.metric == "ordinal" and coded.n_categories > _MAX_REMADE:
-        kernel, notes = coefficient(entry.name).kernel or kernel, (HELD,)
-    used, distinct, freq, rows = _what_matters(entry, kernel, coded, v)
+        formula, notes = coefficient(entry.name).formula or formula, (HELD,)
+    if _are_too_many(formula, coded, v):
+        if not delta:
+            raise ParameterError(
+                f"ratings: {len(coded.codes)} items of {made.n_categories} different "
+                "grades are too many for an interval that counts each of them; "
+                'method="analytic" counts none, nor do the interval metric and '
+                "quadratic weights"
+            )
+        formula = NO_SUMS
+    used, distinct, freq, rows = _what_matters(entry, formula, coded, v)
     matters, every_freq = np.asarray(rows.any(axis=1)), freq
     patterns = distinct
     if not matters.all():
         patterns = replace(distinct, codes=distinct.codes[matters])
         freq, rows = freq[matters], rows[matters]
     sums = np.asarray(freq @ rows)
-    value = float(kernel.value(sums, v))
-    if kernel is NO_SUMS:
+    value = float(formula.value(sums, v))
+    if formula is NO_SUMS:
         value = entry(coded, weights=weights).value
     # a pair is of one rater in a test-retest, where rows without one do not matter
     paired = (patterns.codes >= 0).sum(axis=1) >= 2
     return IntervalProblem(
         entry=entry,
-        kernel=kernel,
+        formula=formula,
         coded=coded,
         used=used,
         distinct=distinct,
@@ -290,7 +305,7 @@ def pose_problem(
         rows=rows,
         sums=sums,
         v=v,
-        unweighted=made.name in ("identity", "nominal"),
+        unweighted=made.counts_misses,
         n_items=int(freq.sum()),
         n_paired_items=int(freq @ paired),
         value=value,
@@ -337,7 +352,7 @@ def _of_counted(
     ratings: CountedRatings, target: Target, categories: Sequence[Label] | None
 ) -> CodedRatings:
     # counted ratings, or counts that do not say who rated what
-    if ratings.coded is not None:
+    if ratings.knows_raters:
         return code_ratings(ratings, categories)
     if target != "items":
         raise ParameterError(
@@ -346,7 +361,7 @@ def _of_counted(
         )
     if categories is not None:
         check_scale(ratings.categories, categories)
-    return places_of(ratings)
+    return ratings.coded
 
 
 def _refuse_coefficient(entry: Coefficient) -> NoReturn:
@@ -356,37 +371,34 @@ def _refuse_coefficient(entry: Coefficient) -> NoReturn:
     )
 
 
-def _of_many(
-    kernel: Kernel, coded: CodedRatings, made: Weights, delta: bool
-) -> tuple[Kernel, Any]:
-    # the kernel, and v of many categories as it takes it
-    takes_many = kernel.takes_many and not made.has_matrix and made.reason is None
-    if takes_many and isinstance(made.operator, Squared):
-        return kernel, made.operator
-    q = made.n_categories
-    fewest = len(coded.codes) if takes_many else max(len(coded.codes), q)
-    if fewest * q <= _MAX_PLACES:
-        return kernel, made.operator if takes_many else made.floats
-    if delta:
-        return NO_SUMS, np.empty((0, 0))
-    raise ParameterError(
-        f"ratings: {len(coded.codes)} items of {q} different grades are too many for "
-        'an interval that counts each of them; method="analytic" counts none, nor do '
-        "Krippendorff's alpha by the interval metric and coefficients that do not tell "
-        "raters from one another with quadratic weights"
-    )
+def _are_too_many(formula: Formula, coded: CodedRatings, v: Any) -> bool:
+    # features of every item to be held; those of few grades always are
+    if len(v) <= _FEW_GRADES:
+        return False
+    one = formula.features(coded.codes[:1], v, None)
+    n_features = len(one.dense) + one.n
+    return max(len(coded.codes), len(v)) * n_features > _MAX_PLACES
 
 
-def _rated(coded: CodedRatings, _v: Floats) -> Floats:
-    # (n_items, 1): whether an item has a rating
-    rated = (coded.codes >= 0).any(axis=1, keepdims=True)
-    return np.asarray(rated, dtype=np.float64)
+def _whether_rated(codes: Codes, _v: Any, _repeats: Any = None) -> Features:
+    none = np.empty((len(codes), 0))
+    rated = np.asarray((codes >= 0).any(axis=1, keepdims=True).T, dtype=np.float64)
+    return Features(rated, none.astype(np.int64), none, 0)
 
 
-NO_SUMS = Kernel(
-    features=_rated, value=lambda sums, _v: np.full(sums.shape[:-1], math.nan)
+def _no_sums(sums: Floats, _v: Any) -> tuple[Floats, Floats]:
+    none = np.full((*sums.shape[:-1], 1), math.nan)
+    return none, none
+
+
+NO_SUMS = Formula(
+    name="",
+    title="",
+    features=_whether_rated,
+    disagreements=_no_sums,
+    slope=lambda sums, _v: np.full(sums.shape, math.nan),
 )
-"""In place of the kernel of a coefficient whose features would be too many."""
+"""In place of the formula of a coefficient whose features would be too many."""
 
 
 def find_entry(statistic: Statistic, metric: Metric | None = None) -> Coefficient:
@@ -414,7 +426,7 @@ def _check_raters(entry: Coefficient, coded: CodedRatings) -> None:
 
 
 def _what_matters(
-    entry: Coefficient, kernel: Kernel, coded: CodedRatings, v: Floats
+    entry: Coefficient, formula: Formula, coded: CodedRatings, v: Floats
 ) -> tuple[CodedRatings, CodedRatings, Integers, Floats]:
     """Return ratings of raters who matter, distinct rows, frequencies and features."""
     # A row whose features are all 0 changes no sum: to the coefficient it is no item.
@@ -428,7 +440,7 @@ def _what_matters(
             coded = replace(coded, codes=coded.codes[:, rated])
             continue
         distinct = replace(coded, codes=codes)
-        rows = _features(kernel, distinct, v)
+        rows = _features(formula, distinct, v)
         codes = codes[rows.any(axis=1)]
         shape = (len(codes), codes.shape[1] // width, width)
         rates = (codes >= 0).reshape(shape).all(axis=2).any(axis=0)  # (n_raters,)
@@ -437,14 +449,14 @@ def _what_matters(
         coded = replace(coded, codes=coded.codes[:, rates.repeat(width)])
 
 
-def _features(kernel: Kernel, coded: CodedRatings, v: Floats) -> Floats:
+def _features(formula: Formula, coded: CodedRatings, v: Floats) -> Floats:
     # (n_items, n_features), made a block at a time
     n_items = len(coded.codes)
     if n_items <= _BLOCK:
-        return kernel.features(coded, v)
+        return formula.features(coded.codes, v).rows()
     features = None
     for block in blocks(n_items):
-        part = kernel.features(replace(coded, codes=coded.codes[block]), v)
+        part = formula.features(coded.codes[block], v).rows()
         if features is None:
             features = np.empty((n_items, part.shape[1]))
         features[block] = part

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import betainc, expit, sici
 
-from masrel.agreement._kernel import Floats
+from masrel.agreement._engine import Floats
 from masrel.errors import ConvergenceError
 
 SETTLED = 1e-7

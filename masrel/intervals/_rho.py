@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
-from masrel.agreement._kernel import Floats
+from masrel.agreement._engine import Floats
 from masrel.errors import ParameterError
 from masrel.estimates import Distribution, Interval
 from masrel.intervals._dirichlet_multinomial import DirichletMultinomial, RhoDensity

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 from scipy.special import betainc, betaln, xlogy
 
-from masrel.agreement._kernel import Floats
+from masrel.agreement._engine import Floats
 from masrel.errors import ConvergenceError
 from masrel.estimates import Distribution
 from masrel.intervals._quadrature import (

@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from masrel.agreement._kernel import Floats
+from masrel.agreement._engine import Floats
 from masrel.agreement._weights import MANY
 from masrel.errors import ParameterError
 from masrel.estimates import Interval

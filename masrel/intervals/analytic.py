@@ -7,22 +7,17 @@ from dataclasses import replace
 from typing import Literal, get_args
 
 from masrel.agreement import Label, Metric, WeightsLike
-from masrel.agreement._kernel import NO_SPREAD, ONE_PAIR
+from masrel.agreement._engine import NO_SPREAD, ONE_PAIR
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval, Target, Unit
 from masrel.intervals._clusters import ClusterSums, clustered_error, clusters_of
+from masrel.intervals._conventions import Convention, error_by
 from masrel.intervals._problem import (
     HELD,
     IntervalProblem,
     Statistic,
     pose_problem,
     warn_small,
-)
-from masrel.intervals._published_errors import (
-    NAMES,
-    ErrorName,
-    check_error,
-    published_error,
 )
 
 _Distribution = Literal["t", "normal", "logit", "fisher"]
@@ -33,6 +28,12 @@ _METHODS: dict[_Distribution, str] = {
     "normal": "normal",
     "logit": "t(n-1) on the logit",
     "fisher": "t(n-1) on Fisher's z",
+}
+
+_NAMES: dict[Convention, str] = {
+    "irrcac": "irrCAC's error",
+    "spss": "SPSS's error",
+    "over_n": "delta method over n",
 }
 
 
@@ -46,7 +47,7 @@ def analytic(
     metric: Metric | None = None,
     level: float = 0.95,
     distribution: _Distribution = "t",
-    error: ErrorName = "delta",
+    convention: Convention | None = None,
     clusters: object = None,
 ) -> Interval:
     """Compute an interval from a standard error.
@@ -57,9 +58,8 @@ def analytic(
         Name of a coefficient, or its public function.
     ratings : nested sequence, array_like or DataFrame
         What the coefficient takes.
-    target : {"items", "both"}
-        The standard error takes items as the sample and says nothing of raters; with
-        the unconditional error, "both".
+    target : {"items"}
+        The standard error takes items as the sample and says nothing of raters.
     categories : sequence, optional
         The declared scale in order.
     weights : str or array_like, optional
@@ -73,8 +73,8 @@ def analytic(
         Student's t with n - 1 degrees, n the items with a pair of ratings; the
         normal; or t on the logit of the
         position between the ends of the parameter space or on Fisher's z.
-    error : {"delta", "over_n", "cohen", "irrcac", "unconditional"}, optional
-        Ours, or the one that others publish, by name; see Notes.
+    convention : {"irrcac", "spss", "over_n"}, optional
+        Take the standard error that another program prints in place of ours; see Notes.
     clusters : sequence of labels, length n_items, optional
         The cluster of every item, such as the patient of a site: n are then clusters.
         Each item by itself when not given.
@@ -87,30 +87,26 @@ def analytic(
     Raises
     ------
     ParameterError
-        If an option is invalid, the error does not answer for the target, or is not
-        of the coefficient.
+        If an option is invalid, the target is not "items", or the convention has no
+        error of the coefficient.
     RatingsError
         If the ratings do not fit the coefficient.
 
     Warns
     -----
     SmallSampleWarning
-        Below 10 items with a pair of ratings, and with the unconditional error below 5
-        raters.
+        Below 10 items with a pair of ratings.
     UndefinedStatisticWarning
         If the estimate or its standard error is undefined or 0.
 
     Notes
     -----
     "over_n" is the delta method's with n in place of n - 1: for Cohen's kappa Fleiss,
-    Cohen and Everitt's [2]_, which the R packages vcd and psych print (psych's of
-    weighted kappa has a fault), with "normal" their interval. "cohen" is Cohen's own
-    [3]_, √[p_o (1 - p_o) / (n (1 - p_e)²)], as if chance agreement were known, and with
-    weights that of [4]_. "irrcac" is what the package irrCAC prints, also of
-    Krippendorff's alpha; the two are the same where every item has at least two
-    ratings, but for alpha. "unconditional" is Gwet's [5]_ for other items and raters:
-    the variance over items with these raters, and the jackknife's over raters. The
-    degrees of freedom are the smaller of n - 1 and those of the raters.
+    Cohen and Everitt's [2]_, which SPSS and the R packages vcd and psych print (psych's
+    of weighted kappa has a fault), with "normal" their interval. "irrcac" is what the
+    package irrCAC prints, also of Krippendorff's alpha; but for alpha it is ours where
+    every item has at least two ratings. "spss" is "over_n" for Cohen's kappa, and for
+    Fleiss' kappa that of the hypothesis that kappa is 0 [3]_.
 
     References
     ----------
@@ -118,14 +114,9 @@ def analytic(
     .. [2] Fleiss, J. L., Cohen, J., Everitt, B. S. (1969). Large sample standard
        errors of kappa and weighted kappa. Psychological Bulletin, 72(5), 323-327.
        https://doi.org/10.1037/h0028106
-    .. [3] Cohen, J. (1960). A coefficient of agreement for nominal scales.
-       Educational and Psychological Measurement, 20(1), 37-46, equation 7.
-       https://doi.org/10.1177/001316446002000104
-    .. [4] Cohen, J. (1968). Weighted kappa. Psychological Bulletin, 70(4), 213-220.
-       https://doi.org/10.1037/h0026256
-    .. [5] Gwet, K. L. (2008). Variance estimation of nominal-scale inter-rater
-       reliability with random selection of raters. Psychometrika, 73(3), 407-430.
-       https://doi.org/10.1007/s11336-007-9054-8
+    .. [3] Fleiss, J. L., Nee, J. C. M., Landis, J. R. (1979). Large sample variance of
+       kappa in the case of different sets of raters. Psychological Bulletin, 86(5),
+       974-977. https://doi.org/10.1037/0033-2909.86.5.974
 
     Examples
     --------
@@ -137,7 +128,7 @@ def analytic(
     As R's vcd and psych print it:
 
     >>> interval = analytic(
-    ...     "cohen_kappa", ratings, target="items", error="over_n",
+    ...     "cohen_kappa", ratings, target="items", convention="over_n",
     ...     distribution="normal",
     ... )
     >>> round(interval.low, 3), round(interval.high, 3)
@@ -148,6 +139,10 @@ def analytic(
             f"distribution: needs one of {', '.join(get_args(_Distribution))}, "
             f"got {distribution!r}"
         )
+    if convention not in (None, *_NAMES):
+        raise ParameterError(
+            f"convention: needs one of {', '.join(_NAMES)}, got {convention!r}"
+        )
     problem = pose_problem(
         coefficient,
         ratings,
@@ -156,41 +151,47 @@ def analytic(
         weights=weights,
         metric=metric,
         level=level,
-        delta=error == "delta" and clusters is None,
+        delta=convention is None and clusters is None,
     )
-    check_error(error, target)
+    if target != "items":
+        raise ParameterError(
+            'target: the delta method generalises to other items only, so "items"; for '
+            f'other raters, or both, use the jackknife; got "{target}"'
+        )
     if problem.entry.metric == "ordinal":
         problem = replace(problem, notes=(HELD,))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UndefinedStatisticWarning)  # given below
         estimate = problem.entry(problem.coded, weights=weights)
-    if error != "delta" and estimate.reason is None and estimate.n_items > 1:
-        by_name = published_error(problem, estimate, error, weights)
-        estimate = replace(estimate, standard_error=by_name)
+    method = f"delta method, {_METHODS[distribution]}"
+    if convention is not None:
+        method = f"{_NAMES[convention]}, {_METHODS[distribution]}"
+        if estimate.reason is None and estimate.n_items > 1:
+            error = error_by(convention, problem, estimate)
+            estimate = replace(estimate, standard_error=error)
     n_clusters = None
     if clusters is not None:
-        if error != "delta":
-            raise ParameterError(f'clusters: needs error "delta", got "{error}"')
+        if convention is not None:
+            raise ParameterError(f'clusters: needs no convention, got "{convention}"')
         codes = clusters_of(problem, clusters)
         n_clusters = ClusterSums.of(problem, codes).n_paired
         if estimate.reason is None and n_clusters > 1:
             by_cluster = clustered_error(problem, codes)
             estimate = replace(estimate, standard_error=by_cluster)
-    return _interval_around_estimate(problem, estimate, distribution, error, n_clusters)
+    return _interval_around_estimate(
+        problem, estimate, distribution, method, n_clusters
+    )
 
 
 def _interval_around_estimate(
     problem: IntervalProblem,
     estimate: Estimate,
     distribution: _Distribution,
-    error: ErrorName,
+    method: str,
     n_clusters: int | None,
 ) -> Interval:
     unit: Unit | None = None
-    method = f"{NAMES[error]}, {_METHODS[distribution]}"
-    if error == "unconditional":
-        method, unit = method.replace("n-1", "min(n, r)-1"), "raters"
-    elif n_clusters is not None:
+    if n_clusters is not None:
         method, unit = f"{method}, of clusters", "clusters"
     reason = _why_undefined(estimate, n_clusters)
     if reason is not None:
@@ -201,9 +202,6 @@ def _interval_around_estimate(
         notes = warn_small(n_clusters, 10, "clusters")
     else:
         notes = warn_small(df + 1, 10, "items", estimate.n_items)
-    if unit == "raters":
-        notes += warn_small(problem.n_paired_raters, 5, "raters", estimate.n_raters)
-        df = min(df, problem.n_paired_raters - 1)
     lowest = None
     if distribution in ("logit", "fisher"):
         # artanh x is half the logit of (x + 1)/2, so that both give the same ends

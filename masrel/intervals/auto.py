@@ -116,7 +116,7 @@ def estimate(
     entry = find_entry(coefficient, metric)
     if method == "auto" and entry.interval_target not in (None, target):
         _refuse_target(entry, target)
-    if entry.kernel is None:
+    if entry.formula is None:
         result = entry(ratings, categories=categories, weights=weights, level=level)
     else:
         is_counted = isinstance(ratings, CountedRatings)
@@ -145,8 +145,7 @@ def estimate(
         interval = posterior(entry, ratings, rng=rng, **options)
     few = interval.target != "items" and result.n_raters < _MANY_RATERS
     notes = (*interval.notes, _CARELESS) if few else interval.notes
-    # `vars` has the standard error as it is: still to be computed when it is read.
-    return Estimate(**{**vars(result), "interval": replace(interval, notes=notes)})
+    return replace(result, interval=replace(interval, notes=notes))
 
 
 def _clustered(
@@ -178,7 +177,7 @@ def _clustered(
     error = result.standard_error
     if result.reason is None:
         error = clustered_error(problem, codes)
-    return Estimate(**{**vars(result), "standard_error": error, "interval": interval})
+    return replace(result, standard_error=error, interval=interval)
 
 
 def _chosen(entry: Coefficient, ratings: object, options: "_Options") -> Interval:
@@ -186,7 +185,7 @@ def _chosen(entry: Coefficient, ratings: object, options: "_Options") -> Interva
 
     target = options["target"]
     problem = pose_problem(entry, ratings, delta=target == "items", **options)
-    if problem.kernel is NO_SUMS:
+    if problem.formula is NO_SUMS:
         interval, why = analytic(entry, ratings, **options), _TOO_MANY
     else:
         interval, why = choose_interval(problem, unweighted=problem.unweighted)

@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 
 from masrel.agreement import CodedRatings, Label, Metric, WeightsLike
-from masrel.agreement._counts import distinct_rows
-from masrel.agreement._kernel import Array, Floats, Integers, divide
+from masrel.agreement._engine import Array, Floats, Integers, divide
+from masrel.agreement._rows import distinct_rows
 from masrel.errors import MasrelWarning, ParameterError
 from masrel.estimates import Estimate
 from masrel.intervals._confusion import (

@@ -9,6 +9,7 @@ import numpy as np
 
 from masrel.agreement import Label, Significance, count_ratings
 from masrel.agreement._labels import is_row
+from masrel.agreement._rows import item_counts
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate
 
@@ -54,9 +55,9 @@ def equality_test(estimates: Sequence[Estimate]) -> Significance:
 
     Examples
     --------
-    >>> from masrel.agreement import cohen_kappa_from_table
+    >>> from masrel.agreement import cohen_kappa, count_table
     >>> tables = [[[40, 6], [5, 29]], [[55, 20], [15, 30]], [[20, 3], [4, 8]]]
-    >>> print(equality_test([cohen_kappa_from_table(table) for table in tables]))
+    >>> print(equality_test([cohen_kappa(count_table(table)) for table in tables]))
     equality_test: 7.971, chi-squared(2), p = 0.0186
     """
     checked: list[Any] = list(estimates) if is_row(estimates) else [estimates]
@@ -179,9 +180,8 @@ def _concordance(
         counted = count_ratings(ratings, categories)
     except RatingsError as error:
         raise RatingsError(f"groups: group {place}: {error}") from error
-    used = counted.items.n_categories
-    rows = np.array(counted.items.rows, dtype=np.int64).reshape(-1, max(used, 1))
-    freq = np.array(counted.items.freq, dtype=np.int64)
+    used, freq = counted.n_categories, counted.freq
+    rows = item_counts(counted.codes, max(used, 1), counted.repeats)
     if used == 0:
         raise RatingsError(f"groups: group {place}: needs a rating, got none")
     if used > 2 or rows.sum(axis=1).max(initial=0) > 2:

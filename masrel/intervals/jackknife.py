@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from masrel.agreement import Label, Metric, WeightsLike
-from masrel.agreement._kernel import Floats
+from masrel.agreement._engine import Floats
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target, Unit
 from masrel.intervals._clusters import ClusterSums, clusters_of

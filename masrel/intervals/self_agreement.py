@@ -19,8 +19,8 @@ from scipy.special import betainc, expit, gammaln, logit
 
 from masrel.agreement import Label
 from masrel.agreement._data import code_pairs, pairs_of_raters
-from masrel.agreement._kernel import Floats, check_level
-from masrel.agreement._pairs import pair_table
+from masrel.agreement._engine import Floats, check_level
+from masrel.agreement._rows import pair_table
 from masrel.errors import UndefinedStatisticWarning
 from masrel.estimates import Interval, Target
 from masrel.intervals._dirichlet_multinomial import log_convolve

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from masrel.agreement import Label, Metric, Significance, WeightsLike
-from masrel.agreement._kernel import Floats, Integers
+from masrel.agreement._engine import Floats, Integers
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate
 from masrel.intervals._clusters import cluster_codes

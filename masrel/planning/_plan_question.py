@@ -9,7 +9,7 @@ from typing import Any, get_args
 import numpy as np
 
 from masrel.agreement import Coefficient, Label, WeightsLike, coefficient
-from masrel.agreement._kernel import check_level
+from masrel.agreement._engine import check_level
 from masrel.errors import ParameterError
 from masrel.estimates import Target
 from masrel.planning._aims import Aim, checked_number
@@ -284,7 +284,7 @@ def _check_choice(name: str, value: object, choices: Sequence[object]) -> None:
 
 def _entry(name: str) -> Coefficient:
     entry = coefficient(name)
-    if entry.kernel is None and entry.name not in FORMS:
+    if entry.formula is None and entry.name not in FORMS:
         raise ParameterError(
             f"coefficient: {entry.title} cannot be planned for: it is no function of "
             f"sums over items; the others and {', '.join(FORMS)} can"

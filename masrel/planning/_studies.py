@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from masrel.agreement import CodedRatings, Coefficient, coefficient
-from masrel.agreement._counts import distinct_rows
+from masrel.agreement._rows import distinct_rows
 from masrel.agreement._weights import WeightsLike
 from masrel.errors import ParameterError, SmallSampleWarning, UndefinedStatisticWarning
 from masrel.estimates import Interval, Target
@@ -38,7 +38,6 @@ from masrel.planning._item_models import (
 
 NDArrayBool = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
-_STEP = 1e-30  # of a derivative by a complex step, which cancels no digits
 _PLACES = 1 << 20  # numbers held at once
 _LARGE = 1e12  # items of a population
 _LEAST = 1e-13  # of a half-width: what rounding may leave above the aim
@@ -241,7 +240,9 @@ class StudyMaker:
         features = self.features_of(rows)
         sums = _LARGE * (p @ features)
         u = _LARGE * (features @ self._slopes(sums[None])[0])
-        return float(self.problem.values(sums)), math.sqrt(float(p @ u**2))
+        matters = p * features.any(axis=1)
+        u -= matters @ u / matters.sum()
+        return float(self.problem.values(sums)), math.sqrt(float(matters @ u**2))
 
     def _values(self, sums: Floats) -> Floats:
         # 0/0 where a study has no coefficient
@@ -249,13 +250,9 @@ class StudyMaker:
             return self.problem.values(sums)
 
     def _slopes(self, sums: Floats) -> Floats:
-        # of the coefficient in each sum, by a complex step; (..., n_features)
-        slopes = np.empty_like(sums)
-        for place in range(sums.shape[-1]):
-            stepped = sums.astype(complex)
-            stepped[..., place] += 1j * _STEP
-            slopes[..., place] = np.imag(self._values(stepped)) / _STEP
-        return slopes
+        # of the coefficient in each sum, (..., n_features)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return self.problem.slopes(sums)
 
     # -- what studies show --------------------------------------------------------
 
@@ -313,8 +310,10 @@ class StudyMaker:
         weight = freq.astype(np.float64)
         sums = weight @ self.features
         slopes = self._slopes(sums)
-        squares = (weight * (slopes @ self.features.T) ** 2).sum(axis=1)
+        u = slopes @ self.features.T
         n_rated = weight @ self.features.any(axis=1)
+        mean = (weight * u).sum(axis=1) / np.maximum(n_rated, 1.0)
+        squares = (weight * u**2).sum(axis=1) - n_rated * mean**2
         n_paired = weight @ ((self.rows >= 0).sum(axis=1) >= 2)
         return self._wald(self._values(sums), squares, n_rated, n_paired)
 
@@ -324,8 +323,8 @@ class StudyMaker:
         from scipy.special import ndtri, stdtrit
 
         n: Floats = np.where(n_rated > 1, n_rated, np.nan)
-        # √[Σ (n u_i)² / (n (n - 1))], as of every estimate
-        error = np.sqrt(squares * n / (n - 1.0))
+        # √[Σ (n u_i)² / (n (n - 1))] about the mean, as of every estimate
+        error = np.sqrt(np.maximum(squares, 0.0) * n / (n - 1.0))
         upper = 0.5 + 0.5 * self.design.level
         df = np.maximum(n_paired - 1.0, 1.0)
         is_normal = self.design.interval == "normal"
@@ -367,7 +366,7 @@ class StudyMaker:
         if self.design.entry.shape == "pairs":
             is_paired = features.any(axis=2)  # a pair is of one rater
         n_paired = is_paired.sum(axis=1).astype(float)
-        squares = (u**2).sum(axis=1)
+        squares = (u**2).sum(axis=1) - u.sum(axis=1) ** 2 / np.maximum(n_rated, 1.0)
         return self._wald(self._values(sums), squares, n_rated, n_paired)
 
     def _raters_left_out(self, codes: Integers) -> Floats:

@@ -197,8 +197,9 @@ def at_value(
         )
     if not low < 0.0 < high:
         raise ParameterError(
-            f"value: {entry.title} under {model.name} lies between {low + value:.3f} "
-            f"and {high + value:.3f} with these prevalences, got {value:g}"
+            f"value: {entry.title} under {model.name} lies between "
+            f"{low + value + 1e-15:.3f} and {high + value:.3f} with these prevalences, "
+            f"got {value:g}"
         )
     return at(float(brentq(short_of, *ends, xtol=1e-15, rtol=1e-14)))
 

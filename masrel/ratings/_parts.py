@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement import CodedRatings, CountedRatings, count_ratings
-from masrel.agreement._counts import DistinctItems
 from masrel.agreement._labels import code_type
-from masrel.agreement._weights import MANY
-from masrel.errors import ParameterError, RatingsError
+from masrel.agreement._rows import count_items
+from masrel.errors import RatingsError
 from masrel.ratings._grade_texts import Grades, coded_texts, is_number
 from masrel.ratings._layout import Layout
 from masrel.ratings._text_cells import Sheet
@@ -25,7 +24,6 @@ Codes = NDArray[np.int64]
 
 _MAX_DENSE = 20_000_000  # places, items by raters, that are always kept one by one
 _MAX_SPARSE = 8  # places a rating beyond which only counts are kept
-_MAX_COUNTED = 20_000_000  # places, items by categories, that can be counted
 _MAX_LAID_OUT = 200_000_000  # ratings of a stream that are laid out one by one
 _MAX_COUNTS = 200_000_000  # places, items by categories, of counts
 
@@ -58,22 +56,7 @@ class RatingsPart:
 
     @cached_property
     def counted(self) -> CountedRatings:
-        """The ratings, counted once for several coefficients.
-
-        Raises
-        ------
-        ParameterError
-            If they are measurements, with too many different values to be counted.
-        """
-        q = len(self.ratings.categories)
-        if isinstance(self.ratings, CodedRatings):
-            n_items = len(self.ratings.codes)
-            if q <= MANY and n_items * q > _MAX_COUNTED:
-                raise ParameterError(
-                    f"{n_items} items with {q} different grades look like "
-                    "measurements, and cannot be counted as categories: "
-                    "--coefficients icc_a1 or icc_c1"
-                )
+        """The ratings, counted once for several coefficients."""
         return count_ratings(self.ratings)
 
 
@@ -253,10 +236,9 @@ def put_together(
         rated = triples.grade >= 0
         keys = item[rated] * q + triples.grade[rated]
         counts = np.bincount(keys, minlength=shape[0] * q).reshape(shape[0], q)
-        ratings = CountedRatings(
-            categories=scale.values,
-            items=DistinctItems.of_counts(counts),
-            n_raters=len(np.unique(rater[rated])),
+        ratings = replace(
+            count_items(counts, categories=scale.values),
+            n_known=len(np.unique(rater[rated])),
             source=dense,  # only if a coefficient needs to know who rated what
         )
     return RatingsPart(
@@ -286,12 +268,8 @@ def patterns_part(
         codes.setflags(write=False)
         return CodedRatings(codes=codes, categories=scale.values)
 
-    distinct = CodedRatings(codes=rows, categories=scale.values)
     ratings = CountedRatings(
-        categories=scale.values,
-        items=DistinctItems.of_patterns(distinct, freq),
-        n_raters=int((rows >= 0).any(axis=0).sum()),
-        source=laid_out,
+        codes=rows, freq=freq, categories=scale.values, source=laid_out
     )
     return RatingsPart(
         group=None, session=None, items=(), raters=tuple(raters), ratings=ratings

@@ -6,7 +6,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement._counts import digits, distinct_rows
+from masrel.agreement._rows import digits, distinct_rows
 from masrel.ratings._grade_texts import coded_texts
 from masrel.ratings._large_files import (
     NoStreamError,

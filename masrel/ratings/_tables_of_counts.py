@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement._count_tables import count_items, count_table
+from masrel.agreement._rows import count_items, count_table
 from masrel.errors import ParameterError
 from masrel.ratings._doubts import doubt_counts, doubt_names
 from masrel.ratings._grade_texts import GradeOptions, Grades, coded_texts, is_number

@@ -352,24 +352,26 @@ def standard_error(
     D_i = Σ_j ∂g/∂S_j t_ij. Items being a sample, each moves S independently, so that
     the variance of g is n times the variance of D_i over items,
 
-        SE² = n · Σ_i D_i² / (n - 1).
+        SE² = n · Σ_i (D_i - D̄)² / (n - 1).
 
     The mean of D_i is 0 wherever g does not change when every item is doubled. Alpha
-    does change, by its n - 1; its squares are taken about 0 too, as Gwet does.
+    does change, by its n - 1.
     """
     features, function = COEFFICIENTS[name]
     items = _of_who_rated(items)
     sums = _sum(items, features, w)
     slopes = {key: _slope(function, sums, key, w, q) for key in sums}
-    n, squares = 0, Fraction(0)
+    n, total, squares = 0, Fraction(0), Fraction(0)
     for item in items:
         t = features(item, w)
         if any(t.values()):
             n += item.times
             moved = sum((slopes[key] * part for key, part in t.items()), Fraction(0))
+            total += item.times * moved
             squares += item.times * moved**2
     if n < 2:
         return None
+    squares -= total**2 / n
     with mpmath.workdps(_DIGITS):
         return mpmath.sqrt(_mpf(squares * n / (n - 1)))
 

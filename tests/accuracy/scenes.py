@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 from masrel import agreement as offered
-from masrel.agreement import count_ratings, count_table
+from masrel.agreement import count_items, count_ratings, count_table
 from masrel.errors import UndefinedStatisticWarning
 from masrel.estimates import Estimate
 from tests.accuracy import reference
@@ -39,19 +39,13 @@ def prepared(case: Case) -> Any:
     if case.table:
         return count_table(case.table, categories=case.scale)
     if case.counts:
-        return case.counts
+        return count_items(case.counts, categories=case.scale)
     return count_ratings(case.labels(), categories=case.scale)
 
 
-def estimate(case: Case, name: str, weights: str, ratings: Any) -> Estimate:
+def estimate(name: str, weights: str, ratings: Any) -> Estimate:
     """Ask masrel for a coefficient of prepared ratings."""
     how = {"metric": METRICS[weights]} if weights in METRICS else {"weights": weights}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UndefinedStatisticWarning)
-        if case.table and name in ("cohen_kappa", "scott_pi"):
-            function = getattr(offered, f"{name}_from_table")
-            return function(case.table, categories=case.scale, **how)
-        if case.counts:
-            function = getattr(offered, f"{name}_from_counts")
-            return function(ratings, categories=case.scale, **how)
         return getattr(offered, name)(ratings, **how)

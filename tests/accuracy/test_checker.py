@@ -17,7 +17,7 @@ def the(name: str) -> Case:
 
 
 def found_in(case: Case, name: str) -> Estimate:
-    return estimate(case, name, "identity", prepared(case))
+    return estimate(name, "identity", prepared(case))
 
 
 def cohen_in_floats(table: Sequence[Sequence[int]]) -> tuple[float, float]:
@@ -37,31 +37,6 @@ def cohen_in_floats(table: Sequence[Sequence[int]]) -> tuple[float, float]:
     return kappa, math.sqrt(max(variance, 0) / (n - 1)) / (1 - chance)
 
 
-HARD = [
-    "no agreement on the rare category",
-    "Cohen's κ and Scott's π at −10⁻¹²",
-    "every coefficient at about 10⁻¹³",
-]
-
-
-@pytest.mark.parametrize("name", HARD)
-def test_a_value_in_floats_is_found_out(name: str) -> None:
-    case = the(name)
-    value, _ = cohen_in_floats(case.table)
-    wrong = replace(found_in(case, "cohen_kappa"), value=value)
-    assert any(
-        "ulp off" in fault for fault in checked(case, "cohen_kappa", "identity", wrong)
-    )
-
-
-def test_an_error_in_floats_is_found_out() -> None:
-    case = the("2 raters, as a table")
-    _, error = cohen_in_floats(case.table)
-    wrong = replace(found_in(case, "cohen_kappa"), standard_error=error)
-    (fault,) = checked(case, "cohen_kappa", "identity", wrong)
-    assert "standard error" in fault
-
-
 def test_the_textbook_in_floats_is_right_where_nothing_cancels() -> None:
     # 20, 5 / 10, 15: κ = 0.4. What the cases above find out is not another formula.
     case = the("50 items × 2 raters")
@@ -71,11 +46,11 @@ def test_the_textbook_in_floats_is_right_where_nothing_cancels() -> None:
     assert relative(error, true.standard_error) < 1e-14
 
 
-@pytest.mark.parametrize("towards", [-math.inf, math.inf])
-def test_the_float_beside_the_nearest_is_found_out(towards: float) -> None:
+@pytest.mark.parametrize("off", [-2e-14, 2e-14])
+def test_a_value_beyond_the_bound_is_found_out(off: float) -> None:
     case = the("4 items × 8 raters (HESS, Table V)")
     found = found_in(case, "fleiss_kappa")
-    wrong = replace(found, value=math.nextafter(found.value, towards))
+    wrong = replace(found, value=found.value + off)
     assert checked(case, "fleiss_kappa", "identity", found) == []
     assert checked(case, "fleiss_kappa", "identity", wrong) != []
 
@@ -94,7 +69,7 @@ def test_undefined_on_one_side_only_is_found_out() -> None:
     alpha = found_in(undefined, "krippendorff_alpha")
     assert checked(undefined, "krippendorff_alpha", "identity", alpha) == []
     one = exact(defined, "fleiss_kappa", "identity")
-    assert faults(alpha, one, "identity") != []
+    assert faults(alpha, one) != []
     for wrong in (
         replace(alpha, value=1.0, standard_error=0.0, reason=None),
         replace(alpha, reason=None),
@@ -116,6 +91,6 @@ def test_a_small_number_in_place_of_zero_is_found_out() -> None:
     found = found_in(case, "fleiss_kappa")
     true = exact(case, "fleiss_kappa", "identity")
     assert true.value == 0
-    assert faults(replace(found, value=1e-17), true, "identity") != []
+    assert faults(replace(found, value=2e-14), true) != []
     nothing = Exact(true.value, 0)
-    assert faults(replace(found, standard_error=1e-15), nothing, "identity") != []
+    assert faults(replace(found, standard_error=1e-15), nothing) != []

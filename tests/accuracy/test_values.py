@@ -21,7 +21,7 @@ def wrong_with(case: Case, weights: Sequence[str]) -> list[str]:
             if of_name in METRICS and name != "krippendorff_alpha":
                 continue
             try:
-                found = estimate(case, name, of_name, ratings)
+                found = estimate(name, of_name, ratings)
             except ParameterError:  # a scale on which a metric divides by 0
                 assert of_name == "ratio metric"
                 assert any(-x in case.scale for x in case.scale)

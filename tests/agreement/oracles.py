@@ -1,8 +1,10 @@
 """Reference data sets: those of the project, and those named by the environment."""
 
+import functools
 import json
 import os
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +16,7 @@ from masrel.errors import UndefinedStatisticWarning
 from masrel.estimates import Estimate
 
 Dataset = dict[str, Any]
+Check = Callable[[Dataset, str], None]
 
 FILE = Path(__file__).parents[1] / "oracles" / "agreement.json"
 # Data sets that ship with R packages stay outside the project.
@@ -28,16 +31,27 @@ def datasets() -> list[Dataset]:
     return found
 
 
-def cases(*names: str, field: str) -> list[Any]:
-    """Return (data set, key) of every expected field that is not cautioned against."""
+def by_dataset(*names: str, field: str) -> Callable[[Check], Callable[[str], None]]:
+    """Check every expected field of these coefficients, one test a data set."""
     import pytest
 
-    return [
-        pytest.param(dataset, key, id=f"{dataset['name']}-{key}")
-        for dataset in datasets()
-        for key, expected in dataset["expected"].items()
-        if key.partition("/")[0] in names and "@" not in key and field in expected
-    ]
+    found: dict[str, list[tuple[Dataset, str]]] = {}
+    for dataset in datasets():
+        for key, expected in dataset["expected"].items():
+            if key.partition("/")[0] in names and "@" not in key and field in expected:
+                found.setdefault(dataset["name"], []).append((dataset, key))
+
+    def as_test(check: Check) -> Callable[[str], None]:
+        @pytest.mark.parametrize("name", found)
+        @functools.wraps(check)
+        def test(name: str) -> None:
+            for dataset, key in found[name]:
+                check(dataset, key)
+
+        del test.__wrapped__  # whose parameters are no fixtures
+        return test
+
+    return as_test
 
 
 def estimate(dataset: Dataset, key: str, **options: Any) -> Estimate:

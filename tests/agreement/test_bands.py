@@ -14,7 +14,7 @@ from masrel.agreement import (
     bands,
     benchmark,
     brennan_prediger,
-    brennan_prediger_from_counts,
+    count_items,
     fleiss_kappa,
     strength,
 )
@@ -256,7 +256,7 @@ def test_a_level_is_a_probability(level: float) -> None:
 def test_a_value_at_an_end_has_the_published_word(
     counts: list[int], scale: BandScale, word: str
 ) -> None:
-    found = brennan_prediger_from_counts([counts] * 5)
+    found = brennan_prediger(count_items([counts] * 5))
     assert strength(found.value, scale=scale) == word
 
 

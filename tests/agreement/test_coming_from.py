@@ -16,8 +16,8 @@ from statsmodels.stats import inter_rater
 from masrel.agreement import (
     brennan_prediger,
     cohen_kappa,
-    cohen_kappa_from_table,
     conger_kappa,
+    count_table,
     fleiss_kappa,
     fleiss_null,
     gwet_ac,
@@ -27,7 +27,7 @@ from masrel.agreement import (
     light_kappa,
     p_value,
     percent_agreement,
-    scott_pi_from_table,
+    scott_pi,
 )
 from masrel.estimates import Estimate
 from masrel.intervals import analytic
@@ -89,7 +89,7 @@ def test_spss_crosstabs_prints_an_error_over_n_and_t_under_no_agreement() -> Non
     # https://stats.oarc.ucla.edu/spss/faq/ on unequal ranges of scores: 12 films
     # prints Kappa .500, Asymp. Std. Error .156, Approx. T 3.000
     films = [[4, 0, 0], [0, 4, 0], [0, 4, 0]]
-    kappa = cohen_kappa_from_table(films)
+    kappa = cohen_kappa(count_table(films))
     assert kappa.value == 0.5
     assert kappa.standard_error == pytest.approx(0.163, abs=5e-4)
     assert kappa.standard_error * math.sqrt(11 / 12) == pytest.approx(0.156, abs=5e-4)
@@ -132,10 +132,13 @@ def test_irrcac_has_our_value_error_and_interval_of_complete_items(name: str) ->
 @of_items
 def test_irrcac_error_with_a_single_rating_is_offered_by_name(name: str) -> None:
     printed = irrcac(GAPS, name, categories=[1.0, 2.0, 3.0])
-    ours = CAC[name](GAPS, variance="irrcac")
+    ours = CAC[name](GAPS)
     assert printed["coefficient_value"] == pytest.approx(ours.value, abs=1e-11)
-    assert printed["se"] == pytest.approx(ours.standard_error, abs=1e-11)
-    assert ours.standard_error > CAC[name](GAPS).standard_error
+    assert printed["se"] > ours.standard_error
+    options = {"target": "items", "convention": "irrcac"}
+    interval = quiet(analytic, ours.coefficient, GAPS, **options)
+    ends = (interval.low, interval.high)
+    assert printed["confidence_interval"] == pytest.approx(ends, abs=1e-11)
 
 
 def test_irrcac_error_of_alpha_is_that_of_fleiss_kappa() -> None:
@@ -166,13 +169,13 @@ def test_irrcac_of_one_category_fails() -> None:
 
 @pytest.mark.parametrize(
     ("name", "ours"),
-    [("cohen", cohen_kappa_from_table), ("scott", scott_pi_from_table)],
+    [("cohen", cohen_kappa), ("scott", scott_pi)],
 )
 def test_irrcac_error_of_a_table_is_over_n(
     name: str, ours: Callable[..., Estimate]
 ) -> None:
     table = package("irrCAC.table").CAC(pd.DataFrame(TABLE), digits=12)
-    printed, estimate = quiet(getattr(table, name))["est"], ours(TABLE)
+    printed, estimate = quiet(getattr(table, name))["est"], ours(count_table(TABLE))
     assert printed["coefficient_value"] == pytest.approx(estimate.value, abs=1e-11)
     over_n = estimate.standard_error * math.sqrt(8 / 9)
     assert printed["se"] == pytest.approx(over_n, abs=1e-11)
@@ -225,7 +228,7 @@ def test_sklearn_refuses_a_gap(gap: float | None) -> None:
 def test_statsmodels_error_of_cohens_kappa_is_over_n(weights: Any) -> None:
     table = [[2, 1, 0], [0, 3, 1], [1, 0, 1]]
     printed = inter_rater.cohens_kappa(table, wt=weights)
-    ours = cohen_kappa_from_table(table, weights=weights or "identity")
+    ours = cohen_kappa(count_table(table), weights=weights or "identity")
     assert printed.kappa == pytest.approx(ours.value, rel=1e-12)
     over_n = ours.standard_error * math.sqrt(8 / 9)
     assert printed.std_kappa == pytest.approx(over_n, rel=1e-12)

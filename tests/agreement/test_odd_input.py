@@ -10,10 +10,11 @@ import pytest
 from masrel.agreement import (
     code_long,
     code_ratings,
-    cohen_kappa_from_table,
+    cohen_kappa,
+    count_items,
     count_ratings,
+    count_table,
     fleiss_kappa,
-    fleiss_kappa_from_counts,
     gwet_ac,
     icc,
     kendall_w,
@@ -152,9 +153,9 @@ def test_a_file_says_what_looks_missing_in_its_own_words(tmp_path: Path) -> None
 
 def test_ragged_tables_are_refused_as_what_they_are() -> None:
     with pytest.raises(CountsError, match="counts: needs rows of the same length"):
-        fleiss_kappa_from_counts([[1, 2], [1]])
+        fleiss_kappa(count_items([[1, 2], [1]]))
     with pytest.raises(CountsError, match="rows of the same length"):
-        cohen_kappa_from_table([[1, 2], [1]])
+        cohen_kappa(count_table([[1, 2], [1]]))
     with pytest.raises(ParameterError, match="weights: needs rows of the same length"):
         fleiss_kappa([[1, 2], [2, 2]], weights=[[1, 0], [1]])
     with pytest.raises(RatingsError, match=r"two dimensions .* got shape 3"):

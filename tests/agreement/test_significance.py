@@ -15,7 +15,7 @@ from masrel.agreement import (
     Alternative,
     Significance,
     cohen_kappa,
-    cohen_kappa_from_table,
+    count_table,
     equivalence_p_value,
     fleiss_kappa,
     holm,
@@ -81,7 +81,7 @@ def test_of_a_table_of_two_raters_by_hand() -> None:
     # [[20, 5], [10, 15]]: kappa 0.4, ASE² = 0.2016/12.5 over 50, ours over 49;
     # t = 0.4/√(0.2016/12.5 · 50/49) = 3.1180, P(|t(49)| ≥ 3.1180) = 0.003045.
     t = 0.4 / math.sqrt(0.2016 / 12.5 * 50 / 49)
-    found = p_value(cohen_kappa_from_table([[20, 5], [10, 15]]))
+    found = p_value(cohen_kappa(count_table([[20, 5], [10, 15]])))
     assert found == pytest.approx(both_tails(t, 49), rel=1e-10)
     assert found == pytest.approx(0.003045, abs=5e-7)
 
@@ -183,7 +183,7 @@ AGAINST = [
 @pytest.mark.parametrize("case", AGAINST)
 def test_kappa_against_a_value(case: tuple[object, ...]) -> None:
     table, weights, null, value, over_n, over_one_less = case
-    kappa = cohen_kappa_from_table(table, weights=weights)  # type: ignore[arg-type]
+    kappa = cohen_kappa(count_table(table), weights=weights)  # type: ignore[arg-type]
     n = kappa.n_items
     assert kappa.value == pytest.approx(value, abs=1e-12)
     assert kappa.standard_error == pytest.approx(over_one_less, rel=1e-9)

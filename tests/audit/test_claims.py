@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from statsmodels.stats.inter_rater import cohens_kappa
 
-from masrel.agreement import cohen_kappa_from_table
+from masrel.agreement import cohen_kappa, count_table
 from masrel.audit import Claim, audit_claim, read_claims
 from masrel.errors import ParameterError, RatingsError
 
@@ -38,7 +38,7 @@ def test_standard_errors_and_intervals_are_of_one_kind(error: str) -> None:
     n, p_o, p_e = 27, 21 / 27, (7 * 9 + 20 * 18) / 27**2
     spread = {
         "delta": other.std_kappa,
-        "delta n-1": cohen_kappa_from_table(TABLE).standard_error,
+        "delta n-1": cohen_kappa(count_table(TABLE)).standard_error,
         "null": other.std_kappa0,
         "simple": (p_o * (1 - p_o) / n) ** 0.5 / (1 - p_e),
     }[error]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from masrel.agreement import cohen_kappa_from_table, fleiss_kappa_from_counts
+from masrel.agreement import cohen_kappa, count_items, count_table, fleiss_kappa
 from masrel.audit import ConsistentTables, consistent_tables
 from masrel.errors import ParameterError
 from tests.audit.printing import (
@@ -241,7 +241,7 @@ def test_impossible_claims_are_seen(seeds: range) -> None:
 def test_numbers_of_the_statistics_here_are_consistent() -> None:
     table = [[11, 2, 0], [1, 9, 3], [0, 2, 12]]
     for weights in WEIGHTS:
-        value = cohen_kappa_from_table(table, weights=weights).value
+        value = cohen_kappa(count_table(table), weights=weights).value
         result = consistent_tables(
             n_items=40,
             n_categories=3,
@@ -252,7 +252,7 @@ def test_numbers_of_the_statistics_here_are_consistent() -> None:
         assert result.n_tables is not None
         assert result.n_tables > 0
     counts = [[4, 0], [3, 1], [0, 4], [1, 3], [0, 4], [4, 0]]
-    value = fleiss_kappa_from_counts(counts).value
+    value = fleiss_kappa(count_items(counts)).value
     result = consistent_tables(
         n_items=6, n_categories=2, n_raters=4, kappa=f"{value:.9f}"
     )

@@ -249,19 +249,12 @@ def _methods() -> dict[str, Method]:
     )
     methods = {
         "value": Method(_value),
-        "irrcac": Method(_function, {"variance": "irrcac"}, POOLED),
         "population": Method(_function, {"population": 1000}, COUNTED),
         "counts": Method(_counted, of=COUNTED),
         "cells": Method(_cells, of=TWO_RATERS),
         "analytic": Method(analytic, ITEMS),
         "analytic clusters": Method(analytic, CLUSTERS),
         "jackknife clusters": Method(jackknife, CLUSTERS),
-        "bootstrap hayes": Method(
-            bootstrap, ITEMS | DRAWN | {"kind": "hayes"}, ALPHA, 4
-        ),
-        "bootstrap krippendorff": Method(
-            bootstrap, ITEMS | DRAWN | {"kind": "krippendorff"}, ALPHA, 4
-        ),
         "estimate clusters": Method(estimate, CLUSTERS),
         "difference clusters": Method(
             _difference, {"design": "dependent", "clusters": True}
@@ -273,11 +266,9 @@ def _methods() -> dict[str, Method]:
     for distribution in ("normal", "logit", "fisher"):
         options = {**ITEMS, "distribution": distribution}
         methods[f"analytic {distribution}"] = Method(analytic, options)
-    published = {"over_n": (), "cohen": ("cohen_kappa",), "unconditional": (),
-                 "irrcac": (*POOLED, *ALPHA)}  # fmt: skip
-    for error, of in published.items():
-        target = BOTH if error == "unconditional" else ITEMS
-        methods[f"analytic {error}"] = Method(analytic, {**target, "error": error}, of)
+    for convention, of in (("over_n", ()), ("irrcac", (*POOLED, *ALPHA))):
+        options = {**ITEMS, "convention": convention}
+        methods[f"analytic {convention}"] = Method(analytic, options, of)
     for target in (ITEMS, RATERS, BOTH):
         (name,) = target.values()
         methods[f"jackknife {name}"] = Method(jackknife, target)

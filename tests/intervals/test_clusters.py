@@ -24,7 +24,7 @@ from masrel.intervals import (
 
 FILE = Path(__file__).parents[1] / "oracles" / "several_kappas.json"
 SETTINGS = json.loads(FILE.read_text(encoding="utf-8"))["settings"]
-KINDS = [n for n, e in COEFFICIENTS.items() if e.kernel and e.shape == "ratings"]
+KINDS = [n for n, e in COEFFICIENTS.items() if e.formula and e.shape == "ratings"]
 
 
 def drawn(

@@ -16,7 +16,7 @@ from masrel.intervals import diagnose, difference, estimate
 KINDS = [
     name
     for name, entry in COEFFICIENTS.items()
-    if entry.kernel and entry.shape == "ratings" and entry.n_raters[1] is None
+    if entry.formula and entry.shape == "ratings" and entry.n_raters[1] is None
 ]
 
 

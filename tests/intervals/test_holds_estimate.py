@@ -93,7 +93,7 @@ DO_NOT_PROMISE = {
     "differences": "of many pairs at once; test_several.py holds them to their values",
     "diagnose": "the same; its intervals are those of `estimate` and `difference`",
 }
-KERNELS = [name for name, entry in COEFFICIENTS.items() if entry.kernel is not None]
+KERNELS = [name for name, entry in COEFFICIENTS.items() if entry.formula is not None]
 OF_RATERS = ("raters", "both")
 OWN = [name for name, entry in COEFFICIENTS.items() if entry.has_interval]
 

@@ -41,8 +41,10 @@ def ratings() -> NDArray[np.int8]:
     return np.where(rng.random((N_ITEMS, 5)) < 0.6, truth, other)
 
 
-@pytest.mark.parametrize("kind", ["percentile", "basic", "bca", "studentized"])
-@pytest.mark.parametrize("target", ["items", "raters"])
+@pytest.mark.parametrize(
+    ("target", "kind"),
+    [("items", "bca"), ("items", "studentized"), ("raters", "bca")],
+)
 def test_a_bootstrap_keeps_sums_and_not_resamples(
     ratings: NDArray[np.int8], target: str, kind: str
 ) -> None:

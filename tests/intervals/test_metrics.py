@@ -1,9 +1,7 @@
 """Intervals of Krippendorff's alpha by his metrics, and its bootstraps by name."""
 
 import itertools
-import json
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,9 +17,6 @@ pytestmark = pytest.mark.filterwarnings(
     "ignore::masrel.errors.UndefinedStatisticWarning",
 )
 
-FILE = Path(__file__).parents[1] / "oracles" / "alpha_bootstrap.json"
-ORACLE = json.loads(FILE.read_text(encoding="utf-8"))
-SETTINGS = [pytest.param(of, id=of["name"]) for of in ORACLE["settings"]]
 METRICS: list[Metric] = ["nominal", "ordinal", "interval", "ratio"]
 
 RATINGS = [
@@ -142,101 +137,6 @@ def test_a_difference_by_a_metric_needs_its_entry_alone() -> None:
     assert result.standard_error == pytest.approx(weighted.standard_error, rel=1e-9)
 
 
-@pytest.mark.parametrize("of", SETTINGS)
-@pytest.mark.parametrize("metric", ["nominal", "ordinal", "interval"])
-def test_kalpha_draws_pairs_of_values(of: dict[str, Any], metric: Metric) -> None:
-    # Four Monte Carlo errors: in one of 16 000 runs a right mean lies beyond. The seed
-    # is fixed. A draw of one value alone, which KALPHA counts as 0, has a probability
-    # below 1e-4 here.
-    expected, n = of["hayes"][metric], 40_000
-    result = bootstrap(
-        "krippendorff_alpha",
-        of["ratings"],
-        target="items",
-        metric=metric,
-        kind="hayes",
-        n_resamples=n,
-        rng=7,
-    )
-    assert result.distribution is not None
-    values, sd = result.distribution.values, expected["exact_sd"]
-    assert abs(values.mean() - expected["exact_mean"]) < 4 * sd / math.sqrt(n)
-    assert values.std() == pytest.approx(sd, rel=4 * 0.8 / math.sqrt(n))
-    draws = math.ceil(expected["draws_per_resample"])
-    assert any(f"{draws} a resample" in note for note in result.notes)
-    if "exact_quantiles" in expected:
-        assert result.low == pytest.approx(expected["exact_quantiles"]["0.025"])
-        assert result.high == pytest.approx(expected["exact_quantiles"]["0.975"])
-
-
-@pytest.mark.parametrize("of", ORACLE["width"], ids=lambda of: f"{of['n_units']} items")
-def test_kalpha_stops_narrowing(of: dict[str, Any]) -> None:
-    n = of["n_units"]
-    ratings = [[0, 0]] * (2 * n // 5) + [[1, 1]] * (2 * n // 5) + [[0, 1]] * (n // 5)
-    result = bootstrap(
-        "krippendorff_alpha",
-        ratings,
-        target="items",
-        kind="hayes",
-        n_resamples=40_000,
-        rng=7,
-    )
-    assert krippendorff_alpha(ratings).value == pytest.approx(of["alpha"], abs=1e-9)
-    assert result.distribution is not None
-    sd = result.distribution.values.std()
-    assert sd == pytest.approx(of["kalpha_exact_sd"], rel=0.016)
-    low, high = of["kalpha_exact_interval"]
-    step = 2 / of["draws"]  # one pair more that differs: an end may fall on either side
-    assert (result.low, result.high) == pytest.approx((low, high), abs=1.01 * step)
-    assert any("does not narrow" in note for note in result.notes)
-
-
-@pytest.mark.parametrize("of", SETTINGS)
-def test_krippendorffs_bootstrap_holds_chance(of: dict[str, Any]) -> None:
-    result = bootstrap(
-        "krippendorff_alpha", of["ratings"], target="items", kind="krippendorff"
-    )
-    assert result.method == "percentile bootstrap, chance held, exact"
-    assert result.distribution is not None
-    values, weights = result.distribution.values, result.distribution.weights
-    mean = values @ weights
-    sd = math.sqrt(weights @ (values - mean) ** 2)
-    if of["held_chance_sd"] is not None:
-        assert mean == pytest.approx(of["alpha"]["nominal"], rel=1e-9)
-        assert sd == pytest.approx(of["held_chance_sd"], rel=1e-9)
-    # One run of the package, 2000 resamples: four errors of a mean, and ends.
-    run = of["krippendorffsalpha_run_of_2000"]
-    assert abs(run["mean"] - mean) < 4 * sd / math.sqrt(2000)
-    assert result.low == pytest.approx(run["q025"], abs=0.02)
-    assert result.high == pytest.approx(run["q975"], abs=0.02)
-
-
-def test_krippendorffs_bootstrap_by_hand() -> None:
-    # Items (a, a), (b, b), (a, b): N = 6, D_e = (36 - 9 - 9)/30 = 3/5. A resample with
-    # k items that differ has D_o = k/3 and α = 1 - 5k/9, k of a binomial (3, 1/3).
-    result = bootstrap(
-        "krippendorff_alpha",
-        [["a", "a"], ["b", "b"], ["a", "b"]],
-        target="items",
-        kind="krippendorff",
-    )
-    assert result.distribution is not None
-    expected = [1 - 5 * k / 9 for k in (3, 2, 1, 0)]
-    assert result.distribution.values == pytest.approx(expected, abs=1e-15)
-    shares = [1 / 27, 6 / 27, 12 / 27, 8 / 27]
-    assert result.distribution.weights == pytest.approx(shares, rel=1e-12)
-
-
-def test_perfect_agreement_has_no_spread_by_any_bootstrap() -> None:
-    for kind in ("krippendorff", "hayes"):
-        result = bootstrap(
-            "krippendorff_alpha", [[1, 1], [2, 2]] * 9, target="items", kind=kind
-        )
-        assert math.isnan(result.low)
-        assert result.reason is not None
-        assert "same value" in result.reason
-
-
 @pytest.mark.parametrize(
     ("call", "said"),
     [
@@ -264,22 +164,6 @@ def test_perfect_agreement_has_no_spread_by_any_bootstrap() -> None:
                 metric="intervall",  # type: ignore[arg-type]
             ),
             "metric: needs one of nominal, ordinal, interval, ratio, jaccard, masi",
-        ),
-        (
-            lambda: bootstrap("fleiss_kappa", RATINGS, target="items", kind="hayes"),
-            'kind: "hayes" is a bootstrap of krippendorff_alpha, got fleiss_kappa',
-        ),
-        (
-            lambda: bootstrap(
-                "krippendorff_alpha", RATINGS, target="raters", kind="krippendorff"
-            ),
-            'target: the bootstrap "krippendorff" generalises to other items',
-        ),
-        (
-            lambda: bootstrap(
-                "krippendorff_alpha", RATINGS, target="items", kind="hayes", exact=True
-            ),
-            'exact: does not go with kind="hayes"',
         ),
         (
             lambda: jackknife(

@@ -16,7 +16,6 @@ from scipy import stats
 from masrel.agreement import (
     COEFFICIENTS,
     cohen_kappa,
-    cohen_kappa_from_table,
     count_table,
     krippendorff_alpha,
     scott_pi,
@@ -133,7 +132,7 @@ def sets(seed: int, n: int, g: int) -> list[NDArray[np.int64]]:
 
 @pytest.mark.parametrize(
     "name",
-    [name for name, e in COEFFICIENTS.items() if e.kernel and e.shape == "ratings"],
+    [name for name, e in COEFFICIENTS.items() if e.formula and e.shape == "ratings"],
 )
 def test_without_clusters_errors_are_those_of_the_coefficients(name: str) -> None:
     # the delta method by one path and by the other; with gaps
@@ -296,7 +295,7 @@ def test_sets_are_of_the_same_items() -> None:
 
 def over_n(table: list[list[int]]) -> Estimate:
     """Cohen's kappa with the error of Fleiss, Cohen and Everitt over n."""
-    estimate = cohen_kappa_from_table(table)
+    estimate = cohen_kappa(count_table(table))
     n = estimate.n_items
     return replace(
         estimate, standard_error=estimate.standard_error * np.sqrt((n - 1) / n)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import get_args
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -44,7 +45,11 @@ every = pytest.mark.parametrize(
 )
 with_kernel = pytest.mark.parametrize(
     "entry",
-    [pytest.param(e, id=e.name) for e in COEFFICIENTS.values() if e.kernel is not None],
+    [
+        pytest.param(e, id=e.name)
+        for e in COEFFICIENTS.values()
+        if e.formula is not None
+    ],
 )
 
 
@@ -221,7 +226,7 @@ def test_perfect_agreement_on_two_categories_is_exactly_1(
     found = estimate(entry, [[grade, grade] for grade in grades])
     if len(set(grades)) > 1:
         assert found.value == 1.0
-        assert found.standard_error == 0.0 or entry.kernel is None
+        assert found.standard_error == 0.0 or entry.formula is None
     elif "unused category" not in entry.properties or entry.name == "percent_agreement":
         assert found.value == 1.0  # chance agreement is not 1: defined
     else:
@@ -244,9 +249,10 @@ def test_kernel_and_function_are_the_same_coefficient(
     rate = (coded.codes >= 0).any(axis=0)
     if entry.shape == "ratings" and rate.sum() >= 2:  # a kernel sees no other raters
         coded = replace(coded, codes=coded.codes[:, rate])
-    v = declared_weights(weights, LABELS).floats
-    assert entry.kernel is not None
-    value = float(entry.kernel.value(entry.kernel.features(coded, v).sum(axis=0), v))
+    v = declared_weights(weights, LABELS).v
+    assert entry.formula is not None
+    sums = entry.formula.features(coded.codes, v).sums(np.ones(len(coded.codes)))
+    value = float(entry.formula.value(sums, v))
     found = estimate(entry, table, weights=weights).value
     assert (math.isnan(value) and math.isnan(found)) or math.isclose(
         value, found, rel_tol=1e-9, abs_tol=1e-11
@@ -344,7 +350,6 @@ def _public(names: Mapping[str, object]) -> set[str]:
         for name, value in names.items()
         if inspect.isfunction(value)
         and inspect.signature(value).return_annotation is Estimate
-        and not name.endswith(("_from_counts", "_from_table"))
         and name != "category_kappa"  # one of Fleiss' kappa, for a category
     }
 

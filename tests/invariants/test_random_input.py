@@ -32,11 +32,7 @@ OF_RATINGS: list[Callable[..., Any]] = [
     *(_A.count_table, _A.mcnemar, _A.bowker, _A.stuart_maxwell, _A.bhapkar),
     *(_A.prevalence_index, _A.bias_index, _A.kappa_max, _A.specific_agreement),
     *(_I.equality_test, _A.p_value, _A.bands, _A.benchmark, _A.strength, _A.holm),
-    *(
-        getattr(_A, n)
-        for n in _A.__all__
-        if n.endswith(("_from_counts", "_from_table"))
-    ),
+    _A.count_items,
 ]
 OF_COEFFICIENTS: list[Callable[..., Any]] = [
     *(_I.analytic, _I.jackknife, _I.bootstrap, _I.posterior, _I.estimate)

@@ -43,8 +43,7 @@ def test_a_thousand_times_the_studies_call_the_kernel_as_often_a_block(
         calls.clear()
         maker().simulate(np.random.default_rng(1), n_studies)
         of_size.append(calls["kernel"])
-    # five features, and the estimate
-    assert of_size == [6, 6]
+    assert of_size == [1, 1]
 
 
 def test_an_interval_is_chosen_once_for_each_distinct_study(

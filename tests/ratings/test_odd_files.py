@@ -24,8 +24,8 @@ def values_of(ratings: Any, **options: Any) -> Values:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UndefinedStatisticWarning)
         both = (
-            percent_agreement(ratings, **options).value,
-            fleiss_kappa(ratings, **options).value,
+            round(percent_agreement(ratings, **options).value, 12),
+            round(fleiss_kappa(ratings, **options).value, 12),
         )
     return tuple(-2 if math.isnan(value) else value for value in both)  # type: ignore[return-value]
 

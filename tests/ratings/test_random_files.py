@@ -49,7 +49,7 @@ def check(written: WrittenTable, folder: Path, masrel: Caller) -> None:
         estimates = json.loads(done.out)["estimates"]
         values = {e["coefficient"]: e["value"] for e in estimates}
         if options or not (written.needs_options or "warning:" in done.err):
-            assert values == expected, done
+            assert values == pytest.approx(expected, abs=1e-14), done
 
 
 @given(written=written_tables())

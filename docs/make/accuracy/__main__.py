@@ -99,7 +99,7 @@ def compare(case: Case, coefficient: str, weights: str, packages: list[str]) -> 
     """Ask masrel and every package, and hold them to the exact coefficient."""
     with mpmath.workdps(50):
         true = exact(case, coefficient, weights)
-        ours = estimate(case, coefficient, weights, prepared(case))
+        ours = estimate(coefficient, weights, prepared(case))
         answers = {"masrel": Answer(ours.value, ours.standard_error)}
         answers |= {p: ask(p, case, coefficient, weights) for p in packages}
         values = {p: _off_value(answer, true) for p, answer in answers.items()}

@@ -16,8 +16,8 @@ from scipy.special import gammaln, ndtr, ndtri
 
 from docs.make.coverage.latent import severities
 from docs.make.coverage.studies import Floats
-from masrel.agreement import COEFFICIENTS, CodedRatings, declared_weights
-from masrel.agreement._kernel import Kernel
+from masrel.agreement import COEFFICIENTS, declared_weights
+from masrel.agreement._engine import Formula as Kernel
 
 Patterns = NDArray[np.int64]
 Population = Literal["alike", "unlike", "double coding"]
@@ -55,11 +55,11 @@ class Formula:
     @classmethod
     def of(cls, name: str, weights: str, table: Table) -> "Formula":
         """Prepare a coefficient by its name."""
-        kernel = cast("Kernel", COEFFICIENTS[name].kernel)
+        kernel = cast("Kernel", COEFFICIENTS[name].formula)
         scale = tuple(range(table.n_categories))
-        v = declared_weights(weights, scale, declared=True).floats  # type: ignore[arg-type]
-        coded = CodedRatings(codes=table.patterns, categories=scale)
-        return cls(kernel=kernel, v=v, features=kernel.features(coded, v))
+        v = declared_weights(weights, scale, declared=True).v  # type: ignore[arg-type]
+        features = kernel.features(table.patterns, v).rows()
+        return cls(kernel=kernel, v=v, features=features)
 
     def of_sums(self, sums: Floats) -> Floats:
         """Return the coefficient of sums (..., n_features)."""

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit, ndtr, ndtri
 
-from masrel.agreement._kernel import Floats
+from masrel.agreement._engine import Floats
 from masrel.agreement._labels import Codes
 
 NOISE_UNIT = 0.2  # η of about which logarithms of the noises differ in studies

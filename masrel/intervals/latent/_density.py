@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit, log_ndtr, ndtr
 
-from masrel.agreement._kernel import Floats
+from masrel.agreement._engine import Floats
 from masrel.agreement._labels import Codes
 from masrel.errors import ParameterError
 from masrel.intervals.latent._coordinates import (

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from masrel.agreement._kernel import Floats
+from masrel.agreement._engine import Floats
 from masrel.agreement._labels import Codes
 from masrel.intervals.latent._coordinates import Traits
 

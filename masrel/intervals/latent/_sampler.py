@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 from scipy.optimize import minimize
 
-from masrel.agreement._kernel import Floats
+from masrel.agreement._engine import Floats
 from masrel.intervals._mcmc import (
     MAX_R_HAT,
     Walkers,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement import Label, code_ratings
-from masrel.agreement._kernel import Floats, check_level
+from masrel.agreement._engine import Floats, check_level
 from masrel.agreement._labels import Codes
 from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Distribution, Estimate, Interval, Target

@@ -16,13 +16,13 @@ was before the run says nothing about the rater as he or she is now.
 
 import math
 from dataclasses import dataclass, field
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement._data import CodedRatings
-from masrel.agreement._pairs import COHEN_KERNEL
-from masrel.agreement._weights import declared_weights
+from masrel.agreement import COEFFICIENTS, declared_weights
+from masrel.agreement._engine import Formula
 from masrel.lab.protocol import Protocol
 from masrel.lab.training._trainees import (
     SKILLS,
@@ -30,6 +30,8 @@ from masrel.lab.training._trainees import (
     confusion_with_kappa,
     draw_training,
 )
+
+_COHEN = cast("Formula", COEFFICIENTS["cohen_kappa"].formula)
 
 _Floats = NDArray[np.float64]
 _Integers = NDArray[np.int64]
@@ -102,7 +104,7 @@ class Criterion:
         largest = np.full((*sums.shape[:-2], n_sets), -np.inf)
         for length in range(1, min(n_sets, self.window // self.n_models) + 1):
             run = sums[..., length:, :] - sums[..., :-length, :]
-            excess = COHEN_KERNEL.value(run, self._disagreement()) - self.reference
+            excess = _COHEN.value(run, self._disagreement()) - self.reference
             evidence = length * self.n_models * np.nan_to_num(excess, nan=-np.inf)
             looks = largest[..., length - 1 :]
             np.maximum(looks, evidence, out=looks)
@@ -123,18 +125,19 @@ class Criterion:
         """
         freq = np.bincount(self.intended, minlength=len(self.grades))
         sums = (freq[:, None] * confusion).ravel() @ self._features()
-        return float(COHEN_KERNEL.value(sums, self._disagreement()))
+        return float(_COHEN.value(sums, self._disagreement()))
 
     def _disagreement(self) -> _Floats:
         # of every two grades
-        return declared_weights(self.weights, self.grades).floats
+        return np.asarray(declared_weights(self.weights, self.grades).v)
 
     def _features(self) -> _Floats:
         # (n_grades², n_features): of each pair of an intended grade and another
         ranks = np.arange(len(self.grades))
         pairs = np.stack(np.meshgrid(ranks, ranks, indexing="ij"), axis=-1)
-        coded = CodedRatings(codes=pairs.reshape(-1, 2), categories=self.grades)
-        return COHEN_KERNEL.features(coded, self._disagreement())
+        return np.asarray(
+            _COHEN.features(pairs.reshape(-1, 2), self._disagreement()).rows()
+        )
 
     def _sums(
         self, intended: _Integers, codes: _Integers, weights: _Floats | None

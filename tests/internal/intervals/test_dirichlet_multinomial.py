@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.special import betaln
 
 from masrel.agreement import code_ratings
-from masrel.agreement._counts import item_counts
+from masrel.agreement._rows import item_counts
 from masrel.intervals._dirichlet_multinomial import DirichletMultinomial, RhoDensity
 from tests.internal.intervals.test_sampled_posterior import (
     TWO,
@@ -30,7 +30,7 @@ WITH_PAIRS = tables().filter(
 @settings(max_examples=25)
 @given(WITH_PAIRS)
 def test_unused_categories_are_one_of_the_sum_of_their_priors(table: Table) -> None:
-    counts = item_counts(code_ratings(table, LABELS))
+    counts = item_counts(code_ratings(table, LABELS).codes, len(LABELS))
     used = counts.any(axis=0)
     unused = float((~used).sum())
     few = np.column_stack([counts[:, used], np.zeros(len(counts), np.int64)])

@@ -5,7 +5,7 @@ import pytest
 from scipy.special import betainc, logit
 
 from masrel.agreement import code_ratings
-from masrel.agreement._counts import item_counts
+from masrel.agreement._rows import item_counts
 from masrel.errors import ConvergenceError
 from masrel.intervals._quadrature import beta_nodes, line_distribution
 from masrel.intervals._rho import DEFAULT_PRIOR, RhoPosterior
@@ -13,7 +13,7 @@ from tests.intervals.data import SCALE, TABLE_V
 
 
 def test_probabilities_rise_and_are_those_of_quantiles() -> None:
-    counts = item_counts(code_ratings(TABLE_V, SCALE))
+    counts = item_counts(code_ratings(TABLE_V, SCALE).codes, len(SCALE))
     posterior = RhoPosterior.of(counts, DEFAULT_PRIOR, 0.95)
     shares = [1e-6, 0.025, 0.3, 0.5, 0.9, 1.0 - 1e-6]
     points = [logit(posterior.quantile(share)) for share in shares]

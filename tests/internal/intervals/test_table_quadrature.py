@@ -96,7 +96,7 @@ def test_every_coefficient_of_two_raters_has_a_table() -> None:
     of_pairs = {
         name
         for name, entry in COEFFICIENTS.items()
-        if entry.kernel is not None and entry.shape == "ratings"
+        if entry.formula is not None and entry.shape == "ratings"
     }
     assert set(CHANCE_AGREEMENT) == of_pairs
 

@@ -6,8 +6,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from masrel.agreement import COEFFICIENTS, CodedRatings, declared_weights
-from masrel.agreement._counts import distinct_rows
+from masrel.agreement import COEFFICIENTS, declared_weights
+from masrel.agreement._rows import distinct_rows
 
 # Rater 2 alone rated two items, raters 0 and 1 alone another two.
 CODES = np.array(
@@ -17,8 +17,8 @@ CODES = np.array(
 POOLED = [  # the shares of Conger's raters are each rater's own
     name
     for name, entry in COEFFICIENTS.items()
-    if entry.kernel is not None
-    and entry.kernel.rater_sums is not None
+    if entry.formula is not None
+    and entry.formula.rater_sums is not None
     and name != "conger_kappa"
 ]
 
@@ -48,12 +48,12 @@ def plain(taken: Sequence[int], v: np.ndarray) -> tuple[float, np.ndarray] | Non
 def test_of_resampled_raters_only_items_that_one_of_them_rated_count(
     name: str, weights: str
 ) -> None:
-    kernel = COEFFICIENTS[name].kernel
-    assert kernel is not None
-    assert kernel.rater_sums is not None
-    v = declared_weights(weights, [1, 2, 4]).floats  # type: ignore[arg-type]
+    formula = COEFFICIENTS[name].formula
+    assert formula is not None
+    assert formula.rater_sums is not None
+    v = declared_weights(weights, [1, 2, 4]).v  # type: ignore[arg-type]
     rows, freq = distinct_rows(CODES, 3)
-    sums = kernel.rater_sums(CodedRatings(codes=rows, categories=(1, 2, 4)), freq, v)
+    sums = formula.rater_sums(rows, freq, v)
     chance = {
         "percent_agreement": lambda _: 1.0,
         "fleiss_kappa": lambda p: p @ v @ p,
@@ -63,7 +63,7 @@ def test_of_resampled_raters_only_items_that_one_of_them_rated_count(
     n_defined = 0
     for taken in product(range(3), repeat=3):
         taken_freq = np.bincount(taken, minlength=3).astype(np.float64)
-        value = float(kernel.value(sums(taken_freq), v))
+        value = float(formula.value(sums(taken_freq), v))
         parts = plain(taken, v)
         if parts is None:
             assert np.isnan(value)

@@ -1,0 +1,414 @@
+"""Kappas of raters who are not told apart: percent, Fleiss, Scott, Brennan, Gwet.
+
+Sums over items are d, s and P_k: the disagreement d of the s items with a pair of
+ratings, and the shares of each item's raters who chose category k, all in `WHOLE`
+parts. D_o = d/s, and D_e is a function of p = P / Σ_k P_k alone: a coefficient is its
+chance function, which also gives the gradient. v is the disagreement of two categories.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from masrel.agreement._engine import (
+    WHOLE,
+    Features,
+    Floats,
+    Formula,
+    Integers,
+    disagreement_within,
+    divide,
+    estimate,
+)
+from masrel.agreement._labels import Codes, Label
+from masrel.agreement._rater_sums import crossed_pooled, resampled_pooled
+from masrel.agreement._rows import count_ratings, two_raters
+from masrel.agreement._weights import WeightsLike
+from masrel.estimates import Estimate
+
+_Chance = Callable[[Floats, Any], tuple[Floats, Floats]]
+"""From p (..., q) and v to D_e (..., 1) and its gradient (..., q)."""
+
+
+def _no_chance(p: Floats, _v: Any) -> tuple[Floats, Floats]:
+    return np.ones((*p.shape[:-1], 1)), np.zeros_like(p)  # 1 - D_o/1: what is observed
+
+
+def _shared_margins(p: Floats, v: Any) -> tuple[Floats, Floats]:
+    others = p @ v
+    # 1 - P̄_e = Σ_kl v_kl p_k p_l of Fleiss (1971)
+    return (others * p).sum(axis=-1, keepdims=True), 2.0 * others
+
+
+def _every_category_alike(p: Floats, v: Any) -> tuple[Floats, Floats]:
+    mean = v.sum() / len(v) ** 2 if len(v) else 0.0  # 1 - Σ_kl w_kl / q²
+    return np.full((*p.shape[:-1], 1), mean), np.zeros_like(p)
+
+
+def _hard_items(p: Floats, v: Any) -> tuple[Floats, Floats]:
+    # 1 - p_e with p_e = T_w / (q (q - 1)) Σ_k p_k (1 - p_k), T_w = Σ_kl w_kl
+    q = len(v)
+    if q < 2:  # one category leaves no room for chance: 0/0
+        return np.zeros((*p.shape[:-1], 1)), np.zeros_like(p)
+    t_w = (q * q - v.sum()) / (q * (q - 1))
+    d_e = 1.0 - t_w * (p * (1.0 - p)).sum(axis=-1, keepdims=True)
+    # where all weights are 1 and all categories equally frequent it is 0, but rounded
+    return np.where(abs(d_e) < 1e-15, 0.0, d_e), -t_w * (1.0 - 2.0 * p)
+
+
+def _features(codes: Codes, v: Any, repeats: Integers | None = None) -> Features:
+    chosen = codes >= 0 if repeats is None else repeats
+    size = chosen.sum(axis=1)
+    within = disagreement_within(codes, v, repeats)
+    d = within * (WHOLE / np.maximum(size * (size - 1.0), 1.0))
+    d[size < 2] = 0.0  # also where v is nan
+    dense = np.array([d, (size > 1) * float(WHOLE)])
+    shares = chosen * (WHOLE / np.maximum(size, 1.0))[:, None]
+    return Features(dense, np.maximum(codes, 0), shares, len(v))
+
+
+def _complete_features(
+    codes: Codes, v: Any, repeats: Integers | None = None
+) -> Features:
+    # of the rows that every rater rated
+    whole = (codes >= 0).all(axis=1, keepdims=True)
+    return _features(np.where(whole, codes, -1), v, repeats)
+
+
+def _disagreements(chance: _Chance, sums: Floats, v: Any) -> tuple[Floats, Floats]:
+    p = divide(sums[..., 2:], sums[..., 2:].sum(axis=-1, keepdims=True))
+    return divide(sums[..., :1], sums[..., 1:2]), chance(p, v)[0]
+
+
+def _slope(chance: _Chance, sums: Floats, v: Any) -> Floats:
+    d, s, r = sums[..., :1], sums[..., 1:2], sums[..., 2:].sum(axis=-1, keepdims=True)
+    p = sums[..., 2:] / r
+    d_e, of_p = chance(p, v)
+    # ∂κ = -∂D_o / D_e + D_o/D_e² ∂D_e
+    of_d = -1.0 / (s * d_e)
+    of_s = d / (s * s * d_e)
+    of_shares = (of_p - (of_p * p).sum(axis=-1, keepdims=True)) * (of_s * s / (d_e * r))
+    return np.concatenate([of_d, of_s, of_shares], axis=-1)
+
+
+def _pooled(name: str, title: str, chance: _Chance) -> Formula:
+    """Return the formula of a coefficient by its expected disagreement."""
+    return Formula(
+        name=name,
+        title=title,
+        features=_features,
+        disagreements=partial(_disagreements, chance),
+        slope=partial(_slope, chance),
+        rater_sums=resampled_pooled,
+        crossed_sums=crossed_pooled,
+    )
+
+
+_PERCENT = _pooled("percent_agreement", "percent agreement", _no_chance)
+_FLEISS = _pooled("fleiss_kappa", "Fleiss' kappa", _shared_margins)
+_BRENNAN_PREDIGER = _pooled(
+    "brennan_prediger", "the Brennan-Prediger coefficient", _every_category_alike
+)
+_GWET = _pooled("gwet_ac", "Gwet's AC", _hard_items)
+_SCOTT = Formula(
+    name="scott_pi",
+    title="Scott's pi",
+    features=_complete_features,
+    disagreements=_FLEISS.disagreements,
+    slope=_FLEISS.slope,
+)
+
+
+def percent_agreement(
+    ratings: object,
+    *,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightsLike" = "identity",
+    population: int | None = None,
+) -> Estimate:
+    """Estimate how often two raters of the same item agree.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Labels or numbers; None and ``nan`` are missing.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; the labels met when not given.
+    weights : str or array_like, shape (n_categories, n_categories), optional
+        How much two categories agree; see `declared_weights`.
+    population : int, optional
+        Items there are in all, for the finite-population correction.
+
+    Returns
+    -------
+    Estimate
+        The proportion with its standard error over items.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table.
+    ParameterError
+        If an option is invalid, or the weights do not fit the categories.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If no item has ratings of two raters; the value is then ``nan``.
+
+    Notes
+    -----
+    Items with fewer than two ratings say nothing about agreement and are left out
+    of the mean; they count in the standard error, where the number of usable items
+    is itself random.
+
+    References
+    ----------
+    .. [1] Gwet, K. L. (2014). Handbook of Inter-Rater Reliability, 4th ed., ch. 2.
+
+    Examples
+    --------
+    >>> percent_agreement([["a", "a"], ["a", "b"]]).value
+    0.5
+    """
+    counted = count_ratings(ratings, categories)
+    return estimate(_PERCENT, counted, weights, population=population)
+
+
+def fleiss_kappa(
+    ratings: object,
+    *,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightsLike" = "identity",
+    population: int | None = None,
+) -> Estimate:
+    """Estimate Fleiss' kappa from an item × rater table.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Labels or numbers; None and ``nan`` are missing.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; the labels met when not given.
+    weights : str or array_like, shape (n_categories, n_categories), optional
+        How much two categories agree; see `declared_weights`.
+    population : int, optional
+        Items there are in all, for the finite-population correction.
+
+    Returns
+    -------
+    Estimate
+        The coefficient with its standard error over items.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table.
+    ParameterError
+        If an option is invalid, or the weights do not fit the categories.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If no item has ratings of two raters, or all ratings are in one category;
+        the value is then ``nan``.
+
+    Notes
+    -----
+    With missing ratings, agreement is averaged over items with at least two
+    ratings, and a category's share is the mean over items with any rating of the
+    share of the item's raters who chose it (Gwet's convention).
+
+    References
+    ----------
+    .. [1] Fleiss, J. L. (1971). Measuring nominal scale agreement among many
+       raters. Psychological Bulletin, 76(5), 378-382.
+       https://doi.org/10.1037/h0031619
+    .. [2] Gwet, K. L. (2014). Handbook of Inter-Rater Reliability, 4th ed.
+
+    Examples
+    --------
+    Two raters agree on two items and differ on a third:
+
+    >>> round(fleiss_kappa([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
+    0.333
+    """
+    counted = count_ratings(ratings, categories)
+    return estimate(_FLEISS, counted, weights, population=population)
+
+
+def brennan_prediger(
+    ratings: object,
+    *,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightsLike" = "identity",
+    population: int | None = None,
+) -> Estimate:
+    """Estimate Brennan and Prediger's coefficient, of two categories PABAK.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Labels or numbers; None and ``nan`` are missing.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; the labels met when not given.
+    weights : str or array_like, shape (n_categories, n_categories), optional
+        How much two categories agree; see `declared_weights`.
+    population : int, optional
+        Items there are in all, for the finite-population correction.
+
+    Returns
+    -------
+    Estimate
+        The coefficient with its standard error over items.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table.
+    ParameterError
+        If an option is invalid, or the weights do not fit the categories.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If no item has ratings of two raters, or one category is declared; the value
+        is then ``nan``.
+
+    Notes
+    -----
+    _Chance agreement is Σ_kl w_kl / q², with q the declared categories, used or not.
+    With two categories it is the prevalence-adjusted bias-adjusted kappa, PABAK.
+    Missing ratings as in `fleiss_kappa`.
+
+    References
+    ----------
+    .. [1] Brennan, R. L., Prediger, D. J. (1981). Coefficient kappa: some uses,
+       misuses, and alternatives. Educational and Psychological Measurement, 41(3),
+       687-699. https://doi.org/10.1177/001316448104100307
+
+    Examples
+    --------
+    >>> round(brennan_prediger([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
+    0.333
+    """
+    counted = count_ratings(ratings, categories)
+    return estimate(_BRENNAN_PREDIGER, counted, weights, population=population)
+
+
+def gwet_ac(
+    ratings: object,
+    *,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightsLike" = "identity",
+    population: int | None = None,
+) -> Estimate:
+    """Estimate Gwet's AC1, or AC2 with weights.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Labels or numbers; None and ``nan`` are missing.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; the labels met when not given.
+    weights : str or array_like, shape (n_categories, n_categories), optional
+        How much two categories agree; see `declared_weights`.
+    population : int, optional
+        Items there are in all, for the finite-population correction.
+
+    Returns
+    -------
+    Estimate
+        The coefficient with its standard error over items.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table.
+    ParameterError
+        If an option is invalid, or the weights do not fit the categories.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If no item has ratings of two raters, or one category is declared; the value
+        is then ``nan``.
+
+    Notes
+    -----
+    _Chance agreement is Σ_kl w_kl / (q (q - 1)) · Σ_k p_k (1 - p_k): the declared
+    categories count, used or not. It is small when nearly all ratings are in one
+    category, where kappa falls towards 0. Missing ratings as in `fleiss_kappa`.
+
+    References
+    ----------
+    .. [1] Gwet, K. L. (2008). Computing inter-rater reliability and its variance in
+       the presence of high agreement. British Journal of Mathematical and
+       Statistical Psychology, 61(1), 29-48. https://doi.org/10.1348/000711006X126600
+
+    Examples
+    --------
+    >>> round(gwet_ac([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
+    0.333
+    """
+    counted = count_ratings(ratings, categories)
+    return estimate(_GWET, counted, weights, population=population)
+
+
+def scott_pi(
+    ratings: object,
+    *,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightsLike" = "identity",
+    population: int | None = None,
+) -> Estimate:
+    """Estimate Scott's pi of two raters.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, 2)
+        Labels or numbers; None and ``nan`` are missing.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; the labels met when not given.
+    weights : str or array_like, shape (n_categories, n_categories), optional
+        How much two categories agree; see `declared_weights`.
+    population : int, optional
+        Items there are in all, for the finite-population correction.
+
+    Returns
+    -------
+    Estimate
+        The coefficient with its standard error over items.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table or not of two raters.
+    ParameterError
+        If an option is invalid, or the weights do not fit the categories.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If no item has both ratings, or all ratings are in one category; the value
+        is then ``nan``.
+
+    Notes
+    -----
+    Only items with both ratings are used; on these it is Fleiss' kappa.
+
+    References
+    ----------
+    .. [1] Scott, W. A. (1955). Reliability of content analysis: the case of nominal
+       scale coding. Public Opinion Quarterly, 19(3), 321-325.
+       https://doi.org/10.1086/266577
+
+    Examples
+    --------
+    >>> round(scott_pi([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
+    0.333
+    """
+    counted = two_raters(ratings, categories, _SCOTT.title)
+    return estimate(_SCOTT, counted, weights, population=population)

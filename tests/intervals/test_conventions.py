@@ -1,0 +1,132 @@
+"""Standard errors by the conventions of other programs."""
+
+import json
+import math
+import warnings
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from masrel.agreement import cohen_kappa, count_table
+from masrel.errors import MasrelWarning, ParameterError
+from masrel.estimates import Interval
+from masrel.intervals import analytic
+from tests.agreement.oracles import datasets
+
+FILE = Path(__file__).parents[1] / "oracles" / "published_errors.json"
+PUBLISHED: dict[str, dict[str, Any]] = json.loads(FILE.read_text("utf-8"))["errors"]
+DATA = {dataset["name"]: dataset for dataset in datasets()}
+TABLE = [[20, 5], [10, 15]]
+PAIRS = [["a", "a"]] * 20 + [["a", "b"]] * 5 + [["b", "a"]] * 10 + [["b", "b"]] * 15
+RATINGS = [list(row) for row in ("aaa", "aab", "bbb", "bcc", "cca", "aaa", "cbb")] * 2
+
+
+def quiet(*args: Any, **options: Any) -> Interval:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MasrelWarning)
+        return analytic(*args, **options)
+
+
+def half(interval: Interval) -> float:
+    return 0.5 * (interval.high - interval.low)
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_intervals_are_those_that_packages_print(name: str) -> None:
+    dataset = DATA[name]
+    for key, printed in PUBLISHED[name].items():
+        coefficient, _, rest = key.partition("/")
+        weights, _, variant = rest.partition("@")
+        ours = quiet(
+            coefficient,
+            dataset["ratings"],
+            target="items",
+            categories=dataset.get("categories"),
+            weights="identity" if weights == "unweighted" else weights,
+            convention="over_n" if coefficient == "cohen_kappa" else "irrcac",
+            distribution="normal" if variant in ("vcd", "psych") else "t",
+        )
+        low, high = printed["ci"]
+        if low is None:  # one usable item, of which irrCAC has an error and no ends
+            continue
+        ends = (max(low, -1.0), min(high, 1.0))
+        assert (ours.low, ours.high) == pytest.approx(ends, abs=1e-9), key
+
+
+def test_over_n_is_the_error_that_vcd_prints() -> None:
+    # Fleiss, Cohen and Everitt's of the table: √(.2016/12.5) = .126996 (vcd, psych)
+    interval = analytic(
+        "cohen_kappa", PAIRS, target="items", convention="over_n", distribution="normal"
+    )
+    assert half(interval) / 1.959964 == pytest.approx(0.126996062931, rel=1e-6)
+    ours = cohen_kappa(count_table(TABLE)).standard_error
+    assert half(interval) / 1.959964 == pytest.approx(ours * math.sqrt(0.98), rel=1e-6)
+
+
+IRRCAC = {"target": "items", "convention": "irrcac", "distribution": "normal"}
+UNITS = [
+    (1, 1, None, 1), (2, 2, 3, 2), (3, 3, 3, 3), (3, 3, 3, 3), (2, 2, 2, 2),
+    (1, 2, 3, 4), (4, 4, 4, 4), (1, 1, 2, 1), (2, 2, 2, 2), (None, 5, 5, 5),
+    (None, None, 1, 1), (None, None, 3, None),
+]  # fmt: skip
+SINGLE = [["a", "a", "a"], ["a", "a", "b"], ["a", None, None]]
+LONE = [["a", "a"], ["a", "b"], ["b", "b"], ["b", None]]
+
+
+@pytest.mark.parametrize(
+    ("name", "ratings", "error"),
+    [
+        # by hand, u_i + (2/3)(s_i n/n' - 1): 1/2 + 1/3, -1/2 + 1/3, 0 - 2/3
+        ("percent_agreement", SINGLE, math.sqrt(7 / 36)),
+        # ours are 10, -14, 6, -2 ninths; 1/9 more with a pair, 1/3 less without
+        ("conger_kappa", LONE, math.sqrt((121 + 169 + 49 + 25) / 81 / 12)),
+        # as R prints them of Krippendorff's units
+        ("percent_agreement", UNITS, 0.12561),
+        ("gwet_ac", UNITS, 0.14295),
+        ("fleiss_kappa", UNITS, 0.15302),
+    ],
+)
+def test_irrcac_counts_a_single_rating_as_disagreement(
+    name: str, ratings: list, error: float
+) -> None:
+    found = half(quiet(name, ratings, **IRRCAC, level=0.2)) / 0.253347
+    assert found == pytest.approx(error, rel=1e-4)
+
+
+def test_irrcacs_error_of_complete_ratings_is_ours_but_for_alpha() -> None:
+    for name in ("fleiss_kappa", "gwet_ac", "percent_agreement", "conger_kappa"):
+        ours = quiet(name, RATINGS, target="items", distribution="normal")
+        assert half(quiet(name, RATINGS, **IRRCAC)) == pytest.approx(half(ours))
+    # of alpha it is that of Fleiss' kappa, as the factor for small samples is left out
+    alpha, kappa = (
+        half(quiet(name, RATINGS, **IRRCAC))
+        for name in ("krippendorff_alpha", "fleiss_kappa")
+    )
+    assert alpha == pytest.approx(kappa, rel=1e-12)
+
+
+def test_spss_prints_the_error_of_the_hypothesis_that_fleiss_kappa_is_0() -> None:
+    # p = (13/20, 7/20) of ten items: SE0 = √(2 [(Σpq)² - Σpq(q - p)]/20)/Σpq
+    ratings = [["a", "a"]] * 5 + [["b", "b"]] * 2 + [["a", "b"]] * 3
+    pq = 13 * 7 / 400
+    by_hand = math.sqrt(2 * ((2 * pq) ** 2 - 0.0) / 20) / (2 * pq)
+    options: dict[str, Any] = {"convention": "spss", "distribution": "normal"}
+    interval = quiet("fleiss_kappa", ratings, target="items", **options)
+    assert half(interval) / 1.959964 == pytest.approx(by_hand, rel=1e-6)
+    of_two = quiet("cohen_kappa", PAIRS, target="items", **options)
+    same = quiet(
+        "cohen_kappa", PAIRS, target="items", **options | {"convention": "over_n"}
+    )
+    assert (of_two.low, of_two.high) == (same.low, same.high)
+
+
+def test_a_convention_has_errors_of_some_coefficients() -> None:
+    def refused(match: str, name: str = "fleiss_kappa", **options: Any) -> None:
+        with pytest.raises(ParameterError, match=match):
+            analytic(name, PAIRS, **{"target": "items", **options})
+
+    refused("convention: needs one of irrcac, spss, over_n", convention="vcd")
+    refused('to other items only, so "items".*got "raters"', target="raters")
+    refused('"irrcac" has no error of Light', "light_kappa", convention="irrcac")
+    refused('"spss" has no error of Gwet', "gwet_ac", convention="spss")
