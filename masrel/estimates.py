@@ -1,4 +1,4 @@
-"""The two result types of every statistic: an estimate and its interval."""
+"""The result types of every statistic: an estimate with its interval, and a test."""
 
 import dataclasses
 import math
@@ -13,6 +13,7 @@ __all__ = [
     "Distribution",
     "Estimate",
     "Interval",
+    "Significance",
     "Target",
     "Unit",
     "as_document",
@@ -216,6 +217,50 @@ def _as_html(lines: _Lines) -> str:
         for name, text in lines
     )
     return f"<table>{''.join(rows)}</table>"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Significance:
+    """A test of a hypothesis; never an interval.
+
+    Attributes
+    ----------
+    name : str
+        Name of the function that computed it, such as ``"bowker"``.
+    hypothesis : str
+        What is tested, in words.
+    statistic : float
+        The test statistic; ``nan`` when undefined.
+    distribution : str
+        Its distribution under the hypothesis, such as ``"chi-squared"``.
+    df : tuple of float
+        Degrees of freedom of it; empty where it has none.
+    p_value : float
+        Two-sided where there are two sides, within [0, 1].
+    n_items : int
+        Items it rests on.
+    reason : str or None
+        Why it is undefined, or None.
+    """
+
+    name: str
+    hypothesis: str
+    statistic: float
+    distribution: str
+    df: tuple[float, ...]
+    p_value: float
+    n_items: int
+    reason: str | None = None
+
+    def __str__(self) -> str:
+        if self.reason is not None:
+            return f"{self.name}: undefined ({self.reason})"
+        degrees = ", ".join(f"{df:g}" for df in self.df)
+        of = f"({degrees})" if degrees else ""
+        return (
+            f"{self.name}: {self.statistic:.4g}, {self.distribution}{of}, "
+            f"p = {self.p_value:.3g}"
+        )
 
 
 def as_document(result: Estimate | Interval) -> dict[str, object]:

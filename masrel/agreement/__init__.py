@@ -58,11 +58,11 @@ from masrel.agreement.pairs import (
 from masrel.agreement.registry import COEFFICIENTS, Coefficient, Property, coefficient
 from masrel.agreement.significance import (
     Alternative,
-    Significance,
     equivalence_p_value,
     holm,
     p_value,
 )
+from masrel.estimates import Significance
 
 __all__ = [
     "COEFFICIENTS",

@@ -64,8 +64,14 @@ class Features:
 
     def sums(self, freq: Integers) -> Floats:
         """Return the sums over rows that occur so often each, (m + n,)."""
-        often = (self.values * freq[:, None]).ravel()
-        others = np.bincount(self.places.ravel(), often, minlength=self.n)[: self.n]
+        kinds, often, places = np.ones(1), self.values * freq[:, None], self.places
+        if (often % 1.0).any():  # shares of more raters: those alike are counted first
+            kinds, kind = np.unique(self.values, return_inverse=True)
+            places = places + self.n * kind.reshape(places.shape)
+            often = np.broadcast_to(freq[:, None].astype(np.float64), places.shape)
+        size = len(kinds) * self.n
+        counts = np.bincount(places.ravel(), often.ravel(), minlength=size)[:size]
+        others = kinds @ counts.reshape(len(kinds), self.n)
         return np.concatenate([(self.dense * freq).sum(axis=1), others])
 
     def dot(self, slope: Floats) -> Floats:

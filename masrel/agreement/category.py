@@ -12,9 +12,8 @@ from masrel.agreement._engine import undefined
 from masrel.agreement._labels import Label, shown
 from masrel.agreement._rows import count_items, count_ratings, item_counts
 from masrel.agreement.kappas import fleiss_kappa
-from masrel.agreement.significance import Significance
 from masrel.errors import ParameterError
-from masrel.estimates import Estimate
+from masrel.estimates import Estimate, Significance
 
 
 def category_kappa(

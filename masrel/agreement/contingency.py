@@ -14,8 +14,8 @@ from masrel.agreement._rows import (
     pair_table,
     two_raters,
 )
-from masrel.agreement.significance import Significance
 from masrel.errors import CountsError, ParameterError
+from masrel.estimates import Significance
 
 _MAX_SUMMED = 1_000  # changes up to which binomial probabilities are summed
 

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from masrel.agreement._data import complete_values, rated_part, rating_values
 from masrel.agreement._engine import check_level, undefined
 from masrel.agreement._labels import Label
-from masrel.agreement.significance import Significance
 from masrel.errors import ParameterError
-from masrel.estimates import Estimate, Interval, Target
+from masrel.estimates import Estimate, Interval, Significance, Target
 
 if TYPE_CHECKING:
     from masrel.agreement._reml import Components

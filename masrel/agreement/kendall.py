@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from masrel.agreement._data import complete_values
 from masrel.agreement._engine import undefined
 from masrel.agreement._labels import Label
-from masrel.agreement.significance import Significance
-from masrel.estimates import Estimate
+from masrel.estimates import Estimate, Significance
 
 
 def kendall_w(

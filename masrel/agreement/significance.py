@@ -1,62 +1,17 @@
-"""The result of a test of a hypothesis, and p-values of estimates."""
+"""P-values of estimates, and their adjustment for several."""
 
 import math
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 
 from masrel.agreement._engine import NO_SPREAD, ONE_PAIR, undefined
 from masrel.agreement._labels import is_row, shown
+from masrel.agreement.registry import COEFFICIENTS
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Significance:
-    """A test of a hypothesis; never an interval.
-
-    Attributes
-    ----------
-    name : str
-        Name of the function that computed it, such as ``"bowker"``.
-    hypothesis : str
-        What is tested, in words.
-    statistic : float
-        The test statistic; ``nan`` when undefined.
-    distribution : str
-        Its distribution under the hypothesis, such as ``"chi-squared"``.
-    df : tuple of float
-        Degrees of freedom of it; empty where it has none.
-    p_value : float
-        Two-sided where there are two sides, within [0, 1].
-    n_items : int
-        Items it rests on.
-    reason : str or None
-        Why it is undefined, or None.
-    """
-
-    name: str
-    hypothesis: str
-    statistic: float
-    distribution: str
-    df: tuple[float, ...]
-    p_value: float
-    n_items: int
-    reason: str | None = None
-
-    def __str__(self) -> str:
-        if self.reason is not None:
-            return f"{self.name}: undefined ({self.reason})"
-        degrees = ", ".join(f"{df:g}" for df in self.df)
-        of = f"({degrees})" if degrees else ""
-        return (
-            f"{self.name}: {self.statistic:.4g}, {self.distribution}{of}, "
-            f"p = {self.p_value:.3g}"
-        )
-
 
 Alternative = Literal["two-sided", "greater", "less"]
 """What a p-value is evidence for: that the true value is other, greater or less."""
@@ -189,9 +144,6 @@ def equivalence_p_value(estimate: Estimate, *, low: float, high: float) -> float
 def _null(estimate: Estimate, null: float | None) -> float:
     """Check the value under the hypothesis, 0 if that is what chance gives."""
     if null is None:
-        # Imported here: the register imports coefficients that import this file.
-        from masrel.agreement.registry import COEFFICIENTS
-
         entry = COEFFICIENTS.get(estimate.coefficient)
         if entry is not None and not entry.chance_corrected:
             raise ParameterError(

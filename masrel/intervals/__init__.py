@@ -9,13 +9,17 @@ from typing import TYPE_CHECKING
 from masrel.intervals.analytic import analytic
 from masrel.intervals.auto import estimate
 from masrel.intervals.bootstrap import bootstrap
+from masrel.intervals.contrasts import (
+    Differences,
+    difference,
+    difference_test,
+    differences,
+)
 from masrel.intervals.diagnosis import Diagnosis, diagnose
-from masrel.intervals.difference import difference, difference_test
 from masrel.intervals.equality import donner_test, equality_test
 from masrel.intervals.jackknife import jackknife
 from masrel.intervals.posterior import posterior
 from masrel.intervals.quantity import Quantity
-from masrel.intervals.several import Differences, differences
 
 if TYPE_CHECKING:
     from masrel.intervals.latent._density import LatentPrior

@@ -1,16 +1,14 @@
 """Items that come in clusters, such as sites of a patient: what leaves is a cluster."""
 
-import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement._engine import Floats
+from masrel.agreement._engine import Floats, standard_error
 from masrel.agreement._labels import is_missing, is_row
 from masrel.errors import ParameterError
-from masrel.intervals._influences import sample_factor, unit_influences
 from masrel.intervals._problem import Integers, IntervalProblem, blocks
 
 
@@ -59,11 +57,13 @@ def clusters_of(problem: IntervalProblem, clusters: object) -> Integers:
 def clustered_error(problem: IntervalProblem, codes: Integers) -> float:
     """Return the delta-method standard error with clusters as the sample."""
     # √[n/(n - 1) Σ_c s_c²], s_c the sum of the influences of a cluster's items:
-    # Vanbelle, S. (2017), as of `differences`
-    influences = unit_influences(problem, codes)
-    return math.sqrt(
-        sample_factor(influences) * float(influences.moves @ influences.moves)
-    )
+    # Vanbelle, S. (2017). Comparing dependent kappa coefficients obtained on multilevel
+    # data. Biometrical Journal, 59(5), 1016-1034. https://doi.org/10.1002/bimj.201600093
+    features = problem.formula.features(problem.used.codes, problem.v)
+    of_items = features.dot(problem.slopes(problem.sums))
+    moves = np.bincount(codes, weights=of_items).astype(np.float64)
+    known = np.unique(codes[features.matters])
+    return standard_error(moves[known], np.ones(len(known), dtype=np.int64), None)
 
 
 def cluster_codes(clusters: object, n_items: int) -> Integers:

@@ -34,10 +34,12 @@ class MaxT:
 
     def exceeded(self, quantile: float) -> float:
         """Return the probability of a larger one."""
-        from scipy.special import fdtrc
+        from scipy.special import fdtrc, stdtr
 
         if not quantile > 0.0:
             return 1.0
+        if self.rank == 1:  # Student's t
+            return min(1.0, 2.0 * float(stdtr(self.df, -quantile)))
         with np.errstate(divide="ignore"):
             ratios = (quantile / self._largest) ** 2 / self.rank
         return float(fdtrc(self.rank, self.df, ratios).mean())

@@ -191,7 +191,7 @@ def test_independent_clusters_add_their_variances() -> None:
 
 def test_dependent_clusters_are_of_the_same_rows() -> None:
     first, clusters = drawn(12, 11)
-    with pytest.raises(RatingsError, match="need the same rows"):
+    with pytest.raises(RatingsError, match="need the same items"):
         difference(
             "fleiss_kappa", first, first[1:], design="dependent", clusters=clusters
         )

@@ -18,6 +18,7 @@ from masrel.lab.analysis._analysis_json import analysis_text
 from masrel.lab.protocol import Protocol, report_sections
 from masrel.lab.ratings import InPerson, Ratings
 from masrel.lab.report._agreement import estimates_section
+from masrel.lab.report._blocks import Block, Chapter, Document
 from masrel.lab.report._conduct import CONDUCT_SECTIONS, StudyConduct, conduct_sections
 from masrel.lab.report._design import design_section
 from masrel.lab.report._grade_tables import categories_section, confusion_section
@@ -29,7 +30,7 @@ from masrel.lab.report._grades import (
 from masrel.lab.report._material import Drawing, Material, Section, gather
 from masrel.lab.report._methods import methods_section
 from masrel.lab.report._order_section import order_section
-from masrel.lab.report._pages import WRITERS, Block, Chapter, Document, Writer
+from masrel.lab.report._pages import WRITERS, Writer
 from masrel.lab.report._published_numbers import PublishedClaims, claims_section
 from masrel.lab.report._question_tables import questionnaires_section
 from masrel.lab.report._report_folder import (

@@ -10,6 +10,7 @@ from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
 from masrel.errors import ParameterError
+from masrel.lab.report._blocks import Block, Document
 from masrel.lab.report._docx_table import (
     MARGIN,
     PAGE,
@@ -21,7 +22,6 @@ from masrel.lab.report._docx_table import (
     write,
 )
 from masrel.lab.report._material import Drawing, Listing, Paragraph
-from masrel.lab.report._pages import Block, Document
 from masrel.tables._tables import Table
 
 if TYPE_CHECKING:

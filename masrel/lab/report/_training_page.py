@@ -2,8 +2,9 @@
 
 from masrel import __version__
 from masrel.lab.protocol import Protocol, protocol_hash
+from masrel.lab.report._blocks import Block, Chapter, Document
 from masrel.lab.report._material import SIMULATED_GRADES, Drawing, Paragraph
-from masrel.lab.report._pages import WRITERS, Block, Chapter, Document
+from masrel.lab.report._pages import WRITERS
 from masrel.lab.report._training_tables import (
     NOT_RATINGS,
     learning_view,
