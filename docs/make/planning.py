@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from masrel.planning import LatentModel, Plan, precision, sample_size
-from masrel.planning._aims import Aim
-from masrel.planning._plan_question import RATER_SHARE, pose_question
-from masrel.planning._studies import StudyMaker, StudySums
+from masrel.planning import LatentModel, Plan, Study, precision, sample_size
+from masrel.planning._planned_design import design_of
+from masrel.planning._studies import numbers_of, simulated
 
 DOCS = Path(__file__).parents[1]
 PAGE, FIGURE = DOCS / "planning_designs.md", DOCS / "figures" / "planning_error.png"
@@ -69,46 +68,20 @@ DESIGNS: tuple[dict[str, Any], ...] = (
 )
 
 
-def came_true(design: dict[str, Any], plan: Plan, n_studies: int) -> StudySums:
-    """Return sums over studies that are drawn anew for a plan."""
-    aim = {key: design.get(key) for key in ("half_width", "lower", "upper", "null")}
-    question = pose_question(
-        coefficient=design["coefficient"],
-        value=design["value"],
-        weights=design.get("weights", "identity"),
-        categories=None,
-        prevalences=design["prevalences"],
-        model=design["model"],
-        target=design["target"],
-        p_missing=design.get("p_missing", 0.0),
-        level=0.95,
-        sides=design.get("sides", 2),
-        interval=design["interval"],
-        method="auto",
-        aim=Aim(**aim, power=design.get("power"), assurance=design.get("assurance")),
-        prices=(0.0, 0.0, 1.0),
-        max_cost=None,
-        rng=2,
-        rater_share=RATER_SHARE,
-    )
-    maker = StudyMaker(question.design(plan.n_items, plan.n_raters))
-    return maker.simulate(np.random.default_rng(20261122), n_studies)
+def came_true(
+    design: dict[str, Any], plan: Plan, n_studies: int
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Return numbers of studies that are drawn anew for a plan, and their errors."""
+    shown = {key: value for key, value in design.items() if key != "assurance"}
+    size = {"n_items": plan.n_items, "n_raters": plan.n_raters}
+    study = design_of(Study(**{**shown, **size}))
+    return numbers_of(simulated(study, np.random.default_rng(20261122), n_studies))
 
 
-def number_of(design: dict[str, Any], sums: StudySums) -> float:
-    """Return the number that a design aims at."""
-    if "null" in design:
-        return sums.share(1)
-    if "power" in design:
-        return sums.share(2)
-    return sums.share(0) if "assurance" in design else sums.mean(0)[0]
-
-
-def planned(design: dict[str, Any], plan: Plan) -> float:
-    """Return the same as it was planned."""
-    if "power" in design:
-        return plan.power
-    return plan.assurance if "assurance" in design else plan.expected_half_width
+def number_of(design: dict[str, Any]) -> str:
+    """Return the name of the number that a design aims at."""
+    named = [name for name in ("power", "assurance") if name in design]
+    return named[0] if named else "expected_half_width"
 
 
 def _designs(n_studies: int) -> list[str]:
@@ -117,12 +90,13 @@ def _designs(n_studies: int) -> list[str]:
         "|---|---|---|---|---|---|---|---|",
     ]
     for design in DESIGNS:
-        plan = sample_size(**design)
-        sums = came_true(design, plan, n_studies)
+        plan = sample_size(Study(**design))
+        numbers, _ = came_true(design, plan, n_studies)
+        name = number_of(design)
         lines.append(
             f"| {design['coefficient']} {design.get('weights', '')} "
             f"| {design['model']} | {plan.n_raters} | {_aim(design)} | {plan.n_items} "
-            f"| {planned(design, plan):.4f} | {number_of(design, sums):.4f} "
+            f"| {getattr(plan, name):.4f} | {numbers[name]:.4f} "
             f"| {plan.method} |"
         )
         print(lines[-1], flush=True)
@@ -136,12 +110,13 @@ def _formulas(n_studies: int) -> list[str]:
         "|---|---|---|---|---|---|---|",
     ]
     for design in DESIGNS[:14]:
-        plan = sample_size(**{**design, "method": "wald"})
-        sums = came_true(design, plan, n_studies)
+        plan = sample_size(Study(**{**design, "method": "wald"}))
+        numbers, _ = came_true(design, plan, n_studies)
+        half, reached = numbers["expected_half_width"], numbers["assurance"]
         lines.append(
             f"| {design['coefficient']} {design.get('weights', '')} "
             f"| {design['model']} | {plan.n_raters} | {design['half_width']} "
-            f"| {plan.n_items} | {sums.mean(0)[0]:.4f} | {100 * sums.share(0):.0f} % |"
+            f"| {plan.n_items} | {half:.4f} | {100 * reached:.0f} % |"
         )
     return lines
 
@@ -163,17 +138,19 @@ def _packages() -> list[str]:
         at = setting["design"]
         three = at["n_categories"] > 2 and at["n_raters"] > 2
         plan = sample_size(
-            "fleiss_kappa",
-            value=at["kappa"],
-            n_raters=at["n_raters"],
-            prevalences=at["prevalences"],
-            model=_DM if three else "mixture",
-            target="items",
-            level=at["level"],
-            sides=at["sides"],
-            lower=at["kappa_lower"],
-            upper=at["kappa_upper"],
-            method="goodness-of-fit",
+            Study(
+                "fleiss_kappa",
+                value=at["kappa"],
+                n_raters=at["n_raters"],
+                prevalences=at["prevalences"],
+                model=_DM if three else "mixture",
+                target="items",
+                level=at["level"],
+                sides=at["sides"],
+                lower=at["kappa_lower"],
+                upper=at["kappa_upper"],
+                method="goodness-of-fit",
+            )
         )
         printed = setting.get("package", {}).get("n")
         limits = f"{at['kappa_lower']} to {at['kappa_upper'] or '…'}"
@@ -189,14 +166,16 @@ def _packages() -> list[str]:
     for case in oracle["presize"]:
         if "width" in case:
             plan = sample_size(
-                "fleiss_kappa",
-                value=case["kappa"],
-                n_raters=case["raters"],
-                prevalences=[1 - case["prevalence"], case["prevalence"]],
-                model="mixture",
-                target="items",
-                half_width=case["width"] / 2,
-                method="goodness-of-fit",
+                Study(
+                    "fleiss_kappa",
+                    value=case["kappa"],
+                    n_raters=case["raters"],
+                    prevalences=[1 - case["prevalence"], case["prevalence"]],
+                    model="mixture",
+                    target="items",
+                    half_width=case["width"] / 2,
+                    method="goodness-of-fit",
+                )
             )
             lines.append(
                 f"| {case['kappa']} | {case['raters']} | {case['width']} "
@@ -215,14 +194,16 @@ def _paper() -> list[str]:
     for name, model in models.items():
         for target in ("raters", "items"):
             plan = precision(
-                "fleiss_kappa",
-                value=None if isinstance(model, LatentModel) else 0.626,
-                categories=None if isinstance(model, LatentModel) else 6,
-                model=model,
-                target=target,  # type: ignore[arg-type]
-                n_items=4,
-                n_raters=8,
-                rng=1,
+                Study(
+                    "fleiss_kappa",
+                    value=None if isinstance(model, LatentModel) else 0.626,
+                    categories=None if isinstance(model, LatentModel) else 6,
+                    model=model,
+                    target=target,  # type: ignore[arg-type]
+                    n_items=4,
+                    n_raters=8,
+                    rng=1,
+                )
             )
             lines.append(
                 f"| {name} | {target} | {plan.expected_half_width:.3f} "
@@ -254,14 +235,16 @@ def _same_items(value: float) -> LatentModel:
 def of_latent(model: LatentModel) -> float:
     """Return Fleiss' kappa of a latent model."""
     shown = precision(
-        "fleiss_kappa",
-        value=None,
-        model=model,
-        target="raters",
-        n_items=4,
-        n_raters=8,
-        interval="t",
-        method="wald",
+        Study(
+            "fleiss_kappa",
+            value=None,
+            model=model,
+            target="raters",
+            n_items=4,
+            n_raters=8,
+            interval="t",
+            method="wald",
+        )
     )
     return shown.value
 
@@ -272,7 +255,7 @@ def _error_figure() -> None:
     from masrel.plots._style import BLUE, VERMILLION, finished, house_style
 
     common = {**DESIGNS[5], "rng": 1}
-    plan = sample_size(**common)
+    plan = sample_size(Study(**common))
     with house_style(parse_math=True):
         figure = Figure(figsize=(5.6, 3.4))
         axes = figure.subplots()
@@ -280,15 +263,15 @@ def _error_figure() -> None:
             ("standard error", "t", BLUE, "o-"),
             ("interval of analyze", "auto", VERMILLION, "s--"),
         ):
-            seconds, errors = [], []
+            seconds, sizes = [], []
             for n in (100, 300, 1000, 3000) + (
                 (10_000, 100_000) if interval == "t" else ()
             ):
                 start = time.process_time()
-                sums = came_true({**common, "interval": interval}, plan, n)
+                _, found = came_true({**common, "interval": interval}, plan, n)
                 seconds.append(time.process_time() - start)
-                errors.append(sums.mean(0)[1])
-            axes.loglog(seconds, errors, mark, color=colour, label=label)
+                sizes.append(found["expected_half_width"])
+            axes.loglog(seconds, sizes, mark, color=colour, label=label)
         axes.set_xlabel("processor time (s)")
         axes.set_ylabel("Monte Carlo error of the half-width")
         axes.legend(frameon=False)

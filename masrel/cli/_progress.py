@@ -34,6 +34,11 @@ class Progress:
             self._bar.total = n_steps
             self._bar.refresh()
 
+    def reach(self, n_made: int, n_expected: int) -> None:
+        """Say how many steps are made, and how many there will be."""
+        self.expect(n_expected)
+        self.update(n_made - self._n_made)
+
     def update(self, n_steps: int) -> None:
         """Count steps that were made."""
         self._n_made += n_steps

@@ -1,111 +1,94 @@
-"""How many items or raters a study needs, and what a study of a given size shows."""
+"""How large a study must be: the smallest size, the cheapest design, grids of both."""
 
-from collections.abc import Sequence
-from typing import Literal
+import itertools
+import math
+from bisect import bisect_left
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any, Literal
 
-import numpy as np
-
-from masrel.agreement import Label, WeightsLike
 from masrel.errors import ParameterError
-from masrel.estimates import Target
-from masrel.planning._aims import Aim
-from masrel.planning._cheapest import cheapest_plan
-from masrel.planning._item_models import LatentModel
-from masrel.planning._plan_question import RATER_SHARE, pose_question
-from masrel.planning._precision import Plan, plan_of
-from masrel.planning._smallest_size import Search
-from masrel.planning._tasks import Progress
+from masrel.planning._formulas import (
+    check_has_numbers,
+    items_nearby,
+    numbers_by_formula,
+    size_by_formula,
+)
+from masrel.planning._planned_design import Design, design_of
+from masrel.planning._studies import shown
+from masrel.planning._study_plan import (
+    FORMULAS,
+    Plan,
+    Progress,
+    Study,
+    aim_words,
+    chance_of,
+    check_one_aim,
+    has_aim,
+    is_met,
+    number_of,
+    reached_words,
+    refuse,
+)
 
-Method = Literal["auto", "wald", "goodness-of-fit", "exact", "simulation"]
-Model = str | LatentModel | None
-Prices = tuple[float, float, float]  # of an item, a rater, a rating
-_RATINGS: Prices = (0.0, 0.0, 1.0)
+_FEWEST_ITEMS, _MAX_ITEMS, _MAX_RATERS = 2, 100_000, 60
+_FAR = 1.3  # times a size: where a formula asks for more, the size does not do
+_MAX_SCAN = 1_500_000  # tables that are looked at around a size
+_PATIENCE = 4  # numbers of raters that are no better, after which none will be
+_CHEAPER = 1.0 - 1e-9
+# sizes that grow on both sides, until one reaches the aim
+_STEPS = ((15, 3), (30, 4), (60, 6), (120, 8), (250, 12), (500, 20), (1000, 40))
 
 
-def sample_size(
-    coefficient: str,
-    *,
-    value: float | None,
-    n_raters: int | None = None,
-    n_items: int | None = None,
-    weights: WeightsLike = "identity",
-    categories: int | Sequence[Label] | None = None,
-    prevalences: object = None,
-    model: Model = None,
-    target: Target,
-    p_missing: float = 0.0,
-    level: float = 0.95,
-    sides: int = 2,
-    half_width: float | None = None,
-    lower: float | None = None,
-    upper: float | None = None,
-    null: float | None = None,
-    power: float | None = None,
-    assurance: float | None = None,
-    max_cost: float | None = None,
-    prices: Prices | None = None,
-    interval: str = "auto",
-    rater_share: float = RATER_SHARE,
-    rng: np.random.Generator | int | None = None,
-    method: Method = "auto",
-    progress: Progress | None = None,
-) -> Plan:
+def precision(study: Study, *, progress: Progress | None = None) -> Plan:
+    """Say what a study of a given size can show.
+
+    Parameters
+    ----------
+    study : Study
+        With `n_items` and `n_raters`. With `half_width`, `lower` or `upper` the plan's
+        assurance is the chance of an interval as narrow, or inside these; with `null`
+        its power is the chance of an interval that excludes it.
+    progress : callable, optional
+        Called as studies are drawn, with how many there are and how many there will be.
+
+    Returns
+    -------
+    Plan
+        What the study shows.
+
+    Raises
+    ------
+    ParameterError
+        If something does not fit the coefficient, or a size is missing.
+
+    Examples
+    --------
+    >>> study = Study(
+    ...     "icc_1", value=0.6, n_items=100, n_raters=3, target="both", half_width=0.1
+    ... )
+    >>> plan = precision(study)
+    >>> round(plan.expected_half_width, 4), round(plan.assurance, 3)
+    (0.0995, 0.513)
+    """
+    is_whole = study.n_items is not None and study.n_raters is not None
+    refuse((not is_whole, "n_items, n_raters: a study that is shown needs both"))
+    design = design_of(study)
+    check_has_numbers(design)
+    return _plan_of(design, progress)
+
+
+def sample_size(study: Study, *, progress: Progress | None = None) -> Plan:
     """Solve for the number of items or of raters that a study needs.
 
     Parameters
     ----------
-    coefficient : str
-        Its name in the register; any that is a function of sums over items, and the
-        intraclass correlations icc_1, icc_c1 and icc_a1.
-    value : float or None
-        The coefficient that is taken to be true; None where the model has it: a table,
-        or a `LatentModel`.
-    n_raters, n_items : int, optional
-        Exactly one of them: the other is solved for. With `prices` neither: the
-        cheapest study is.
-    weights : str or array_like, optional
-        How much two categories agree.
-    categories : int or sequence, optional
-        How many there are, or the scale in order, by which weights of numbers go.
-    prevalences : sequence of float, optional
-        Of the categories, with sum 1; equal when not given. With model "table" the
-        joint probabilities of two raters, shape (n_categories, n_categories).
-    model : {"mixture", "dirichlet-multinomial", "latent", "table"} or LatentModel
-        How the ratings of an item come about. An intraclass correlation takes none:
-        its ratings are normal.
-    target : {"items", "raters", "both"}
-        What a new study would draw anew.
-    p_missing : float, optional
-        Chance of every rating to be missing.
-    level : float, optional
-        Nominal level of the interval.
-    sides : {1, 2}, optional
-        How many tails share 1 - level.
-    half_width : float, optional
-        Aim: half the width of the interval, expected or with `assurance`.
-    lower, upper : float, optional
-        Aim: ends of the interval no lower, no higher; expected, or with `assurance`, or
-        with `power` (non-inferiority by one, equivalence by both).
-    null : float, optional
-        Aim, with `power`: the interval excludes this value.
-    power, assurance : float, optional
-        Chances to be reached.
-    max_cost : float, optional
-        What the study may cost; without an aim, the study is the most that this buys.
-    prices : tuple of float, optional
-        Of an item, a rater, and a rating; (0, 0, 1) when not given.
-    interval : str, optional
-        The interval that is planned: a method of `masrel.intervals.estimate`, such as
-        "auto" or "jackknife", or estimate ± quantile times standard error, not cut at
-        the ends of the scale: "t" or "normal".
-    rater_share : float, optional
-        Of the error of icc_a1, how much the levels of the raters make.
-    rng : numpy.random.Generator or int, optional
-        Seed of simulated studies; drawn and kept in the plan when not given.
-    method : {"auto", "exact", "simulation", "wald", "goodness-of-fit"}, optional
-        "auto" sums over all studies where there are few, and else draws them.
+    study : Study
+        With exactly one of `n_items` and `n_raters`: the other is solved for. With
+        `prices` neither: the cheapest study is.
     progress : callable, optional
-        Called as studies are drawn, with how many there are and how many there will be.
+        As of `precision`, for each size that is looked at.
 
     Returns
     -------
@@ -115,8 +98,8 @@ def sample_size(
     Raises
     ------
     ParameterError
-        If an argument is out of range, or nothing reaches the aim; the message then
-        says what is the best that can be had.
+        If something does not fit the coefficient, or nothing reaches the aim; the
+        message then says what is the best that can be had.
 
     Notes
     -----
@@ -127,7 +110,7 @@ def sample_size(
     --------
     How many items have an expected half-width of 0.15?
 
-    >>> plan = sample_size(
+    >>> study = Study(
     ...     "scott_pi",
     ...     value=0.5,
     ...     prevalences=[0.7, 0.3],
@@ -137,154 +120,415 @@ def sample_size(
     ...     half_width=0.15,
     ...     interval="normal",
     ... )
+    >>> plan = sample_size(study)
     >>> plan.n_items, plan.method
     (154, 'exact')
     """
-    is_cheapest = n_items is None and n_raters is None and prices is not None
-    if not is_cheapest:
-        _check_one_size(n_items, n_raters)
-    aim = Aim(
-        half_width=half_width,
-        lower=lower,
-        upper=upper,
-        null=null,
-        power=power,
-        assurance=assurance,
-    ).checked()
-    question = pose_question(
-        coefficient=coefficient,
-        value=value,
-        weights=weights,
-        categories=categories,
-        prevalences=prevalences,
-        model=model,
-        target=target,
-        p_missing=p_missing,
-        level=level,
-        sides=sides,
-        interval=interval,
-        method=method,
-        aim=aim,
-        prices=_RATINGS if prices is None else prices,
-        max_cost=max_cost,
-        rng=rng,
-        rater_share=rater_share,
-        progress=progress,
-    )
-    if aim.kind is None and max_cost is None:
-        raise ParameterError(
-            "half_width: needs an aim: a half-width, a lower or upper limit, or a null "
-            "value with power; got none"
+    n_known = (study.n_items is not None) + (study.n_raters is not None)
+    got = "both" if n_known else "none, and no prices by which to find the cheapest"
+    refuse(
+        (
+            n_known == 2 or (n_known == 0 and study.prices is None),
+            "n_items, n_raters: needs exactly one of them, since the other is solved "
+            f"for; got {got}",
         )
-    if is_cheapest:
-        return cheapest_plan(question)
-    return Search(question, n_items=n_items, n_raters=n_raters).plan()
-
-
-def _check_one_size(n_items: int | None, n_raters: int | None) -> None:
-    if (n_items is None) != (n_raters is None):
-        return
-    got = (
-        "both"
-        if n_items is not None
-        else "none, and no prices by which to find the cheapest of both"
     )
-    raise ParameterError(
-        f"n_items, n_raters: needs exactly one of them, since the other is solved for; "
-        f"got {got}"
+    check_one_aim(study)
+    design = design_of(study)
+    refuse(
+        (
+            not has_aim(study) and study.max_cost is None,
+            "half_width: needs an aim: a half-width, a lower or upper limit, or a null "
+            "value with power; got none",
+        )
     )
+    if n_known == 0:
+        return _cheapest(design, progress)
+    return _reaching(_Search(design, progress).reached())
 
 
-def precision(
-    coefficient: str,
+def plan_grid(
+    study: Study,
     *,
-    n_items: int,
-    n_raters: int,
-    value: float | None,
-    weights: WeightsLike = "identity",
-    categories: int | Sequence[Label] | None = None,
+    n_items: int | Sequence[int] | None = None,
+    n_raters: int | Sequence[int] | None = None,
+    value: float | Sequence[float] | None = None,
     prevalences: object = None,
-    model: Model = None,
-    target: Target,
-    p_missing: float = 0.0,
-    level: float = 0.95,
-    sides: int = 2,
-    half_width: float | None = None,
-    lower: float | None = None,
-    upper: float | None = None,
-    null: float | None = None,
-    prices: Prices = _RATINGS,
-    interval: str = "auto",
-    rater_share: float = RATER_SHARE,
-    prior: tuple[float, float] | None = None,
-    rng: np.random.Generator | int | None = None,
-    method: Method = "auto",
+    executor: Literal["dask"] | None = None,
+    scheduler: str | None = None,
     progress: Progress | None = None,
-) -> Plan:
-    """Say what a study of a given size can show.
+) -> tuple[Plan, ...]:
+    """Say what studies of many sizes, and under several truths, can show.
 
     Parameters
     ----------
-    coefficient : str
-        Its name.
-    n_items, n_raters : int
-        The size of the study.
-    value, weights, categories, prevalences, model, target, p_missing : optional
-        What is taken to be true, as of `sample_size`.
-    level, sides : optional
-        Of the interval, as of `sample_size`.
-    half_width : float, optional
-        The plan's assurance is the chance of an interval as narrow as this.
-    lower, upper : float, optional
-        Its assurance is the chance of an interval inside these.
-    null : float, optional
-        Its power is the chance of an interval that excludes this.
-    prices, interval, rater_share : optional
-        As of `sample_size`.
-    prior : tuple of float, optional
-        Parameters of a Beta distribution of the true value, over which the power of
-        method "goodness-of-fit" is averaged.
-    rng, method, progress : optional
-        How it is computed, as of `sample_size`.
+    study : Study
+        What all of them share. Its method is "auto".
+    n_items, n_raters : int or sequence of int, optional
+        Sizes; those of `study` when not given. Where one is None it is solved for in
+        every cell.
+    value : float or sequence of float, optional
+        True coefficients.
+    prevalences : sequence of float, or several of them, optional
+        Of the categories; with model "table" one table.
+    executor : {"dask"}, optional
+        Who plans the cells; this process when not given. Dask is the extra
+        ``masrel[dask]``.
+    scheduler : str, optional
+        Address of a Dask scheduler; a cluster on this machine when not given.
+    progress : callable, optional
+        Called with how many cells are done, and of how many.
 
     Returns
     -------
-    Plan
-        What the study shows.
+    tuple of Plan
+        One for each value, prevalences, number of items and number of raters, the last
+        of them varying first. Where a size is solved for and none reaches the aim, the
+        best that can be had, whose `reaches_aim` is False.
 
     Raises
     ------
     ParameterError
-        If an argument is out of range.
+        If something does not fit the coefficient, or Dask is not installed.
 
     Examples
     --------
-    >>> plan = precision(
-    ...     "icc_1", value=0.6, n_items=100, n_raters=3, target="both", half_width=0.1
+    >>> study = Study(
+    ...     "scott_pi",
+    ...     prevalences=[0.7, 0.3],
+    ...     model="mixture",
+    ...     target="items",
+    ...     n_raters=2,
+    ...     interval="normal",
     ... )
-    >>> round(plan.expected_half_width, 4), round(plan.assurance, 3)
-    (0.0995, 0.513)
+    >>> plans = plan_grid(study, value=0.6, n_items=[20, 40])
+    >>> [round(plan.expected_half_width, 3) for plan in plans]
+    [0.383, 0.274]
     """
-    aim = Aim(half_width=half_width, lower=lower, upper=upper, null=null)
-    question = pose_question(
-        coefficient=coefficient,
-        value=value,
-        weights=weights,
-        categories=categories,
-        prevalences=prevalences,
-        model=model,
-        target=target,
-        p_missing=p_missing,
-        level=level,
-        sides=sides,
-        interval=interval,
-        method=method,
-        aim=aim.checked(needs_chance=False),
-        prices=prices,
-        max_cost=None,
-        rng=rng,
-        rater_share=rater_share,
-        prior=prior,
-        progress=progress,
+    sizes = [
+        _several(study.n_items if n_items is None else n_items),
+        _several(study.n_raters if n_raters is None else n_raters),
+    ]
+    shares: Any = study.prevalences if prevalences is None else prevalences
+    is_rows = isinstance(shares, Sequence) and isinstance(shares[0], Sequence)
+    truths = itertools.product(
+        _several(study.value if value is None else value),
+        shares if is_rows and study.model != "table" else (shares,),
     )
-    return plan_of(question, question.design(n_items, n_raters))
+    _check_grid(study, [None in several for several in sizes], executor, scheduler)
+    cells = [
+        design_of(replace(study, value=truth, prevalences=share, n_items=n, n_raters=r))
+        for (truth, share), n, r in itertools.product(truths, *sizes)
+    ]
+    planned = map(_planned, cells) if executor is None else _by_dask(cells, scheduler)
+    plans: list[Plan] = []
+    for plan in planned:
+        plans.append(plan)
+        if progress is not None:
+            progress(len(plans), len(cells))
+    return tuple(plans)
+
+
+def _several(values: Any) -> Sequence[Any]:
+    return values if isinstance(values, Sequence) else (values,)
+
+
+def _check_grid(
+    study: Study, is_solved: list[bool], executor: object, scheduler: object
+) -> None:
+    if any(is_solved) or chance_of(study) is not None:
+        check_one_aim(study)
+    refuse(
+        (all(is_solved), "n_items, n_raters: a grid needs one of them, got none"),
+        (
+            any(is_solved) and not has_aim(study),
+            "half_width: needs an aim, where one of the sizes is solved for; got none",
+        ),
+        (
+            study.method != "auto",
+            f"method: a grid is by auto, exact where it can be; got {study.method}",
+        ),
+        (
+            executor not in (None, "dask"),
+            f'executor: needs "dask", or nothing for this process, got {executor!r}',
+        ),
+        (
+            scheduler is not None and executor is None,
+            'scheduler: is of executor "dask" alone, got None',
+        ),
+    )
+
+
+def _planned(design: Design) -> Plan:
+    # a cell of a grid: the best that can be had, where nothing reaches the aim
+    is_known = None not in (design.study.n_items, design.study.n_raters)
+    return _plan_of(design) if is_known else _Search(design).reached()
+
+
+def _by_dask(cells: Sequence[Design], scheduler: str | None) -> Iterator[Plan]:
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise ParameterError(
+            'executor: "dask" needs Dask: pip install "masrel[dask]"'
+        ) from error
+    try:
+        client = Client(scheduler, set_as_default=False, timeout="10s")  # type: ignore[no-untyped-call]
+    except (OSError, ValueError) as error:
+        raise ParameterError(
+            f"scheduler: needs an address as tcp://127.0.0.1:8786, got {scheduler!r}: "
+            f"{error}"
+        ) from error
+    with client:  # a cell whose worker dies is planned again by another
+        for future in client.map(_planned, cells, pure=False):
+            yield future.result()
+
+
+# -- one size -------------------------------------------------------------------------
+
+
+def _plan_of(design: Design, progress: Progress | None = None) -> Plan:
+    """Return what a design shows."""
+    study, model = design.study, design.model
+    repeated = (
+        *("coefficient", "n_items", "n_raters", "target", "interval", "level"),
+        *("sides", "p_missing", "half_width", "lower", "upper", "null"),
+    )
+    make: Callable[..., Plan] = partial(
+        Plan,
+        **{name: getattr(study, name) for name in repeated},
+        value=design.value,
+        weights=study.weights if isinstance(study.weights, str) else "custom",
+        model=model.name,
+        prevalences=model.prevalences,
+        table=model.table,
+        cost=design.cost(design.n_items, design.n_raters),
+    )
+    if study.method in FORMULAS:
+        return make(method=study.method, **numbers_by_formula(design))
+    numbers, errors, n_studies = shown(design, progress)
+    plan = make(
+        method="simulation" if n_studies else "exact",
+        **numbers,
+        monte_carlo_error=errors.get(number_of(study), 0.0),
+        errors=errors,
+        n_studies=n_studies,
+        seed=study.seed if n_studies else None,
+    )
+    return replace(plan, reaches_aim=is_met(study, plan)) if has_aim(study) else plan
+
+
+def _reaching(plan: Plan) -> Plan:
+    # the plan, or the refusal that is its note
+    refuse((plan.reaches_aim is False, "".join(plan.notes[:1])))
+    return plan
+
+
+class _Search:
+    """The smallest number of items, or of raters, that reaches an aim."""
+
+    def __init__(self, design: Design, progress: Progress | None = None) -> None:
+        self.design, self._progress = design, progress
+        self._plans: dict[int, Plan] = {}
+        self._of_items = design.study.n_items is None
+        self._name, self.highest = "raters", _MAX_RATERS
+        self.lowest = design.min_raters
+        if self._of_items:
+            self._name, self.highest = "items", _MAX_ITEMS
+            self.lowest = _FEWEST_ITEMS + design.is_icc
+
+    def _sizes(self, n: int) -> tuple[int, int]:
+        known = (self.design.n_items, self.design.n_raters)
+        return (n, known[1]) if self._of_items else (known[0], n)
+
+    def _design(self, n: int) -> Design:
+        return self.design.of_size(*self._sizes(n))
+
+    def at(self, n: int) -> Plan:
+        """Return the plan of a size, computed once."""
+        if n not in self._plans:
+            self._plans[n] = _plan_of(self._design(n), self._progress)
+        return self._plans[n]
+
+    def reached(self) -> Plan:
+        """Return the plan of the smallest size, or the best, with what it lacks."""
+        study = self.design.study
+        if study.method in FORMULAS:
+            plan = self.at(size_by_formula(self.design))
+        elif not has_aim(study):
+            plan = self.at(self._affordable_size())
+        else:
+            plan = self.up_to(self.highest)
+        limit = study.max_cost
+        if limit is None or plan.cost <= limit or plan.reaches_aim is False:
+            return plan
+        n = self._affordable_size()
+        note = (
+            f"max_cost: {aim_words(study)[1]} needs {plan.n_items} items and "
+            f"{plan.n_raters} raters, which cost {plan.cost:g}; {limit:g} pays for {n} "
+            f"{self._name}"
+        )
+        if study.method not in FORMULAS:
+            plan = self.at(n)
+            note += f", which reach {reached_words(study, plan)}"
+        return replace(plan, notes=(note,), reaches_aim=False)
+
+    def up_to(self, highest: int) -> Plan:
+        """Return the plan of the smallest size that is no larger than one."""
+        study, n = self.design.study, None
+        guess = items_nearby(self.design) if self._of_items else self.lowest
+        if guess <= _FAR * highest:
+            n = _smallest(
+                lambda size: bool(self.at(size).reaches_aim),
+                guess=min(max(guess, self.lowest), highest),
+                lowest=self.lowest,
+                highest=highest,
+            )
+        if n is not None:
+            return self._stable(n)
+        n = highest
+        if self._of_items and not self._design(20).has_rows:
+            n = min(n, 200)  # a study of so many whose ratings are drawn one by one
+        best, (name, words) = self.at(n), aim_words(study)
+        note = (
+            f"{name}: {words} needs more than {highest} {self._name}; the best that "
+            f"can be had with {n} is {reached_words(study, best)}"
+        )
+        return replace(best, notes=(note,), reaches_aim=False)
+
+    def _stable(self, n: int) -> Plan:
+        # An exact chance goes up and down with n: from where on it holds.
+        plan = self.at(n)
+        is_smooth = chance_of(self.design.study) is None or plan.method != "exact"
+        if is_smooth or self.design.is_icc or not self._of_items:
+            return plan
+        around = range(max(self.lowest, int(0.85 * n)), int(1.25 * n) + 2)
+        if sum(self._design(size).n_tables for size in around) > _MAX_SCAN:
+            note = "larger sizes were not looked at: a chance can fall with one more"
+            return replace(plan, notes=(note,))
+        met = [size for size in around if self.at(size).reaches_aim]
+        stable = 1 + max((size for size in around if size not in met), default=n - 1)
+        if met[0] == stable:
+            return self.at(stable)
+        note = (
+            f"{met[0]} {self._name} reach it first, but {stable - 1} do not: the "
+            "chance goes up and down"
+        )
+        return replace(self.at(stable), notes=(note,))
+
+    def _cost(self, n: int) -> float:
+        return self.design.cost(*self._sizes(n))
+
+    def affordable(self, limit: float) -> int | None:
+        """Return the largest size that costs no more than a limit, if any does."""
+        if self._cost(self.lowest) > limit:
+            return None
+        fixed, one_more = self._cost(0), self._cost(1) - self._cost(0)
+        if one_more == 0.0 or math.isinf(limit):
+            return self.highest
+        return min(int((limit - fixed) / one_more * (1.0 + 1e-12)), self.highest)
+
+    def _affordable_size(self) -> int:
+        limit = self.design.study.max_cost or 0.0
+        n = self.affordable(limit) or 0
+        refuse(
+            (
+                n == 0 or self._cost(n + 1) <= limit,
+                f"max_cost: needs a limit between {self._cost(self.lowest):g}, of the "
+                f"smallest study, and what some study costs; got {limit:g}",
+            )
+        )
+        return n
+
+
+def _smallest(
+    is_met: Callable[[int], bool], *, guess: int, lowest: int, highest: int
+) -> int | None:
+    """Return the smallest size that meets an aim, found near a guess."""
+    low, high = lowest, guess
+    while not is_met(high):
+        if high == highest:
+            return None
+        low, high = high + 1, min(2 * high, highest)
+    return low + bisect_left(range(low, high), True, key=is_met)
+
+
+# -- both sizes, by what they cost ----------------------------------------------------
+
+
+def _cheapest(design: Design, progress: Progress | None) -> Plan:
+    """Return the cheapest study that reaches an aim, or the most a budget pays for."""
+    # Numbers of raters are tried from the fewest on. For each, the largest number of
+    # items that is no dearer than the best study so far is looked at first: where that
+    # does not reach the aim, nothing with as many raters can be cheaper.
+    study, best, n_worse = design.study, None, 0
+    _check_prices(study)
+    limit, is_counted = study.max_cost or math.inf, not has_aim(study)
+    most = int(min(design.max_raters, _MAX_RATERS))
+    if math.isinf(limit):
+        best = _first_that_reaches(design, most, progress)
+        limit = best.cost
+    for n_raters in range(design.min_raters, most + 1):
+        search = _Search(design.of_size(None, n_raters), progress)
+        n = search.affordable(limit)
+        if n is None or n_worse >= _PATIENCE:
+            break
+        plan = search.at(n)
+        if plan.reaches_aim:
+            plan = search.up_to(n)
+        if plan.cost <= limit and (best is None or _gain(study, plan, best) >= 0.0):
+            best, n_worse = plan, 0
+            if plan.reaches_aim:  # too few raters may reach nothing: they do not count
+                limit, is_counted = plan.cost * _CHEAPER, True
+        else:
+            n_worse += is_counted
+    least = design.cost(_FEWEST_ITEMS + design.is_icc, design.min_raters)
+    if best is None:
+        raise ParameterError(
+            f"max_cost: needs at least {least:g}, of the smallest study; got {limit:g}"
+        )
+    refuse(
+        (
+            best.reaches_aim is False,
+            f"max_cost: {aim_words(study)[1]} is not reached for {limit:g}; the best "
+            f"that can be had is {best.n_items} items and {best.n_raters} raters, "
+            f"which cost {best.cost:g} and reach {reached_words(study, best)}",
+        )
+    )
+    return best
+
+
+def _gain(study: Study, plan: Plan, best: Plan) -> float:
+    # what the aim is worth, then the price of a study that reaches it
+    if plan.reaches_aim and best.reaches_aim:
+        return best.cost - plan.cost
+    if plan.reaches_aim is not best.reaches_aim:
+        return 1.0 if plan.reaches_aim else -1.0
+    more = getattr(plan, number_of(study)) - getattr(best, number_of(study))
+    return float(-more if chance_of(study) is None else more)
+
+
+def _check_prices(study: Study) -> None:
+    per_item, per_rater, per_rating = study.prices or (0.0, 0.0, 1.0)
+    free = "an item" if per_item + per_rating == 0.0 else "a rater"
+    refuse(
+        (
+            study.method in FORMULAS,
+            f"n_items, n_raters: needs one of them with method {study.method}; "
+            '"auto" finds the cheapest of both',
+        ),
+        (
+            min(per_item, per_rater) + per_rating == 0.0,
+            f"prices: needs a price of {free} or of a rating, since no number is best "
+            f"of what costs nothing; got {study.prices}",
+        ),
+    )
+
+
+def _first_that_reaches(design: Design, most: int, progress: Progress | None) -> Plan:
+    for n_items, n_raters in _STEPS:
+        n_raters = max(min(n_raters, most), design.min_raters)
+        search = _Search(design.of_size(None, n_raters), progress)
+        if (plan := search.at(n_items)).reaches_aim:
+            return plan
+    return _reaching(search.reached())

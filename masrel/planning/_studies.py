@@ -1,467 +1,352 @@
 """What studies of one design show, exactly or by whole studies drawn in arrays.
 
-In: a `StudyDesign`. Out: `StudySums`, sums over studies that can be added up, so that
-tasks on any number of processes give the same numbers.
+In: a `Design`. Out: its numbers, means over studies, each with its Monte Carlo error.
+Studies of an intraclass correlation are mean squares of normal ratings, the others how
+often each distinct row of ratings occurs, or the ratings themselves.
 """
 
 import math
 import warnings
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
+from scipy.special import fdtr, fdtri, gammaln, ndtri, stdtrit
 
-from masrel.agreement import CodedRatings, Coefficient, coefficient
-from masrel.agreement._rows import distinct_rows
-from masrel.agreement._weights import WeightsLike
-from masrel.errors import ParameterError, SmallSampleWarning, UndefinedStatisticWarning
-from masrel.estimates import Interval, Target
-from masrel.intervals._choice import choose_interval
-from masrel.intervals._problem import IntervalProblem, pose_problem, rows_problem
-from masrel.intervals.bootstrap import bootstrap
-from masrel.intervals.jackknife import (
-    _interval_around_estimate,
-    _jackknife_variance,
+from masrel.agreement import CodedRatings
+from masrel.agreement.icc import _absolute_ends
+from masrel.errors import MasrelWarning
+from masrel.intervals import estimate
+from masrel.planning._planned_design import AGREEMENT, MAX_TABLES, ONE_WAY, Design
+from masrel.planning._study_plan import (
+    Progress,
+    has_limits,
+    limits_of,
+    number_of_limits,
+    refuse,
 )
-from masrel.intervals.posterior import posterior
-from masrel.planning._item_models import (
-    MAX_ROWS,
-    Floats,
-    Integers,
-    ItemModel,
-    draw_ratings,
-    n_rows,
-    probabilities,
-    rows_of,
-)
+from masrel.planning._truth import Floats, Integers, draw_ratings
 
-NDArrayBool = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+# numbers, their Monte Carlo errors, and how many studies were drawn
+Shown = tuple[dict[str, float], dict[str, float], int]
+
+EVENTS = ("assurance", "power", "coverage")
+NUMBERS = (
+    *("expected_half_width", "expected_low", "expected_high"),
+    *EVENTS,
+    "p_undefined",
+)
+# whether they are means over defined studies; an undefined one reaches nothing
+_OF_DEFINED = np.array([True, True, True, False, False, True, False])
 
 _PLACES = 1 << 20  # numbers held at once
-_LARGE = 1e12  # items of a population
+_TINY = 1e-12
 _LEAST = 1e-13  # of a half-width: what rounding may leave above the aim
-_WALD = ("t", "normal", "analytic")  # computed for all studies at once
+_TASK = 10_000  # studies that are drawn before their Monte Carlo error is looked at
+_CHOSEN_TASK, _RESAMPLED_TASK = 250, 50  # with intervals study by study; resamples
+_MAX_TASKS = 100
+# Monte Carlo errors that are small enough, of a half-width and of a chance; twice as
+# much where intervals are chosen study by study
+_RELATIVE, _SMALL = 0.003, {"assurance": 0.004, "power": 0.004}
+_NODES = 4001  # of the sum over log F; smooth, so that it converges at once
+_HALVES = 60  # of the distance of two nodes
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StudyDesign:
-    """A study to be planned: all that its simulation depends on."""
-
-    coefficient: str
-    weights: WeightsLike
-    model: ItemModel
-    n_items: int
-    n_raters: int
-    target: Target
-    level: float  # of the two-sided interval that is computed
-    interval: str  # "t", "normal", or a method of `masrel.intervals`
-    value: float  # the true coefficient
-    half_width: float | None = None
-    lower: float | None = None
-    upper: float | None = None
-    null: float | None = None
-
-    @property
-    def entry(self) -> Coefficient:
-        """The coefficient's entry in the register."""
-        return coefficient(self.coefficient)
-
-    @property
-    def ordered(self) -> bool:
-        """Whether it matters which rater gave which rating."""
-        alike = not self.entry.tells_raters_apart or self.entry.name == "scott_pi"
-        return self.model.name == "table" or not alike
-
-    @property
-    def has_rows(self) -> bool:
-        """Whether a study is how often each distinct row of ratings occurs."""
-        return (
-            self.target == "items"
-            and self.model.has_rows
-            and self.entry.shape == "ratings"
-            and n_rows(self.model, self.n_raters, ordered=self.ordered) <= MAX_ROWS
+def shown(design: Design, progress: Progress | None = None) -> Shown:
+    """Return what studies of a design show."""
+    if not design.is_exact:
+        return _drawn(design, progress)
+    if design.is_icc and design.study.coefficient != AGREEMENT:
+        return _exact_icc(design), {}, 0
+    listed = f"{design.n_tables:g}" if design.n_tables < math.inf else "no list"
+    refuse(
+        (
+            design.n_tables > 20 * MAX_TABLES,
+            'method: "exact" sums over all studies that differ, and there is '
+            f'{listed} of them; "simulation" needs no list',
         )
-
-    @property
-    def is_jackknife(self) -> bool:
-        """Whether raters are left out, one at a time, of all studies at once."""
-        of_raters = self.target == "raters" and self.entry.shape == "ratings"
-        return of_raters and self.interval in ("auto", "t", "jackknife")
-
-    @property
-    def is_chosen(self) -> bool:
-        """Whether an interval is computed study by study."""
-        return self.interval not in _WALD and not self.is_jackknife
-
-    @property
-    def n_tables(self) -> float:
-        """How many studies there are that differ; infinite where none are listed."""
-        if not (self.has_rows and self.model.n_categories == 2):
-            return math.inf
-        cells = n_rows(self.model, self.n_raters, ordered=self.ordered)
-        return math.comb(self.n_items + cells - 1, cells - 1)
+    )
+    n, total = design.n_items, np.zeros((3, len(NUMBERS)))
+    log_p = np.log(np.maximum(design.p, 1e-300))
+    for freq in _tables(n, len(design.rows)):
+        logs = gammaln(n + 1) - gammaln(freq + 1.0).sum(axis=1) + freq @ log_p
+        total += moments(design, _of_freq(design, freq), np.exp(logs))
+    return numbers_of(total)[0], {}, 0
 
 
-@dataclass(frozen=True, slots=True)
-class StudySums:
-    """Sums over studies, by weight: counts of studies, or probabilities."""
+def _drawn(design: Design, progress: Progress | None) -> Shown:
+    # until the Monte Carlo errors are small, or as many as were asked for
+    is_resampled = design.study.interval == "bootstrap"
+    of_chosen = _RESAMPLED_TASK if is_resampled else _CHOSEN_TASK
+    size, factor = (of_chosen, 2.0) if design.is_chosen else (_TASK, 1.0)
+    total, task, n_tasks = np.zeros((3, len(NUMBERS))), 0, 1
+    while task < n_tasks:  # each has its own seed
+        rng = np.random.default_rng([design.study.seed, task])
+        total += simulated(design, rng, size)
+        task += 1
+        numbers, errors = numbers_of(total)
+        half = numbers.get("expected_half_width", 0.0) or math.inf
+        small = {"expected_half_width": _RELATIVE * half, **_SMALL}
+        ratio = max(errors.get(name, 0.0) / small[name] for name in small) / factor
+        n_tasks = min(max(task, math.ceil(ratio**2 * task)), _MAX_TASKS)
+        if design.study.n_studies is not None:
+            n_tasks = -(-design.study.n_studies // size)
+        if progress is not None:
+            progress(task * size, n_tasks * size)
+    return numbers, errors, task * size
 
-    # weight; weight of defined; then of defined studies the half-width, the ends and
-    # the estimate, each with its square; then weights of: narrow enough, rejecting,
-    # inside the limits, holding the truth
-    sums: Floats = field(compare=False, repr=False)  # (14,)
 
-    def __add__(self, other: "StudySums") -> "StudySums":
-        return StudySums(self.sums + other.sums)
-
-    @classmethod
-    def of(cls, design: StudyDesign, outcomes: Floats, weight: Floats) -> "StudySums":
-        """Sum up outcomes (n_studies, 4): estimate, half-width, low and high."""
-        value, half, low, high = outcomes.T
-        is_defined = ~np.isnan(half)
-        w = np.where(is_defined, weight, 0.0)
-        parts = [float(weight.sum()), float(w.sum())]
-        for number in (half, low, high, value):
-            plain = np.where(is_defined, number, 0.0)
-            parts += [float(w @ plain), float(w @ plain**2)]
-        narrow = half <= (design.half_width or math.inf) * (1.0 + _LEAST)
-        inside = (low >= _or(design.lower, -math.inf)) & (
-            high <= _or(design.upper, math.inf)
+def simulated(design: Design, rng: np.random.Generator, n_studies: int) -> Floats:
+    """Return moments of studies that are drawn, in blocks of about one size."""
+    if design.is_icc:
+        drawn = _drawn_agreement(design, rng, n_studies)
+        return moments(design, drawn, np.ones(n_studies))
+    total, has_rows = np.zeros((3, len(NUMBERS))), design.has_rows
+    size = len(design.rows) if has_rows else design.n_items * design.n_raters
+    block = max(1, 2 * _PLACES // size)
+    for start in range(0, n_studies, block):
+        n = min(block, n_studies - start)
+        outcomes = (
+            _of_freq(design, rng.multinomial(design.n_items, design.p, size=n))
+            if has_rows
+            else of_codes(design, draw(design, rng, n))
         )
-        holds = (low <= design.value + 1e-12) & (design.value - 1e-12 <= high)
-        for event in (narrow, _rejects(design, low, high), inside, holds):
-            parts.append(float(w @ event))
-        return cls(np.array(parts))
-
-    @property
-    def weight(self) -> float:
-        """Studies, or 1 where they are probabilities."""
-        return float(self.sums[0])
-
-    @property
-    def p_undefined(self) -> float:
-        """Share of studies without a coefficient or an interval."""
-        return max(0.0, 1.0 - float(self.sums[1] / self.sums[0]))
-
-    def mean(self, place: int) -> tuple[float, float]:
-        """Return mean and Monte Carlo error of half-width, low, high or estimate."""
-        n = float(self.sums[1])
-        if n == 0.0:
-            return math.nan, math.nan
-        first, second = self.sums[2 + 2 * place : 4 + 2 * place] / n
-        return float(first), math.sqrt(max(second - first**2, 0.0) / n)
-
-    def share(self, place: int) -> float:
-        """Return how often: narrow, rejecting, inside, or holding where defined."""
-        over = self.sums[1] if place == 3 else self.sums[0]
-        return float(self.sums[10 + place] / over) if over else math.nan
+        total += moments(design, outcomes, np.ones(n))
+    return total
 
 
-def _or(value: float | None, otherwise: float) -> float:
-    return otherwise if value is None else value
+def draw(design: Design, rng: np.random.Generator, n: int) -> Integers:
+    """Draw the ratings of n studies, (n, n_items, n_columns)."""
+    if design.entry.shape == "ratings":
+        return draw_ratings(design.model, rng, (n, design.n_items, design.n_raters))
+    # a rater's two gradings are those of two raters who never differ in bias
+    pairs = draw_ratings(design.model, rng, (n, design.n_items * design.n_raters, 2))
+    return pairs.reshape(n, design.n_items, 2 * design.n_raters)
 
 
-def _rejects(design: StudyDesign, low: Floats, high: Floats) -> NDArrayBool:
-    # the end of the interval on the side of the null value lies beyond it
-    if design.null is None:
-        return np.zeros(len(low), dtype=bool)
-    if design.value >= design.null:
-        return np.asarray(low > design.null)
-    return np.asarray(high < design.null)
+def _of_freq(design: Design, freq: Integers) -> Floats:
+    # how often each distinct row occurs (n_studies, n_rows) -> (n_studies, 3)
+    if not design.is_chosen:
+        return _wald(design, freq.astype(np.float64), design.rows)
+    distinct, place = np.unique(freq, axis=0, return_inverse=True)
+    known = [_chosen(design, design.rows.repeat(row, axis=0)) for row in distinct]
+    return np.array(known)[place.ravel()]
 
 
-class StudyMaker:
-    """The studies of a design: what is the same in all of them, made once."""
+def of_codes(design: Design, codes: Integers) -> Floats:
+    """Return half-width, low and high of studies (n_studies, n_items, n_raters)."""
+    if design.leaves_raters_out:
+        return _raters_left_out(design, codes)
+    if design.is_chosen:
+        return np.array([_chosen(design, study) for study in codes])
+    return _wald(design, np.ones(codes.shape[:2]), codes)
 
-    def __init__(self, design: StudyDesign) -> None:
-        self.design = design
-        self._intervals: dict[bytes, tuple[float, float, float]] = {}
 
-    @cached_property
-    def rows(self) -> Integers:
-        """Distinct rows of the ratings of an item."""
-        design = self.design
-        return rows_of(design.model, design.n_raters, ordered=design.ordered)
+@np.errstate(invalid="ignore")  # 0/0 where a study has no coefficient
+def _wald(design: Design, weight: Floats, codes: Integers) -> Floats:
+    # weight (n_studies, n_rows); rows that all studies have, or each its own
+    features, rows = design.features(codes), "rf" if codes.ndim == 2 else "srf"
+    sums = np.einsum(f"sr,{rows}->sf", weight, features, optimize=True)
+    u = np.einsum(f"sf,{rows}->sr", design.slopes(sums), features, optimize=True)
+    is_rated = features.any(axis=-1)
+    # a pair of ratings of an item; in a retest of one rater
+    is_pair = design.entry.shape == "pairs"
+    is_paired = is_rated if is_pair else (codes >= 0).sum(axis=-1) >= 2
+    n = (weight * is_rated).sum(axis=1)
+    n_paired = (weight * is_paired).sum(axis=1)
+    n = np.where(n > 1, n, np.nan)
+    # √[Σ (n u_i)² / (n (n - 1))] about the mean, as of every estimate
+    u = is_rated * (u - (weight * u).sum(axis=1, keepdims=True) / n[:, None])
+    error = np.sqrt((weight * u**2).sum(axis=1) * n / (n - 1.0))
+    upper = 0.5 + 0.5 * design.level
+    is_normal = design.study.interval == "normal"
+    t = stdtrit(np.maximum(n_paired - 1.0, 1.0), upper)
+    half = error * (ndtri(upper) if is_normal else t)
+    is_cut = design.study.interval == "analytic"
+    if is_cut:  # there is none without spread
+        half = np.where((error > 0.0) & (n_paired > 1), half, np.nan)
+    return _around(design, design.values(sums), half, is_cut=is_cut)
 
-    @cached_property
-    def p(self) -> Floats:
-        """How probable each is, (n_rows,)."""
-        p = probabilities(self.design.model, self.rows, ordered=self.design.ordered)
-        p = np.maximum(p, 0.0)
-        return np.asarray(p / p.sum())
 
-    @cached_property
-    def problem(self) -> IntervalProblem:
-        """The question about the ratings, of which each study has others."""
-        design = self.design
-        per_rater = 2 if design.entry.shape == "pairs" else 1
-        q, r = design.model.n_categories, design.n_raters * per_rater
-        codes = np.arange(q)[:, None] * np.ones((1, r), dtype=np.int64)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            return pose_problem(
-                replace(design.entry, code=lambda ratings, _categories: ratings),
-                CodedRatings(
-                    codes=codes, categories=design.model.scale or tuple(range(q))
-                ),
-                target=design.target,
-                categories=None,
-                weights=design.weights,
-                level=design.level,
-            )
+def _around(design: Design, value: Floats, half: Floats, *, is_cut: bool) -> Floats:
+    # intervals as an analysis gives them are cut at the ends of the scale
+    low, high = value - half, value + half
+    if not is_cut:
+        return np.column_stack([np.where(np.isnan(low), np.nan, half), low, high])
+    low = np.maximum(low, np.minimum(design.entry.lowest, value))
+    high = np.minimum(high, 1.0)
+    return np.column_stack([0.5 * (high - low), low, high])
 
-    @cached_property
-    def features(self) -> Floats:
-        """Features of each distinct row, (n_rows, n_features)."""
-        return self.features_of(self.rows)
 
-    def features_of(self, codes: Integers) -> Floats:
-        """Return the features of items, (n_items, n_features)."""
-        return self.problem.features(replace(self.problem.coded, codes=codes))
+def _raters_left_out(design: Design, codes: Integers) -> Floats:
+    # The rater jackknife of `intervals` for all studies at once; what that leaves
+    # undefined or without spread is left to the choice of `intervals`, one by one.
+    r = design.n_raters
+    every = [codes, *(np.delete(codes, rater, axis=2) for rater in range(r))]
+    value, *without = (design.values(design.features(of).sum(axis=1)) for of in every)
+    variance = (r - 1) ** 2 / r * np.var(without, axis=0, ddof=1)
+    half = stdtrit(r - 1, 0.5 + 0.5 * design.level) * np.sqrt(variance)
+    if design.study.interval == "t":
+        return _around(design, value, half, is_cut=False)
+    outcomes = _around(design, value, half, is_cut=True)
+    for study in np.flatnonzero(~(variance > 1e-3 / codes[0].size)):
+        outcomes[study] = _chosen(design, codes[study])
+    return outcomes
 
-    # -- the truth ----------------------------------------------------------------
 
-    def true_value(self) -> float:
-        """Return the coefficient of a population of items and of raters."""
-        value, _ = self._population(2)
-        return value
-
-    def item_sd(self) -> float:
-        """Return the standard deviation of what one item moves the coefficient by."""
-        return self._population(self.design.n_raters)[1]
-
-    def _population(self, n_raters: int) -> tuple[float, float]:
-        model = self.design.model
-        whole = replace(model, p_missing=0.0) if n_raters == 2 else model
-        ordered = self.design.ordered
-        rows = rows_of(whole, n_raters, ordered=ordered)
-        p = probabilities(whole, rows, ordered=ordered)
-        features = self.features_of(rows)
-        sums = _LARGE * (p @ features)
-        u = _LARGE * (features @ self._slopes(sums[None])[0])
-        matters = p * features.any(axis=1)
-        u -= matters @ u / matters.sum()
-        return float(self.problem.values(sums)), math.sqrt(float(matters @ u**2))
-
-    def _values(self, sums: Floats) -> Floats:
-        # 0/0 where a study has no coefficient
-        with np.errstate(invalid="ignore"):
-            return self.problem.values(sums)
-
-    def _slopes(self, sums: Floats) -> Floats:
-        # of the coefficient in each sum, (..., n_features)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return self.problem.slopes(sums)
-
-    # -- what studies show --------------------------------------------------------
-
-    def exact(self) -> StudySums:
-        """Sum over every study that there can be, by its probability."""
-        from scipy.special import gammaln
-
-        total = StudySums(np.zeros(14))
-        log_p = np.log(np.maximum(self.p, 1e-300))
-        n = self.design.n_items
-        for freq in _tables(n, len(self.rows)):
-            logs = gammaln(n + 1) - gammaln(freq + 1.0).sum(axis=1) + freq @ log_p
-            weight = np.exp(logs)
-            total += StudySums.of(self.design, self._of_freq(freq), weight)
-        return total
-
-    def simulate(self, rng: np.random.Generator, n_studies: int) -> StudySums:
-        """Sum over studies that are drawn, in blocks so that memory stays flat."""
-        design, total = self.design, StudySums(np.zeros(14))
-        size = len(self.rows) if design.has_rows else design.n_items * design.n_raters
-        block = max(1, min(n_studies, 2 * _PLACES // size))
-        for start in range(0, n_studies, block):
-            n = min(block, n_studies - start)
-            if design.has_rows:
-                freq = rng.multinomial(design.n_items, self.p, size=n)
-                outcomes = self._of_freq(freq)
-            else:
-                outcomes = self._of_codes(self._draw(rng, n))
-            total += StudySums.of(design, outcomes, np.ones(n))
-        return total
-
-    def _draw(self, rng: np.random.Generator, n: int) -> Integers:
-        design = self.design
-        if design.entry.shape == "ratings":
-            return draw_ratings(
-                design.model,
-                rng,
-                n_studies=n,
-                n_items=design.n_items,
-                n_raters=design.n_raters,
-            )
-        # a rater's two gradings are those of two raters who never differ in bias
-        n_pairs = design.n_items * design.n_raters
-        codes = draw_ratings(
-            design.model, rng, n_studies=n, n_items=n_pairs, n_raters=2
-        )
-        return codes.reshape(n, design.n_items, 2 * design.n_raters)
-
-    def _of_freq(self, freq: Integers) -> Floats:
-        # how often each distinct row occurs (n_studies, n_rows) -> (n_studies, 4)
-        if self.design.is_chosen:
-            distinct, place = np.unique(freq, axis=0, return_inverse=True)
-            results = [self._chosen(self.rows, row) for row in distinct]
-            return np.array(results).reshape(-1, 4)[place.ravel()]
-        weight = freq.astype(np.float64)
-        sums = weight @ self.features
-        slopes = self._slopes(sums)
-        u = slopes @ self.features.T
-        n_rated = weight @ self.features.any(axis=1)
-        mean = (weight * u).sum(axis=1) / np.maximum(n_rated, 1.0)
-        squares = (weight * u**2).sum(axis=1) - n_rated * mean**2
-        n_paired = weight @ ((self.rows >= 0).sum(axis=1) >= 2)
-        return self._wald(self._values(sums), squares, n_rated, n_paired)
-
-    def _wald(
-        self, value: Floats, squares: Floats, n_rated: Floats, n_paired: Floats
-    ) -> Floats:
-        from scipy.special import ndtri, stdtrit
-
-        n: Floats = np.where(n_rated > 1, n_rated, np.nan)
-        # √[Σ (n u_i)² / (n (n - 1))] about the mean, as of every estimate
-        error = np.sqrt(np.maximum(squares, 0.0) * n / (n - 1.0))
-        upper = 0.5 + 0.5 * self.design.level
-        df = np.maximum(n_paired - 1.0, 1.0)
-        is_normal = self.design.interval == "normal"
-        half = error * (ndtri(upper) if is_normal else stdtrit(df, upper))
-        if self.design.interval != "analytic":
-            return np.column_stack([value, half, value - half, value + half])
-        # as `analytic` gives it: cut at the ends of the scale, none without spread
-        has_spread = (error > 0.0) & (n_paired > 1)
-        return self._cut(value, np.asarray(np.where(has_spread, half, np.nan)))
-
-    def _cut(self, value: Floats, half: Floats) -> Floats:
-        lowest = np.minimum(self.design.entry.lowest, value)
-        low, high = np.maximum(value - half, lowest), np.minimum(value + half, 1.0)
-        return np.column_stack([value, 0.5 * (high - low), low, high])
-
-    def _of_codes(self, codes: Integers) -> Floats:
-        # codes (n_studies, n_items, n_raters) -> (n_studies, 4)
-        if self.design.is_jackknife:
-            return self._raters_left_out(codes)
-        if not self.design.is_chosen:
-            return self._wald_of_codes(codes)
-        return np.array([self._chosen_of_codes(of) for of in codes]).reshape(-1, 4)
-
-    def _chosen_of_codes(self, codes: Integers) -> tuple[float, ...]:
-        rows, freq = distinct_rows(codes, self.design.model.n_categories)
-        return self._chosen(rows, freq)
-
-    def _features_of_studies(self, codes: Integers) -> Floats:
-        n, n_items, n_raters = codes.shape
-        features = self.features_of(codes.reshape(-1, n_raters))
-        return features.reshape(n, n_items, -1)
-
-    def _wald_of_codes(self, codes: Integers) -> Floats:
-        features = self._features_of_studies(codes)
-        sums = features.sum(axis=1)
-        u = np.einsum("sif,sf->si", features, self._slopes(sums))
-        n_rated = features.any(axis=2).sum(axis=1).astype(float)
-        is_paired = (codes >= 0).sum(axis=2) >= 2
-        if self.design.entry.shape == "pairs":
-            is_paired = features.any(axis=2)  # a pair is of one rater
-        n_paired = is_paired.sum(axis=1).astype(float)
-        squares = (u**2).sum(axis=1) - u.sum(axis=1) ** 2 / np.maximum(n_rated, 1.0)
-        return self._wald(self._values(sums), squares, n_rated, n_paired)
-
-    def _raters_left_out(self, codes: Integers) -> Floats:
-        # The rater jackknife of `intervals` for all studies at once; what that leaves
-        # undefined or without spread is left to the choice of `intervals`, one by one.
-        from scipy.special import stdtrit
-
-        r = codes.shape[2]
-        value = self._values(self._features_of_studies(codes).sum(axis=1))
-        without = np.stack(
-            [
-                self._values(
-                    self._features_of_studies(np.delete(codes, rater, axis=2)).sum(1)
-                )
-                for rater in range(r)
-            ],
-            axis=1,
-        )
-        moved = without - without.mean(axis=1, keepdims=True)
-        variance = (r - 1) / r * (moved**2).sum(axis=1)
-        half = stdtrit(r - 1, 0.5 + 0.5 * self.design.level) * np.sqrt(variance)
-        if self.design.interval == "t":
-            return np.column_stack([value, half, value - half, value + half])
-        outcomes = self._cut(value, half)
-        for study in np.flatnonzero(~(variance > 1e-3 / codes[0].size)):
-            outcomes[study] = self._chosen_of_codes(codes[study])
-        return outcomes
-
-    def _chosen(self, rows: Integers, freq: Integers) -> tuple[float, ...]:
-        # the interval that an analysis would choose of one study
-        occurs = freq > 0
-        key = rows[occurs].tobytes() + freq[occurs].tobytes()
-        if key not in self._intervals:
-            self._intervals[key] = self._interval(rows[occurs], freq[occurs])
-        value, low, high = self._intervals[key]
-        return value, 0.5 * (high - low), low, high
-
-    def _interval(self, rows: Integers, freq: Integers) -> tuple[float, float, float]:
-        problem = rows_problem(self.problem, rows, freq)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UndefinedStatisticWarning)
-            warnings.simplefilter("ignore", SmallSampleWarning)
-            interval = self._interval_of(problem)
-        return problem.value, interval.low, interval.high
-
-    def _interval_of(self, problem: IntervalProblem) -> Interval:
-        # what an analysis would compute by the method that is planned
-        method = self.design.interval
-        if method in ("auto", "t"):
-            return choose_interval(problem, unweighted=problem.unweighted)[0]
-        if method == "jackknife":
-            return _interval_around_estimate(problem, _jackknife_variance(problem))
-        rows, freq = problem.distinct.codes, problem.distinct_freq
-        ratings = replace(problem.coded, codes=np.repeat(rows, freq, axis=0))
-        compute = bootstrap if method == "bootstrap" else posterior
-        return compute(
-            problem.entry,
+def _chosen(design: Design, codes: Integers) -> tuple[float, float, float]:
+    # the interval that an analysis would compute of one study
+    ratings: Any = CodedRatings(codes=codes, categories=design.model.scale)
+    if design.entry.shape == "pairs":  # rater by rater
+        labels = np.array([*design.model.scale, None], dtype=object)[codes]
+        ratings = labels.reshape(len(codes), -1, 2).transpose(1, 0, 2).tolist()
+    method = design.study.interval
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MasrelWarning)
+        interval = estimate(
+            design.entry.name,
             ratings,
-            target=self.design.target,
-            weights=self.design.weights,
-            level=self.design.level,
+            target=design.study.target,
+            method="auto" if method == "t" or method == "normal" else method,
+            categories=design.model.scale,
+            weights=design.study.weights,
+            level=design.level,
             rng=0,
-        )
+        ).interval
+    low, high = (math.nan,) * 2 if interval is None else (interval.low, interval.high)
+    return 0.5 * (high - low), low, high
+
+
+def _events(design: Design, outcomes: Floats) -> Floats:
+    # whether a study reaches each aim, and holds the truth, (n_studies, 3)
+    study, (half, low, high) = design.study, outcomes.T
+    events = dict.fromkeys(EVENTS, np.full(len(half), math.nan))
+    if has_limits(study):
+        lower, upper = limits_of(study)
+        events[number_of_limits(study)] = (low >= lower) & (high <= upper)
+    if study.half_width is not None:
+        events["assurance"] = half <= study.half_width * (1.0 + _LEAST)
+    if study.null is not None:  # the end on the side of the null lies beyond it
+        is_above = design.value >= study.null
+        events["power"] = low > study.null if is_above else high < study.null
+    events["coverage"] = (low <= design.value + _TINY) & (design.value - _TINY <= high)
+    return np.column_stack(list(events.values()))
+
+
+def moments(design: Design, outcomes: Floats, weight: Floats) -> Floats:
+    """Return sums of weights, of every number and of its square, (3, n_numbers)."""
+    is_defined = ~np.isnan(outcomes[:, :1])
+    x = np.column_stack([outcomes, _events(design, outcomes), ~is_defined])
+    counts = is_defined | ~_OF_DEFINED
+    w, x = weight[:, None] * counts, np.where(counts, x, 0.0)
+    return np.array([w.sum(axis=0), (w * x).sum(axis=0), (w * x**2).sum(axis=0)])
+
+
+def numbers_of(moments: Floats) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the means over studies that there are, and their Monte Carlo errors."""
+    n, sums, squares = moments
+    with np.errstate(invalid="ignore"):
+        mean = sums / n
+        error = np.sqrt(np.maximum(squares / n - mean**2, 0.0) / n)
+    return _named(NUMBERS, mean), _named(NUMBERS, error)
+
+
+def _named(names: Sequence[str], numbers: Floats) -> dict[str, float]:
+    every = zip(names, numbers.tolist(), strict=True)
+    return {name: number for name, number in every if not math.isnan(number)}
 
 
 def _tables(n: int, n_cells: int) -> Iterator[Integers]:
     """Yield every way in which n items fall into cells, in blocks of rows."""
-    if n_cells * math.comb(n + n_cells - 1, n) <= _PLACES:
-        yield _all_tables(n, n_cells)
+    if n_cells * math.comb(n + n_cells - 1, n) > _PLACES:
+        for count in range(n + 1):
+            for rest in _tables(n - count, n_cells - 1):
+                yield np.column_stack([np.full(len(rest), count), rest])
         return
-    for count in range(n + 1):
-        for rest in _tables(n - count, n_cells - 1):
-            yield np.column_stack([np.full(len(rest), count), rest])
-
-
-def _all_tables(n: int, n_cells: int) -> Integers:
     # cell by cell: each row as often as there are counts left for the next cell
     tables, left = np.zeros((1, 0), dtype=np.int64), np.array([n])
     for _ in range(n_cells - 1):
         row = np.repeat(np.arange(len(left)), left + 1)
-        count = np.arange(len(row)) - np.repeat(
-            np.cumsum(left + 1) - left - 1, left + 1
-        )
+        count = np.arange(len(row)) - (np.cumsum(left + 1) - left - 1)[row]
         tables, left = np.column_stack([tables[row], count]), left[row] - count
-    return np.column_stack([tables, left])
+    yield np.column_stack([tables, left])
 
 
-def check_raters(design: StudyDesign) -> None:
-    """Check that the coefficient and the target can have so many raters."""
-    fewest, most = design.entry.n_raters
-    if design.target != "items" and design.entry.shape == "ratings":
-        fewest = 3
-    if design.n_raters < fewest or design.n_raters > (most or design.n_raters):
-        raise ParameterError(
-            f"n_raters: {design.entry.title} for other {design.target} needs "
-            f"{fewest if most != fewest else f'{fewest} exactly,'} "
-            f"{'or more, ' if most is None else ''}got {design.n_raters}"
-        )
+# -- intraclass correlations: mean squares of normal ratings --------------------------
+
+
+def icc_ratio(r: float, k: int) -> float:
+    """Return θ = (1 + (k - 1) ρ)/(1 - ρ), the ratio of expected mean squares."""
+    return (1 + (k - 1) * r) / (1 - r)
+
+
+def _exact_icc(design: Design) -> dict[str, float]:
+    # ICC(1) and ICC(C,1), from the F distribution of the ratio of mean squares
+    f, weight = _ratios(design)
+    numbers, _ = numbers_of(moments(design, _of_ratios(design, f), weight))
+    return {**numbers, **_named(EVENTS, _probabilities_of_events(design, f))}
+
+
+def _degrees(design: Design) -> tuple[float, float]:
+    """Return the degrees of freedom of the two mean squares."""
+    n, k = design.n_items, design.n_raters
+    is_one_way = design.study.coefficient == ONE_WAY
+    return float(n - 1), float(n * (k - 1) if is_one_way else (n - 1) * (k - 1))
+
+
+def _ratios(design: Design) -> tuple[Floats, Floats]:
+    """Return ratios F of mean squares on a grid, and how probable each is."""
+    first, second = _degrees(design)
+    # log of F/θ on a grid that holds all but 1e-15 of it
+    ends = np.log(fdtri(first, second, [1e-15, 1 - 1e-15]))
+    x = np.linspace(float(ends[0]), float(ends[1]), _NODES)
+    # density of log F, by the trapezoid rule
+    logs = 0.5 * first * (x + math.log(first / second))
+    logs -= 0.5 * (first + second) * np.log1p(first / second * np.exp(x))
+    logs += gammaln(0.5 * (first + second)) - gammaln(0.5 * first)
+    weight = np.exp(logs - gammaln(0.5 * second))
+    theta = icc_ratio(design.value, design.n_raters)
+    return theta * np.exp(x), weight / weight.sum()
+
+
+def _of_ratios(design: Design, f: Floats) -> Floats:
+    """Return half-width, low and high of studies by their F, (n_studies, 3)."""
+    # McGraw and Wong (1996), table 7, for single ratings
+    first, second = _degrees(design)
+    upper, k = 0.5 + 0.5 * design.level, design.n_raters
+    up, down = fdtri(first, second, upper), fdtri(second, first, upper)
+    low, high = ((ratio - 1) / (ratio + k - 1) for ratio in (f / up, f * down))
+    return np.column_stack([0.5 * (high - low), low, high])
+
+
+def _probabilities_of_events(design: Design, f: Floats) -> Floats:
+    """Return how probable events are; each begins and ends between nodes of F."""
+    occurs = _events(design, _of_ratios(design, f))
+    place, event = np.nonzero(np.diff(np.nan_to_num(occurs), axis=0))
+    before, low, high = occurs[place, event], f[place], f[place + 1]
+    for _ in range(_HALVES):
+        middle = 0.5 * (low + high)
+        there = _events(design, _of_ratios(design, middle))
+        is_before = there[np.arange(len(place)), event] == before
+        low, high = np.where(is_before, middle, low), np.where(is_before, high, middle)
+    theta = icc_ratio(design.value, design.n_raters)
+    step = (2.0 * before - 1.0) * fdtr(*_degrees(design), low / theta)
+    return np.asarray(occurs[-1] + np.bincount(event, step, occurs.shape[1]))
+
+
+def _drawn_agreement(
+    design: Design, rng: np.random.Generator, n_studies: int
+) -> Floats:
+    """Return outcomes of studies of ICC(A,1) whose mean squares are drawn."""
+    n, k, r = design.n_items, design.n_raters, design.value
+    # variance of items 1; raters and residual share (1 - ρ)/ρ
+    error = (1.0 - r) / r
+    of_raters = design.study.rater_share * error
+    residual = error - of_raters
+    rows = (k + residual) * rng.chisquare(n - 1, n_studies) / (n - 1)
+    columns = (n * of_raters + residual) * rng.chisquare(k - 1, n_studies) / (k - 1)
+    df = (n - 1) * (k - 1)
+    rest = residual * rng.chisquare(df, n_studies) / df
+    value = (rows - rest) / (rows + (k - 1) * rest + k * (columns - rest) / n)
+    low, high = _absolute_ends(n, k, (rows, columns, rest), value, design.level)
+    return np.column_stack([0.5 * (high - low), low, high])

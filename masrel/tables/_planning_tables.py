@@ -1,7 +1,7 @@
 """Plans as a table, a sentence for a protocol, JSON, TOML, and a curve."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 
 from masrel.agreement import coefficient
@@ -10,6 +10,7 @@ from masrel.plots._drawn_values import PlanCurve, PlanCurves
 from masrel.tables._tables import (
     Column,
     Table,
+    Value,
     number,
     percent,
     rounded,
@@ -17,28 +18,46 @@ from masrel.tables._tables import (
 )
 
 _TARGETS = {"items": "items", "raters": "raters", "both": "items and raters"}
-_COLUMNS = (
-    Column(key="line", heading="line of the plan", align="left"),
-    Column(key="interval", heading="interval", align="left"),
-    Column(key="target", heading="for other", align="left"),
-    Column(key="prevalences", heading="prevalences", align="left"),
-    Column(key="value", heading="κ or ICC", digits=3),
-    Column(key="n_items", heading="items"),
-    Column(key="n_raters", heading="raters"),
-    Column(key="half_width", heading="half-width", digits=3),
-    Column(key="low", heading="low", digits=3),
-    Column(key="high", heading="high", digits=3),
-    Column(key="assurance", heading="assurance", digits=3),
-    Column(key="power", heading="power", digits=3),
-    Column(key="coverage", heading="coverage", digits=3),
-    Column(key="p_undefined", heading="undefined", digits=3),
-    Column(key="reaches", heading="reaches the aim", align="left"),
-    Column(key="cost", heading="cost", digits=0),
-    Column(key="monte_carlo_error", heading="Monte Carlo error", digits=4),
-    Column(key="method", heading="method", align="left"),
-)
+_REACHES = {True: "yes", False: "no", None: None}
 _EQUAL = 1e-9  # prevalences that differ by less
-_OF_LINES = ("line", "interval", "target")  # what differs by line of a plan
+_COMPUTED = ("expected_half_width", "expected_low", "expected_high")
+_CHANCES = ("assurance", "power", "coverage")
+
+
+def _column(key: str, heading: str | None = None, digits: int | None = 3) -> Column:
+    return Column(key=key, heading=key if heading is None else heading, digits=digits)
+
+
+def _text(key: str, heading: str) -> Column:
+    return Column(key=key, heading=heading, align="left")
+
+
+# columns after that of lines, and what they show of a plan: None where there is nothing
+_COLUMNS: tuple[tuple[Column, Callable[[Plan], Value]], ...] = (
+    (_text("interval", "interval"), lambda plan: plan.interval),
+    (_text("target", "for other"), lambda plan: _TARGETS[plan.target]),
+    (
+        _text("prevalences", "prevalences"),
+        lambda plan: ", ".join(significant(share, 3) for share in plan.prevalences),
+    ),
+    (_column("value", "κ or ICC"), lambda plan: plan.value),
+    (_column("n_items", "items", None), lambda plan: plan.n_items),
+    (_column("n_raters", "raters", None), lambda plan: plan.n_raters),
+    (_column("half_width", "half-width"), lambda plan: plan.expected_half_width),
+    (_column("low"), lambda plan: plan.expected_low),
+    (_column("high"), lambda plan: plan.expected_high),
+    (_column("assurance"), lambda plan: plan.assurance),
+    (_column("power"), lambda plan: plan.power),
+    (_column("coverage"), lambda plan: plan.coverage),
+    (_column("p_undefined", "undefined"), lambda plan: plan.p_undefined),
+    (_text("reaches", "reaches the aim"), lambda plan: _REACHES[plan.reaches_aim]),
+    (_column("cost", digits=0), lambda plan: plan.cost),
+    (
+        _column("monte_carlo_error", "Monte Carlo error", 4),
+        lambda plan: plan.monte_carlo_error if plan.n_studies else None,
+    ),
+    (_text("method", "method"), lambda plan: plan.method),
+)
 
 
 def planning_table(plans: Sequence[Plan], *, labels: Sequence[str] = ()) -> Table:
@@ -51,93 +70,52 @@ def planning_table(plans: Sequence[Plan], *, labels: Sequence[str] = ()) -> Tabl
         if not labels
         else "What the study can show, by line of its plan"
     )
-    lines: Sequence[str | None] = labels or [None] * len(plans)
-    rows = [_row(plan, line) for line, plan in zip(lines, plans, strict=True)]
-    shown = _shown(plans, has_lines=bool(labels), rows=rows)
+    shown: dict[Column, Sequence[Value]]
+    shown = {_text("line", "line of the plan"): list(labels)} if labels else {}
+    # of one plan that reaches its aim that is not said, nor what all plans share
+    hidden = {"reaches"} if len(plans) == 1 and first.reaches_aim else set()
+    hidden |= set() if labels else {"interval", "target"}
+    hidden |= (
+        {"prevalences"} if len({plan.prevalences for plan in plans}) < 2 else set()
+    )
+    for column, value_of in _COLUMNS:
+        values = [None if _is_nan(value_of(plan)) else value_of(plan) for plan in plans]
+        if column.key not in hidden and any(value is not None for value in values):
+            shown[column] = values
     return Table(
         name="plan",
         caption=caption,
-        columns=tuple(column for column in _COLUMNS if column.key in shown),
-        rows=tuple(
-            tuple(
-                value
-                for column, value in zip(_COLUMNS, row, strict=True)
-                if column.key in shown
-            )
-            for row in rows
-        ),
+        columns=tuple(shown),
+        rows=tuple(zip(*shown.values(), strict=True)),
         notes=_notes(plans),
         data="foreign",
     )
 
 
-def _row(plan: Plan, label: str | None) -> tuple[float | int | str | None, ...]:
-    numbers = (
-        plan.expected_half_width,
-        plan.expected_low,
-        plan.expected_high,
-        plan.assurance,
-        plan.power,
-        plan.coverage,
-        plan.p_undefined,
-    )
-    reaches = {True: "yes", False: "no", None: None}[plan.reaches_aim]
-    return (
-        label,
-        plan.interval,
-        _TARGETS[plan.target],
-        ", ".join(significant(share, 3) for share in plan.prevalences),
-        plan.value,
-        plan.n_items,
-        plan.n_raters,
-        *(None if math.isnan(x) else x for x in numbers),
-        reaches,
-        None if math.isnan(plan.cost) else plan.cost,
-        plan.monte_carlo_error if plan.n_studies else None,
-        plan.method,
-    )
-
-
-def _shown(
-    plans: Sequence[Plan],
-    *,
-    has_lines: bool,
-    rows: Sequence[tuple[float | int | str | None, ...]],
-) -> set[str]:
-    # columns that say something: of lines, what differs, and what was computed
-    shown = {
-        column.key
-        for place, column in enumerate(_COLUMNS)
-        if any(row[place] is not None for row in rows)
-    }
-    shown -= set() if has_lines else set(_OF_LINES)
-    if len({plan.prevalences for plan in plans}) < 2:
-        shown -= {"prevalences"}
-    is_solved = len(plans) == 1 and plans[0].reaches_aim is True
-    return shown - ({"reaches"} if is_solved else set())
+def _is_nan(value: object) -> bool:
+    return isinstance(value, float) and math.isnan(value)
 
 
 def _notes(plans: Sequence[Plan]) -> tuple[str, ...]:
-    notes = {
+    notes = [
         "half-width, low and high are expected ones: about half of all studies have a "
-        "wider interval": None
-    }
-    if any(plan.n_studies for plan in plans):
+        "wider interval"
+    ]
+    if n := sum(plan.n_studies for plan in plans):
         seeds = sorted({plan.seed for plan in plans if plan.seed is not None})
-        n = sum(plan.n_studies for plan in plans)
-        notes[
+        notes.append(
             f"{n} simulated studies, seed {', '.join(map(str, seeds))}; the Monte "
             "Carlo error is that of the number aimed at, else of the half-width"
-        ] = None
+        )
     reaching = [plan for plan in plans if plan.reaches_aim]
     if len(plans) > 1 and reaching:
         best = min(reaching, key=lambda plan: plan.cost)
-        notes[
+        notes.append(
             f"the cheapest of these that reaches the aim: {best.n_items} items and "
             f"{best.n_raters} raters, cost {significant(best.cost)}"
-        ] = None
-    notes.update({note: None for plan in plans for note in plan.notes})
-    return tuple(notes)
+        )
+    notes += [note for plan in plans for note in plan.notes]
+    return tuple(dict.fromkeys(notes))
 
 
 def planning_sentence(plan: Plan) -> str:
@@ -197,17 +175,11 @@ def _model(plan: Plan) -> str:
 
 def planning_document(plans: Sequence[Plan]) -> dict[str, object]:
     """Return plans as JSON has them: every digit, null for what is not computed."""
-    return {"plans": [_without_nan(asdict(plan)) for plan in plans]}
-
-
-def _without_nan(values: dict[str, object]) -> dict[str, object]:
     return {
-        key: None
-        if isinstance(value, float) and not math.isfinite(value)
-        else dict(value)
-        if isinstance(value, dict)
-        else value
-        for key, value in values.items()
+        "plans": [
+            {key: None if _is_nan(x) else x for key, x in asdict(plan).items()}
+            for plan in plans
+        ]
     }
 
 
@@ -252,84 +224,51 @@ def _estimate_lines(plan: Plan, name: str) -> tuple[str, ...]:
 
 def _toml_values(plan: Plan) -> Iterator[tuple[str, str]]:
     # keys of [[analysis.sample_sizes]]; what is not there is left out
-    shares = () if plan.table else plan.prevalences
-    for key, value in (
-        ("n_items", plan.n_items),
-        ("n_raters", plan.n_raters),
-        ("value", plan.value),
-        ("model", f'"{plan.model}"'),
-        ("prevalences", [*shares] or None),
-        ("table", [[*row] for row in plan.table] or None),
-        ("p_missing", plan.p_missing or None),
-        ("sides", plan.sides if plan.sides == 1 else None),
-        *(
-            (key, getattr(plan, key))
-            for key in ("half_width", "lower", "upper", "null")
-        ),
-        *((key, _to_digits(plan, key)) for key in _COMPUTED),
-        ("method", f'"{plan.method}"'),
-        ("n_studies", plan.n_studies or None),
-        ("seed", plan.seed if plan.n_studies else None),
-    ):
+    aims = ("half_width", "lower", "upper", "null")
+    computed = {key: getattr(plan, key) for key in (*_COMPUTED, *_CHANCES)}
+    for key, value in {
+        "n_items": plan.n_items,
+        "n_raters": plan.n_raters,
+        "value": plan.value,
+        "model": f'"{plan.model}"',
+        "prevalences": None if plan.table else [*plan.prevalences] or None,
+        "table": [[*row] for row in plan.table] or None,
+        "p_missing": plan.p_missing or None,
+        "sides": plan.sides if plan.sides == 1 else None,
+        **{key: getattr(plan, key) for key in aims},
+        # four digits, which is more than a plan is exact to
+        **{k: rounded(x, 4) for k, x in computed.items() if not math.isnan(x)},
+        "method": f'"{plan.method}"',
+        "n_studies": plan.n_studies or None,
+        "seed": plan.seed if plan.n_studies else None,
+    }.items():
         if value is not None:
             yield key, str(value)
 
 
-_COMPUTED = (
-    "expected_half_width",
-    "expected_low",
-    "expected_high",
-    "assurance",
-    "power",
-    "coverage",
-)
-
-
-def _to_digits(plan: Plan, key: str) -> float | None:
-    # four digits, which is more than a plan is exact to
-    value = getattr(plan, key)
-    return None if math.isnan(value) else rounded(value, 4)
-
-
-def planning_curves(
-    plans: Sequence[Plan],
-    *,
-    power: float | None = None,
-    assurance: float | None = None,
-) -> PlanCurves:
+def planning_curves(plans: Sequence[Plan], aim: Mapping[str, float]) -> PlanCurves:
     """Return what plans aim at, else their half-width, over items or over raters."""
-    name, what, limit = _drawn(plans, power, assurance)
+    has_power = not any(math.isnan(plan.power) for plan in plans)
+    name = "power" if has_power else "expected_half_width"
+    name = "assurance" if "assurance" in aim else name
     several = len({plan.value for plan in plans}) > 1
     over_items = len({plan.n_items for plan in plans}) > 1
+    over, other = ("items", "raters") if over_items else ("raters", "items")
     groups: dict[tuple[int, float, tuple[float, ...]], list[Plan]] = {}
     for plan in plans:
-        n_others = plan.n_raters if over_items else plan.n_items
-        groups.setdefault((n_others, plan.value, plan.prevalences), []).append(plan)
-    other = "raters" if over_items else "items"
+        key = (getattr(plan, f"n_{other}"), plan.value, plan.prevalences)
+        groups.setdefault(key, []).append(plan)
     return PlanCurves(
         title=coefficient(plans[0].coefficient).title,
-        what=what,
-        over="items" if over_items else "raters",
-        limit=limit,
+        what=name.replace("_", " ").replace("half ", "half-"),
+        over=over,
+        limit=aim.get(name, plans[0].half_width),
         curves=tuple(
             PlanCurve(
                 label=f"{n} {other}" + (f", {significant(value)}" if several else ""),
-                sizes=tuple(
-                    plan.n_items if over_items else plan.n_raters for plan in group
-                ),
+                sizes=tuple(getattr(plan, f"n_{over}") for plan in group),
                 numbers=tuple(getattr(plan, name) for plan in group),
             )
             for (n, value, _), group in groups.items()
         ),
     )
-
-
-def _drawn(
-    plans: Sequence[Plan], power: float | None, assurance: float | None
-) -> tuple[str, str, float | None]:
-    # which number of the plans, its name, and what it is to reach
-    if assurance is not None:
-        return "assurance", "assurance", assurance
-    if all(not math.isnan(plan.power) for plan in plans):
-        return "power", "power", power
-    return "expected_half_width", "expected half-width", plans[0].half_width

@@ -26,19 +26,16 @@ def test_the_number_of_items_is_solved_for(masrel: Caller) -> None:
     assert json.loads(less.out)["plans"][0]["expected_half_width"] > 0.2
 
 
-def test_a_sentence_for_a_protocol(masrel: Caller) -> None:
-    done = masrel(*KAPPA, "--raters", "2", "--items", "30", "--sentence")
-    assert done.out.startswith(
-        "With 30 items and 2 raters, the 95 % interval of Fleiss' κ for other items "
-        "has an expected half-width of 0.331 (0.254 to 0.916), with coverage 0.923, if "
-        "the coefficient is 0.6 (mixture model with prevalences 0.7, 0.3; summed over"
-    )
-
-
-def test_equal_prevalences_are_called_so(masrel: Caller) -> None:
-    size = ("--raters", "2", "--items", "30", "--prevalences", "0.5,0.5")
-    done = masrel(*KAPPA, *size, "--sentence")
-    assert "(mixture model with prevalences all 2 equal; summed over" in done.out
+@pytest.mark.parametrize(
+    ("shares", "words"),
+    [
+        ("0.7,0.3", "(0.254 to 0.916), with coverage 0.923, if the coefficient is 0.6"),
+        ("0.5,0.5", "(mixture model with prevalences all 2 equal; summed over"),
+    ],
+)
+def test_a_sentence_for_a_protocol(masrel: Caller, shares: str, words: str) -> None:
+    size = ("--raters", "2", "--items", "30", "--prevalences", shares)
+    assert words in masrel(*KAPPA, *size, "--sentence").out
 
 
 def test_lines_for_a_protocol_are_toml(masrel: Caller) -> None:
@@ -66,51 +63,18 @@ def plans_of(masrel: Caller, *options: object) -> list[dict[str, Any]]:
     return plans
 
 
-def test_one_size_is_solved_for_in_every_cell_of_a_grid(masrel: Caller) -> None:
-    aim = ("--null", "0.2", "--power", "0.8")
-    plans = plans_of(masrel, *KAPPA, "--raters", "2,3", *aim)
-    assert [plan["n_raters"] for plan in plans] == [2, 3]
-    assert plans[0]["n_items"] > plans[1]["n_items"]
-    assert all(plan["reaches_aim"] and plan["power"] >= 0.8 for plan in plans)
-
-
-def test_a_grid_says_which_sizes_reach_the_aim_and_which_is_cheapest(
-    masrel: Caller,
-) -> None:
-    sizes = ("--raters", "2,3", "--items", "40,60,80")
-    aim = ("--half-width", "0.2", "--assurance", "0.8", "--prices", "5,20,1")
-    done = masrel(*KAPPA, *sizes, *aim)
-    rows = [line.split() for line in done.out.splitlines() if line.startswith("   0.6")]
-    yes = {(row[1], row[2]): row[9] for row in rows}
-    assert yes["40", "3"] == "no"
-    assert yes["60", "3"] == "yes"
-    assert "the cheapest of these that reaches the aim: 60 items and 3 raters" in (
-        done.out
-    )
-
-
 def test_an_aim_at_a_known_size_says_whether_it_is_reached(masrel: Caller) -> None:
     size = ("--items", "40", "--raters", "3", "--null", "0.4")
     (plan,) = plans_of(masrel, *KAPPA, *size, "--power", "0.9")
     assert plan["reaches_aim"] is False
 
 
-def test_with_prices_the_cheapest_of_both_is_solved_for(masrel: Caller) -> None:
-    aim = ("--half-width", "0.35", "--prices", "5,20,1")
-    (plan,) = plans_of(masrel, *KAPPA, *aim)
-    assert plan["expected_half_width"] <= 0.35
-    done = masrel(*KAPPA, *aim, "--max-cost", "150")
-    assert done.code == 2
-    assert "max_cost: a half-width of 0.35 is not reached for 150; the" in done.err
-
-
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Few studies, since only where plans come from is looked at."""
-    monkeypatch.setattr("masrel.planning._tasks.TASK", 20)
-    monkeypatch.setattr("masrel.planning._tasks._CHOSEN_TASK", 5)
-    monkeypatch.setattr("masrel.planning._tasks._RELATIVE", 1.0)
-    monkeypatch.setattr("masrel.planning._tasks._SHARE", 1.0)
+    monkeypatch.setattr("masrel.planning._studies._TASK", 20)
+    monkeypatch.setattr("masrel.planning._studies._CHOSEN_TASK", 5)
+    monkeypatch.setattr("masrel.planning._studies._RELATIVE", 1.0)
 
 
 @pytest.fixture
@@ -213,17 +177,6 @@ def test_a_study_has_its_own_plan(
     assert words in done.err
 
 
-def test_how_long_it_takes_is_told_once_some_studies_are_drawn(
-    masrel: Caller, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("masrel.planning._tasks.TASK", 1_000)
-    monkeypatch.setattr("masrel.cli.plan._SHORT_S", 0.0)
-    sizes = ("--raters", "4", "--items", "20", "--prevalences", "0.4,0.3,0.3")
-    loud = [option for option in KAPPA if option != "--quiet"]
-    assert "planning: about 1 s\n" in masrel(*loud, *sizes).err
-    assert "planning" not in masrel(*KAPPA, *sizes).err
-
-
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -233,9 +186,9 @@ def test_how_long_it_takes_is_told_once_some_studies_are_drawn(
         ((), "n_items, n_raters: needs exactly one of them"),
         (("--items", "5,6"), "half_width: needs an aim, where one of the sizes is"),
         (("--value", "0.4,0.6"), "n_items, n_raters: a grid needs one of them"),
-        (("--items", "0", "--raters", "2"), "n_items: needs a whole number above 0"),
-        (("--raters", "2", "--prevalences", "a"), "--prevalences: needs numbers as"),
-        (("--raters", "2", "--prices", "1"), "--prices: needs three"),
+        (("--items", "0", "--raters", "2"), "n_items: needs a whole number above 1"),
+        (("--raters", "2", "--prevalences", "a"), "needs numbers as 10,20"),
+        (("--raters", "2", "--prices", "1"), "needs 3 numbers, got 1"),
         (
             ("--raters", "2", "--items", "9", "--power", ".8"),
             "power: needs null, lower",
@@ -250,13 +203,8 @@ def test_how_long_it_takes_is_told_once_some_studies_are_drawn(
             "--method: a grid is",
         ),
         (
-            ("--raters", "2", "--items", "9", "--resume", "x.json"),
-            "--resume: is of grids",
-        ),
-        (("--raters", "2", "--items", "9", "--studies", "9"), "--studies: is of grids"),
-        (
-            ("--items", "9,8", "--resume", "x", "--half-width", ".2"),
-            "file: is of grids",
+            ("--raters", "2", "--items", "9", "--scheduler", "x"),
+            "--scheduler: is of grids",
         ),
         (("--prices", "1,1,1"), "half_width: needs an aim"),
         (

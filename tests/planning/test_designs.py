@@ -5,22 +5,17 @@ from typing import Any
 
 import pytest
 
-from docs.make.planning import DESIGNS, came_true, number_of, planned
-from masrel.planning import sample_size
+from docs.make.planning import DESIGNS, came_true, number_of
+from masrel.planning import Study, sample_size
 
 
 def holds(design: dict[str, Any], n_studies: int) -> None:
     """Compare within 2 %, or four Monte Carlo errors of both sides."""
-    plan = sample_size(**design)
-    sums = came_true(design, plan, n_studies)
-    number, wanted = number_of(design, sums), planned(design, plan)
-    error = (
-        math.sqrt(number * (1.0 - number) / n_studies)
-        if plan.power > 0.0 or "assurance" in design
-        else sums.mean(0)[1]
-    )
-    both = math.hypot(error, plan.monte_carlo_error)
-    assert number == pytest.approx(wanted, abs=max(4.0 * both, 0.02 * wanted))
+    plan, name = sample_size(Study(**design)), number_of(design)
+    numbers, errors = came_true(design, plan, n_studies)
+    wanted = getattr(plan, name)
+    both = math.hypot(errors[name], plan.monte_carlo_error)
+    assert numbers[name] == pytest.approx(wanted, abs=max(4.0 * both, 0.02 * wanted))
 
 
 @pytest.mark.long

@@ -2,14 +2,15 @@
 
 import itertools
 import math
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from masrel.agreement import coefficient
-from masrel.intervals import analytic, estimate
-from masrel.planning import precision
+from masrel.agreement import CodedRatings, coefficient
+from masrel.planning import Study, precision
+from masrel.planning._planned_design import design_of
+from masrel.planning._studies import draw
 
 MODELS = ["mixture", "dirichlet-multinomial", "latent"]
 
@@ -58,16 +59,18 @@ def test_the_sum_over_all_studies_is_that_of_an_enumeration(
     reference = enumerated(model, n_items, n_raters, name)
     kappa = true_value(name)
     plan = precision(
-        name,
-        value=kappa,
-        prevalences=[0.7, 0.3],
-        model=model,
-        target="items",
-        n_items=n_items,
-        n_raters=n_raters,
-        half_width=0.6,
-        interval="normal",
-        method="exact",
+        Study(
+            name,
+            value=kappa,
+            prevalences=[0.7, 0.3],
+            model=model,
+            target="items",
+            n_items=n_items,
+            n_raters=n_raters,
+            half_width=0.6,
+            interval="normal",
+            method="exact",
+        )
     )
     assert plan.expected_half_width == pytest.approx(reference["half"], abs=1e-9)
     assert plan.assurance == pytest.approx(reference["narrow"], abs=1e-9)
@@ -82,26 +85,55 @@ def true_value(name: str) -> float:
     return 1 - disagreement / (1 - 2 * 0.7 * 0.3)
 
 
+@pytest.mark.parametrize(
+    ("name", "n_raters", "p_missing"),
+    [
+        ("fleiss_kappa", 2, 0.2),
+        ("fleiss_kappa", 4, 0.2),
+        ("pooled_kappa", 1, 0.0),
+        ("stratified_kappa", 3, 0.0),
+    ],
+)
+def test_the_formula_is_near_what_studies_show(
+    name: str, n_raters: int, p_missing: float
+) -> None:
+    study = Study(
+        name,
+        value=0.5,
+        prevalences=[0.5, 0.3, 0.2],
+        model="mixture",
+        target="items",
+        n_items=150,
+        n_raters=n_raters,
+        p_missing=p_missing,
+        interval="normal",
+        rng=1,
+    )
+    shown = precision(study).expected_half_width
+    formula = precision(replace(study, method="wald")).expected_half_width
+    assert formula == pytest.approx(shown, rel=0.01)
+
+
 @pytest.mark.parametrize("p_missing", [0.0, 0.2])
 @pytest.mark.parametrize("model", MODELS)
 def test_drawn_ratings_have_the_prevalences_and_the_kappa(
     model: str, p_missing: float
 ) -> None:
     # 400 studies of 50 items; four standard errors fail once in 15 000 runs
-    from masrel.planning._aims import Aim
-    from masrel.planning._item_models import draw_ratings
-    from masrel.planning._plan_question import pose_question
-
-    question = question_of(model, p_missing, Aim(), pose_question)
-    codes = draw_ratings(
-        question.model,
-        np.random.default_rng(7),
-        n_studies=1,
+    study = Study(
+        "fleiss_kappa",
+        value=0.4,
+        prevalences=[0.5, 0.3, 0.2],
+        model=model,
+        target="items",
+        p_missing=p_missing,
         n_items=20_000,
         n_raters=3,
-    )[0]
-    ratings = np.where(codes < 0, None, codes.astype(object))  # type: ignore[call-overload]
-    result = coefficient("fleiss_kappa")(ratings.tolist(), categories=[0, 1, 2])
+    )
+    codes = draw(design_of(study), np.random.default_rng(7), 1)[0]
+    result = coefficient("fleiss_kappa")(
+        CodedRatings(codes=codes, categories=(0, 1, 2))
+    )
     # raters' biases are only three in one study, so that kappa of a latent trait moves
     error = 0.05 if model == "latent" else 4 * result.standard_error
     assert result.value == pytest.approx(0.4, abs=error)
@@ -109,75 +141,3 @@ def test_drawn_ratings_have_the_prevalences_and_the_kappa(
     wide = 0.1 if model == "latent" else 0.015
     assert shares == pytest.approx([0.5, 0.3, 0.2], abs=wide)
     assert (codes < 0).mean() == pytest.approx(p_missing, abs=0.01)
-
-
-def question_of(model: str, p_missing: float, aim: Any, pose_question: Any) -> Any:
-    return pose_question(
-        coefficient="fleiss_kappa",
-        value=0.4,
-        weights="identity",
-        categories=3,
-        prevalences=[0.5, 0.3, 0.2],
-        model=model,
-        target="items",
-        p_missing=p_missing,
-        level=0.95,
-        sides=2,
-        interval="auto",
-        method="auto",
-        aim=aim,
-        prices=(0.0, 0.0, 1.0),
-        max_cost=None,
-        rng=1,
-        rater_share=1 / 3,
-    )
-
-
-@pytest.mark.filterwarnings("ignore::masrel.errors.SmallSampleWarning")
-@pytest.mark.parametrize("p_missing", [0.0, 0.15])
-@pytest.mark.parametrize(
-    ("name", "weights"),
-    [
-        ("fleiss_kappa", "quadratic"),
-        ("krippendorff_alpha", "linear"),
-        ("conger_kappa", "identity"),
-        ("gwet_ac", "identity"),
-    ],
-)
-def test_a_simulated_study_has_the_error_and_the_interval_of_an_analysis(
-    name: str, weights: str, p_missing: float
-) -> None:
-    from masrel.planning._item_models import ItemModel
-    from masrel.planning._studies import StudyDesign, StudyMaker
-    from masrel.planning._true_models import at_value
-
-    entry = coefficient(name)
-    model = ItemModel(
-        name="mixture", prevalences=(0.5, 0.3, 0.2), kappa=0.5, p_missing=p_missing
-    )
-    design = StudyDesign(
-        coefficient=name,
-        weights=weights,
-        model=at_value(entry, weights, model, 0.5),
-        n_items=12,
-        n_raters=3,
-        target="items",
-        level=0.95,
-        interval="t",
-        value=0.5,
-    )
-    maker = StudyMaker(design)
-    freq = np.random.default_rng(3).multinomial(12, maker.p, size=3)
-    for of_study, outcome in zip(freq, maker._of_freq(freq), strict=True):
-        codes = maker.rows.repeat(of_study, axis=0)
-        ratings = np.where(codes < 0, None, codes.astype(object))  # type: ignore[call-overload]
-        options: Any = {"target": "items", "categories": [0, 1, 2], "weights": weights}
-        interval = analytic(name, ratings.tolist(), **options)
-        if interval.low > -1 and interval.high < 1:  # else it is cut
-            ends = [interval.low, interval.high]
-            assert outcome[2:].tolist() == pytest.approx(ends, abs=1e-9)
-        chosen = estimate(name, ratings.tolist(), **options).interval
-        value, _, low, high = maker._chosen(maker.rows, of_study)
-        assert value == pytest.approx(outcome[0], abs=1e-12)
-        assert chosen is not None
-        assert [low, high] == pytest.approx([chosen.low, chosen.high], abs=1e-12)

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from masrel.planning import LatentModel, precision, sample_size
+from masrel.planning import LatentModel, Study, precision, sample_size
 from tests.planning.oracles import MODELS, SETTINGS, of_kappa, settings
 
 INTERVALS = {"normal": "normal", "t(n-1)": "t"}
@@ -17,12 +17,14 @@ INTERVALS = {"normal": "normal", "t(n-1)": "t"}
 def test_items_by_goodness_of_fit(setting: Any) -> None:
     design = setting["design"]
     plan = sample_size(
-        **of_kappa(setting),
-        value=design["kappa"],
-        n_raters=design["n_raters"],
-        lower=design["kappa_lower"],
-        upper=design["kappa_upper"],
-        method="goodness-of-fit",
+        Study(
+            **of_kappa(setting),
+            value=design["kappa"],
+            n_raters=design["n_raters"],
+            lower=design["kappa_lower"],
+            upper=design["kappa_upper"],
+            method="goodness-of-fit",
+        )
     )
     assert plan.n_items == setting["reference"]["n"]
 
@@ -40,7 +42,7 @@ def width(setting: Any) -> dict[str, Any]:
 
 @pytest.mark.parametrize("setting", settings("half_width", "half_width_cohen"))
 def test_items_by_the_formula_of_a_wald_interval(setting: Any) -> None:
-    plan = sample_size(**width(setting), method="wald")
+    plan = sample_size(Study(**width(setting), method="wald"))
     assert plan.n_items == setting["reference"]["n_formula"]
 
 
@@ -60,8 +62,8 @@ def is_exact(setting: Any) -> bool:
 def test_the_smallest_expected_width_over_all_studies(setting: Any) -> None:
     reference = setting["reference"]
     n = reference["n_expected_half_width_exact"]
-    plan = precision(**width(setting), n_items=n, method="exact")
-    fewer = precision(**width(setting), n_items=n - 1, method="exact")
+    plan = precision(Study(**width(setting), n_items=n, method="exact"))
+    fewer = precision(Study(**width(setting), n_items=n - 1, method="exact"))
     assert plan.monte_carlo_error == 0.0
     assert plan.expected_half_width == pytest.approx(
         reference["expected_half_width_at_that_n"], rel=1e-8
@@ -88,7 +90,9 @@ def test_the_size_from_which_on_an_assurance_holds(
     setting: Any, assurance: str
 ) -> None:
     reference = setting["reference"][f"n_assurance_{assurance}"]
-    plan = sample_size(**width(setting), assurance=int(assurance) / 100, method="exact")
+    plan = sample_size(
+        Study(**width(setting), assurance=int(assurance) / 100, method="exact")
+    )
     assert plan.n_items == reference["stable"]
     assert plan.assurance == pytest.approx(reference["p_at_stable"], rel=1e-8)
     first = f"{reference['first']} items reach it first"
@@ -101,7 +105,9 @@ def test_the_size_from_which_on_an_assurance_holds(
 def test_simulated_studies_of_a_wald_interval(setting: Any) -> None:
     simulated = setting["validation"]["simulation_at_n_formula"]
     n = setting["reference"]["n_formula"]
-    plan = precision(**width(setting), n_items=n, method="simulation", rng=20261122)
+    plan = precision(
+        Study(**width(setting), n_items=n, method="simulation", rng=20261122)
+    )
     error = plan.errors["expected_half_width"]
     both = math.hypot(error, simulated["mcse"]["mean_half_width"])
     assert plan.expected_half_width == pytest.approx(
@@ -115,12 +121,14 @@ def test_simulated_studies_of_a_wald_interval(setting: Any) -> None:
 def test_power_of_a_goodness_of_fit_test(setting: Any) -> None:
     design, reference = setting["design"], setting["reference"]
     plan = sample_size(
-        **of_kappa(setting),
-        n_raters=2,
-        value=design["kappa_alternative"],
-        null=design["kappa_null"],
-        power=design["power"],
-        method="goodness-of-fit",
+        Study(
+            **of_kappa(setting),
+            n_raters=2,
+            value=design["kappa_alternative"],
+            null=design["kappa_null"],
+            power=design["power"],
+            method="goodness-of-fit",
+        )
     )
     assert plan.n_items == reference["n_normal"]
     exact = reference["exact_power_at_n_normal"]
@@ -140,7 +148,9 @@ def test_power_of_a_test_of_cohens_kappa(setting: Any) -> None:
         "sides": design["sides"],
         "null": design["kappa_null"],
     }
-    plan = sample_size("cohen_kappa", **common, power=design["power"], method="wald")
+    plan = sample_size(
+        Study("cohen_kappa", **common, power=design["power"], method="wald")
+    )
     assert plan.n_items == setting["reference"]["n"]
 
 
@@ -149,18 +159,20 @@ def test_power_of_a_test_of_cohens_kappa(setting: Any) -> None:
 def test_power_of_a_wald_test_over_all_studies(setting: Any) -> None:
     design = setting["design"]
     plan = precision(
-        "cohen_kappa",
-        value=None,
-        n_items=setting["reference"]["n"],
-        n_raters=2,
-        prevalences=design["joint_alternative"],
-        model="table",
-        target="items",
-        level=design["level"],
-        sides=design["sides"],
-        null=design["kappa_null"],
-        interval="normal",
-        method="exact",
+        Study(
+            "cohen_kappa",
+            value=None,
+            n_items=setting["reference"]["n"],
+            n_raters=2,
+            prevalences=design["joint_alternative"],
+            model="table",
+            target="items",
+            level=design["level"],
+            sides=design["sides"],
+            null=design["kappa_null"],
+            interval="normal",
+            method="exact",
+        )
     )
     exact = setting["validation"]["exact_power_wald"]
     assert plan.power == pytest.approx(exact, rel=1e-8)
@@ -170,13 +182,15 @@ def test_power_of_a_wald_test_over_all_studies(setting: Any) -> None:
 def test_power_over_a_prior(setting: Any) -> None:
     design = setting["design"]
     plan = precision(
-        **of_kappa(setting),
-        value=0.5,
-        n_items=design["n_items"],
-        n_raters=2,
-        null=design["kappa_null"],
-        prior=tuple(design["prior_parameters"]),
-        method="goodness-of-fit",
+        Study(
+            **of_kappa(setting),
+            value=0.5,
+            n_items=design["n_items"],
+            n_raters=2,
+            null=design["kappa_null"],
+            prior=tuple(design["prior_parameters"]),
+            method="goodness-of-fit",
+        )
     )
     assert plan.power == pytest.approx(setting["reference"]["assurance"], rel=1e-8)
 
@@ -209,9 +223,10 @@ def test_items_of_an_intraclass_correlation(setting: Any) -> None:
     }
     by_formula, exact = ICC[setting["kind"]]
     assert (
-        sample_size("icc_1", **common, method="wald").n_items == reference[by_formula]
+        sample_size(Study("icc_1", **common, method="wald")).n_items
+        == reference[by_formula]
     )
-    plan = sample_size("icc_1", **common)
+    plan = sample_size(Study("icc_1", **common))
     assert plan.method == "exact"
     assert plan.n_items == reference[exact]
     numbers = {
@@ -230,14 +245,16 @@ def test_simulated_studies_of_absolute_agreement(setting: Any) -> None:
     design, reference = setting["design"], setting["reference"]
     raters, residual = design["variance_raters"], design["variance_residual"]
     plan = precision(
-        "icc_a1",
-        value=design["icc_true"],
-        n_items=design["n_items"],
-        n_raters=design["n_raters"],
-        target="both",
-        level=design["level"],
-        rater_share=raters / (raters + residual),
-        rng=20261122,
+        Study(
+            "icc_a1",
+            value=design["icc_true"],
+            n_items=design["n_items"],
+            n_raters=design["n_raters"],
+            target="both",
+            level=design["level"],
+            rater_share=raters / (raters + residual),
+            rng=20261122,
+        )
     )
     error = math.hypot(
         2.0 * plan.errors["expected_half_width"],
@@ -255,16 +272,18 @@ def test_power_of_a_wald_interval_by_formula(setting: Any) -> None:
     design, reference = setting["design"], setting["reference"]
     names = {"fleiss": "fleiss_kappa", "ac1": "gwet_ac"}
     plan = precision(
-        names[design["coefficient"]],
-        value=design["coefficient_alternative"],
-        prevalences=design["prevalences"],
-        model=MODELS[setting["model"]],
-        n_items=design["n_items"],
-        n_raters=design["n_raters"],
-        target="items",
-        level=design["level"],
-        sides=design["sides"],
-        method="wald",
+        Study(
+            names[design["coefficient"]],
+            value=design["coefficient_alternative"],
+            prevalences=design["prevalences"],
+            model=MODELS[setting["model"]],
+            n_items=design["n_items"],
+            n_raters=design["n_raters"],
+            target="items",
+            level=design["level"],
+            sides=design["sides"],
+            method="wald",
+        )
     )
     z = NormalDist().inv_cdf(1.0 - (1.0 - design["level"]) / design["sides"])
     error = plan.expected_half_width / z
@@ -297,17 +316,19 @@ def test_simulated_studies_of_other_raters(setting: Any) -> None:
         a, b = design["beta_a"], design["beta_b"]
         value, prevalences = 1.0 / (1.0 + a + b), [b / (a + b), a / (a + b)]
     plan = precision(
-        "fleiss_kappa",
-        value=value,
-        prevalences=prevalences,
-        n_items=design["n_items"],
-        n_raters=design["n_raters"],
-        model=model,
-        target="raters",
-        weights=design["weights"],
-        level=design["level"],
-        interval="t",
-        rng=20261122,
+        Study(
+            "fleiss_kappa",
+            value=value,
+            prevalences=prevalences,
+            n_items=design["n_items"],
+            n_raters=design["n_raters"],
+            model=model,
+            target="raters",
+            weights=design["weights"],
+            level=design["level"],
+            interval="t",
+            rng=20261122,
+        )
     )
     truth = reference["kappa_of_the_rater_population"]
     assert plan.value == pytest.approx(truth, abs=1e-8)

@@ -6,7 +6,6 @@ from typing import Any
 import msgspec
 import pytest
 
-import masrel.planning._studies as studies
 from masrel.lab.analysis import analyze
 from masrel.lab.checklist import fill_checklist
 from masrel.lab.protocol import Protocol, SampleSize, StudyPaths, report_sections
@@ -48,7 +47,7 @@ def test_what_was_planned_stands_beside_what_came(
     def refuse(*_: object) -> None:
         raise AssertionError
 
-    monkeypatch.setattr(studies.StudyMaker, "__init__", refuse)  # nothing is drawn
+    monkeypatch.setattr("masrel.planning._sizes.shown", refuse)  # nothing is drawn
     text = page(tmp_path, protocol({}))
     assert "With 6 items and 8 raters, the 95 % interval of Fleiss' κ" in text
     assert "assurance 0.700 of a half-width up to 0.25, if the coefficient is" in text

@@ -14,38 +14,34 @@ import numpy as np
 import masrel
 from docs.make.benchmarks.parts import write_part
 from masrel.agreement import fleiss_kappa
-from masrel.planning._item_models import ItemModel
-from masrel.planning._studies import StudyDesign, StudyMaker
+from masrel.planning import Study
+from masrel.planning import _studies as masrel_studies
+from masrel.planning._planned_design import Design, design_of
 
 PAGE = Path(__file__).parents[2] / "benchmarks.md"
 N_STUDIES, N_LOOPED = 1_000_000, 2_000
 
 
-def maker() -> StudyMaker:
+def maker() -> Design:
     """Return studies of 30 items by 5 raters, four categories."""
-    model = ItemModel(
-        name="dirichlet-multinomial", prevalences=(0.4, 0.3, 0.2, 0.1), kappa=0.5
+    study = Study(
+        "fleiss_kappa",
+        value=0.5,
+        prevalences=(0.4, 0.3, 0.2, 0.1),
+        model="dirichlet-multinomial",
+        target="items",
+        n_items=30,
+        n_raters=5,
+        interval="t",
     )
-    return StudyMaker(
-        StudyDesign(
-            coefficient="fleiss_kappa",
-            weights="identity",
-            model=model,
-            n_items=30,
-            n_raters=5,
-            target="items",
-            level=0.95,
-            interval="t",
-            value=0.5,
-        )
-    )
+    return design_of(study)
 
 
 def simulated(n_studies: int) -> tuple[float, float]:
     """Return seconds of the clock and of the processor."""
     studies = maker()
     clock, processor = time.perf_counter(), time.process_time()
-    studies.simulate(np.random.default_rng(1), n_studies)
+    masrel_studies.simulated(studies, np.random.default_rng(1), n_studies)
     return time.perf_counter() - clock, time.process_time() - processor
 
 

@@ -1,12 +1,11 @@
 """What every line of a study's plan can show at the study's size."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from masrel.cli._planning_options import PlanningOptions
 from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -14,102 +13,87 @@ if TYPE_CHECKING:
     from masrel.planning import Plan
 
 _USUAL_VALUES = (0.4, 0.6, 0.8)
-_OF_THE_STUDY = (
-    *("coefficient", "weights", "items", "raters", "categories", "target", "pilot"),
-    *("power", "assurance", "max_cost", "prices", "executor", "scheduler", "resume"),
-)
+_AIM = ("half_width", "lower", "upper", "null")
 
 
 def study_plans(
-    study: Path,
-    options: PlanningOptions,
-    progress: Callable[[int], Callable[[int, int], None]],
+    folder: Path, options: dict[str, Any], progress: Callable[[int, int], None]
 ) -> "tuple[tuple[str, ...], tuple[Plan, ...]]":
     """Return the ids of lines, and their plans; what has none is noted."""
-    # progress: takes how many plans are still to come
     from masrel.lab.protocol import StudyPaths, read_protocol
+    from masrel.planning import Study, precision
 
-    options.refuse(_OF_THE_STUDY, "is not of a study, whose protocol says it")
-    protocol = read_protocol(StudyPaths(study).protocol)
-    cells = list(_cells(protocol, options))
-    labels: list[str] = []
-    plans: list[Plan] = []
-    for place, (line, arguments) in enumerate(cells):
+    cells = list(_cells(read_protocol(StudyPaths(folder).protocol), options))
+    labelled: list[tuple[str, Plan]] = []
+    for place, (line, arguments) in enumerate(cells, 1):
         try:
-            plan = _planned(line, arguments, progress(len(cells) - place))
+            labelled.append((line.id, precision(Study(line.coefficient, **arguments))))
         except ParameterError as error:
             click.echo(f"note: {line.id}: {error}", err=True)
-            continue
-        labels.append(line.id)
-        plans.append(plan)
-    if not plans:
+        progress(place, len(cells))
+    if not labelled:
         raise ParameterError(
-            f"{study}: needs a line of [[analysis.estimates]] that can be planned for"
+            f"{folder}: needs a line of [[analysis.estimates]] that can be planned for"
         )
-    return tuple(labels), tuple(plans)
+    labels, plans = zip(*labelled, strict=True)
+    return labels, plans
 
 
 def _cells(
-    protocol: "Protocol", options: PlanningOptions
+    protocol: "Protocol", options: dict[str, Any]
 ) -> "Iterator[tuple[EstimatePlan, dict[str, Any]]]":
     # every line that has an interval, for every value that is taken to be true
     sizes = {size.estimate: size for size in protocol.analysis.sample_sizes}
     for line in protocol.analysis.estimates:
         size = sizes.get(line.id)
-        if line.interval == "none" and options.interval is None:
+        if line.interval == "none" and "interval" not in options:
             note = "has no interval to be planned for; --interval names one"
             click.echo(f"note: {line.id}: {note}", err=True)
             continue
-        common = _arguments(protocol, line, size, options)
-        values: Sequence[float] = options.value or _USUAL_VALUES
-        if options.value is None and size is not None:
-            values = (size.value,)
-        if size is not None:
-            _compare(line, size, common)
-        yield from ((line, {**common, "value": value}) for value in values)
-
-
-def _planned(
-    line: "EstimatePlan", arguments: dict[str, Any], progress: Callable[..., None]
-) -> "Plan":
-    from masrel.planning import precision
-
-    return precision(line.coefficient, **arguments, progress=progress)
+        arguments = _arguments(protocol, line, size, options)
+        for name, words in (("n_items", "items"), ("n_raters", "raters")):
+            planned, actual = getattr(size, name, arguments[name]), arguments[name]
+            if planned != actual:  # a study that is not as large as was planned
+                click.echo(
+                    f"note: {line.id}: {planned} {words} were planned for, the study "
+                    f"has {actual}",
+                    err=True,
+                )
+        usual = _USUAL_VALUES if size is None else (size.value,)
+        for value in options.get("value", usual):
+            yield line, {**arguments, "value": value}
 
 
 def _arguments(
     protocol: "Protocol",
     line: "EstimatePlan",
     size: "SampleSize | None",
-    options: PlanningOptions,
+    options: dict[str, Any],
 ) -> dict[str, Any]:
     # what the options say, else how the size was chosen, else what is usual
     from masrel.lab.protocol import scale_of
 
-    n_items, n_raters = _study_size(protocol, line)
-    shares = options.shares
-    if shares is None and size is not None:
-        shares = size.table or size.prevalences or None
     is_normal = line.coefficient.startswith("icc")
-    model = options.model or (size.model if size else "dirichlet-multinomial")
-    aim = options.aim()
-    if size is not None and not any(x is not None for x in aim.values()):
-        aim = {name: getattr(size, name) for name in aim}
+    level = protocol.analysis.level
+    declared: dict[str, Any] = {"level": level, "model": "dirichlet-multinomial"}
+    declared["interval"] = "auto" if is_normal else line.interval
+    if size is not None:
+        declared |= {
+            name: getattr(size, name) for name in ("model", "sides", "p_missing")
+        }
+        declared["prevalences"] = size.table or size.prevalences or None
+        if options.keys().isdisjoint(_AIM):
+            declared |= {name: getattr(size, name) for name in _AIM}
+    declared |= {**options, "categories": scale_of(protocol).values}
+    if is_normal:
+        declared |= dict.fromkeys(("categories", "prevalences", "model"))
+    n_items, n_raters = _study_size(protocol, line)
     return {
+        **declared,
         "n_items": n_items,
         "n_raters": n_raters,
         "weights": line.weights,
-        "categories": None if is_normal else scale_of(protocol).values,
-        "prevalences": None if is_normal else shares,
-        "model": None if is_normal else model,
         "target": line.target,
-        "interval": options.interval or ("auto" if is_normal else line.interval),
-        "level": options.level or protocol.analysis.level,
-        "sides": options.sides or (size.sides if size else 2),
-        "p_missing": options.p_missing or (size.p_missing if size else 0.0),
-        "method": options.method,
-        "rng": options.seed,
-        **aim,
     }
 
 
@@ -123,17 +107,3 @@ def _study_size(protocol: "Protocol", line: "EstimatePlan") -> tuple[int, int]:
     if line.kind == "test-retest" and coefficient(line.coefficient).shape != "pairs":
         n_raters = 2
     return n_models * protocol.schedule.repeats, n_raters
-
-
-def _compare(
-    line: "EstimatePlan", size: "SampleSize", arguments: dict[str, Any]
-) -> None:
-    # a study that is not as large as was planned
-    for name, words in (("n_items", "items"), ("n_raters", "raters")):
-        planned, actual = getattr(size, name), arguments[name]
-        if planned != actual:
-            click.echo(
-                f"note: {line.id}: {planned} {words} were planned for, the study has "
-                f"{actual}",
-                err=True,
-            )

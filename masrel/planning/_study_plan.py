@@ -1,0 +1,480 @@
+"""A study to be planned, as it is declared, and the plan that comes of it."""
+
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Literal, get_args
+
+import numpy as np
+
+from masrel.agreement import Label, WeightsLike
+from masrel.errors import ParameterError
+from masrel.estimates import Target
+
+Method = Literal["auto", "wald", "goodness-of-fit", "exact", "simulation"]
+Interval = Literal[
+    "auto", "t", "normal", "analytic", "jackknife", "bootstrap", "posterior"
+]
+Progress = Callable[[int, int], None]  # what is done, and of how many
+
+FORMULAS = ("wald", "goodness-of-fit")
+RATER_SHARE = 1 / 3  # of the error of ICC(A,1) that raters' levels make
+_OF_ITEMS_ALONE = ("normal", "analytic", "posterior")
+_REACHED = 1e-9
+
+
+def refuse(*rules: tuple[object, str]) -> None:
+    """Raise for the first rule that is broken: whether it is, and what is said."""
+    for is_broken, sentence in rules:
+        if is_broken:
+            raise ParameterError(sentence)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LatentModel:
+    """Grades cut from an item's trait, plus a rater's bias, plus noise.
+
+    Attributes
+    ----------
+    thresholds : tuple of float
+        Where one category ends and the next begins, ascending, on the scale of the
+        trait, whose standard deviation over items is 1.
+    noise_sd : float
+        Standard deviation of the noise of a rating.
+    rater_sd : float
+        Standard deviation of the raters' biases.
+    positions : tuple of float
+        The traits of the items where every study has the same items; empty where they
+        are drawn anew.
+
+    Examples
+    --------
+    >>> LatentModel(thresholds=(-0.4, 0.4), noise_sd=0.5).rater_sd
+    0.0
+    """
+
+    thresholds: tuple[float, ...]
+    noise_sd: float
+    rater_sd: float = 0.0
+    positions: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check what must be positive or ascending."""
+        ascending = all(a < b for a, b in itertools.pairwise(self.thresholds))
+        refuse(
+            (
+                not (self.noise_sd > 0.0 and self.rater_sd >= 0.0),
+                "model: needs noise_sd above 0 and rater_sd of at least 0, got "
+                f"{self.noise_sd:g} and {self.rater_sd:g}",
+            ),
+            (
+                not (self.thresholds and ascending),
+                f"model: needs ascending thresholds, got {self.thresholds}",
+            ),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """A study to be planned: what is taken to be true, its size, and its aim.
+
+    Attributes
+    ----------
+    coefficient : str
+        Its name in the register; any that is a function of sums over items, and the
+        intraclass correlations icc_1, icc_c1 and icc_a1.
+    target : {"items", "raters", "both"}
+        What a new study would draw anew.
+    value : float or None
+        The coefficient that is taken to be true; None where the model has it: a table,
+        or a `LatentModel`.
+    n_items, n_raters : int or None
+        The size of the study; what is None is solved for.
+    weights : str or array_like
+        How much two categories agree.
+    categories : int or sequence or None
+        How many there are, or the scale in order, by which weights of numbers go.
+    prevalences : sequence of float or None
+        Of the categories, with sum 1; equal when not given. With model "table" the
+        joint probabilities of two raters, shape (n_categories, n_categories).
+    model : {"mixture", "dirichlet-multinomial", "latent", "table"} or LatentModel
+        How the ratings of an item come about. An intraclass correlation takes none:
+        its ratings are normal.
+    p_missing : float
+        Chance of every rating to be missing.
+    level : float
+        Nominal level of the interval.
+    sides : {1, 2}
+        How many tails share 1 - level.
+    interval : str
+        The interval that is planned: a method of `masrel.intervals.estimate`, such as
+        "auto" or "jackknife", or estimate ± quantile times standard error, not cut at
+        the ends of the scale: "t" or "normal".
+    half_width : float or None
+        Aim: half the width of the interval, expected or with `assurance`.
+    lower, upper : float or None
+        Aim: ends of the interval no lower, no higher; expected, or with `assurance`, or
+        with `power` (non-inferiority by one, equivalence by both).
+    null : float or None
+        Aim, with `power`: the interval excludes this value.
+    power, assurance : float or None
+        Chances to be reached.
+    prices : tuple of float or None
+        Of an item, a rater, and a rating; (0, 0, 1) when not given.
+    max_cost : float or None
+        What the study may cost; without an aim, the study is the most that this buys.
+    method : {"auto", "exact", "simulation", "wald", "goodness-of-fit"}
+        "auto" sums over all studies where there are few, and else draws them.
+    prior : tuple of float or None
+        Parameters of a Beta distribution of the true value, over which the power of
+        method "goodness-of-fit" at a given size is averaged.
+    rater_share : float
+        Of the error of icc_a1, how much the levels of the raters make.
+    n_studies : int or None
+        Studies that are drawn; as many as a small Monte Carlo error needs when not
+        given.
+    rng : numpy.random.Generator or int or None
+        Seed of simulated studies, or where it comes from; it is kept as `seed`.
+
+    Raises
+    ------
+    ParameterError
+        If a number or a choice is out of range. What does not fit the coefficient is
+        said when the study is planned.
+
+    Examples
+    --------
+    >>> Study("icc_1", target="both", value=0.6, n_items=100, n_raters=3).level
+    0.95
+    """
+
+    coefficient: str
+    _: KW_ONLY
+    target: Target
+    value: float | None = None
+    n_items: int | None = None
+    n_raters: int | None = None
+    weights: WeightsLike = "identity"
+    categories: int | Sequence[Label] | None = None
+    prevalences: object = None
+    model: str | LatentModel | None = None
+    p_missing: float = 0.0
+    level: float = 0.95
+    sides: int = 2
+    interval: Interval = "auto"
+    half_width: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+    null: float | None = None
+    power: float | None = None
+    assurance: float | None = None
+    prices: tuple[float, float, float] | None = None
+    max_cost: float | None = None
+    method: Method = "auto"
+    prior: tuple[float, float] | None = None
+    rater_share: float = RATER_SHARE
+    n_studies: int | None = None
+    rng: np.random.Generator | int | None = None
+
+    @property
+    def seed(self) -> int:
+        """The seed of simulated studies."""
+        return int(self.rng)  # type: ignore[arg-type]  # since it was made one below
+
+    def __post_init__(self) -> None:
+        """Check numbers and choices, and draw the seed where none was given."""
+        for name, (needed, holds) in _NUMBERS.items():
+            number = getattr(self, name)
+            if number is None and name not in _ALWAYS:
+                continue
+            if not isinstance(number, int | float | np.integer | np.floating):
+                raise ParameterError(f"{name}: needs a number, got {number!r}")
+            refuse((not holds(float(number)), f"{name}: needs {needed} got {number:g}"))
+        for name, least in (("n_items", 2), ("n_raters", 1), ("n_studies", 1)):
+            n = getattr(self, name)
+            is_size = isinstance(n, int | np.integer) and n >= least
+            needed = f"needs a whole number above {least - 1}"
+            refuse((n is not None and not is_size, f"{name}: {needed}, got {n!r}"))
+        for name, choices in _CHOICES.items():
+            chosen, known = getattr(self, name), ", ".join(map(str, choices))
+            refuse(
+                (chosen not in choices, f"{name}: needs one of {known}, got {chosen!r}")
+            )
+        _check_together(self)
+        object.__setattr__(self, "rng", _seed(self.rng))
+
+
+_CHANCE = ("(0, 1),", lambda x: 0.0 < x < 1.0)
+_SHARE = ("[0, 1),", lambda x: 0.0 <= x < 1.0)
+_ON_SCALE = ("[-1, 1],", lambda x: -1.0 <= x <= 1.0)
+_NUMBERS: dict[str, tuple[str, Callable[[float], bool]]] = {
+    "half_width": (
+        "(0, 1], since the scale from -1 to 1 is no wider;",
+        lambda x: 0.0 < x <= 1.0,
+    ),
+    **dict.fromkeys(("power", "assurance", "level"), _CHANCE),
+    **dict.fromkeys(("lower", "upper", "null", "value"), _ON_SCALE),
+    **dict.fromkeys(("p_missing", "rater_share"), _SHARE),
+    "max_cost": ("a number above 0,", lambda x: x > 0.0),
+}
+_ALWAYS = ("level", "p_missing", "rater_share")  # numbers that are never None
+_CHOICES: dict[str, tuple[object, ...]] = {
+    "sides": (1, 2),
+    "target": get_args(Target),
+    "interval": get_args(Interval),
+    "method": get_args(Method),
+}
+
+
+def _check_together(study: Study) -> None:
+    # what is in range by itself, and does not fit the rest
+    target, interval, prior = study.target, study.interval, study.prior
+    is_of_items = interval in _OF_ITEMS_ALONE and target != "items"
+    prices = (0.0, 0.0, 1.0) if study.prices is None else study.prices
+    are_prices = len(prices) == 3 and all(0.0 <= price < math.inf for price in prices)
+    refuse(
+        (
+            study.sides == 1 and study.level <= 0.5,
+            f"level: needs more than 0.5 with one side, got {study.level:g}",
+        ),
+        (
+            is_of_items or (interval, target) == ("t", "both"),
+            f'interval: "{interval}" is not of target "{target}", where "auto" and '
+            '"jackknife" are',
+        ),
+        (not are_prices, f"prices: needs three of at least 0, got {prices}"),
+    )
+    if prior is not None:
+        are_two = len(prior) == 2 and all(0.0 < part < math.inf for part in prior)
+        refuse(
+            (not are_two, f"prior: needs two numbers above 0, got {prior}"),
+            (
+                study.method != "goodness-of-fit",
+                f'prior: is of method "goodness-of-fit" alone, got "{study.method}"',
+            ),
+        )
+
+
+def _seed(rng: np.random.Generator | int | None) -> int:
+    if rng is None:
+        rng = np.random.default_rng()
+    if isinstance(rng, np.random.Generator):
+        return int(rng.integers(2**63))
+    is_seed = isinstance(rng, int | np.integer) and rng >= 0
+    refuse((not is_seed, f"rng: needs a seed of at least 0, got {rng!r}"))
+    return int(rng)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """A study of some size, and what it can show.
+
+    Attributes
+    ----------
+    coefficient, weights : str
+        What is estimated.
+    value : float
+        The coefficient that is taken to be true.
+    n_items, n_raters : int
+        The size of the study.
+    model : str
+        How the ratings of an item come about.
+    target : {"items", "raters", "both"}
+        What was sampled.
+    interval : str
+        The interval that is planned: "auto" is that of `masrel.intervals.estimate`.
+    level : float
+        Its level.
+    sides : int
+        2 leaves half of 1 - level in each tail, 1 all of it in one.
+    method : {"exact", "simulation", "wald", "goodness-of-fit"}
+        How the numbers were computed.
+    prevalences : tuple of float
+        Of the categories; empty where a model has none.
+    table : tuple of tuple of float
+        The joint probabilities of two raters, of model "table".
+    p_missing : float
+        Chance of every rating to be missing.
+    half_width, lower, upper, null : float or None
+        What `assurance` and `power` are of.
+    expected_half_width : float
+        Half the width of the interval, on average over studies.
+    expected_low, expected_high : float
+        Its ends, on average.
+    assurance : float
+        Chance that the interval is as narrow as wanted, or inside the limits; ``nan``
+        without either.
+    power : float
+        Chance that the interval excludes the null value, or lies inside the limits of
+        equivalence; ``nan`` without either.
+    coverage : float
+        How often the interval holds `value`.
+    p_undefined : float
+        How often a study has no coefficient or no interval.
+    monte_carlo_error : float
+        Standard error, from simulation, of the number that was aimed at: of
+        `expected_half_width` without an aim. 0 where nothing was drawn.
+    errors : mapping of str to float
+        The same beside every number.
+    reaches_aim : bool or None
+        Whether it reaches what was aimed at; None without an aim.
+    cost : float
+        Of items, raters and ratings at their prices.
+    n_studies : int
+        Simulated studies; 0 where nothing was drawn.
+    seed : int or None
+        The seed from which they can be drawn again.
+    notes : tuple of str
+        What to know.
+
+    Examples
+    --------
+    >>> from masrel.planning import Study, precision
+    >>> study = Study(
+    ...     "fleiss_kappa",
+    ...     value=0.5,
+    ...     prevalences=[0.7, 0.3],
+    ...     model="mixture",
+    ...     target="items",
+    ...     n_items=60,
+    ...     n_raters=2,
+    ...     method="wald",
+    ... )
+    >>> round(precision(study).expected_half_width, 3)
+    0.239
+    """
+
+    coefficient: str
+    weights: str
+    value: float
+    n_items: int
+    n_raters: int
+    model: str
+    target: Target
+    interval: str
+    level: float
+    sides: int
+    method: str
+    prevalences: tuple[float, ...] = ()
+    table: tuple[tuple[float, ...], ...] = ()
+    p_missing: float = 0.0
+    half_width: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+    null: float | None = None
+    expected_half_width: float = math.nan
+    expected_low: float = math.nan
+    expected_high: float = math.nan
+    assurance: float = math.nan
+    power: float = math.nan
+    coverage: float = math.nan
+    p_undefined: float = math.nan
+    monte_carlo_error: float = 0.0
+    errors: Mapping[str, float] = field(default_factory=dict)
+    reaches_aim: bool | None = None
+    cost: float = math.nan
+    n_studies: int = 0
+    seed: int | None = None
+    notes: tuple[str, ...] = ()
+
+
+# -- aims -----------------------------------------------------------------------------
+
+
+def has_limits(study: Study) -> bool:
+    """Whether ends of the interval are aimed at."""
+    return study.lower is not None or study.upper is not None
+
+
+def limits_of(study: Study) -> tuple[float, float]:
+    """Return the limits of the interval, infinite where there is none."""
+    low = -math.inf if study.lower is None else study.lower
+    return low, math.inf if study.upper is None else study.upper
+
+
+def has_aim(study: Study) -> bool:
+    """Whether a study is to show something."""
+    of_interval = study.half_width is not None or has_limits(study)
+    return of_interval or study.power is not None
+
+
+def chance_of(study: Study) -> float | None:
+    """Return the chance that is aimed at; None where it is what is expected."""
+    return study.assurance if study.power is None else study.power
+
+
+def number_of(study: Study) -> str:
+    """Return the name of the number of a plan that is aimed at."""
+    if study.power is not None:
+        return "power"
+    return "expected_half_width" if study.assurance is None else "assurance"
+
+
+def number_of_limits(study: Study) -> str:
+    """Return the name of the chance of an interval inside the limits."""
+    is_power = study.power is not None and study.null is None
+    return "power" if is_power else "assurance"
+
+
+def is_met(study: Study, plan: Plan) -> bool:
+    """Whether a plan reaches what a study aims at."""
+    number, chance = getattr(plan, number_of(study)), chance_of(study)
+    if chance is not None:
+        return bool(number >= chance - _REACHED)
+    if study.half_width is not None:
+        return bool(number <= study.half_width * (1.0 + _REACHED))
+    low, high = limits_of(study)
+    return low <= plan.expected_low and plan.expected_high <= high
+
+
+def aim_words(study: Study) -> tuple[str, str]:
+    """Return the parameter that says the aim, and the aim for a reader."""
+    if study.power is not None:
+        return "power", f"power of {study.power:g}"
+    chance = "" if study.assurance is None else f" with assurance {study.assurance:g}"
+    if study.half_width is not None:
+        return "half_width", f"a half-width of {study.half_width:g}{chance}"
+    ends = ["…" if x is None else f"{x:g}" for x in (study.lower, study.upper)]
+    name = "upper" if study.lower is None else "lower"
+    return name, f"an interval inside [{ends[0]}, {ends[1]}]{chance}"
+
+
+def reached_words(study: Study, plan: Plan) -> str:
+    """Say what a plan reaches of what a study aims at."""
+    name = number_of(study)
+    if chance_of(study) is not None:
+        return f"{name} {getattr(plan, name):.3f}"
+    if has_limits(study):
+        low, high = plan.expected_low, plan.expected_high
+        return f"an expected interval of {low:.3f} to {high:.3f}"
+    return f"an expected half-width of {plan.expected_half_width:.3f}"
+
+
+def check_one_aim(study: Study) -> None:
+    """Check that a study whose size is solved for has one aim, and all of it."""
+    limits, null, power = has_limits(study), study.null, study.power
+    n_aims = limits + (study.half_width is not None) + (null is not None)
+    refuse(
+        (
+            n_aims > 1,
+            "half_width: needs to be alone, as null does, and lower and upper do: one "
+            "aim a plan",
+        ),
+        (
+            power is not None and study.assurance is not None,
+            "assurance: needs no power beside it",
+        ),
+        (
+            power is not None and null is None and not limits,
+            "power: needs null, lower or upper, got none",
+        ),
+        (
+            power is None and null is not None,
+            f"null: needs power, got null {null} without",
+        ),
+        (
+            study.assurance is not None and not has_aim(study),
+            "assurance: needs half_width, lower or upper",
+        ),
+    )
