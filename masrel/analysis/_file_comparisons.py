@@ -1,23 +1,28 @@
 """How much the groups of a file differ in agreement: pair by pair, and all at once.
 
-In: a `RatingsFile` whose parts are the groups. Out: differences of coefficients with
-their tests, and tests that all groups agree as well.
+In: a `RatingsFile` whose parts are the groups. Out: rows of the differences of
+coefficients with their tests, and of tests that all groups agree as well.
 """
 
 import itertools
-import warnings
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Literal
+from typing import Any
 
 import numpy as np
 
 from masrel.agreement import CodedRatings, Coefficient, Significance, holm
-from masrel.analysis._file_estimates import EstimateOptions, on_grades
-from masrel.analysis._file_parts import coded_part, label, part_names
-from masrel.errors import MasrelError, MasrelWarning, ParameterError, RatingsError
-from masrel.estimates import Estimate
+from masrel.analysis._file_estimates import (
+    Answer,
+    EstimateOptions,
+    Note,
+    Row,
+    on_grades,
+)
+from masrel.analysis._file_questions import coded_part, label, part_names
+from masrel.errors import MasrelError, ParameterError, RatingsError
+from masrel.estimates import Estimate, as_document
 from masrel.ratings import RatingsFile, RatingsPart
 from masrel.scales import Scale
 
@@ -28,50 +33,6 @@ HOTELLING = "Hotelling's T² as F"
 
 _INTRACLASS = ("fleiss_kappa", "scott_pi")
 """Coefficients that are the intraclass kappa of two raters and two categories."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Pair:
-    """Two groups, and whether they are of the same items, or clusters."""
-
-    first: str
-    second: str
-    ratings: tuple[CodedRatings, CodedRatings]  # row by row the same items, if they are
-    design: Literal["dependent", "independent"]
-    same_items: bool
-    clusters: object  # of the items, as `difference` takes them
-    n_shared: int  # names of items that both have
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Difference:
-    """One coefficient of two groups."""
-
-    pair: Pair
-    title: str
-    estimate: Estimate
-    test: Significance
-    adjusted: float  # p after Holm, over the pairs of the coefficient
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Comparison:
-    """Every two groups in every coefficient."""
-
-    pairs: tuple[Pair, ...]
-    differences: tuple[Difference, ...]
-    without: tuple[str, ...]  # titles of coefficients that have no such interval
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EqualityTest:
-    """A test of one coefficient of all groups."""
-
-    entry: Coefficient
-    title: str
-    weights: str
-    name: str
-    result: Significance
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,116 +121,162 @@ def _share_clusters(parts: Sequence[RatingsPart]) -> bool:
     return len(set().union(*of_parts)) < sum(map(len, of_parts))
 
 
-def compare_pairs(
+def difference_rows(
     file: RatingsFile, entries: Sequence[Coefficient], options: EstimateOptions
-) -> Comparison:
+) -> Answer:
     """Return the difference of every two groups in every coefficient."""
     if len(file.parts) < 2:
         raise ParameterError(
             "--compare: needs two groups or more, so --by with the column that tells "
             "them apart"
         )
-    pairs = _pairs(file)
+    names = [label(part_names(file, part).values()) for part in file.parts]
+    pairs = {
+        (names[one], names[other]): _groups_of((file.parts[one], file.parts[other]))
+        for one, other in itertools.combinations(range(len(file.parts)), 2)
+    }
     # one that was named is refused rather than left out
     can = [of for of in entries if of.formula is not None or not options.takes_all]
-    return Comparison(
-        pairs=tuple(pairs),
-        differences=tuple(
-            difference
-            for entry in can
-            for difference in _differences(entry, pairs, options, file.scale)
-        ),
-        without=tuple(entry.title for entry in entries if entry not in can),
+    without = ", ".join(entry.title for entry in entries if entry not in can)
+    every = [
+        row for entry in can for row in _differences(entry, pairs, options, file.scale)
+    ]
+    notes = _difference_notes(pairs, options.level)
+    return Answer(
+        name="differences",
+        rows=[row for row, _ in every],
+        shown=[shown for _, shown in every],
+        notes=(*notes, *([Note("without", {"titles": without})] if without else [])),
+        is_single=len(pairs) == 1,
     )
 
 
-def _pairs(file: RatingsFile) -> list[Pair]:
-    names = [label(part_names(file, part).values()) for part in file.parts]
-    pairs = []
-    for one, other in itertools.combinations(range(len(file.parts)), 2):
-        groups = _groups_of((file.parts[one], file.parts[other]))
-        first, second = groups.sets
-        pairs.append(
-            Pair(
-                first=names[one],
-                second=names[other],
-                ratings=(first, second),
-                design="dependent" if groups.is_dependent else "independent",
-                same_items=groups.same_items,
-                clusters=groups.clusters,
-                n_shared=groups.n_shared,
-            )
-        )
-    return pairs
-
-
 def _differences(
-    entry: Coefficient, pairs: Sequence[Pair], options: EstimateOptions, scale: Scale
-) -> list[Difference]:
+    entry: Coefficient,
+    pairs: Mapping[tuple[str, str], _Groups],
+    options: EstimateOptions,
+    scale: Scale,
+) -> Iterator[tuple[Row, Row]]:
+    # the row of every pair, and what a table shows of it
     from masrel.intervals import difference, difference_test
 
-    weights = options.weights_of(entry)
     results = []
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", MasrelWarning)  # the results say it
-        for pair in pairs:
-            ratings = [on_grades(of, entry, scale) for of in pair.ratings]
-            try:
-                estimate = difference(
-                    entry,
-                    *ratings,
-                    design=pair.design,
-                    weights=weights,
-                    level=options.level,
-                    clusters=pair.clusters,
-                )
-                test = difference_test(
-                    entry,
-                    *ratings,
-                    design=pair.design,
-                    weights=weights,
-                    clusters=pair.clusters,
-                )
-            except MasrelError as error:
-                raise type(error)(
-                    f"--compare: {pair.first} and {pair.second}: {error}"
-                ) from error
-            results.append((pair, estimate, test))
-    adjusted = holm([test.p_value for _, _, test in results])
-    title = options.title(entry)
-    return [
-        Difference(pair=pair, title=title, estimate=estimate, test=test, adjusted=p)
-        for (pair, estimate, test), p in zip(results, adjusted, strict=True)
-    ]
+    for names, groups in pairs.items():
+        design = "dependent" if groups.is_dependent else "independent"
+        ratings = [on_grades(of, entry, scale) for of in groups.sets]
+        of_pair: Any = {
+            "design": design,
+            "weights": options.weights_of(entry),
+            "clusters": groups.clusters,
+        }
+        try:
+            estimate = difference(entry, *ratings, level=options.level, **of_pair)
+            test = difference_test(entry, *ratings, **of_pair)
+        except MasrelError as error:
+            raise type(error)(f"--compare: {' and '.join(names)}: {error}") from error
+        results.append((names, groups, design, estimate, test))
+    adjusted = holm([test.p_value for *_, test in results])
+    for (names, groups, design, estimate, test), p in zip(
+        results, adjusted, strict=True
+    ):
+        first, second = names
+        row = {
+            "first": first,
+            "second": second,
+            "design": design,
+            **as_document(estimate),
+            "coefficient": estimate.coefficient.removeprefix("difference of "),
+            "t": test.statistic,
+            "df": test.df[0],
+            "p_value": test.p_value,
+            "p_holm": p,
+            "test_reason": test.reason,
+        }
+        titles = {"title": options.title(entry), "group": f"{first} and {second}"}
+        items = "the same" if groups.same_items else "others"
+        yield row, {**row, **titles, "items": items, **_shown(estimate, test)}
 
 
-def compare_all(
+def _shown(estimate: Estimate, test: Significance) -> Row:
+    # what a table has of a difference: ``nan`` where it is undefined
+    interval = estimate.interval
+    texts = () if interval is None else interval.notes
+    if test.reason is not None:
+        texts = (*texts, f"undefined: {test.reason}")
+    return {
+        "texts": texts,
+        "difference": estimate.value,
+        "standard_error": estimate.standard_error,
+        "low": math.nan if interval is None else interval.low,
+        "high": math.nan if interval is None else interval.high,
+        "level": None if interval is None else interval.level,
+    }
+
+
+def _difference_notes(
+    pairs: Mapping[tuple[str, str], _Groups], level: float
+) -> Iterator[Note]:
+    groups = pairs.values()
+    is_clustered = any(of.clusters is not None for of in groups)
+    unit = "clusters" if is_clustered else "items"
+    yield Note(f"difference_of_{unit}", {"level": level})
+    if len(pairs) > 1:
+        yield Note("holm", {"n": len(pairs)})
+    if any(of.is_dependent for of in groups):
+        yield Note(f"shared_{unit}")
+    for (first, second), of in pairs.items():
+        if not of.same_items and of.n_shared:
+            values = {"first": first, "second": second, "n": of.n_shared}
+            yield Note("same_names", values)
+
+
+def equality_rows(
     file: RatingsFile, entries: Sequence[Coefficient], options: EstimateOptions
-) -> list[EqualityTest]:
+) -> Answer:
     """Return the tests that all groups have the same coefficient, for each of them."""
     groups = _groups_of(file.parts)
-    tests: list[EqualityTest] = []
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", MasrelWarning)  # the results say it
-        for entry in entries:
-            if entry.formula is not None:  # else the differences say it
-                of_entry = tuple(on_grades(s, entry, file.scale) for s in groups.sets)
-                tests += _equality_tests(entry, replace(groups, sets=of_entry), options)
-    return tests
+    rows, shown, kinds, undefined = [], [], [], []
+    for entry in entries:
+        if entry.formula is None:  # the differences say it
+            continue
+        of_entry = tuple(on_grades(of, entry, file.scale) for of in groups.sets)
+        of_groups = replace(groups, sets=of_entry)
+        for test, result in _equality_tests(entry, of_groups, options):
+            rows.append(
+                {
+                    "coefficient": entry.name,
+                    "weights": options.weights_of(entry),
+                    "test": result.name,
+                    "statistic": result.statistic,
+                    "distribution": result.distribution,
+                    "df": list(result.df),
+                    "p_value": result.p_value,
+                    "n_items": result.n_items,
+                    "reason": result.reason,
+                }
+            )
+            shown.append({**rows[-1], "title": options.title(entry), "test": test})
+            kinds.append(test)
+            if result.reason is not None:
+                values = {"of": entry.title, "reason": result.reason}
+                undefined.append(Note("undefined", values))
+    return Answer(
+        name="equality",
+        rows=rows,
+        shown=shown,
+        notes=(*map(Note, dict.fromkeys(kinds)), *undefined),
+    )
 
 
 def _equality_tests(
     entry: Coefficient, groups: _Groups, options: EstimateOptions
-) -> Iterator[EqualityTest]:
+) -> Iterator[tuple[str, Significance]]:
     from masrel.intervals import differences, donner_test, equality_test, estimate
 
     weights, clusters = options.weights_of(entry), groups.clusters
-    test = partial(
-        EqualityTest, entry=entry, title=options.title(entry), weights=weights
-    )
     if groups.is_dependent:
         result = differences(entry, groups.sets, weights=weights, clusters=clusters)
-        yield test(name=HOTELLING, result=result.equality)
+        yield HOTELLING, result.equality
         return
     if clusters is None:
         estimates = [entry(ratings, weights=weights) for ratings in groups.sets]
@@ -278,10 +285,10 @@ def _equality_tests(
             estimate(entry, ratings, target="items", weights=weights, clusters=of)
             for ratings, of in zip(groups.sets, clusters, strict=True)
         ]
-    yield test(name=FLEISS, result=equality_test(estimates))
+    yield FLEISS, equality_test(estimates)
     of_two = all(
         ratings.codes.shape[1] == 2 and len(ratings.categories) == 2
         for ratings in groups.sets
     )
     if of_two and clusters is None and entry.name in _INTRACLASS:
-        yield test(name=DONNER, result=donner_test(groups.sets))
+        yield DONNER, donner_test(groups.sets)

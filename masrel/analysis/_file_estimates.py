@@ -5,9 +5,9 @@ In: a part of the file, and how estimates are made. Out: a row for every coeffic
 
 import math
 import warnings
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, TypeVar
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from masrel.errors import MasrelError, MasrelWarning, ParameterError
 from masrel.estimates import Estimate, Interval, Target
@@ -115,6 +115,44 @@ class AgreementRow:
     # what the true value reaches with 95 % by its interval; None if there is none, or
     # no word is to be named
     lower_bound: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """What a reader must know of a table, as data; `masrel.tables` has the words."""
+
+    kind: str
+    values: Mapping[str, object] = field(default_factory=dict)
+
+
+Row = dict[str, Any]
+"""Values by name; ``nan`` and infinities are null in JSON."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """What a question gives."""
+
+    name: str  # in the JSON, and of the table
+    rows: list[Row]  # of the JSON
+    shown: list[Row] | None = None  # rows of the table, where they are others
+    # what tells parts apart: a key of the table's rows, and what it is called
+    heads: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[Note, ...] = ()
+    of: str = ""  # what the caption says it is of
+    grades: tuple[str, ...] = ()  # that have a column each
+    has_reference: bool = False  # whether a rater is held against another
+    is_single: bool = False  # whether there is nothing that p is adjusted for
+    # estimates, of which `rows` has what tells them apart
+    estimates: "Sequence[AgreementRow]" = ()
+    # what a figure shows of each part: its name, and its result
+    figure: tuple[tuple[str, Any], ...] = ()
+
+
+def group_key(by: str) -> str:
+    """Return what groups are called in a CSV and a record, unlike all else there."""
+    fields = set(Estimate.__dataclass_fields__) | set(Interval.__dataclass_fields__)
+    return f"group_{by}" if by in fields | {"title", "word", "words", "data"} else by
 
 
 def estimate_rows(

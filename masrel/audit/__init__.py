@@ -5,13 +5,17 @@ how many integer tables give them, under which reading of what was printed.
 """
 
 from masrel.audit._claims import Claim, read_claims
-from masrel.audit._consistency import ConsistentTables, Reading, consistent_tables
-from masrel.audit._readings import ClaimAudit, ClaimReading, audit_claim
+from masrel.audit._readings import (
+    ClaimAudit,
+    ConsistentTables,
+    Reading,
+    audit_claim,
+    consistent_tables,
+)
 
 __all__ = [
     "Claim",
     "ClaimAudit",
-    "ClaimReading",
     "ConsistentTables",
     "Reading",
     "audit_claim",

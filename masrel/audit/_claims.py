@@ -1,29 +1,40 @@
 """What a paper prints of an agreement, checked; and files with one claim a row."""
 
 import csv
-import io
-from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from io import StringIO
 from pathlib import Path
+from typing import Literal, get_args
+
+import numpy as np
 
 from masrel._input import MAX_TABLE, listed, not_utf8, read_regular
-from masrel.audit._printed import PrintedNumber, parse_printed
-from masrel.audit._windows import (
-    MAX_CATEGORIES,
-    MAX_ITEMS,
-    MAX_RATERS,
-    WEIGHTS,
-    AuditWeights,
-    check_count,
-    check_rounding,
-    check_weights,
-    parse_agreement,
-    parse_kappa,
-)
+from masrel.audit._printed import RULES, PrintedNumber, Rule, parse_printed
 from masrel.errors import MasrelError, ParameterError, RatingsError
 
-MAX_UNRATED = 20
-"""Items of which it is tried that not both ratings are there."""
+AuditWeights = Literal["identity", "linear", "quadratic"]
+"""Weights of printed coefficients."""
+
+WEIGHTS: tuple[AuditWeights, ...] = get_args(AuditWeights)
+
+_MAX_UNRATED = 20  # items of which it is tried that not both ratings are there
+_COUNTS = {  # the least and the greatest
+    "n_items": (1, 10_000),
+    "n_categories": (2, 20),
+    "n_raters": (2, 1_000),
+    "n_unrated": (0, _MAX_UNRATED),
+}
+_PRINTED = {  # the least, the greatest, an example
+    "agreement": (0, 100, "97.4"),
+    "kappa": (-1, 1, "0.81"),
+    "standard_error": (0, 10, "0.12"),
+    "low": (-2, 2, "0.12"),
+    "high": (-2, 2, "0.12"),
+    "p": (0, 1, "0.003"),
+}
+_MARGINS = ("margins_1", "margins_2")
+UNCERTAINTY = ("standard_error", "low", "high", "p")
+"""What may be printed beside the kappa of two raters."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,121 +100,117 @@ class Claim:
 
     def __post_init__(self) -> None:
         """Check all of it."""
-        check_count("n_items", self.n_items, 1, MAX_ITEMS)
-        check_count("n_categories", self.n_categories, 2, MAX_CATEGORIES)
-        check_count("n_raters", self.n_raters, 2, MAX_RATERS)
-        check_count("n_unrated", self.n_unrated, 0, min(MAX_UNRATED, self.n_items - 1))
+        for key, (least, most) in _COUNTS.items():
+            if key == "n_unrated":
+                most = min(most, self.n_items - 1)
+            _check_count(key, getattr(self, key), least, most)
         if self.agreement is None and self.kappa is None:
             raise ParameterError(
                 "agreement, kappa: needs at least one of them, got neither"
             )
-        if self.agreement is not None:
-            parse_agreement(self.agreement)
-        if self.kappa is not None:
-            parse_kappa(self.kappa)
+        printed = self.printed()
         for key in ("agreement_weights", "kappa_weights"):
-            if getattr(self, key) != "any":
-                check_weights(key, getattr(self, key), more=("any",))
-        check_rounding(self.rounding)
-        self._check_margins()
-        self._check_uncertainty()
+            check_weights(key, getattr(self, key), (*WEIGHTS, "any"))
+        if self.rounding not in (*RULES, "either"):
+            raise ParameterError(
+                f"rounding: needs half_even, half_up or either, got {self.rounding!r}"
+            )
+        for key in _MARGINS:
+            self._check_margins(key, getattr(self, key))
+        self._check_uncertainty(printed)
 
-    def _check_margins(self) -> None:
-        for key in ("margins_1", "margins_2"):
-            margins = getattr(self, key)
-            if margins is None:
-                continue
-            if self.n_raters != 2:
-                raise ParameterError(f"{key}: needs two raters, got {self.n_raters}")
-            sums = range(self.n_items - self.n_unrated, self.n_items + 1)
-            if len(margins) != self.n_categories or min(margins) < 0:
-                raise ParameterError(
-                    f"{key}: needs {self.n_categories} counts, one a category, got "
-                    f"{';'.join(map(str, margins))}"
-                )
-            if sum(margins) not in sums:
-                raise ParameterError(
-                    f"{key}: needs counts that sum to n_items, {self.n_items}, got "
-                    f"{';'.join(map(str, margins))}, which sum to {sum(margins)}"
-                )
+    def _check_margins(self, key: str, margins: tuple[int, ...] | None) -> None:
+        if margins is None:
+            return
+        if self.n_raters != 2:
+            raise ParameterError(f"{key}: needs two raters, got {self.n_raters}")
+        shown = ";".join(map(str, margins))
+        sums = range(self.n_items - self.n_unrated, self.n_items + 1)
+        if len(margins) != self.n_categories or min(margins) < 0:
+            raise ParameterError(
+                f"{key}: needs {self.n_categories} counts, one a category, got {shown}"
+            )
+        if sum(margins) not in sums:
+            raise ParameterError(
+                f"{key}: needs counts that sum to n_items, {self.n_items}, got "
+                f"{shown}, which sum to {sum(margins)}"
+            )
 
-    def _check_uncertainty(self) -> None:
-        for key in ("standard_error", "low", "high", "p"):
-            if getattr(self, key) is None:
-                continue
-            if self.n_raters != 2 or self.kappa is None:
+    def _check_uncertainty(self, printed: dict[str, PrintedNumber]) -> None:
+        for key in UNCERTAINTY:
+            if key in printed and (self.n_raters != 2 or self.kappa is None):
                 raise ParameterError(f"{key}: needs the kappa of two raters beside it")
-        if (self.low is None) != (self.high is None):
-            absent, other = ("low", "high") if self.low is None else ("high", "low")
-            raise ParameterError(f"{absent}: needed beside {other}, got none")
+        for absent, other in (("low", "high"), ("high", "low")):
+            if other in printed and absent not in printed:
+                raise ParameterError(f"{absent}: needed beside {other}, got none")
         if not 0.5 <= self.level < 1:
             raise ParameterError(
                 f"level: needs a number from 0.5 to below 1, got {self.level!r}"
             )
-        printed = self.printed()
         if self.low is not None and printed["low"].value > printed["high"].value:
             raise ParameterError(
                 f"low: needs to be no higher than high, {self.high}, got {self.low}"
             )
 
+    def printed(self) -> dict[str, PrintedNumber]:
+        """Return the numbers that are printed, by their names here."""
+        numbers = {}
+        for key, (low, high, example) in _PRINTED.items():
+            text = getattr(self, key)
+            if text is not None:
+                text = (
+                    text.removeprefix("<") if key == "p" and str(text) == text else text
+                )
+                numbers[key] = parse_printed(
+                    text, key, low=low, high=high, example=example
+                )
+        return numbers
+
+    @property
+    def rules(self) -> tuple[Rule, ...]:
+        """The rules that its rounding stands for."""
+        return tuple(rule for rule in RULES if self.rounding in (rule, "either"))
+
     @property
     def excludes_kappa(self) -> bool:
         """Whether the interval has kappa outside, which is true of no table."""
-        if self.low is None or self.kappa is None:
+        if self.low is None:
             return False
-        printed, kappa = self.printed(), parse_kappa(self.kappa)
-        low, high = printed["low"], printed["high"]
+        printed = self.printed()
+        low, high, kappa = (printed[key] for key in ("low", "high", "kappa"))
         return (
             low.value - low.half_unit > kappa.value + kappa.half_unit
             or high.value + high.half_unit < kappa.value - kappa.half_unit
         )
 
-    def printed(self) -> dict[str, PrintedNumber]:
-        """Return standard error, interval and p, as far as they are printed."""
-        limits = {"standard_error": (0, 10), "low": (-2, 2), "high": (-2, 2)}
-        texts = {key: getattr(self, key) for key in limits}
-        numbers = {
-            key: parse_printed(
-                text, key, low=limits[key][0], high=limits[key][1], example="0.12"
-            )
-            for key, text in texts.items()
-            if text is not None
-        }
-        if self.p is not None:
-            p = self.p.removeprefix("<") if isinstance(self.p, str) else self.p
-            numbers["p"] = parse_printed(p, "p", low=0, high=1, example="0.003")
-        return numbers
-
-    @property
-    def numbers(self) -> str:
-        """Return percentage and kappa in words."""
-        parts = []
-        if self.agreement is not None:
-            parts.append(f"{self.agreement} % agreement")
-        if self.kappa is not None:
-            parts.append(f"κ {self.kappa}")
-        return " and ".join(parts)
-
     def weights(self) -> list[tuple[AuditWeights, AuditWeights]]:
         """Return the weights of agreement and of kappa that it may be read with."""
-        names = [self.agreement_weights, self.kappa_weights]
-        if self.agreement is None:
-            names[0] = "identity"
-        if self.kappa is None:
-            names[1] = "identity"
-        if self.n_categories == 2:  # all weights are alike
-            names = ["identity" if name == "any" else name for name in names]
-        first, second = (
-            WEIGHTS if name == "any" else (check_weights("weights", name),)
-            for name in names
+        pairs = []
+        for number, name in (
+            (self.agreement, self.agreement_weights),
+            (self.kappa, self.kappa_weights),
+        ):
+            # of two categories all weights are alike
+            is_one = number is None or (name == "any" and self.n_categories == 2)
+            chosen = "identity" if is_one else name
+            pairs.append([w for w in WEIGHTS if chosen in (w, "any")])
+        return [(a, k) for a in pairs[0] for k in pairs[1]]
+
+
+def _check_count(name: str, count: object, least: int, most: int) -> None:
+    is_whole = isinstance(count, int | np.integer) and not isinstance(count, bool)
+    if not is_whole or not least <= count <= most:  # type: ignore[operator]
+        raise ParameterError(
+            f"{name}: needs a whole number from {least} to {most}, got {count!r}"
         )
-        return [(a, k) for a in first for k in second]
 
 
-_TEXTS = ("name", "agreement", "kappa", "agreement_weights", "kappa_weights",
-          "rounding", "standard_error", "low", "high", "p", "source")  # fmt: skip
-_WHOLE = ("n_items", "n_categories", "n_raters", "n_unrated")
-_NEEDED = ("n_items", "n_categories")
+def check_weights(name: str, weights: str, known: tuple[str, ...] = WEIGHTS) -> None:
+    """Refuse weights that cannot be audited."""
+    if weights not in known:
+        raise ParameterError(
+            f"{name}: needs one of {', '.join(known)}, got {weights!r}"
+        )
 
 
 def read_claims(file: Path) -> tuple[Claim, ...]:
@@ -245,34 +252,27 @@ def read_claims(file: Path) -> tuple[Claim, ...]:
         )
     separator = ";" if lines[0][1].count(";") > lines[0][1].count(",") else ","
     try:
-        rows = [next(csv.reader(io.StringIO(t), delimiter=separator)) for _, t in lines]
+        rows = [next(csv.reader(StringIO(t), delimiter=separator)) for _, t in lines]
     except csv.Error as error:
         raise RatingsError(f"{file}: needs CSV, got what is none: {error}") from error
     head = [name.strip() for name in rows[0]]
-    _check_head(file, head)
+    known, needed = [field.name for field in fields(Claim)], ("n_items", "n_categories")
+    if strays := [name for name in head if name not in known]:
+        raise RatingsError(
+            f"{file}: needs columns among {', '.join(known)}, got {listed(strays)}"
+        )
+    if not set(head).issuperset(needed) or len(set(head)) < len(head):
+        raise RatingsError(
+            f"{file}: needs the columns {', '.join(needed)}, and each column once, "
+            f"got {listed(head)}"
+        )
     return tuple(
-        _claim(file, number, head, row)
+        _claim(f"{file}: row {number}", number, head, row)
         for (number, _), row in zip(lines[1:], rows[1:], strict=True)
     )
 
 
-def _check_head(file: Path, head: list[str]) -> None:
-    known = [field.name for field in fields(Claim)]
-    strays = [name for name in head if name not in known]
-    absent = [name for name in _NEEDED if name not in head]
-    if strays:
-        raise RatingsError(
-            f"{file}: needs columns among {', '.join(known)}, got {listed(strays)}"
-        )
-    if absent or len(set(head)) < len(head):
-        raise RatingsError(
-            f"{file}: needs the columns {', '.join(_NEEDED)}, and each column once, "
-            f"got {listed(head)}"
-        )
-
-
-def _claim(file: Path, number: int, head: list[str], row: list[str]) -> Claim:
-    where = f"{file}: row {number}"
+def _claim(where: str, number: int, head: list[str], row: list[str]) -> Claim:
     if len(row) != len(head):
         raise RatingsError(
             f"{where}: needs {len(head)} cells, as many as there are columns, got "
@@ -281,41 +281,35 @@ def _claim(file: Path, number: int, head: list[str], row: list[str]) -> Claim:
     cells = {
         name: text.strip() for name, text in zip(head, row, strict=True) if text.strip()
     }
-    absent = [name for name in _NEEDED if name not in cells]
-    if absent:
-        raise RatingsError(f"{where}, column {absent[0]}: needs a number, got nothing")
+    for name in ("n_items", "n_categories"):
+        if name not in cells:
+            raise RatingsError(f"{where}, column {name}: needs a number, got nothing")
     try:
-        return Claim(**({"name": f"row {number}"} | _values(cells)))  # type: ignore[arg-type]
+        return claim_of({"name": f"row {number}"} | cells)
     except MasrelError as error:  # its message begins with the parameter
         raise RatingsError(f"{where}, column {error}") from error
 
 
-def _values(cells: Mapping[str, str]) -> dict[str, object]:
-    # the parameters of a claim from their texts
-    values: dict[str, object] = {key: cells[key] for key in _TEXTS if key in cells}
-    for key in _WHOLE:
-        if key in cells:
-            values[key] = whole(key, cells[key])
-    for key in ("margins_1", "margins_2"):
-        if key in cells:
-            values[key] = margins_of(key, cells[key])
-    if "level" in cells:
-        try:
-            values["level"] = float(cells["level"])
-        except ValueError:
-            raise ParameterError(
-                f"level: needs a number such as 0.95, got {cells['level']!r}"
-            ) from None
-    return values
+def claim_of(texts: dict[str, str]) -> Claim:
+    """Return a claim from the texts of its parameters."""
+    values: dict[str, object] = dict(texts)
+    for key, text in texts.items():
+        if key in _COUNTS:
+            values[key] = _whole(key, text)
+        elif key in _MARGINS:
+            parts = text.replace(";", " ").split()
+            values[key] = tuple(_whole(key, part) for part in parts)
+        elif key == "level":
+            try:
+                values[key] = float(text)
+            except ValueError:
+                raise ParameterError(
+                    f"level: needs a number such as 0.95, got {text!r}"
+                ) from None
+    return Claim(**values)  # type: ignore[arg-type]
 
 
-def whole(key: str, text: str) -> int:
-    """Return a whole number from its text."""
+def _whole(key: str, text: str) -> int:
     if not (text.isascii() and text.isdecimal() and len(text) < 10):
         raise ParameterError(f"{key}: needs a whole number, got {text!r}")
     return int(text)
-
-
-def margins_of(key: str, text: str) -> tuple[int, ...]:
-    """Return counts from a text that has them between spaces or semicolons."""
-    return tuple(whole(key, part) for part in text.replace(";", " ").split())

@@ -7,6 +7,7 @@ ends are as well depends on the rule for ties. All is exact: ends are fractions.
 import re
 from dataclasses import dataclass
 from fractions import Fraction
+from math import ceil, floor
 from typing import Literal, NamedTuple
 
 from masrel.errors import ParameterError
@@ -15,6 +16,9 @@ Rule = Literal["half_even", "half_up"]
 """What becomes of a tie: the even neighbour, or the one further from 0."""
 
 RULES: tuple[Rule, ...] = ("half_even", "half_up")
+
+Window = tuple[int, int]
+"""The least and the greatest whole number that is allowed; none where it is less."""
 
 _NUMBER = re.compile(r"[-−]?(\d+\.?\d*|\.\d+)", re.ASCII)
 _MAX_DECIMALS = 12
@@ -28,20 +32,11 @@ class Bounds(NamedTuple):
     has_low: bool  # whether the end itself is one of them
     has_high: bool
 
-    def holds(self, value: Fraction) -> bool:
-        """Return whether a value is printed as the text."""
-        return (
-            self.low < value < self.high
-            or (self.has_low and value == self.low)
-            or (self.has_high and value == self.high)
-        )
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class PrintedNumber:
     """A number with the decimals that it was printed with."""
 
-    text: str
     units: int  # the number in units of its last decimal
     decimals: int
 
@@ -69,29 +64,27 @@ def parse_printed(
     text: object, where: str, *, low: int, high: int, example: str
 ) -> PrintedNumber:
     """Return a printed number between two limits; `where` begins the message."""
-    problem = None
     if not isinstance(text, str):
         problem = f"a text such as {example!r}, since its decimals count"
     elif not _NUMBER.fullmatch(text.strip()):
         problem = f"a number with a decimal point and no unit, such as {example!r}"
-    if problem is None:
-        plain = str(text).strip().replace("−", "-")
+    else:
+        value = Fraction(plain := text.strip().replace("−", "-"))
         decimals = len(plain.partition(".")[2])
-        if decimals > _MAX_DECIMALS:
-            problem = f"at most {_MAX_DECIMALS} decimals"
-        elif not low <= Fraction(plain) <= high:
-            problem = f"a number from {low} to {high}"
-    if problem is not None:
-        raise ParameterError(f"{where}: needs {problem}, got {text!r}")
-    units = int(Fraction(plain) * 10**decimals)
-    return PrintedNumber(text=plain, units=units, decimals=decimals)
+        if low <= value <= high and decimals <= _MAX_DECIMALS:
+            return PrintedNumber(int(value * 10**decimals), decimals)
+        problem = (
+            f"at most {_MAX_DECIMALS} decimals"
+            if decimals > _MAX_DECIMALS
+            else f"a number from {low} to {high}"
+        )
+    raise ParameterError(f"{where}: needs {problem}, got {text!r}")
 
 
-def first_whole(low: Fraction, has_low: bool) -> int:
-    """Return the least whole number above an end, or at it where it counts."""
-    return -(-low.numerator // low.denominator) if has_low else low.__floor__() + 1
-
-
-def last_whole(high: Fraction, has_high: bool) -> int:
-    """Return the greatest whole number below an end, or at it where it counts."""
-    return high.__floor__() if has_high else -(-high.numerator // high.denominator) - 1
+def whole_numbers(bounds: Bounds) -> Window:
+    """Return the whole numbers within bounds, and at those ends that count."""
+    low, high, has_low, has_high = bounds
+    return (
+        ceil(low) if has_low else floor(low) + 1,
+        floor(high) if has_high else ceil(high) - 1,
+    )

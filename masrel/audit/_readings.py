@@ -1,34 +1,60 @@
-"""Every reading of a claim, and how many tables each of them leaves."""
+"""How many tables give what is printed, by every reading of it.
 
-from collections.abc import Iterator, Mapping
+What a program prints as the standard error of kappa is one of several; the interval is
+kappa plus and minus a normal quantile of it, and p that of kappa over it. All these are
+floats: a printed number fits where it is nearer than half of its last decimal.
+"""
+
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
+from statistics import NormalDist
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from masrel.audit._claims import Claim
-from masrel.audit._consistency import (
-    CellRows,
-    ConsistentTables,
-    CountStatus,
-    answer,
-    count_text,
+from masrel.agreement import cohen_kappa, count_table
+from masrel.audit._claims import (
+    UNCERTAINTY,
+    AuditWeights,
+    Claim,
+    check_weights,
 )
-from masrel.audit._square_tables import (
+from masrel.audit._printed import PrintedNumber
+from masrel.audit._search import (
     MAX_COUNTED,
+    N_EXAMPLES,
+    CellRows,
+    Integers,
     SquareTables,
-    Work,
     WorkLimitError,
+    as_rows,
+    count_tables,
+    disagreement,
+    matrix_of,
 )
-from masrel.audit._uncertainty import ERROR_KINDS, Uncertainty
-from masrel.audit._windows import AuditWeights, Integers, Question, pose_question
 
-_MAX_LISTED = 10_000  # tables that are made to look at their margins and errors
+CountStatus = Literal["exact", "at least", "cannot tell"]
+
+_Floats = NDArray[np.float64]
+_Flags = NDArray[np.bool_]
+_Weights = tuple[AuditWeights, AuditWeights]  # of agreement and of kappa
+
+_ERRORS = ("delta", "delta n-1", "null", "simple")
+_TESTS = {
+    "null, two-sided": ("null", 2),
+    "null, one-sided": ("null", 1),
+    "delta, two-sided": ("delta", 2),
+    "delta, one-sided": ("delta", 1),
+}
+_NORMAL = NormalDist()
+_SLACK = 1e-9  # of floats, either side of a tie
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ClaimReading:
-    """One way to read a claim, and how many tables it leaves.
+class Reading:
+    """One way to read printed numbers, and how many tables it leaves.
 
     Attributes
     ----------
@@ -54,14 +80,68 @@ class ClaimReading:
     """
 
     n_items: int
-    agreement_weights: AuditWeights | None
-    kappa_weights: AuditWeights | None
+    agreement_weights: str | None
+    kappa_weights: str | None
     rounding: str
     error: str | None = None
     test: str | None = None
     n_tables: int | None
     status: CountStatus
     n_agreed: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConsistentTables:
+    """How many tables give the printed numbers.
+
+    Attributes
+    ----------
+    n_tables : int or None
+        Tables that give both numbers, 0 if none does; None if it cannot be told.
+    status : str
+        ``"exact"``: there are so many; ``"at least"``: there may be more, since no
+        more than 10 000 are counted; ``"cannot tell"``: the bound on work was met
+        before a table was met.
+    examples : tuple of tables
+        Up to ten of them, each a tuple of rows. Two raters: categories of the first
+        (rows) and of the second rater (columns). More raters: items (rows), and how
+        many raters chose each category (columns).
+    readings : tuple of Reading
+        What was tried, one reading a rule of rounding.
+    n_agreed : tuple of int
+        On how many items two raters agree in any of these tables; empty for more
+        raters, and where not every table was counted.
+    n_visited : int
+        Partial tables that were visited, at most 10⁸; a step counts as a thousand of
+        them at the least.
+    """
+
+    n_tables: int | None
+    status: CountStatus
+    examples: tuple[CellRows, ...] = field(repr=False)
+    readings: tuple[Reading, ...] = field(repr=False)
+    n_agreed: tuple[int, ...] = ()
+    n_visited: int = field(compare=False)
+
+    @property
+    def is_possible(self) -> bool | None:
+        """Whether any table gives the numbers; None if it cannot be told."""
+        return None if self.n_tables is None else self.n_tables > 0
+
+    def __str__(self) -> str:
+        return count_text(self.n_tables, self.status)
+
+
+def count_text(n_tables: int | None, status: CountStatus) -> str:
+    """Return a count of tables in words."""
+    if n_tables is None:
+        return "cannot tell"
+    number = f"{n_tables:,}".replace(",", " ")
+    if status == "at least":
+        return f"at least {number} tables"
+    if n_tables < 2:
+        return "one table" if n_tables else "no table"
+    return f"{number} tables"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +152,7 @@ class ClaimAudit:
     ----------
     claim : Claim
         The claim.
-    readings : tuple of ClaimReading
+    readings : tuple of Reading
         Every reading that was tried.
     alone : dict of str to ConsistentTables
         Where no reading leaves a table: how many tables give a part of the numbers,
@@ -82,7 +162,7 @@ class ClaimAudit:
     """
 
     claim: Claim
-    readings: tuple[ClaimReading, ...]
+    readings: tuple[Reading, ...]
     alone: Mapping[str, ConsistentTables] = field(default_factory=dict)
     examples: tuple[CellRows, ...] = ()
 
@@ -98,11 +178,12 @@ class ClaimAudit:
     def sentence(self) -> str:
         """What came out, in a sentence that accuses nobody."""
         claim, n = self.claim, len(self.readings)
-        table = f"of {counted_items(claim.n_items)} in {claim.n_categories} categories"
+        items = "1 item" if claim.n_items == 1 else f"{claim.n_items} items"
+        table = f"of {items} in {claim.n_categories} categories"
         if claim.n_raters > 2:
             table += f" by {claim.n_raters} raters"
         both = "both " if claim.agreement and claim.kappa else ""
-        what = f"{both}{claim.numbers}{_beside(claim)}"
+        what = f"{both}{_numbers(claim)}{_beside(claim)}"
         if self.is_possible is None:
             return (
                 f"cannot tell whether any table {table} gives {what}: the bound on "
@@ -115,15 +196,36 @@ class ClaimAudit:
         count = _range_text(some)
         verb = "gives" if count == "one table" else "give"
         by = "" if len(some) == n else f", by {len(some)} of {n} readings"
-        return f"{count} {table} {verb} {what}{by}{_agreed_text(claim, some)}"
+        agreed = {n for reading in some for n in reading.n_agreed}
+        in_them = ""
+        if agreed and all(reading.n_agreed for reading in some):
+            ends = " to ".join(map(str, sorted({min(agreed), max(agreed)})))
+            in_them = f"; in them the raters agree on {ends} of {claim.n_items}"
+        return f"{count} {table} {verb} {what}{by}{in_them}"
 
 
-def counted_items(n_items: int) -> str:
-    """Return a number of items in words."""
-    return "1 item" if n_items == 1 else f"{n_items} items"
+def _numbers(claim: Claim) -> str:
+    # percentage and kappa in words
+    texts = {
+        f"{claim.agreement} % agreement": claim.agreement,
+        f"κ {claim.kappa}": claim.kappa,
+    }
+    return " and ".join(name for name, text in texts.items() if text is not None)
 
 
-def _range_text(readings: list[ClaimReading]) -> str:
+def _beside(claim: Claim) -> str:
+    # what else is printed, in words
+    parts = {
+        "margins": claim.margins_1 or claim.margins_2,
+        "standard error": claim.standard_error,
+        "interval": claim.low,
+        "p": claim.p,
+    }
+    names = [name for name, printed in parts.items() if printed is not None]
+    return f" with its {', '.join(names)}" if names else ""
+
+
+def _range_text(readings: list[Reading]) -> str:
     # how many tables readings leave
     order = sorted(readings, key=lambda r: (r.n_tables or 0, r.status == "at least"))
     first, last = (count_text(r.n_tables, r.status) for r in (order[0], order[-1]))
@@ -133,25 +235,112 @@ def _range_text(readings: list[ClaimReading]) -> str:
     return f"{first} to {last}"
 
 
-def _agreed_text(claim: Claim, readings: list[ClaimReading]) -> str:
-    # on how many items the raters agree, where it is known of every table
-    numbers = {n for reading in readings for n in reading.n_agreed}
-    if not numbers or not all(reading.n_agreed for reading in readings):
-        return ""
-    ends = " to ".join(map(str, sorted({min(numbers), max(numbers)})))
-    return f"; in them the raters agree on {ends} of {claim.n_items}"
+def consistent_tables(
+    *,
+    n_items: int,
+    n_categories: int,
+    n_raters: int = 2,
+    agreement: str | None = None,
+    kappa: str | None = None,
+    agreement_weights: str = "identity",
+    kappa_weights: str = "identity",
+    rounding: str = "either",
+) -> ConsistentTables:
+    """Count the integer tables that give a printed agreement and a printed kappa.
+
+    Parameters
+    ----------
+    n_items : int
+        Items that every rater rated, 1 to 10 000.
+    n_categories : int
+        Categories of the scale, used or not, 2 to 20.
+    n_raters : int, optional
+        Raters of each item. Of two, kappa is Cohen's; of more it is Fleiss', and the
+        agreement is that of pairs of raters.
+    agreement : str, optional
+        The agreement in percent as it is printed, without a sign: its decimals count.
+    kappa : str, optional
+        Kappa as it is printed. At least one of both is needed.
+    agreement_weights, kappa_weights : str, optional
+        ``"identity"``, ``"linear"`` or ``"quadratic"``.
+    rounding : str, optional
+        What became of ties: ``"half_even"``, ``"half_up"`` (away from 0), or
+        ``"either"``: both numbers by one rule, whichever.
+
+    Returns
+    -------
+    ConsistentTables
+        How many tables there are, some of them, and what was tried.
+
+    Raises
+    ------
+    ParameterError
+        If a parameter is not what it must be, or both numbers are absent.
+
+    Notes
+    -----
+    Raters and categories are told apart, and so are items of more than two raters: a
+    table and its transpose are two. Tables of which kappa is undefined are not counted
+    where a kappa is printed. Of two raters all tables are decided, in integers, unless
+    the bound on work is met. Of more raters this holds for few items; with many, a
+    part of the tables is tried, and where none of them fits it cannot be told.
+
+    Examples
+    --------
+    >>> print(consistent_tables(
+    ...     n_items=20, n_categories=2, agreement="85.0", kappa="0.58"))
+    4 tables
+    >>> print(consistent_tables(
+    ...     n_items=20, n_categories=2, agreement="65.0", kappa="0.244"))
+    no table
+    """
+    check_weights("agreement_weights", agreement_weights)
+    check_weights("kappa_weights", kappa_weights)
+    return _answer(
+        Claim(
+            n_items=n_items,
+            n_categories=n_categories,
+            n_raters=n_raters,
+            agreement=agreement,
+            kappa=kappa,
+            agreement_weights=agreement_weights,
+            kappa_weights=kappa_weights,
+            rounding=rounding,
+        )
+    )
 
 
-def _beside(claim: Claim) -> str:
-    # what else is printed, in words
-    parts = {
-        "margins": claim.margins_1 is not None or claim.margins_2 is not None,
-        "standard error": claim.standard_error is not None,
-        "interval": claim.low is not None,
-        "p": claim.p is not None,
-    }
-    names = [name for name, is_printed in parts.items() if is_printed]
-    return f" with its {', '.join(names)}" if names else ""
+def _answer(claim: Claim) -> ConsistentTables:
+    # of a claim whose weights are named, by its percentage and kappa alone
+    count = count_tables(claim)
+    agreed = tuple(sorted(count.n_agreed)) if count.is_whole else ()
+    whole = _reading(claim, count.numbers[None], count.is_whole, "either", agreed)
+    return ConsistentTables(
+        n_tables=whole.n_tables,
+        status=whole.status,
+        examples=tuple(count.examples),
+        readings=tuple(
+            _reading(claim, count.numbers[rule], count.is_whole, rule, agreed)
+            for rule in claim.rules
+        ),
+        n_agreed=agreed,
+        n_visited=count.n_visited,
+    )
+
+
+def _reading(
+    claim: Claim, n: int, is_whole: bool, rounding: str, n_agreed: tuple[int, ...]
+) -> Reading:
+    # is_whole: whether all tables were looked at, of which n fit
+    return Reading(
+        n_items=claim.n_items,
+        agreement_weights=claim.agreement_weights if claim.agreement else None,
+        kappa_weights=claim.kappa_weights if claim.kappa else None,
+        rounding=rounding,
+        n_tables=min(n, MAX_COUNTED) if n or is_whole else None,
+        status="exact" if is_whole else "at least" if n else "cannot tell",
+        n_agreed=n_agreed if n else (),
+    )
 
 
 def audit_claim(claim: Claim) -> ClaimAudit:
@@ -192,153 +381,173 @@ def audit_claim(claim: Claim) -> ClaimAudit:
     >>> audit_claim(claim).sentence
     'no table of 12 items in 3 categories gives κ 0.771, by the one reading tried'
     """
-    readings: list[ClaimReading] = []
+    readings: list[Reading] = []
     examples: tuple[CellRows, ...] = ()
+    bare = _bare(claim)
     for n_absent, weights in product(range(claim.n_unrated + 1), claim.weights()):
-        question = _question(claim, claim.n_items - n_absent, weights)
-        if _has_more(claim):
-            rows, tables = _looked_at(claim, question)
+        n_items = claim.n_items - n_absent
+        if claim == bare:
+            result = _answer(_named(bare, weights, n_items))
+            rows, tables = _by_rounding(claim, result), result.examples
         else:
-            result = answer(question)
-            rows, tables = _by_rounding(claim, question, result), result.examples
+            rows, tables = _looked_at(claim, _named(claim, weights, n_items))
         readings += rows
         examples = examples or tables
     audit = ClaimAudit(claim=claim, readings=tuple(readings), examples=examples)
-    if audit.is_possible is False:
-        return replace(audit, alone=_alone(claim))
-    return audit
+    if audit.is_possible is not False:
+        return audit
+    return replace(audit, alone=_alone(claim, _named(bare, claim.weights()[0])))
 
 
-def _question(
-    claim: Claim, n_items: int, weights: tuple[AuditWeights, AuditWeights]
-) -> Question:
-    return pose_question(
+def _bare(claim: Claim) -> Claim:
+    # by its percentage and kappa alone
+    absent = dict.fromkeys(("margins_1", "margins_2", *UNCERTAINTY))
+    return replace(claim, **absent)  # type: ignore[arg-type]
+
+
+def _named(claim: Claim, weights: _Weights, n_items: int | None = None) -> Claim:
+    # a claim read by named weights, of so many items that have both ratings
+    n_items = n_items or claim.n_items
+    # margins of more items than are left say nothing of those that are
+    first, second = (
+        margins if margins is not None and sum(margins) == n_items else None
+        for margins in (claim.margins_1, claim.margins_2)
+    )
+    return replace(
+        claim,
         n_items=n_items,
-        n_categories=claim.n_categories,
-        n_raters=claim.n_raters,
-        agreement=claim.agreement,
-        kappa=claim.kappa,
+        n_unrated=0,
         agreement_weights=weights[0],
         kappa_weights=weights[1],
-        rounding=claim.rounding,
+        margins_1=first,
+        margins_2=second,
     )
 
 
-def _has_more(claim: Claim) -> bool:
-    return bool(claim.printed()) or not claim.margins_1 is claim.margins_2 is None
-
-
-def _alone(claim: Claim) -> dict[str, ConsistentTables]:
+def _alone(claim: Claim, bare: Claim) -> dict[str, ConsistentTables]:
     # by the first weights: which of the numbers it is that no table gives
-    question = _question(claim, claim.n_items, claim.weights()[0])
     alone = {}
     if claim.agreement is not None and claim.kappa is not None:
-        alone[f"{claim.agreement} % agreement"] = answer(replace(question, kappa=None))
-        alone[f"κ {claim.kappa}"] = answer(replace(question, agreement=None))
-    if _has_more(claim):
-        alone[claim.numbers] = answer(question)
+        alone[f"{claim.agreement} % agreement"] = _answer(replace(bare, kappa=None))
+        alone[f"κ {claim.kappa}"] = _answer(replace(bare, agreement=None))
+    if claim != _bare(claim):
+        alone[_numbers(claim)] = _answer(bare)
     return alone
 
 
-def _by_rounding(
-    claim: Claim, question: Question, result: ConsistentTables
-) -> list[ClaimReading]:
+def _by_rounding(claim: Claim, result: ConsistentTables) -> list[Reading]:
     # one reading where both rules lead to the same
-    first = result.readings[0]
-    if all(
-        (reading.n_tables, reading.status) == (first.n_tables, first.status)
-        for reading in result.readings
-    ):
-        named = {claim.rounding: first}
-    else:
-        named = {reading.rounding: reading for reading in result.readings}
-    return [
-        replace(
-            _reading(question, reading.n_tables, reading.status),
-            rounding=rounding,
-            n_agreed=result.n_agreed if reading.n_tables else (),
-        )
-        for rounding, reading in named.items()
-    ]
-
-
-def _reading(
-    question: Question, n_tables: int | None, status: CountStatus
-) -> ClaimReading:
-    return ClaimReading(
-        n_items=question.n_items,
-        agreement_weights=question.agreement_weights if question.agreement else None,
-        kappa_weights=question.kappa_weights if question.kappa else None,
-        rounding="either" if len(question.rules) > 1 else question.rules[0],
-        n_tables=n_tables,
-        status=status,
-    )
+    first, *others = result.readings
+    if all((r.n_tables, r.status) == (first.n_tables, first.status) for r in others):
+        return [replace(first, rounding=claim.rounding)]
+    return list(result.readings)
 
 
 def _looked_at(
-    claim: Claim, question: Question
-) -> tuple[list[ClaimReading], tuple[CellRows, ...]]:
+    claim: Claim, named: Claim
+) -> tuple[list[Reading], tuple[CellRows, ...]]:
     # readings of margins, errors and p, from tables made one by one
-    tables, is_whole = _listed(claim, question)
+    tables, is_whole = _listed(named)
     is_whole = is_whole or claim.excludes_kappa
-    uncertainty = Uncertainty.of(claim, tables, question.kappa_weights)
-    errors = ERROR_KINDS if uncertainty.has_error else (None,)
-    tests = tuple(uncertainty.tests) or (None,)
-    readings: list[ClaimReading] = []
+    printed = claim.printed()
+    values = (
+        _errors(tables, named.kappa_weights) if printed.keys() & UNCERTAINTY else {}
+    )
+    has_error = printed.keys() & {"standard_error", "low"}
+    readings: list[Reading] = []
     examples: tuple[CellRows, ...] = ()
-    for error, test in product(errors, tests):
-        fits = uncertainty.fits(error, test)
-        n = int(fits.sum())
-        status: CountStatus = (
-            "exact" if is_whole else "at least" if n else "cannot tell"
-        )
+    for error, test in product(
+        _ERRORS if has_error else (None,), _TESTS if claim.p is not None else (None,)
+    ):
+        fits = np.ones(len(tables), dtype=bool)
+        if error is not None:
+            fits &= _has_error(claim, printed, values["kappa"], values[error])
+        if test is not None:
+            fits &= _has_p(claim, printed["p"], values, test)
         agreed = np.unique(np.trace(tables[fits], axis1=1, axis2=2)).tolist()
-        readings.append(
-            replace(
-                _reading(question, n if n or is_whole else None, status),
-                error=error,
-                test=test,
-                n_agreed=tuple(agreed) if is_whole else (),
-            )
+        reading = _reading(
+            named,
+            int(fits.sum()),
+            is_whole,
+            claim.rounding,
+            tuple(agreed) if is_whole else (),
         )
-        examples = examples or _as_rows(tables[fits][:10])
+        readings.append(replace(reading, error=error, test=test))
+        examples = examples or tuple(as_rows(tables[fits][:N_EXAMPLES]))
     return readings, examples
 
 
-def _as_rows(tables: Integers) -> tuple[CellRows, ...]:
-    return tuple(tuple(map(tuple, table)) for table in tables.tolist())
-
-
-def _listed(claim: Claim, question: Question) -> tuple[Integers, bool]:
-    # the tables that have the margins, and whether it is all of them
-    q = question.n_categories
+def _listed(claim: Claim) -> tuple[Integers, bool]:
+    # the tables that have percentage, kappa and margins, and whether it is all of them
+    q = claim.n_categories
     blocks, n = [np.zeros((0, q, q), dtype=np.int64)], 0
     try:
-        for block in _with_margins(claim, question):
+        for block in SquareTables(claim).tables():
             blocks.append(block)
             n += len(block)
-            if n >= _MAX_LISTED:
-                return np.concatenate(blocks)[:MAX_COUNTED], False
+            if n >= MAX_COUNTED:
+                break
     except WorkLimitError:
         return np.concatenate(blocks), False
-    return np.concatenate(blocks), True
+    return np.concatenate(blocks)[:MAX_COUNTED], n < MAX_COUNTED
 
 
-def _with_margins(claim: Claim, question: Question) -> Iterator[Integers]:
-    sides = [
-        None
-        if margins is None or sum(margins) != question.n_items
-        else np.array(margins)
-        for margins in (claim.margins_1, claim.margins_2)
-    ]
-    # margins of more items than are left say nothing of those that are
-    both = None if sides[0] is None or sides[1] is None else sides[0] + sides[1]
-    search = SquareTables(question, Work(), margins=both)
-    for hit in search.hits():
-        for block in search.tables(hit):
-            fits = np.ones(len(block), dtype=bool)
-            for margins, axis in zip(sides, (2, 1), strict=True):
-                if margins is not None:
-                    fits &= (block.sum(axis=axis) == margins).all(axis=1)
-            if fits.any():
-                yield block[fits]
+def _errors(tables: Integers, weights: str) -> dict[str, _Floats]:
+    # kappa of every table with the standard errors that programs print; w = 1 - v/v_max
+    estimates = [cohen_kappa(count_table(t), weights=weights) for t in tables]
+    delta = np.array([estimate.standard_error for estimate in estimates])
+    v = matrix_of(disagreement(weights, tables.shape[1])).astype(float)
+    w = 1 - v / v.max()
+    n = tables.sum(axis=(1, 2))
+    p = tables / n[:, None, None]
+    rows, columns = p.sum(axis=2), p.sum(axis=1)
+    observed = (p * w).sum(axis=(1, 2))
+    chance = np.einsum("tk,km,tm->t", rows, w, columns)
+    means = (columns @ w.T)[:, :, None] + (rows @ w)[:, None, :]
+    # [1], eq. 9: Σ p_i. p_.j [w_ij - (w_i. + w_.j)]² - p_e², of kappa 0
+    variance = np.einsum("tk,tkm,tm->t", rows, (w - means) ** 2, columns) - chance**2
+    # [2]: the first one of Cohen
+    squares = np.maximum((p * w**2).sum(axis=(1, 2)) - observed**2, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return {
+            "kappa": np.array([estimate.value for estimate in estimates]),
+            "delta": delta * np.sqrt((n - 1) / n),
+            "delta n-1": delta,
+            "null": np.sqrt(np.maximum(variance, 0.0) / n) / (1 - chance),
+            "simple": np.sqrt(squares / n) / (1 - chance),
+        }
+
+
+def _has_error(
+    claim: Claim, printed: dict[str, PrintedNumber], kappa: _Floats, error: _Floats
+) -> _Flags:
+    fits = np.ones(len(kappa), dtype=bool)
+    if "standard_error" in printed:
+        fits &= _near(error, printed["standard_error"])
+    if "low" in printed:
+        reach = _NORMAL.inv_cdf(0.5 + claim.level / 2) * error
+        fits &= _near(kappa - reach, printed["low"], -1.0)
+        fits &= _near(kappa + reach, printed["high"], 1.0)
+    return fits
+
+
+def _has_p(
+    claim: Claim, printed: PrintedNumber, values: dict[str, _Floats], test: str
+) -> _Flags:
+    error, sides = _TESTS[test]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        z = values["kappa"] / values[error]
+    above = np.array([1 - _NORMAL.cdf(value) for value in z])
+    p = above if sides == 1 else 2 * np.minimum(above, 1 - above)
+    if str(claim.p).startswith("<"):
+        return p < float(printed.value)
+    return _near(p, printed)
+
+
+def _near(values: _Floats, printed: PrintedNumber, end: float | None = None) -> _Flags:
+    # end: of the scale, where intervals may have been cut off
+    reach = float(printed.half_unit) + _SLACK
+    near = abs(values - float(printed.value)) <= reach
+    if end is not None and float(printed.value) == end:
+        near |= values * end > 1
+    return near

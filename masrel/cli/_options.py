@@ -17,7 +17,7 @@ from masrel.cli._paths import FileInFolder, OutputFile
 from masrel.errors import MasrelWarning, ParameterError
 
 if TYPE_CHECKING:
-    from masrel.plots._drawn_values import Content, Form
+    from masrel.plots._drawn_values import Content, Drawn, Form
     from masrel.tables._tables import Table
 
 Command = Callable[..., None]
@@ -144,7 +144,7 @@ def write_output(
     *,
     document: Callable[[], dict[str, object]],
     text: "Callable[[], Table | str]",
-    figure: "Callable[[], Content] | None" = None,
+    figure: "Callable[[], Content | Drawn] | None" = None,
     stamp: str = "",
     notes: tuple[str, ...] = (),
     more: "Sequence[Table]" = (),

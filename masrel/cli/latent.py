@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from masrel.ratings import RatingsFile, RatingsPart
 
 
+_DRAWER = "masrel.plots._latent_scale:latent_figure"
+
+
 @click.command("latent")
 @click.argument("file", type=InputFile(path_type=Path))
 @click.option(
@@ -84,11 +87,8 @@ def latent(
         compare=not one_prior,
         is_quiet=output.quiet,
     )
-    from masrel.tables._latent_trait import (
-        latent_document,
-        latent_scale,
-        latent_table,
-    )
+    from masrel.plots._drawn_values import Drawn
+    from masrel.tables._latent_trait import latent_document, latent_table
     from masrel.tables._tables import SIMULATED
 
     grades, simulated = ratings.scale.grades, ratings.simulated
@@ -101,7 +101,7 @@ def latent(
             notes=notes,
             data="simulated" if simulated else "foreign",
         ),
-        figure=lambda: latent_scale(result, grades),
+        figure=lambda: Drawn(_DRAWER, (result, grades)),
         stamp=SIMULATED if simulated else "",
         notes=notes,
     )

@@ -4,9 +4,10 @@ Items at one place are one dot, the larger the more there are. Where there are t
 places for dots the plane is in hexagons, the darker the more items are in each.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,9 +17,14 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogFormatter
 from numpy.typing import NDArray
 
-from masrel.plots._drawn_values import DifferencePanel, Differences
 from masrel.plots._style import BLACK, BLUE, DASHES, GREY, ORANGE
 from masrel.tables._tables import counted, fixed_or_significant, percent
+
+if TYPE_CHECKING:
+    from masrel.agreement import LimitsOfAgreement
+
+    # what a part is called, its two raters, and their limits
+    Panel = tuple[str, tuple[Sequence[str], LimitsOfAgreement]]
 
 _MOST_DOTS = 2000
 _MOST_IN_A_ROW = 2
@@ -33,23 +39,24 @@ _LOOKS: tuple[dict[str, Any], ...] = (
 _SHADES = LinearSegmentedColormap.from_list("items", ["#D6E6F2", "#5BA3D0", "#003A5D"])
 
 
-def limits_figure(content: Differences) -> Figure:
+def limits_figure(panels: "Sequence[Panel]", unit: str) -> Figure:
     """Return the differences of every part, one panel each."""
-    n = len(content.panels)
+    # unit: of the ratings, or nothing
+    n, level = len(panels), panels[0][1][1].mean_interval.level
     columns = min(n, _MOST_IN_A_ROW)
     rows = -(-n // columns)
     figure = Figure(figsize=(5.2 if n == 1 else 3.9 * columns, 3.5 * rows + 0.3))
     places = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
-    dots = [_Dots.of(panel) for panel in content.panels]
+    dots = [_Dots.of(panel) for _, (_, panel) in panels]
     many = max(
         (int(of.freq.max()) for of in dots if of.are_shown and len(of.freq)), default=1
     )
-    for axes, panel, of_panel in zip(places, content.panels, dots, strict=False):
-        _draw(axes, panel, of_panel, content.unit, _area(dots, many))
+    for axes, panel, of_panel in zip(places, panels, dots, strict=False):
+        _draw(axes, panel, of_panel, unit, _area(dots, many))
     for axes in places[n:]:
         axes.set_visible(False)
     band = Line2D([], [], color=GREY, alpha=0.3, linewidth=6.0)
-    band.set_label(f"{percent(content.level)} % confidence interval, exact")
+    band.set_label(f"{percent(level)} % confidence interval, exact")
     sizes = [1, many] if many > 1 else []
     figure.legend(
         handles=[*(_size_mark(size, _area(dots, many)) for size in sizes), band],
@@ -68,7 +75,7 @@ class _Dots:
     freq: NDArray[np.int64]
 
     @classmethod
-    def of(cls, panel: DifferencePanel) -> "_Dots":
+    def of(cls, panel: "LimitsOfAgreement") -> "_Dots":
         points = np.column_stack([panel.averages, panel.differences])
         return cls(*np.unique(points, axis=0, return_counts=True))
 
@@ -98,9 +105,8 @@ def _size_mark(size: int, area: float) -> Line2D:
     )
 
 
-def _draw(
-    axes: Axes, panel: DifferencePanel, dots: _Dots, unit: str, area: float
-) -> None:
+def _draw(axes: Axes, of_part: "Panel", dots: _Dots, unit: str, area: float) -> None:
+    title, ((first, second), panel) = of_part
     _draw_lines(axes, panel)
     if dots.are_shown:
         axes.scatter(
@@ -115,15 +121,14 @@ def _draw(
     else:
         _draw_hexagons(axes, panel)
     of_unit = f" ({unit})" if unit else ""
-    first, second = panel.raters
     axes.set_xlabel(f"mean of {first} and {second}{of_unit}")
     axes.set_ylabel(f"{first} − {second}{of_unit}")
-    if panel.title:
-        axes.set_title(panel.title, loc="left")
+    if title:
+        axes.set_title(title, loc="left")
     axes.margins(x=0.06, y=0.08)
 
 
-def _draw_hexagons(axes: Axes, panel: DifferencePanel) -> None:
+def _draw_hexagons(axes: Axes, panel: "LimitsOfAgreement") -> None:
     drawn = axes.hexbin(
         panel.averages,
         panel.differences,
@@ -146,12 +151,19 @@ def _draw_hexagons(axes: Axes, panel: DifferencePanel) -> None:
         bar.set_label("items in a hexagon")
 
 
-def _draw_lines(axes: Axes, panel: DifferencePanel) -> None:
+def _draw_lines(axes: Axes, panel: "LimitsOfAgreement") -> None:
     axes.axhline(0.0, color=GREY, linewidth=0.7, linestyle=DASHES, zorder=1.0)
-    for (value, low, high), name, look in zip(
-        panel.lines, _NAMES, _LOOKS, strict=False
-    ):
-        axes.axhspan(low, high, color=GREY, alpha=0.16, linewidth=0.0, zorder=0.5)
+    if math.isnan(panel.mean):
+        return
+    lines = (
+        (panel.upper, panel.upper_interval),
+        (panel.mean, panel.mean_interval),
+        (panel.lower, panel.lower_interval),
+    )
+    for (value, ends), name, look in zip(lines, _NAMES, _LOOKS, strict=True):
+        axes.axhspan(
+            ends.low, ends.high, color=GREY, alpha=0.16, linewidth=0.0, zorder=0.5
+        )
         axes.axhline(value, linewidth=1.2, zorder=2.0, **look)
         text = fixed_or_significant(value, 2).replace("-", "−")
         axes.annotate(

@@ -2,8 +2,9 @@
 
 import math
 import textwrap
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,9 +16,11 @@ from matplotlib.textpath import TextPath
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from masrel.plots._drawn_values import PairMaps, RaterPairs
 from masrel.plots._style import BLACK, BLUE, DASHES, GREY, short_name
 from masrel.tables._tables import number, percent
+
+if TYPE_CHECKING:
+    from masrel.intervals import Diagnosis
 
 _Floats = NDArray[np.float64]
 
@@ -39,59 +42,76 @@ _ZERO: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "linestyle": DASHES}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class RaterPairs:
+    """How well every two raters of a group agree, and what each of them adds."""
+
+    title: str  # the coefficient
+    raters: tuple[str, ...]  # first on top
+    # by rater and rater, and then with the reference if there is one; ``nan`` for none
+    pairs: _Floats
+    reference: str | None
+    changes: _Floats  # by rater, of the coefficient of all without
+    change_ends: _Floats  # (n_raters, 2)
+    level: float  # of the intervals
+
+    @classmethod
+    def of(cls, title: str, result: "Diagnosis") -> "RaterPairs":
+        """Return a diagnosis with the raters who agree best with the others first."""
+        means = np.where(np.isnan(result.mean_values), -math.inf, result.mean_values)
+        order = np.argsort(-means, kind="stable")
+        pairs = result.pair_values[np.ix_(order, order)]
+        if result.reference is not None:
+            pairs = np.column_stack([pairs, result.reference_values[order]])
+        ends = np.column_stack([result.change_low, result.change_high])
+        return cls(
+            title=title,
+            raters=tuple(result.raters[place] for place in order),
+            pairs=pairs,
+            reference=result.reference,
+            changes=result.changes[order],
+            change_ends=ends[order],
+            level=result.level,
+        )
+
+
 class _Layout:
     """Where the map of a group and the panel beside it are, in inches."""
 
     # so that cells stay square, and rows of both the same
-    labels: list[str]
-    letters: float  # points
-    cell: float
-    room: float  # of the labels
-    across: float  # the map
-    has_panel: bool
-
-    @classmethod
-    def of(cls, group: RaterPairs) -> "_Layout":
+    def __init__(self, group: RaterPairs) -> None:
         r = len(group.raters)
-        cell = next(inches for most, inches in _CELLS if r <= most)
-        letters = 9.0 if cell > 0.25 else 7.5 if cell > 0.15 else 6.0
+        self.cell = next(inches for most, inches in _CELLS if r <= most)
+        self.letters = 9.0 if self.cell > 0.25 else 7.5 if self.cell > 0.15 else 6.0
         names = [*group.raters, *filter(None, [group.reference])]
-        labels = [short_name(name) for name in names]
-        return cls(
-            labels=labels,
-            letters=letters,
-            cell=cell,
-            room=max(_width(label, letters) for label in labels) + 0.12,
-            across=cell * (r if group.reference is None else r + 1.0 + _GAP),
-            has_panel=any(math.isfinite(change) for change in group.changes),
-        )
-
-    @property
-    def left(self) -> float:
-        """Where the panel begins, or the figure ends."""
-        return self.room + max(self.across, _MIN_BAR) + _BETWEEN
-
-    @property
-    def width(self) -> float:
-        return self.left + _PANEL + 0.2 if self.has_panel else self.left
-
-    @property
-    def above(self) -> float:
-        return max(self.room, 0.5 if self.has_panel else 0.0) + _STAMP
+        self.labels = [short_name(name) for name in names]
+        self.room = max(_width(label, self.letters) for label in self.labels) + 0.12
+        self.across = self.cell * (r if group.reference is None else r + 1.0 + _GAP)
+        self.has_panel = bool(np.isfinite(group.changes).any())
+        left = self.room + max(self.across, _MIN_BAR) + _BETWEEN
+        self.width = left + _PANEL + 0.2 if self.has_panel else left
+        above = max(self.room, 0.5 * self.has_panel) + _STAMP
+        self.height = above + self.cell * r + _BELOW
 
 
-def rater_figure(content: PairMaps) -> Figure:
+def rater_figure(parts: "Sequence[tuple[str, Diagnosis]]", title: str) -> Figure:
     """Return a heatmap of pairs a group, with the change without each rater beside."""
-    layouts = [_Layout.of(group) for group in content.groups]
-    heights = [
-        at.above + at.cell * len(group.raters) + _BELOW
-        for group, at in zip(content.groups, layouts, strict=True)
-    ]
-    figure = Figure(figsize=(max(at.width for at in layouts), sum(heights)))
-    below = sum(heights)
-    for group, layout, height in zip(content.groups, layouts, heights, strict=True):
-        below -= height
-        _group(figure, group, layout, below)
+    # parts: each with its name; title: the coefficient
+    return pairs_figure(
+        [
+            RaterPairs.of(f"{title} ({name})" if name else title, result)
+            for name, result in parts
+        ]
+    )
+
+
+def pairs_figure(groups: Sequence[RaterPairs]) -> Figure:
+    """Return the figure of groups."""
+    layouts = [_Layout(group) for group in groups]
+    below = sum(at.height for at in layouts)
+    figure = Figure(figsize=(max(at.width for at in layouts), below))
+    for group, at in zip(groups, layouts, strict=True):
+        below -= at.height
+        _group(figure, group, at, below)
     return figure
 
 
@@ -129,7 +149,7 @@ def _heatmap(
     axes: Axes, content: RaterPairs, labels: list[str], size: float
 ) -> AxesImage:
     r = len(content.raters)
-    values = np.array(content.pairs, dtype=np.float64)
+    values = content.pairs
     every = values[~np.isnan(values)]
     lowest = math.floor(10.0 * min(every.min(initial=1.0), 0.9)) / 10.0
     look: dict[str, Any] = {

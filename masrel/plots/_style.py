@@ -17,8 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from masrel.plots import _drawn_values as data
-from masrel.plots._margins import arrange
-from masrel.plots._picture import files_of
+from masrel.plots._picture import arrange, files_of
 
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
@@ -90,13 +89,16 @@ def house_style(*, parse_math: bool = False) -> Iterator[None]:
 
 
 def draw(
-    content: data.Content, *, stamp: str, forms: Sequence[data.Form] = ("png", "svg")
+    content: data.Content | data.Drawn,
+    *,
+    stamp: str,
+    forms: Sequence[data.Form] = ("png", "svg"),
 ) -> dict[data.Form, bytes]:
     """Draw values in the house style.
 
     Parameters
     ----------
-    content : Content
+    content : Content or Drawn
         What is drawn.
     stamp : str
         The line that says where the data come from; none if empty.
@@ -111,7 +113,8 @@ def draw(
     with house_style():
         module, _, function = content.drawer.partition(":")
         # imported here: one figure loads what no other needs
-        figure = getattr(importlib.import_module(module), function)(content)
+        drawer = getattr(importlib.import_module(module), function)
+        figure = drawer(*content.arguments)
         return finished(figure, stamp=stamp, forms=forms)
 
 

@@ -1,10 +1,10 @@
 """Printed agreement held against every table: a row a claim, a row a reading."""
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import asdict
 
-from masrel.audit import Claim, ClaimAudit, ClaimReading, ConsistentTables
-from masrel.tables._tables import Column, Table, Value, in_thousands
+from masrel.audit import ClaimAudit, Reading
+from masrel.tables._tables import Column, Table, in_thousands, table_of
 
 _CLAIM_COLUMNS = (
     Column(key="claim", heading="Claim", align="left"),
@@ -28,8 +28,6 @@ _READING_COLUMNS = (
     Column(key="n_agreed", heading="Items agreed on"),
 )
 
-_ROUNDING = {"half_even": "half even", "half_up": "half up", "either": "either"}
-
 _COUNTED = (
     "A table and its transpose are two; no more than 10 000 are counted. Where there "
     "is none, the numbers do not belong to one table as they were read; it is not said "
@@ -39,17 +37,27 @@ _COUNTED = (
 
 def claims_table(audits: Sequence[ClaimAudit]) -> Table:
     """Return what became of each claim."""
-    return Table(
-        name="claims",
-        caption="Printed agreement held against every table that could give it",
-        columns=_CLAIM_COLUMNS,
-        rows=tuple(_claim_row(audit) for audit in audits),
-        notes=(
-            *(f"{audit.claim.name}: {audit.sentence}." for audit in audits),
-            *(note for audit in audits for note in _alone_notes(audit)),
-            *(note for audit in audits for note in _examples_note(audit)),
-            _COUNTED,
-        ),
+    notes = [f"{audit.claim.name}: {audit.sentence}." for audit in audits]
+    notes += [
+        f"{audit.claim.name}: {numbers} alone: {result}."
+        for audit in audits
+        for numbers, result in audit.alone.items()
+    ]
+    notes += [note for audit in audits for note in _examples_note(audit)]
+    return table_of(
+        "claims",
+        "Printed agreement held against every table that could give it",
+        _CLAIM_COLUMNS,
+        [
+            asdict(audit.claim)
+            | {
+                "claim": audit.claim.name,
+                "agreement_percent": audit.claim.agreement,
+                "result": _result(audit),
+            }
+            for audit in audits
+        ],
+        notes=(*notes, _COUNTED),
         data="published",
     )
 
@@ -57,20 +65,22 @@ def claims_table(audits: Sequence[ClaimAudit]) -> Table:
 def readings_table(audits: Sequence[ClaimAudit]) -> Table:
     """Return every reading that was tried, with what it leaves."""
     rows = [
-        _reading_row(audit, reading) for audit in audits for reading in audit.readings
+        asdict(reading)
+        | {
+            "claim": audit.claim.name,
+            "rounding": reading.rounding.replace("_", " "),
+            "n_tables": _number(reading),
+            "n_agreed": _ends(reading.n_agreed),
+        }
+        for audit in audits
+        for reading in audit.readings
     ]
-    # columns of which there is nothing are left out on a page
-    columns = tuple(
-        column
-        if any(row[k] is not None for row in rows)
-        else Column(key=column.key, heading=column.heading, where="csv")
-        for k, column in enumerate(_READING_COLUMNS)
-    )
-    return Table(
-        name="readings",
-        caption="Every reading that was tried",
-        columns=columns,
-        rows=tuple(rows),
+    return table_of(
+        "readings",
+        "Every reading that was tried",
+        _READING_COLUMNS,
+        rows,
+        hide_empty=True,
         data="published",
     )
 
@@ -80,10 +90,10 @@ def claims_document(audits: Sequence[ClaimAudit]) -> dict[str, object]:
     return {
         "claims": [
             {
-                "claim": _fields(audit.claim),
+                "claim": asdict(audit.claim),
                 "is_possible": audit.is_possible,
                 "sentence": audit.sentence,
-                "readings": [_fields(reading) for reading in audit.readings],
+                "readings": list(map(asdict, audit.readings)),
                 "alone": {
                     name: {"n_tables": result.n_tables, "status": result.status}
                     for name, result in audit.alone.items()
@@ -95,55 +105,22 @@ def claims_document(audits: Sequence[ClaimAudit]) -> dict[str, object]:
     }
 
 
-def _fields(result: Claim | ClaimReading) -> dict[str, object]:
-    return {each.name: getattr(result, each.name) for each in fields(result)}
-
-
-def _claim_row(audit: ClaimAudit) -> tuple[Value, ...]:
-    claim = audit.claim
-    result = {True: "some", False: "none", None: "cannot tell"}[audit.is_possible]
+def _result(audit: ClaimAudit) -> str:
     n_some = sum(bool(reading.n_tables) for reading in audit.readings)
     if audit.is_possible and n_some < len(audit.readings):
-        result = f"some, by {n_some} of {len(audit.readings)} readings"
-    return (
-        claim.name,
-        claim.n_items,
-        claim.n_categories,
-        claim.n_raters,
-        claim.agreement,
-        claim.kappa,
-        result,
-    )
+        return f"some, by {n_some} of {len(audit.readings)} readings"
+    return {True: "some", False: "none", None: "cannot tell"}[audit.is_possible]
 
 
-def _reading_row(audit: ClaimAudit, reading: ClaimReading) -> tuple[Value, ...]:
-    agreed = reading.n_agreed
-    ends = [str(n) for n in sorted({agreed[0], agreed[-1]})] if agreed else []
-    return (
-        audit.claim.name,
-        reading.n_items,
-        reading.agreement_weights,
-        reading.kappa_weights,
-        _ROUNDING[reading.rounding],
-        reading.error,
-        reading.test,
-        _number(reading),
-        " to ".join(ends) or None,
-    )
+def _ends(numbers: tuple[int, ...]) -> str | None:
+    return " to ".join(map(str, sorted({*numbers[:1], *numbers[-1:]}))) or None
 
 
-def _number(result: ClaimReading | ConsistentTables) -> Value:
-    if result.n_tables is None:
+def _number(reading: Reading) -> str:
+    if reading.n_tables is None:
         return "cannot tell"
-    number = in_thousands(result.n_tables)
-    return f"at least {number}" if result.status == "at least" else number
-
-
-def _alone_notes(audit: ClaimAudit) -> list[str]:
-    return [
-        f"{audit.claim.name}: {numbers} alone: {result}."
-        for numbers, result in audit.alone.items()
-    ]
+    number = in_thousands(reading.n_tables)
+    return f"at least {number}" if reading.status == "at least" else number
 
 
 def _examples_note(audit: ClaimAudit) -> tuple[str, ...]:

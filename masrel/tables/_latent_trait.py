@@ -1,21 +1,23 @@
-"""The table, the JSON and the figure of a latent-trait model of ratings."""
+"""The table and the JSON of a latent-trait model of ratings."""
 
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from masrel.estimates import as_document
-from masrel.plots._drawn_values import LatentScale, ScaleRow
-from masrel.tables._tables import (
-    Column,
-    Table,
-    Value,
-    number,
-    percent,
-    significant,
-)
+from masrel.tables._tables import Column, Table, number, percent, significant, table_of
 
 if TYPE_CHECKING:
     from masrel.intervals import LatentTrait, Quantity
+
+_COLUMNS = (
+    Column(key="what", heading="What", align="left"),
+    Column(key="of", heading="Of", align="left"),
+    Column(key="median", heading="Median", digits=3),
+    Column(key="low", heading="Low", digits=3),
+    Column(key="high", heading="High", digits=3),
+    Column(key="other_low", heading="Low, other prior", digits=3),
+    Column(key="other_high", heading="High, other prior", digits=3),
+)
 
 _UNLIKELY = 0.01
 """A p-value of the predictive check below this, or above 1 less this, is noted."""
@@ -25,57 +27,38 @@ def latent_table(
     result: "LatentTrait", *, caption: str, notes: tuple[str, ...], data: str
 ) -> Table:
     """Return the table of every quantity of the model with its interval."""
-    columns = [
-        Column(key="what", heading="What", align="left"),
-        Column(key="of", heading="Of", align="left"),
-        Column(key="median", heading="Median", digits=3),
-        Column(key="low", heading="Low", digits=3),
-        Column(key="high", heading="High", digits=3),
-    ]
-    if result.other is not None:
-        columns += [
-            Column(key="other_low", heading="Low, other prior", digits=3),
-            Column(key="other_high", heading="High, other prior", digits=3),
+    rows = list(_rows(result))
+    if result.other is not None:  # its intervals stand beside those under the first
+        rows = [
+            row | {"other_low": other["low"], "other_high": other["high"]}
+            for row, other in zip(rows, _rows(result.other), strict=True)
         ]
-    return Table(
-        name="latent_trait",
-        caption=caption,
-        columns=tuple(columns),
-        rows=tuple(_rows(result)),
+    return table_of(
+        "latent_trait",
+        caption,
+        _COLUMNS if result.other is not None else _COLUMNS[:-2],
+        rows,
         notes=(*notes, *_notes(result)),
         data=data,
     )
 
 
-def _parts(result: "LatentTrait") -> list[tuple[str, Iterable["Quantity"]]]:
-    return [
+def _rows(result: "LatentTrait") -> Iterator[dict[str, object]]:
+    quantities: list[tuple[str, Iterable[Quantity]]] = [
         ("severity", result.items),
         ("threshold", result.thresholds),
         ("bias", result.raters),
         ("noise", result.noises),
         ("share of variance", result.shares),
     ]
-
-
-def _rows(result: "LatentTrait") -> Iterator[tuple[Value, ...]]:
-    # the intervals under the other prior stand beside those under the first
-    other = result.other
-    interval = result.kappa.interval
-    other_interval = None if other is None else other.kappa.interval
-    if interval is not None:
-        ends = (
-            [] if other_interval is None else [other_interval.low, other_interval.high]
-        )
-        name, value = "two new raters", result.kappa.value
-        yield ("kappa", name, value, interval.low, interval.high, *ends)
-    others = [None] * 5 if other is None else [list(q) for _, q in _parts(other)]
-    for (part, quantities), beside in zip(_parts(result), others, strict=True):
-        for index, quantity in enumerate(quantities):
-            ends = []
-            if beside is not None:
-                ends = [beside[index].interval.low, beside[index].interval.high]
-            low, high = quantity.interval.low, quantity.interval.high
-            yield (part, quantity.name, quantity.value, low, high, *ends)
+    cells = [("kappa", "two new raters", result.kappa.value, result.kappa.interval)]
+    cells += [
+        (what, of.name, of.value, of.interval) for what, of_ in quantities for of in of_
+    ]
+    for what, name, median, interval in cells:
+        if interval is not None:
+            ends = {"low": interval.low, "high": interval.high}
+            yield {"what": what, "of": name, "median": median, **ends}
 
 
 def _notes(result: "LatentTrait") -> Iterator[str]:
@@ -171,27 +154,3 @@ def _quantity(quantity: "Quantity") -> dict[str, object]:
         "r_hat": quantity.r_hat,
         "ess": quantity.ess,
     }
-
-
-def latent_scale(result: "LatentTrait", grades: tuple[str, ...]) -> LatentScale:
-    """Return what a figure shows: raters, items and thresholds on one scale."""
-    return LatentScale(
-        items=tuple(map(_scale_row, result.items)),
-        thresholds=tuple(map(_scale_row, result.thresholds)),
-        raters=tuple(
-            _scale_row(bias, noise.value)
-            for bias, noise in zip(result.raters, result.noises, strict=True)
-        ),
-        grades=grades,
-        level=result.items[0].interval.level,
-    )
-
-
-def _scale_row(quantity: "Quantity", noise: float | None = None) -> ScaleRow:
-    return ScaleRow(
-        label=quantity.name,
-        value=quantity.value,
-        low=quantity.interval.low,
-        high=quantity.interval.high,
-        noise=noise,
-    )

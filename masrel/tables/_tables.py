@@ -11,10 +11,10 @@ import math
 import re
 import textwrap
 import unicodedata
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from decimal import ROUND_HALF_UP, Decimal
-from typing import Literal
+from typing import Any, Literal
 
 from masrel._cells import safe_cell
 
@@ -58,6 +58,7 @@ class Column:
     # the digits they were entered with
     digits: int | None = None
     align: Align = "right"
+    is_p: bool = False  # whether a page shows it as a p-value
     # whether a page (or screen) and the CSV have it: a page puts in one column what a
     # CSV keeps in several
     where: Literal["everywhere", "page", "csv"] = "everywhere"
@@ -89,7 +90,42 @@ class Table:
     @property
     def labelled_caption(self) -> str:
         """The caption, after the label of simulated data where any are."""
-        return f"{self.tag.upper()} {self.caption}".strip()
+        return f"{tag_of(self.data).upper()} {self.caption}".strip()
+
+
+def table_of(
+    name: str,
+    caption: str,
+    columns: Iterable[Column],
+    rows: Sequence[Mapping[str, Any]],
+    *,
+    hide_empty: bool = False,
+    **more: Any,
+) -> Table:
+    """Return a table of rows, whose cells have the keys of its columns."""
+    # hide_empty: whether a page has no column of which there is nothing; more: notes,
+    # data and whatever else a table has
+    shown = [
+        replace(column, where="csv")
+        if hide_empty and all(row.get(column.key) is None for row in rows)
+        else column
+        for column in columns
+    ]
+    cells = [[row.get(column.key) for column in shown] for row in rows]
+    cells = [[_joined(c) if isinstance(c, list) else c for c in row] for row in cells]
+    return Table(
+        name=name,
+        caption=caption,
+        columns=tuple(shown),
+        rows=tuple(map(tuple, cells)),
+        **more,
+    )
+
+
+def _joined(values: Sequence[float]) -> str | None:
+    # numbers such as degrees of freedom as one text
+    parts = [str(int(x)) if float(x).is_integer() else significant(x) for x in values]
+    return ", ".join(parts) or None
 
 
 def number(value: Value, digits: int | None, *, in_units: bool = False) -> str:
@@ -165,9 +201,9 @@ def interval_text(low: float, high: float, digits: int = 3) -> str:
     return f"[{number(low, digits)}, {number(high, digits)}]"
 
 
-def p_text(p: float) -> str:
+def p_text(p: Value) -> str:
     """Return a p-value as shown: three decimals, or below the least that they show."""
-    return "<0.001" if p < 0.0005 else number(p, 3)
+    return "<0.001" if isinstance(p, float) and p < 0.0005 else number(p, 3)
 
 
 def at_ranks(values: Sequence[float]) -> dict[str, int]:
@@ -196,7 +232,12 @@ def page_cells(table: Table) -> tuple[list[Column], list[list[str]]]:
     """Return the columns of a page or a screen, and its rows as shown in them."""
     places = [(i, c) for i, c in enumerate(table.columns) if c.where != "csv"]
     rows = [
-        [number(row[i], c.digits, in_units=at in table.in_units) for i, c in places]
+        [
+            p_text(row[i])
+            if c.is_p
+            else number(row[i], c.digits, in_units=at in table.in_units)
+            for i, c in places
+        ]
         for at, row in enumerate(
             table.rows if table.page_rows is None else table.page_rows
         )

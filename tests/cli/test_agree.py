@@ -84,17 +84,6 @@ def test_json_on_stdout_is_one_document_and_the_target_is_in_it(wide: Path) -> N
     assert "Scale:" not in declared.stderr
 
 
-def test_undefined_is_null_with_a_reason(tmp_path: Path) -> None:
-    path = tmp_path / "same.csv"
-    path.write_text("item,A,B\nx,1,1\ny,1,1\n", encoding="utf-8")
-    done = agree(path, "--coefficients", "fleiss_kappa", "--json", "-")
-    (kappa,) = json.loads(done.stdout)["estimates"]
-    assert kappa["value"] is None
-    assert "0/0" in kappa["reason"]
-    shown = agree(path, "--coefficients", "fleiss_kappa")
-    assert "undefined: 0/0" in shown.stdout
-
-
 def test_seeded_intervals_repeat(tmp_path: Path) -> None:
     # so many different items that not every resample can be taken
     path = tmp_path / "many.csv"
@@ -103,30 +92,6 @@ def test_seeded_intervals_repeat(tmp_path: Path) -> None:
     asked = (path, "--target", "items", "--interval", "bootstrap", "--json", "-")
     assert agree(*asked, "--seed", "4").stdout == agree(*asked, "--seed", "4").stdout
     assert agree(*asked, "--seed", "4").stdout != agree(*asked, "--seed", "5").stdout
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--coefficients", "kappa"], "fleiss_kappa"),
-        (["--coefficients", "cohen_kappa"], "two raters, got 3"),
-        (["--coefficients", "stratified_kappa"], "two sessions"),
-        (["--categories", "1,2,3"], "line 2, column 'Lee'"),
-        (["--level", "1", "--target", "items"], "level: needs (0, 1), got 1"),
-        (["--level", "2"], "level: needs (0, 1), got 2"),
-        (["--target", "raters", "--interval", "analytic"], "target"),
-        (["--json", "no/such/folder.json"], "no/such/folder.json"),
-        (["--item", "animal"], "animal"),
-    ],
-)
-def test_a_wrong_call_is_one_sentence_and_code_2(
-    wide: Path, arguments: list[str], said: str
-) -> None:
-    done = agree(wide, *arguments)
-    assert done.returncode == 2
-    assert said in done.stderr
-    assert "Traceback" not in done.stderr
-    assert done.stdout == ""
 
 
 def test_sessions_are_never_pooled_in_silence(tmp_path: Path) -> None:

@@ -61,13 +61,6 @@ def record(masrel: Caller, *arguments: object) -> Record:
     return document
 
 
-def refused(masrel: Caller, *arguments: object) -> str:
-    done = masrel("agree", *arguments)
-    assert done.code == 2
-    assert done.out == ""
-    return done.err
-
-
 def test_a_diagnosis_is_that_of_the_library(masrel: Caller, wide: Path) -> None:
     arguments = (wide, "--ignore", "site", "--diagnose", "--target", "items")
     document = record(masrel, *arguments, "--reference", "Gold")
@@ -178,32 +171,6 @@ def test_the_figure_of_a_diagnosis_needs_no_interval(
     assert figure.read_bytes().startswith(b"<?xml")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("--reference", "Gold"), "--reference: belongs to --diagnose"),
-        (("--diagnose", "--target", "raters"), "--diagnose: is of these raters"),
-        (("--diagnose", "--reference", "Bob"), "--reference: needs one of Kim, Lee"),
-        (
-            ("--diagnose", "--coefficients", "gwet_ac,fleiss_kappa"),
-            "--diagnose: needs one coefficient, got --coefficients gwet_ac,fleiss",
-        ),
-        (
-            ("--diagnose", "--coefficients", "conger_kappa", "--clusters", "site"),
-            "--clusters: --diagnose takes every item by itself",
-        ),
-        (("--clusters", "Site"), "--clusters: there is no column 'Site'"),
-        (("--clusters", "site", "--target", "both"), "so it takes --target items"),
-        (("--clusters", "Kim", "--raters", "Kim,Lee"), "needed each column once"),
-    ],
-)
-def test_options_that_do_not_fit_are_refused(
-    masrel: Caller, wide: Path, arguments: tuple[str, ...], message: str
-) -> None:
-    ignore = () if "site" in arguments else ("--ignore", "site")
-    assert message in refused(masrel, wide, *ignore, *arguments)
-
-
 @pytest.mark.parametrize("option", ["--diagnose", "--compare"])
 def test_sets_of_labels_are_taken_as_such(
     masrel: Caller, tmp_path: Path, option: str
@@ -221,19 +188,6 @@ def test_sets_of_labels_are_taken_as_such(
     else:
         first = document["diagnosis_raters"][0]
         assert first["without"] - first["change"] == pytest.approx(values[0])
-
-
-def test_counts_have_neither_clusters_nor_a_diagnosis(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    path = tmp_path / "counts.csv"
-    path.write_text("item,p,a,b\nx,1,2,0\ny,1,1,1\n", encoding="utf-8")
-    assert "--clusters: counts do not" in refused(
-        masrel, path, "--counts", "--clusters", "p"
-    )
-    assert "who rated what" in refused(
-        masrel, path, "--counts", "--ignore", "p", "--diagnose"
-    )
 
 
 def test_clusters_are_left_out_as_in_the_library(masrel: Caller, sites: Path) -> None:
@@ -289,17 +243,6 @@ def test_groups_with_clusters_in_common_are_compared_cluster_by_cluster(
     assert row["design"] == "dependent"
     out = masrel("agree", sites, *names, "--compare").out
     assert "Groups have clusters in common" in out
-
-
-def test_an_item_is_in_one_cluster(masrel: Caller, tmp_path: Path) -> None:
-    path = tmp_path / "long.csv"
-    path.write_text(
-        "rater,item,patient,grade\nA,1,p,x\nB,1,p,y\nA,2,p,x\nB,2,q,x\n",
-        encoding="utf-8",
-    )
-    message = refused(masrel, path, "--item", "item", "--clusters", "patient")
-    assert "line 4 and line 5: needed one cluster of item '2'" in message
-    assert "got 'p' and 'q'" in message
 
 
 def test_a_category_that_nobody_met_has_no_row_of_confusions(

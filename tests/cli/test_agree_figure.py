@@ -49,32 +49,6 @@ def test_the_same_ratings_give_the_same_bytes(
     assert first == second
 
 
-@pytest.mark.parametrize(
-    ("name", "target", "why"),
-    [
-        ("kappa.jpg", ("--target", "items"), ".png, .svg or .pdf"),
-        ("kappa", ("--target", "items"), ".png, .svg or .pdf"),
-        ("kappa.svg", (), "--target"),
-    ],
-)
-def test_what_cannot_be_drawn_is_refused_in_one_sentence(
-    masrel: Caller, tmp_path: Path, name: str, target: tuple[str, ...], why: str
-) -> None:
-    done = masrel("agree", TABLE_V, *target, "--figure", tmp_path / name)
-    assert (done.code, done.out) == (2, "")
-    assert done.err.startswith("masrel: --figure: ")
-    assert why in done.err
-    assert done.err.count("\n") == 1
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_folder_that_is_not_there_is_named(masrel: Caller, tmp_path: Path) -> None:
-    file = tmp_path / "none" / "kappa.svg"
-    done = masrel("agree", TABLE_V, "--target", "raters", "--figure", file)
-    assert done.code == 2
-    assert str(file) in done.err
-
-
 @pytest.mark.parametrize("draws", [False, True])
 def test_only_a_figure_loads_what_draws(tmp_path: Path, draws: bool) -> None:
     figure = ["--figure", str(tmp_path / "kappa.svg")] if draws else []
@@ -126,17 +100,6 @@ def test_simulated_sessions_are_headed_and_labelled(
     svg = file.read_text("utf-8")
     for words in ("SIMULATED DATA", ">first<", ">second<", "resamples"):
         assert words in svg
-
-
-def test_the_table_of_simulated_ratings_is_labelled(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    ratings = tmp_path / "ratings.csv"
-    ratings.write_text(TWO_SESSIONS, encoding="utf-8")
-    table = masrel("agree", ratings, "--by", "session")
-    assert table.out.startswith("SIMULATED DATA. ")
-    rows = masrel("agree", ratings, "--by", "session", "--csv").out.splitlines()[1:]
-    assert all(row.endswith(",simulated") for row in rows)
 
 
 @pytest.mark.usefixtures("readable")

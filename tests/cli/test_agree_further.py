@@ -69,14 +69,6 @@ def record(masrel: Caller, *arguments: object) -> Record:
     return document
 
 
-def refused(masrel: Caller, *arguments: object) -> str:
-    done = masrel("agree", *arguments)
-    assert done.code == 2
-    assert done.out == ""
-    assert done.err.count("\n") == 1
-    return done.err
-
-
 @pytest.fixture
 def sessions(tmp_path: Path) -> Path:
     path = tmp_path / "sessions.csv"
@@ -184,28 +176,6 @@ def test_a_rater_and_an_item_of_one_session_are_left_out_and_named(
     assert "Left out: rater R9 (test only); item I7 (retest only)." in out
 
 
-def test_sessions_are_named_once_unless_groups_have_others(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    def notes(sessions: dict[str, str]) -> list[str]:
-        rows = [
-            (clinic, sessions.get(clinic + session, session), rater, item, grade)
-            for clinic in ("North", "South")
-            for session, rater, item, grade in retest_rows()
-        ]
-        path = write(tmp_path / "c.csv", "clinic,session,rater,item,grade", rows)
-        out = masrel(
-            *("agree", path, "--by", "clinic", "--session", "session", "--retest")
-        ).out
-        return [line for line in out.splitlines() if "Each rater's grades" in line]
-
-    assert notes({}) == ["Each rater's grades of test and of retest."]
-    assert notes({"Southretest": "late"}) == [
-        "North: Each rater's grades of test and of retest.",
-        "South: Each rater's grades of test and of late.",
-    ]
-
-
 def test_the_first_table_estimates_each_session(masrel: Caller, sessions: Path) -> None:
     found = record(masrel, sessions, "--session", "session", "--retest")
     expected = record(masrel, sessions, "--by", "session")
@@ -237,71 +207,6 @@ def test_retest_of_groups_is_one_of_each(masrel: Caller, tmp_path: Path) -> None
     ]
     of_both = [found[3]["value"], found[5]["value"]]
     assert of_both == pytest.approx([2 / 3, 0.4], abs=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("rows", "arguments", "reason"),
-    [
-        (
-            [*retest_rows(), ("third", "R1", "I0", "a")],
-            ("--session", "session"),
-            "needs two sessions in column 'session', got 3 (test, retest, third)",
-        ),
-        (
-            retest_rows()[:9],
-            ("--session", "session"),
-            "needs two sessions in column 'session', got 1 (test)",
-        ),
-        (retest_rows(), ("--by", "session"), "--by must not take them apart"),
-        (
-            [("test", "R1", "I0", "a"), ("retest", "R2", "I0", "a")],
-            ("--session", "session"),
-            "needs a rater of both sessions, got R1 in 'test' and R2 in 'retest'",
-        ),
-        (
-            [("test", "R1", "I0", "a"), ("retest", "R1", "I1", "a")],
-            ("--session", "session"),
-            "needs an item of both sessions, got I0 in 'test' and I1 in 'retest'",
-        ),
-        (
-            retest_rows(),
-            ("--session", "session", "--weights", "linear"),
-            "--weights linear: needs --categories",
-        ),
-    ],
-)
-def test_a_retest_that_cannot_be_is_refused(
-    masrel: Caller,
-    tmp_path: Path,
-    rows: list[tuple[str, ...]],
-    arguments: tuple[str, ...],
-    reason: str,
-) -> None:
-    path = write(tmp_path / "r.csv", "session,rater,item,grade", rows)
-    assert reason in refused(masrel, path, "--retest", *arguments)
-
-
-def test_a_retest_needs_a_column_of_sessions(masrel: Caller, clinics: Path) -> None:
-    assert "--retest: needs --session" in refused(
-        masrel, clinics, "--ignore", "clinic", "--retest"
-    )
-
-
-def test_a_retest_of_counts_is_refused(masrel: Caller, tmp_path: Path) -> None:
-    rows = [(session, n, 2, 0) for session in "ab" for n in range(3)]
-    path = write(tmp_path / "n.csv", "session,item,yes,no", rows)
-    names = ("--counts", "--session", "session", "--retest")
-    assert "--session: counts do not say who rated what" in refused(
-        masrel, path, *names
-    )
-
-
-def test_a_coefficient_of_two_sessions_alone_says_which_option(
-    masrel: Caller, clinics: Path
-) -> None:
-    assert "--session COL --retest computes it" in refused(
-        masrel, clinics, "--by", "clinic", "--coefficients", "pooled_kappa"
-    )
 
 
 # --- each category
@@ -397,26 +302,6 @@ def test_two_categories_have_mcnemars_test(masrel: Caller, tmp_path: Path) -> No
     assert bowker["statistic"] == 16 / 6
 
 
-def test_a_test_that_is_undefined_or_infinite_says_why(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    path = write(tmp_path / "w.csv", "item,K,L", pairs_of([[5, 0], [0, 5]], "ab"))
-    exact, *others = record(masrel, path, "--symmetry")["symmetry"]
-    assert (exact["p_value"], exact["reason"]) == (1.0, None)
-    for row in others:
-        assert row["p_value"] is None
-        assert row["reason"] == "0/0: no item changed"
-    assert (
-        "Bowker: undefined: 0/0: no item changed."
-        in masrel("agree", path, "--symmetry").out
-    )
-    path = write(tmp_path / "w.csv", "item,K,L", pairs_of([[0, 5], [0, 0]], "ab"))
-    *_, bhapkar = record(masrel, path, "--symmetry")["symmetry"]
-    assert (bhapkar["statistic"], bhapkar["p_value"]) == (None, 0.0)
-    assert bhapkar["reason"].startswith("infinite")
-    assert "∞" in masrel("agree", path, "--symmetry").out
-
-
 def test_indices_by_hand(masrel: Caller, tmp_path: Path) -> None:
     # docs/agreement/indices.md; 40/55 and 30/45 are the agreement on yes and on no
     path = write(
@@ -442,39 +327,6 @@ def test_indices_by_hand(masrel: Caller, tmp_path: Path) -> None:
     # 2 p_o - 1 has twice the error of p_o: 2 √(0.7 · 0.3/49)
     assert found[0]["standard_error"] == pytest.approx(2 * (0.21 / 49) ** 0.5)
     assert {row["n_items"] for row in found} == {50}
-
-
-def test_an_index_that_is_undefined_says_why(masrel: Caller, tmp_path: Path) -> None:
-    path = write(tmp_path / "w.csv", "item,K,L", pairs_of([[5, 0], [0, 0]], "ab"))
-    found = record(masrel, path, "--indices", "--categories", "a,b")["indices"]
-    by_name = {(row["index"], row["category"]): row for row in found}
-    assert by_name["kappa_max", None]["value"] is None
-    assert "0/0" in by_name["kappa_max", None]["reason"]
-    assert by_name["specific_agreement", "a"]["value"] == 1.0
-    assert by_name["specific_agreement", "a"]["reason"] is None
-    assert "nobody used it" in by_name["specific_agreement", "b"]["reason"]
-
-
-def test_tables_of_two_raters_are_refused_of_three(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    rows = [("I1", "a", "b", "a"), ("I2", "b", "b", "a")]
-    path = write(tmp_path / "w.csv", "item,Kim,Lee,Ann", rows)
-    for option in ("--symmetry", "--indices"):
-        message = refused(masrel, path, option)
-        assert f"{option}: needs two raters, got 3 (Kim, Lee, Ann)" in message
-
-
-def test_indices_are_of_two_categories(masrel: Caller, tmp_path: Path) -> None:
-    path = write(tmp_path / "w.csv", "item,Kim,Lee", pairs_of(THREE, "abc"))
-    message = refused(masrel, path, "--indices")
-    assert "--indices: needs a scale of two categories, got 3 (a, b, c)" in message
-
-
-def test_counts_do_not_say_who_rated_what(masrel: Caller, tmp_path: Path) -> None:
-    path = write(tmp_path / "n.csv", "item,a,b", [("I1", 2, 0), ("I2", 1, 1)])
-    for option in ("--symmetry", "--indices"):
-        assert "who rated what" in refused(masrel, path, "--counts", option)
 
 
 # --- differences
@@ -558,23 +410,6 @@ def test_groups_of_the_same_items_are_compared_item_by_item(
     assert ",p_holm" in masrel("agree", path, *names, "--csv").out
 
 
-def test_a_few_items_of_one_name_are_different_ones_and_that_is_said(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    rows = [
-        (clinic, n, *pair)
-        for clinic, pairs in (("A", "aa bb ab aa bb"), ("B", "aa ab bb ba"))
-        for n, pair in enumerate(pairs.split(), start=1)
-    ]
-    path = write(tmp_path / "w.csv", "clinic,item,Kim,Lee", rows)
-    names = ("--by", "clinic", "--compare")
-    assert {row["design"] for row in record(masrel, path, *names)["differences"]} == {
-        "independent"
-    }
-    out = " ".join(masrel("agree", path, *names).out.split())
-    assert "A and B: 4 items have the same name, taken for different items." in out
-
-
 def test_a_difference_without_spread_is_null_with_its_reason(
     masrel: Caller, tmp_path: Path
 ) -> None:
@@ -584,31 +419,6 @@ def test_a_difference_without_spread_is_null_with_its_reason(
         assert (row["value"], row["p_value"], row["p_holm"]) == (0.0, None, None)
         assert row["test_reason"] == row["interval"]["reason"]
         assert "leaves the difference as it is" in row["test_reason"]
-
-
-def test_what_has_no_difference_is_left_out_of_all_and_refused_by_name(
-    masrel: Caller, clinics: Path
-) -> None:
-    names = ("--by", "clinic", "--compare", "--categories", "a,b", "--coefficients")
-    found = record(masrel, clinics, *names, "all")["differences"]
-    assert {"cohen_kappa", "gwet_ac"} <= {row["coefficient"] for row in found}
-    assert "kendall_w" not in {row["coefficient"] for row in found}
-    done = masrel("agree", clinics, *names, "all")
-    assert "Kendall's W" in done.out.split("Left out:")[-1]
-    assert "no function of sums" in refused(masrel, clinics, *names, "kendall_w")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "reason"),
-    [
-        (("--ignore", "clinic"), "--compare: needs --by"),
-        (("--by", "clinic", "--target", "raters"), "takes --target items, got"),
-    ],
-)
-def test_a_comparison_that_cannot_be_is_refused(
-    masrel: Caller, clinics: Path, arguments: tuple[str, ...], reason: str
-) -> None:
-    assert reason in refused(masrel, clinics, "--compare", *arguments)
 
 
 def three_groups(folder: Path, *, same_items: bool) -> Path:
@@ -663,14 +473,6 @@ def test_three_groups_of_the_same_items_are_tested_by_hotellings_t2(
     assert test["p_value"] == pytest.approx(expected.p_value, rel=1e-12)
 
 
-def test_one_group_is_not_compared(masrel: Caller, tmp_path: Path) -> None:
-    rows = [("A", n, "a", "ab"[n % 2]) for n in range(6)]
-    path = write(tmp_path / "w.csv", "clinic,item,Kim,Lee", rows)
-    assert "--compare: needs two groups or more" in refused(
-        masrel, path, "--by", "clinic", "--compare"
-    )
-
-
 # --- how they are shown
 
 ALL = ("--by", "clinic", "--each-category", "--symmetry", "--indices", "--compare")
@@ -697,23 +499,6 @@ def test_text_csv_and_latex_have_every_table(masrel: Caller, clinics: Path) -> N
         assert row["coefficient"] == found["coefficient"]
 
 
-def test_a_small_p_is_not_shown_as_none(masrel: Caller, tmp_path: Path) -> None:
-    path = write(tmp_path / "w.csv", "item,K,L", pairs_of([[9, 40], [1, 9]], "ab"))
-    out = masrel("agree", path, "--symmetry").out
-    assert "<0.001" in out
-    assert "$<$0.001" in masrel("agree", path, "--symmetry", "--latex").out
-
-
-def test_simulated_ratings_are_labelled_in_every_table(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    rows = [(*row, "simulated") for row in retest_rows()]
-    path = write(tmp_path / "s.csv", "session,rater,item,grade,source", rows)
-    names = ("--session", "session", "--retest", "--each-category")
-    out = masrel("agree", path, *names).out
-    assert out.count("SIMULATED DATA") == 3
-
-
 def test_without_the_options_nothing_of_them_is_loaded(clinics: Path) -> None:
     code = (
         "import sys; from masrel.cli import main\n"
@@ -721,8 +506,8 @@ def test_without_the_options_nothing_of_them_is_loaded(clinics: Path) -> None:
         "try: main()\n"
         "except SystemExit: pass\n"
         "print([name for name in sys.modules if name.startswith('scipy')\n"
-        "       or name.endswith(('_further_tables', '_two_rater_tables',\n"
-        "                         '_comparison_tables', 'masrel.intervals'))])"
+        "       or name.endswith(('_file_questions', '_file_comparisons',\n"
+        "                         'masrel.intervals'))])"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True

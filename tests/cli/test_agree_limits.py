@@ -118,35 +118,3 @@ def test_estimates_in_small_units_keep_their_digits(
     assert " 7.071e−05 " in row
     assert " 1.000 " in next(line for line in out.splitlines() if "Lin's" in line)
     assert "SEM, consistency = 7.071e−05" in masrel(*call, "--sentence").out
-
-
-@pytest.mark.parametrize(
-    ("more", "why"),
-    [
-        (("--unit", "deg"), "--unit: belongs to --limits-of-agreement, got it alone"),
-        (
-            ("--limits-of-agreement", "--diagnose"),
-            "--diagnose and --limits-of-agreement: each has a figure",
-        ),
-        (
-            ("--coefficients", "sem", "--target", "both", "--figure", "sem.svg"),
-            "--figure: shows coefficients of agreement, got only estimates in",
-        ),
-    ],
-)
-def test_what_does_not_fit_is_one_sentence(
-    masrel: Caller, pairs: Path, more: tuple[str, ...], why: str
-) -> None:
-    done = masrel("agree", pairs, *more)
-    assert done.code != 0
-    assert why in done.err
-
-
-def test_three_raters_and_text_are_refused(masrel: Caller, tmp_path: Path) -> None:
-    three, text = tmp_path / "three.csv", tmp_path / "text.csv"
-    three.write_text("item,A,B,C\nx,1,2,3\ny,2,2,4\n", encoding="utf-8")
-    text.write_text("item,A,B\nx,mild,severe\ny,mild,mild\n", encoding="utf-8")
-    done = masrel("agree", three, "--limits-of-agreement")
-    assert "needs two raters, got 3 (A, B, C); --raters chooses two" in done.err
-    done = masrel("agree", text, "--limits-of-agreement")
-    assert "--limits-of-agreement: needs grades that are numbers" in done.err

@@ -114,15 +114,6 @@ def test_several_come_in_the_order_asked_for(masrel: Caller, wide: Path) -> None
     assert found[2]["value"] == pytest.approx(2 / 3, rel=1e-15)
 
 
-def test_an_unknown_coefficient_is_named_with_those_there_are(
-    masrel: Caller, wide: Path
-) -> None:
-    said = refused(masrel("agree", wide, "--coefficients", "gwet_ac,flies_kappa"))
-    assert "'flies_kappa'" in said
-    for name in COEFFICIENTS:
-        assert name in said
-
-
 @pytest.mark.parametrize("weights", get_args(WeightName))
 def test_weights_are_those_of_the_declared_scale(
     masrel: Caller, wide: Path, weights: WeightName
@@ -146,15 +137,6 @@ def test_numbers_weigh_by_value_and_ten_comes_after_two(
     asked = ("--coefficients", "cohen_kappa", "--weights", "linear", "--json", "-")
     (found,) = estimates(masrel("agree", path, *asked))
     assert found["value"] == pytest.approx(34 / 37, abs=1e-14)
-
-
-def test_weights_are_named_beside_the_coefficient(masrel: Caller, wide: Path) -> None:
-    done = masrel("agree", wide, "--weights", "quadratic")
-    assert "Fleiss' κ, quadratic" in done.out
-    assert masrel("agree", wide, "--weights", "squared").out == done.out
-    said = refused(masrel("agree", wide, "--weights", "quadratik"))
-    assert "needs one of identity, linear, quadratic" in said
-    assert "'quadratik'" in said
 
 
 @pytest.mark.parametrize(
@@ -315,19 +297,6 @@ def test_json_in_a_file_leaves_the_table_on_stdout(
     assert json.loads(path.read_text(encoding="utf-8")) == json.loads(both.out)
 
 
-@pytest.mark.parametrize("form", [(), ("--latex",)])
-def test_an_undefined_coefficient_says_why(
-    masrel: Caller, tmp_path: Path, form: tuple[str, ...]
-) -> None:
-    path = tmp_path / "same.csv"
-    path.write_text("item,A,B\nx,1,1\ny,1,1\n", encoding="utf-8")
-    done = masrel("agree", path, "--coefficients", "all", *form)
-    assert done.code == 0
-    text = " ".join(done.out.split())
-    assert "undefined: 0/0: chance agreement is 1" in text
-    assert "undefined: 0/0: every rater gives all items one rating" in text
-
-
 def test_an_undefined_coefficient_is_empty_in_csv_and_null_in_json(
     masrel: Caller, tmp_path: Path
 ) -> None:
@@ -340,48 +309,7 @@ def test_an_undefined_coefficient_is_empty_in_csv_and_null_in_json(
     assert document["observed"] == document["chance"] == 1.0
 
 
-def test_all_say_which_has_no_such_interval_and_one_alone_is_refused(
-    masrel: Caller, wide: Path
-) -> None:
-    call = ("--target", "raters", "--interval", "jackknife")
-    done = masrel("agree", wide, "--coefficients", "all", *call)
-    assert done.code == 0
-    assert "Kendall's W; Robinson's A: no interval: " in done.out
-    said = refused(masrel("agree", wide, "--coefficients", "kendall_w", *call))
-    assert "Kendall's W is no function of sums" in said
-
-
 # What is refused.
-
-
-@pytest.mark.parametrize("form", ["--csv", "--latex"])
-def test_stdout_is_promised_once(masrel: Caller, wide: Path, form: str) -> None:
-    said = refused(masrel("agree", wide, form, "--json", "-"))
-    assert f"--json - and {form} want the same stdout" in said
-    said = refused(masrel("agree", wide, "--csv", "--latex"))
-    assert "--csv and --latex want the same stdout" in said
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--words", "landis"], "landis_koch"),
-        (["--target", "patients"], "items"),
-        (["--interval", "exact"], "jackknife"),
-        (["--by", "rater"], "no column 'rater', but 'patient'"),
-        (["--level", "high"], "high"),
-        (["--target", "items", "--level", "95"], "level: needs (0, 1), got 95"),
-        (["--seed", "x"], "x"),
-        (["--coefficients", ""], "fleiss_kappa"),
-        (["--categories", "1,1,2"], "repeated: ['1']"),
-        (["--categories", ""], "--categories: needed every grade"),
-        (["--colour"], "--colour"),
-    ],
-)
-def test_a_wrong_option_is_refused_by_name(
-    masrel: Caller, wide: Path, arguments: list[str], said: str
-) -> None:
-    assert said in refused(masrel("agree", wide, *arguments))
 
 
 @pytest.mark.parametrize(
@@ -424,20 +352,6 @@ def test_the_grade_1_plus_tells_the_modified_ashworth_scale(
     assert "Ashworth" not in masrel("agree", wide, *declared).out
 
 
-def test_weights_of_undeclared_text_are_refused_and_of_numbers_told(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    text, numbers = tmp_path / "text.csv", tmp_path / "numbers.csv"
-    text.write_text("item,A,B\nx,low,mid\ny,high,high\n", encoding="utf-8")
-    numbers.write_text("item,A,B\nx,2,10\ny,10,10\n", encoding="utf-8")
-    said = refused(masrel("agree", text, "--weights", "linear"))
-    assert "--weights linear: needs --categories" in said
-    assert "high, low, mid" in said
-    assert masrel("agree", text).code == 0
-    done = masrel("agree", numbers, "--weights", "linear")
-    assert "Grades: 2 ×1, 10 ×3. Scale: the grades met" in done.out
-
-
 def test_a_level_is_that_of_every_interval(masrel: Caller, wide: Path) -> None:
     call = ("--target", "items", "--level", "0.8", "--json", "-")
     names = "icc_c1,fleiss_kappa"
@@ -468,42 +382,6 @@ def test_every_coefficient_has_a_posterior_of_items(masrel: Caller, wide: Path) 
     )
 
 
-def test_weights_that_a_named_coefficient_does_not_take_are_said(
-    masrel: Caller, wide: Path
-) -> None:
-    call = ("agree", wide, "--weights", "linear", "--coefficients")
-    done = masrel(*call, "kendall_w,fleiss_kappa")
-    assert "Kendall's W: unweighted, there are no weights for it." in done.out
-    assert "unweighted" not in masrel(*call, "all").out
-
-
-def test_notes_name_the_session_where_it_is_not_all(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    path = tmp_path / "two.csv"
-    rows = ["session,item,rater,grade"]
-    for session, grades in (("one", "aaaa"), ("two", "abba")):
-        for i, grade in enumerate(grades):
-            rows.append(f"{session},{i // 2},{'AB'[i % 2]},{grade}")
-    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
-    call = ("agree", path, "--by", "session", "--coefficients", "fleiss_kappa,gwet_ac")
-    done = masrel(*call)
-    assert "Fleiss' κ (one): undefined: 0/0" in done.out
-    # a CSV has no place for the reason: it is on stderr
-    table = masrel(*call, "--csv")
-    assert "undefined" not in table.out
-    assert "Fleiss' κ (one): undefined: 0/0" in table.err
-
-
-@pytest.mark.parametrize("option", ["--json", "--figure"])
-def test_a_file_without_a_folder_is_refused_before_anything_is_computed(
-    masrel: Caller, wide: Path, option: str
-) -> None:
-    done = masrel("agree", wide, "--target", "both", option, "no/such.svg")
-    assert (done.code, done.out) == (2, "")
-    assert f"{option}: needs a folder that exists, got no/such.svg" in done.err
-
-
 # Metrics of alpha.
 
 
@@ -523,23 +401,6 @@ def test_a_metric_is_of_alpha(masrel: Caller, tmp_path: Path) -> None:
     assert "Krippendorff's α, interval metric" in done.out
     said = refused(masrel(*call[:4], "--coefficients", "fleiss_kappa,gwet_ac"))
     assert "--metric ratio: is of krippendorff_alpha, which is not among" in said
-
-
-def test_beside_a_metric_others_keep_their_weights(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    path = tmp_path / "two.csv"
-    path.write_text("item,A,B\nx,1,1\ny,2,1\nz,4,4\nu,2,3\n", encoding="utf-8")
-    names = "fleiss_kappa,krippendorff_alpha"
-    call = ("--coefficients", names, "--weights", "linear", "--metric", "interval")
-    done = masrel("agree", path, *call)
-    assert "Fleiss' κ, linear" in done.out
-    alpha = "Krippendorff's α, interval metric"
-    assert f"{alpha}: by its metric, without linear weights." in done.out
-    text = tmp_path / "text.csv"
-    text.write_text("item,A,B\nx,a,a\ny,b,a\n", encoding="utf-8")
-    said = refused(masrel("agree", text, "--metric", "interval"))
-    assert "needs grades that are numbers or --categories" in said
 
 
 def test_grades_of_several_labels_are_sets(masrel: Caller, tmp_path: Path) -> None:

@@ -23,8 +23,6 @@ from tests.cli.process import Caller, Done
 
 TABLE_V = Path(__file__).parents[2] / "studies/hess2012/ratings/published.csv"
 WIDE = "patient,Kim,Lee,Ann\nA,1,1+,1\nB,2,NA,2\nC,1,1,2\nD,3,3,3\n"
-TEXT = "item,A,B\nx,low,mid\ny,high,high\nz,low,low\nw,mid,mid\n"
-PERFECT = "item,A,B\n1,1,1\n2,2,2\n3,3,3\n4,1,1\n"
 SESSIONS = "session,item,rater,grade,source\n" + "".join(
     f"{session},{item},{rater},{(item * rater) % 3},simulated\n"
     for session in ("first", "second")
@@ -110,68 +108,13 @@ def test_what_is_null_has_its_reason(masrel: Caller, tmp_path: Path) -> None:
             assert known or f"interval.{end}: null" in said
 
 
-def test_an_infinite_end_is_null_and_said(masrel: Caller, tmp_path: Path) -> None:
-    path = written(tmp_path, "item,A,B\n1,2,2\n2,5,4\n3,2,3\n")
-    call = ("--coefficients", "icc_ak", "--json", "-")
-    (one,) = document(masrel("agree", path, *call))["estimates"]
-    assert one["interval"]["low"] is None
-    assert "interval.low: null, there is no bound" in one["notes"]
-    shown = masrel("agree", path, *call[:2]).out
-    assert "−∞" in shown
-
-
 # A table as CSV and LaTeX.
-
-
-def test_the_columns_of_a_csv(masrel: Caller, tmp_path: Path) -> None:
-    path = written(tmp_path, SESSIONS)
-    names = (
-        "coefficient,title,weights,value,standard_error,median,low,high,level,method,"
-        "target,n_items,n_raters"
-    )
-    call = ("agree", path, "--by", "session", "--target", "raters", "--csv")
-    head = masrel(*call).out.splitlines()[0]
-    assert head == f"session,{names},data"
-    head = masrel(*call, "--words", "fleiss").out.splitlines()[0]
-    assert head == f"session,{names},words,data"
-
-
-@pytest.mark.parametrize(("target", "name"), [("items", "icc_c1"), ("both", "icc_a1")])
-def test_an_icc_has_an_interval_for_one_target(
-    masrel: Caller, tmp_path: Path, target: str, name: str
-) -> None:
-    call = ("agree", written(tmp_path, SESSIONS), "--by", "session", "--target")
-    first, *_ = table(masrel(*call, target, "--coefficients", name, "--csv"))
-    shown = [first[key] for key in ("level", "method", "target")]
-    assert shown == ["0.95", "F distribution", target]
-    for other in {"items", "raters", "both"} - {target}:
-        done = masrel(*call, other, "--coefficients", name)
-        assert f'which is "{target}", and it has no other; got "{other}"' in done.err
-        assert (done.code, done.out) == (2, "")
-    # among all that fit it is shown as what it is
-    rows = table(masrel(*call, "raters", "--coefficients", "all", "--csv"))
-    assert {r["target"] for r in rows if r["coefficient"] == name} == {target}
 
 
 def latex(masrel: Caller, folder: Path) -> str:
     path = written(folder, SESSIONS.replace("first", "50%_{&}~#$^\\"), "a_b&c%.csv")
     call = ("agree", path, "--by", "session", "--coefficients", "all", "--words")
     return masrel(*call, "altman", "--target", "items", "--latex", "--explain").out
-
-
-def test_latex_has_a_label_and_says_what_it_needs(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    out = latex(masrel, tmp_path)
-    assert out.startswith("% needs \\usepackage{booktabs}\n")
-    assert out.count("\\label{tab:agreement}") == 1
-    assert out.index("\\caption") < out.index("\\label") < out.index("tabular")
-    begun = re.findall(r"\\begin\{(\w+)\}", out)
-    assert begun == re.findall(r"\\end\{(\w+)\}", out)[::-1]
-    body = re.sub("(?m)^%.*\n", "", out)  # below the comments every % is escaped
-    assert re.findall(r"(?<!\\)[%#]", body) == []
-    assert "--" not in re.sub(r" -- (?=[&\\])", "", body)  # a dash for what is absent
-    assert body.isascii() or set(re.findall(r"[^\x00-\x7f]", body)) <= set("–")
 
 
 def compiled(folder: Path, text: str) -> str:
@@ -234,18 +177,6 @@ def test_latex_of_many_groups_compiles(masrel: Caller, tmp_path: Path) -> None:
     assert "Float too large" not in log
 
 
-def test_latex_names_letters_that_pdflatex_lacks(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    path = written(tmp_path, "item,Ωμ,名\n1,a,b\n2,b,b\n3,a,a\n")
-    call = ("agree", path, "--latex", "--by", "ward")
-    assert "lualatex" not in masrel("agree", path, "--latex").out
-    text = "ward,item,A,B\n" + "".join(f"名ά,{i},{i % 2},{i // 2}\n" for i in range(4))
-    path.write_text(text, encoding="utf-8")
-    second = masrel(*call).out.splitlines()[1]
-    assert second == "% needs lualatex and a font with ά 名"
-
-
 # Notes below a table.
 
 
@@ -257,80 +188,7 @@ def notes(done: Done) -> list[str]:
     return lines[rows[-1] + 1 :]
 
 
-def test_an_interval_takes_one_line_and_explain_more(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    rows = [f"{i},{i % 5},{i % 7 % 5},{i % 11 % 5}" for i in range(30)]
-    path = written(tmp_path, "\n".join(["item,A,B,C", *rows]) + "\n")
-    call = ("agree", path, "--target", "items", "--interval", "jackknife")
-    assert notes(masrel(*call)) == [
-        "SE: delta method, items as the sample.",
-        "95 % CI, item jackknife, t(29): generalises to other items like these.",
-    ]
-    explained = " ".join(notes(masrel(*call, "--explain")))
-    assert "from leaving out one item at a time" in explained
-    assert "95 % of the intervals" in explained
-
-
-def test_notes_are_no_longer_than_the_table(masrel: Caller, wide: Path) -> None:
-    for target in ("items", "raters", "both"):
-        done = masrel("agree", wide, "--target", target, "--coefficients", "all")
-        below = "\n".join(notes(done))
-        # gaps add the variances of ICC, one-way and two-way
-        assert len(below) < 1.3 * (len(done.out) - len(below))
-        assert "given these ratings" not in below
-        assert "chosen for" not in below
-
-
 # Items 1 to 4 of each clinic have one rating, of A; the others have two or three.
-SPARSE = "clinic,item,A,B,C\n" + "".join(
-    f"{clinic},{clinic}{k},{k % 2},{'' if k < 5 else k % 2},{'' if k < 9 else k % 3}\n"
-    for clinic, items in (("North", range(1, 11)), ("South", range(1, 12)))
-    for k in items
-)
-
-
-def test_items_without_a_pair_of_ratings_are_told(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    sparse = written(tmp_path, SPARSE)
-    call = ("agree", sparse, "--raters", "A,B,C")
-    done = masrel(*call)
-    n_items, n_paired = 10 + 11, 6 + 7
-    note = f"{n_paired} of {n_items} items have two ratings or more."
-    assert note in done.out.splitlines()
-    assert all(
-        (e["n_items"], e["n_items_paired"]) == (n_items, n_paired)
-        for e in document(masrel(*call, "--json", "-"))["estimates"]
-    )
-    sentence = masrel(*call, "--sentence")
-    assert f"{n_items} items ({n_paired} with two ratings or more)" in sentence.out
-    assert note not in sentence.out + sentence.err
-    note = "Items that have two ratings or more: 6 of 10 (North), 7 of 11 (South)."
-    assert note in masrel(*call, "--by", "clinic").out.splitlines()
-    assert "two ratings" not in masrel("agree", written(tmp_path, WIDE, "w.csv")).out
-
-
-def test_a_note_names_rows_that_follow_each_other_by_the_first_and_the_last(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    sparse = written(tmp_path, SPARSE)
-    call = ("agree", sparse, "--raters", "A,B,C", "--coefficients", "all")
-    text = " ".join(masrel(*call, "--target", "both").out.split())
-    assert "Percent agreement to Krippendorff's α: 3 raters: below 5 " in text
-    assert "Kendall's W; Robinson's A: no interval: " in text
-    call = ("agree", sparse, "--by", "clinic", "--target", "items")
-    by = " ".join(masrel(*call, "--interval", "jackknife").out.split())
-    for clinic, df in (("North", 5), ("South", 6)):
-        assert f"Clinic {clinic}: 95 % CI, item jackknife, t({df}): " in by
-
-
-def test_standard_errors_are_explained_where_there_are_any(
-    masrel: Caller, wide: Path
-) -> None:
-    call = ("agree", wide, "--coefficients")
-    assert "SE: " not in masrel(*call, "icc_a1,kendall_w").out
-    assert "SE: " in masrel(*call, "icc_a1,gwet_ac").out
 
 
 @pytest.mark.parametrize(("columns", "most"), [(None, 88), ("60", 60), ("300", 100)])
@@ -388,106 +246,7 @@ def test_a_word_follows_the_interval_that_is_shown(
     assert "by its interval (one-sided)" in masrel(*call, *more, "--csv").err
 
 
-def test_a_bound_gives_the_word_at_its_whole_level(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    # its lower end, 0.340, is exceeded with 95 %; that at 90 % would be higher
-    path = written(tmp_path, PERFECT)
-    call = ("--coefficients", "fleiss_kappa", "--target", "items", "--words", "altman")
-    (row,) = table(masrel("agree", path, *call, "--csv"))
-    assert row["method"].endswith("one-sided")
-    assert row["words"] == strength(float(row["low"]), scale="altman") == "fair"
-    # without an interval there is only an error of 0, which is no certainty
-    done = masrel("agree", path, *call[:2], *call[4:], "--csv")
-    assert word_of(done) == "undefined"
-    assert "undefined where the SE is 0" in " ".join(done.err.split())
-
-
-def test_a_word_without_its_interval_is_undefined(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    path = written(tmp_path, PERFECT)
-    call = ("--coefficients", "gwet_ac", "--target", "items", "--interval", "analytic")
-    assert word_of(masrel("agree", path, *call, "--words", "altman", "--csv")) == (
-        "undefined"
-    )
-
-
-def test_icc_has_words_by_its_interval_and_others_by_a_normal_law(
-    masrel: Caller, wide: Path
-) -> None:
-    call = ("agree", wide, "--words", "cicchetti", "--coefficients")
-    done = masrel(*call, "icc_a1,gwet_ac,percent_agreement", "--csv")
-    assert [row["words"] for row in table(done)] == ["poor", "poor", ""]
-    law = "by its interval (one-sided), or by a normal law around the estimate where"
-    assert law in done.err
-    assert "by a normal law around the estimate;" in masrel(
-        *call, "gwet_ac"
-    ).out.replace("\n ", "")
-
-
 # Sentences.
-
-
-def test_a_sentence_is_ready_for_a_paper(masrel: Caller) -> None:
-    call = ("agree", TABLE_V, "--target", "raters", "--sentence")
-    done = masrel(*call)
-    lines = done.out.splitlines()
-    assert lines[1].startswith("Fleiss' κ = .63, 95 % CI [")
-    assert lines[1].endswith("] (rater jackknife), 4 items, 8 raters.")
-    assert "0." not in done.out
-    assert "generalises to other raters like these" in done.err
-    assert "SE: " not in done.err
-    plain = masrel("agree", TABLE_V, "--sentence", "--coefficients", "icc_ck,gwet_ac")
-    assert re.match(r"ICC\(C,k\) = \.\d\d, 95 % CI \[", plain.out)
-    assert ", SE = ." in plain.out.splitlines()[1]
-    assert "SE: " in plain.err
-
-
-def test_sentences_of_what_is_undefined_or_one_sided(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    path = written(tmp_path, "item,A,B\nx,1,1\ny,1,1\n")
-    out = masrel("agree", path, "--sentence").out.splitlines()
-    assert out[0] == "Percent agreement = 1.00, SE = .00, 2 items, 2 raters."
-    assert out[1].startswith("Fleiss' κ is undefined (0/0: chance agreement is 1")
-    path = written(tmp_path, PERFECT)
-    out = masrel("agree", path, "--sentence", "--target", "items").out.splitlines()
-    bound = "95 % credible lower bound .34 (Dirichlet-multinomial posterior)"
-    assert out[1] == f"Fleiss' κ = 1.00, {bound}, 4 items, 2 raters."
-    more = ("--target", "items", "--interval", "analytic")
-    out = masrel("agree", path, "--sentence", *more).out.splitlines()
-    assert "Fleiss' κ = 1.00, SE = .00, no 95 % CI (the standard error is 0" in out[1]
-
-
-def test_a_sentence_names_weights_group_and_simulated_data(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    path = written(tmp_path, SESSIONS)
-    call = ("--coefficients", "gwet_ac", "--weights", "linear", "--by", "session")
-    first, second = masrel("agree", path, *call, "--sentence").out.splitlines()
-    start = "SIMULATED DATA. Session {}: Gwet's AC (linear weights) = "
-    assert first.startswith(start.format("first"))
-    assert second.startswith(start.format("second"))
-
-
-def test_a_sentence_has_the_word_it_earns(masrel: Caller) -> None:
-    call = ("agree", TABLE_V, "--target", "raters", "--words", "landis_koch")
-    word = table(masrel(*call, "--csv"))[1]["words"]
-    done = masrel(*call, "--sentence")
-    percent, kappa = done.out.splitlines()
-    assert f", at least {word} after Landis and Koch (1977), 4 items" in kappa
-    assert "at least" not in percent
-    assert "by its interval (one-sided)" in done.err
-
-
-@pytest.mark.parametrize("form", [("--csv",), ("--latex",), ("--json", "-")])
-def test_a_sentence_has_stdout_to_itself(
-    masrel: Caller, wide: Path, form: tuple[str, ...]
-) -> None:
-    done = masrel("agree", wide, "--sentence", *form)
-    assert (done.code, done.out) == (2, "")
-    assert "want the same stdout" in done.err
 
 
 # The offer of an interval.
@@ -513,19 +272,6 @@ def test_the_command_that_is_offered_gives_an_interval(
     assert "no interval" not in done.err
 
 
-def test_the_offer_works_where_coefficients_were_named(
-    masrel: Caller, wide: Path
-) -> None:
-    words, command = offer(
-        masrel(*("agree", wide, "--coefficients"), "icc_a1,gwet_ac,icc_c1", "--csv")
-    )
-    assert words.endswith("(without ICC(A,1))")  # its interval is for raters, too
-    names = [row["coefficient"] for row in table(masrel(*command))]
-    assert names == ["gwet_ac", "icc_c1"]
-    _, command = offer(masrel("agree", "--", wide))
-    assert masrel(*command).code == 0
-
-
 def test_nothing_is_offered_for_what_came_through_a_pipe(
     masrel: Caller, wide: Path
 ) -> None:
@@ -536,16 +282,6 @@ def test_nothing_is_offered_for_what_came_through_a_pipe(
     done = masrel("agree", f"/dev/fd/{reading}")
     os.close(reading)
     assert (done.code, done.err) == (0, "")
-
-
-def test_nothing_is_offered_where_all_is_there(masrel: Caller, wide: Path) -> None:
-    for names in ("icc_1,icc_ak", "kendall_w"):
-        assert "--target" not in masrel("agree", wide, "--coefficients", names).err
-    wide.write_text("item,A\n1,2\n2,3\n", encoding="utf-8")  # nothing to compare
-    done = masrel("agree", wide)
-    assert "undefined: no item has ratings of two raters." in done.out
-    assert "SE: " not in done.out
-    assert done.err == ""
 
 
 # The register, and what was probably meant.
@@ -567,45 +303,6 @@ def test_a_coefficient_can_be_asked_for_by_another_name(
     rows = table(masrel("agree", wide, "--coefficients", "maxwell_re", "--csv"))
     same = table(masrel("agree", wide, "--coefficients", "brennan_prediger", "--csv"))
     assert rows == same
-
-
-@pytest.mark.parametrize(
-    ("typed", "meant"),
-    [
-        ("randolf_kappa", "randolph_kappa"),
-        ("flies_kappa", "fleiss_kappa"),
-        ("fleiss", "fleiss_kappa"),
-        ("Cohen's kappa", "cohen_kappa"),
-        ("alpha", "krippendorff_alpha"),
-    ],
-)
-def test_an_unknown_coefficient_is_guessed(
-    masrel: Caller, wide: Path, typed: str, meant: str
-) -> None:
-    done = masrel("agree", wide, "--coefficients", typed)
-    assert (done.code, done.out) == (2, "")
-    assert f"did you mean {meant}?" in done.err
-
-
-@pytest.mark.parametrize(
-    ("typed", "option"),
-    [
-        ("mcnemar", "--symmetry"),
-        ("fleiss_kappa,Stuart-Maxwell", "--symmetry"),
-        ("bland_altman", "--limits-of-agreement"),
-    ],
-)
-def test_a_table_that_is_asked_for_as_a_coefficient_is_named(
-    masrel: Caller, wide: Path, typed: str, option: str
-) -> None:
-    done = masrel("agree", wide, "--coefficients", typed)
-    assert (done.code, done.out) == (2, "")
-    assert f"{option} has that table" in done.err
-
-
-def test_what_could_be_many_is_not_guessed(masrel: Caller, wide: Path) -> None:
-    for typed in ("kappa", "icc", "qqqqqq", "", "all,fleiss_kappa"):
-        assert "did you mean" not in masrel("agree", wide, "--coefficients", typed).err
 
 
 def test_verbs_and_options_are_guessed(masrel: Caller, wide: Path) -> None:
@@ -638,31 +335,3 @@ def test_a_shell_completes_verbs_and_options(wide: Path) -> None:
 
 
 # Grades without an order.
-
-
-def test_text_without_an_order_has_no_numbers(masrel: Caller, tmp_path: Path) -> None:
-    path = written(tmp_path, TEXT)
-    done = masrel("agree", path, "--coefficients", "all", "--json", "-")
-    made = document(done)
-    names = {one["coefficient"] for one in made["estimates"]}
-    assert {"fleiss_kappa", "gwet_ac", "cohen_kappa"} <= names
-    assert not any(COEFFICIENTS[name].needs_order for name in names)
-    (note,) = made["notes"]
-    assert note.startswith("Left out: the six forms of ICC, Kendall's W and Robinson's")
-    declared = ("--categories", "low,mid,high", "--coefficients", "all", "--json", "-")
-    made = document(masrel("agree", path, *declared))
-    assert "icc_a1" in {one["coefficient"] for one in made["estimates"]}
-    assert made["notes"] == []
-
-
-@pytest.mark.parametrize("name", ["icc_a1", "kendall_w", "robinson_a"])
-def test_a_coefficient_that_needs_an_order_says_so(
-    masrel: Caller, tmp_path: Path, name: str
-) -> None:
-    path = written(tmp_path, TEXT)
-    done = masrel("agree", path, "--coefficients", f"gwet_ac,{name}")
-    assert (done.code, done.out) == (2, "")
-    assert done.err == (
-        f"masrel: {name}: needs grades that are numbers or --categories with every "
-        "grade in order, the grades met are text: high, low, mid\n"
-    )

@@ -51,36 +51,6 @@ def test_the_published_study_audits_its_paper(masrel: Caller) -> None:
     assert lines[2].endswith("in them the raters agree on 10 of 12.")
 
 
-BAD = [
-    (("--kappa", "1.2"), "--kappa: needs a number from -1 to 1"),
-    (("--kappa", "0,5"), "--kappa: needs a number with a decimal point"),
-    (("--kappa", "0.5", "--items", "0"), "--items: needs a whole number from 1"),
-    (("--kappa", "0.5", "--interval", "0", "x"), "--interval: needs a number"),
-    (("--kappa", "0.5", "--margins-1", "3 x"), "--margins-1: needs a whole number"),
-    (("--kappa", "0.5", "--agreement", "101"), "--agreement: needs a number from 0"),
-    (("--kappa", "0.5", "--level", "0.9"), "--level: needs --interval beside it"),
-    (
-        ("--kappa", "0.5", "--agreement-weights", "linear"),
-        "--agreement-weights: needs --agreement beside it",
-    ),
-    (
-        ("--agreement", "85", "--kappa-weights", "linear"),
-        "--kappa-weights: needs --kappa beside it",
-    ),
-    ((), "--agreement, --kappa: needs at least one of them"),
-]
-
-
-@pytest.mark.parametrize(("options", "message"), BAD)
-def test_what_cannot_be_is_refused_in_one_sentence(
-    options: tuple[str, ...], message: str, masrel: Caller
-) -> None:
-    done = masrel("audit", "--items", 20, "--categories", 2, *options)
-    assert (done.code, done.out) == (2, "")
-    assert done.err.startswith(f"masrel: {message}")
-    assert done.err.count("\n") == 1
-
-
 def test_a_source_comes_without_options(masrel: Caller, tmp_path: Path) -> None:
     assert "no option" in masrel("audit", STUDY, "--kappa", "0.5").err
     assert "ratings/claims.csv" in masrel("audit", tmp_path).err

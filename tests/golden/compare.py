@@ -14,7 +14,9 @@ Kind = Literal[
 
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w.]*\w)")
 
-COEFFICIENTS = ("agreement", "intervals", "agree", "analyze", "demo")
+COEFFICIENTS = (
+    "agreement", "intervals", "agree", "analyze", "demo", "transcripts",
+)  # fmt: skip
 """Groups whose values are coefficients, good to some ulp."""
 
 SAMPLED = ("latent",)

@@ -5,6 +5,8 @@ import hashlib
 import io
 import json
 import re
+import shlex
+import tomllib
 from functools import partial
 from pathlib import Path
 
@@ -60,11 +62,30 @@ def cases() -> list[Case]:
     made += [
         Case("grading", f"drawn-{n}", partial(_grading, n, "drawn")) for n in range(4)
     ]
+    made += [
+        Case("transcripts", name, partial(_transcripts, lines))
+        for name, lines in TRANSCRIPTS["lines"].items()
+    ]
     made += [Case("latent", name, partial(_latent, o), slow=True) for name, o in LATENT]
     return made + [
         Case("demo", study, partial(_demo, study), slow=True)
         for study in ("hess2012", "small")
     ]
+
+
+TRANSCRIPTS = tomllib.loads(
+    (Path(__file__).parent / "transcripts.toml").read_text("utf-8")
+)
+
+
+def _transcripts(lines: list[str]) -> dict[str, object]:
+    with folder():
+        for name, text in TRANSCRIPTS["files"].items():
+            Path(name).write_text(text, "utf-8")
+        results = {line: masrel(*shlex.split(line)) for line in lines}
+    for result in results.values():
+        result.get("json", {}).pop("masrel", None)  # the version
+    return results
 
 
 def _files() -> dict[str, Path | str]:

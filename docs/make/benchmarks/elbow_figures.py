@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from masrel.plots._margins import arrange
-from masrel.plots._picture import files_of
+from masrel.plots._picture import arrange, files_of
 from masrel.plots._style import (
     BLACK,
     BLUE,

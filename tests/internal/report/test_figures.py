@@ -23,9 +23,9 @@ from masrel.lab.report.figures._order_differences import difference_figure
 from masrel.lab.report.figures._study_figures import aim_figure, speed_figure
 from masrel.lab.report.figures._trace_figures import trace_figure
 from masrel.plots import draw
-from masrel.plots._drawn_values import Forest, ForestRow, PairMaps, RaterPairs
+from masrel.plots._drawn_values import Drawn, Forest, ForestRow
 from masrel.plots._forest import forest_figure
-from masrel.plots._rater_pairs import rater_figure
+from masrel.plots._rater_pairs import RaterPairs, pairs_figure
 from masrel.plots._style import STYLE, house_style
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -99,12 +99,16 @@ def pairs(n_raters: int, reference: str | None = None) -> RaterPairs:
     return RaterPairs(
         title="Fleiss' κ",
         raters=tuple(f"R{k}" for k in range(n_raters)),
-        pairs=tuple(map(tuple, values.tolist())),
+        pairs=values,
         reference=reference,
-        changes=tuple(0.01 * k - 0.02 for k in range(n_raters)),
-        change_ends=tuple((0.01 * k - 0.05, 0.01 * k) for k in range(n_raters)),
+        changes=0.01 * np.arange(n_raters) - 0.02,
+        change_ends=0.01 * np.arange(n_raters)[:, None] - [0.05, 0.0],
         level=0.95,
     )
+
+
+def drawn_pairs(*groups: RaterPairs) -> Drawn:
+    return Drawn("masrel.plots._rater_pairs:pairs_figure", (groups,))
 
 
 DRAWINGS = {
@@ -120,7 +124,7 @@ DRAWINGS = {
         raters=("R1", "R2"),
         slowest=60.0,
     ),
-    "pairs": PairMaps(groups=(pairs(3),)),
+    "pairs": drawn_pairs(pairs(3)),
     "traces": TraceColumns(panels=(panel(),)),
 }
 
@@ -264,7 +268,7 @@ def test_pairs_are_written_in_their_cells_and_long_names_are_shortened(
     assert few.count(">−.05</text>") == 1
     assert ">95 % confidence interval</text>" in few
     of_many = pairs(15, reference="a long name " * 4)
-    many = draw(PairMaps(groups=(of_many,)), stamp="", forms=("svg",))["svg"].decode()
+    many = draw(drawn_pairs(of_many), stamp="", forms=("svg",))["svg"].decode()
     assert ">a long nam…" in many
     assert ">.05</text>" not in many
 
@@ -298,20 +302,18 @@ def test_two_raters_have_a_map_and_nothing_beside_it() -> None:
     content = RaterPairs(
         title="Scott's π",
         raters=("A", "B"),
-        pairs=((nan, 0.5), (0.5, nan)),
+        pairs=np.array([[nan, 0.5], [0.5, nan]]),
         reference=None,
-        changes=(nan, nan),
-        change_ends=((nan, nan), (nan, nan)),
+        changes=np.full(2, nan),
+        change_ends=np.full((2, 2), nan),
         level=0.95,
     )
-    assert (
-        len(rater_figure(PairMaps(groups=(content,))).axes) == 2
-    )  # the map and its colours
-    assert len(rater_figure(PairMaps(groups=(pairs(3),))).axes) == 3
+    assert len(pairs_figure([content]).axes) == 2  # the map and its colours
+    assert len(pairs_figure([pairs(3)]).axes) == 3
 
 
 def test_every_group_has_its_map_one_below_the_other() -> None:
-    figure = rater_figure(PairMaps(groups=(pairs(3), pairs(12, reference="Gold"))))
+    figure = pairs_figure([pairs(3), pairs(12, reference="Gold")])
     maps = [axes for axes in figure.axes if axes.images]
     first, *second = (axes.get_position() for axes in maps)
     assert len(second) == 1

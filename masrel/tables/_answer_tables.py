@@ -1,0 +1,474 @@
+"""Tables, JSON, sentences and the figure of answers to questions about a file."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from masrel.agreement import COEFFICIENTS, BandScale, benchmark, strength
+from masrel.analysis._file_estimates import AgreementRow, Answer, Note, Row
+from masrel.errors import ParameterError
+from masrel.estimates import Estimate, Interval, Target, as_document
+from masrel.tables._estimate_words import (
+    NotedRow,
+    aside,
+    forest_row,
+    origin,
+    pair_words,
+    promise,
+    row_notes,
+    sentence,
+    words,
+)
+from masrel.tables._tables import SIMULATED, Column, Table, capital, percent, table_of
+
+if TYPE_CHECKING:
+    from masrel.plots._drawn_values import Forest, ForestRow
+
+_CAPTIONS = {
+    "agreement": "Agreement of the raters in {of}",
+    "retest": "Agreement of raters with themselves",
+    "categories": "Agreement on each category against all others",
+    "symmetry": "Do the changes from one rater to the other balance?",
+    "indices": "Prevalence, bias and agreement on each category",
+    "limits_of_agreement": "Limits of agreement{of}",
+    "diagnosis_raters": "What each rater adds to {of}",
+    "diagnosis_pairs": "{of} of every two raters",
+    "diagnosis_categories": "Agreement on each category",
+    "diagnosis_confusion": "What each rater said where {of} said the first",
+    "differences": "Differences of agreement between groups",
+    "equality": "Equality of agreement in all groups",
+}
+
+_P = Column(key="p_value", heading="p", is_p=True)
+_ITEMS = Column(key="n_items", heading="Items")
+_VALUE = Column(key="value", heading="Value", digits=3)
+_ERROR = Column(key="standard_error", heading="SE", digits=3)
+_ENDS = (
+    Column(key="low", heading="Low", digits=3),
+    Column(key="high", heading="High", digits=3),
+)
+_COEFFICIENT = (
+    Column(key="coefficient", heading="Coefficient", where="csv"),
+    Column(key="title", heading="Coefficient", align="left"),
+    Column(key="weights", heading="Weights", where="csv"),
+)
+
+_COLUMNS: dict[str, tuple[Column, ...]] = {
+    "symmetry": (
+        Column(key="test", heading="Test", align="left"),
+        Column(key="statistic", heading="Statistic", digits=3),
+        Column(key="distribution", heading="Distribution", align="left"),
+        Column(key="df", heading="df"),
+        _P,
+        _ITEMS,
+    ),
+    "indices": (Column(key="index", heading="Index", align="left"), _VALUE, _ERROR),
+    "limits_of_agreement": (
+        Column(key="quantity", heading="Difference", align="left"),
+        _VALUE,
+        *_ENDS,
+        Column(key="pair_low", heading="Low, both", digits=3),
+        Column(key="pair_high", heading="High, both", digits=3),
+        _ITEMS,
+    ),
+    "diagnosis_raters": (
+        Column(key="rater", heading="Rater", align="left"),
+        Column(key="mean_of_pairs", heading="Mean of pairs", digits=3),
+        Column(key="with_reference", heading="With reference", digits=3),
+        Column(key="reference_low", heading="Low", digits=3, where="csv"),
+        Column(key="reference_high", heading="High", digits=3, where="csv"),
+        Column(key="without", heading="All without", digits=3),
+        Column(key="change", heading="Change", digits=3),
+        _ERROR,
+        *_ENDS,
+    ),
+    "diagnosis_pairs": (
+        Column(key="first", heading="First", align="left"),
+        Column(key="second", heading="Second", align="left"),
+        _VALUE,
+        *_ENDS,
+        _ITEMS,
+    ),
+    "diagnosis_categories": (
+        Column(key="category", heading="Category", align="left"),
+        Column(key="n_ratings", heading="Ratings"),
+        Column(key="agreement", heading="Agreement", digits=3),
+        *_ENDS,
+    ),
+    "diagnosis_confusion": (
+        Column(key="rater", heading="Rater", align="left"),
+        Column(key="of", heading="{of} said", align="left"),
+        Column(key="n", heading="Times"),
+    ),
+    "differences": (
+        *_COEFFICIENT,
+        Column(key="first", heading="First", align="left"),
+        Column(key="second", heading="Second", align="left"),
+        Column(key="items", heading="Items", align="left"),
+        Column(key="difference", heading="Difference", digits=3),
+        _ERROR,
+        *_ENDS,
+        Column(key="level", heading="Level", where="csv"),
+        Column(key="t", heading="t", where="csv"),
+        Column(key="df", heading="df", where="csv"),
+        _P,
+        Column(key="p_holm", heading="p (Holm)", is_p=True),
+    ),
+    "equality": (
+        *_COEFFICIENT,
+        Column(key="test", heading="Test", align="left"),
+        Column(key="statistic", heading="Statistic", digits=2),
+        Column(key="distribution", heading="Distribution", align="left", where="csv"),
+        Column(key="df", heading="df", align="left"),
+        _P,
+    ),
+}
+
+_OF_COLUMNS = ("change", "standard_error", "agreement")
+"""Columns of diagnoses that a note explains, which has their name."""
+
+
+_OF_ESTIMATES = (
+    *_COEFFICIENT,
+    _VALUE,
+    _ERROR,
+    Column(key="median", heading="Median", digits=3),
+    *_ENDS,
+    Column(key="level", heading="Level", where="csv"),
+    Column(key="method", heading="Method", where="csv"),
+    Column(key="target", heading="Target", where="csv"),
+    _ITEMS,
+    Column(key="n_raters", heading="Raters"),
+)
+
+_POPULATIONS = {"items": "items", "raters": "raters", "both": "items and raters"}
+
+_SOURCES = {
+    "landis_koch": "Landis and Koch (1977)",
+    "altman": "Altman (1991)",
+    "fleiss": "Fleiss (1981)",
+    "cicchetti": "Cicchetti and Sparrow (1981)",
+}
+
+_OF_ESTIMATE = ("coefficient", "weights", "value", "n_items", "n_raters")
+_OF_INTERVAL = ("median", "low", "high", "level", "method", "target")
+
+_CHOSEN = "chosen for other "
+"""Start of the note that says why an interval was chosen."""
+
+_PRIORS = (", so the prior weighs: ", " rests on the prior, too: ")
+"""Where a note goes on with the interval under another prior."""
+
+_VARIANCES = "ratings are missing; variances by REML: "
+"""Start of the note on the variances that an ICC is made of."""
+
+
+def answer_table(
+    answer: Answer,
+    *,
+    bands: BandScale | None,
+    explain: bool,
+    in_sentences: bool,
+    data: str,
+) -> Table:
+    """Return the table of an answer."""
+    # bands: whose words for values; explain: whether notes say what intervals promise;
+    # in_sentences: whether notes are for `agreement_sentences`
+    of, estimates = answer.of, answer.estimates
+    if answer.name == "limits_of_agreement":
+        of = f" ({of})" if of else ""
+    shown = answer.rows if answer.shown is None else answer.shown
+    noted = [
+        NotedRow(title=row["title"], group=row["group"], texts=row["texts"])
+        for row in shown
+        if "texts" in row
+    ]
+    # what groups of rows are called in notes
+    by = ", ".join(answer.heads.values()) or None
+    if answer.name == "differences":
+        by = "groups"
+    notes, after = list(map(words, answer.notes)), []
+    if estimates:
+        shown = [_cells(row, answer.heads, bands) for row in estimates]
+        noted = [_noted(row, explain) for row in estimates]
+        notes += _errors_note(estimates, in_sentences)
+        notes += [] if in_sentences else _paired_note(estimates)
+        after = [] if bands is None else [_words_note(estimates, bands)]
+    is_diagnosis = answer.name.startswith("diagnosis")
+    table = table_of(
+        answer.name,
+        _CAPTIONS[answer.name].format(of=of),
+        _columns(answer, shown, bands),
+        shown,
+        hide_empty=is_diagnosis and not answer.grades,
+        in_units=tuple(at for at, row in enumerate(estimates) if _is_in_units(row)),
+        notes=(*notes, *row_notes(noted, by), *after),
+        data=data,
+    )
+    if not is_diagnosis:
+        return table
+    on_page = [c.key for c in table.columns if c.where != "csv"]
+    explained = [words(Note(key)) for key in _OF_COLUMNS if key in on_page]
+    return replace(table, notes=(*explained, *table.notes))
+
+
+def _columns(
+    answer: Answer, shown: Sequence[Row], bands: BandScale | None
+) -> list[Column]:
+    columns = [
+        Column(key=key, heading=capital(name), align="left")
+        for key, name in answer.heads.items()
+    ]
+    hidden = {"p_holm"} if answer.is_single else set()
+    if not any(row.get("median") is not None for row in shown):
+        hidden.add("median")
+    for column in _COLUMNS.get(answer.name, _OF_ESTIMATES):
+        if "reference" in column.key and not answer.has_reference:
+            continue
+        heading = column.heading
+        if "{of}" in heading:
+            heading = heading.format(of=answer.of).capitalize()
+        where = "csv" if column.key in hidden else column.where
+        columns.append(replace(column, heading=heading, where=where))
+    columns += [Column(key=f"said_{g}", heading=g, digits=2) for g in answer.grades]
+    if bands is not None and answer.estimates:
+        columns.append(Column(key="words", heading="At least", align="left"))
+    return columns
+
+
+def answer_documents(
+    answer: Answer, bands: BandScale | None
+) -> list[dict[str, object]]:
+    """Return the rows of an answer for JSON: ``nan`` and infinities as None."""
+    if not answer.estimates:
+        return [{key: _plain(value) for key, value in r.items()} for r in answer.rows]
+    return [
+        {
+            **keys,
+            **as_document(row.estimate),
+            **({} if bands is None else {"word": _word(row, bands)}),
+            "notes": [*row.notes, *_why_null(row.estimate)],
+        }
+        for keys, row in zip(answer.rows, answer.estimates, strict=True)
+    ]
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: _plain(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return list(map(_plain, value))
+    is_lost = isinstance(value, float) and not math.isfinite(value)
+    return None if is_lost else value
+
+
+def _is_in_units(row: AgreementRow) -> bool:
+    entry = COEFFICIENTS.get(row.estimate.coefficient)  # none of kappa of a category
+    return entry is not None and entry.in_units
+
+
+def _cells(row: AgreementRow, heads: Mapping[str, str], bands: BandScale | None) -> Row:
+    estimate, interval = row.estimate, row.estimate.interval
+    cells = {key: getattr(estimate, key) for key in _OF_ESTIMATE}
+    if interval is not None:
+        cells |= {key: getattr(interval, key) for key in _OF_INTERVAL}
+    return {
+        **cells,
+        "title": row.title,
+        "standard_error": estimate.standard_error if _has_error(estimate) else None,
+        "words": None if bands is None else _word(row, bands),
+        **dict.fromkeys(heads, row.group),
+    }
+
+
+def _has_error(estimate: Estimate) -> bool:
+    # without observed agreement a statistic as a rule has no error either
+    parts = (estimate.observed, estimate.standard_error)
+    return not all(map(math.isnan, parts)) or estimate.reason is not None
+
+
+def _word(row: AgreementRow, bands: BandScale) -> str | None:
+    """Return the best word that the true value reaches with 95 % probability."""
+    estimate = row.estimate
+    entry = COEFFICIENTS.get(estimate.coefficient)  # none of kappa of a category
+    is_raw = entry is not None and not entry.chance_corrected
+    if is_raw or math.isnan(estimate.value):
+        return None
+    if row.lower_bound is not None:
+        return strength(row.lower_bound, scale=bands)
+    if not estimate.standard_error > 0.0:  # said in a note rather than warned of
+        return "undefined"
+    return benchmark(estimate, scale=bands)
+
+
+def _errors_note(rows: Sequence[AgreementRow], in_sentences: bool) -> list[str]:
+    # a sentence has the standard error only where there is no interval
+    units = [
+        None if row.estimate.interval is None else row.estimate.interval.unit
+        for row in rows
+        if not math.isnan(row.estimate.standard_error)
+        and not (in_sentences and row.estimate.interval is not None)
+    ]
+    are_clustered = {unit == "clusters" for unit in units}
+    samples = {True: "clusters", False: "items"}
+    return [
+        f"SE: delta method, {sample} as the sample."
+        for is_clustered, sample in samples.items()
+        if is_clustered in are_clustered
+    ]
+
+
+def _paired_note(rows: Sequence[AgreementRow]) -> list[str]:
+    # how many items the values rest on, where some have no pair of ratings
+    fewer = {
+        row.group: row.estimate
+        for row in rows
+        if row.estimate.n_items_paired < row.estimate.n_items
+    }
+    counts = {of: f"{e.n_items_paired} of {e.n_items}" for of, e in fewer.items()}
+    if not fewer:
+        return []
+    pair = pair_words(next(iter(fewer.values())))
+    if len({row.group for row in rows}) == 1:
+        return [f"{count} items have {pair}." for count in counts.values()]
+    of_groups = ", ".join(f"{count} ({group})" for group, count in counts.items())
+    return [f"Items that have {pair}: {of_groups}."]
+
+
+def _noted(row: AgreementRow, explain: bool) -> NotedRow:
+    # how its interval was made, what to know of it, and why a value is undefined
+    estimate, interval = row.estimate, row.estimate.interval
+    texts = [] if estimate.reason is None else [f"undefined: {estimate.reason}"]
+    texts += row.notes
+    of_interval = None
+    if interval is not None:
+        of_interval = []
+        if interval.reason is None:
+            of_interval.append(_interval_note(interval, explain))
+        elif interval.reason != estimate.reason:
+            of_interval.append(f"no interval ({interval.method}): {interval.reason}")
+        brief = filter(None, map(_brief, interval.notes))
+        of_interval += interval.notes if explain else brief
+    return NotedRow(
+        title=row.title,
+        group=row.group,
+        texts=tuple(texts),
+        interval_texts=None if of_interval is None else tuple(of_interval),
+    )
+
+
+def _brief(note: str) -> str:
+    """Return a note of an interval without what only `--explain` shows."""
+    if note.startswith((_CHOSEN, _VARIANCES)):
+        return ""
+    for start in _PRIORS:
+        before, is_there, _ = note.partition(start)
+        if is_there:
+            return f"{before}{start.removesuffix(': ')} (--explain says by how much)"
+    return note
+
+
+def _interval_note(interval: Interval, explain: bool) -> str:
+    kind = "CI"
+    if interval.kind == "credible":
+        kind = "credible bound" if interval.is_one_sided else "credible interval"
+    name = f"{percent(interval.level)} % {kind}, {interval.method}"
+    population = _POPULATIONS[interval.target]
+    if interval.unit == "clusters":
+        population = f"clusters of {population}"
+    to = f"generalises to other {population} like these"
+    if not explain:
+        return f"{name}: {to}"
+    promised = promise(interval, "item")
+    return f"{name}{origin(interval, 'item')}: {to}: {promised}"
+
+
+def _words_note(rows: Sequence[AgreementRow], bands: BandScale) -> str:
+    named = [row for row in rows if _word(row, bands) is not None]
+    laws = []
+    if any(row.lower_bound is not None for row in named):
+        laws.append("its interval (one-sided)")
+    if any(row.lower_bound is None for row in named):
+        none = " where there is none" if laws else ""
+        laws.append(f"a normal law around the estimate{none}")
+    by = f", by {', or by '.join(laws)}" if laws else ""
+    if any(r.lower_bound is None and r.estimate.standard_error == 0.0 for r in named):
+        by += "; undefined where the SE is 0, which does not mean that it is certain"
+    return (
+        f"At least: the best word of {_SOURCES[bands]} that the true value reaches "
+        f"with 95 % probability{by}; the words are conventions."
+    )
+
+
+def agreement_sentences(answer: Answer, *, bands: BandScale | None, data: str) -> str:
+    """Return a sentence for every estimate, one a line."""
+    lines = []
+    for row in answer.estimates:
+        word = None if bands is None else _word(row, bands)
+        earned = ""
+        if bands is not None and word not in (None, "undefined"):
+            earned = f"at least {word} after {_SOURCES[bands]}"
+        of_group = [f"{capital(by)} {row.group}: " for by in answer.heads.values()]
+        stamp = [f"{SIMULATED}. "] * (data == "simulated")
+        lines.append("".join([*stamp, *of_group, sentence(row.estimate, word=earned)]))
+    return "\n".join(lines)
+
+
+def _why_null(estimate: Estimate) -> list[str]:
+    # why a number of a record is null, where neither `reason` says it
+    interval, names = estimate.interval, ""
+    if math.isnan(estimate.standard_error):
+        names = (
+            "standard_error"
+            if _has_error(estimate)
+            else "standard_error, observed, chance"
+        )
+    elif math.isnan(estimate.observed):
+        names = "observed, chance"
+    why = []
+    if names and estimate.reason is None:
+        is_error = names == "standard_error"
+        who = "one item" if is_error else COEFFICIENTS[estimate.coefficient].title
+        why.append(f"{names}: null, {who} has none")
+    ends = () if interval is None else (("low", interval.low), ("high", interval.high))
+    return why + [
+        f"interval.{name}: null, there is no bound"
+        for name, end in ends
+        if math.isinf(end)
+    ]
+
+
+def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> "Forest":
+    """Return what a figure shows: the estimates and their intervals."""
+    from masrel.plots._drawn_values import Forest
+
+    # what is in the units of the ratings is on no axis of agreement
+    rows = [row for row in rows if not _is_in_units(row)]
+    if not rows:
+        raise ParameterError(
+            "--figure: shows coefficients of agreement, got only estimates in the "
+            "units of the ratings"
+        )
+    population = _POPULATIONS[target]
+    several = len({row.group for row in rows}) > 1
+    return Forest(
+        rows=tuple(_forest_row(row, target, has_group=several) for row in rows),
+        axis_label=f"agreement (1 is perfect); intervals for other {population}",
+    )
+
+
+def _forest_row(row: AgreementRow, target: Target, *, has_group: bool) -> "ForestRow":
+    interval = row.estimate.interval
+    # what neither the axis nor the legend says of the interval
+    details = []
+    if interval is not None:
+        details.append(aside(interval))
+        if interval.target != target:
+            details.append(f"other {_POPULATIONS[interval.target]}")
+    return forest_row(
+        row.title,
+        row.estimate,
+        detail=", ".join(filter(None, details)),
+        group=row.group if has_group else "",
+    )
