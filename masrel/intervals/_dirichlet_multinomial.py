@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import expit, gammaln, xlogy
+from scipy.special import gammaln, xlogy
 
 from masrel.agreement._engine import Floats
 from masrel.errors import ConvergenceError
@@ -80,42 +80,6 @@ class DirichletMultinomial:
         more = np.array(met, dtype=np.float64)[:, :0:-1].cumsum(axis=1)[:, ::-1]
         more = np.ascontiguousarray(more)
         return cls(prior=prior, shape=shape, powers=more[:-1], sizes=more[-1])
-
-    @property
-    def n_dimensions(self) -> int:
-        """The logit of ρ, and the log-ratios of π to its last part."""
-        return int(self.prior.size)
-
-    def parts(self, position: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return ρ, 1 - ρ and π at unbounded positions."""
-        # position (n, n_dimensions) -> ρ and 1 - ρ, both (n,), and π, (n, n_parts)
-        rho, rest = expit(position[:, 0]), expit(-position[:, 0])
-        ratios = np.column_stack([position[:, 1:], np.zeros(len(position))])
-        ratios = np.exp(ratios - ratios.max(axis=1, keepdims=True))
-        return rho, rest, ratios / ratios.sum(axis=1, keepdims=True)
-
-    def log_likelihood(self, rho: Floats, rest: Floats, pi: Floats) -> Floats:
-        """Return the log-likelihood, constants left out."""
-        # With A = (1 - ρ)/ρ every factor A π_k + j and A + j, times ρ, is (1 - ρ) π_k +
-        # j ρ and 1 - ρ + j ρ; numerator and denominator have as many of them.
-        # rho, rest (n,), pi (n, n_parts) -> (n,)
-        part, depth = np.nonzero(self.powers)
-        numerator = rest[:, None] * pi[:, part] + rho[:, None] * depth
-        denominator = rest[:, None] + rho[:, None] * np.arange(self.sizes.size)
-        log = np.log(numerator) @ self.powers[part, depth]
-        return np.asarray(log - np.log(denominator) @ self.sizes)
-
-    def log_density(self, position: Floats) -> Floats:
-        """Return the log posterior density of unbounded positions."""
-        # position (n, n_dimensions) -> (n,)
-        rho, rest, pi = self.parts(position)
-        with np.errstate(divide="ignore", invalid="ignore"):  # far out a part is 0
-            # Beta density (ρ (1 - ρ))^(shape - 1), times the logit's Jacobian ρ (1 - ρ)
-            of_rho = self.shape * (np.log(rho) + np.log(rest))
-            # Dirichlet density Π π_k^(a_k - 1), times the log-ratios' Jacobian Π π_k
-            of_pi = np.log(pi) @ self.prior
-            density = self.log_likelihood(rho, rest, pi) + of_rho + of_pi
-        return np.where(np.isfinite(density), density, -np.inf)
 
     def log_cofactor(self, logit: Floats) -> Floats:
         """Return what multiplies the polynomial in A = exp(-logit ρ), as logarithm."""
@@ -201,8 +165,8 @@ class RhoDensity:
             right = lowest & highest  # nothing that is needed was dropped
             if is_new and not right.any():
                 raise ConvergenceError(
-                    "the exact posterior needs terms that floats cannot hold; "
-                    'method="emcee" samples it'
+                    "the exact posterior needs terms that floats cannot hold; use the "
+                    "jackknife"
                 )
             out[left[right]] = total[right]
             left = left[~right]
@@ -314,7 +278,7 @@ def log_coefficients(exponents: tuple[float, ...]) -> Floats:
     if sum(exponents[1:]) > _MAX_FACTORS:
         raise ConvergenceError(
             f"the exact posterior needs {sum(exponents):.0f} ratings in one "
-            'category multiplied out in logarithms; method="emcee" samples it'
+            "category multiplied out in logarithms; use the jackknife"
         )
     log = np.zeros(1)
     for j, n in enumerate(exponents):

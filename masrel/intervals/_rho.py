@@ -13,7 +13,7 @@ from masrel.agreement._engine import Floats
 from masrel.errors import ParameterError
 from masrel.estimates import Distribution, Interval
 from masrel.intervals._dirichlet_multinomial import DirichletMultinomial, RhoDensity
-from masrel.intervals._problem import IntervalProblem, recorded_generator
+from masrel.intervals._problem import IntervalProblem
 from masrel.intervals._quadrature import (
     TOLERANCE,
     LineDistribution,
@@ -258,27 +258,16 @@ def _lower_bound_of_rho(problem: IntervalProblem) -> Interval:
     )
 
 
-def rho_interval(
-    problem: IntervalProblem,
-    prior: Prior,
-    *,
-    sampled: bool,
-    n_steps: int,
-    max_steps: int,
-    rng: np.random.Generator | int | None,
-) -> Interval:
+def rho_interval(problem: IntervalProblem, prior: Prior) -> Interval:
     """Compute the central credible interval of ρ."""
-    method = f"Dirichlet-multinomial posterior, {'emcee' if sampled else 'exact'}"
+    method = "Dirichlet-multinomial posterior, exact"
     counts = problem.item_counts()
     reason = _nothing_to_learn(counts)
     if reason is not None:
         undefined = problem.undefined(reason, method=method, unit=None)
         return dataclasses.replace(undefined, kind="credible")
     level = problem.level
-    if sampled:
-        interval = _sampled(problem, counts, prior, method, n_steps, max_steps, rng)
-    else:
-        interval = _central(problem, RhoPosterior.of(counts, prior, level), method)
+    interval = _central(problem, RhoPosterior.of(counts, prior, level), method)
     notes = prior_notes(counts, prior, level, interval.low, interval.high)
     return dataclasses.replace(interval, notes=notes)
 
@@ -290,45 +279,3 @@ def _nothing_to_learn(counts: NDArray[np.int64]) -> str | None:
     if counts.shape[1] < 2:
         return "one category is declared"
     return None
-
-
-def _sampled(
-    problem: IntervalProblem,
-    counts: NDArray[np.int64],
-    prior: Prior,
-    method: str,
-    n_steps: int,
-    max_steps: int,
-    rng: np.random.Generator | int | None,
-) -> Interval:
-    # Imported here: the quadrature loads no sampler.
-    from masrel.intervals._mcmc import sample
-
-    generator, seed = recorded_generator(rng)
-    model = DirichletMultinomial.of_counts(
-        counts, concentration=prior.concentration, shape=PRIOR_SHAPES[prior.name]
-    )
-    draws = sample(
-        model.log_density,
-        model.n_dimensions,
-        lambda position: model.parts(position)[0],
-        generator=generator,
-        n_steps=n_steps,
-        max_steps=max_steps,
-    )
-    tail = 0.5 * (1.0 - problem.level)
-    return Interval(
-        low=draws.quantile(tail),
-        high=draws.quantile(1.0 - tail),
-        median=draws.quantile(0.5),
-        level=problem.level,
-        kind="credible",
-        method=method,
-        target=problem.target,
-        n_resamples=int(draws.values.size),
-        monte_carlo_error=(
-            draws.quantile_error(tail),
-            draws.quantile_error(1.0 - tail),
-        ),
-        seed=seed,
-    )

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 _RHO_COEFFICIENTS = ("fleiss_kappa", "scott_pi", "krippendorff_alpha")
 
 _Model = Literal["auto", "dirichlet-multinomial", "table", "patterns"]
-_Method = Literal["exact", "emcee"]
 
 
 def posterior(
@@ -33,10 +32,7 @@ def posterior(
     model: _Model = "auto",
     prior: "PriorName" = "uniform",
     concentration: float | None = None,
-    method: _Method = "exact",
     n_draws: int = 10_000,
-    n_steps: int = 3_000,
-    max_steps: int = 48_000,
     rng: np.random.Generator | int | None = None,
 ) -> Interval:
     """Compute the posterior of a coefficient in the population of items.
@@ -68,13 +64,9 @@ def posterior(
         Every share of a category is Dirichlet(concentration, ...), 1 unless given;
         with "table" every cell. Unless given, the prior of the table is worth 1.5
         items, half of it on pairs that agree; so is that of the patterns.
-    method : {"exact", "emcee"}, optional
-        Quadrature, which draws nothing; or a sampler, to check it.
     n_draws : int, optional
         Draws, where they are needed: by "patterns", by the table of more than two
         categories, and of what is no function of ρ alone.
-    n_steps, max_steps : int, optional
-        Steps of every walker at first, and where the sampler gives up; for "emcee".
     rng : Generator or int, optional
         Where randomness comes from, if any is needed; an integer is recorded as the
         seed. Without it a fresh seed is drawn and recorded.
@@ -92,7 +84,7 @@ def posterior(
     RatingsError
         If the ratings do not fit.
     ConvergenceError
-        If the sampler has not converged after `max_steps`.
+        If floats cannot hold the exact posterior of so many ratings.
 
     Warns
     -----
@@ -136,37 +128,22 @@ def posterior(
         weights=weights,
         level=level,
     )
-    # Imported here: the other intervals load neither scipy nor emcee.
+    # Imported here: the other intervals load no scipy.
     from masrel.intervals._rho import Prior, rho_interval
 
     checked_prior = Prior.of(prior, 1.0 if concentration is None else concentration)
-    model = _checked_model(problem, model, method)
+    model = _checked_model(problem, model)
     if model == "dirichlet-multinomial" and _is_rho(problem, weights):
-        return rho_interval(
-            problem,
-            checked_prior,
-            sampled=method == "emcee",
-            n_steps=n_steps,
-            max_steps=max_steps,
-            rng=rng,
-        )
+        return rho_interval(problem, checked_prior)
     from masrel.intervals._drawn_posterior import alike_interval, patterns_interval
 
-    if model == "dirichlet-multinomial" and method == "exact":
+    if model == "dirichlet-multinomial":
         return alike_interval(problem, checked_prior, n_draws=n_draws, rng=rng)
-    options = f'prior="{prior}", method="{method}"'
+    options = "" if prior == "uniform" else f'prior="{prior}"'
     if model == "patterns" and concentration is not None:
-        options += f", concentration={concentration!r}"
-    elif method == "exact" and prior == "uniform":
-        options = ""
-    if options and model == "dirichlet-multinomial":
-        raise ParameterError(
-            f'method: "emcee" samples ρ, which {problem.entry.name} is not'
-        )
+        options = f"concentration={concentration!r}"
     if options:
-        raise ParameterError(
-            f'model: "{model}" has one prior, and no sampler; got {options}'
-        )
+        raise ParameterError(f'model: "{model}" has one prior; got {options}')
     if model == "patterns":
         return patterns_interval(problem, n_draws=n_draws, rng=rng)
     from masrel.intervals._two_raters import table_interval
@@ -174,12 +151,11 @@ def posterior(
     return table_interval(problem, concentration, n_draws=n_draws, rng=rng)
 
 
-def _checked_model(problem: IntervalProblem, model: _Model, method: _Method) -> _Model:
+def _checked_model(problem: IntervalProblem, model: _Model) -> _Model:
     """Check what was chosen, and return the model, which may be left to the data."""
-    for name, value, options in (("model", model, _Model), ("method", method, _Method)):
-        if value not in get_args(options):
-            known = ", ".join(get_args(options))
-            raise ParameterError(f"{name}: needs one of {known}, got {value!r}")
+    if model not in get_args(_Model):
+        known = ", ".join(get_args(_Model))
+        raise ParameterError(f"model: needs one of {known}, got {model!r}")
     if problem.target != "items":
         raise ParameterError(
             "target: a posterior generalises to other items, so "

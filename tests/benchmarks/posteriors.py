@@ -12,6 +12,7 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import expit
 
 from masrel.intervals import posterior
 from masrel.intervals._dirichlet_multinomial import DirichletMultinomial
@@ -20,6 +21,7 @@ from tests.benchmarks.bootstrap import Codes, Point, Race, counted, made, measur
 from tests.benchmarks.sidebyside import Timing, side_by_side
 from tests.intervals.gauss_legendre import ByPanels
 
+Floats = NDArray[np.float64]
 TAILS = (0.025, 0.975)
 ESS = 2000.0
 INTERVAL, QUADRATURE = "posterior()", "its quadrature"
@@ -30,6 +32,42 @@ WALKERS = {STRETCH: 32, EVOLUTION: 80}
 STUDIES = ((4, 8, 4), (100, 5, 4), (1000, 5, 4))
 
 
+def parts(position: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return ρ, 1 - ρ and π at unbounded positions."""
+    # position (n, n_dimensions) -> ρ and 1 - ρ, both (n,), and π, (n, n_parts)
+    rho, rest = expit(position[:, 0]), expit(-position[:, 0])
+    ratios = np.column_stack([position[:, 1:], np.zeros(len(position))])
+    ratios = np.exp(ratios - ratios.max(axis=1, keepdims=True))
+    return rho, rest, ratios / ratios.sum(axis=1, keepdims=True)
+
+
+def log_likelihood(
+    model: DirichletMultinomial, rho: Floats, rest: Floats, pi: Floats
+) -> Floats:
+    """Return the log-likelihood, constants left out."""
+    # With A = (1 - ρ)/ρ every factor A π_k + j and A + j, times ρ, is (1 - ρ) π_k +
+    # j ρ and 1 - ρ + j ρ; numerator and denominator have as many of them.
+    # rho, rest (n,), pi (n, n_parts) -> (n,)
+    part, depth = np.nonzero(model.powers)
+    numerator = rest[:, None] * pi[:, part] + rho[:, None] * depth
+    denominator = rest[:, None] + rho[:, None] * np.arange(model.sizes.size)
+    log = np.log(numerator) @ model.powers[part, depth]
+    return np.asarray(log - np.log(denominator) @ model.sizes)
+
+
+def log_density(model: DirichletMultinomial, position: Floats) -> Floats:
+    """Return the log posterior density of unbounded positions."""
+    # position (n, n_dimensions) -> (n,)
+    rho, rest, pi = parts(position)
+    with np.errstate(divide="ignore", invalid="ignore"):  # far out a part is 0
+        # Beta density (ρ (1 - ρ))^(shape - 1), times the logit's Jacobian ρ (1 - ρ)
+        of_rho = model.shape * (np.log(rho) + np.log(rest))
+        # Dirichlet density Π π_k^(a_k - 1), times the log-ratios' Jacobian Π π_k
+        of_pi = np.log(pi) @ model.prior
+        density = log_likelihood(model, rho, rest, pi) + of_rho + of_pi
+    return np.where(np.isfinite(density), density, -np.inf)
+
+
 def chains(
     way: str, model: DirichletMultinomial, n_steps: int, seed: int
 ) -> NDArray[np.float64]:
@@ -37,13 +75,13 @@ def chains(
     import emcee
 
     rng = np.random.default_rng(seed)
-    start = rng.normal(scale=1.5, size=(WALKERS[way], model.n_dimensions))
+    start = rng.normal(scale=1.5, size=(WALKERS[way], model.prior.size))
     legacy = np.random.RandomState(seed).get_state()
     moves = None
     if way == EVOLUTION:
         moves = [(emcee.moves.DEMove(), 0.9), (emcee.moves.DEMove(gamma0=1.0), 0.1)]
     sampler = emcee.EnsembleSampler(
-        *start.shape, model.log_density, moves=moves, vectorize=True
+        *start.shape, partial(log_density, model), moves=moves, vectorize=True
     )
     sampler.run_mcmc(emcee.State(start, random_state=legacy), n_steps)
     logit = sampler.get_chain()[..., 0]
@@ -75,10 +113,10 @@ def importance_ends(
     from scipy.special import gammaincinv, ndtri
     from scipy.stats import qmc
 
-    d, df = model.n_dimensions, 5.0
+    d, df = model.prior.size, 5.0
 
     def minus(position: NDArray[np.float64]) -> float:
-        return -float(model.log_density(position[None])[0])
+        return -float(log_density(model, position[None])[0])
 
     found = minimize(minus, np.zeros(d), method="BFGS")
     root = np.linalg.cholesky(_inverse_hessian(model, found.x))
@@ -89,7 +127,7 @@ def importance_ends(
     spread = normal * np.sqrt(df / chi)[:, None]
     log_t = -0.5 * (df + d) * np.log1p((spread**2).sum(axis=1) / df)
     position = found.x + spread @ root.T
-    log = model.log_density(position) - log_t
+    log = log_density(model, position) - log_t
     weights = np.exp(log - log.max())
     order = np.argsort(position[:, 0])
     upto = np.cumsum(weights[order])
@@ -107,7 +145,7 @@ def _inverse_hessian(
     unit = step * np.eye(d)
     at = [mode + a * unit[i] + b * unit[j] for i in range(d) for j in range(d)
           for a in (1, -1) for b in (1, -1)]  # fmt: skip
-    value = model.log_density(np.array(at)).reshape(d, d, 2, 2)
+    value = log_density(model, np.array(at)).reshape(d, d, 2, 2)
     hessian = (value[..., 0, 0] - value[..., 0, 1] - value[..., 1, 0]
                + value[..., 1, 1]) / (4 * step**2)  # fmt: skip
     return np.asarray(np.linalg.inv(-hessian))

@@ -145,7 +145,6 @@ def test_coefficients_of_the_same_value_in_the_population_have_it(name: str) -> 
     assert result == posterior("fleiss_kappa", ratings, target="items")
 
 
-@pytest.mark.parametrize("method", ["exact", "emcee"])
 @pytest.mark.parametrize(
     ("ratings", "reason"),
     [
@@ -154,10 +153,10 @@ def test_coefficients_of_the_same_value_in_the_population_have_it(name: str) -> 
     ],
 )
 def test_where_the_prior_alone_would_speak_it_is_undefined(
-    ratings: list[list[str | None]], reason: str, method: str
+    ratings: list[list[str | None]], reason: str
 ) -> None:
     with pytest.warns(UndefinedStatisticWarning, match=reason):
-        result = posterior("fleiss_kappa", ratings, target="items", method=method)  # type: ignore[arg-type]
+        result = posterior("fleiss_kappa", ratings, target="items")
     assert math.isnan(result.low)
     assert math.isnan(result.high)
     assert (result.reason, result.kind) == (reason, "credible")
@@ -170,18 +169,15 @@ def test_where_the_prior_alone_would_speak_it_is_undefined(
         ({"level": 1.0}, r"level: needs \(0, 1\), got 1"),
         ({"level": math.nan}, r"level: needs \(0, 1\), got nan"),
         ({"prior": "flat"}, "prior: needs one of uniform, jeffreys, got 'flat'"),
-        ({"method": "gibbs"}, "method: needs one of exact, emcee, got 'gibbs'"),
         ({"concentration": 0.0}, "concentration: needs a positive number, got 0.0"),
         ({"concentration": math.inf}, "concentration: needs a positive number"),
         ({"weights": "linear", "model": "dirichlet-multinomial"}, "to unweighted"),
-        ({"weights": "linear", "method": "emcee"}, "and no sampler"),
         ({"target": "raters"}, 'so "items"; for other raters use the jackknife'),
         ({"target": "both"}, 'got "both"'),
         (
             {"weights": "quadratic", "model": "dirichlet-multinomial"},
             "unweighted .* got fleiss_kappa with weights='quadratic'",
         ),
-        ({"coefficient": "gwet_ac", "method": "emcee"}, "and no sampler"),
         ({"coefficient": "kendall_w"}, "coefficient"),
     ],
 )

@@ -102,12 +102,3 @@ def test_the_other_exact_ones_draw_nothing(call: str) -> None:
     drew, loaded = watched(call, 5)
     assert not drew
     assert loaded <= SPECIAL
-
-
-@pytest.mark.slow
-def test_the_sampler_alone_loads_emcee() -> None:
-    call = 'posterior("fleiss_kappa", rows, target="items", method="emcee", rng=1)'
-    drew, loaded = watched(call, 5)
-    assert drew
-    assert {"emcee", "arviz_stats"} <= loaded
-    assert not loaded & {"matplotlib", "statsmodels", "pandas"}
