@@ -51,7 +51,6 @@ from masrel.errors import (
     UndefinedStatisticWarning,
 )
 from masrel.ratings import RatingsFile, RatingsPart
-from masrel.ratings._doubts import doubt_of_name
 
 if TYPE_CHECKING:
     from masrel.intervals import Diagnosis
@@ -98,7 +97,7 @@ def coded_part(part: RatingsPart, option: str) -> CodedRatings:
 
 def without_reference(file: RatingsFile, reference: str) -> RatingsFile:
     """Return the ratings of all but the rater whom the others are held against."""
-    doubt, parts = doubt_of_name(reference), []
+    parts = []
     for part in file.parts:
         coded = coded_part(part, "--diagnose")
         if reference not in part.raters:
@@ -109,8 +108,12 @@ def without_reference(file: RatingsFile, reference: str) -> RatingsFile:
         raters = tuple(part.raters[place] for place in others)
         ratings = replace(coded, codes=coded.codes[:, others])
         parts.append(replace(part, raters=raters, ratings=ratings))
-    texts = tuple(text for text in file.warnings if not text.startswith(doubt))
-    return replace(file, parts=tuple(parts), warnings=texts)
+    findings = tuple(
+        finding
+        for finding in file.warnings
+        if (finding.code, finding.facts.get("column")) != ("named rater", reference)
+    )
+    return replace(file, parts=tuple(parts), warnings=findings)
 
 
 def _two_raters(file: RatingsFile, part: RatingsPart, option: str) -> CodedRatings:

@@ -1,6 +1,6 @@
 """The options of verbs that read any file of ratings, and what they say of it."""
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -8,53 +8,12 @@ import click
 
 from masrel.cli._options import split_commas
 from masrel.cli._progress import progress
-from masrel.errors import ParameterError
+from masrel.ratings._findings import ReadingOptions
 
 if TYPE_CHECKING:
-    from masrel.ratings import RatingsFile, Repeated
+    from masrel.ratings import RatingsFile
 
 _SHOWN = 12  # raters that are named
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReadingOptions:
-    """What the caller says of a file; None and () are for the file to tell."""
-
-    item: tuple[str, ...] = ()
-    rater: str | None = None
-    grade: str | None = None
-    raters: tuple[str, ...] = ()
-    ignore: tuple[str, ...] = ()
-    no_item: bool = False
-    no_header: bool = False
-    session: str | None = None
-    by: str | None = None
-    clusters: str | None = None
-    repeated: "Repeated" = "error"
-    categories: list[str] | None = None
-    missing_codes: tuple[str, ...] = ()
-    decimal: str = "."
-    delimiter: str = "auto"
-    encoding: str | None = None
-    sheet: str | None = None
-    transpose: bool = False
-    counts: bool = False
-    table: bool = False
-    source: str | None = None
-    stream: bool | None = None
-
-    def record(self) -> dict[str, object]:
-        """Return what the caller said, as plain values for JSON."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
-        return {
-            name: list(value) if isinstance(value, tuple) else value
-            for name, value in values.items()
-            if value != getattr(type(self)(), name)
-        }
-
-
-def _codes(texts: tuple[str, ...]) -> list[str]:
-    return [code for text in texts for code in split_commas(text)]
 
 
 def read_file(file: Path, options: ReadingOptions) -> "RatingsFile":
@@ -62,20 +21,8 @@ def read_file(file: Path, options: ReadingOptions) -> "RatingsFile":
     from masrel.ratings import read_ratings
 
     arguments = asdict(options)
-    names = {"auto": None, "tab": "\t", "\\t": "\t", "space": " ", "blanks": " "}
-    delimiter = names.get(options.delimiter, options.delimiter)
-    if delimiter is not None and len(delimiter) != 1:
-        raise ParameterError(
-            f"--delimiter: needed auto, one letter, tab or blanks, got {delimiter!r}"
-        )
-    if len(options.decimal) != 1 or options.decimal in "+-0123456789eE":
-        raise ParameterError(
-            f"--decimal: needed one letter such as a comma, got {options.decimal!r}"
-        )
-    arguments |= {
-        "delimiter": delimiter,
-        "missing_codes": _codes(options.missing_codes),
-    }
+    codes = map(split_commas, options.missing_codes)
+    arguments["missing_codes"] = [code for listed in codes for code in listed]
     with progress("reading", "MB", is_quiet=False) as shown:
         n_shown = 0
 

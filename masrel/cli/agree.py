@@ -34,13 +34,13 @@ from masrel.cli._options import (
 )
 from masrel.cli._paths import InputFile
 from masrel.cli._reading import (
-    ReadingOptions,
     read_file,
     reading_options,
     table_options,
     what_was_read,
 )
 from masrel.errors import MasrelWarning, ParameterError, RatingsError
+from masrel.ratings._findings import ReadingOptions
 
 if TYPE_CHECKING:
     from masrel.agreement import Coefficient
@@ -275,7 +275,6 @@ class _FileAgreement:
     def notes(self) -> tuple[str, ...]:
         """Return what may have been read wrongly, and what is left out of it."""
         from masrel.agreement import COEFFICIENTS
-        from masrel.ratings._grade_texts import MEASUREMENTS
 
         # of measurements it is warned unless all coefficients weigh how far they lie
         # from each other
@@ -288,7 +287,7 @@ class _FileAgreement:
         notes = [
             f"warning: {text}"
             for text in self.ratings.warnings
-            if is_warned or MEASUREMENTS not in text
+            if is_warned or text.code != "measurements"
         ]
         if self.options.takes_all and not self.ratings.is_ordered:
             notes.append(

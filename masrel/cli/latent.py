@@ -15,12 +15,12 @@ from masrel.cli._options import (
 from masrel.cli._paths import InputFile
 from masrel.cli._progress import duration_words, progress
 from masrel.cli._reading import (
-    ReadingOptions,
     read_file,
     reading_options,
     what_was_read,
 )
 from masrel.errors import ParameterError, RatingsError
+from masrel.ratings._findings import ReadingOptions
 
 if TYPE_CHECKING:
     from masrel.intervals import LatentTrait

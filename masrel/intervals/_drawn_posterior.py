@@ -94,10 +94,11 @@ def nothing_to_learn(problem: IntervalProblem) -> str | None:
     if problem.coded.n_categories < 2:
         return "one category is declared"
     # distances, which stand for the matrix of many categories, are all numbers
-    if not isinstance(problem.v, Distances) and np.isnan(problem.v).any():
-        return "the scale has no such weights"
-    if not problem.v.any():
-        return "the weights count nothing as disagreement"
+    if not isinstance(problem.v, Distances):
+        if np.isnan(problem.v).any():
+            return "the scale has no such weights"
+        if not problem.v.any():
+            return "the weights count nothing as disagreement"
     if problem.entry.metric == "ordinal":
         return "the ordinal metric depends on the ratings"
     if problem.coded.n_categories > _MAX_CATEGORIES:

@@ -4,14 +4,17 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from masrel.ratings._parts import RatingsPart, Repeated
+    from masrel.ratings._findings import Finding, Repeated
+    from masrel.ratings._parts import RatingsPart
     from masrel.ratings.reader import RatingsFile, read_ratings
 
-__all__ = ["RatingsFile", "RatingsPart", "Repeated", "read_ratings"]
+__all__ = ["Finding", "RatingsFile", "RatingsPart", "Repeated", "read_ratings"]
+
+_HOMES = {"Finding": "_findings", "Repeated": "_findings", "RatingsPart": "_parts"}
 
 
 def __getattr__(name: str) -> object:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    home = "reader" if name in ("RatingsFile", "read_ratings") else "_parts"
-    return getattr(importlib.import_module(f"masrel.ratings.{home}"), name)
+    home = f"masrel.ratings.{_HOMES.get(name, 'reader')}"
+    return getattr(importlib.import_module(home), name)

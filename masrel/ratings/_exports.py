@@ -1,27 +1,319 @@
-"""Exports of annotation tools as long tables, one row a rating.
+"""Files of other programs as sheets: workbooks, Parquet, JSON, SPSS, annotation tools.
 
-Each tool has a function from its records to `_Ratings`: who gave which item which
-category. Only categories of whole documents are read; several of them at once, spans
-and relations are refused.
+An annotation tool has a function from its records to `_Ratings`: who gave which item
+which category. Only categories of whole documents are read; several of them at once,
+spans and relations are refused.
 """
 
+import csv
+import io
+import json
+import re
+import sys
+import tempfile
+import zipfile
+import zlib
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from masrel.errors import ParameterError, RatingsError
+from masrel.ratings._findings import ReadingOptions, library, refusal
+from masrel.ratings._sheet import MAX_UNPACKED, Column, Sheet, value_text
+
+_WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
+_ARROW = {".parquet": "pyarrow.parquet", ".feather": "pyarrow.feather"}
+_PYREADSTAT = {
+    ".sav": "read_sav",
+    ".zsav": "read_sav",
+    ".por": "read_por",
+    ".dta": "read_dta",
+    ".sas7bdat": "read_sas7bdat",
+    ".xpt": "read_xport",
+}
+
+_MAX_WORKBOOK = MAX_UNPACKED // 4  # bytes of XML: its cells take several times the room
+_OLD_WORKBOOK = b"\xd0\xcf\x11\xe0"  # how an .xls begins, in which archives may lie
+# a cell of type error: its formula, if any, and its value
+_ERROR_CELL = re.compile(
+    rb'<c\s[^>]*?\bt="e"[^>]*>(?:<f[^>]*?(?:/>|>[^<]*</f>))?<v>([^<]*)</v>'
+)
+_OF_ZIP = (zipfile.BadZipFile, zlib.error, EOFError)  # what reading it may raise
+_EXPORTED = (".json", ".jsonl", ".csv")
+_ENCODED = (".sav", ".zsav", ".dta", ".sas7bdat", ".xpt")  # pyreadstat takes theirs
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Export:
-    """The ratings of an export, and what was read of it."""
+# ---- files whose cells have types ----
 
-    frame: pd.DataFrame  # columns item, rater, the grade, and text where it has any
-    facts: dict[str, Any]
-    dropped: dict[str, int]  # why annotations are left out, and how many
+
+def read_typed(
+    name: str,
+    sha256: Callable[[], str],
+    suffix: str,
+    data: bytes,
+    options: ReadingOptions,
+) -> Sheet:
+    """Read a file whose cells have types, or the export of an annotation tool."""
+    facts: dict[str, Any] = {"format": suffix.removeprefix(".")}
+    if options.encoding is not None and suffix not in _ENCODED:
+        raise ParameterError(
+            f"--encoding: needed a file of text, got {facts['format']}, whose is known"
+        )
+    if options.sheet is not None and suffix not in _WORKBOOKS:
+        raise ParameterError(f"--sheet: needed a workbook, got {facts['format']}")
+    first, header = 0, None
+    dropped: dict[str, int] = {}
+    if options.source is not None:
+        files = _json_files(name, suffix, data)
+        frame, facts, dropped = _export(name, options.source, files, options.grade)
+    elif suffix in _WORKBOOKS:
+        header, frame, first = _workbook(name, suffix, data, options.sheet, facts)
+    elif suffix in _ARROW:
+        frame = _arrow(name, suffix, data)
+    elif suffix in _PYREADSTAT:
+        frame = _statistical(name, suffix, data, options.encoding, facts)
+    else:
+        frame = _objects(name, _json_values(name, suffix, data))
+    names = [str(column) for column in frame.columns] if header is None else header
+    return Sheet(
+        name=name,
+        sha256=sha256,
+        header=tuple(names),
+        columns=tuple(
+            _column(name, names[place], frame.iloc[:, place])
+            for place in range(len(names))
+        ),
+        facts=facts,
+        dropped=dropped,
+        line_of=lambda number: f"row {first + number + 1}",
+    )
+
+
+def _column(name: str, title: str, values: "pd.Series[Any]") -> Column:
+    # the cells of a column as text, empty where a value is missing
+    if values.dtype == object:
+        kinds = set(map(type, values))
+        nested = {list, dict, set, np.ndarray} & kinds
+        if nested:
+            where, kind = f"column {title!r}: ", nested.pop().__name__
+            raise refusal(name, "nested cell", where=where, kind=kind)
+        if {bool, np.bool_} & kinds and len(kinds) > 1:
+            # True equals 1 in Python, and is another grade
+            pairs = zip(values, values.isna(), strict=True)
+            return Column.of_cells("" if lost else value_text(v) for v, lost in pairs)
+    codes, known = pd.factorize(values, use_na_sentinel=True)
+    # numpy's floats know their precision
+    each: Any = known.to_numpy() if known.dtype.kind == "f" else known
+    texts = [*map(value_text, each), ""]  # missing values are the last
+    return Column.of(np.where(codes < 0, len(each), codes), texts).rows(slice(None))
+
+
+def _read(
+    name: str, suffix: str, read: Callable[[], Any], *errors: type[Exception]
+) -> Any:
+    # Readers of these formats raise what they like for bytes that are not theirs.
+    kinds: tuple[type[Exception], ...] = (ValueError, TypeError, KeyError, *errors)
+    kinds += (OSError, RuntimeError)
+    try:
+        return read()
+    except kinds as error:
+        lines = str(error).strip().splitlines() or [type(error).__name__]
+        line = lines[0][:200].rstrip(". ")
+        raise refusal(name, "damaged", suffix=suffix, error=line) from error
+
+
+def _check_unpacked(name: str, suffix: str, data: bytes, most: int, do: str) -> None:
+    def size() -> int:
+        n = 0
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            for member in archive.infolist():
+                # read to its end: where that is said to be may be a lie
+                member.file_size = sys.maxsize
+                with archive.open(member) as packed:
+                    while n <= most and (block := packed.read(1 << 20)):
+                        n += len(block)
+        return n
+
+    if _read(name, suffix, size, *_OF_ZIP) > most:
+        raise refusal(name, "unpacked", most=most, it="", do=do)
+
+
+def _workbook(
+    name: str, suffix: str, data: bytes, chosen: str | None, facts: dict[str, Any]
+) -> tuple[list[str], pd.DataFrame, int]:
+    # -> names, the cells below them, and how many blank rows are above
+    calamine = library(name, "python_calamine")
+    if zipfile.is_zipfile(io.BytesIO(data)) and not data.startswith(_OLD_WORKBOOK):
+        do = "save its sheet as CSV, since a large table of text is read piece by piece"
+        _check_unpacked(name, suffix, data, _MAX_WORKBOOK, do)
+
+    def sheets() -> dict[str, Any]:
+        book = calamine.CalamineWorkbook.from_filelike(io.BytesIO(data))
+        names = list(map(str, book.sheet_names))
+        meant = [n for n in names if chosen in (None, n)]
+        return dict.fromkeys(names) | {n: book.get_sheet_by_name(n) for n in meant}
+
+    stored = _read(name, suffix, sheets, calamine.CalamineError)
+    if chosen is not None and chosen not in stored:
+        raise refusal(name, "no sheet", sheet=chosen, sheets=", ".join(stored))
+    meant = {n: cells for n, cells in stored.items() if cells is not None}
+    filled = {n: cells for n, cells in meant.items() if cells.start is not None}
+    if len(filled) > 1:
+        raise refusal(name, "sheets", sheets=", ".join(filled))
+    if not filled:
+        raise refusal(name, "no cells", sheet=", ".join(meant))
+    ((facts["sheet"], cells),) = filled.items()
+    frame = pd.DataFrame(cells.to_python(skip_empty_area=True), dtype=object)
+    # a column without name and cells is a space between others
+    frame = frame.loc[:, (frame != "").any(axis=0)]
+    if errors := _read(name, suffix, lambda: _error_cells(suffix, data), *_OF_ZIP):
+        facts["errors"] = errors
+    return [value_text(cell) for cell in frame.iloc[0]], frame[1:], cells.start[0]
+
+
+def _error_cells(suffix: str, data: bytes) -> dict[str, int]:
+    # errors of formulas in any sheet, such as #N/A, which calamine gives as empty
+    if suffix not in (".xlsx", ".xlsm"):
+        return {}
+    errors: Counter[str] = Counter()
+    with zipfile.ZipFile(io.BytesIO(data)) as packed:
+        for member in packed.namelist():
+            if member.startswith("xl/worksheets/") and member.endswith(".xml"):
+                texts = _ERROR_CELL.findall(packed.read(member))
+                errors.update(text.decode("utf-8", "replace") for text in texts)
+    return dict(errors)
+
+
+def _arrow(name: str, suffix: str, data: bytes) -> pd.DataFrame:
+    module = library(name, _ARROW[suffix])
+
+    def read() -> pd.DataFrame:
+        # whole numbers beside missing ones stay whole, however many digits they have
+        table = module.read_table(io.BytesIO(data))
+        frame: pd.DataFrame = table.to_pandas(integer_object_nulls=True)
+        return frame
+
+    frame: pd.DataFrame = _read(name, suffix, read)
+    if isinstance(frame.index, pd.RangeIndex) and frame.index.name is None:
+        return frame
+    names = [str(name or "") for name in frame.index.names]  # of rows, as items have
+    return pd.DataFrame(frame.reset_index(names=names, allow_duplicates=True))
+
+
+def _statistical(
+    name: str, suffix: str, data: bytes, encoding: str | None, facts: dict[str, Any]
+) -> pd.DataFrame:
+    # with what its codes are called, column by column, as a fact
+    pyreadstat = library(name, "pyreadstat")
+    text = {} if encoding is None else {"encoding": encoding}
+    if suffix == ".xpt" and len(data) % 80:
+        raise refusal(name, "xpt")
+    with tempfile.TemporaryDirectory() as folder:  # it reads no bytes, but files
+        file = Path(folder) / f"data{suffix}"
+        file.write_bytes(data)
+        frame, about = _read(
+            name,
+            suffix,
+            lambda: getattr(pyreadstat, _PYREADSTAT[suffix])(str(file), **text),
+            pyreadstat.ReadstatError,
+            pyreadstat.PyreadstatError,
+        )
+    labels = {
+        str(column): {value_text(code): str(label) for code, label in codes.items()}
+        for column, codes in about.variable_value_labels.items()
+    }
+    if labels:
+        facts["labels"] = labels
+    return pd.DataFrame(frame)
+
+
+# ---- JSON ----
+
+
+def _json_files(name: str, suffix: str, data: bytes) -> list[tuple[str, list[Any]]]:
+    # an export's files, each by its name without the ending, "" where it is one alone
+    if not data.startswith(b"PK\3\4"):  # a pipe has no name that says .zip
+        return [("", _json_values(name, suffix, data))]
+    _check_unpacked(name, suffix, data, MAX_UNPACKED, "unpack it and leave files out")
+    files = []
+    with zipfile.ZipFile(io.BytesIO(data)) as packed:
+        for path in map(Path, packed.namelist()):
+            kind = path.suffix.lower()
+            # a Mac adds a folder to every archive
+            if kind in _EXPORTED and path.parts[0] != "__MACOSX":
+                content = packed.read(path.as_posix())
+                where = f"{name}: {path.as_posix()}"
+                files.append((path.stem, _json_values(where, kind, content)))
+    if not files:
+        raise refusal(name, "no export", suffixes=", ".join(_EXPORTED))
+    return files
+
+
+def _json_values(name: str, suffix: str, data: bytes) -> list[Any]:
+    # values of JSON, of JSON lines whatever the name ends with, or rows of a CSV file
+    try:
+        text = data.decode("utf-8-sig")
+        if suffix == ".csv":
+            return list(csv.DictReader(io.StringIO(text, newline="")))
+    except UnicodeDecodeError as error:
+        raise refusal(name, "no utf-8", error=error) from error
+    except csv.Error as error:
+        raise refusal(name, "no table", error=error) from error
+    if suffix != ".jsonl":
+        try:
+            values = _parsed(name, text)
+            return values if isinstance(values, list) else [values]
+        except json.JSONDecodeError as error:
+            if not error.msg.startswith("Extra data"):
+                facts = {"line": error.lineno, "error": error.msg}
+                raise refusal(name, "no JSON", **facts) from error
+    values = []
+    for number, line in enumerate(text.split("\n"), start=1):
+        try:
+            if line.strip():
+                values.append(_parsed(f"{name}: line {number}", line))
+        except json.JSONDecodeError as error:
+            raise refusal(name, "no JSON", line=number, error=error.msg) from error
+    return values
+
+
+def _parsed(name: str, text: str) -> Any:
+    def pairs(items: list[tuple[str, Any]]) -> dict[str, Any]:
+        value = dict(items)
+        if len(value) < len(items):  # the json module would keep the last in silence
+            keys = [key for key, _ in items]
+            double = next(key for key in keys if keys.count(key) > 1)
+            raise refusal(name, "same key", key=double)
+        return value
+
+    return json.loads(text, object_pairs_hook=pairs)
+
+
+def _objects(name: str, values: list[Any]) -> pd.DataFrame:
+    # a list of objects, one a row; or one object of columns, as pandas and R write
+    if len(values) == 1 and isinstance(values[0], dict):
+        columns = list(values[0].values())
+        if all(isinstance(c, dict) and c.keys() == columns[0].keys() for c in columns):
+            return pd.DataFrame(values[0], dtype=object).reset_index(drop=True)
+        if all(isinstance(c, list) and len(c) == len(columns[0]) for c in columns):
+            return pd.DataFrame(values[0], dtype=object)
+    if not values or not all(isinstance(value, dict) for value in values):
+        raise refusal(name, "no objects")
+    for number, value in enumerate(values, start=1):
+        for key, cell in value.items():
+            if isinstance(cell, dict | list):
+                raise refusal(name, "nested", number=number, key=key)
+    return pd.DataFrame(values, dtype=object)
+
+
+# ---- annotation tools ----
+
+_Records = list[tuple[str, dict[str, Any]]]  # name of the file, or "", and a record
 
 
 @dataclass(slots=True)
@@ -75,10 +367,11 @@ class _Ratings:
         return self.chosen
 
 
-def read_export(
+def _export(
     name: str, source: str, files: list[tuple[str, list[Any]]], grade: str | None
-) -> Export:
-    """Read the export of a tool: the values of its files, each by the file's name."""
+) -> tuple[pd.DataFrame, dict[str, Any], dict[str, int]]:
+    # columns item, rater, the grade, and text where it has any; its facts, and why
+    # annotations are left out
     if source not in _TOOLS:
         raise ParameterError(f"--from: needed {', '.join(_TOOLS)}, got {source!r}")
     ratings = _Ratings(name, grade)
@@ -94,21 +387,14 @@ def read_export(
         ) from error
     if not ratings.rows:
         raise ratings.error(f"needed ratings of {of}, got none")
-    frame = pd.DataFrame(
-        ratings.rows, columns=["item", "rater", "grade", "text"], dtype=object
-    )
-    if frame["text"].isna().all() or grade == "text":
-        frame = frame.drop(columns="text")
+    names = ["item", "rater", grade or "grade", "text"]
     if grade in ("item", "rater"):
         raise ratings.error(f"--grade: a field cannot be called {grade!r} here")
-    return Export(
-        frame=frame.rename(columns={"grade": grade or "grade"}),
-        facts={"format": f"{source} export", "field": of},
-        dropped=dict(ratings.dropped),
-    )
+    frame = pd.DataFrame(ratings.rows, columns=names, dtype=object)
+    if frame.iloc[:, 3].isna().all() or grade == "text":
+        frame = frame.iloc[:, :3]
+    return frame, {"format": f"{source} export", "field": of}, dict(ratings.dropped)
 
-
-_Records = list[tuple[str, dict[str, Any]]]  # name of the file, or "", and a record
 
 # Label Studio's results that are categories of a whole task, and the key of the value.
 _CATEGORIES = {

@@ -1,4 +1,4 @@
-"""What a cell of a foreign table means: which grade it is, or that there is none.
+"""Which grade a text is, or that there is none.
 
 Every text that occurs is looked at once. Two texts are one grade only where that cannot
 be wrong, and each time it is noted; whatever else looks alike is warned of.
@@ -6,23 +6,25 @@ be wrong, and each time it is noted; whatever else looks alike is warned of.
 
 import math
 import re
-import shlex
 import unicodedata
-from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from decimal import Decimal
 from functools import cache
-from itertools import count, pairwise
+from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from masrel.errors import ParameterError, RatingsError
+from masrel.ratings._findings import (
+    USUAL_MISSING,
+    Finding,
+    ReadingOptions,
+    listed,
+    quoted,
+)
+from masrel.ratings._sheet import Codes, Sheet, plain
 from masrel.scales import MODIFIED_ASHWORTH, Scale
-
-USUAL_MISSING = ("", "NA")
-"""Cells that stand for a missing grade unless the scale has them."""
 
 # Whole numbers that programs write for "missing", where they lie far from the others.
 _CODES = frozenset(
@@ -33,29 +35,20 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,5})?", re.ASCII)
 _NUMBER_BEGINS = frozenset("+-.0123456789")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+", re.ASCII)
 _HALF_GRADE = re.compile(r"\d+([+-]+|[A-Za-z])")  # 1+, 4-, 2a: numbers, more or less
-_UNPLAIN = re.compile(r"[^\x21-\x7e]")  # blanks, and letters that may have two forms
 _INVISIBLE = re.compile("[\u200b-\u200f\u2060\ufeff\u00ad]")
 _NEEDS_CARE = re.compile(r"[\s'\"`=,.:;!]")
 # Dashes, and Cyrillic and Greek letters that look like Latin ones.
 _LOOK_ALIKE = str.maketrans(
     "‐‑‒–—―−‘’“”авекмнорстухіαικνορτυχ", "-------''\"\"abekmhopctyxiaikvoptux"
 )
-_SHOWN = 6  # texts that a message lists
-_LONGEST = 60  # letters of a text that it shows
+_LOOKS_MISSING = (
+    "n/a na nan -nan null none nil nat n.a n/d n.d n.r <na> <null> (null) (blank) "
+    "(empty) #n/a #na #null! #value! #div/0! #ref! #name? #num! 1.#qnan 1.#ind -1.#ind "
+    "\\n . - -- --- ? ?? missing blank undefined unrated notrated norating notassessed "
+    "notapplicable notavailable"
+)
 _SCALE = 10  # widest span of grades of a scale, rather than of measurements
 _MANY_GRADES = 15  # of the longest usual scale: Borg's, from 6 to 20
-
-MEASUREMENTS = "look like measurements"
-"""What a warning says that concerns only coefficients of equal grades."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GradeOptions:
-    """What a caller says of the grades."""
-
-    categories: tuple[str, ...] | None = None  # every grade of the scale in order
-    missing_codes: tuple[str, ...] = ()  # codes of missing grades beside the usual ones
-    decimal: str = "."
 
 
 @dataclass(slots=True, kw_only=True)
@@ -63,10 +56,10 @@ class Grades:
     """The texts of a table's cells as grades."""
 
     scale: Scale
-    codes: NDArray[np.int64]  # (n_texts,): place in the scale, -1 where missing
+    codes: Codes  # (n_texts,): place in the scale, -1 where missing
     merged: dict[str, list[str]] = field(default_factory=dict)  # grade to its spellings
     n_missing: dict[str, int] = field(default_factory=dict)  # code to number of cells
-    warnings: list[str] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
 
     @property
     def is_ordered(self) -> bool:
@@ -74,37 +67,19 @@ class Grades:
         return self.scale.name != "observed" or all(map(is_number, self.scale.grades))
 
 
-def coded_texts(cells: NDArray[np.object_]) -> tuple[NDArray[np.int64], list[str]]:
-    """Return the texts of cells and where each occurs; blanks around them go."""
-    # (n,) -> (n,) places in the texts
-    listed = cells.tolist()
-    number: dict[str, int] = defaultdict(count().__next__)  # a new one is the next
-    codes = np.arange(len(listed))
-    if _are_different(listed):
-        uniques = listed
-    else:
-        codes = np.fromiter(map(number.__getitem__, listed), np.int64, len(listed))
-        uniques = list(number)
-    if not _UNPLAIN.search("".join(uniques)):
-        return codes, uniques
-    texts = [_plain(text) for text in uniques]
-    place: dict[str, int] = {}
-    places = [place.setdefault(text, len(place)) for text in texts]
-    if len(place) < len(texts):
-        codes = np.array(places, dtype=np.int64)[codes]
-    return codes, list(place)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Met:
+    """Texts that are grades, and where they are."""
 
+    sheet: Sheet
+    freq: dict[str, int]  # text to how many cells have it
+    number: dict[str, str | None]  # text to the number it is, as Python writes it
+    where: Callable[[str], str]
 
-def _are_different(texts: Sequence[str]) -> bool:
-    # a few tell of nearly all columns that texts are there twice
-    few = texts[:1000]
-    return len(set(few)) == len(few) and len(set(texts)) == len(texts)
-
-
-def _plain(text: str) -> str:
-    # One letter may be written in two ways that are the same by Unicode's own rule.
-    text = text.strip()
-    return text if text.isascii() else unicodedata.normalize("NFC", text).strip()
+    def refuse(self, code: str, texts: Sequence[str], **facts: str) -> RatingsError:
+        """Return the error of some texts, where the first of them stands."""
+        at = self.where(texts[0])
+        return self.sheet.refuse(code, at, None, got=listed(texts), **facts)
 
 
 def is_number(text: str) -> bool:
@@ -113,54 +88,59 @@ def is_number(text: str) -> bool:
 
 
 def read_grades(
+    sheet: Sheet,
     texts: Sequence[str],
-    freq: NDArray[np.int64],
-    options: GradeOptions,
+    freq: Codes,
+    options: ReadingOptions,
     where: Callable[[int], str],
 ) -> Grades:
     """Decide which grade each text is; `where` says where a text first stands."""
     # freq (n_texts,): how many cells have each
-    options = _checked(options)
-    declared = options.categories or ()
-    absent = set(_missing_codes(texts, options))
-    as_number = {text: _decimal_point(text, options.decimal) for text in texts}
-    places = [i for i, text in enumerate(texts) if text not in absent and freq[i]]
-    grades = Grades(
-        scale=MODIFIED_ASHWORTH, codes=np.full(len(texts), -1, dtype=np.int64)
+    declared, codes = _declared(options)
+    # codes of missing grades; numbers among those that are named by their value
+    absent = {code for code in USUAL_MISSING if code not in declared} | set(codes)
+    values = {Decimal(code) for code in codes if is_number(code)}
+    if values:
+        absent |= {t for t in texts if is_number(t) and Decimal(t) in values}
+    counted = [(t, n) for t, n in zip(texts, freq.tolist(), strict=True) if n]
+    place = {text: k for k, text in enumerate(texts)}
+    pointed, mark = dict(zip(texts, texts, strict=True)), options.decimal
+    if mark != ".":
+        pointed = {t: "" if "." in t else t.replace(mark, ".") for t in texts}
+    met = _Met(
+        sheet=sheet,
+        freq={text: n for text, n in counted if text not in absent},
+        number={text: p if is_number(p) else None for text, p in pointed.items()},
+        where=lambda text: where(place[text]),
     )
-    for text, n in zip(texts, freq.tolist(), strict=True):
-        if text in absent and n:
-            grades.n_missing[text] = int(n)
-    met = {texts[i]: int(freq[i]) for i in places}
-    if not met:
-        raise RatingsError("needed at least one grade, got none")
-    first = {texts[i]: i for i in places}
-
-    def stands(text: str) -> str:
-        return where(first[text])
-
+    if not met.freq:
+        raise sheet.refuse("no grades")
+    findings: list[Finding] = []
     if declared:
-        grades.scale = Scale(name="declared", grades=declared)
-        grade_of = _declared_grades(met, declared, as_number, stands)
+        scale = Scale(name="declared", grades=declared)
+        grade_of = _declared_grades(met, declared)
     else:
-        _refuse_doubtful(met, options, stands)
-        grade_of = _observed_grades(met, as_number, stands)
-        grades.scale = _observed_scale(list(dict.fromkeys(grade_of.values())))
-        grades.warnings += _doubts_of_grades(met, grade_of, as_number, stands)
-    place = {grade: code for code, grade in enumerate(grades.scale.grades)}
+        _refuse_doubtful(met, options)
+        grade_of = _observed_grades(met)
+        scale = _observed_scale(list(dict.fromkeys(grade_of.values())))
+        findings = _doubts(met, grade_of)
+    code = {grade: k for k, grade in enumerate(scale.grades)}
     spellings: dict[str, list[str]] = {}
-    for i in places:
-        grade = grade_of[texts[i]]
-        grades.codes[i] = place[grade]
-        spellings.setdefault(grade, []).append(texts[i])
-    grades.merged = {g: s for g, s in spellings.items() if len(s) > 1 or s != [g]}
-    return grades
+    for text, grade in grade_of.items():
+        spellings.setdefault(grade, []).append(text)
+    return Grades(
+        scale=scale,
+        codes=np.array([code.get(grade_of.get(t, ""), -1) for t in texts], np.int64),
+        merged={g: s for g, s in spellings.items() if len(s) > 1 or s != [g]},
+        n_missing={text: n for text, n in counted if text in absent},
+        findings=findings,
+    )
 
 
-def _checked(options: GradeOptions) -> GradeOptions:
-    # categories and codes as cells are: without blanks around them, by one Unicode form
-    declared = tuple(map(_plain, options.categories or ()))
-    codes = tuple(map(_plain, options.missing_codes))
+def _declared(options: ReadingOptions) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    # categories and codes of missing grades as cells are
+    declared = tuple(map(plain, options.categories or ()))
+    codes = tuple(map(plain, options.missing_codes))
     again = [grade for grade in dict.fromkeys(declared) if declared.count(grade) > 1]
     if again or "" in declared:
         what = f"repeated: {again}" if again else "got none between two commas"
@@ -171,99 +151,41 @@ def _checked(options: GradeOptions) -> GradeOptions:
             raise ParameterError(
                 f"--categories, --missing: {code!r} is a grade or missing, not both"
             )
-    return replace(options, categories=declared or None, missing_codes=codes)
+    return declared, codes
 
 
-def _missing_codes(texts: Sequence[str], options: GradeOptions) -> list[str]:
-    # texts that stand for a missing grade; numbers among the codes by their value
-    declared = options.categories or ()
-    codes = {c for c in USUAL_MISSING if c not in declared} | set(options.missing_codes)
-    numbers = {Decimal(code) for code in options.missing_codes if is_number(code)}
-    return [
-        text
-        for text in texts
-        if text in codes or (numbers and is_number(text) and Decimal(text) in numbers)
-    ]
-
-
-def _decimal_point(text: str, decimal: str) -> str | None:
-    # the number as Python writes it, or None
-    if decimal != ".":
-        text = text.replace(decimal, ".") if "." not in text else ""
-    return text if is_number(text) else None
-
-
-def _shown(texts: Sequence[str]) -> str:
-    shown = ", ".join(repr(text[:_LONGEST]) for text in texts[:_SHOWN])
-    n_more = len(texts) - _SHOWN
-    return shown + (f" and {n_more} more" if n_more > 0 else "")
-
-
-def _declared_grades(
-    met: Mapping[str, int],
-    declared: Sequence[str],
-    as_number: Mapping[str, str | None],
-    stands: Callable[[str], str],
-) -> dict[str, str]:
+def _declared_grades(met: _Met, declared: Sequence[str]) -> dict[str, str]:
     # text to the category it is: the same text, else the same number
     is_numeric = all(map(is_number, declared))
     numbers = {Decimal(c): c for c in declared} if is_numeric else {}
     if len(numbers) < len(declared):  # 1 and 1.0 are two grades: 01 is neither
         numbers = {}
     grade_of: dict[str, str] = {}
-    wrong: list[str] = []
-    for text in met:
-        number = as_number[text]
-        turned = f"{text[1:]}+"  # clinicians write +1 for 1+
-        if text in declared:
-            grade_of[text] = text
-        elif text.startswith("+") and turned in declared:
-            grade_of[text] = turned
-        elif number is not None and Decimal(number) in numbers:
-            grade_of[text] = numbers[Decimal(number)]
-        else:
-            wrong.append(text)
+    for text in met.freq:
+        number = Decimal(met.number[text] or "nan")
+        turned = f"{text[1:]}+" * text.startswith("+")  # clinicians write +1 for 1+
+        meant = [grade for grade in (text, turned) if grade in declared]
+        if meant or number in numbers:
+            grade_of[text] = [*meant, numbers.get(number, "")][0]
+    wrong = [text for text in met.freq if text not in grade_of]
     if wrong:
-        likely = [t for t in wrong if _looks_missing(t)]
+        likely = list(filter(_looks_missing, wrong))
         hint = f"; --missing {quoted(likely)} if it is missing" if likely else ""
-        raise RatingsError(
-            f"{stands(wrong[0])}: needed one of {', '.join(declared)}, got "
-            f"{_shown(wrong)}{hint}"
-        )
+        raise met.refuse("other grade", wrong, scale=", ".join(declared), hint=hint)
     return grade_of
 
 
-def _refuse_doubtful(
-    met: Mapping[str, int], options: GradeOptions, stands: Callable[[str], str]
-) -> None:
-    likely = [text for text in met if _looks_missing(text)]
+def _refuse_doubtful(met: _Met, options: ReadingOptions) -> None:
+    likely = list(filter(_looks_missing, met.freq))
     if likely:
-        raise RatingsError(
-            f"{stands(likely[0])}: {_shown(likely)} looks like a missing grade: "
-            f"--missing {quoted(likely)} counts it as one, --categories with it in the "
-            "scale as a grade"
-        )
-    broken = [text for text in met if "\n" in text or "\r" in text]
+        raise met.refuse("looks missing", likely, codes=quoted(likely))
+    broken = [text for text in met.freq if "\n" in text or "\r" in text]
     if broken:
-        raise RatingsError(
-            f"{stands(broken[0])}: needed a grade on one line, got "
-            f"{_shown(broken[:1])}: a quote may be opened and not closed"
-        )
-    commas = [text for text in met if _DECIMAL_COMMA.fullmatch(text)]
-    rest = [t for t in met if t not in commas and not is_number(t)]
+        raise met.refuse("broken", broken[:1])
+    commas = [text for text in met.freq if _DECIMAL_COMMA.fullmatch(text)]
+    rest = [t for t in met.freq if t not in commas and not is_number(t)]
     if commas and not rest and options.decimal == ".":
-        raise RatingsError(
-            f"{stands(commas[0])}: {_shown(commas)} looks like a number with a decimal "
-            "comma: --decimal , reads it so, --categories makes it text"
-        )
-
-
-_LOOKS_MISSING = (
-    "n/a na nan -nan null none nil nat n.a n/d n.d n.r <na> <null> (null) (blank) "
-    "(empty) #n/a #na #null! #value! #div/0! #ref! #name? #num! 1.#qnan 1.#ind -1.#ind "
-    "\\n . - -- --- ? ?? missing blank undefined unrated notrated norating notassessed "
-    "notapplicable notavailable"
-)
+        raise met.refuse("decimal comma", commas)
 
 
 @cache
@@ -276,36 +198,20 @@ def _looks_missing(text: str) -> bool:
     return normal_form(text) in _missing_forms()
 
 
-def quoted(names: Sequence[str]) -> str:
-    """Return a list as an option takes it on a command line."""
-    return shlex.quote(",".join(names))
-
-
-def _observed_grades(
-    met: Mapping[str, int],
-    as_number: Mapping[str, str | None],
-    stands: Callable[[str], str],
-) -> dict[str, str]:
+def _observed_grades(met: _Met) -> dict[str, str]:
     # text to grade where nobody declared a scale
-    plus = [t for t in met if t.startswith("+") and as_number[t] is not None]
-    others = [t for t in met if t[0].isdigit() and _positive(as_number[t])]
-    others += [t for t in met if f"+{t[:-1]}" in plus and t.endswith("+")]
+    number = {text: met.number[text] for text in met.freq}
+    plus = [t for t, value in number.items() if t.startswith("+") and value is not None]
+    others = [t for t, value in number.items() if t[0].isdigit() and float(value or 0)]
+    others += [t for t in number if f"+{t[:-1]}" in plus and t.endswith("+")]
     if plus and others:
-        raise RatingsError(
-            f"{stands(plus[0])}: {_shown(plus)} beside grades such as "
-            f"{others[0]!r} may be that number or the grade '{plus[0][1:]}+': "
-            "--categories with the scale in order tells"
-        )
-    if any(as_number[text] is None for text in met):
-        return {text: text for text in met}
+        raise met.refuse("plus", plus, other=others[0], grade=f"{plus[0][1:]}+")
+    if None in number.values():
+        return {text: text for text in number}
     shortest: dict[Decimal, str] = {}
-    for text in sorted(met, key=lambda t: (len(t), t)):
-        shortest.setdefault(Decimal(str(as_number[text])), str(as_number[text]))
-    return {text: shortest[Decimal(str(as_number[text]))] for text in met}
-
-
-def _positive(number: str | None) -> bool:
-    return number is not None and float(number) > 0
+    for text in sorted(number, key=lambda t: (len(t), t)):
+        shortest.setdefault(Decimal(str(number[text])), str(number[text]))
+    return {text: shortest[Decimal(str(number[text]))] for text in number}
 
 
 def _observed_scale(grades: Sequence[str]) -> Scale:
@@ -317,33 +223,39 @@ def _observed_scale(grades: Sequence[str]) -> Scale:
     return Scale(name="observed", grades=tuple(sorted(grades)))
 
 
+# ---- what looks alike, or wrong ----
+
+
 def normal_form(text: str) -> str:
     """Return what texts have in common that a reader takes for the same."""
-    plain = text.casefold()
-    if plain.isalnum() and plain.isascii():  # as most names of items are
-        if plain.isdigit():
-            return plain.lstrip("0") or "0"
-        if not plain[0].isdigit():
-            return plain
-    if not plain.isascii():
-        plain = _INVISIBLE.sub("", unicodedata.normalize("NFKC", plain))
-        plain = plain.casefold().translate(_LOOK_ALIKE)
-        plain = "".join(str(unicodedata.decimal(c, c)) for c in plain)
-    if _NEEDS_CARE.search(plain):
-        plain = "".join(plain.split()).strip("'\"`=")
-        if _DECIMAL_COMMA.fullmatch(plain):
-            plain = plain.replace(",", ".")
-        plain = plain.rstrip(".,:;!") or plain[:1]
-    if plain[:1] in _NUMBER_BEGINS and is_number(plain):
-        return f"{Decimal(plain).normalize():f}"
-    return plain
+    form = text.casefold()
+    if form.isalnum() and form.isascii():  # as most names of items are
+        if form.isdigit():
+            return form.lstrip("0") or "0"
+        if not form[0].isdigit():
+            return form
+    if not form.isascii():
+        form = _INVISIBLE.sub("", unicodedata.normalize("NFKC", form))
+        form = form.casefold().translate(_LOOK_ALIKE)
+        form = "".join(str(unicodedata.decimal(c, c)) for c in form)
+    if _NEEDS_CARE.search(form):
+        form = "".join(form.split()).strip("'\"`=")
+        if _DECIMAL_COMMA.fullmatch(form):
+            form = form.replace(",", ".")
+        form = form.rstrip(".,:;!") or form[:1]
+    if form[:1] in _NUMBER_BEGINS and is_number(form):
+        return f"{Decimal(form).normalize():f}"
+    return form
 
 
-def alike_texts(texts: Sequence[str]) -> list[list[str]]:
+def spelled_alike(texts: Sequence[str]) -> list[list[str]]:
     """Return the texts, all different, that differ by spelling alone, together."""
-    if _differ_plainly(texts):
-        return []
-    forms = list(map(normal_form, texts))
+    joined = "".join(texts)
+    is_plain = joined.isascii() and joined.isalnum()
+    if is_plain and (joined.isdigit() or not any(text[0].isdigit() for text in texts)):
+        forms = [text.lower().lstrip("0") for text in texts]  # as names of items are
+    else:
+        forms = list(map(normal_form, texts))
     if len(set(forms)) == len(forms):
         return []
     groups: dict[str, list[str]] = {}
@@ -352,121 +264,61 @@ def alike_texts(texts: Sequence[str]) -> list[list[str]]:
     return [group for group in groups.values() if len(group) > 1]
 
 
-def _differ_plainly(texts: Sequence[str]) -> bool:
-    # whether all are numbers without a zero in front, or names of letters and digits
-    # that differ in small letters, too, as most names of items are
-    joined = "".join(texts)
-    if not (joined.isascii() and joined.isalnum()):
-        return False
-    lines = "\n".join(["", *texts, ""]).lower()
-    if joined.isdecimal():
-        is_short = lines.count("\n0") == lines.count("\n0\n")
-        return is_short or len(set(map(len, texts))) == 1
-    if re.search(r"\n\d", lines):
-        return False
-    return len(set(lines.split("\n"))) == len(texts) + 1
-
-
-def _doubts_of_grades(
-    met: Mapping[str, int],
-    grade_of: Mapping[str, str],
-    as_number: Mapping[str, str | None],
-    stands: Callable[[str], str],
-) -> list[str]:
+def _doubts(met: _Met, grade_of: dict[str, str]) -> list[Finding]:
     # what looks wrong in a scale that nobody declared
     freq: dict[str, int] = {}
-    for text, n in met.items():
+    for text, n in met.freq.items():
         freq[grade_of[text]] = freq.get(grade_of[text], 0) + n
-    warnings = [
-        "grades that differ by spelling alone are counted as different: "
-        + ", ".join(f"{text!r} ({freq[text]} times)" for text in group)
-        for group in alike_texts(list(freq))
-    ]
-    numbers = [text for text in met if as_number[text] is not None]
-    others = [text for text in met if as_number[text] is None]
-    if not others:
-        warnings += _same_floats(list(freq)) + _measurements(freq)
-    if all(map(_HALF_GRADE.fullmatch, others)):
-        return warnings + _far_codes([g for g in freq if is_number(g)], freq)
-    return warnings + _stray(numbers, others, met, stands)
-
-
-def _same_floats(grades: Sequence[str]) -> list[str]:
-    # numbers that differ beyond the digits of a float
-    by_value: dict[float, str] = {}
-    for grade in grades:
-        other = by_value.setdefault(float(grade), grade)
-        if other != grade:
-            return [
-                f"{other} and {grade} are too near to be told apart as numbers, so "
-                "that grades weigh by their place in the scale"
-            ]
-    return []
-
-
-def _measurements(freq: Mapping[str, int]) -> list[str]:
-    # more numbers than a scale has grades, most of which hardly ever come again
+    findings = []
+    for group in spelled_alike(list(freq)):
+        grades = ", ".join(f"{text!r} ({freq[text]} times)" for text in group)
+        findings.append(Finding("alike grades", grades=grades))
+    numbers = [text for text in met.freq if met.number[text] is not None]
+    others = [text for text in met.freq if met.number[text] is None]
     n_ratings = sum(freq.values())
-    if len(freq) <= _MANY_GRADES or 2 * len(freq) <= n_ratings:
-        return []
-    return [
-        f"{len(freq)} different numbers in {n_ratings} ratings {MEASUREMENTS}: "
-        "percent agreement and unweighted kappas count only those that are equal; "
-        "--coefficients icc_a1 or --metric interval weigh how far they lie from each "
-        "other"
-    ]
+    if not others:
+        # numbers that differ beyond the digits of a float
+        by_value: dict[float, str] = {}
+        for grade in freq:
+            other = by_value.setdefault(float(grade), grade)
+            if other != grade:
+                findings.append(Finding("too near", one=other, other=grade))
+                break
+        # more numbers than a scale has grades, most of which hardly ever come again
+        if len(freq) > _MANY_GRADES and 2 * len(freq) > n_ratings:
+            findings.append(Finding("measurements", n=len(freq), n_ratings=n_ratings))
+    if all(map(_HALF_GRADE.fullmatch, others)):
+        return findings + _far_codes([g for g in freq if is_number(g)], freq)
+    # texts among numbers, or numbers among texts, whichever are fewer
+    code, strays = "number", numbers
+    if sum(map(met.freq.__getitem__, others)) <= n_ratings / 2:
+        forms = set(map(normal_form, numbers))  # those are named already
+        halves = {text for text in others if _HALF_GRADE.fullmatch(text)}
+        strays = [t for t in others if t not in halves and normal_form(t) not in forms]
+        code = "no number"
+    if strays:
+        where = met.where(strays[0])
+        facts = {"got": listed(strays), "where": where, "codes": quoted(strays)}
+        findings.append(Finding(code, **facts))
+    return findings
 
 
-def _far_codes(grades: Sequence[str], freq: Mapping[str, int]) -> list[str]:
+def _far_codes(grades: Sequence[str], freq: dict[str, int]) -> list[Finding]:
     # numbers such as 99 and -9 that lie far from all others, at either end
-    warnings = []
+    findings = []
     for is_top in (False, True):
         order = sorted(grades, key=Decimal, reverse=is_top)
         values = [abs(float(grade) - float(order[-1])) for grade in order]
-        codes = 0
-        while codes < len(order) - 1 and _is_code(order[codes]):
-            codes += 1
-        for n_far in range(1, codes + 1):
+        for n_far, grade in enumerate(order[:-1], start=1):
+            if not (float(grade).is_integer() and int(float(grade)) in _CODES):
+                break
             gap, rest = values[n_far - 1] - values[n_far], values[n_far:]
             step = max((a - b for a, b in pairwise(rest)), default=0)
-            is_odd = not is_top and float(order[n_far - 1]) < 0 <= float(order[n_far])
+            is_odd = not is_top and float(grade) < 0 <= float(order[n_far])
             is_off_scale = rest[0] <= _SCALE and gap > max(2 * step, 2)
             if is_odd or is_off_scale or gap >= rest[0] + 1:
                 far = sorted(order[:n_far], key=Decimal)
                 named = ", ".join(f"{g} ({freq[g]} times)" for g in far)
-                warnings.append(
-                    f"{named}: far from the other grades; if missing ones are meant, "
-                    f"--missing {quoted(far)}"
-                )
+                findings.append(Finding("far", grades=named, codes=quoted(far)))
                 break
-    return warnings
-
-
-def _is_code(grade: str) -> bool:
-    value = float(grade)
-    return value.is_integer() and int(value) in _CODES
-
-
-def _stray(
-    numbers: Sequence[str],
-    others: Sequence[str],
-    met: Mapping[str, int],
-    stands: Callable[[str], str],
-) -> list[str]:
-    # texts among numbers, or numbers among texts, whichever are fewer
-    n_numbers, n_others = (sum(map(met.__getitem__, t)) for t in (numbers, others))
-    if n_others <= n_numbers:
-        forms = set(map(normal_form, numbers))  # those are named already
-        strays = [
-            text
-            for text in others
-            if not _HALF_GRADE.fullmatch(text) and normal_form(text) not in forms
-        ]
-        what, so = "no number", ", so that all grades are text"
-    else:
-        strays = list(numbers)
-        what, so = "a number among grades that are text", ""
-    return strays and [
-        f"{what}: {_shown(strays)} ({stands(strays[0])}){so}; if that is missing, "
-        f"--missing {quoted(strays)}"
-    ]
+    return findings

@@ -1,11 +1,25 @@
 """Which column of a sheet is what: named by the caller, else by its usual name."""
 
+import re
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from masrel.errors import ParameterError, RatingsError
-from masrel.ratings._text_cells import Sheet
+from masrel.ratings._findings import (
+    USUAL_MISSING,
+    Finding,
+    ReadingOptions,
+    listed,
+    quoted,
+)
+from masrel.ratings._grade_texts import is_number, normal_form, spelled_alike
+from masrel.ratings._sheet import Codes, Sheet
+from masrel.scales import Scale
 
 Kind = Literal["long", "wide", "counts", "table"]
 
@@ -26,23 +40,31 @@ USUAL_NAMES = {
 STUDY_COLUMNS = ("session", "rater", "model", "repeat", "grade")
 """Columns of a table that `masrel ratings` writes; it has others, too."""
 
+_ROLES = ("rater", "grade", "session", "by", "clusters")
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LayoutOptions:
-    """What a caller says of the columns; None and () are for the file to tell."""
-
-    # a name each; several for an item that several columns name together
-    item: tuple[str, ...] = ()
-    rater: str | None = None
-    grade: str | None = None
-    session: str | None = None
-    by: str | None = None
-    clusters: str | None = None
-    raters: tuple[str, ...] = ()  # the raters of a wide table
-    ignore: tuple[str, ...] = ()  # columns that are left aside
-    no_item: bool = False  # whether every column is a rater, or a category
-    counts: bool = False  # whether it is a table of items by categories
-    table: bool = False  # whether it is a contingency table of two raters
+# Names of columns that are seldom those of raters.
+_NO_RATER = re.compile(
+    r"(age|sex|gender|comments?|notes?|remarks?|mean|average|avg|median|sd|total|sum|"
+    r"id|index|date|day|time|timestamp|duration|lead_time|gold|truth|ground_truth|"
+    r"reference|consensus|majority|adjudicated|weight|height|bmi|group|site|cent(er|re)|"
+    r"diagnosis|side|text|email|n|count|unnamed: \d+)",
+    re.IGNORECASE,
+)
+# Names of columns that name items: a word of these, in any case.
+_ITEM_NAME = re.compile(
+    r"|#|(.*[^a-z])?(id|no|nr|num|key|code|name|participants?|[a-z]*(item|subject|patient|"
+    r"person|case|row|index|unit|record|target|stimulus|image|document|sample|file|model|"
+    r"video|task|label)(s|id|no|nr|name|code)?)([^a-z].*)?",
+    re.IGNORECASE,
+)
+# Names of rows that summarize the others.
+_SUMMARY = re.compile(
+    r"(grand )?(total|sum|mean|average|avg|median|sd|s\.d\.|std|min|max|n|count|all)s?"
+    r"|[Σσ]|kappa|agreement",
+    re.IGNORECASE,
+)
+_MAX_COMPARED = 2000  # columns that are compared with all others
+_SHOWN = 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,143 +74,131 @@ class Layout:
     kind: Kind
     item: tuple[int, ...]  # none where rows are items without names
     raters: tuple[int, ...] = ()  # of a wide table; categories of a table of counts
-    # rater, grade: of a long table
-    rater: int | None = None
-    grade: int | None = None
+    rater: int = -1  # of a long table, as the grade
+    grade: int = -1
     session: int | None = None
     by: int | None = None
     clusters: int | None = None
     # whether the item is the first column because nothing else was said of it
     is_item_guessed: bool = False
 
+    @property
+    def used(self) -> set[int | None]:
+        """The columns that are something."""
+        named = {self.rater, self.grade, self.session, self.by, self.clusters}
+        return {*self.item, *self.raters, *named}
 
-def find_layout(sheet: Sheet, options: LayoutOptions) -> Layout:
+
+def find_layout(sheet: Sheet, options: ReadingOptions) -> Layout:
     """Decide which column is what, or say which option would."""
     options = _resolved(sheet, options)
-    layout = _columns_of(sheet, options)
-    if options.clusters is None:
-        return layout
-    return replace(layout, clusters=sheet.header.index(options.clusters))
-
-
-def _columns_of(sheet: Sheet, options: LayoutOptions) -> Layout:
-    # every column but that of the clusters
-    header = sheet.header
-    position = {name: place for place, name in enumerate(header)}
-    taken = {position[name] for name in options.ignore}
-    by = None if options.by is None else position[options.by]
+    place = {name: k for k, name in enumerate(sheet.header)}
+    taken = {place[name] for name in options.ignore}
+    by = None if options.by is None else place[options.by]
     session = _role(sheet, "session", options.session, taken)
-    taken |= {place for place in (by, session) if place is not None}
-    if options.clusters is not None and options.clusters not in options.item:
-        taken.add(position[options.clusters])
+    clusters = None if options.clusters is None else place[options.clusters]
+    taken |= {k for k in (by, session) if k is not None}
+    if clusters is not None and options.clusters not in options.item:
+        taken.add(clusters)
     if options.counts or options.table:
-        kind: Kind = "counts" if options.counts else "table"
-        return _wide(sheet, kind, options, taken, session=None, by=by)
-    is_wide = bool(options.raters) or options.no_item
+        layout = _wide(sheet, "counts" if options.counts else "table", options, taken)
+        return replace(layout, by=by)
     # the corner of a transposed table names its rows, which are now its columns
+    is_wide = bool(options.raters) or options.no_item
     is_wide |= sheet.is_transposed and not (options.rater or options.grade)
-    if not is_wide:
-        columns = _long(sheet, options, taken)
-        if columns is not None:
-            item, rater, grade = columns
-            return Layout(
-                kind="long",
-                item=item,
-                rater=rater,
-                grade=grade,
-                session=session,
-                by=by,
-            )
-    return _wide(sheet, "wide", options, taken, session=session, by=by)
+    long = None if is_wide else _long(sheet, options, taken)
+    layout = long or _wide(sheet, "wide", options, taken)
+    return replace(layout, session=session, by=by, clusters=clusters)
 
 
-def resolve_names(option: str, values: Sequence[str], sheet: Sheet) -> tuple[str, ...]:
-    """Return the columns that an option names, between commas or one a value."""
-    names: list[str] = []
-    for value in values:
-        parts = value.split(",")
-        while parts:
-            # the longest name first: names of columns may hold commas
-            for n in range(len(parts), 0, -1):
-                name = ",".join(parts[:n]).strip()
-                if name in sheet.header:
-                    break
-            else:
-                raise unknown_column(sheet, option, parts[0].strip())
-            names.append(name)
-            parts = parts[n:]
-    return tuple(names)
-
-
-def unknown_column(sheet: Sheet, option: str, name: str) -> RatingsError:
-    """Return the error of a column that is not there."""
-    from difflib import get_close_matches  # loaded only for an error
-
-    near = get_close_matches(name, sheet.header, n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
-    return sheet.error(f"{option}: there is no column {name!r}, {_listed(sheet)}{hint}")
-
-
-def _listed(sheet: Sheet) -> str:
-    shown = ", ".join(repr(name) for name in sheet.header[:12])
-    n_more = len(sheet.header) - 12
-    return f"but {shown}" + (f" and {n_more} more" if n_more > 0 else "")
-
-
-def _resolved(sheet: Sheet, options: LayoutOptions) -> LayoutOptions:
+def _resolved(sheet: Sheet, options: ReadingOptions) -> ReadingOptions:
     # the options with every name checked
-    if options.counts and options.table:
-        raise ParameterError("--counts, --table: needed one of them, got both")
-    if options.session and (options.counts or options.table):
-        raise ParameterError(
-            "--session: counts do not say who rated what; --by tells groups apart"
-        )
-    if options.clusters and (options.counts or options.table):
-        raise ParameterError(
-            "--clusters: counts do not say which item is which, so needs ratings"
-        )
-    if options.raters and (options.rater or options.grade):
-        raise ParameterError(
+    is_counted = options.counts or options.table
+    is_long = bool(options.rater or options.grade)
+    for is_wrong, text in (
+        (
+            options.counts and options.table,
+            "--counts, --table: needed one of them, got both",
+        ),
+        (
+            options.session and is_counted,
+            "--session: counts do not say who rated what; --by tells groups apart",
+        ),
+        (
+            options.clusters and is_counted,
+            "--clusters: counts do not say which item is which, so needs ratings",
+        ),
+        (
+            options.raters and is_long,
             "--raters names the columns of a wide table, --rater and --grade those of "
-            "a long one: needed one kind, got both"
-        )
-    if options.no_item and options.item:
-        raise ParameterError("--item, --no-item: needed one of them, got both")
-    for role in ("rater", "grade", "session", "by", "clusters"):
+            "a long one: needed one kind, got both",
+        ),
+        (
+            options.no_item and options.item,
+            "--item, --no-item: needed one of them, got both",
+        ),
+    ):
+        if is_wrong:
+            raise ParameterError(text)
+    for role in _ROLES:
         name: str | None = getattr(options, role)
         if name is not None and name not in sheet.header:
-            raise unknown_column(sheet, f"--{role}", name)
+            raise _no_column(sheet, f"--{role}", name)
     options = replace(
         options,
-        item=resolve_names("--item", options.item, sheet),
-        raters=resolve_names("--raters", options.raters, sheet),
-        ignore=resolve_names("--ignore", options.ignore, sheet),
+        item=_names(sheet, "--item", options.item),
+        raters=_names(sheet, "--raters", options.raters),
+        ignore=_names(sheet, "--ignore", options.ignore),
     )
     _refuse_two_roles(sheet, options)
     return options
 
 
-def _refuse_two_roles(sheet: Sheet, options: LayoutOptions) -> None:
-    # a column that is named twice; groups may be sessions, or part of the items' names,
-    # as clusters may be
-    named = [(name, "--raters") for name in options.raters]
-    named += [(name, "--ignore") for name in options.ignore]
-    named += [(name, "--item") for name in options.item]
-    for role in ("rater", "grade", "session", "by", "clusters"):
-        name: str | None = getattr(options, role)
-        if name is not None:
-            named.append((name, f"--{role}"))
+def _names(sheet: Sheet, option: str, values: Sequence[str]) -> tuple[str, ...]:
+    # the columns that an option names, between commas or one a value
+    names: list[str] = []
+    for value in values:
+        parts = value.split(",")
+        while parts:
+            # the longest name first: names of columns may hold commas
+            joined = [",".join(parts[:n]).strip() for n in range(len(parts), 0, -1)]
+            name = next((name for name in joined if name in sheet.header), None)
+            if name is None:
+                raise _no_column(sheet, option, joined[-1])
+            names.append(name)
+            parts = parts[len(parts) - joined.index(name) :]
+    return tuple(names)
+
+
+def _no_column(sheet: Sheet, option: str, name: str) -> RatingsError:
+    from difflib import get_close_matches  # loaded only for an error
+
+    near = get_close_matches(name, sheet.header, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    columns = f"but {listed(sheet.header, 12)}"
+    return sheet.refuse(
+        "no column", option=option, column=name, columns=columns, hint=hint
+    )
+
+
+def _refuse_two_roles(sheet: Sheet, options: ReadingOptions) -> None:
+    # groups may be sessions, or part of the items' names, as clusters may be
+    roles: dict[str, list[str]] = defaultdict(list)
+    for option in ("raters", "ignore", "item"):
+        for name in getattr(options, option):
+            roles[name].append(f"--{option}")
+    for role in _ROLES:
+        if getattr(options, role) is not None:
+            roles[getattr(options, role)].append(f"--{role}")
     allowed = {"--item", "--session", "--by", "--rater"}
-    first: dict[str, str] = {}
-    for name, option in named:
-        other = first.setdefault(name, option)
-        if (name, option) == (name, other) and named.count((name, option)) == 1:
-            continue
-        both_are = {option, other}
-        is_cluster = both_are in ({"--clusters", "--item"}, {"--clusters", "--by"})
-        if not (is_cluster or ("--by" in both_are and both_are <= allowed)):
-            both = option if other == option else f"{other}, {option}"
-            raise sheet.error(f"{both}: needed each column once, got {name!r} twice")
+    for name, (first, *others) in roles.items():
+        for other in others:
+            both = {first, other}
+            is_part = both in ({"--clusters", "--item"}, {"--clusters", "--by"})
+            is_part |= "--by" in both and both <= allowed and first != other
+            if not is_part:
+                named = ", ".join(dict.fromkeys([first, other]))
+                raise sheet.refuse("two roles", options=named, column=name)
 
 
 def _role(sheet: Sheet, role: str, name: str | None, taken: set[int]) -> int | None:
@@ -196,112 +206,287 @@ def _role(sheet: Sheet, role: str, name: str | None, taken: set[int]) -> int | N
     if name is not None:
         return sheet.header.index(name)
     usual = USUAL_NAMES[role]
-    places = [
-        place
-        for place, column in enumerate(sheet.header)
-        if column.casefold() in usual and place not in taken
-    ]
+    named = (k for k, n in enumerate(sheet.header) if n.casefold() in usual)
+    places = [place for place in named if place not in taken]
     if len(places) > 1:
         names = " and ".join(sheet.header[place] for place in places)
-        raise sheet.error(
-            f"{sheet.line_of(0)}: needed one column for the {role}, got {names}: "
-            f"--{role} chooses one, --ignore leaves a column aside"
-        )
+        raise sheet.refuse("role twice", where=sheet.line_of(0), role=role, names=names)
     return places[0] if places else None
 
 
-def _long(
-    sheet: Sheet, options: LayoutOptions, taken: set[int]
-) -> tuple[tuple[int, ...], int, int] | None:
-    # item, rater and grade, or None where the table is not long
+def _long(sheet: Sheet, options: ReadingOptions, taken: set[int]) -> Layout | None:
+    # None where the table is not long
     header = sheet.header
-    item = tuple(header.index(name) for name in options.item)
+    item = tuple(map(header.index, options.item))
     named = {header.index(n) for n in (options.rater, options.grade) if n is not None}
     taken = taken | named | {*item}
-    rater = _places(_role(sheet, "rater", options.rater, taken))
-    grade = _places(_role(sheet, "grade", options.grade, taken))
-    if not rater and not grade:
+    roles: dict[str, tuple[int, ...]] = {"item": item}
+    for role in ("rater", "grade"):
+        place = _role(sheet, role, getattr(options, role), taken)
+        roles[role] = () if place is None else (place,)
+    if not roles["rater"] and not roles["grade"]:
         return None
-    taken = taken | {*rater, *grade}
-    roles = {
-        "item": item or _usual_item(sheet, taken),
-        "rater": rater,
-        "grade": grade,
-    }
+    taken = taken | {*roles["rater"], *roles["grade"]}
+    if not item and set(STUDY_COLUMNS) <= set(header):
+        roles["item"] = header.index("model"), header.index("repeat")
+    elif not item:
+        place = _role(sheet, "item", None, taken)
+        roles["item"] = () if place is None else (place,)
+    left = [k for k in range(len(header)) if k not in taken | {*roles["item"]}]
     unknown = [role for role, places in roles.items() if not places]
-    taken = taken | {*roles["item"]}
-    left = [place for place in range(len(header)) if place not in taken]
     if len(unknown) == len(left) == 1:
         roles[unknown.pop()] = (left[0],)
     if unknown:
-        raise _unknown_roles(sheet, roles)
+        known = (f"the {r} is {header[p[0]]!r}" for r, p in roles.items() if p)
+        raise sheet.refuse(
+            "unknown role",
+            where=sheet.line_of(0),
+            known=", ".join(known),
+            needed=" and ".join(f"--{role}" for role in unknown),
+            columns=f"but {listed(header, 12)}",
+        )
     every = [place for places in roles.values() for place in places]
     if len({*every}) < len(every):
-        raise sheet.error(
-            "needed different columns for item, rater and grade, got "
-            + ", ".join(header[place] for place in every)
-        )
-    return roles["item"], roles["rater"][0], roles["grade"][0]
+        names = ", ".join(header[place] for place in every)
+        raise sheet.refuse("same column", names=names)
+    rater, grade = roles["rater"][0], roles["grade"][0]
+    return Layout(kind="long", item=roles["item"], rater=rater, grade=grade)
 
 
-def _places(place: int | None) -> tuple[int, ...]:
-    return () if place is None else (place,)
-
-
-def _usual_item(sheet: Sheet, taken: set[int]) -> tuple[int, ...]:
-    # the columns of the items where nobody named them
-    if set(STUDY_COLUMNS) <= set(sheet.header):
-        return sheet.header.index("model"), sheet.header.index("repeat")
-    return _places(_role(sheet, "item", None, taken))
-
-
-def _unknown_roles(sheet: Sheet, roles: dict[str, tuple[int, ...]]) -> RatingsError:
-    # the error of a long table some columns of which are not known
-    known = ", ".join(
-        f"the {role} is {sheet.header[places[0]]!r}"
-        for role, places in roles.items()
-        if places
-    )
-    needed = " and ".join(f"--{role}" for role, places in roles.items() if not places)
-    return sheet.error(
-        f"{sheet.line_of(0)}: looks like one row a rating ({known}): needs "
-        f"{needed}, {_listed(sheet)}; if its columns are raters, --raters "
-        "names them, if they are items, --transpose"
-    )
-
-
-def _wide(
-    sheet: Sheet,
-    kind: Kind,
-    options: LayoutOptions,
-    taken: set[int],
-    *,
-    session: int | None,
-    by: int | None,
-) -> Layout:
+def _wide(sheet: Sheet, kind: Kind, options: ReadingOptions, taken: set[int]) -> Layout:
     header = sheet.header
-    raters = tuple(header.index(name) for name in options.raters)
-    item = tuple(header.index(name) for name in options.item)
-    is_guessed = False
+    raters = tuple(map(header.index, options.raters))
+    item, is_guessed = tuple(map(header.index, options.item)), False
     if not item and not options.no_item:
-        place = (
-            None if kind == "table" else _role(sheet, "item", None, {*taken, *raters})
+        others = {*taken, *raters}
+        place = None if kind == "table" else _role(sheet, "item", None, others)
+        free = [k for k in range(len(header)) if k not in others]
+        is_guessed = place is None and bool(free)
+        item = tuple(free[:1]) if place is None else (place,)
+    used = taken | {*item}
+    raters = raters or tuple(k for k in range(len(header)) if k not in used)
+    if not raters:
+        what = "a rater" if kind == "wide" else "a category"
+        raise sheet.refuse("no rater", where=sheet.line_of(0), what=what)
+    return Layout(kind=kind, item=item, raters=raters, is_item_guessed=is_guessed)
+
+
+# ---- what looks as if it were something else ----
+
+
+def without_second_header(sheet: Sheet) -> tuple[Sheet, list[Finding]]:
+    """Leave Qualtrics' lines of questions and import ids out, and say so."""
+    for row in range(min(2, len(sheet.numbers))):
+        cells = [column.texts[column.codes[row]] for column in sheet.columns]
+        if all('"ImportId"' in cell for cell in cells if cell):
+            finding = Finding("qualtrics", first=sheet.where(0), last=sheet.where(row))
+            above = np.arange(len(sheet.numbers)) <= row
+            return sheet.without(above, "second header"), [finding]
+    return sheet, []
+
+
+def doubt_columns(
+    sheet: Sheet, layout: Layout, codes: Codes, scale: Scale, freq: Codes | None = None
+) -> list[Finding]:
+    """Refuse or warn of columns of a wide table that are no raters."""
+    # codes (n_items, n_raters): places in the scale, -1 where missing; freq: how often
+    # each row is there, if not once
+    names = [sheet.header[place] for place in layout.raters]
+    if len(layout.item) == 1 and len(names) == len(sheet.numbers) > 1:
+        if set(sheet.columns[layout.item[0]].texts) == set(names):
+            raise sheet.refuse("contingency")
+    findings = _first_line(sheet, layout, names, scale)
+    findings += _first_column(sheet, layout, scale)
+    odd = _unlike(codes, scale) if len(names) <= _MAX_COMPARED else set()
+    named = {k for k, name in enumerate(names) if _NO_RATER.fullmatch(name)}
+    if odd & named and len(names) > 1:
+        doubtful = odd | named if len(odd) < len(names) else odd & named
+        wrong = [names[k] for k in sorted(doubtful)]
+        columns = ", ".join(map(repr, wrong))
+        raise sheet.refuse("no raters", columns=columns, names=quoted(wrong))
+    for k in sorted(named):
+        findings.append(
+            Finding("named rater", column=names[k], name=quoted([names[k]]))
         )
-        free = [p for p in range(len(header)) if p not in taken and p not in raters]
-        if place is None and free:
-            place, is_guessed = free[0], True
-        item = () if place is None else (place,)
-    if not raters:
-        used = taken | set(item)
-        raters = tuple(p for p in range(len(header)) if p not in used)
-    if not raters:
-        what = {"wide": "a rater", "counts": "a category", "table": "a category"}[kind]
-        raise sheet.error(f"{sheet.line_of(0)}: needed a column for {what}, got none")
-    return Layout(
-        kind=kind,
-        item=item,
-        raters=raters,
-        session=session,
-        by=by,
-        is_item_guessed=is_guessed,
+    alone = [names[k] for k in sorted(odd - named)][:_SHOWN]
+    if alone and len(names) > 1:
+        findings.append(Finding("apart", columns=listed(alone), names=quoted(alone)))
+    findings += _looks_counted(names, codes, scale, freq)
+    return findings + _second_header(sheet, codes, scale)
+
+
+def _first_line(
+    sheet: Sheet, layout: Layout, names: Sequence[str], scale: Scale
+) -> list[Finding]:
+    # names that are grades, and more names than rows
+    if not sheet.has_header or sheet.is_transposed:
+        return []
+    grades = set(map(normal_form, scale.grades))
+    are_numbers = all(map(is_number, scale.grades))
+    n_grades = sum(
+        normal_form(name) in grades
+        or name in USUAL_MISSING
+        or (are_numbers and is_number(name))
+        for name in names
     )
+    findings = []
+    items = [(sheet.header[p], sheet.columns[p].texts[0]) for p in layout.item]
+    # P1 above P2; a name that is no item's above its names
+    is_numbered = any(
+        re.sub(r"\d+", "0", name) == re.sub(r"\d+", "0", cell) for name, cell in items
+    )
+    is_named = items and all(_ITEM_NAME.fullmatch(name) for name, _ in items)
+    if is_numbered or (n_grades >= len(names) / 2 and not is_named):
+        columns = ", ".join(map(repr, names[:_SHOWN]))
+        findings.append(Finding("grades as names", columns=columns))
+    n_items = len(sheet.numbers)
+    if layout.is_item_guessed and len(names) > 2 * n_items:
+        findings.append(Finding("many raters", n=len(names), n_items=n_items))
+    return findings
+
+
+def _first_column(sheet: Sheet, layout: Layout, scale: Scale) -> list[Finding]:
+    # The first column is the item because nothing else was: it may be a rater.
+    if not layout.is_item_guessed:
+        return []
+    place = layout.item[0]
+    name, texts = sheet.header[place], sheet.columns[place].texts
+    numbers = {float(grade) for grade in scale.grades if is_number(grade)}
+    low, high = min(numbers, default=0.0), max(numbers, default=0.0) + 1
+    values = [float(text) for text in texts if is_number(text)]
+    n_near = sum(low <= value <= high for value in values)
+    n_in_scale = sum(value in numbers for value in values)
+    n_in_scale += sum(not is_number(t) and t in scale.grades for t in texts)
+    facts: dict[str, Any] = {"column": name, "name": quoted([name])}
+    if len(texts) < len(sheet.numbers):
+        if n_in_scale == len(texts):
+            raise sheet.refuse("first column", where=sheet.line_of(0), **facts)
+        return []  # refused as repeated
+    if max(n_in_scale, n_near) < len(texts) / 2 or _ITEM_NAME.fullmatch(name):
+        return []
+    return [Finding("item or rater", **facts)]
+
+
+def _unlike(codes: Codes, scale: Scale) -> set[int]:
+    # columns without a grade, or a value, in common with any other
+    n_grades = len(scale.grades)
+    rated = [np.flatnonzero(_counts(column, n_grades)) for column in codes.T]
+    known = np.flatnonzero([len(grades) for grades in rated])
+    if len(known) < 2:
+        return set()
+    if all(map(is_number, scale.grades)):  # measurements seldom are the same twice
+        values = np.array(scale.values)
+        low, high = (values[[rated[k][end] for k in known]] for end in (0, -1))
+        n_like = ((low[:, None] <= high) & (low <= high[:, None])).sum(axis=1)
+        return set(known[n_like == 1].tolist())  # each is like itself
+    n_columns = np.bincount(np.concatenate(rated), minlength=n_grades)
+    return {int(k) for k in known if (n_columns[rated[k]] == 1).all()}
+
+
+def _counts(codes: Codes, n_grades: int) -> NDArray[np.int64]:
+    return np.bincount(codes + 1, minlength=n_grades + 1)[1:]
+
+
+def _looks_counted(
+    names: Sequence[str], codes: Codes, scale: Scale, freq: Codes | None
+) -> list[Finding]:
+    # Whole numbers whose sum is the same in every row, or in most and nowhere above
+    # what one of them is alone, as where all raters agree.
+    if not all(map(is_number, scale.grades)) or len(codes) < 2 or codes.shape[1] < 2:
+        return []
+    values = np.array([*scale.values, 0.0])  # a missing count, at -1, is 0
+    if (values < 0).any() or (values % 1 != 0).any():
+        return []
+    sums = values[codes].sum(axis=1)
+    total = sums.max()
+    has_zeros = 0 in scale.values or bool((codes < 0).any())
+    has_zeros |= all(map(is_number, names))  # as names of grades are
+    is_most = values.max() == total
+    is_most &= np.average(sums == total, weights=freq) >= 1 / 2
+    if total < 2 or not has_zeros or not ((sums == total).all() or is_most):
+        return []
+    rows = "every row sums" if sums.min() == total else "most rows sum"
+    return [Finding("counts", rows=rows, total=total)]
+
+
+def _second_header(sheet: Sheet, codes: Codes, scale: Scale) -> list[Finding]:
+    # a first row whose grades occur nowhere else, while those of the others do
+    if len(codes) < 4 or not sheet.has_header or (codes[0] < 0).all():
+        return []
+    if all(map(is_number, scale.grades)):
+        return []
+    rest = _counts(codes[1:].ravel(), len(scale.grades))
+    n_met = np.count_nonzero(rest) + bool((codes[1:] < 0).any())
+    is_known = (rest[codes[0][codes[0] >= 0]] > 0).any()
+    if is_known or n_met > codes[1:].size / 2:
+        return []
+    return [Finding("second header", where=sheet.where(0))]
+
+
+def doubt_long(
+    sheet: Sheet, layout: Layout, items: Codes, raters: Codes
+) -> list[Finding]:
+    """Warn of a long table whose items are numbers of rows, or of a second header."""
+    findings = []
+    if items.max(initial=0) + 1 == len(items) > 2:
+        findings.append(numbered(sheet, layout))
+    is_first_alone = len(items) > 4 and not (
+        (items[1:] == items[0]).any() or (raters[1:] == raters[0]).any()
+    )
+    if is_first_alone and sheet.has_header:
+        findings.append(Finding("second names", where=sheet.where(0)))
+    return findings
+
+
+def numbered(sheet: Sheet, layout: Layout) -> Finding:
+    """Return the warning of a long table none of whose items was rated twice."""
+    columns = ", ".join(repr(sheet.header[place]) for place in layout.item)
+    return Finding("numbered", columns=columns)
+
+
+def doubt_names(kind: str, names: Sequence[str]) -> list[Finding]:
+    """Warn of names that differ by spelling alone, and of what is seldom a name."""
+    findings = [
+        Finding("alike", kind=kind, names=", ".join(map(repr, group)))
+        for group in spelled_alike(names)[:_SHOWN]
+    ]
+    if kind == "items":
+        odd = [
+            name
+            for name in names
+            if name[:1] == "#"
+            or (len(name) < 14 and not name[-1].isdigit() and _SUMMARY.fullmatch(name))
+        ]
+        if 0 < len(odd) < len(names) / 2:
+            shown = ", ".join(map(repr, odd[:_SHOWN]))
+            findings.append(Finding("summary", names=shown))
+    return findings
+
+
+def doubt_counts(sheet: Sheet, layout: Layout, table: Codes) -> list[Finding]:
+    """Refuse or warn of a table of counts that has sums, or no column of items."""
+    # of a table (n_rows, n_categories)
+    names = [sheet.header[place] for place in layout.raters]
+    findings = []
+    if len(names) > 1 and (2 * table[:, -1] == table.sum(axis=1)).all():
+        facts: dict[str, Any] = {"column": names[-1], "name": quoted([names[-1]])}
+        if _SUMMARY.fullmatch(names[-1]):
+            raise sheet.refuse("sum column", **facts)
+        findings += [Finding("sum column", **facts)] * (len(names) > 2)
+    if len(table) > 2 and (2 * table[-1] == table.sum(axis=0)).all():
+        where = sheet.where(len(table) - 1)
+        items = [sheet.columns[place] for place in layout.item]
+        if items and _SUMMARY.fullmatch(items[-1].texts[items[-1].codes[-1]]):
+            raise sheet.refuse("sum row", where=where)
+        findings.append(Finding("sum row", where=where))
+    findings += doubt_names("categories", names)
+    if layout.kind == "table" or not layout.item:
+        return findings
+    name, column = sheet.header[layout.item[0]], sheet.columns[layout.item[0]]
+    are_counts = all(text.isdecimal() for text in column.texts)
+    if layout.is_item_guessed and are_counts and not _ITEM_NAME.fullmatch(name):
+        return [*findings, Finding("category or item", column=name)]
+    is_twice = len(column.texts) < len(column.codes) and layout.by is None
+    if len(layout.item) == 1 and is_twice:
+        findings.append(Finding("items twice", column=name))
+    return findings

@@ -100,7 +100,7 @@ def test_a_small_archive_of_large_columns(tmp_path: Path, masrel: Caller) -> Non
 def test_a_small_packed_table_that_is_large(
     tmp_path: Path, masrel: Caller, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("masrel.ratings._file_bytes.MAX_UNPACKED", 1000)
+    monkeypatch.setattr("masrel.ratings._sheet.MAX_UNPACKED", 1000)
     packed = tmp_path / "table.csv.gz"
     packed.write_bytes(gzip.compress(b"item,A,B\n" + b"1,1,1\n" * 1000))
     done = masrel("agree", packed, "--target", "items")

@@ -116,14 +116,6 @@ def test_columns_by_name(header: str, options: dict[str, str], tmp_path: Path) -
     assert grades_of(file) == TABLE
 
 
-def test_several_columns_name_an_item(tmp_path: Path) -> None:
-    text = "site,nr,Kim,Lee\nN,1,1,1\nN,2,2,2\nS,1,3,1\n"
-    for item in (["site", "nr"], ["site,nr"]):
-        file = read(tmp_path, text, item=item)
-        assert file.parts[0].items == ("N 1", "N 2", "S 1")
-        assert grades_of(file) == [["1", "1"], ["2", "2"], ["3", "1"]]
-
-
 def test_raters_or_what_is_ignored(tmp_path: Path) -> None:
     text = "patient,age,Kim,Lee,note\nA,61,1,1,x\nB,47,2,2,\nC,61,3,1,y\n"
     expected = [["1", "1"], ["2", "2"], ["3", "1"]]
@@ -135,36 +127,85 @@ def test_raters_or_what_is_ignored(tmp_path: Path) -> None:
         read(tmp_path, text)
 
 
-def test_names_may_hold_commas(tmp_path: Path) -> None:
-    text = 'patient,"Kim, A","Lee, B",Oh\nA,1,1,1\nB,2,2,1\n'
-    file = read(tmp_path, text, raters=["Kim, A,Lee, B"])
-    assert file.parts[0].raters == ("Kim, A", "Lee, B")
-    assert read(tmp_path, text, raters=["Lee, B", "Oh"]).read["raters"] == [
-        "Lee, B",
-        "Oh",
-    ]
+PAIRS = "1,1\n2,2\n3,1\n1,1\n"
+OF_PAIRS = [["1", "1"], ["2", "2"], ["3", "1"], ["1", "1"]]
+SITES = "site,nr,Kim,Lee\nN,1,1,1\nN,2,2,2\nS,1,3,1\n"
+COMMAS = 'patient,"Kim, A","Lee, B",Oh\nA,1,1,1\nB,2,2,1\n'
+CODES = "item,Kim,Lee\nA,1,9\nB,x,2\nC,2,2\nD,9.0,not rated\n"
+ZEROS = "item,Kim,Lee\nA,1,1.0\nB,01,2\n"
+PLUS = "item,Kim,Lee\nA,+1,1\nB,0,2\n"
+LETTERS = "item,Kim,Lee\nA,l\u00e9ger,le\u0301ger\nB,x,x\n"
+ASHWORTH = ["0", "1", "1+", "2", "3", "4"]
+READ: list[tuple[str, dict[str, Any], list[list[str | None]]]] = [
+    (SITES, {"item": ["site", "nr"]}, [["1", "1"], ["2", "2"], ["3", "1"]]),
+    (SITES, {"item": ["site,nr"]}, [["1", "1"], ["2", "2"], ["3", "1"]]),
+    (COMMAS, {"raters": ["Kim, A,Lee, B"]}, [["1", "1"], ["2", "2"]]),
+    (COMMAS, {"raters": ["Lee, B", "Oh"]}, [["1", "1"], ["2", "1"]]),
+    ("Kim,Lee\n" + PAIRS, {"no_item": True}, OF_PAIRS),
+    (PAIRS, {"no_item": True, "no_header": True}, OF_PAIRS),
+    (
+        "A,x,1\nA,y,2\n",
+        {"no_header": True, "item": "1", "rater": "2", "grade": "3"},
+        [["1", "2"]],
+    ),
+    (
+        "rater,A,B,C\nKim,1,2,3\nLee,1,2,\nAnn,2,NA,3\n",
+        {"transpose": True},
+        [["1", "1", "2"], ["2", "2", None], ["3", None, "3"]],
+    ),
+    (
+        CODES,
+        {"missing_codes": ["9", "x", "not rated"]},
+        [["1", None], [None, "2"], ["2", "2"], [None, None]],
+    ),
+    (
+        "item,Kim,Lee\nA,NA,NA\nB,b,\n",
+        {"categories": ["NA", "b"]},
+        [["NA", "NA"], ["b", None]],
+    ),
+    ("item,Kim,Lee\nA,1,1.0\nB,1+,2\n", {}, [["1", "1.0"], ["1+", "2"]]),
+    (ZEROS, {"categories": ["1.0", "2", "3"]}, [["1.0", "1.0"], ["1.0", "2"]]),
+    (ZEROS, {"categories": ["1", "1.0", "01", "2"]}, [["1", "1.0"], ["01", "2"]]),
+    (PLUS, {"categories": ASHWORTH}, [["1+", "1"], ["0", "2"]]),
+    (PLUS, {"categories": ["0", "1", "2"]}, [["1", "1"], ["0", "2"]]),
+    (LETTERS, {}, [["l\u00e9ger", "l\u00e9ger"], ["x", "x"]]),
+    (
+        LETTERS,
+        {"categories": ["le\u0301ger", "x"]},
+        [["l\u00e9ger", "l\u00e9ger"], ["x", "x"]],
+    ),
+]
 
 
-def test_no_item_and_no_header(tmp_path: Path) -> None:
-    rows = "1,1\n2,2\n3,1\n1,1\n"
-    expected = [["1", "1"], ["2", "2"], ["3", "1"], ["1", "1"]]
-    file = read(tmp_path, "Kim,Lee\n" + rows, no_item=True)
-    assert grades_of(file) == expected
-    assert file.parts[0].items == ("1", "2", "3", "4")
-    file = read(tmp_path, rows, no_item=True, no_header=True)
-    assert grades_of(file) == expected
-    assert file.parts[0].raters == ("1", "2")
-    file = read(
-        tmp_path, "A,x,1\nA,y,2\n", no_header=True, item="1", rater="2", grade="3"
-    )
-    assert file.parts[0].raters == ("x", "y")
+@pytest.mark.parametrize(("text", "options", "grades"), READ)
+def test_what_is_read(
+    tmp_path: Path,
+    text: str,
+    options: dict[str, Any],
+    grades: list[list[str | None]],
+) -> None:
+    assert grades_of(read(tmp_path, text, **options)) == grades
 
 
-def test_raters_as_rows(tmp_path: Path) -> None:
-    text = "rater,A,B,C\nKim,1,2,3\nLee,1,2,\nAnn,2,NA,3\n"
-    file = read(tmp_path, text, transpose=True)
-    assert grades_of(file) == TABLE
-    assert file.parts[0].items == ("A", "B", "C")
+@pytest.mark.parametrize(
+    ("text", "options", "words"),
+    [
+        (ZEROS, {"categories": ["1", "1.0", "2"]}, r"line 3, column 'Kim'.*'01'"),
+        (PLUS.replace("0", "1"), {}, r"'\+1'.*--categories"),
+        (PLUS.replace("2", "1+"), {}, r"'\+1'.*--categories"),
+    ],
+)
+def test_what_is_refused(
+    tmp_path: Path, text: str, options: dict[str, Any], words: str
+) -> None:
+    with pytest.raises(RatingsError, match=words):
+        read(tmp_path, text, **options)
+
+
+def test_codes_of_missing_grades_are_counted(tmp_path: Path) -> None:
+    file = read(tmp_path, CODES, missing_codes=["9", "x", "not rated"])
+    assert file.read["missing"] == {"9": 1, "x": 1, "9.0": 1, "not rated": 1}
+    assert file.read["n_missing"] == 4
 
 
 def test_counts(tmp_path: Path) -> None:
@@ -216,41 +257,11 @@ def test_a_contingency_table(tmp_path: Path) -> None:
 # ---- missing grades, numbers, scales ----
 
 
-def test_codes_of_missing_grades(tmp_path: Path) -> None:
-    text = "item,Kim,Lee\nA,1,9\nB,x,2\nC,2,2\nD,9.0,not rated\n"
-    file = read(tmp_path, text, missing_codes=["9", "x", "not rated"])
-    assert grades_of(file) == [["1", None], [None, "2"], ["2", "2"], [None, None]]
-    assert file.read["missing"] == {"9": 1, "x": 1, "9.0": 1, "not rated": 1}
-    assert file.read["n_missing"] == 4
-
-
-def test_na_may_be_a_grade(tmp_path: Path) -> None:
-    text = "item,Kim,Lee\nA,NA,NA\nB,b,\n"
-    file = read(tmp_path, text, categories=["NA", "b"])
-    assert grades_of(file) == [["NA", "NA"], ["b", None]]
-
-
 def test_equal_numbers_are_one_grade_and_named(tmp_path: Path) -> None:
     file = read(tmp_path, "item,Kim,Lee\nA,1,1.0\nB,02,2\nC,10,3\n")
     assert grades_of(file) == [["1", "1"], ["2", "2"], ["10", "3"]]
     assert file.scale.grades == ("1", "2", "3", "10")
     assert file.read["merged"] == {"1": ["1", "1.0"], "2": ["02", "2"]}
-
-
-def test_equal_numbers_are_two_texts_beside_text(tmp_path: Path) -> None:
-    file = read(tmp_path, "item,Kim,Lee\nA,1,1.0\nB,1+,2\n")
-    assert grades_of(file) == [["1", "1.0"], ["1+", "2"]]
-    assert any("'1' (1 times), '1.0' (1 times)" in text for text in file.warnings)
-
-
-def test_declared_numbers(tmp_path: Path) -> None:
-    text = "item,Kim,Lee\nA,1,1.0\nB,01,2\n"
-    file = read(tmp_path, text, categories=["1.0", "2", "3"])
-    assert grades_of(file) == [["1.0", "1.0"], ["1.0", "2"]]
-    file = read(tmp_path, text, categories=["1", "1.0", "01", "2"])
-    assert grades_of(file) == [["1", "1.0"], ["01", "2"]]
-    with pytest.raises(RatingsError, match=r"line 3, column 'Kim'.*'01'"):
-        read(tmp_path, text, categories=["1", "1.0", "2"])
 
 
 def test_a_decimal_comma(tmp_path: Path) -> None:
@@ -272,22 +283,6 @@ def test_the_modified_ashworth_scale_is_known_by_its_grade(tmp_path: Path) -> No
     assert (file.scale.name, file.is_ordered) == ("observed", False)
 
 
-def test_a_leading_plus(tmp_path: Path) -> None:
-    text = "item,Kim,Lee\nA,+1,1\nB,0,2\n"
-    scale = ["0", "1", "1+", "2", "3", "4"]
-    assert grades_of(read(tmp_path, text, categories=scale)) == [
-        ["1+", "1"],
-        ["0", "2"],
-    ]
-    assert grades_of(read(tmp_path, text, categories=["0", "1", "2"])) == [
-        ["1", "1"],
-        ["0", "2"],
-    ]
-    for other in ("1", "2", "1+"):
-        with pytest.raises(RatingsError, match=r"'\+1'.*--categories"):
-            read(tmp_path, f"item,Kim,Lee\nA,+1,{other}\nB,0,0\n")
-
-
 def test_the_order_of_text(tmp_path: Path) -> None:
     text = "item,Kim,Lee\nA,mild,severe\nB,absent,mild\n"
     file = read(tmp_path, text)
@@ -297,13 +292,6 @@ def test_the_order_of_text(tmp_path: Path) -> None:
     assert file.scale.grades == ("severe", "mild", "absent", "none")
     assert file.read["scale"]["declared"]
     assert file.read["grades"] == {"severe": 1, "mild": 2, "absent": 1}
-
-
-def test_letters_composed_and_not_are_the_same(tmp_path: Path) -> None:
-    composed, decomposed = "l\u00e9ger", "le\u0301ger"
-    text = f"item,Kim,Lee\nA,{composed},{decomposed}\nB,x,x\n"
-    for options in ({}, {"categories": [decomposed, "x"]}):
-        assert grades_of(read(tmp_path, text, **options))[0] == [composed] * 2
 
 
 # ---- repeats, sessions, groups ----
@@ -481,7 +469,7 @@ def test_options_are_repeated_on_the_command_line(
     ("place", "options"),
     [
         ("masrel.ratings.read_ratings", ()),
-        ("masrel.ratings._stream_codes.DistinctRows.add", ("--stream",)),
+        ("masrel.ratings._large.Scan.answer", ("--stream",)),
     ],
 )
 def test_an_end_from_outside_is_one_sentence(
@@ -497,33 +485,13 @@ def test_an_end_from_outside_is_one_sentence(
         raise error
 
     if options:
-        pytest.importorskip("pyarrow")
+        pytest.importorskip("duckdb")
     monkeypatch.setattr(place, interrupted)
     path = tmp_path / "r.csv"
     path.write_text(WIDE)
     done = masrel("agree", path, *options)
     assert done.code == 1
     assert done.err.strip() == f"masrel: {words}"  # below the ^C of a terminal
-
-
-@pytest.mark.parametrize("end", ["", "1"])  # the last cell missing, or a cell too many
-def test_widths_of_a_large_text_are_those_of_its_first_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, end: str
-) -> None:
-    monkeypatch.setattr("masrel.ratings._text_records._LARGE", 0)
-    assert grades_of(read(tmp_path, WIDE)) == TABLE
-    wrong = WIDE.replace("C,3,,3", "C,3,1" if not end else "C,3,1,3,1")
-    with pytest.raises(RatingsError, match=r"line 4: needed 4 cells.*got [35]: 'C, 3"):
-        read(tmp_path, wrong)
-
-
-def test_a_large_text_may_be_separated_by_blanks(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    text = "patient  Kim Lee\tAnn\nA   1  1 2\nB 2\t2 NA\nC 3 NA   3\n"
-    assert grades_of(read(tmp_path, text)) == TABLE
-    monkeypatch.setattr("masrel.ratings._text_records._LARGE", 0)
-    assert grades_of(read(tmp_path, text)) == TABLE
 
 
 def test_names_numbered_like_the_items_below_may_be_a_row(tmp_path: Path) -> None:

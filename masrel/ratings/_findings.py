@@ -1,0 +1,280 @@
+"""What a caller says of a file of ratings, and the texts of what is found in it."""
+
+import shlex
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any, Literal
+
+from masrel.errors import ParameterError, RatingsError
+
+Repeated = Literal["error", "first", "last", "mean"]
+"""What becomes of a second grade of an item by the same rater."""
+
+USUAL_MISSING = ("", "NA")
+"""Cells that stand for a missing grade unless the scale has them."""
+
+_SHOWN = 6  # texts that a message lists
+_LONGEST = 60  # letters of a text that it shows
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadingOptions:
+    """What a caller says of a file; None and () are for the file to tell."""
+
+    item: tuple[str, ...] = ()  # columns that name the item together
+    rater: str | None = None
+    grade: str | None = None
+    raters: tuple[str, ...] = ()  # columns of a wide table
+    ignore: tuple[str, ...] = ()  # columns that are left aside
+    no_item: bool = False  # whether every column is a rater, or a category
+    no_header: bool = False  # whether the first line is a row like the others
+    session: str | None = None
+    by: str | None = None
+    clusters: str | None = None
+    repeated: Repeated = "error"
+    categories: Sequence[str] | None = None  # every grade of the scale in order
+    missing_codes: tuple[str, ...] = ()  # beside the usual ones
+    decimal: str = "."
+    delimiter: str = "auto"
+    encoding: str | None = None
+    sheet: str | None = None  # of a workbook
+    transpose: bool = False  # whether raters are rows
+    counts: bool = False  # whether it is a table of items by categories
+    table: bool = False  # whether it is a contingency table of two raters
+    source: str | None = None  # annotation tool whose export it is
+    stream: bool | None = None
+
+    def record(self) -> dict[str, object]:
+        """Return what the caller said, as plain values for JSON."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return {
+            name: list(value) if isinstance(value, tuple) else value
+            for name, value in values.items()
+            if value != getattr(ReadingOptions(), name)
+        }
+
+    def mark(self) -> str | None:
+        """Return the separator of cells, None for the file to tell."""
+        names = {"auto": None, "tab": "\t", "\\t": "\t", "space": " ", "blanks": " "}
+        mark = names.get(self.delimiter, self.delimiter)
+        if mark is not None and len(mark) != 1:
+            raise ParameterError(
+                f"--delimiter: needed auto, one letter, tab or blanks, got {mark!r}"
+            )
+        if len(self.decimal) != 1 or self.decimal in "+-0123456789eE":
+            raise ParameterError(
+                f"--decimal: needed one letter such as a comma, got {self.decimal!r}"
+            )
+        return mark
+
+
+class Finding(str):
+    """What is found in a file: a text, with its code and the facts it is made of.
+
+    Parameters
+    ----------
+    code : str
+        Its row in the table of texts.
+    **facts
+        Columns, grades and options that it names.
+
+    Attributes
+    ----------
+    code : str
+        Its row in the table of texts.
+    facts : dict
+        Columns, grades and options that it names.
+
+    Examples
+    --------
+    >>> Finding("named rater", column="age", name="age").code
+    'named rater'
+    """
+
+    __slots__ = ("code", "facts")
+    code: str
+    facts: dict[str, Any]
+
+    def __new__(cls, code: str, /, **facts: Any) -> "Finding":
+        finding = super().__new__(cls, _TEXTS[code].format(**facts))
+        finding.code, finding.facts = code, facts
+        return finding
+
+
+def refusal(name: str, code: str, /, **facts: Any) -> RatingsError:
+    """Return the error of a file."""
+    return RatingsError(f"{name}: {Finding(code, **facts)}")
+
+
+def quoted(names: Iterable[str]) -> str:
+    """Return a list as an option takes it on a command line."""
+    return shlex.quote(",".join(names))
+
+
+def listed(texts: Sequence[str], most: int = _SHOWN, more: str = "") -> str:
+    """Return the first of some texts, and how many more there are."""
+    shown = ", ".join(repr(text[:_LONGEST]) for text in texts[:most])
+    n_more = len(texts) - most
+    return f"{shown} and {n_more} more{more}" if n_more > 0 else shown
+
+
+def library(name: str, module: str, extra: str = "files") -> Any:
+    """Import a library that not everybody needs, or say how to get it."""
+    top = module.partition(".")[0]
+    if find_spec(top) is None:
+        raise refusal(name, "library", library=top, extra=extra)
+    return import_module(module)
+
+
+_ROW_LIKE_OTHERS = "--no-header if this line is a row like the others"
+
+_TEXTS = {
+    # the file
+    "folder": "needed a file, got a folder",
+    "absent": "no such file",
+    "device": "needed a file or a pipe, got a device",
+    "empty": "needed a header and rows, the file is empty",
+    "no records": "needed a header and rows, the file has none",
+    "no rows": "needed rows of ratings below the names, got none",
+    "library": "reading it needs {library}: pip install 'masrel[{extra}]'",
+    "damaged": "is damaged, or no {suffix} file ({error})",
+    "members": "needed one file in it, got {n}: {members}",
+    "unpacked": "is more than {most} bytes when {it}unpacked: {do}",
+    "kind": "needed text, got a file of the kind {suffix}",
+    "no stream": "--stream: needed a Parquet file, or text in UTF-8 with a separator "
+    "that is no blank, as it stands and not packed, without --transpose, --sheet and "
+    "--from",
+    # text
+    "encoding": "line {line}: needed {encoding} text, got the byte 0x{byte:02x}; "
+    "--encoding {likely} may be right",
+    "zero byte": "line {line}: needed text, got a zero byte{hint}",
+    "comment or header": "line {line}: begins with # and has as many cells as the line "
+    "below: take the # away if it is the header, or the line if it is a comment",
+    "two separators": "line 1: needed one separator, {names} both make columns; "
+    "--delimiter chooses",
+    "one column": "line 1: needed columns, got one, {first!r}; --delimiter names the "
+    "separator",
+    "other separator": "line {line}: needed cells with the separator {delimiter}, got "
+    "{first!r}",
+    "width": "{where}: needed {width} cells, as the first line has, got {n}: {cells!r}",
+    "open quote": "{where}: a quote that is opened is not closed",
+    "names again": "holds the names of the columns once more: delete it; --no-header "
+    "if the first line is a row like the others",
+    "no name": "{where}: needed a name for column {column}, got none; "
+    + _ROW_LIKE_OTHERS,
+    "same name": "{where}: needed different names of columns, {column!r} is there "
+    "twice; " + _ROW_LIKE_OTHERS,
+    # workbooks, JSON, exports
+    "no cells": "sheet {sheet}: needed a header and rows, got none",
+    "no sheet": "--sheet: there is no sheet {sheet!r}, but {sheets}",
+    "sheets": "needs --sheet with one of its sheets, {sheets}",
+    "nested cell": "{where}needed text or numbers, got a {kind}",
+    "no export": "needed {suffixes} in it, got none",
+    "no table": "needed cells of a table ({error})",
+    "no utf-8": "needed text in UTF-8 ({error})",
+    "no JSON": "line {line}: is no JSON: {error}",
+    "same key": "needed different keys in an object, {key!r} is there twice",
+    "no objects": "needed a JSON list of objects, one a row; --from reads exports of "
+    "annotation tools",
+    "nested": "object {number}: needed text or a number for {key!r}, got what is "
+    "nested; --from reads exports of annotation tools",
+    "xpt": "is damaged, or no .xpt file (needed lines of 80 bytes)",
+    # columns
+    "no column": "{option}: there is no column {column!r}, {columns}{hint}",
+    "two roles": "{options}: needed each column once, got {column!r} twice",
+    "role twice": "{where}: needed one column for the {role}, got {names}: --{role} "
+    "chooses one, --ignore leaves a column aside",
+    "same column": "needed different columns for item, rater and grade, got {names}",
+    "unknown role": "{where}: looks like one row a rating ({known}): needs {needed}, "
+    "{columns}; if its columns are raters, --raters names them, if they are items, "
+    "--transpose",
+    "no rater": "{where}: needed a column for {what}, got none",
+    "unnamed": "needed the {role}, got {got!r}",
+    "no value": "needed a value",
+    "contingency": "rows and columns have the same names, so that this looks like a "
+    "contingency table of two raters: --table reads it as one",
+    "no raters": "{columns}: no grade in common with the other columns, or the name of "
+    "something else: --ignore {names} leaves such columns aside, --raters names those "
+    "that rate",
+    "first column": "{where}: the first column, {column!r}, holds grades like the "
+    "others: --no-item if it is a rater, --item {name} if it names the items",
+    # warnings of columns
+    "named rater": "column {column!r} counts as a rater; if it is none, --ignore "
+    "{name}",
+    "apart": "no grade in common with the other columns: {columns}; if it is no rater, "
+    "--ignore {names}",
+    "grades as names": "the names of the columns, {columns}, may be grades: "
+    "--no-header if the first line is a row like the others, --counts if cells are "
+    "numbers of raters",
+    "many raters": "{n} columns count as raters of {n_items} items: --transpose if a "
+    "row is a rater",
+    "item or rater": "the first column, {column!r}, is taken for the names of items: "
+    "--no-item if it is a rater, --item {name} if it names the items",
+    "counts": "{rows} to {total:g}, so that this may be a table of counts, items by "
+    "categories: --counts reads it as one",
+    "second header": "{where} holds grades that occur nowhere else: if it is a second "
+    "line of names, delete it",
+    "second names": "{where} names a rater and an item that occur nowhere else: if it "
+    "is a second line of names, delete it",
+    "numbered": "no item was rated twice: {columns} may number the rows, --item names "
+    "the column of the items",
+    "alike": "{kind} that differ by spelling alone are counted as different: {names}",
+    "summary": "{names} counts as an item: if it is a comment, or sums up other rows, "
+    "delete it",
+    "no grade of": "{rater!r} has no grade",
+    "qualtrics": "{first} to {last} are questions and import ids of Qualtrics, no "
+    "ratings: left out",
+    "errors": "errors of formulas in the workbook are read as empty cells: {errors}",
+    "stream": "read as a stream: names of items that differ by spelling alone, or sum "
+    "up others, are not looked for",
+    # tables of counts
+    "count": "--{kind} needs whole numbers from 0, got {text!r}",
+    "no counts": "--{kind}: needed at least one rating, got none",
+    "other categories": "--categories: needed those of the columns, {names}, in order, "
+    "got {categories}",
+    "rows of table": "--table: needed as many rows as categories, {n}, got {n_rows}; "
+    "--no-item if no column names the rows",
+    "names of table": "--table: needed rows and columns of the same categories, got "
+    "{rows} and {names}",
+    "sum column": "{column!r} is the sum of the other columns: --ignore {name} leaves "
+    "it aside",
+    "sum row": "{where}: is the sum of the rows above: delete it",
+    "category or item": "the first column, {column!r}, is taken for the names of "
+    "items: --no-item if it is a category",
+    "items twice": "{column!r} names items more than once: each row counts as an item",
+    # grades
+    "no grades": "needed at least one grade, got none",
+    "other grade": "needed one of {scale}, got {got}{hint}",
+    "looks missing": "{got} looks like a missing grade: --missing {codes} counts it as "
+    "one, --categories with it in the scale as a grade",
+    "broken": "needed a grade on one line, got {got}: a quote may be opened and not "
+    "closed",
+    "decimal comma": "{got} looks like a number with a decimal comma: --decimal , "
+    "reads it so, --categories makes it text",
+    "plus": "{got} beside grades such as {other!r} may be that number or the grade "
+    "'{grade}': --categories with the scale in order tells",
+    "alike grades": "grades that differ by spelling alone are counted as different: "
+    "{grades}",
+    "too near": "{one} and {other} are too near to be told apart as numbers, so that "
+    "grades weigh by their place in the scale",
+    "measurements": "{n} different numbers in {n_ratings} ratings look like "
+    "measurements: percent agreement and unweighted kappas count only those that are "
+    "equal; --coefficients icc_a1 or --metric interval weigh how far they lie from "
+    "each other",
+    "far": "{grades}: far from the other grades; if missing ones are meant, --missing "
+    "{codes}",
+    "no number": "no number: {got} ({where}), so that all grades are text; if that is "
+    "missing, --missing {codes}",
+    "number": "a number among grades that are text: {got} ({where}); if that is "
+    "missing, --missing {codes}",
+    # ratings
+    "twice": "{rows}: {rater!r} graded {item!r} more than once: --by or --session "
+    "names a column that tells such ratings apart{hint}, --repeated first, last or "
+    "mean keeps one{guess}",
+    "means": "--repeated mean: needs grades that are numbers without a declared scale, "
+    "got {grades}",
+    "two clusters": "{rows}: needed one cluster of item {item!r} in column {column!r}, "
+    "got {both}; if items are numbered in each cluster, --item names both columns",
+}

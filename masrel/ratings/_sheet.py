@@ -1,0 +1,521 @@
+"""Files as columns of text: bytes, unpacked and decoded, and text taken apart.
+
+In: a path, "-" or a pipe, and what the caller says of it. Out: a `Sheet`.
+"""
+
+import codecs
+import csv
+import gzip
+import io
+import lzma
+import math
+import re
+import sys
+import unicodedata
+import zipfile
+import zlib
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import date, datetime
+from decimal import Decimal
+from functools import partial
+from itertools import chain, count, islice
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel._collector import collector_off
+from masrel.errors import ParameterError, RatingsError
+from masrel.ratings._findings import ReadingOptions, refusal
+
+Codes = NDArray[np.int64]
+
+TEXT_FORMATS = {".csv": "CSV", ".tsv": "TSV", ".txt": "text", ".dat": "text"}
+TYPED_FORMATS = (
+    *(".xlsx", ".xlsm", ".xls", ".ods", ".parquet", ".feather", ".json", ".jsonl"),
+    *(".sav", ".zsav", ".por", ".dta", ".sas7bdat", ".xpt"),
+)
+DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "blanks"}
+"""Separators, and what they are called."""
+
+MAX_UNPACKED = 256_000_000
+_BOMS = (
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+_PACKED = {b"\x1f\x8b": ".gz", b"\xfd7zXZ\0": ".xz"}  # how packed files begin
+_MARKS = {  # how files begin that are no text, and what their names end in
+    b"PK\x03\x04": ".xlsx, .ods or .zip",
+    b"\xd0\xcf\x11\xe0": ".xls",
+    b"PAR1": ".parquet",
+    b"ARROW1": ".feather",
+    b"$FL": ".sav or .zsav",
+    b"<stata_dta>": ".dta",
+    b"BZh": ".bz2, which is not read",
+    b"(\xb5/\xfd": ".zst, which is not read",
+    b"%PDF": ".pdf, which is not read",
+}
+_UNPLAIN = re.compile(r"[^\x21-\x7e]")  # blanks, and letters that may have two forms
+_SNIFFED = 20, 1 << 16  # lines, and letters, that the separator is found in
+_CHUNK = 1 << 14  # records that are taken apart at once
+_END = "\0"  # a record behind the last, which a quote that stays open swallows
+
+
+# ---- columns and sheets ----
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """The cells of a column: the texts that differ, and where each is."""
+
+    codes: Codes  # (n_rows,): places in the texts
+    texts: list[str]  # in the order first met, without blanks around
+
+    @classmethod
+    def of(cls, codes: Codes, cells: Sequence[str]) -> "Column":
+        """Take cells that differ, some of them by blanks or Unicode forms alone."""
+        if not _UNPLAIN.search("".join(cells)):
+            return cls(codes, list(cells))
+        number: dict[str, int] = {}
+        places = [number.setdefault(plain(c), len(number)) for c in cells]
+        if len(number) < len(cells):
+            codes = np.array(places, dtype=np.int64)[codes]
+        return cls(codes, list(number))
+
+    @classmethod
+    def of_cells(cls, cells: Iterable[str]) -> "Column":
+        """Take cells row by row."""
+        number: dict[str, int] = defaultdict(count().__next__)  # a new one is the next
+        codes = np.array([number[cell] for cell in cells], dtype=np.int64)
+        return cls.of(codes, list(number))
+
+    def rows(self, chosen: Any) -> "Column":
+        """Return some of the rows."""
+        codes, met = first_met(self.codes[chosen])
+        return Column(codes, [self.texts[k] for k in met.tolist()])
+
+    def is_text(self, text: str) -> NDArray[np.bool_]:
+        """Return which rows hold a text."""
+        code = self.texts.index(text) if text in self.texts else -1
+        return np.equal(self.codes, code)
+
+    def cells(self) -> list[str]:
+        """Return the text of every row."""
+        return [self.texts[code] for code in self.codes.tolist()]
+
+
+def plain(text: str) -> str:
+    """Return a text without blanks around, in the one of two equal Unicode forms."""
+    text = text.strip()
+    return text if text.isascii() else unicodedata.normalize("NFC", text).strip()
+
+
+def value_text(value: Any) -> str:
+    """Return what a cell with a type says."""
+    # 1.0 of a column of numbers is the grade 1; other floats have their shortest digits
+    if isinstance(value, bool | np.bool_):
+        return str(value).lower()
+    if isinstance(value, float | np.floating | Decimal):
+        is_whole = math.isfinite(value) and value == int(value)
+        return str(int(value)) if is_whole and abs(int(value)) < 2**53 else str(value)
+    if isinstance(value, datetime) and value.timetz() != datetime.min.timetz():
+        return value.isoformat()
+    if isinstance(value, date):
+        return date(value.year, value.month, value.day).isoformat()
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "backslashreplace")
+    return str(value)
+
+
+def first_met(codes: Codes) -> tuple[Codes, Codes]:
+    """Return codes numbered in the order in which they are met, and which they were."""
+    first = first_rows(codes, int(codes.max(initial=-1)) + 1)
+    places = np.argsort(first, kind="stable")[: int((first < len(codes)).sum())]
+    rank = np.zeros(len(first), dtype=np.int64)
+    rank[places] = np.arange(len(places))
+    return rank[codes], places
+
+
+def first_rows(codes: Codes, n_codes: int) -> Codes:
+    """Return where each code is met first."""
+    first = np.full(n_codes, len(codes))
+    first[codes[::-1]] = np.arange(len(codes) - 1, -1, -1)
+    return first
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sheet:
+    """A file as text, column by column."""
+
+    name: str  # the file, as the caller calls it
+    sha256: Callable[[], str]  # of its bytes
+    header: tuple[str, ...]  # names of the columns, all different
+    columns: tuple[Column, ...] = field(repr=False)
+    # (n_rows,): number of the record of every row in the file; the names are 0
+    numbers: Codes = field(default_factory=lambda: np.arange(0), repr=False)
+    # format; delimiter, encoding or sheet; what codes are called
+    facts: dict[str, Any] = field(default_factory=dict)
+    dropped: dict[str, int] = field(default_factory=dict)  # why rows are left out
+    has_header: bool = True
+    is_transposed: bool = False  # whether rows and columns are exchanged
+    is_simulated: bool = False  # whether a comment at its head says so
+    line_of: Callable[[int], str]  # number of a record to where it stands
+
+    def where(self, row: int) -> str:
+        """Return where a row, from 0, stands in the file."""
+        return self.line_of(int(self.numbers[row]))
+
+    def refuse(
+        self, code: str, at: str = "", place: int | None = None, /, **facts: Any
+    ) -> RatingsError:
+        """Return the error of this file, at a row and a column."""
+        column = "" if place is None else f", column {self.header[place]!r}"
+        where = f"{self.name}: {at}{column}" if at else self.name
+        return refusal(where, code, **facts)
+
+    def without(self, rows: NDArray[np.bool_], why: str) -> "Sheet":
+        """Leave rows out, and say so."""
+        if not rows.any():
+            return self
+        return replace(
+            self,
+            columns=tuple(column.rows(~rows) for column in self.columns),
+            numbers=self.numbers[~rows],
+            dropped={**self.dropped, why: int(rows.sum())},
+        )
+
+
+def finished(sheet: Sheet, options: ReadingOptions) -> Sheet:
+    """Turn a sheet as it was stored as the options say, and check its names."""
+    header, columns = list(sheet.header), list(sheet.columns)
+    if options.transpose:
+        cells = [[n, *c.cells()] for n, c in zip(header, columns, strict=True)]
+        records = list(zip(*cells, strict=True))
+        header = [record[0] for record in records]
+        columns = [Column.of_cells(record[1:]) for record in records]
+        sheet = replace(sheet, is_transposed=True, line_of=_column_number)
+    start = int(not options.no_header)
+    if options.no_header:
+        columns = [
+            Column.of_cells([name, *column.cells()])
+            for name, column in zip(header, columns, strict=True)
+        ]
+        header = [str(n) for n in range(1, len(columns) + 1)]
+    n_rows = len(columns[0].codes) if columns else 0
+    header = [name.strip() for name in header]
+    # a separator at the end of every line makes a column without name and cells
+    if header and not header[-1] and set(columns[-1].texts) <= {""}:
+        header, columns = header[:-1], columns[:-1]
+    _check_names(sheet, header)
+    sheet = replace(
+        sheet,
+        header=tuple(header),
+        columns=tuple(columns),
+        numbers=np.arange(start, start + n_rows),
+        has_header=not options.no_header,
+    )
+    blank = _rows_of(sheet, [""] * len(header))
+    sheet = sheet.without(blank, "blank")
+    again = _rows_of(sheet, header)
+    if sheet.has_header and again.any():
+        raise sheet.refuse("names again", sheet.where(int(np.argmax(again))))
+    return sheet
+
+
+def _column_number(number: int) -> str:
+    return f"column {number + 1}"
+
+
+def _rows_of(sheet: Sheet, texts: Sequence[str]) -> NDArray[np.bool_]:
+    # which rows hold these texts
+    same = np.full(len(sheet.numbers), bool(texts))
+    for column, text in zip(reversed(sheet.columns), reversed(texts), strict=True):
+        if not same.any():
+            break
+        same &= column.is_text(text)
+    return same
+
+
+def _check_names(sheet: Sheet, header: Sequence[str]) -> None:
+    seen: set[str] = set()
+    for position, name in enumerate(header, start=1):
+        if not name and position > 1:  # the first may be R's or pandas' row names
+            raise sheet.refuse("no name", where=sheet.line_of(0), column=position)
+        if name in seen:
+            raise sheet.refuse("same name", where=sheet.line_of(0), column=name)
+        seen.add(name)
+
+
+# ---- bytes ----
+
+
+def bytes_of(path: Path | str) -> bytes:
+    """Return the bytes of a file, or of standard input for "-"."""
+    if str(path) == "-":
+        return sys.stdin.buffer.read()
+    path = Path(path)
+    wrong = {
+        "folder": path.is_dir(),
+        "absent": not path.exists(),
+        "device": path.is_char_device() or path.is_block_device(),
+    }
+    for code, is_so in wrong.items():
+        if is_so:
+            raise refusal(str(path), code)
+    return path.read_bytes()
+
+
+def unpacked(name: str, data: bytes, *, is_export: bool) -> tuple[str, bytes]:
+    """Return what is in a packed file, by its suffix: the name without it, and it."""
+    stem, suffix = name.removesuffix(Path(name).suffix), Path(name).suffix.lower()
+    packed = next((e for mark, e in _PACKED.items() if data.startswith(mark)), None)
+    suffix = packed or suffix  # a pipe has no suffix
+    stem = stem if name.lower().endswith(suffix) else name
+    try:
+        if suffix == ".gz":
+            return stem, _within(name, gzip.GzipFile(fileobj=io.BytesIO(data)))
+        if suffix == ".xz":
+            return stem, _within(name, lzma.LZMAFile(io.BytesIO(data)))
+        if suffix == ".zip":
+            with zipfile.ZipFile(io.BytesIO(data)) as archive:
+                members = [m for m in archive.namelist() if not m.endswith("/")]
+                if len(members) > 1 and is_export:  # such as a file of each annotator
+                    return f"{stem}.zip", data
+                if len(members) != 1:
+                    some = ", ".join(members[:5])
+                    raise refusal(name, "members", n=len(members), members=some)
+                with archive.open(members[0]) as member:
+                    return members[0], _within(name, member)
+    except (
+        *(OSError, EOFError, zlib.error, lzma.LZMAError, zipfile.BadZipFile),
+        *(RuntimeError, NotImplementedError),  # encrypted, packed in another way
+    ) as error:
+        raise refusal(name, "damaged", suffix=suffix, error=error) from error
+    return name, data
+
+
+def _within(name: str, packed: IO[bytes] | gzip.GzipFile) -> bytes:
+    # What is in a packed file, if it is not so much that it fills the memory
+    data = packed.read(MAX_UNPACKED + 1)
+    if len(data) > MAX_UNPACKED:
+        do = "unpack it, since a large table is read piece by piece"
+        raise refusal(name, "unpacked", most=MAX_UNPACKED, it="it is ", do=do)
+    return data
+
+
+def decoded(name: str, data: bytes, encoding: str | None, n_before: int = 0) -> str:
+    """Return bytes as text, by the encoding, or by their mark, or as UTF-8."""
+    # n_before: lines of the file before these
+    marked = next((e for bom, e in _BOMS if data.startswith(bom)), None)
+    encoding = encoding or marked or "utf-8"
+    for mark, suffix in _MARKS.items():
+        if data.startswith(mark):
+            raise refusal(name, "kind", suffix=suffix)
+    try:
+        text = data.decode("utf-8-sig" if encoding == "utf-8" else encoding)
+    except UnicodeDecodeError as error:
+        raise refusal(
+            name,
+            "encoding",
+            line=n_before + len((data[: error.start] + b"x").splitlines()),
+            encoding=encoding,
+            byte=data[error.start],
+            likely="utf-16" if 0 in data[:100] else "cp1252 or latin-1",
+        ) from error
+    except (LookupError, ValueError) as error:
+        raise ParameterError(
+            f"--encoding: there is none called {encoding!r}"
+        ) from error
+    if "\0" in text:
+        line = text.count("\n", 0, text.index("\0")) + 1
+        hint = "; --encoding utf-16 may be right" if 0 in data[:4] else ""
+        raise refusal(name, "zero byte", line=line, hint=hint)
+    text = text.removeprefix("\ufeff")
+    return text if "\n" in text else text.replace("\r", "\n")  # of an old Mac
+
+
+# ---- text ----
+
+
+def read_text(
+    name: str, sha256: Callable[[], str], text: str, kind: str, options: ReadingOptions
+) -> Sheet:
+    """Take a text apart: its comments, its separator, its records."""
+    declared = re.match(r'"?sep=(.)"?(\r\n|\n|\r)', text, re.IGNORECASE)
+    delimiter = options.mark() or (declared.group(1) if declared else None)
+    start = declared.end() if declared else 0
+    comments, start = _comments(name, text, start, delimiter)
+    text, n_before = text[start:], text.count("\n", 0, start)
+    if not text.strip():
+        raise refusal(name, "no records")
+    delimiter, widths = _separator(name, text, delimiter)
+    called = DELIMITERS.get(delimiter, delimiter)
+    # R's write.table has no name above its row names
+    has_row_names = len(widths) > 1 and set(widths[1:]) == {widths[0] + 1}
+    if widths[0] + has_row_names < 2:
+        first, line = text.splitlines()[0].strip()[:60], n_before + 1
+        mark = DELIMITERS.get(delimiter, repr(delimiter))
+        raise refusal(name, "other separator", line=line, delimiter=mark, first=first)
+    sheet = Sheet(
+        name=name,
+        sha256=sha256,
+        header=(),
+        columns=(),
+        facts={
+            "format": kind,
+            "delimiter": called,
+            "encoding": options.encoding or "utf-8",
+        },
+        is_simulated=any("SIMULATED" in comment for comment in comments),
+        line_of=partial(_line_of, text, delimiter, n_before),
+    )
+    header, columns = _columns(sheet, text, delimiter, widths[0], int(has_row_names))
+    if has_row_names:
+        is_last_empty = set(columns[-1].texts) <= {""}
+        header = [*header, ""] if is_last_empty else ["", *header]
+    return replace(sheet, header=tuple(header), columns=tuple(columns))
+
+
+def _comments(
+    name: str, text: str, start: int, delimiter: str | None
+) -> tuple[list[str], int]:
+    # Lines at the head that begin with "#" are comments, unless the last of them has as
+    # many cells as the line below, and may be the header; and where the others begin.
+    comments, below, last = [], "", start
+    for line in io.StringIO(text[start:], newline=""):
+        if line.startswith("#"):
+            comments.append(line.rstrip("\r\n"))
+            last = start
+        elif line.strip() or not comments:
+            below = line.rstrip("\r\n")
+            break
+        start += len(line)
+    for candidate in [delimiter] if delimiter else [",", ";", "\t", "|"]:
+        if not comments or (candidate == " " and comments[-1].startswith("# ")):
+            continue
+        n_cells, n_below = (
+            len(next(records([line], candidate), (0, []))[1])
+            for line in (comments[-1], below)
+        )
+        if 1 < n_cells == n_below:
+            if re.match(r"#\s+[^\s,;|]", comments[-1]) and candidate != "\t":
+                line_number = text.count("\n", 0, last) + 1
+                raise refusal(name, "comment or header", line=line_number)
+            return comments[:-1], last
+    return comments, start
+
+
+def _reader(lines: Iterable[str], delimiter: str) -> Any:
+    if delimiter == " ":  # any number of blanks or tabs, as R's write.table writes
+        lines = (line.rstrip(" \t\r\n").replace("\t", " ") for line in lines)
+    csv.field_size_limit(2**31 - 1)  # of all readers: a cell may be long
+    is_skipped = delimiter != "\t"
+    return csv.reader(lines, delimiter=delimiter, skipinitialspace=is_skipped)
+
+
+def records(
+    lines: Iterable[str], delimiter: str, n_before: int = 0
+) -> Iterator[tuple[int, list[str]]]:
+    """Yield the line where each record begins, and its cells, without blank lines."""
+    reader, begins = _reader(lines, delimiter), n_before + 1
+    for record in reader:
+        if not _is_blank(record):
+            yield begins, record
+        begins = n_before + reader.line_num + 1
+
+
+def _is_blank(record: list[str]) -> bool:
+    return len(record) < 2 and not "".join(record).strip(" \t")
+
+
+def _line_of(text: str, delimiter: str, n_before: int, number: int) -> str:
+    # where a record begins, looked up only for a message
+    lines = records(io.StringIO(text, newline=""), delimiter, n_before)
+    line, _ = next(islice(lines, number, None), (None, []))
+    return "the end" if line is None else f"line {line}"
+
+
+def _separator(name: str, text: str, delimiter: str | None) -> tuple[str, list[int]]:
+    # what stands between cells, and how many cells the first records have
+    head, n_letters = [], 0
+    for line in filter(str.strip, io.StringIO(text, newline="")):
+        head.append(line)
+        n_letters += len(line)
+        if len(head) == _SNIFFED[0] or (len(head) > 3 and n_letters > _SNIFFED[1]):
+            break
+    widths = {
+        mark: [len(record) for _, record in records(head, mark)]
+        for mark in ([delimiter] if delimiter else DELIMITERS)
+    }
+    if delimiter:
+        return delimiter, widths[delimiter]
+    # as many cells in every record, or one more below a header without row names; a
+    # decimal comma is in the rows alone
+    consistent = [
+        mark
+        for mark, (first, *below) in widths.items()
+        if first > 1 and len(set(below)) < 2 and (below or [first])[0] - first in (0, 1)
+    ]
+    marked = [mark for mark in consistent if mark != " "] or consistent
+    are_decimal = not re.search(r"(?<!\d),|,(?!\d)", "".join(head))
+    if "," in marked and are_decimal:  # such commas may be in numbers
+        if len(marked) > 1:
+            marked.remove(",")
+        elif " " in consistent and widths[" "][0] > widths[","][0]:
+            marked.append(" ")
+    if len(marked) > 1:
+        names = " and ".join(DELIMITERS[mark] for mark in marked)
+        raise refusal(name, "two separators", names=names)
+    several = [mark for mark, n in widths.items() if n[0] > 1 and mark != " "]
+    if not marked and not several:
+        raise refusal(name, "one column", first=head[0].strip())
+    mark = marked[0] if marked else max(several, key=lambda mark: widths[mark][0])
+    return mark, widths[mark]
+
+
+def _columns(
+    sheet: Sheet, text: str, delimiter: str, n_names: int, n_more: int
+) -> tuple[list[str], list[Column]]:
+    # the names, and the cells below them, n_more than names
+    width = n_names + n_more
+    reader = _reader(chain(io.StringIO(text, newline=""), [_END]), delimiter)
+    header = next(record for record in reader if not _is_blank(record))
+    numbers: list[dict[str, int]]
+    numbers = [defaultdict(count().__next__) for _ in range(width)]
+    codes: list[list[Codes]] = [[np.zeros(0, dtype=np.int64)] for _ in range(width)]
+    n_rows, is_closed = 0, False
+    # lists of text are no cycles, and to look for some in them takes as long as to read
+    with collector_off():
+        while chunk := list(islice(reader, _CHUNK)):
+            if set(map(len, chunk)) != {width}:
+                chunk = [record for record in chunk if not _is_blank(record)]
+                is_closed = chunk[-1:] == [[_END]]
+                _check_widths(sheet, chunk[: len(chunk) - is_closed], width, n_rows)
+                chunk = chunk[: len(chunk) - is_closed]
+            for k, cells in enumerate(zip(*chunk, strict=True)):
+                part = map(numbers[k].__getitem__, cells)
+                codes[k].append(np.fromiter(part, np.int64, len(chunk)))
+            n_rows += len(chunk)
+    if not is_closed:
+        raise sheet.refuse("open quote", where=sheet.line_of(n_rows))
+    parts = zip(codes, numbers, strict=True)
+    return header, [Column.of(np.concatenate(c), list(n)) for c, n in parts]
+
+
+def _check_widths(
+    sheet: Sheet, chunk: Sequence[list[str]], width: int, n_rows: int
+) -> None:
+    for number, record in enumerate(chunk, start=n_rows + 1):
+        if record[-1].endswith(_END):
+            raise sheet.refuse("open quote", where=sheet.line_of(number))
+        if len(record) != width:
+            where, cells = sheet.line_of(number), ", ".join(record)[:60]
+            raise sheet.refuse(
+                "width", where=where, width=width, n=len(record), cells=cells
+            )
