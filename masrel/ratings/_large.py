@@ -49,6 +49,7 @@ from masrel.ratings._sheet import (
     Sheet,
     decoded,
     finished,
+    long_cells,
     plain,
     read_text,
     records,
@@ -126,7 +127,7 @@ class Scan:
         return "the end" if line is None else f"line {line}"
 
     def _records(self) -> Iterator[tuple[int, list[str]]]:
-        with self.path.open(encoding="utf-8", newline="") as file:
+        with self.path.open(encoding="utf-8", newline="") as file, long_cells():
             for _ in range(self.n_before or 0):
                 file.readline()
             yield from records(file, self.delimiter, self.n_before or 0)

@@ -16,6 +16,7 @@ import zipfile
 import zlib
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import date, datetime
 from decimal import Decimal
@@ -343,6 +344,17 @@ def decoded(name: str, data: bytes, encoding: str | None, n_before: int = 0) -> 
 # ---- text ----
 
 
+@contextmanager
+def long_cells() -> Iterator[None]:
+    """Let the csv module read cells of any length; the limit is that of all readers."""
+    limit = csv.field_size_limit(2**31 - 1)
+    try:
+        yield
+    finally:
+        csv.field_size_limit(limit)
+
+
+@long_cells()
 def read_text(
     name: str, sha256: Callable[[], str], text: str, kind: str, options: ReadingOptions
 ) -> Sheet:
@@ -414,7 +426,6 @@ def _comments(
 def _reader(lines: Iterable[str], delimiter: str) -> Any:
     if delimiter == " ":  # any number of blanks or tabs, as R's write.table writes
         lines = (line.rstrip(" \t\r\n").replace("\t", " ") for line in lines)
-    csv.field_size_limit(2**31 - 1)  # of all readers: a cell may be long
     is_skipped = delimiter != "\t"
     return csv.reader(lines, delimiter=delimiter, skipinitialspace=is_skipped)
 
@@ -434,6 +445,7 @@ def _is_blank(record: list[str]) -> bool:
     return len(record) < 2 and not "".join(record).strip(" \t")
 
 
+@long_cells()
 def _line_of(text: str, delimiter: str, n_before: int, number: int) -> str:
     # where a record begins, looked up only for a message
     lines = records(io.StringIO(text, newline=""), delimiter, n_before)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from masrel import __version__
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.schedule import draw_schedule, schedule_problems, write_schedules
 from masrel.lab.schedule.sheets import _schedule_text as schedule_text
@@ -33,7 +34,8 @@ def drawn_then(paths: StudyPaths, name: str) -> Protocol:
                 paths.sheet_file(rater, session.id): sheet_text(drawn),
             }
             for path, text in texts.items():  # no file named its format then
-                path.write_text(text.removeprefix("# format: 1\n"))
+                text = text.removeprefix("# format: 1\n")
+                path.write_text(text.replace(__version__, "0.1.0"))
     return protocol
 
 
