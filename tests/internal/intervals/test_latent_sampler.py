@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 
-import emcee
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -298,30 +297,6 @@ def test_chains_agree_with_weighted_draws_of_the_prior(
     assert np.quantile(fit.chains.values[0], shares) == pytest.approx(kappa, abs=0.03)
     at = fit.parts["bias"].start
     assert np.quantile(fit.chains.values[at], shares) == pytest.approx(bias, abs=0.08)
-
-
-@pytest.mark.slow
-def test_snooker_moves_of_emcee_are_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    # DESnookerMove of emcee 3.1.6 does not keep a density: it gives a unit normal a
-    # variance of about 0.67. The package uses differential evolution without it.
-    from masrel.intervals._mcmc import sample
-
-    def unit(position: Floats) -> Floats:
-        density: Floats = -0.5 * (position**2).sum(axis=1)
-        return density
-
-    def off() -> float:
-        draws = sample(
-            unit, 2, lambda x: x[:, 0],
-            generator=np.random.default_rng(1), n_steps=1200, max_steps=9_600,
-        )  # fmt: skip
-        return misses(draws.values, stats.norm.ppf)
-
-    monkeypatch.setattr("masrel.intervals._mcmc.MIN_ESS", 4_000)
-    assert off() < 4.5
-    snooker = emcee.moves.DESnookerMove
-    monkeypatch.setattr(emcee.moves, "DEMove", lambda **_: snooker())
-    assert off() > 10
 
 
 def test_walkers_repeat_byte_by_byte() -> None:
