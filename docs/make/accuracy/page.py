@@ -64,13 +64,17 @@ def _seen(lines: Lines) -> dict[str, str]:
     defined = [line for line in lines if line.true.value is not None]
     undefined = [line for line in lines if line.true.value is None]
     ours = [line.values["masrel"] for line in defined]
-    known = [off for off in ours if not off.note and off.absolute is None]
+    away = [
+        off.relative * abs(float(line.true.value or 0.0)) + (off.absolute or 0.0)
+        for line, off in zip(defined, ours, strict=True)
+        if not off.note
+    ]
     nearest = sum(off.absolute == 0 or off.units <= NEAREST for off in ours)
     worst = max(lines, key=_error)
     return {
         "n_values": str(len(ours)),
         "n_nearest": str(nearest),
-        "largest_value": f"{max(off.units for off in known):.2f}",
+        "largest_value": cells.power(max(away)),
         "largest_error": cells.power(_error(worst)),
         "where": f"{_title(worst)}, {worst.case.name}",
         "ordinary": cells.units(_largest_of_others(lines)),
