@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement._engine import Floats
-from masrel.intervals._problem import ROUNDING, Integers
+from masrel.intervals._problem import ROUNDING, Integers, blocks
 
 MAX_ALL = 300_000
 """Distinct resamples that are all taken rather than drawn."""
 
+_SORTED = 2_000  # rows that are sorted column by column
 _AT_ONCE = 1 << 20  # numbers held at once while values are computed
 
 
@@ -94,7 +95,18 @@ class Resamples:
 
 def distinct_features(rows: Floats, freq: Integers) -> tuple[Floats, Integers]:
     """Put items, or clusters, with equal features together."""
-    distinct, kind = np.unique(rows, axis=0, return_inverse=True)
+    if len(rows) <= _SORTED:
+        distinct, kind = np.unique(rows, axis=0, return_inverse=True)
+    else:
+        # Equal rows have equal polynomials at any place, others hardly ever: sorting
+        # these copies no millions of rows.
+        key = np.zeros(len(rows))
+        for column in rows.T:
+            key = key * 0.7390851332151607 + column
+        _, first, kind = np.unique(key, return_index=True, return_inverse=True)
+        distinct = rows[first]
+        if any((distinct[kind[at]] != rows[at]).any() for at in blocks(len(rows))):
+            return rows, freq
     return distinct, np.bincount(kind.ravel(), weights=freq).astype(np.int64)
 
 
