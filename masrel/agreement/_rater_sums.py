@@ -1,4 +1,7 @@
-"""Sums of features where raters are resampled, none paired with a copy of itself."""
+"""Sums of features where raters are resampled, none paired with a copy of itself.
+
+They are in whole units and not in `WHOLE` parts, which ratios of them do not notice.
+"""
 
 import numpy as np
 

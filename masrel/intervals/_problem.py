@@ -276,8 +276,8 @@ def pose_problem(
             raise ParameterError(
                 f"ratings: {len(coded.codes)} items of {made.n_categories} different "
                 "grades are too many for an interval that counts each of them; "
-                'method="analytic" counts none, nor do the interval metric and '
-                "quadratic weights"
+                'for other items method="analytic" counts none, and intraclass '
+                "correlations (ICC) take measurements as they are"
             )
         formula = NO_SUMS
     used, distinct, freq, rows = _what_matters(entry, formula, coded, v)
