@@ -102,3 +102,19 @@ class Line(Distances):
     def sum(self) -> float:
         """Return Σ_kl v_kl."""
         return float((np.ones(self.n) @ self).sum())
+
+    def nodes(self) -> tuple[Floats, Floats] | None:
+        """Return shares L of every value in three nodes, and v of the nodes, if any.
+
+        Squares of distances are polynomials of second degree in either value, so that
+        with Lagrange's shares L_j(x), v(x, y) = Σ_ij L_i(x) v_ij L_j(y) for all x, y.
+        """
+        # -> (n_categories, 3), (3, 3)
+        linear, square = self._factors
+        half = float(abs(self.values).max())
+        if linear or not half:
+            return None
+        t = self.values / half
+        shares = np.stack([t * (t - 1.0) / 2.0, 1.0 - t * t, t * (t + 1.0) / 2.0])
+        at = half * np.arange(-1.0, 2.0)
+        return shares.T, square * (at[:, None] - at) ** 2

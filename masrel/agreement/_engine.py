@@ -121,6 +121,8 @@ class Formula:
     # rows and v to a callable: how often each row and each rater is taken, (b, n_rows)
     # and (b, n_raters), to sums (b, m + n); None where rater_sums is
     crossed_sums: Callable[[Codes, Any], CrossedSums] | None = None
+    # whether chance looks at each category by itself, not at sums of v of pairs alone
+    needs_categories: bool = False
 
     def value(self, sums: Floats, v: Any) -> Floats:
         """Return the coefficient, (...); ``nan`` where undefined."""

@@ -341,6 +341,16 @@ def _of_many(name: str, categories: Sequence[Label]) -> Distances:
     )
 
 
+def as_line(weights: Weights, categories: Sequence[Label]) -> Line | None:
+    """Return weights as an operator of distances on a line, if they are one."""
+    if isinstance(weights.v, Line):
+        return weights.v
+    if weights.name not in ("quadratic", "interval") or weights.reason is not None:
+        return None
+    x = positions(categories)
+    return Line(x if weights.name == "interval" else x / np.ptp(x), square=1.0)
+
+
 def _gaps(x: Floats) -> Floats:
     return np.asarray(abs(x[:, None] - x))
 

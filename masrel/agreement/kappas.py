@@ -7,6 +7,7 @@ chance function, which also gives the gradient. v is the disagreement of two cat
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -108,10 +109,13 @@ def _pooled(name: str, title: str, chance: _Chance) -> Formula:
 
 _PERCENT = _pooled("percent_agreement", "percent agreement", _no_chance)
 _FLEISS = _pooled("fleiss_kappa", "Fleiss' kappa", _shared_margins)
-_BRENNAN_PREDIGER = _pooled(
-    "brennan_prediger", "the Brennan-Prediger coefficient", _every_category_alike
+_BRENNAN_PREDIGER = replace(
+    _pooled(
+        "brennan_prediger", "the Brennan-Prediger coefficient", _every_category_alike
+    ),
+    needs_categories=True,
 )
-_GWET = _pooled("gwet_ac", "Gwet's AC", _hard_items)
+_GWET = replace(_pooled("gwet_ac", "Gwet's AC", _hard_items), needs_categories=True)
 _SCOTT = Formula(
     name="scott_pi",
     title="Scott's pi",

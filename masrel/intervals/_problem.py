@@ -22,11 +22,11 @@ from masrel.agreement import (
     coefficient,
 )
 from masrel.agreement._data import check_scale
-from masrel.agreement._distances import Distances
+from masrel.agreement._distances import Distances, Line
 from masrel.agreement._engine import Features, Floats, Formula, RaterSums, check_level
 from masrel.agreement._labels import Codes
 from masrel.agreement._rows import distinct_rows, item_counts
-from masrel.agreement._weights import declared_weights
+from masrel.agreement._weights import as_line, declared_weights
 from masrel.errors import (
     ParameterError,
     SmallSampleWarning,
@@ -272,14 +272,9 @@ def pose_problem(
     if entry.metric == "ordinal" and coded.n_categories > _MAX_REMADE:
         formula, notes = coefficient(entry.name).formula or formula, (HELD,)
     if _are_too_many(formula, coded, v):
-        if not delta:
-            raise ParameterError(
-                f"ratings: {len(coded.codes)} items of {made.n_categories} different "
-                "grades are too many for an interval that counts each of them; "
-                'for other items method="analytic" counts none, and intraclass '
-                "correlations (ICC) take measurements as they are"
-            )
-        formula = NO_SUMS
+        line = as_line(made, coded.categories)
+        v = v if line is None else line
+        formula = NO_SUMS if delta else _of_nodes(formula, coded, line)
     used, distinct, freq, rows = _what_matters(entry, formula, coded, v)
     matters, every_freq = np.asarray(rows.any(axis=1)), freq
     patterns = distinct
@@ -378,6 +373,45 @@ def _are_too_many(formula: Formula, coded: CodedRatings, v: Any) -> bool:
     one = formula.features(coded.codes[:1], v, None)
     n_features = len(one.dense) + one.n
     return max(len(coded.codes), len(v)) * n_features > _MAX_PLACES
+
+
+def _of_nodes(formula: Formula, coded: CodedRatings, line: Line | None) -> Formula:
+    """Return the formula with all ratings shared out among three nodes, or refuse.
+
+    Where v is the square of a distance, the nodes stand for any number of grades.
+    """
+    nodes = None if line is None or formula.needs_categories else line.nodes()
+    if nodes is None:
+        raise ParameterError(
+            f"ratings: {len(coded.codes)} items of {coded.n_categories} different "
+            "grades are too many for an interval that counts each of them; kappas by "
+            "Cohen, Conger, Fleiss and Light and alpha with quadratic weights count "
+            'none, nor does method="analytic" for other items; intraclass correlations '
+            "(ICC) take measurements as they are"
+        )
+    shares, v = nodes
+
+    def features(codes: Codes, _v: Any, repeats: Integers | None = None) -> Features:
+        made = formula.features(codes, line, repeats)
+        slot, grade = np.divmod(made.places, len(shares))
+        places = 3 * slot[:, :, None] + np.arange(3)
+        values = made.values[:, :, None] * shares[grade]
+        flat = len(codes), 3 * slot.shape[1]
+        n = 3 * made.n // len(shares)
+        return Features(made.dense, places.reshape(flat), values.reshape(flat), n)
+
+    def disagreements(sums: Floats, _v: Any) -> tuple[Floats, Floats]:
+        d_o, d_e = formula.disagreements(sums, v)
+        return d_o, np.where(d_e > ROUNDING * v.max(), d_e, 0.0)  # 0 is rounded here
+
+    return replace(
+        formula,
+        features=features,
+        disagreements=disagreements,
+        slope=lambda sums, _v: formula.slope(sums, v),
+        rater_sums=None,
+        crossed_sums=None,
+    )
 
 
 def _whether_rated(codes: Codes, _v: Any, _repeats: Any = None) -> Features:

@@ -272,7 +272,7 @@ def test_what_cannot_be_left_out_has_the_delta_method() -> None:
     assert result.interval is not None
     assert "delta method" in result.interval.method
     assert "too many different grades" in result.interval.notes[0]
-    with pytest.raises(ParameterError, match='method="analytic" counts none'):
+    with pytest.raises(ParameterError, match='method="analytic"'):
         jackknife("fleiss_kappa", codes, target="items")
 
 
