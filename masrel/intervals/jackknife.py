@@ -115,7 +115,7 @@ def jackknife(
     )
     if clusters is not None:
         codes = clusters_of(problem, clusters)
-        jackknifed = _cluster_variance(problem, codes)
+        jackknifed = _jackknife_variance(problem, codes)
         return _interval_around_estimate(problem, jackknifed, "clusters")
     return _interval_around_estimate(problem, _jackknife_variance(problem))
 
@@ -152,28 +152,25 @@ class _JackknifeVariance:
     reason: str | None = None  # why it makes no interval, or None
 
 
-def _jackknife_variance(problem: IntervalProblem) -> _JackknifeVariance:
-    """Leave out items, raters, or both, as the target says."""
+def _jackknife_variance(
+    problem: IntervalProblem, clusters: Integers | None = None
+) -> _JackknifeVariance:
+    """Leave out items, raters, or both, as the target says, or clusters of items."""
     if math.isnan(problem.value):
         reason = "the estimate itself is undefined"
         return _JackknifeVariance(variance=math.nan, df=math.nan, reason=reason)
     variance, df = 0.0, problem.max_df
     notes: tuple[str, ...] = ()
-    units = _UNITS[problem.target]
+    units = _UNITS[problem.target] if clusters is None else ("clusters",)
     for unit in units:
-        if unit == "items":
-            freq, n = problem.freq, problem.n_paired_items
-            replicates = problem.values_without(problem.sums, problem.rows)
-        else:
-            replicates, freq = _without_rater(problem)
-            n = problem.n_paired_raters
+        replicates, freq, n = _without_one(problem, unit, clusters)
         if np.isnan(replicates).any():
             reason = f"with one of the {unit} left out the estimate is undefined"
             return _JackknifeVariance(variance=math.nan, df=math.nan, reason=reason)
         variance += _variance_of(replicates, freq, n)
         # Satterthwaite's degrees for a sum would lie above the fewer ones.
         df = min(df, n - 1)
-        notes += warn_small(n, 10 if unit == "items" else 5, unit, int(freq.sum()))
+        notes += warn_small(n, 5 if unit == "raters" else 10, unit, int(freq.sum()))
     if not variance > 0.0:
         reason = (
             f"leaving out any of the {' or '.join(units)} leaves the estimate as it "
@@ -183,30 +180,25 @@ def _jackknife_variance(problem: IntervalProblem) -> _JackknifeVariance:
     return _JackknifeVariance(variance=variance, df=df, notes=notes)
 
 
-def _cluster_variance(problem: IntervalProblem, codes: Integers) -> _JackknifeVariance:
-    """Leave out clusters of items."""
-    if math.isnan(problem.value):
-        reason = "the estimate itself is undefined"
-        return _JackknifeVariance(variance=math.nan, df=math.nan, reason=reason)
-    clusters = ClusterSums.of(problem, codes)
-    replicates, n = clusters.values_without(problem), clusters.n_paired
-    if n < 2 or np.isnan(replicates).any():
-        reason = "with one of the clusters left out the estimate is undefined"
-        return _JackknifeVariance(variance=math.nan, df=math.nan, reason=reason)
-    notes = warn_small(n, 10, "clusters", len(replicates))
-    variance = _variance_of(replicates, np.ones(len(replicates), dtype=np.int64), n)
-    if not variance > 0.0:
-        reason = (
-            "leaving out any of the clusters leaves the estimate as it is, so the "
-            "jackknife cannot say how uncertain it is"
-        )
-        return _JackknifeVariance(variance=0.0, df=math.nan, notes=notes, reason=reason)
-    return _JackknifeVariance(variance=variance, df=n - 1, notes=notes)
+def _without_one(
+    problem: IntervalProblem, unit: str, clusters: Integers | None
+) -> tuple[Floats, Integers, int]:
+    """Return estimates without a unit, how often each, and units that have a pair."""
+    if unit == "items":
+        values = problem.values_without(problem.sums, problem.rows)
+        return values, problem.freq, problem.n_paired_items
+    if clusters is not None:
+        made = ClusterSums.of(problem, clusters)
+        values, n = made.values_without(problem), made.n_paired
+    else:
+        of_raters = [problem.values(sums) for sums, _ in _rows_without_rater(problem)]
+        values, n = np.array(of_raters, dtype=np.float64), problem.n_paired_raters
+    return values, np.ones(len(values), dtype=np.int64), n
 
 
 def _logit_interval(problem: IntervalProblem, codes: Integers) -> Interval:
     """Leave out clusters of items, on a scale without ends."""
-    jackknifed = _cluster_variance(problem, codes)
+    jackknifed = _jackknife_variance(problem, codes)
     if jackknifed.reason is not None:
         return _interval_around_estimate(problem, jackknifed, "clusters")
     return problem.around(
@@ -230,12 +222,6 @@ def _variance_of(replicates: Floats, freq: Integers, n: int) -> float:
     deviations = moved - freq @ moved / freq.sum()
     variance = float((n - 1) / n * (freq @ deviations**2))
     return 0.0 if math.sqrt(variance) <= ROUNDING else variance
-
-
-def _without_rater(problem: IntervalProblem) -> tuple[Floats, Integers]:
-    """Return the estimate without each rater, and a 1 for each."""
-    values = [problem.values(sums) for sums, _ in _rows_without_rater(problem)]
-    return np.array(values, dtype=np.float64), np.ones(len(values), dtype=np.int64)
 
 
 def _rows_without_rater(problem: IntervalProblem) -> Iterator[tuple[Floats, Floats]]:
