@@ -38,10 +38,10 @@ def _features(codes: Codes, v: Any, _repeats: Integers | None = None) -> Feature
     return Features(dense, places, rated.astype(np.float64), q * codes.shape[1])
 
 
-def _of_raters(sums: Floats, v: Any) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    # of each rater: n_g (..., n_raters, 1) and n_gk (..., n_raters, q), how often it is
-    # taken, and Σ_l v_kl Σ_{h≠g} p_hl; and pairs (..., 1). A rater without ratings is
-    # taken 0 repeats; where raters are resampled, two have c_g c_h pairs.
+def _of_raters(sums: Floats, v: Any) -> tuple[Floats, ...]:
+    # of each rater: n_g (..., n_raters, 1), p_gk (..., n_raters, q), how often it is
+    # taken, and Σ_l v_kl Σ_{h≠g} p_hl; and pairs and D_e (..., 1). A rater without
+    # ratings is taken 0 times; where raters are resampled, two have c_g c_h pairs.
     n_raters = (sums.shape[-1] - 2) // (1 + len(v))
     n_g = sums[..., 2 : 2 + n_raters, None]
     n_gk = sums[..., 2 + n_raters :].reshape(*sums.shape[:-1], n_raters, len(v))
@@ -49,23 +49,22 @@ def _of_raters(sums: Floats, v: Any) -> tuple[Floats, Floats, Floats, Floats, Fl
     others = (shares.sum(axis=-2, keepdims=True) - shares) @ v
     taken = over(n_gk.sum(axis=-1, keepdims=True), n_g)
     n_pairs = taken.sum(axis=-2) ** 2 - (taken**2).sum(axis=-2)
-    return n_g, n_gk, taken, others, n_pairs
+    d_e = divide((others * shares).sum(axis=(-1, -2))[..., None], n_pairs)
+    return n_g, shares, taken, others, n_pairs, d_e
 
 
 def _disagreements(sums: Floats, v: Any) -> tuple[Floats, Floats]:
-    n_g, n_gk, _, others, n_pairs = _of_raters(sums, v)
-    between = (others * over(n_gk, n_g)).sum(axis=(-1, -2))[..., None]
-    return divide(sums[..., :1], sums[..., 1:2]), divide(between, n_pairs)
+    return divide(sums[..., :1], sums[..., 1:2]), _of_raters(sums, v)[-1]
 
 
 def _slope(sums: Floats, v: Any) -> Floats:
-    n_g, n_gk, taken, others, n_pairs = _of_raters(sums, v)
-    d_o, d_e = _disagreements(sums, v)
+    n_g, shares, taken, others, n_pairs, d_e = _of_raters(sums, v)
+    d_o = divide(sums[..., :1], sums[..., 1:2])
     # 2 Σ_l v_kl Σ_{h≠g} p_hl, less what a rater more adds to the number of pairs
     rest = taken.sum(axis=-2, keepdims=True) - taken
     moves = 2.0 * (others - d_e[..., None] * rest)
     of_k = divide(d_o, d_e**2 * n_pairs)[..., None] * over(moves, n_g)
-    of_g = -over((of_k * n_gk).sum(axis=-1, keepdims=True), n_g)
+    of_g = -(of_k * shares).sum(axis=-1, keepdims=True)
     of_d = divide(-1.0 / sums[..., 1:2], d_e)
     flat = [
         part.reshape(*sums.shape[:-1], part.shape[-1] * part.shape[-2])
