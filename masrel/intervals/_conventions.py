@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from masrel.agreement import COEFFICIENTS
-from masrel.agreement._engine import bilinear, standard_error
+from masrel.agreement._engine import disagreement_within, standard_error
 from masrel.agreement.category import _null_error
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
@@ -40,20 +40,25 @@ def _irrcac_of_alpha(problem: IntervalProblem, _estimate: Estimate) -> float:
     #   e_i = Σ_k n_ik Σ_l w_kl p_l / r - p_e (r_i - r)/r,   α' = (P' - p_e)/(1 - p_e),
     #   p_a = P' + (1 - P')/n,   SE² = Σ (x_i - α')² / (m (m - 1)).
     # It takes the factor of alpha for small samples into p_a, and out of all else.
-    counts, v = problem.item_counts().astype(np.float64), problem.v
-    counts = counts[counts.sum(axis=1) > 1]
-    size = counts.sum(axis=1)
-    m, mean = len(counts), size.mean()
-    p = counts.sum(axis=0) / size.sum()
-    p_e = 1.0 - p @ v @ p
-    of_items = size / mean - bilinear(counts, v, counts) / (mean * (size - 1.0))
-    agreement = of_items.mean()
-    p_a = agreement + (1.0 - agreement) / size.sum()
+    codes, v = problem.patterns.codes, problem.v
+    rated = codes >= 0
+    size, freq = rated.sum(axis=1), problem.freq  # every item has a pair of ratings
+    m, n = int(freq.sum()), float(freq @ size)
+    mean = n / m
+    often = np.broadcast_to(freq[:, None], codes.shape)[rated]
+    p = np.bincount(codes[rated], often, minlength=len(v)) / n
+    others = p @ v
+    p_e = 1.0 - others @ p
+    within = disagreement_within(codes, v, None)
+    of_items = size / mean - within / (mean * (size - 1.0))
+    agreement = freq @ of_items / m
+    p_a = agreement + (1.0 - agreement) / n
     alpha = (agreement - p_e) / (1.0 - p_e)
     excess = (size - mean) / mean
-    chance = (size - counts @ (p @ v)) / mean - p_e * excess
+    between = np.where(rated, others[codes], 0.0).sum(axis=1)
+    chance = (size - between) / mean - p_e * excess
     x = of_items - p_a * excess - p_e - 2.0 * (1.0 - alpha) * (chance - p_e)
-    squares = ((x / (1.0 - p_e) - alpha) ** 2).sum()
+    squares = freq @ (x / (1.0 - p_e) - alpha) ** 2
     return math.sqrt(squares / (m * (m - 1.0)))
 
 

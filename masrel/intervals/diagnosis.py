@@ -12,6 +12,7 @@ import numpy as np
 from masrel.agreement import CodedRatings, Label, Metric, WeightsLike
 from masrel.agreement._engine import Array, Floats, Integers, divide
 from masrel.agreement._rows import distinct_rows
+from masrel.agreement._weights import MANY
 from masrel.errors import MasrelWarning, ParameterError
 from masrel.estimates import Estimate
 from masrel.intervals._confusion import (
@@ -231,6 +232,12 @@ def diagnose(
     pose = partial(pose_problem, entry, target="items", weights=weights, level=level)
     problem = everybody = pose(ratings, categories=categories)
     coded = everybody.coded
+    if coded.n_categories > MANY:
+        raise ParameterError(
+            f"ratings: a table of confusions needs at most {MANY} different grades, "
+            f"got {coded.n_categories}; for measurements there are limits of agreement "
+            "and ICC"
+        )
     names = _names(ratings, raters, coded.codes.shape[1])
     right = None if reference is None else _place(reference, names)
     others = [place for place in range(len(names)) if place != right]

@@ -206,6 +206,12 @@ def test_what_does_not_fit_is_refused(options: dict[str, Any], message: str) -> 
         diagnose(drawn(), **options)
 
 
+def test_measurements_have_no_table_of_confusions() -> None:
+    measured = np.random.default_rng(1).normal(size=(700, 3))
+    with pytest.raises(ParameterError, match="at most 2000 different grades, got 2100"):
+        diagnose(measured, weights="quadratic")
+
+
 def test_few_items_are_warned_of_where_there_are_intervals() -> None:
     ratings = drawn(n=8)
     diagnose(ratings)
