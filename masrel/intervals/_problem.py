@@ -384,10 +384,10 @@ def _of_nodes(formula: Formula, coded: CodedRatings, line: Line | None) -> Formu
     if nodes is None:
         raise ParameterError(
             f"ratings: {len(coded.codes)} items of {coded.n_categories} different "
-            "grades are too many for an interval that counts each of them; kappas by "
-            "Cohen, Conger, Fleiss and Light and alpha with quadratic weights count "
-            'none, nor does method="analytic" for other items; intraclass correlations '
-            "(ICC) take measurements as they are"
+            f"grades are too many for an interval of {formula.title} that counts each "
+            "of them; kappas by Cohen, Conger, Fleiss and Light and alpha with "
+            'quadratic weights count none, nor does method="analytic" for other items; '
+            "intraclass correlations (ICC) take measurements as they are"
         )
     shares, v = nodes
 

@@ -229,15 +229,15 @@ def diagnose(
             f"coefficient: needs one of several raters, and {entry.title} is of each "
             "rater's grades of two sessions"
         )
-    pose = partial(pose_problem, entry, target="items", weights=weights, level=level)
-    problem = everybody = pose(ratings, categories=categories)
-    coded = everybody.coded
+    coded = entry.code(ratings, categories)
     if coded.n_categories > MANY:
         raise ParameterError(
             f"ratings: a table of confusions needs at most {MANY} different grades, "
             f"got {coded.n_categories}; for measurements there are limits of agreement "
             "and ICC"
         )
+    pose = partial(pose_problem, entry, target="items", weights=weights, level=level)
+    problem = everybody = pose(coded, categories=None)
     names = _names(ratings, raters, coded.codes.shape[1])
     right = None if reference is None else _place(reference, names)
     others = [place for place in range(len(names)) if place != right]
