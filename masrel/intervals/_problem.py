@@ -26,7 +26,7 @@ from masrel.agreement._distances import Distances, Line
 from masrel.agreement._engine import Features, Floats, Formula, RaterSums, check_level
 from masrel.agreement._labels import Codes
 from masrel.agreement._rows import distinct_rows, item_counts
-from masrel.agreement._weights import as_line, declared_weights
+from masrel.agreement._weights import Weights, as_line, declared_weights
 from masrel.errors import (
     ParameterError,
     SmallSampleWarning,
@@ -80,11 +80,17 @@ class IntervalProblem:
     # those with a pair of ratings, which degrees of freedom and rules for few count
     n_paired_items: int
     value: float  # the estimate; ``nan`` when undefined
-    min_value: float  # where intervals are cut
     target: Target
     level: float
     notes: tuple[str, ...] = ()  # of every interval
     max_df: float = math.inf  # degrees of freedom, where other parts have as few
+
+    @property
+    def min_value(self) -> float:
+        """Where intervals are cut."""
+        # weights, or items of a single rating, can bring a coefficient below -1
+        lowest: float = self.entry.lowest
+        return lowest if self.value >= lowest else -math.inf
 
     @property
     def n_raters(self) -> int:
@@ -261,54 +267,22 @@ def pose_problem(
     else:
         coded = entry.code(ratings, categories)
     _check_raters(entry, coded)
-    formula = entry.formula or _refuse_coefficient(entry)
-    made = (
-        declared_weights(weights, coded.categories, declared=coded.declared)
-        if entry.metric is None
-        else entry.disagreement(coded, weights)
-    )
-    v = made.v
-    notes: tuple[str, ...] = ()
-    if entry.metric == "ordinal" and coded.n_categories > _MAX_REMADE:
-        formula, notes = coefficient(entry.name).formula or formula, (HELD,)
-    if _are_too_many(formula, coded, v):
-        line = as_line(made, coded.categories)
-        v = v if line is None else line
-        formula = NO_SUMS if delta else _of_nodes(formula, coded, line)
+    made, formula, v, notes = _as_sums(entry, coded, weights, delta)
     used, distinct, freq, rows = _what_matters(entry, formula, coded, v)
-    matters, every_freq = np.asarray(rows.any(axis=1)), freq
-    patterns = distinct
-    if not matters.all():
-        patterns = replace(distinct, codes=distinct.codes[matters])
-        freq, rows = freq[matters], rows[matters]
-    sums = np.asarray(freq @ rows)
-    value = float(formula.value(sums, v))
+    parts = _of_rows(formula, v, distinct, freq, rows)
     if formula is NO_SUMS:
-        value = entry(coded, weights=weights).value
-    # a pair is of one rater in a test-retest, where rows without one do not matter
-    paired = (patterns.codes >= 0).sum(axis=1) >= 2
+        parts["value"] = entry(coded, weights=weights).value
     return IntervalProblem(
         entry=entry,
         formula=formula,
         coded=coded,
         used=used,
-        distinct=distinct,
-        distinct_freq=every_freq,
-        matters=matters,
-        patterns=patterns,
-        freq=freq,
-        rows=rows,
-        sums=sums,
         v=v,
         unweighted=made.counts_misses,
-        n_items=int(freq.sum()),
-        n_paired_items=int(freq @ paired),
-        value=value,
-        # weights, or items of a single rating, can bring a coefficient below -1
-        min_value=entry.lowest if value >= entry.lowest else -math.inf,
         target=target,
         level=level,
         notes=notes,
+        **parts,
     )
 
 
@@ -319,28 +293,57 @@ def rows_problem(
     # Takes codes (n_patterns, n_raters), freq (n_patterns,)
     distinct = replace(problem.coded, codes=codes)
     rows = problem.features(distinct)
-    matters = np.asarray(rows.any(axis=1))
-    patterns = replace(distinct, codes=codes[matters])
-    of_patterns, rows = freq[matters], rows[matters]
+    parts = _of_rows(problem.formula, problem.v, distinct, freq, rows)
+    return replace(problem, coded=distinct, used=distinct, **parts)
+
+
+def _of_rows(
+    formula: Formula,
+    v: Any,
+    distinct: CodedRatings,
+    freq: Integers,
+    rows: Floats,
+) -> dict[str, Any]:
+    """Return what distinct rows and their features make of a question."""
+    matters, patterns, of_patterns = rows.any(axis=1), distinct, freq
+    if not matters.all():
+        patterns = replace(distinct, codes=distinct.codes[matters])
+        of_patterns, rows = freq[matters], rows[matters]
     sums = np.asarray(of_patterns @ rows)
-    value = float(problem.values(sums))
+    value = float(formula.value(sums, v))
+    # a pair is of one rater in a test-retest, where rows without one do not matter
     paired = (patterns.codes >= 0).sum(axis=1) >= 2
-    return replace(
-        problem,
-        coded=distinct,
-        used=distinct,
-        distinct=distinct,
-        distinct_freq=freq,
-        matters=matters,
-        patterns=patterns,
-        freq=of_patterns,
-        rows=rows,
-        sums=sums,
-        n_items=int(of_patterns.sum()),
-        n_paired_items=int(of_patterns @ paired),
-        value=value,
-        min_value=problem.entry.lowest if value >= problem.entry.lowest else -math.inf,
-    )
+    return {
+        "distinct": distinct,
+        "distinct_freq": freq,
+        "matters": matters,
+        "patterns": patterns,
+        "freq": of_patterns,
+        "rows": rows,
+        "sums": sums,
+        "n_items": int(of_patterns.sum()),
+        "n_paired_items": int(of_patterns @ paired),
+        "value": value,
+    }
+
+
+def _as_sums(
+    entry: Coefficient, coded: CodedRatings, weights: "WeightsLike", delta: bool
+) -> tuple[Weights, Formula, Any, tuple[str, ...]]:
+    """Return weights, the formula of sums, the v that it takes, and notes."""
+    formula = entry.formula or _refuse_coefficient(entry)
+    if entry.metric is None:
+        made = declared_weights(weights, coded.categories, declared=coded.declared)
+    else:
+        made = entry.disagreement(coded, weights)
+    notes: tuple[str, ...] = ()
+    if entry.metric == "ordinal" and coded.n_categories > _MAX_REMADE:
+        formula, notes = coefficient(entry.name).formula or formula, (HELD,)
+    if not _are_too_many(formula, coded, made.v):
+        return made, formula, made.v, notes
+    line = as_line(made, coded.categories)
+    formula = NO_SUMS if delta else _of_nodes(formula, coded, line)
+    return made, formula, made.v if line is None else line, notes
 
 
 def _of_counted(
