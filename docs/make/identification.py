@@ -21,9 +21,9 @@ from masrel.lab.elbow import STANDARD_MODELS, fit, fit_friction
 from masrel.lab.elbow.identification._quantities import QUANTITIES
 from masrel.lab.report._figure_data import FrictionView, JointFitView
 from masrel.plots import draw
-from tests.elbow.identification.synthesis import Scatter, recording, study
-from tests.elbow.identification.test_friction import backdriven
-from tests.elbow.identification.test_lack_of_fit import (
+from tests.lab.elbow.identification.synthesis import Scatter, recording, study
+from tests.lab.elbow.identification.test_friction import backdriven
+from tests.lab.elbow.identification.test_lack_of_fit import (
     NAMES,
     RIGHT,
     TERMS,

@@ -10,10 +10,10 @@ from pathlib import Path
 
 from playwright.sync_api import Page, sync_playwright
 
-from tests.serve.browser.conftest import CHROMIUM, FLAGS
-from tests.serve.browser.serving import Server
-from tests.serve.browser.stages import Stage
-from tests.serve.browser.studies import make_study
+from tests.lab.serve.browser.conftest import CHROMIUM, FLAGS
+from tests.lab.serve.browser.serving import Server
+from tests.lab.serve.browser.stages import Stage
+from tests.lab.serve.browser.studies import make_study
 
 FIGURES = Path(__file__).parents[1] / "figures"
 

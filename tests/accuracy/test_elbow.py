@@ -7,8 +7,8 @@ import pytest
 from tqdm import tqdm
 
 from docs.make.accuracy import elbow
-from tests.elbow.exactness import errors
-from tests.elbow.scenes import corner_cases
+from tests.lab.elbow.exactness import errors
+from tests.lab.elbow.scenes import corner_cases
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.flow.cuts import masrel_command
+from tests.lab.flow.cuts import masrel_command
 
 SLOW = pytest.mark.slow
 ENCODINGS = [

@@ -22,7 +22,7 @@ from masrel.lab.protocol import (
     ScaleDefinition,
 )
 from tests.architecture.test_names import DIALECT, PREFIXES, bound
-from tests.protocol.documents import VALID
+from tests.lab.protocol.documents import VALID
 
 PAGES = {str(page.relative_to(ROOT)): page for page in pages()}
 TEXTS = {name: page.read_text(encoding="utf-8") for name, page in PAGES.items()}

@@ -20,7 +20,7 @@ import pytest
 
 from masrel.scales import MODIFIED_ASHWORTH
 from tests.golden.call import folder, masrel
-from tests.protocol.documents import changed, without, write
+from tests.lab.protocol.documents import changed, without, write
 
 TABLE = tomllib.loads(Path(__file__).with_name("refusals.toml").read_text("utf-8"))
 FILES: dict[str, str] = TABLE.pop("files")

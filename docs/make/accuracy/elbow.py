@@ -15,8 +15,8 @@ import numpy as np
 from tqdm import tqdm
 
 from docs.make.accuracy import cells
-from tests.elbow.exactness import Errors, errors
-from tests.elbow.scenes import KINDS, N_SEEDS, corner_cases, random_scene
+from tests.lab.elbow.exactness import Errors, errors
+from tests.lab.elbow.scenes import KINDS, N_SEEDS, corner_cases, random_scene
 
 PAGE = Path(__file__).parents[2] / "accuracy.md"
 HEADING = "\n## The joint model\n"

@@ -26,7 +26,7 @@ from masrel.lab.report._figure_data import MeasuredTorque
 from masrel.lab.report._measured_torque import measured_panel
 from masrel.plots import draw
 from masrel.tables._tables import SIMULATED
-from tests.hess.measured import NOTHING, measured, stretch, to_and_fro
+from tests.lab.hess.measured import NOTHING, measured, stretch, to_and_fro
 
 START, END = radians(30.0), radians(146.0)
 BACKDRIVE = to_and_fro(100.0 / 1.7)  # with a peak of 110 deg/s

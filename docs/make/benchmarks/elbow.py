@@ -33,8 +33,8 @@ from masrel.lab.elbow import (
 )
 from masrel.lab.elbow._scenes import EVENTS
 from tests.benchmarks.sidebyside import Timing, side_by_side
-from tests.elbow.ode import Ode
-from tests.elbow.reference import solved
+from tests.lab.elbow.ode import Ode
+from tests.lab.elbow.reference import solved
 
 N_SCENES = 10_000
 RATES_HZ = (100.0, 1e3, 1e4, 1e5)

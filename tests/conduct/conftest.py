@@ -1,5 +1,0 @@
-"""The small study of the sessions' tests."""
-
-from tests.run.conftest import new_study, small
-
-__all__ = ["new_study", "small"]

@@ -1,0 +1,164 @@
+"""The published study: Table V and what the paper says of it, worked by hand.
+
+Table V (raters R1 to R8 across):
+
+    HM1, built as grade 1:   1  1  1  1+ 1  1  1  1      7 x 1, 1 x 1+
+    HM2, built as grade 1+:  1+ 1+ 1+ 1+ 1+ 1  1+ 1      6 x 1+, 2 x 1
+    HM3, built as grade 2:   2  2  2  2  2  2  2  2      8 x 2
+    HM4, built as grade 3:   3  2  3  3  3  2  3  3      6 x 3, 2 x 2
+"""
+
+import math
+from collections import Counter
+from fractions import Fraction
+
+import msgspec
+import pytest
+from scipy import stats
+
+from masrel.lab.analysis import Analysis, analyze
+from tests.lab.analysis.studies import (
+    hess2012,
+    in_person,
+    plan,
+    protocol_with,
+    ratings,
+    table_v,
+)
+
+KAPPA = 0.626083678854127
+
+
+def published(*lines: object, sections: tuple[str, ...] = ()) -> Analysis:
+    return analyze(
+        protocol_with(*lines, sections=sections), table_v(), in_person=in_person()
+    )
+
+
+def rows_of_table_v() -> list[list[str]]:
+    table = table_v().table
+    return [list(table.loc[table["model"] == f"HM{n}", "grade"]) for n in (1, 2, 3, 4)]
+
+
+def fleiss(rows: list[list[str]]) -> Fraction:
+    """Fleiss (1971) in fractions: pairs that agree, and squares of the shares."""
+    n_raters = len(rows[0])
+    all_grades = Counter(grade for row in rows for grade in row)
+    n_pairs = n_raters * (n_raters - 1)
+    agreeing = sum(n * (n - 1) for row in rows for n in Counter(row).values())
+    observed = Fraction(agreeing, len(rows) * n_pairs)
+    total = sum(all_grades.values())
+    chance = sum((Fraction(n, total) ** 2 for n in all_grades.values()), Fraction(0))
+    return (observed - chance) / (1 - chance)
+
+
+def test_the_kappa_is_the_papers() -> None:
+    # Pairs of 28 that agree: 21 + (15 + 1) + 28 + (15 + 1) = 81, of 112. Shares of the
+    # 32 grades: 9 (1), 7 (1+), 10 (2), 6 (3): by chance (81 + 49 + 100 + 36) / 1024.
+    observed, chance = Fraction(81, 112), Fraction(266, 1024)
+    by_hand = (observed - chance) / (1 - chance)
+    (found,) = published(plan()).estimates
+    assert found.estimate is not None
+    assert found.estimate.value == pytest.approx(float(by_hand), abs=1e-14)
+    assert found.estimate.value == pytest.approx(KAPPA, abs=1e-15)
+    assert round(found.estimate.value, 3) == 0.626  # section IV.A of the paper
+    assert (found.estimate.observed, found.estimate.chance) == (
+        float(observed),
+        float(chance),
+    )
+    assert found.estimate.n_categories == 6  # 0 and 4 are of the scale, though unused
+    assert found.items == ("HM1", "HM2", "HM3", "HM4")
+    assert found.raters == tuple(f"R{n}" for n in range(1, 9))
+    assert (found.n_missing, found.reason) == (0, None)
+
+
+def test_the_interval_is_the_rater_jackknifes() -> None:
+    # Leave each rater out in turn; the error is sqrt((n - 1) / n * sum of squares of
+    # the deviations), times Student's t with 7 degrees of freedom.
+    rows = rows_of_table_v()
+    left_out = [
+        float(fleiss([[g for i, g in enumerate(row) if i != rater] for row in rows]))
+        for rater in range(8)
+    ]
+    centre = sum(left_out) / 8
+    error = math.sqrt(7 / 8 * sum((value - centre) ** 2 for value in left_out))
+    half = stats.t.ppf(0.975, 7) * error
+    (found,) = published(plan(interval="jackknife")).estimates
+    assert found.estimate is not None
+    interval = found.estimate.interval
+    assert interval is not None
+    assert interval.low == pytest.approx(KAPPA - half, abs=1e-12)
+    assert interval.high == pytest.approx(KAPPA + half, abs=1e-12)
+    assert (interval.low, interval.high) == pytest.approx((0.3196, 0.9325), abs=5e-5)
+    assert (interval.level, interval.target, interval.unit) == (
+        0.95,
+        "raters",
+        "raters",
+    )
+
+
+def test_the_intended_grade_was_given_as_the_paper_says() -> None:
+    # 7, 6, 8 and 6 of 8 raters. Mean (87.5 + 75 + 100 + 75) / 4 = 84.375; deviations
+    # 3.125, -9.375, 15.625, -9.375; squares 9.765625 + 87.890625 + 244.140625 +
+    # 87.890625 = 429.6875; over n - 1 = 3 that is 143.2292, its root 11.9678.
+    found = published(sections=("intended",)).intended
+    assert found is not None
+    assert [row.percent for row in found.models] == [87.5, 75.0, 100.0, 75.0]
+    assert [row.n_agree for row in found.models] == [7, 6, 8, 6]
+    assert {row.n_ratings for row in found.models} == {8}
+    assert found.mean == 84.375
+    assert found.sd == pytest.approx(math.sqrt(429.6875 / 3), abs=1e-12)
+    assert round(found.sd, 2) == 11.97
+    assert (found.session, found.reason) == ("test", None)
+
+
+def test_in_person_and_haptic_grades_are_equal_in_all_eleven_pairs() -> None:
+    # Table IV: four subjects, three raters, one of them absent once: 12 - 1 pairs.
+    found = published(sections=("in-person",)).in_person
+    assert found is not None
+    assert (found.n_pairs, found.n_equal, found.n_unpaired) == (11, 11, 1)
+    assert ("R3", "HM2") not in {(pair.rater, pair.model) for pair in found.pairs}
+    # R2 found subject 4 a 2, and so the model, which was built as a 3.
+    (r2,) = [p for p in found.pairs if (p.rater, p.model) == ("R2", "HM4")]
+    assert (r2.in_person, r2.haptic) == ("2", "2")
+
+
+def test_the_speeds_are_table_vs() -> None:
+    # HM4: 68, 65, 64, 72, 60, 65, 61, 60: sum 515, mean 64.375; squares of the
+    # deviations sum to 33275 - 515**2 / 8 = 121.875, over 7 the variance.
+    found = published(sections=("speeds",)).speeds
+    assert found is not None
+    (hm4,) = [summary for summary in found.by_model if summary.name == "HM4"]
+    assert (hm4.session, hm4.n, hm4.mean) == ("test", 8, 64.375)
+    assert hm4.sd == pytest.approx(math.sqrt(121.875 / 7), abs=1e-12)
+    assert (hm4.least, hm4.most) == (60.0, 72.0)
+    # R1: 122, 124, 108, 68: mean 105.5
+    (r1,) = [summary for summary in found.by_rater if summary.name == "R1"]
+    assert (r1.n, r1.mean) == (4, 105.5)
+    assert found.n_missing == 0
+
+
+def test_what_is_not_printed_in_the_paper_is_said_to_be_absent() -> None:
+    lines = hess2012().analysis.estimates
+    found = published(*(msgspec.structs.replace(a, interval="none") for a in lines))
+    reasons = {entry.line.id: entry.reason for entry in found.estimates}
+    assert reasons == {
+        "kappa-standard": None,
+        "kappa-standard-items": None,
+        "percent-standard": None,
+        "kappa-dummies": "no dummy model has ratings in session test",
+        "retest-standard": "there are no ratings of session retest",
+        "retest-dummies": "there are no ratings of session retest",
+    }
+    assert found.simulated is False
+
+
+def test_parts_no_section_asks_for_are_not_computed() -> None:
+    found = published(plan())
+    assert (found.intended, found.in_person, found.speeds) == (None, None, None)
+    assert published(sections=("traces",)).speeds is not None
+
+
+def test_simulated_ratings_are_said_to_be() -> None:
+    simulated = ratings(("test", "R1", "HM1", "1"), source="simulated")
+    assert analyze(protocol_with(), simulated).simulated is True

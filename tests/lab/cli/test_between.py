@@ -1,0 +1,212 @@
+"""``masrel between``: what it writes, what a study makes of it, what it refuses."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from masrel.lab.elbow import STANDARD_MODELS, intermediate_models
+from masrel.lab.protocol import elbow_parameters, read_model_file, read_protocol
+from tests.cli.process import Caller, Done
+
+STANDARDS = ("HM1", "HM2", "HM3", "HM4")
+PUBLISHED = Path(__file__).parents[3] / "studies" / "hess2012" / "protocol.toml"
+
+
+def refused(done: Done) -> str:
+    """The one sentence on stderr of a call that was wrong."""
+    assert done.code == 2
+    assert done.out == ""
+    (line,) = done.err.splitlines()
+    assert line.startswith("masrel: ")
+    return line.removeprefix("masrel: ")
+
+
+def simulated(path: Path, *, is_it: str = "true") -> Path:
+    """A model file that says whether it is simulated."""
+    path.write_text(
+        f'format = "masrel joint model 1"\nmade_from = "a test"\nsimulated = {is_it}\n'
+        "[model]\ncatch_angle_constant_deg = 125.0\ncatch_torque_nms_rad = 1.7\n"
+        "residual_ratio = 0.2\ncatch_travel_deg = 55.0\n",
+        encoding="utf-8",
+    )
+    return path
+
+
+def test_files_hold_the_models_of_the_rule(masrel: Caller, tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "dummies"
+    done = masrel("between", *STANDARDS, "-n", "12", "-o", folder)
+    assert done.code == 0
+    expected = intermediate_models(STANDARD_MODELS, 12)
+    assert sorted(path.stem for path in folder.iterdir()) == list(expected)
+    for name, joint in expected.items():
+        # degrees in the file: two roundings
+        made = read_model_file(folder / f"{name}.toml")
+        for field in ("catch_angle_constant", "catch_travel", "residual_ratio"):
+            assert getattr(made, field) == pytest.approx(
+                getattr(joint, field), rel=1e-15
+            )
+    text = (folder / "D02.toml").read_text(encoding="utf-8")
+    assert "2/5 of the way from HM1 to HM2" in text
+    assert "simulated = false" in text
+    assert "i/(n + 1) of the way" in done.out
+    assert str(folder) in done.err
+
+
+def test_a_study_can_name_them_and_has_the_published_dummies(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    study = tmp_path / "study"
+    assert masrel("init", study, "--study", "hess2012").code == 0
+    assert masrel("between", *STANDARDS, "-n", 12, "-o", study / "models").code == 0
+    protocol = study / "protocol.toml"
+    kept, in_dummy = [], False
+    for line in protocol.read_text(encoding="utf-8").splitlines():
+        key = line.split(" ")[0]
+        in_dummy = in_dummy and not line.startswith("[")
+        if line.startswith('id = "D'):
+            in_dummy = True
+            line = f'{line}\nfile = "models/{line[6:9]}.toml"'
+        elif in_dummy and key.startswith(("catch_", "residual_")):
+            continue
+        kept.append(line)
+    protocol.write_text("\n".join(kept) + "\n", encoding="utf-8")
+    (study / "published_secret.txt").unlink()
+    done = masrel("check", study)
+    assert done.code == 0
+    notes = done.err.splitlines()
+    assert all(note.startswith(f"note: {protocol}: device.") for note in notes)
+    written, named = read_protocol(PUBLISHED), read_protocol(protocol)
+    for number in range(1, 13):
+        name = f"D{number:02}"
+        one, two = elbow_parameters(written, name), elbow_parameters(named, name)
+        assert two.catch_travel == pytest.approx(one.catch_travel, rel=1e-14)
+        assert two.catch_torque_constant == pytest.approx(
+            one.catch_torque_constant, rel=1e-14
+        )
+
+
+def test_what_lies_next_to_simulated_is_simulated(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    file = simulated(tmp_path / "käte.toml")
+    done = masrel("between", "HM1", "HM2", file, "-n", "2", "--json", "-")
+    document = json.loads(done.out)
+    assert [model["simulated"] for model in document["models"]] == [False, True]
+    assert document["simulated"] is True
+    assert "käte" in document["models"][1]["made_from"]
+    assert "sha256" in document["models"][1]["made_from"]
+    shown = masrel("between", "HM1", "HM2", file, "-n", "2")
+    assert shown.out.startswith("SIMULATED DATA")
+
+
+def test_json_is_one_document_and_nothing_else(masrel: Caller, tmp_path: Path) -> None:
+    done = masrel("between", "HM1", "HM2", "-n", "1", "-o", tmp_path, "--json", "-")
+    document = json.loads(done.out)
+    (model,) = document["models"]
+    assert (model["name"], model["from"], model["to"]) == ("D01", "HM1", "HM2")
+    assert model["way"] == "1/2"
+    assert model["file"] == str(tmp_path / "D01.toml")
+    assert model["model"]["catch_torque_nms_rad"] == 1.7  # (1.4 + 2.0)/2
+    file = tmp_path / "all.json"
+    assert masrel("between", "HM1", "HM2", "-n", "1", "--json", file).code == 0
+    assert json.loads(file.read_text("utf-8"))["models"][0]["file"] is None
+
+
+def test_nothing_is_overwritten_unless_asked(masrel: Caller, tmp_path: Path) -> None:
+    (tmp_path / "D02.toml").write_text("mine", encoding="utf-8")
+    arguments = ("between", "HM1", "HM2", "-n", "2", "-o", tmp_path)
+    said = refused(masrel(*arguments))
+    assert said == (
+        f"--output: {tmp_path} holds D02.toml already; --overwrite replaces what is "
+        "there"
+    )
+    assert [path.name for path in tmp_path.iterdir()] == ["D02.toml"]
+    assert (tmp_path / "D02.toml").read_text(encoding="utf-8") == "mine"
+    assert masrel(*arguments, "--overwrite").code == 0
+    assert read_model_file(tmp_path / "D02.toml").residual_ratio == 0.25
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("HM1", "HM9", "-n", "1"), "MODEL: needs HM1, HM2, HM3, HM4 or a model file"),
+        (("HM1", "-n", "1"), "models: need two or more, got 1"),
+        (("HM1", "HM2", "HM1", "-n", "2"), "got two called HM1"),
+        (
+            ("HM1", "HM2", "-n", "0"),
+            "number of models: needs a multiple of 1, one or more",
+        ),
+        (
+            ("HM1", "HM2", "-n", "-3"),
+            "number of models: needs a multiple of 1, one or more",
+        ),
+        (("HM1", "HM2", "HM3", "-n", "3"), "number of models: needs a multiple of 2"),
+        (
+            ("HM1", "none.toml", "-n", "1"),
+            "needed a model file, got none.toml: No such",
+        ),
+        (("HM1", "HM2", "-n", "1", "--overwrite"), "--overwrite: needs --output"),
+    ],
+)
+def test_calls_that_are_wrong_are_refused(
+    masrel: Caller, arguments: tuple[str, ...], message: str
+) -> None:
+    assert message in refused(masrel("between", *arguments))
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"\xff\xfe\x00", "needed a model file, got"),
+        (b"not toml", "needed a model file, got"),
+        (b'format = "another"\n', 'whose format is "masrel joint model 1"'),
+        (b"", 'whose format is "masrel joint model 1"'),
+    ],
+)
+def test_files_that_are_no_models_are_refused(
+    masrel: Caller, tmp_path: Path, content: bytes, message: str
+) -> None:
+    path = tmp_path / "other.toml"
+    path.write_bytes(content)
+    said = refused(masrel("between", "HM1", path, "-n", "1"))
+    assert message in said
+    assert "other.toml" in said
+
+
+def test_a_file_that_hides_whether_it_is_simulated_is_refused(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    path = simulated(tmp_path / "a.toml", is_it='"no"')
+    said = refused(masrel("between", "HM1", path, "-n", "1"))
+    assert "a.toml: simulated must be true or false" in said
+    kept = path.read_text(encoding="utf-8").replace('simulated = "no"\n', "")
+    path.write_text(kept, encoding="utf-8")
+    assert "got nothing" in refused(masrel("between", "HM1", path, "-n", "1"))
+
+
+def test_models_that_read_the_law_differently_have_nothing_between(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    path = simulated(tmp_path / "a.toml")
+    with path.open("a", encoding="utf-8") as file:
+        file.write('[constants]\npost_catch = "additive"\n')
+    said = refused(masrel("between", "HM1", path, "-n", "1"))
+    assert said.startswith("models: HM1 and a need one post_catch")
+
+
+def test_a_folder_that_is_a_file_is_refused(masrel: Caller, tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_text("", encoding="utf-8")
+    said = refused(masrel("between", "HM1", "HM2", "-n", "1", "-o", path))
+    assert str(path) in said
+
+
+def test_json_may_lie_in_the_folder_that_is_made(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    folder = tmp_path / "new"
+    file = folder / "all.json"
+    done = masrel("between", "HM1", "HM2", "-n", "1", "-o", folder, "--json", file)
+    assert done.code == 0, done.err
+    assert sorted(path.name for path in folder.iterdir()) == ["D01.toml", "all.json"]

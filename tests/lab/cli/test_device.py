@@ -1,0 +1,146 @@
+"""``masrel device`` against an emulated puck."""
+
+import json
+import signal
+from pathlib import Path
+
+import pytest
+
+from masrel.lab.hess import puck
+from masrel.lab.hess.puck import steady_runs
+from tests.cli.process import Caller
+
+EMULATED = ("--channel", "cli", "--emulate")
+
+
+def test_probe_says_who_is_there(masrel: Caller) -> None:
+    done = masrel("device", "probe", *EMULATED)
+    assert done.code == 0
+    assert done.out.splitlines() == [
+        "puck 1: motor, firmware 148, asleep",
+        "(simulated: there is no hardware on this bus)",
+    ]
+    assert done.err == ""  # no terminal, no progress bar
+
+
+def test_probe_says_that_nobody_is_there(masrel: Caller) -> None:
+    done = masrel("device", "probe", "--interface", "virtual", "--channel", "empty")
+    assert done.code == 1
+    assert done.out.startswith("nobody answers\n")
+
+
+def test_probe_finds_the_node(masrel: Caller) -> None:
+    done = masrel("device", "probe", *EMULATED, "--puck", 5, "--json", "-")
+    document = json.loads(done.out)
+    assert document["simulated"] is True
+    assert [one["puck"] for one in document["found"]] == [5]
+    assert document["found"][0]["is_supported"] is True
+
+
+def test_check_looks_at_everything(masrel: Caller) -> None:
+    done = masrel("device", "check", *EMULATED)
+    assert done.code == 0
+    looked = [line.split(":")[0] for line in done.out.splitlines()[:-1]]
+    assert looked == [
+        "ok   units",
+        "ok   answers",
+        "ok   position",
+        "ok   rest",
+        "ok   torque mode",
+        "ok   error frames",
+    ]
+    assert "0 of 1000 lost" in done.out
+    assert "not zeroed yet" in done.out
+
+
+def test_zero_says_the_count(masrel: Caller, tmp_path: Path) -> None:
+    # 90 deg * 4096 * 18.8 / 360 = 19251.2
+    file = tmp_path / "zero.json"
+    done = masrel("device", "zero", "--angle-deg", 90, *EMULATED, "--json", file)
+    assert done.code == 0
+    assert done.out.startswith("the arm is at 90 deg: 19251 counts\n")
+    document = json.loads(file.read_text(encoding="utf-8"))
+    assert document.pop("format") == "masrel device zero 1"
+    assert document == {"angle_deg": 90.0, "counts": 19251, "simulated": True}
+
+
+def test_a_full_disk_loses_no_result(masrel: Caller) -> None:
+    done = masrel("device", "probe", *EMULATED, "--json", "/dev/full")
+    assert done.out.startswith("puck 1: motor, firmware 148, asleep\n")
+
+
+@pytest.mark.slow  # lab/hess/puck/test_documentation.py reads its lines by default
+def test_friction_finds_that_of_the_emulated_arm(masrel: Caller) -> None:
+    done = masrel("device", "friction", "--arm-is-free", *EMULATED, "--json", "-")
+    assert done.code == 0
+    found = json.loads(done.out)
+    assert found["viscous"] == pytest.approx(0.168, rel=0.015)  # (7)
+    assert found["coulomb"] == pytest.approx(0.189, rel=0.015)
+    assert abs(found["offset"]) < 0.002
+    assert len(found["runs"]) == 8
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_is_an_emergency_stop_while_the_arm_turns(
+    masrel: Caller, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    def signalled(*arguments, **options):
+        signal.raise_signal(signal.Signals[name])
+        return steady_runs(*arguments, **options)
+
+    monkeypatch.setattr(puck, "steady_runs", signalled)
+    done = masrel("device", "friction", "--arm-is-free", *EMULATED)
+    assert done.code == 1
+    assert f"emergency stop: signal {name}" in done.err
+    assert "Traceback" not in done.err
+
+
+def test_an_emulated_puck_has_the_gear_that_is_said(masrel: Caller) -> None:
+    # Its arm is held at 60 deg, whatever the gear and the direction
+    mirrored = (*EMULATED, "--direction", -1, "--gear-ratio", 9.4)
+    done = masrel("device", "friction", "--arm-is-free", *mirrored, "--json", "-")
+    assert done.code == 0
+    found = json.loads(done.out)
+    assert found["viscous"] == pytest.approx(0.168, rel=0.03)
+
+
+def test_friction_does_not_move_an_arm_unasked(masrel: Caller) -> None:
+    done = masrel("device", "friction", *EMULATED)
+    assert done.code == 2
+    assert "say --arm-is-free" in done.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (
+            ("check", "--emulate", "--interface", "socketcan"),
+            2,
+            "interface: needs 'virtual' for an emulated puck",
+        ),
+        (("check", "--puck", 9), 2, "puck: needs a motor's node, 1 to 7, got 9"),
+        (("zero", *EMULATED), 2, "Missing option '--angle-deg'"),
+        (("zero", "--angle-deg", 200, *EMULATED), 2, "200.0 is not in the range"),
+        (("zero", "--angle-deg", "nan", *EMULATED), 2, "angle: needs 0 to 180 deg"),
+        (
+            ("probe", *EMULATED, "--json", "/dev/full"),
+            2,
+            "/dev/full: needs to be a file",
+        ),
+        (("probe", *EMULATED, "--json", "no/x"), 2, "--json: needs a folder that"),
+        (("check", "--properties", "none.toml"), 2, "none.toml: No such file"),
+        (("check", "--channel", "can-none"), 1, "cannot open channel 'can-none'"),
+        (
+            ("check", "--interface", "virtual", "--channel", "empty"),
+            1,
+            "puck 1: no answer for property 5 within 50 ms",
+        ),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_one_line(
+    masrel: Caller, arguments: tuple, code: int, words: str
+) -> None:
+    done = masrel("device", *arguments)
+    assert done.code == code
+    assert words in done.err
+    assert "Traceback" not in done.err

@@ -1,0 +1,221 @@
+"""masrel fit: from files to a table, figures, and a model file for a protocol."""
+
+import csv
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.elbow.identification import Movement
+from masrel.lab.protocol import elbow_parameters, read_protocol
+from tests.cli.process import Caller
+from tests.lab.elbow.identification.synthesis import Arm, study
+from tests.lab.elbow.identification.test_friction import backdriven
+from tests.lab.protocol.documents import VALID, write
+
+
+def put(movement: Movement, folder: Path) -> Path:
+    path = folder / f"{movement.name.replace(' ', '_')}.csv"
+    with path.open("w", encoding="utf-8", newline="") as file:
+        file.write("# simulated: true\n")
+        writer = csv.writer(file)
+        writer.writerow(["time_s", "angle_deg", "torque_nm"])
+        columns = movement.time, np.degrees(movement.angle), movement.torque
+        writer.writerows(zip(*(c.tolist() for c in columns), strict=True))
+    return path
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("recordings")
+    made = study(STANDARD_MODELS["HM3"], seed=21, n_slow=3, n_fast=6)
+    return [put(movement, folder) for movement in made]
+
+
+def test_a_fit_goes_into_a_protocol(
+    masrel: Caller, files: list[Path], tmp_path: Path
+) -> None:
+    done = masrel(
+        "fit", *files, "-o", tmp_path / "s3.toml", "--json", tmp_path / "fit.json"
+    )
+    assert done.code == 0, done.err
+    assert "SIMULATED DATA" in done.out
+    assert "3 slow and 6 fast trials" in done.out
+    model = tomllib.loads((tmp_path / "s3.toml").read_text(encoding="utf-8"))
+    assert model["simulated"] is True
+    assert len(model["recordings"]) == 9
+    document = json.loads((tmp_path / "fit.json").read_text(encoding="utf-8"))
+    fitted = {e["key"]: e["value"] for e in document["estimates"]}
+    protocol = dict(VALID)
+    entry = {"id": "S3", "file": "s3.toml"}
+    protocol["models"] = [entry, *VALID["models"][1:]]
+    joint = elbow_parameters(read_protocol(write(protocol, tmp_path)), "S3")
+    assert joint.damping == fitted["damping_nms_rad"]
+    assert joint.residual_ratio == fitted["residual_ratio"]
+    assert joint.catch_slope == pytest.approx(0.35, rel=0.1)
+
+
+def test_a_fit_says_whether_it_fits_everywhere(
+    masrel: Caller, files: list[Path], tmp_path: Path
+) -> None:
+    done = masrel(
+        "fit", *files, "-o", tmp_path / "m.toml", "--json", tmp_path / "f.json"
+    )
+    document = json.loads((tmp_path / "f.json").read_text(encoding="utf-8"))
+    lack = document["lack_of_fit"]
+    assert lack["verdict"] == "fits"
+    assert lack["sentence"] in done.out
+    assert "From the catch on" in done.out
+    assert "Noise at rest" in done.out
+    assert {"runs", "autocorrelation", "sd_nm"} <= set(lack["phases"][0])
+    model = tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))
+    assert model["remarks"][0] == lack["sentence"]
+    assert model["lack_of_fit"]["verdict"] == "fits"
+    assert model["lack_of_fit"]["explained"] == lack["explained"]
+
+
+@pytest.mark.slow
+def test_fits_are_compared(masrel: Caller, files: list[Path], tmp_path: Path) -> None:
+    done = masrel("fit", *files, "--compare", "--json", tmp_path / "f.json")
+    assert done.code == 0, done.err
+    assert "Fits compared by leaving trials out" in done.out
+    document = json.loads((tmp_path / "f.json").read_text(encoding="utf-8"))
+    compared = document["comparison"]
+    assert [each["fitted"] for each in compared] == [
+        [],
+        ["gravity"],
+        ["arm_inertia"],
+        ["drift"],
+        ["lag"],
+        ["rise"],
+    ]
+    assert sum(each["chosen"] for each in compared) == 1
+
+
+def test_json_on_stdout_is_one_document_and_nothing_else(
+    masrel: Caller, files: list[Path]
+) -> None:
+    done = masrel("fit", *files[:3], "--json", "-")
+    document = json.loads(done.out)
+    missing = {e["key"]: e for e in document["estimates"]}["catch_slope_s"]
+    assert missing["value"] is None
+    assert "only slow stretches" in missing["reason"]
+    assert [trial["pace"] for trial in document["trials"]] == ["slow"] * 3
+    assert document["simulated"] is True
+
+
+def test_only_slow_trials_make_no_model_file(
+    masrel: Caller, files: list[Path], tmp_path: Path
+) -> None:
+    done = masrel("fit", *files[:3], "-o", tmp_path / "s3.toml")
+    assert done.code == 2
+    assert "Parameters of the joint" in done.out  # what there is, is shown
+    assert "catch_angle_constant: there are only slow stretches" in done.err
+    assert not (tmp_path / "s3.toml").exists()
+
+
+def test_figures_are_drawn(masrel: Caller, files: list[Path], tmp_path: Path) -> None:
+    folder = tmp_path / "new"  # where JSON may lie, too
+    more = ("--json", folder / "a.json", "--quiet")
+    done = masrel("fit", *files, "--figures", folder, *more)
+    assert done.code == 0, done.err
+    names = ("fit_catches", "fit_residuals", "fit_slow", "fit_trials")
+    drawn = [f"{name}.{form}" for name in names for form in ("png", "svg")]
+    assert sorted(path.name for path in folder.iterdir()) == ["a.json", *drawn]
+
+
+def test_friction_is_fitted_and_drawn(masrel: Caller, tmp_path: Path) -> None:
+    path = put(backdriven(1), tmp_path)
+    done = masrel(
+        "fit", path, "--friction", "--figures", tmp_path / "out", "--json", "-"
+    )
+    assert done.code == 0, done.err
+    document = json.loads(done.out)
+    values = {e["key"]: e["value"] for e in document["estimates"]}
+    assert values["viscous_nms_rad"] == pytest.approx(0.168, rel=0.02)
+    assert (tmp_path / "out" / "fit_friction.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--unit", "torque"], "--unit: needs QUANTITY=TEXT, got 'torque'"),
+        (["--unit", "torque=lb"], "torque needs one of nm, mnm, ncm, got 'lb'"),
+        (["--unit", "angle=rad"], "column angle_deg says deg, units says rad"),
+        (["--column", "torque=Moment"], "needs the column 'Moment'"),
+        (["--friction", "-o", "x.toml"], "a model file is of a joint"),
+        (["--level", "2"], "level: needs more than 0.5"),
+        (["--gravity", "much"], "needs off, fitted or a number, got 'much'"),
+        (["--rise", "0.2"], "rise: needs 0 to ΔT_peak, 0.1 s, got 0.2 s"),
+        (["--lag", "-1"], "lag: needs 0 or more, got -1"),
+    ],
+)
+def test_a_wrong_call_is_one_sentence(
+    masrel: Caller, files: list[Path], arguments: list[str], said: str
+) -> None:
+    done = masrel("fit", *files[:2], *arguments)
+    assert done.code == 2
+    assert said in done.err
+    assert "Traceback" not in done.err
+
+
+def test_a_file_that_is_not_there_is_named(masrel: Caller) -> None:
+    done = masrel("fit", "absent.csv")
+    assert done.code == 2
+    assert "absent.csv: no such file" in done.err
+
+
+def test_options_of_a_joint_are_refused_for_a_device(
+    masrel: Caller, files: list[Path]
+) -> None:
+    for option, value in (
+        ("--slow-below", "10"),
+        ("--inertia", "fitted"),
+        ("--post-catch", "additive"),
+        ("--gravity", "fitted"),
+    ):
+        done = masrel("fit", "--friction", files[0], option, value)
+        assert done.code == 2
+        assert done.err == (
+            f"masrel: {option}: says something of a joint, not of a device "
+            "(--friction)\n"
+        )
+
+
+@pytest.mark.parametrize("speed", ["-3", "0", "nan", "inf"])
+def test_a_limit_that_is_none_is_refused_in_its_unit(
+    masrel: Caller, files: list[Path], speed: str
+) -> None:
+    done = masrel("fit", files[0], "--slow-below", speed)
+    assert done.code == 2
+    assert done.err == (
+        f"masrel: --slow-below: needs more than 0 deg/s and finite, got {speed}\n"
+    )
+
+
+def test_only_fast_stretches_are_refused_with_the_option(
+    masrel: Caller, files: list[Path]
+) -> None:
+    done = masrel("fit", *(file for file in files if "fast" in file.name))
+    assert done.code == 2
+    assert done.err.startswith("masrel: recordings: b and k need a slow stretch")
+    assert done.err.endswith(" deg/s. --slow-below raises the limit\n")
+
+
+def test_an_inertia_below_0_is_refused(masrel: Caller, tmp_path: Path) -> None:
+    arm = Arm(inertia=-0.05)
+    made = study(STANDARD_MODELS["HM3"], seed=21, n_slow=3, n_fast=6, arm=arm)
+    done = masrel(
+        "fit", *(put(each, tmp_path) for each in made), "--arm-inertia", "fitted"
+    )
+    assert (done.code, done.out) == (2, "")
+    assert "this is not the law: J of all trials is -0.0" in done.err
+
+
+def test_a_folder_is_no_recording(masrel: Caller, tmp_path: Path) -> None:
+    done = masrel("fit", tmp_path)
+    assert (done.code, done.out) == (2, "")
+    assert done.err == f"masrel: {tmp_path}: a folder; needs a file\n"

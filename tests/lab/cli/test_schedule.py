@@ -1,0 +1,210 @@
+"""``masrel schedule``: what it draws, shows and copies."""
+
+import itertools
+import json
+from pathlib import Path
+
+import pytest
+
+from masrel.lab.protocol import StudyPaths
+from masrel.lab.schedule import read_schedule
+from tests.cli.process import Caller
+from tests.lab.protocol.documents import VALID, changed, write
+
+
+def study_of(folder: Path, scheme: str = "williams", **rules: object) -> StudyPaths:
+    """A study of two sites, four models and six raters in one session."""
+    document = changed("schedule", to={"seed": 5, "scheme": scheme, **rules})
+    first, second = VALID["models"]
+    document["models"] = [
+        first,
+        second,
+        {**second, "id": "D2"},
+        {**first, "id": "HM2", "intended_grade": "2"},
+    ]
+    document["raters"] = [
+        {"id": f"R{n}", "site": "north" if n < 5 else "south"} for n in range(1, 7)
+    ]
+    document["sessions"] = [{"id": "test", "raters": [f"R{n}" for n in range(1, 7)]}]
+    document["analysis"] = {}
+    folder.mkdir()
+    return StudyPaths(write(document, folder).parent)
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> StudyPaths:
+    return study_of(tmp_path / "study", strata="site")
+
+
+def test_a_site_is_drawn_and_the_other_later(masrel: Caller, study: StudyPaths) -> None:
+    assert "4 drawn, 0 kept" in masrel("schedule", study.root, "--site", "north").out
+    assert "2 drawn, 4 kept" in masrel("schedule", study.root).out
+    assert "0 drawn, 2 kept" in masrel("schedule", study.root, "--site", "south").out
+
+
+def test_a_complete_design_shows_its_balance(masrel: Caller, study: StudyPaths) -> None:
+    masrel("schedule", study.root)
+    shown = masrel("schedule", study.root, "--show", "--site", "north")
+    assert shown.code == 0
+    lines = shown.out.splitlines()
+    assert lines[1].startswith("Not for raters")
+    # 4 rows of a Williams design of 4: each model once in each place, each pair once
+    row = next(line.split() for line in lines if line.startswith("test"))
+    assert row[:8] == ["test", "north", "4", "4", "1", "1", "0", "1"]
+    places = lines.index(
+        "How often each model stands in each place, session test, site north"
+    )
+    assert [line.split() for line in lines[places + 3 : places + 7]] == [
+        [model, "1", "1", "1", "1"] for model in ("HM1", "D1", "D2", "HM2")
+    ]
+
+
+def test_every_count_is_that_of_the_files(masrel: Caller, study: StudyPaths) -> None:
+    masrel("schedule", study.root)
+    document = json.loads(masrel("schedule", study.root, "--show", "--json", "-").out)
+    assert [of["site"] for of in document["sessions"]] == ["north", "south"]
+    south = document["sessions"][1]
+    models = south["models"]
+    places = [[0] * 4 for _ in models]
+    pairs = [[0] * 4 for _ in models]
+    for rater in ("R5", "R6"):
+        schedule = read_schedule(study.schedule_file(rater, "test"))
+        order = [models.index(shown.model) for shown in schedule.presentations]
+        for place, model in enumerate(order):
+            places[model][place] += 1
+        for model, following in itertools.pairwise(order):
+            pairs[model][following] += 1
+    assert (south["places"], south["pairs"]) == (places, pairs)
+    assert south["model_runs"] == [1, 1]
+
+
+def test_runs_of_models_grades_and_standards_are_counted(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    study = study_of(tmp_path / "study", "blocks", blocks_by="role", repeats=3)
+    masrel("schedule", study.root)
+    (of,) = json.loads(masrel("schedule", study.root, "--show", "--json", "-").out)[
+        "sessions"
+    ]
+    assert of["standard_runs"] == [6] * 6
+    for index, rater in enumerate(f"R{n}" for n in range(1, 7)):
+        schedule = read_schedule(study.schedule_file(rater, "test"))
+        text = " ".join(shown.model for shown in schedule.presentations)
+        runs = {n for n in (1, 2, 3) for m in of["models"] if " ".join([m] * n) in text}
+        assert of["model_runs"][index] == max(runs)
+        assert of["grade_runs"][index] <= of["model_runs"][index]
+
+
+def test_showing_draws_nothing_and_the_figure_is_the_same_each_time(
+    masrel: Caller, study: StudyPaths, tmp_path: Path
+) -> None:
+    none = masrel("schedule", study.root, "--show")
+    assert none.code != 0
+    assert not study.schedules.exists()
+    masrel("schedule", study.root)
+    before = {path: path.read_bytes() for path in study.schedules.iterdir()}
+    files = [tmp_path / f"{name}.svg" for name in "ab"]
+    for file in files:
+        assert masrel("schedule", study.root, "--show", "--figure", file).code == 0
+    assert files[0].read_bytes() == files[1].read_bytes()
+    assert {path: path.read_bytes() for path in study.schedules.iterdir()} == before
+
+
+def test_a_copy_for_a_site_draws_and_verifies_by_itself(
+    masrel: Caller, study: StudyPaths, tmp_path: Path
+) -> None:
+    copy = StudyPaths(tmp_path / "south")
+    made = masrel("schedule", study.root, "--site", "south", "--copy-to", copy.root)
+    assert (
+        made.out
+        == f"{copy.root}: a copy of the study with the secret of south alone.\n"
+    )
+    assert not study.schedules.exists()
+    assert "2 drawn, 0 kept" in masrel("schedule", copy.root, "--site", "south").out
+    masrel("schedule", study.root)
+    for rater in ("R5", "R6"):
+        file = study.schedule_file(rater, "test")
+        assert copy.schedule_file(rater, "test").read_bytes() == file.read_bytes()
+    for each in (study, copy):
+        verified = masrel("verify", each.root)
+        assert verified.code == 0, verified.err
+        checked = masrel("check", each.root)
+        assert checked.code == 0, checked.err
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (["--copy-to", "x"], "--copy-to: needs --site, got it alone"),
+        (["--figure", "x.png"], "--figure: needs --show, got it alone"),
+        (["--json", "-"], "--json: needs --show, got it alone"),
+        (["--show", "--redraw"], "--show: draws nothing, so needs no --redraw"),
+        (["--site", "east"], "site: needed one of north, south, got 'east'"),
+        (["--show"], "schedules: needed drawn schedules, got none"),
+    ],
+)
+def test_options_that_do_not_go_together_are_refused(
+    masrel: Caller, study: StudyPaths, options: list[str], sentence: str
+) -> None:
+    refused = masrel("schedule", study.root, *options)
+    assert refused.code != 0
+    assert sentence in refused.err
+    assert not study.schedules.exists()
+
+
+def test_a_row_that_was_forged_is_broken(masrel: Caller, study: StudyPaths) -> None:
+    masrel("schedule", study.root)
+    file = study.schedule_file("R1", "test")
+    text = file.read_text(encoding="utf-8")
+    file.write_text(text.replace("# row: 1", "# row: 4"), encoding="utf-8")
+    verified = masrel("verify", study.root)
+    assert verified.code == 2
+    assert f"broken: {file}: needed row 1, by {study.conduct_file}, got row 4" in (
+        verified.err
+    )
+
+
+def test_sites_that_drew_by_themselves_are_merged(
+    masrel: Caller, study: StudyPaths, tmp_path: Path
+) -> None:
+    south, both = tmp_path / "south", tmp_path / "both"
+    masrel("schedule", study.root, "--site", "south", "--copy-to", south)
+    masrel("schedule", study.root, "--site", "north")
+    masrel("schedule", south, "--site", "south")
+    merged = masrel("merge", study.root, south, "-o", both)
+    assert merged.code == 0, merged.err
+    assert masrel("verify", both).code == 0
+    assert "0 drawn, 6 kept" in masrel("schedule", both).out
+    # what the whole study would have drawn, and nothing else
+    masrel("schedule", study.root)
+    for file in sorted(study.schedules.glob("test_*.csv")):
+        assert (both / "schedules" / file.name).read_bytes() == file.read_bytes()
+
+
+def test_a_copy_without_the_secret_is_not_merged(
+    masrel: Caller, study: StudyPaths, tmp_path: Path
+) -> None:
+    other = tmp_path / "south"
+    other.mkdir()
+    (other / "protocol.toml").write_bytes(study.protocol.read_bytes())
+    masrel("schedule", study.root, "--site", "north")
+    masrel("schedule", other, "--site", "south")
+    refused = masrel("merge", study.root, other, "-o", tmp_path / "both")
+    assert refused.code == 2
+    assert "commitment" in refused.err
+    assert not (tmp_path / "both").exists()
+
+
+def test_the_copy_of_a_site_is_about_that_site_alone(
+    masrel: Caller, study: StudyPaths, tmp_path: Path
+) -> None:
+    copy = tmp_path / "south"
+    masrel("schedule", study.root, "--site", "south", "--copy-to", copy)
+    before = json.loads(masrel("status", copy, "--json", "-").out)
+    assert [session["rater"] for session in before["sessions"]] == ["R5", "R6"]
+    assert before["next"]["command"] == f"masrel schedule {copy}"
+    done = masrel("schedule", copy)
+    assert done.code == 0
+    assert "2 drawn, 0 kept" in done.out
+    after = json.loads(masrel("status", copy, "--json", "-").out)
+    assert after["next"]["command"].startswith(f"masrel run {copy} --rater ")

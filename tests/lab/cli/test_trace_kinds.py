@@ -1,0 +1,240 @@
+"""masrel trace of other kinds of joints, and the angles of the Tardieu scale."""
+
+import csv
+import json
+import re
+from math import degrees, radians
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from masrel.cli import cli
+from masrel.errors import MasrelError
+from masrel.lab.elbow import MODELS, ConstantSpeed
+from masrel.lab.elbow.tone import ClaspKnife, Contracture, ToneModel
+
+KINDS = [kind for kind, law in MODELS.items() if issubclass(law, ToneModel)]
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(
+        cli, ["trace", *map(str, arguments)], catch_exceptions=True
+    )
+
+
+def document(*arguments: object) -> dict:
+    done = run(*arguments, "--json", "-")
+    assert done.exit_code == 0, done.output
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_has_its_events_and_its_exact_torque(kind: str) -> None:
+    scene = document("--kind", kind, "--speed-deg-s", 90, "--at-s", 0.5, "--at-s", 0.9)
+    joint = MODELS[kind]()
+    assert isinstance(joint, ToneModel)
+    stretch = ConstantSpeed(start=radians(30), end=joint.range_end, speed=radians(90))
+    assert scene["model"] == scene["kind"] == kind
+    assert scene["to_deg"] == pytest.approx(degrees(joint.range_end))
+    assert [
+        (e["name"], e["time_s"], radians(e["angle_deg"])) for e in scene["events"]
+    ] == [
+        (event.name, event.time, pytest.approx(event.angle))
+        for event in joint.events(stretch)
+    ]
+    assert [row["torque_nm"] for row in scene["torque_at_s"]] == joint.torque(
+        stretch, [0.5, 0.9]
+    ).tolist()
+    bound = joint.largest_torque(start_angle=stretch.start, speed=radians(90))
+    assert 0.0 < scene["peak_torque_nm"] <= bound * (1.0 + 1e-12)
+    assert scene["phases"][-1]["end_s"] == pytest.approx(stretch.duration)
+
+
+def test_a_clasp_knife_by_hand() -> None:
+    # Fires where 3.32 (θ - 56.27° + 0.25 s · 90°/s) = 3 N·m: at 85.543°, 0.61715 s.
+    scene = document("--kind", "clasp-knife", "--speed-deg-s", 90)
+    assert scene["catch_angle_deg"] == pytest.approx(85.5433, abs=1e-4)
+    times = {event["name"]: event["time_s"] for event in scene["events"]}
+    assert times["fire"] == pytest.approx(0.61715, abs=1e-5)
+    assert times["release"] == pytest.approx(0.66715, abs=1e-5)
+    assert scene["peak_torque_nm"] == pytest.approx(3.9419, abs=1e-4)
+
+
+def test_its_numbers_are_those_of_a_protocol() -> None:
+    options = ("--kind", "contracture", "--parameter", "end_angle_deg=100")
+    more = ("--parameter", "range_end_deg=110", "--at-deg", 105, "--speed-deg-s", 60)
+    scene = document(*options, *more)
+    joint = Contracture(end_angle=radians(100), range_end=radians(110))
+    stretch = ConstantSpeed(start=radians(30), end=radians(110), speed=radians(60))
+    (row,) = scene["torque_at_deg"]
+    assert row["angle_deg"] == 105
+    assert row["torque_nm"] == pytest.approx(float(joint.torque(stretch, [1.25])[0]))
+
+
+def test_kinds_and_models_are_scenes_beside_each_other(tmp_path: Path) -> None:
+    names = ("--model", "HM3", "--kind", "clonus", "--kind", "lead-pipe-rigidity")
+    samples = tmp_path / "samples.csv"
+    figure = tmp_path / "figure.png"
+    made = document(
+        *names, "--speed-deg-s", 90, "--csv", samples, "--figure", figure, "--view",
+        "time",
+    )  # fmt: skip
+    assert [s["model"] for s in made["scenes"]] == [
+        "HM3",
+        "clonus",
+        "lead-pipe-rigidity",
+    ]
+    assert figure.read_bytes().startswith(b"\x89PNG")
+    with samples.open(encoding="utf-8") as file:
+        assert file.readline() == "# simulated: true\n"
+        rows = list(csv.DictReader(file))
+    of_pipe = [row for row in rows if row["model"] == "lead-pipe-rigidity"]
+    joint = MODELS["lead-pipe-rigidity"]()
+    stretch = ConstantSpeed(start=radians(30), end=radians(146), speed=radians(90))
+    times = [float(row["time_s"]) for row in of_pipe]
+    torques = [float(row["torque_nm"]) for row in of_pipe]
+    assert len(times) == 1289
+    assert isinstance(joint, ToneModel)
+    np.testing.assert_allclose(torques, joint.torque(stretch, times), atol=2e-6)
+    assert {row["phase"] for row in rows if row["model"] == "clonus"} == {
+        "pre-catch",
+        "catch",
+    }
+
+
+def test_a_model_of_a_study_may_be_of_another_kind() -> None:
+    study = Path(__file__).parents[3] / "studies" / "tone"
+    scene = document("--study", study, "--model", "L3", "--speed-deg-s", 90)
+    assert (scene["model"], scene["kind"]) == ("L3", "lead-pipe-rigidity")
+    stretched = document("--kind", "lead-pipe-rigidity", "--speed-deg-s", 90)
+    assert scene["peak_torque_nm"] == stretched["peak_torque_nm"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (
+            ("--kind", "clonis"),
+            "--kind: needed one of spastic-elbow, .*; did you mean clonus",
+        ),
+        (("--kind", "spastic-elbow"), "--kind: needs another kind than spastic-elbow"),
+        (
+            ("--kind", "clonus", "--parameter", "x=1"),
+            '--parameter x: needed a key of kind "clonus"',
+        ),
+        (
+            ("--kind", "clonus", "--parameter", "delay_s=-1"),
+            "--parameter delay_s: needed 0 or more, got -1.0",
+        ),
+        (
+            ("--kind", "clonus", "--parameter", "delay_s"),
+            "--parameter: needs KEY=VALUE with a number, got 'delay_s'",
+        ),
+        (
+            ("--kind", "clonus", "--kind", "dystonia", "--parameter", "delay_s=1"),
+            "--parameter: goes with one --kind, whose it is",
+        ),
+        (
+            ("--kind", "contracture", "--to-deg", 140),
+            "--to-deg: needs at most the end of range of every model, 125 deg, got 140",
+        ),
+        (
+            ("--kind", "clonus", "--output", "work"),
+            "--output: needs spastic elbows, got clonus",
+        ),
+        (("--kind", "clonus", "--rest-deg", 20), "need a spastic elbow, got clonus"),
+        (("--kind", "clonus", "--at-s", 9), "--at-s: needs times within the motion"),
+        (
+            ("--kind", "clonus", "--figure", "x.png", "--view", "schematic"),
+            "--view schematic: shows the catch of a spastic elbow, got other kinds too",
+        ),
+    ],
+)
+def test_what_cannot_be_traced_is_one_sentence(
+    arguments: tuple[object, ...], words: str
+) -> None:
+    done = run(*arguments, "--speed-deg-s", 90)
+    assert isinstance(done.exception, MasrelError)
+    assert re.search(words, str(done.exception))
+
+
+# Tardieu
+
+
+def test_tardieu_of_hm1_by_hand() -> None:
+    # (2): L - α·v = 130 - 0.35 · 100 and · 150 deg; at 10 deg/s nothing catches.
+    made = document("--tardieu", "--model", "HM1")
+    assert list(made) == [
+        "format",
+        "model",
+        "kind",
+        "from_deg",
+        "r2_deg",
+        "r1_deg",
+        "difference_deg",
+        "catches",
+    ]
+    assert made["kind"] == "spastic-elbow"
+    angles = [made[key] for key in ("r2_deg", "r1_deg", "difference_deg")]
+    assert angles == pytest.approx([146.0, 77.5, 68.5])
+    assert [catch["name"] for catch in made["catches"]] == ["V1", "V2", "V3"]
+    speeds = [catch["speed_deg_s"] for catch in made["catches"]]
+    assert speeds == pytest.approx([10.0, 100.0, 150.0])
+    slow, *fast = [catch["catch_angle_deg"] for catch in made["catches"]]
+    assert slow is None
+    assert fast == pytest.approx([95.0, 77.5])
+
+
+def test_a_contracture_has_no_difference_and_speeds_can_be_chosen() -> None:
+    made = document(
+        "--tardieu", "--kind", "contracture", "--kind", "clasp-knife",
+        "--speed-deg-s", 5, "--speed-deg-s", 90, "--speed-deg-s", 120,
+    )["tardieu"]  # fmt: skip
+    assert made[0]["difference_deg"] == 0.0
+    assert made[0]["r1_deg"] == made[0]["r2_deg"] == pytest.approx(125.0)
+    # 3.32 (θ - 56.27° + 0.25 s · 120°/s) = 3 N·m
+    fires = degrees(3.0 / ClaspKnife().reflex_stiffness) + 56.27 - 0.25 * 120
+    assert made[1]["r1_deg"] == pytest.approx(fires)
+
+
+def test_it_is_a_table_on_the_screen() -> None:
+    done = run("--tardieu", "--model", "HM1", "--model", "HM4")
+    assert done.exit_code == 0
+    lines = done.output.splitlines()
+    assert lines[0].split() == (
+        "model R2 deg R1 deg R2 - R1 V1 10 deg/s V2 100 deg/s V3 150 deg/s".split()
+    )
+    assert lines[1].split() == "HM1 146.00 77.50 68.50 – 95.00 77.50".split()
+    assert lines[2].split() == "HM4 146.00 60.00 86.00 – 75.00 60.00".split()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--csv", "x.csv"), "--tardieu: stretches at constant speed"),
+        (("--motion", "minimum-jerk"), "--tardieu: stretches at constant speed"),
+        (("--to-deg", 100), "--tardieu: stretches at constant speed"),
+        (("--at-s", 1), "--tardieu: stretches at constant speed"),
+        (("--speed-deg-s", 9), "--speed-deg-s: needs V1, V2 and V3 with --tardieu"),
+        (
+            ("--speed-deg-s", 9, "--speed-deg-s", 8, "--speed-deg-s", 7),
+            "speeds: need three above 0 deg/s, .*, got 9, 8, 7",
+        ),
+        (
+            ("--from-deg", 150),
+            "start_angle: needs 0 to less than 146 degrees, .*, got 150 degrees",
+        ),
+        (
+            ("--kind", "clonus", *("--parameter", "beat_rate_hz=5") * 2),
+            "--parameter beat_rate_hz: needs one value, got two",
+        ),
+    ],
+)
+def test_what_tardieu_cannot_say_is_refused(
+    arguments: tuple[object, ...], words: str
+) -> None:
+    done = run("--tardieu", "--model", "HM1", *arguments)
+    assert isinstance(done.exception, MasrelError)
+    assert re.search(words, str(done.exception))

@@ -1,0 +1,291 @@
+"""Many scenes at once: what one scene gives, only what is asked, bounded memory."""
+
+import copy
+import pickle
+import tracemalloc
+from collections.abc import Callable
+from dataclasses import replace
+from math import isnan
+
+import numpy as np
+import pytest
+
+from masrel.errors import ParameterError
+from masrel.lab.elbow import (
+    STANDARD_MODELS,
+    Columns,
+    ConstantSpeed,
+    ElbowParameters,
+    MinimumJerk,
+    Motion,
+    Trapezoid,
+    evaluate,
+    events,
+    impulse,
+    peak_torque,
+    residual_torque,
+    work,
+)
+from masrel.lab.elbow._scenes import EVENTS, LOADS
+from tests.lab.elbow.scenes import KINDS, corner_cases, random_scene
+from tests.lab.elbow.stretches import constant, minimum_jerk, table_v
+
+HM3 = STANDARD_MODELS["HM3"]
+ANGLES = ("catch_angle", "catch_speed", "mean_speed")
+FUNCTIONS = {
+    "peak_torque": peak_torque,
+    "residual_torque": residual_torque,
+    "work": work,
+    "impulse": impulse,
+}
+
+
+def drawn(
+    kind: str, n: int, *, wide: bool, plain: bool = False
+) -> tuple[list[ElbowParameters], list[Motion]]:
+    """Random scenes; `plain` ones without inertia or a smoothed onset."""
+    found = []
+    for seed in range(3 * n):
+        rng = np.random.default_rng([seed, KINDS.index(kind), 11])
+        joint, motion = random_scene(rng, kind, wide=wide)
+        if plain:
+            joint = replace(joint, inertia=0.0, catch_rise=0.0)
+        if motion.start < joint.range_end:
+            found.append((joint, motion))
+    joints, motions = zip(*found[:n], strict=True)
+    return list(joints), list(motions)
+
+
+def same(one: float, other: float | None, size: float) -> bool:
+    # to some units in the last place of the time, angle or speed
+    return isnan(one) if other is None else abs(one - other) <= 1e-12 * size
+
+
+@pytest.mark.parametrize("wide", [False, True])
+@pytest.mark.parametrize("kind", ["constant", "minimum jerk", "interrupted"])
+def test_events_are_those_of_one_scene_to_rounding(kind: str, wide: bool) -> None:
+    joints, motions = drawn(kind, 150, wide=wide)
+    table = evaluate(joints, motions, EVENTS)
+    for i, (joint, motion) in enumerate(zip(joints, motions, strict=True)):
+        found = events(joint, motion)
+        for name in EVENTS:
+            value = table.column(name)[i]
+            size = max(value, 1.0) if name in ANGLES else motion.duration
+            assert same(value, getattr(found, name), size), (i, name)
+
+
+@pytest.mark.parametrize("kind", ["constant", "minimum jerk"])
+def test_torques_and_integrals_are_those_of_one_scene(kind: str) -> None:
+    joints, motions = drawn(kind, 120, wide=False)
+    table = evaluate(joints, motions, LOADS)
+    for name, function in FUNCTIONS.items():
+        expected = [
+            function(joint, motion)
+            for joint, motion in zip(joints, motions, strict=True)
+        ]
+        # sums of up to seven terms that may cancel: 1e-12 of the largest in a study
+        assert table.column(name) == pytest.approx(
+            expected, rel=1e-12, abs=1e-12, nan_ok=True
+        )
+
+
+@pytest.mark.parametrize("kind", ["constant", "minimum jerk"])
+def test_few_scenes_need_to_go_alone(kind: str) -> None:
+    # Nothing but near ties: of 150 scenes over ten orders of magnitude in speed and
+    # nine in D and the peak, at most a few.
+    joints, motions = drawn(kind, 150, wide=True, plain=True)
+    table = evaluate(joints, motions, (*EVENTS, *LOADS))
+    assert table.n_alone <= 30
+    assert np.isfinite(table.column("catch")).sum() > 40
+
+
+def test_corner_cases_are_those_of_one_scene() -> None:
+    cases = corner_cases()
+    joints, motions = (list(column) for column in zip(*cases.values(), strict=True))
+    table = evaluate(joints, motions, (*EVENTS, "peak_torque"))
+    for i, name in enumerate(cases):
+        found = events(joints[i], motions[i])
+        for event in EVENTS:
+            value = table.column(event)[i]
+            size = max(value, 1.0) if event in ANGLES else motions[i].duration
+            assert same(value, getattr(found, event), size), (name, event)
+        peak = peak_torque(joints[i], motions[i])
+        assert table.column("peak_torque")[i] == pytest.approx(peak, rel=1e-13)
+
+
+def test_table_v_in_one_call() -> None:
+    rows = table_v()
+    joints = [STANDARD_MODELS[row.model] for row in rows]
+    motions = [constant(row.speed_deg_s) for row in rows]
+    table = evaluate(joints, motions, ("catch_end", "end"))
+    reaches = np.isfinite(table.column("catch_end"))
+    assert reaches.tolist() == [row.model != "HM1" for row in rows]
+    assert table.n_alone == 0
+
+
+def test_one_joint_for_many_motions_and_one_motion_for_many_joints() -> None:
+    speeds = [constant(speed) for speed in (70.0, 92.0)]
+    table = evaluate(HM3, speeds, ["catch_angle"])
+    assert np.degrees(table.column("catch_angle")) == pytest.approx([90.5, 82.8])
+    models = list(STANDARD_MODELS.values())
+    table = evaluate(models, constant(92.0), ["catch_angle"])
+    expected = [97.8, 87.8, 82.8, 77.8]  # L - 0.35 · 92
+    assert np.degrees(table.column("catch_angle")) == pytest.approx(expected)
+    assert evaluate(HM3, constant(92.0)).values.shape == (1, 2)
+
+
+@pytest.mark.parametrize(
+    "copied",
+    [
+        copy.copy,
+        copy.deepcopy,
+        replace,
+        lambda joint: pickle.loads(pickle.dumps(joint)),
+    ],
+)
+def test_copies_of_a_joint_give_what_it_gives(
+    copied: Callable[[ElbowParameters], ElbowParameters],
+) -> None:
+    joint = replace(
+        HM3, rest_angle=0.4, post_catch="additive", residual_reading="decrease"
+    )
+    again = copied(joint)
+    assert again == joint
+    assert hash(again) == hash(joint)
+    of_each = evaluate([joint, again, HM3], constant(92.0), LOADS).values
+    np.testing.assert_array_equal(of_each[0], of_each[1])
+    assert (of_each[0] != of_each[2]).all()
+
+
+@pytest.mark.parametrize("chunk", [1, 7, 1000])
+def test_chunks_change_nothing(chunk: int) -> None:
+    joints, motions = drawn("minimum jerk", 40, wide=False)
+    whole = evaluate(joints, motions, (*EVENTS, *LOADS))
+    cut = evaluate(joints, motions, (*EVENTS, *LOADS), chunk=chunk)
+    np.testing.assert_allclose(cut.values, whole.values, rtol=1e-14)
+    assert whole.n_alone == cut.n_alone
+
+
+def test_memory_is_that_of_a_chunk() -> None:
+    # 60 000 scenes in chunks of 500: beside the result, 0.5 MB, and the list of rows
+    # there is no more than for 500, some 200 columns of 4 kB.
+    n = 60_000
+    motions = [constant(92.0)] * n
+    evaluate(HM3, motions[:500], chunk=500)
+    tracemalloc.start()
+    try:
+        evaluate(HM3, motions, chunk=500)
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert most < 6e6  # at once 200 columns would take 96 MB
+
+
+# Columns
+
+
+@pytest.mark.parametrize("kind", [ConstantSpeed, MinimumJerk, Trapezoid])
+def test_columns_are_their_rows(kind: type) -> None:
+    rng = np.random.default_rng(3)
+    joints = Columns(
+        ElbowParameters,
+        catch_angle_constant=rng.uniform(1.9, 2.3, 40),
+        catch_torque_constant=rng.uniform(1.4, 3.8, 40),
+        residual_ratio=0.3,
+        catch_travel=rng.uniform(0.2, 1.0, 40),
+        inertia=rng.choice([0.0, 0.1], 40),
+        rest_angle=rng.choice([np.nan, 0.4], 40),
+        post_catch=rng.choice(["continuous", "additive"], 40),
+        residual_reading=rng.choice(["residual", "decrease"], 40),
+        catch_rise=rng.choice([0.0, 0.05], 40),
+    )
+    name = "mean_speed" if kind is MinimumJerk else "speed"
+    rates = {name: rng.uniform(0.3, 2.4, 40)}
+    if kind is Trapezoid:
+        rates["acceleration_rate"] = 10.0
+    motions = Columns(kind, start=0.5, end=rng.uniform(2.0, 2.6, 40), **rates)
+    table = evaluate(joints, motions, (*EVENTS, *LOADS))
+    rows = [joints.row(i) for i in range(40)], [motions.row(i) for i in range(40)]
+    for i, (joint, motion) in enumerate(zip(*rows, strict=True)):
+        alone = evaluate(joint, motion, (*EVENTS, *LOADS))
+        assert table.values[i] == pytest.approx(
+            alone.values[0], rel=1e-12, nan_ok=True
+        ), i
+    objects = evaluate(*rows, (*EVENTS, *LOADS))
+    assert objects.values == pytest.approx(table.values, rel=1e-14, nan_ok=True)
+
+
+def line(**columns: object) -> Columns:
+    return Columns(ConstantSpeed, **{"start": 0.5, "end": 2.5, "speed": 1.0} | columns)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: Columns(dict, a=[1.0]), "kind: needs ElbowParameters, .* got dict"),
+        (lambda: line(speed=[1.0, 0.0]), "row 2: speed: needs more than 0"),
+        (lambda: line(speed=[1.0, np.nan, 2.0]), "row 2: speed: needs more than 0"),
+        (
+            lambda: Columns(
+                ElbowParameters,
+                catch_angle_constant=2.0,
+                catch_torque_constant=2.8,
+                residual_ratio=0.6,
+                catch_travel=0.5,
+                rest_angle=[np.nan, 0.5, np.inf],
+            ),
+            "row 3: rest_angle: needs a finite number, got inf",
+        ),
+        (lambda: line(end=[2.0, 2.5, 0.5]), "row 3: start, end: need 0 <= start < end"),
+        (
+            lambda: line(start=[0.1, 0.2], end=[1.0, 1.5, 2.0]),
+            "columns: need one length",
+        ),
+        (
+            lambda: evaluate(HM3, line(start=[0.5, 2.6], end=3.0)),
+            r"motions\[1\]\.start: needs less than the end of range",
+        ),
+    ],
+)
+def test_wrong_columns_are_refused_with_their_row(call, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        call()
+
+
+# Refused
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: evaluate(HM3, constant(92.0), ["peak"]), "outputs: .* got 'peak'"),
+        (lambda: evaluate(HM3, constant(92.0), []), "outputs: .* got none"),
+        (
+            lambda: evaluate([HM3] * 3, [constant(92.0)] * 2),
+            "one of either, got 3 and 2",
+        ),
+        (lambda: evaluate([], []), "got 0 and 0"),
+        (lambda: evaluate(HM3, constant(92.0), chunk=0), "chunk: needs 1 or more"),
+        (
+            lambda: evaluate(
+                HM3, [constant(92.0), constant(92.0, start_deg=150.0, end_deg=160.0)]
+            ),
+            r"motions\[1\]\.start: needs less than the end of range, 146 degrees",
+        ),
+        (
+            lambda: evaluate(HM3, constant(92.0)).column("work"),
+            "output: needs one of catch_angle, peak_torque, got 'work'",
+        ),
+    ],
+)
+def test_wrong_calls_are_refused(call, said: str) -> None:
+    with pytest.raises(ParameterError, match=said):
+        call()
+
+
+def test_the_names_are_those_of_the_functions() -> None:
+    found = events(HM3, minimum_jerk(92.0))
+    assert all(hasattr(found, name) for name in EVENTS)
+    assert set(LOADS) == set(FUNCTIONS)
+    assert isinstance(constant(1.0), ConstantSpeed)
+    assert isinstance(minimum_jerk(1.0), MinimumJerk)

@@ -1,0 +1,376 @@
+"""Exports are valid by the validators of their forms, and give the same numbers."""
+
+import csv
+import gzip
+import hashlib
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rocrate.rocrate import ROCrate
+
+from masrel.errors import ParameterError
+from masrel.lab.analysis import analyze, as_analysis_document
+from masrel.lab.conduct import record_standing
+from masrel.lab.export import EXPORT_FORMS, export_study
+from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
+from masrel.lab.ratings import RATING_COLUMNS, read_study_data
+from masrel.lab.recording import RECORDING_COLUMNS, read_recording
+from masrel.lab.report import study_conduct, write_report
+from masrel.lab.run import ScriptGrades, record_correction, run_session
+from masrel.lab.schedule import read_schedule, write_schedules
+from tests.lab.run.conftest import PROTOCOL
+from tests.lab.schedule.studies import with_secret
+
+Study = tuple[StudyPaths, Protocol]
+
+PLAN = """
+[[analysis.estimates]]
+id = "kappa"
+kind = "inter-rater"
+coefficient = "fleiss_kappa"
+models = "all"
+sessions = ["test"]
+target = "items"
+interval = "jackknife"
+"""
+ALL = ("notes", "logs", "illness", "after.secret")
+SECRETS = (b"very private", b"private, too", b"Somebody Private", b"a private reason")
+FIELDS = """
+[rater_fields.years]
+type = "whole"
+unit = "a"
+title = "Years of practice"
+public = true
+
+[rater_fields.illness]
+type = "text"
+"""
+ANSWERS = {"after.real": 7, "after.secret": "a private answer"}
+QUESTIONS = """
+[[questionnaires]]
+id = "after"
+title = "After it"
+when = "presentation"
+[[questionnaires.questions]]
+id = "real"
+text = "How real?"
+type = "whole"
+low = 1
+high = 10
+public = true
+[[questionnaires.questions]]
+id = "secret"
+text = "What else?"
+type = "text"
+required = false
+"""
+NOTE = (
+    '[[raters]]\nid = "R2"',
+    '[[raters]]\nid = "R2"\nnote = "very private"\n'
+    'fields = { years = 7, illness = "private, too" }',
+)
+
+
+@pytest.fixture(scope="module")
+def rated(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    """Two sessions with grades, a note on a rater, and a correction; only read."""
+    study = StudyPaths(tmp_path_factory.mktemp("export") / "study")
+    study.root.mkdir()
+    text = f"{PROTOCOL.replace(*NOTE)}\n{FIELDS}\n{QUESTIONS}\n{PLAN}"
+    study.protocol.write_text(text, encoding="utf-8")
+    protocol = read_protocol(study.protocol)
+    with_secret(study)
+    write_schedules(protocol, study)
+    for rater, of_dummy in (("R1", "1+"), ("R2", "2")):
+        grades = {"HM1": "1", "HM3": "2", "D1": of_dummy}
+        schedule = read_schedule(study.schedule_file(rater, "test"))
+        of_code = {shown.code: grades[shown.model] for shown in schedule.presentations}
+        codes = {shown.model: shown.code for shown in schedule.presentations}
+        run_session(
+            study,
+            protocol,
+            rater,
+            "test",
+            grades=ScriptGrades(of_code, answers=ANSWERS),
+            clock="simulated",
+        )
+    record_correction(
+        study,
+        protocol,
+        "R2",
+        "test",
+        code=codes["D1"],
+        grade="3",
+        who="Somebody Private",
+        why="a private reason",
+    )
+    return study, protocol
+
+
+def exported(study: Study, form: str, folder: Path, **options: object) -> Path:
+    export_study(*study, form, folder, **options)  # type: ignore[arg-type]
+    return folder
+
+
+def files(folder: Path) -> Iterator[tuple[str, bytes]]:
+    for path in sorted(folder.rglob("*")):
+        if path.is_file():
+            data = path.read_bytes()
+            yield (
+                path.as_posix(),
+                gzip.decompress(data) if data[:2] == b"\x1f\x8b" else data,
+            )
+
+
+def numbers(study: StudyPaths, file: Path | None = None) -> str:
+    protocol = read_protocol(study.protocol)
+    data = read_study_data(study, protocol, file=file)
+    document = as_analysis_document(
+        analyze(protocol, data.ratings, in_person=data.in_person)
+    )
+    text = json.dumps(document)  # nan is nan, every digit counts
+    return re.sub('"inputs": {[^}]*}', "", text)  # the hashes of what was read
+
+
+@pytest.mark.filterwarnings("ignore::masrel.errors.SmallSampleWarning")
+@pytest.mark.parametrize("form", EXPORT_FORMS)
+def test_the_export_gives_the_same_numbers(
+    rated: Study, form: str, tmp_path: Path
+) -> None:
+    folder = exported(rated, form, tmp_path / "out")
+    root = folder / "sourcedata" if form == "bids" else folder
+    table = next(folder.glob("data/*ratings_data.csv")) if form == "psych-ds" else None
+    assert numbers(StudyPaths(root), table) == numbers(rated[0])
+
+
+@pytest.mark.parametrize("form", EXPORT_FORMS)
+def test_what_is_private_stays_unless_it_is_named(
+    rated: Study, form: str, tmp_path: Path
+) -> None:
+    left_out = export_study(*rated, form, tmp_path / "a")
+    assert len(left_out) == 4
+    assert all("private" not in text.lower() for text in left_out)
+    for name, data in files(tmp_path / "a"):
+        assert b"rivate" not in data, name
+    private = ("notes", "logs", "illness", "after.secret")
+    assert export_study(*rated, form, tmp_path / "b", include=private) == ()
+    everything = b"".join(data for _, data in files(tmp_path / "b"))
+    if os.name == "posix":
+        paths = [path for path in (tmp_path / "b").rglob("*") if path.is_file()]
+        assert {path.stat().st_mode & 0o077 for path in paths} == {0}
+    for text in (
+        b"very private",
+        b"private, too",
+        b"Somebody Private",
+        b"a private reason",
+    ):
+        assert text in everything
+
+
+@pytest.mark.parametrize("form", EXPORT_FORMS)
+def test_the_same_study_gives_the_same_bytes_and_says_that_it_is_simulated(
+    rated: Study, form: str, tmp_path: Path
+) -> None:
+    day = date(2026, 1, 2)
+    one = exported(rated, form, tmp_path / "1" / "x", day=day)
+    other = exported(rated, form, tmp_path / "2" / "x", day=day)
+    texts = [
+        {
+            Path(name).relative_to(folder).as_posix(): data
+            for name, data in files(folder)
+        }
+        for folder in (one, other)
+    ]
+    assert texts[0] == texts[1]
+    assert any(b"SIMULATED DATA" in data for data in texts[0].values())
+
+
+@pytest.mark.slow  # the validator is a program of its own: two seconds
+def test_bids_is_valid_and_its_recordings_are_whole(
+    rated: Study, tmp_path: Path
+) -> None:
+    folder = exported(rated, "bids", tmp_path / "out")
+    validator = Path(sys.executable).with_name("bids-validator-deno")
+    done = subprocess.run(
+        [validator, "--json", folder], capture_output=True, text=True, check=False
+    )
+    issues = json.loads(done.stdout)["issues"]["issues"]
+    assert [issue for issue in issues if issue["severity"] == "error"] == []
+    (folder / "participants.tsv").write_text("participant_id\nsub-R9\n")
+    assert subprocess.run([validator, folder], capture_output=True).returncode != 0
+
+
+def test_a_recording_of_bids_has_every_sample_to_the_last_bit(
+    rated: Study, tmp_path: Path
+) -> None:
+    folder = exported(rated, "bids", tmp_path / "out")
+    study, _ = rated
+    sidecars = sorted(folder.rglob("*_physio.json"))
+    assert len(sidecars) == len(list(study.sessions.rglob("*.npz"))) == 6
+    for sidecar in sidecars:
+        facts = json.loads(sidecar.read_text())
+        assert facts["SamplingFrequency"] == 1000
+        assert tuple(facts["Columns"]) == RECORDING_COLUMNS
+        assert facts["command_torque_nm"]["Units"] == "N*m"
+        text = gzip.decompress(sidecar.with_suffix(".tsv.gz").read_bytes()).decode()
+        rows = np.array([line.split("\t") for line in text.splitlines()], dtype=float)
+        label = re.search("sub-(.*)_ses-(.*)_task-MAS_recording-(.*)_", sidecar.name)
+        assert label is not None
+        rater, session, code = label.groups()
+        recording = read_recording(study.recording_file(rater, session, code))
+        for place, name in enumerate(facts["Columns"]):
+            np.testing.assert_array_equal(rows[:, place], recording.columns[name])
+
+
+@pytest.mark.slow  # the validator is a program of its own: two seconds
+def test_a_data_package_is_valid(rated: Study, tmp_path: Path) -> None:
+    folder = exported(rated, "datapackage", tmp_path / "out")
+    validator = Path(sys.executable).with_name("frictionless")
+
+    def problems() -> list[object]:
+        done = subprocess.run(
+            [validator, "validate", "--json", folder / "datapackage.json"],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        report = json.loads(done.stdout)
+        assert report["stats"]["tasks"] == 3 + 6  # tables, recordings
+        return [error for task in report["tasks"] for error in task["errors"]]
+
+    assert problems() == []
+    table = folder / "ratings" / "ratings.csv"
+    table.write_text(table.read_text().replace(",1+,", ",5,"))
+    assert problems() != []  # a grade that is not of the scale
+
+
+def test_a_crate_loads_with_every_file_and_its_hash(
+    rated: Study, tmp_path: Path
+) -> None:
+    folder = exported(rated, "ro-crate", tmp_path / "out", day=date(2026, 1, 2))
+    crate = ROCrate(folder)
+    assert crate.root_dataset["datePublished"] == "2026-01-02"
+    named = {entity.id: entity["sha256"] for entity in crate.data_entities}
+    there = {
+        path.relative_to(folder).as_posix(): hashlib.sha256(
+            path.read_bytes()
+        ).hexdigest()
+        for path in folder.rglob("*")
+        if path.is_file() and path.name != "ro-crate-metadata.json"
+    }
+    assert named == there
+    assert "schedules/test_R1.csv" in named
+
+
+@pytest.mark.filterwarnings("ignore::masrel.errors.SmallSampleWarning")
+def test_a_report_that_shows_what_is_private_stays(
+    rated: Study, tmp_path: Path
+) -> None:
+    copy = StudyPaths(tmp_path / "study")
+    shutil.copytree(rated[0].root, copy.root)
+
+    def archived(name: str, shown: tuple[str, ...], *include: str) -> tuple[bool, bool]:
+        data = read_study_data(copy, rated[1])
+        conduct = study_conduct(copy, rated[1], include=shown)
+        analysis = analyze(rated[1], data.ratings)
+        write_report(rated[1], data.ratings, analysis, copy.report, conduct=conduct)
+        folder = tmp_path / name
+        left_out = export_study(copy, rated[1], "ro-crate", folder, include=include)
+        return (folder / "report/report.md").is_file(), "the report" in str(left_out)
+
+    assert archived("a", ()) == (True, False)
+    assert archived("b", ("who",)) == (False, True)
+    assert archived("c", ("notes", "illness"), "logs") == (False, True)
+    assert archived("d", ("notes", "illness"), "logs", "illness") == (True, False)
+
+
+def test_psych_ds_describes_every_column_of_files_with_names_of_keywords(
+    rated: Study, tmp_path: Path
+) -> None:
+    folder = exported(rated, "psych-ds", tmp_path / "out")
+    head = json.loads((folder / "dataset_description.json").read_text())
+    assert (head["@type"], bool(head["name"])) == ("Dataset", True)
+    described = {variable["name"] for variable in head["variableMeasured"]}
+    name = re.compile(r"([a-z]+-[a-zA-Z0-9]+)(_[a-z]+-[a-zA-Z0-9]+)*_data\.csv")
+    data = list((folder / "data").iterdir())
+    assert len(data) == 3 + 6
+    for path in data:
+        assert name.fullmatch(path.name)
+        with path.open(newline="") as file:
+            columns, *rows = csv.reader(file)
+        assert set(columns) <= described
+        assert rows
+        assert all(len(row) == len(columns) for row in rows)
+
+
+def test_public_fields_of_raters_go_along(rated: Study, tmp_path: Path) -> None:
+    folder = exported(rated, "bids", tmp_path / "out")
+    lines = (folder / "participants.tsv").read_text().splitlines()
+    assert [line.split("\t") for line in lines] == [
+        ["participant_id", "rater", "site", "status", "late", "years"],
+        ["sub-R1", "R1", "n/a", "begun", "no", "n/a"],
+        ["sub-R2", "R2", "n/a", "complete", "no", "7"],
+    ]
+    described = json.loads((folder / "participants.json").read_text())
+    assert described["years"] == {"Description": "Years of practice", "Units": "a"}
+
+
+def test_public_answers_go_along(rated: Study, tmp_path: Path) -> None:
+    folder = exported(rated, "datapackage", tmp_path / "out")
+    with (folder / "ratings" / "answers.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["question"] for row in rows} == {"real"}
+    assert [row["answer"] for row in rows] == ["7"] * 6
+
+
+def test_who_is_excluded_is_left_out_and_said(rated: Study, tmp_path: Path) -> None:
+    copy = StudyPaths(tmp_path / "study")
+    shutil.copytree(rated[0].root, copy.root)
+    record_standing(
+        copy, rated[1], "R2", "excluded", who="Somebody Private", why="rivate"
+    )
+    study = (copy, rated[1])
+    left_out = export_study(*study, "datapackage", tmp_path / "a")
+    assert "ratings of R2, who are excluded (logs)" in left_out
+    named = {path.name.split("_")[1] for path in (tmp_path / "a/recordings").iterdir()}
+    assert named == {"R1"}
+    ratings = (tmp_path / "a" / "ratings" / "ratings.csv").read_text().splitlines()
+    assert [line.split(",")[1] for line in ratings] == ["rater", *["R1"] * 3]
+    export_study(*study, "datapackage", tmp_path / "b", include=("logs", "notes"))
+    assert "R2" in (tmp_path / "b/ratings/ratings.csv").read_text()
+
+
+def test_every_column_of_ratings_is_described(rated: Study, tmp_path: Path) -> None:
+    folder = exported(rated, "bids", tmp_path / "out")
+    described = json.loads((folder / "task-MAS_beh.json").read_text())
+    assert {*described} - {"TaskName"} == set(RATING_COLUMNS)
+    assert list(described["grade"]["Levels"]) == ["0", "1", "1+", "2", "3", "4"]
+
+
+def test_a_stop_leaves_no_folder(rated: Study, tmp_path: Path) -> None:
+    def stop(_: str) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        export_study(*rated, "bids", tmp_path / "x" / "out", progress=stop)
+    assert list((tmp_path / "x").iterdir()) == []
+
+
+def test_what_is_wrong_is_said_in_one_sentence(rated: Study, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with pytest.raises(ParameterError, match=r"form: needed one of bids, .*got 'xml'"):
+        export_study(*rated, "xml", out)
+    with pytest.raises(ParameterError, match=r"include: needed one of .* got 'who'"):
+        export_study(*rated, "bids", out, include=("who",))
+    with pytest.raises(ParameterError, match="needed a new or empty folder"):
+        export_study(*rated, "bids", rated[0].root)
+    assert not out.exists()

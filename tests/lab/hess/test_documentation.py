@@ -1,0 +1,94 @@
+"""What docs/driver.md says is what the driver does."""
+
+import re
+from math import degrees
+from pathlib import Path
+
+import pytest
+
+from masrel.lab.elbow import STANDARD_MODELS, MinimumJerk, trace
+from masrel.lab.hess import DeviceLimits, Friction, device_names
+from masrel.lab.protocol import DeviceSettings
+from tests.lab.internal.hess.test_backdrive import felt
+
+from .rig import END, START
+from .test_controller import table_5
+
+PAGE = (Path(__file__).parents[3] / "docs" / "driver.md").read_text(encoding="utf-8")
+
+
+def row(first: str) -> list[str]:
+    # Cells of the table row that begins with a word
+    line = next(line for line in PAGE.splitlines() if line.startswith(f"| {first} |"))
+    return [cell.strip() for cell in line.strip("|").split("|")]
+
+
+def test_the_devices_are_those_that_the_page_names() -> None:
+    # When a backend is added, the page's first statement has to change.
+    assert device_names() == ("puck", "replay", "simulated")
+    assert "It has not been tested on physical hardware" in PAGE
+
+
+def test_the_limits_are_the_defaults_of_a_protocol() -> None:
+    settings = DeviceSettings()
+    assert row("torque")[3] == f"{settings.torque_limit_nm:g}"
+    assert row("speed")[3] == f"{settings.speed_limit_deg_s:g} deg/s"
+    assert row("missed ticks")[3] == f"{settings.missed_ticks_limit}"
+    limits = DeviceLimits(torque=1.0, speed=1.0, missed_ticks=0)
+    low, high = degrees(limits.lowest_angle), degrees(limits.highest_angle)
+    assert row("range")[3] == f"{low:.0f} and {high:.0f} deg".replace("-", "−")
+
+
+def test_every_key_of_a_limit_is_on_the_page() -> None:
+    no_limits = ("backend", "rate_hz", "friction", "dead_zone", "full_speed", "slip")
+    for key in DeviceSettings.__struct_fields__:
+        if not key.startswith((*no_limits, "puck")):
+            assert f"`{key}`" in PAGE
+
+
+def shown(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return "none" if value is None else str(value).removesuffix(".0")
+
+
+@pytest.mark.parametrize("key", DeviceSettings.__struct_fields__)
+def test_every_key_of_a_device_has_its_default_and_a_reason(key: str) -> None:
+    rows = [
+        line.strip("| ").split("|") for line in PAGE.splitlines() if line[:1] == "|"
+    ]
+    *cells, reason = next(row for row in rows if f"`{key}`" in "".join(row[:-1]))
+    # "400 deg/s", "5 deg, 10 N·m", "−5 and 185 deg" or alone
+    words = re.split(r"[ ,`]+", " ".join(cells).replace("−", "-"))
+    assert shown(getattr(DeviceSettings(), key)) in words
+    assert len(reason) > 20
+
+
+def test_the_friction_is_the_default_one() -> None:
+    friction = Friction()
+    assert row("I, B, β")[1] == (
+        f"{friction.inertia} kg·m², {friction.viscous} N·m·s/rad, "
+        f"{friction.coulomb} N·m"
+    )
+
+
+def test_the_largest_torque_of_table_5_is_the_one_the_limit_is_explained_by() -> None:
+    largest = max(
+        (
+            trace(
+                STANDARD_MODELS[model],
+                MinimumJerk(start=START, end=END, mean_speed=speed),
+            ).torque.max(),
+            model,
+        )
+        for model, speed in (
+            (model, speed_deg_s * START / 30.0) for model, speed_deg_s in table_5()
+        )
+    )
+    assert largest == (pytest.approx(18.3, abs=0.05), "HM4")
+    assert "HM4 at a mean speed of 72 deg/s asks for most, 18.3 N·m" in PAGE
+
+
+def test_the_backdrive_figures_hold() -> None:
+    assert max(map(abs, felt(0.0))) == pytest.approx(0.52, abs=0.005)
+    assert max(map(abs, felt(0.9))) == pytest.approx(0.20, abs=0.005)

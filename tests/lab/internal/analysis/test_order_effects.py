@@ -1,0 +1,180 @@
+"""Effects of order, against values worked by hand."""
+
+from typing import Any
+
+import pytest
+from scipy.stats import ttest_1samp
+
+from masrel.lab.analysis._order_effects import (
+    OrderEffect,
+    order_effects,
+    place_summaries,
+)
+from masrel.lab.ratings import Ratings, ratings_from_rows
+from masrel.lab.report._sentences import sentence
+from masrel.scales import MODIFIED_ASHWORTH
+from tests.lab.analysis.studies import protocol_with
+
+
+def presented(**orders: str) -> Ratings:
+    """A session per rater: "HM1=1 HM2=3" is the models in their order, with grades."""
+    rows: list[dict[str, Any]] = []
+    for rater, order in orders.items():
+        for position, text in enumerate(order.split(), start=1):
+            model, grade = text.split("=")
+            row = {"session": "test", "rater": rater, "model": model, "grade": grade}
+            rows.append({**row, "position": position})
+    return ratings_from_rows(rows, MODIFIED_ASHWORTH)
+
+
+def effects(rows: Ratings) -> dict[str, OrderEffect]:
+    return {each.kind: each for each in order_effects(protocol_with(), rows, 0.95)}
+
+
+def test_the_second_half_is_held_against_the_first() -> None:
+    rows = presented(R1="HM1=0 HM2=3", R2="HM2=2 HM1=1")
+    # steps: HM1 0 of R1 and 1 of R2, HM2 4 and 3; so half a step below the mean of the
+    # model in the first half and half a step above in the second, for both
+    place = effects(rows)["place"]
+    assert place.mean == pytest.approx(1.0)
+    assert place.n_raters == 2
+    assert place.reason == "it is the same for every rater"
+
+
+def test_the_interval_is_students_t_over_raters() -> None:
+    rows = presented(
+        R1="HM1=0 HM2=1 HM3=2 HM4=3",
+        R2="HM4=4 HM3=3 HM2=1+ HM1=0",
+        R3="HM2=1 HM1=1 HM4=4 HM3=1+",
+    )
+    steps = {
+        "HM1": {"R1": 0, "R2": 0, "R3": 1},
+        "HM2": {"R1": 1, "R2": 2, "R3": 1},
+        "HM3": {"R1": 3, "R2": 4, "R3": 2},
+        "HM4": {"R1": 4, "R2": 5, "R3": 5},
+    }
+    deviation = {
+        (rater, model): of[rater] - sum(of.values()) / 3
+        for model, of in steps.items()
+        for rater in of
+    }
+    later = {"R1": ("HM3", "HM4"), "R2": ("HM2", "HM1"), "R3": ("HM4", "HM3")}
+    by_rater = [
+        sum(
+            deviation[rater, model] * (0.5 if model in last else -0.5)
+            for model in steps
+        )
+        for rater, last in later.items()
+    ]
+    place = effects(rows)["place"]
+    expected = ttest_1samp(by_rater, 0.0).confidence_interval(0.95)
+    assert place.mean == pytest.approx(sum(by_rater) / 3)
+    assert (place.low, place.high) == pytest.approx((expected.low, expected.high))
+
+
+def test_a_grade_drawn_to_the_one_before_is_an_effect_of_the_neighbour() -> None:
+    # HM2 after the severe HM4 is graded a step higher than after the mild HM1
+    orders = {
+        "R1": "HM4=3 HM2=2 HM1=1 HM2=1+",
+        "R2": "HM1=1 HM2=1+ HM4=3 HM2=2",
+    }
+    rows = []
+    for rater, order in orders.items():
+        seen: dict[str, int] = {}
+        for position, text in enumerate(order.split(), start=1):
+            model, grade = text.split("=")
+            seen[model] = seen.get(model, 0) + 1
+            row = {"rater": rater, "model": model, "grade": grade}
+            rows.append({**row, "position": position, "repeat": seen[model]})
+    found = effects(ratings_from_rows(rows, MODIFIED_ASHWORTH))
+    # R1: HM2 after HM4 +1/2, HM1 after HM2 0, so 1/4 after a higher one; HM2 after HM1
+    # -1/2 after a lower one: 3/4. R2: HM2 after HM1 -1/2 and HM4 after HM2 0, so -1/4
+    # after a lower one; HM2 after HM4 +1/2: 3/4.
+    assert found["neighbour"].mean == pytest.approx(0.75)
+    # the second time HM2 is a step lower for R1 and a step higher for R2
+    again = found["again"]
+    assert (again.mean, again.n_pairs, again.n_equal) == (0.0, 2, 0)
+    assert again.low < 0.0 < again.high
+
+
+def test_a_session_is_held_against_the_one_before() -> None:
+    rows = [
+        {"session": session, "rater": rater, "model": model, "grade": grade}
+        for session, rater, model, grade in (
+            ("test", "R1", "HM1", "1"),
+            ("test", "R1", "HM2", "2"),
+            ("test", "R2", "HM1", "1"),
+            ("test", "R3", "HM1", "0"),
+            ("retest", "R1", "HM1", "1+"),
+            ("retest", "R1", "HM2", "2"),
+            ("retest", "R2", "HM1", "1"),
+        )
+    ]
+    (session,) = order_effects(
+        protocol_with(), ratings_from_rows(rows, MODIFIED_ASHWORTH), 0.95
+    )
+    # R1 half a step up on average, R2 none; R3 has no second grade
+    assert (session.kind, session.sessions) == ("session", ("test", "retest"))
+    assert (session.n_raters, session.n_pairs, session.n_equal) == (2, 3, 2)
+    assert session.mean == 0.25
+
+
+def test_models_that_are_milder_or_more_severe_are_no_effect() -> None:
+    # grades that depend on the model alone: nothing is left once that is taken off
+    models = {"HM1": "0", "HM2": "1", "HM3": "2", "HM4": "4"}
+    orders = (("HM1", "HM2", "HM3", "HM4"), ("HM4", "HM2", "HM1", "HM3"))
+    rows = presented(
+        **{
+            f"R{n}": " ".join(f"{model}={models[model]}" for model in order)
+            for n, order in enumerate(orders, start=1)
+        }
+    )
+    found = effects(rows)
+    assert {kind: each.mean for kind, each in found.items()} == {
+        "place": 0.0,
+        "neighbour": 0.0,
+    }
+    for part in place_summaries(protocol_with(), rows):
+        assert part.deviation == 0.0
+
+
+def test_one_rater_has_no_interval_and_no_place_no_effect() -> None:
+    rows = [
+        {"session": session, "rater": "R1", "model": "HM1", "grade": grade}
+        for session, grade in (("test", "1"), ("retest", "1+"))
+    ]
+    (only,) = order_effects(
+        protocol_with(), ratings_from_rows(rows, MODIFIED_ASHWORTH), 0.95
+    )
+    assert (only.mean, only.reason) == (1.0, "one rater has no spread")
+    assert only.low != only.low
+    one = ratings_from_rows(rows[:1], MODIFIED_ASHWORTH)
+    assert order_effects(protocol_with(), one, 0.95) == ()
+    assert place_summaries(protocol_with(), one) == ()
+
+
+def test_places_are_counted_in_quarters_and_halves() -> None:
+    order = " ".join(f"D{n:02}=1" for n in range(1, 9))
+    rows = presented(R1=order, R2=order)
+    parts = place_summaries(protocol_with(), rows)
+    assert [(p.first, p.last, p.n) for p in parts] == [
+        (1, 2, 4),
+        (3, 4, 4),
+        (5, 6, 4),
+        (7, 8, 4),
+    ]
+    assert all(part.n_standard == 0 for part in parts)
+    short = place_summaries(
+        protocol_with(), presented(R1="HM1=1 HM2=2 HM3=2", R2="HM3=2 HM1=0 HM2=1+")
+    )
+    # intended are 1, 1+ and 2: R1 HM1; R2 HM3 in the first place; then HM3; HM2
+    assert [(p.first, p.last, p.n_standard, p.n_intended) for p in short] == [
+        (1, 1, 2, 2),
+        (2, 3, 4, 2),
+    ]
+
+
+def test_every_kind_of_effect_has_its_words() -> None:
+    kinds = ("place", "neighbour", "again", "session")
+    texts = {sentence("order", kind, first="A", last="B") for kind in kinds}
+    assert len(texts) == 4

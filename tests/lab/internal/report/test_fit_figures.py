@@ -1,0 +1,102 @@
+"""Figures of a fit: every trial and law is in them, and the same data give one file."""
+
+import numpy as np
+import pytest
+
+from masrel.lab.elbow import STANDARD_MODELS, fit, fit_friction
+from masrel.lab.elbow.identification import ElbowFit
+from masrel.lab.report._figure_data import FrictionView, JointFitView
+from masrel.lab.report._fits import fit_table
+from masrel.plots import draw
+from masrel.tables._tables import as_text
+from tests.lab.elbow.identification.synthesis import Scatter, study
+from tests.lab.elbow.identification.test_friction import backdriven
+
+VIEWS = ["slow", "fast", "catches", "residuals"]
+
+
+def svg_of(found: ElbowFit, view: str) -> str:
+    drawn = draw(JointFitView(fit=found, view=view), stamp="SIMULATED DATA")  # type: ignore[arg-type]
+    return drawn["svg"].decode("utf-8")
+
+
+@pytest.fixture(scope="module")
+def found() -> ElbowFit:
+    return fit(study(STANDARD_MODELS["HM3"], seed=31, n_slow=3, n_fast=6))
+
+
+@pytest.mark.parametrize("view", VIEWS)
+def test_a_figure_repeats_byte_for_byte(view: str, found: ElbowFit) -> None:
+    shown = JointFitView(fit=found, view=view)  # type: ignore[arg-type]
+    one, two = draw(shown, stamp="SIMULATED DATA"), draw(shown, stamp="SIMULATED DATA")
+    assert one == two
+    assert one["png"].startswith(b"\x89PNG")
+
+
+def test_only_slow_trials_have_figures_too() -> None:
+    found = fit(study(STANDARD_MODELS["HM3"], seed=31, n_slow=3, n_fast=0))
+    assert svg_of(found, "slow")
+    assert svg_of(found, "residuals")
+
+
+@pytest.mark.parametrize(
+    ("terms", "law"),
+    [
+        ({}, "b·θ̇ + k·θ, fitted"),
+        (
+            {"inertia": "fitted", "gravity": "fitted", "drift": 0.1},
+            "b·θ̇ + k·θ + m·θ̈ + G·sin(θ − θ_g) + drift, fitted",
+        ),
+        ({"lag": 0.01}, "b·θ̇ + k·θ with a lag, fitted"),
+    ],
+)
+def test_the_legend_of_slow_trials_has_every_term(
+    terms: dict[str, object], law: str
+) -> None:
+    movements = study(STANDARD_MODELS["HM3"], seed=31, n_slow=5, n_fast=0)
+    assert svg_of(fit(movements, **terms), "slow").count(f"<!-- {law} -->") == 1  # type: ignore[arg-type]
+
+
+def test_the_table_has_a_row_a_parameter_and_its_interval(found: ElbowFit) -> None:
+    table = fit_table(found)
+    assert [row[0] for row in table.rows] == "b k L α H Q D k_post".split()
+    assert table.data == "simulated"
+    by_symbol = {row[0]: row for row in table.rows}
+    value = float(str(by_symbol["L"][2]))
+    degrees = np.degrees(found["catch_angle_constant"].value)
+    assert value == pytest.approx(degrees, abs=0.05)
+    assert "clustered by trial" in as_text(table)
+
+
+def test_friction_has_its_figure_and_table() -> None:
+    found = fit_friction([backdriven(1)])
+    drawn = draw(FrictionView(fit=found), stamp="SIMULATED DATA")
+    assert drawn["svg"].startswith(b"<?xml")
+    assert [row[0] for row in fit_table(found).rows] == ["I", "B", "β"]
+
+
+@pytest.fixture(scope="module")
+def outlasting() -> ElbowFit:
+    """Most catches outlast their stretch, the slowest among them."""
+    scatter = Scatter(catch_travel=0.035)
+    joint = STANDARD_MODELS["HM2"]
+    return fit(study(joint, seed=3, n_slow=4, scatter=scatter, fast=(70.0, 130.0)))
+
+
+def test_an_interval_that_is_not_even_is_written_with_both_ends(
+    outlasting: ElbowFit,
+) -> None:
+    travel = outlasting["catch_travel"]
+    assert travel.high - travel.value > 1.01 * (travel.value - travel.low)
+    low, high = (f"{np.degrees(end):.2f}" for end in (travel.low, travel.high))
+    drawn = svg_of(outlasting, "catches")
+    assert f"[{low}, {high}]" in drawn
+    slope = outlasting["catch_slope"]
+    assert f"α = {slope.value:.3f} ± {slope.high - slope.value:.3f} s" in drawn
+
+
+def test_every_phase_that_is_drawn_is_in_the_legend(outlasting: ElbowFit) -> None:
+    ends = [t.catch.end for t in outlasting.trials if t.catch is not None]
+    assert None in ends
+    drawn = svg_of(outlasting, "fast")
+    assert drawn.count("<!-- catch -->") == drawn.count("<!-- post-catch -->") == 1

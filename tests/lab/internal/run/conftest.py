@@ -1,0 +1,5 @@
+"""The small study of the session's tests."""
+
+from tests.lab.run.conftest import new_study, small
+
+__all__ = ["new_study", "small"]

@@ -1,0 +1,347 @@
+"""Sites of one study become one, byte for byte, or are refused by name."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from masrel.cli import cli
+from masrel.errors import MasrelError, ParameterError, ProtocolError, ScheduleError
+from masrel.lab.conduct import (
+    excluded_raters,
+    read_conduct,
+    record_note,
+    record_standing,
+)
+from masrel.lab.merging import merge_studies
+from masrel.lab.paper import write_sheets
+from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
+from masrel.lab.ratings import ratings_from_logs
+from masrel.lab.run import ScriptGrades, SimulatedGrades, run_session
+from masrel.lab.training import SimulatedTrainee, train_rater
+from masrel.lab.verification import anchors_of, verify_study
+from tests.lab.cli.test_train import RULES
+
+NewStudy = Callable[..., tuple[StudyPaths, Protocol]]
+Sites = tuple[StudyPaths, StudyPaths]
+RATERS = '[[raters]]\nid = "R1"\n\n[[raters]]\nid = "R2"\n'
+FIELDS = """
+[rater_fields.since]
+type = "date"
+[rater_fields.place]
+type = "text"
+"""
+SESSIONS = '[[sessions]]\nid = "retest"\nraters = ["R1"]\n\n'
+
+
+def run(study: StudyPaths, *raters: str) -> None:
+    protocol = read_protocol(study.protocol)
+    for rater in raters:
+        grades = ScriptGrades(["1", "2", "3"])
+        run_session(study, protocol, rater, "test", grades=grades, clock="simulated")
+
+
+def site(new_study: NewStudy, name: str, raters: str, *more: tuple[str, str]) -> Path:
+    ids = raters.split()
+    entries = "".join(f'[[raters]]\nid = "{rater}"\n\n' for rater in ids)
+    listed = ", ".join(f'"{rater}"' for rater in ids)
+    study, _ = new_study(
+        (RATERS, entries),
+        ('raters = ["R1", "R2"]', f"raters = [{listed}]"),
+        (SESSIONS, ""),
+        *more,
+        name=name,
+    )
+    return study.root
+
+
+@pytest.fixture
+def sites(new_study: NewStudy) -> Sites:
+    north = StudyPaths(site(new_study, "north", "R1 R2"))
+    south = StudyPaths(site(new_study, "south", "R2 R3 R4"))  # R2 never comes to it
+    run(north, "R2")
+    run(south, "R3")
+    return north, south
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+def test_all_raters_logs_and_recordings_come_over(sites: Sites, tmp_path: Path) -> None:
+    before = [contents(study.root) for study in sites]
+    unused = {"schedules/test_R2.csv"}  # of another draw than R2 followed
+    merged = merge_studies(sites, tmp_path / "both")
+    assert [contents(study.root) for study in sites] == before  # nothing is changed
+    after = contents(tmp_path / "both")
+    for of_site, others in zip(before, (set(), unused), strict=True):
+        for name, data in of_site.items():
+            is_copied = name.startswith(("schedules/", "sessions/"))
+            assert (after.get(name) == data) == (is_copied and name not in others), name
+    assert [rater.id for rater in merged.protocol.raters] == ["R1", "R2", "R3", "R4"]
+    assert verify_study(merged.study).is_whole
+    ratings = ratings_from_logs(merged.study, merged.protocol)
+    assert ratings.table["rater"].unique().tolist() == ["R2", "R3"]
+    assert not [name for name in after if "secret" in name or name.startswith(".")]
+    run(merged.study, "R4")  # the study goes on in the new folder
+    assert {p.stat().st_mode & 0o077 for p in (merged.study.sessions,)} == {0}
+
+
+@pytest.mark.slow
+def test_what_is_no_rating_comes_over_too(sites: Sites, tmp_path: Path) -> None:
+    for study, rater in zip(sites, ("R2", "R3"), strict=True):
+        with study.protocol.open("a", encoding="utf-8") as file:
+            file.write(RULES)
+        protocol = read_protocol(study.protocol)
+        trainee = SimulatedTrainee(protocol)
+        train_rater(study, protocol, rater, grades=trainee, clock="simulated")
+        for rehearsing in (rater, "R2"):
+            run_session(
+                study,
+                protocol,
+                rehearsing,
+                "test",
+                grades=SimulatedGrades(protocol),
+                clock="simulated",
+                rehearsal=True,
+            )
+        write_sheets(study, protocol)
+    filled_in = sites[0].typed_file("R1", "test")
+    text = filled_in.read_text(encoding="utf-8")
+    filled_in.write_text(text.replace(",\n", ",2\n"), encoding="utf-8")
+    (sites[1].root / "ratings").mkdir()
+    sites[1].published_answers_file.write_text("as it was", encoding="utf-8")
+    before = [contents(study.root) for study in sites]
+    merged = merge_studies(sites, tmp_path / "both").study
+    after = contents(merged.root)
+    # R2 rehearsed at both sites: the second one has the next number
+    logs = [n for n in after if n.startswith("rehearsals/") and n.endswith(".jsonl")]
+    names = "1/rehearsal_test_R2", "2/rehearsal_test_R2"
+    moved = "3/rehearsal_test_R2", "3/rehearsal_test_R3"
+    assert sorted(logs) == [f"rehearsals/{name}.jsonl" for name in (*names, *moved)]
+    for of_site, number in zip(before, ("1", "3"), strict=True):
+        for name, content in of_site.items():
+            if name.startswith(("training/", "rehearsals/1")):
+                assert after[name.replace("s/1/", f"s/{number}/")] == content
+    assert after["ratings/published_answers.csv"] == b"as it was"
+    # a sheet in which nothing was typed is made again
+    assert [n for n in after if n.startswith("sheets/")] == ["sheets/test_R1.csv"]
+    verification = verify_study(merged)
+    assert verification.is_whole
+    assert [each.rater for each in verification.trainings] == ["R2", "R3"]
+    private = (merged.training, merged.rehearsals)
+    assert {path.stat().st_mode & 0o077 for path in private} == {0}
+
+
+def test_both_chains_of_conduct_stay_whole(sites: Sites, tmp_path: Path) -> None:
+    north, south = sites
+    record_note(north, read_protocol(north.protocol), "power cut", who="MK")
+    record_standing(
+        south, read_protocol(south.protocol), "R3", "excluded", who="AB", why="ill"
+    )
+    merged = merge_studies(sites, tmp_path / "both").study
+    for study in sites:
+        copied = merged.merged_conduct / f"{study.root.name}.jsonl"
+        assert copied.read_bytes() == study.conduct_file.read_bytes()
+    assert excluded_raters(merged) == ("R3",)
+    kinds = [event.kind for event in read_conduct(merged)]
+    assert kinds == ["noted", "excluded", "merged", "merged"]
+    anchored = [anchor.log for anchor in anchors_of(merged)]
+    assert anchored[:3] == [
+        "conduct/north.jsonl",
+        "conduct/south.jsonl",
+        "conduct.jsonl",
+    ]
+    # an event changed at the end of a merged log, or taken off, leaves its chain whole
+    log = merged.merged_conduct / "south.jsonl"
+    log.write_bytes(log.read_bytes().replace(b'"ill"', b'"fit"'))
+    messages = [finding.message for finding in verify_study(merged).findings]
+    assert any("south.jsonl: needed 2 lines" in message for message in messages)
+    log.write_bytes(b"".join(log.read_bytes().splitlines(keepends=True)[:-1]))
+    messages = [finding.message for finding in verify_study(merged).findings]
+    assert any("south.jsonl: needed 2 lines" in message for message in messages)
+    log.unlink()
+    messages = [finding.message for finding in verify_study(merged).findings]
+    assert any("needed the log of a merged study" in message for message in messages)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs permissions of POSIX")
+def test_what_is_merged_is_its_owners_alone(
+    sites: Sites, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for study in sites:
+        record_note(study, read_protocol(study.protocol), "ill", who="MK", rater="R2")
+    for path in sites[0].root.rglob("*"):  # as after a copy from elsewhere
+        path.chmod(0o777 if path.is_dir() else 0o666)
+    ever_open, original = [], os.write
+
+    def write(descriptor: int, data: bytes | memoryview) -> int:
+        ever_open.append(os.fstat(descriptor).st_mode & 0o077)
+        return original(descriptor, data)
+
+    monkeypatch.setattr(os, "write", write)
+    umask = os.umask(0)
+    try:
+        merged = merge_studies(sites, tmp_path / "both").study
+    finally:
+        os.umask(umask)
+    modes = {path: path.stat().st_mode & 0o777 for path in merged.root.rglob("*")}
+    assert set(modes.values()) == {0o600, 0o700}
+    assert {modes[path] for path in merged.conduct_logs()} == {0o600}
+    assert modes[merged.merged_conduct] == 0o700
+    assert set(ever_open) == {0}  # nor while they are written
+    log = merged.merged_conduct / "north.jsonl"
+    said = []
+    for mode in (0o600, 0o644):
+        log.chmod(mode)
+        shown = CliRunner().invoke(cli, ["check", str(merged.root)]).output
+        said.append([line for line in shown.splitlines() if "chmod" in line])
+    assert said[0] == []
+    (note,) = said[1]
+    assert f"{log}: " in note
+    assert f"chmod 600 {log}" in note
+
+
+@pytest.mark.slow
+def test_a_merged_study_is_merged_with_a_third(
+    sites: Sites, new_study: NewStudy, tmp_path: Path
+) -> None:
+    record_note(sites[0], read_protocol(sites[0].protocol), "power cut", who="MK")
+    both = merge_studies(sites, tmp_path / "both").study
+    west = StudyPaths(site(new_study, "west", "R5"))
+    run(west, "R5")
+    merged = merge_studies([both, west], tmp_path / "all").study
+    assert verify_study(merged).is_whole
+    names = sorted(path.name for path in merged.merged_conduct.iterdir())
+    assert names == ["both.jsonl", "north.jsonl"]
+
+
+@pytest.mark.slow
+def test_one_protocol_at_both_sites_is_kept_as_it_is(
+    new_study: NewStudy, tmp_path: Path
+) -> None:
+    # each site runs its own raters of the same protocol
+    north = StudyPaths(site(new_study, "north", "R1 R2"))
+    south = StudyPaths(site(new_study, "south", "R1 R2"))
+    run(north, "R1")
+    run(south, "R2")
+    merged = merge_studies([north, south], tmp_path / "both").study
+    assert merged.protocol.read_bytes() == north.protocol.read_bytes()
+    assert len(merged.logs()) == 2
+
+
+def test_every_kind_of_value_in_a_protocol_comes_through(
+    new_study: NewStudy, tmp_path: Path
+) -> None:
+    both = (
+        (
+            "catch_travel_deg = 40.0",
+            "catch_travel_deg = 40.0\nconstants = {damping_nms_rad = 1e-3}",
+        ),
+        (
+            "[schedule]",
+            f'{FIELDS}[presentation]\nstretches = ["slow", "fast"]\n[schedule]',
+        ),
+    )
+    values = '[raters.fields]\nsince = 2001-02-03\nplace = "a \\"b\\" \\u00e9\\n"\n'
+    north = StudyPaths(site(new_study, "north", "R1 R2", *both))
+    south = StudyPaths(
+        site(new_study, "south", "R3", *both, ('id = "R3"\n', f'id = "R3"\n{values}'))
+    )
+    merged = merge_studies([north, south], tmp_path / "both")
+    first = read_protocol(north.protocol)
+    assert merged.protocol.raters[:2] == first.raters
+    assert merged.protocol.raters[2:] == read_protocol(south.protocol).raters
+    assert merged.protocol.models == first.models
+    assert merged.protocol.presentation == first.presentation
+
+
+def refusal(sites: Sites, out: Path, kind: type[MasrelError]) -> str:
+    with pytest.raises(kind) as caught:
+        merge_studies(sites, out)
+    assert not [p for p in out.parent.iterdir() if p.name.startswith(".masrel")]
+    assert not out.exists()
+    return str(caught.value)
+
+
+@pytest.mark.slow
+def test_a_rater_with_sessions_in_both_is_refused(sites: Sites, tmp_path: Path) -> None:
+    run(sites[1], "R2")
+    message = refusal(sites, tmp_path / "both", ParameterError)
+    assert message.startswith("rater R2: needed sessions in one of the studies, got ")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "residual_ratio = 0.15",
+            "residual_ratio = 0.2",
+            "models.HM1.residual_ratio: needed the same in all protocols, got 0.15 in "
+            "{0}/protocol.toml and 0.2 in {1}/protocol.toml",
+        ),
+        ("seed = 11", "seed = 12", "schedule.seed: needed the same"),
+        ('"Three models"', '"3 models"', "study.title: needed the same in all"),
+        ('id = "R1"\n', 'id = "R1"\nnote = "x"\n', "raters.R1.note: needed the same"),
+    ],
+)
+def test_another_key_is_refused_by_name(
+    new_study: NewStudy, tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    north = StudyPaths(site(new_study, "north", "R1 R2"))
+    east = StudyPaths(site(new_study, "east", "R1 R5", (old, new)))
+    text = refusal((north, east), tmp_path / "both", ProtocolError)
+    assert text.startswith(message.format(north.root, east.root))
+
+
+def test_another_secret_is_refused(
+    sites: Sites, new_study: NewStudy, tmp_path: Path
+) -> None:
+    from masrel.lab.schedule import write_schedules
+
+    east = StudyPaths(site(new_study, "east", "R5"))
+    for file in (*east.schedules.glob("*.csv"), east.secret_file):
+        file.unlink(missing_ok=True)
+    east.published_secret_file.unlink(missing_ok=True)
+    write_schedules(read_protocol(east.protocol), east)
+    message = refusal((sites[0], east), tmp_path / "both", ScheduleError)
+    assert "test_R5.csv: commitment: needed that of " in message
+
+
+@pytest.mark.slow
+def test_a_record_that_is_broken_is_refused(sites: Sites, tmp_path: Path) -> None:
+    log = sites[1].log_file("R3", "test")
+    log.write_bytes(log.read_bytes().replace(b'"attempt": 1', b'"attempt": 2'))
+    message = refusal(sites, tmp_path / "both", ParameterError)
+    assert message.startswith(f"{sites[1].root}: needed a record that is whole")
+
+
+@pytest.mark.slow
+def test_a_folder_that_holds_anything_is_refused(sites: Sites, tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="needed a new or empty folder"):
+        merge_studies(sites, sites[0].root)
+    with pytest.raises(ParameterError, match="needed a folder outside"):
+        merge_studies(sites, sites[0].root / "both")
+    with pytest.raises(ParameterError, match="needed two or more, got 1"):
+        merge_studies(sites[:1], tmp_path / "both")
+    with pytest.raises(ParameterError, match="got one twice"):
+        merge_studies([sites[0], sites[0]], tmp_path / "both")
+
+
+@pytest.mark.slow
+def test_a_full_disk_leaves_nothing(
+    sites: Sites, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_space(_: int) -> None:
+        raise OSError(28, os.strerror(28))
+
+    monkeypatch.setattr(os, "fsync", no_space)
+    with pytest.raises(OSError, match="No space left"):
+        merge_studies(sites, tmp_path / "both")
+    assert not [p for p in tmp_path.iterdir() if p.name.startswith(".masrel")]

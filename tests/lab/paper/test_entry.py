@@ -1,0 +1,504 @@
+"""Sheets that were filled in on paper, typed, and brought into session logs."""
+
+import csv
+import io
+import json
+import random
+from collections.abc import Callable, Sequence
+from datetime import UTC, date, datetime
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from masrel.cli import cli
+from masrel.errors import (
+    MasrelError,
+    MasrelWarning,
+    ParameterError,
+    RatingsError,
+    SessionLogError,
+)
+from masrel.lab.analysis import analyze
+from masrel.lab.conduct._study_answers import study_answers
+from masrel.lab.paper import compare_sheet, enter_sheet, write_sheets
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.ratings import corrections_of, ratings_from_logs, read_study_data
+from masrel.lab.run import read_log, record_correction
+from masrel.lab.schedule import read_schedule
+from masrel.lab.verification import verify_study
+from tests.lab.paper.conftest import QUESTIONS
+from tests.lab.run.test_session import console, run
+
+Small = tuple[StudyPaths, Protocol]
+New = Callable[..., Small]
+Rows = list[list[str]]
+
+
+def blank(small: Small, rater: str = "R1", session: str = "test") -> Rows:
+    """The rows of the file that a sheet is typed into."""
+    write_sheets(*small)
+    text = small[0].typed_file(rater, session).read_text(encoding="utf-8")
+    return list(csv.reader(io.StringIO(text)))[1:]  # below the version
+
+
+def filled(
+    small: Small, *grades: str, rater: str = "R1", session: str = "test"
+) -> Rows:
+    rows = blank(small, rater, session)
+    for row, grade in zip(rows[1:], grades, strict=False):
+        row[3] = grade
+    return rows
+
+
+def typed(
+    small: Small,
+    rows: Sequence[Sequence[str]],
+    *,
+    name: str = "typed.csv",
+    delimiter: str = ",",
+    begins: bytes = b"",
+) -> Path:
+    text = io.StringIO(newline="")
+    csv.writer(text, delimiter=delimiter).writerows(rows)
+    path = small[0].root / name
+    path.write_bytes(begins + text.getvalue().encode())
+    return path
+
+
+def enter(small: Small, file: Path, rater: str = "R1", **options: object) -> object:
+    study, protocol = small
+    return enter_sheet(
+        study,
+        protocol,
+        file,
+        rater,
+        "test",
+        who="MK",
+        **options,  # type: ignore[arg-type]
+    )
+
+
+def refusal(small: Small, rows: Sequence[Sequence[str]], **options: object) -> str:
+    """What is said of a sheet that is refused, without the name of the file."""
+    file = typed(small, rows)
+    with pytest.raises(RatingsError) as caught:
+        enter(small, file, **options)
+    assert not small[0].log_file("R1", "test").exists()
+    return str(caught.value).replace(f"{file}: ", "")
+
+
+def test_a_sheet_becomes_a_complete_session_of_a_person(small: Small) -> None:
+    study, protocol = small
+    summary = enter(small, typed(small, filled(small, "1+", "NA", "3")))
+    assert (summary.n_presentations, summary.n_graded) == (3, 2)  # type: ignore[attr-defined]
+    log = read_log(study.log_file("R1", "test"))
+    assert [event.kind for event in log] == ["session", *["entered"] * 3, "complete"]
+    head, first = log[0].fields, log[1].fields
+    assert (head["grades"], head["device"], head["simulated"]) == (
+        *("paper", "none"),
+        False,
+    )
+    assert (first["grade"], first["file"], first["row"], first["who"]) == (
+        *("1+", "typed.csv"),
+        *(2, "MK"),
+    )
+    ratings = ratings_from_logs(study, protocol)
+    shown = read_schedule(study.schedule_file("R1", "test")).presentations
+    assert dict(zip(ratings.table["model"], ratings.table["grade"], strict=True)) == {
+        shown[0].model: "1+",
+        shown[1].model: None,
+        shown[2].model: "3",
+    }
+    assert set(ratings.table["source"]) == {"recorded"}
+    assert (ratings.n_from_persons, ratings.simulated) == (3, False)
+    verification = verify_study(study)
+    assert verification.is_whole
+    assert [s.stage for s in verification.sessions][:1] == ["complete"]
+    analyze(protocol, read_study_data(study, protocol).ratings)
+
+
+@pytest.mark.parametrize(
+    ("delimiter", "begins"),
+    [(",", b""), (";", b"\xef\xbb\xbf"), ("\t", b""), (";", b"sep=;\r\n")],
+)
+def test_the_habits_of_spreadsheets_are_read(
+    delimiter: str, begins: bytes, small: Small
+) -> None:
+    head, *rows = filled(small, "0", "1+", "2")
+    untidy = [[*head, "", ""], *([*row, "", ""] for row in reversed(rows))]
+    untidy[1][3] = " 2 "
+    untidy += [[""] * 6, [], [""] * 6]
+    enter(small, typed(small, untidy, delimiter=delimiter, begins=begins))
+    log = read_log(small[0].log_file("R1", "test"))
+    entered = [event.fields for event in log if event.kind == "entered"]
+    assert [fields["grade"] for fields in entered] == ["0", "1+", "2"]
+    below = 1 if begins.startswith(b"sep") else 0  # rows as a spreadsheet has them
+    assert [fields["row"] for fields in entered] == [4 + below, 3 + below, 2 + below]
+
+
+def test_a_sheet_of_masrel_schedule_is_read_too(small: Small) -> None:
+    rows = [row[1:] for row in filled(small, "0", "1", "2")]
+    assert rows[0] == ["position", "code", "grade"]
+    enter(small, typed(small, rows))
+
+
+def test_unicode_text_and_utf_16_are_told_from_others(small: Small) -> None:
+    text = "\n".join("\t".join(row) for row in filled(small, "0", "1", "2"))
+    file = small[0].root / "typed.txt"
+    file.write_bytes(text.encode("utf-16"))
+    enter(small, file)
+    for data, message in [
+        (b"PK\x03\x04 and so on", 'got a workbook: save the sheet as "CSV UTF-8"'),
+        (
+            b"position,code,grade\n1,\xe4,2\n",
+            "line 2: needed UTF-8 text, got byte 0xe4",
+        ),
+        (b"", "needed the columns position, code, grade, got nothing"),
+    ]:
+        file.write_bytes(data)
+        with pytest.raises(RatingsError, match=message):
+            enter(small, file, rater="R2")
+
+
+def test_answers_come_with_the_grades(new_study: New) -> None:
+    small = new_study(("[schedule]", QUESTIONS))
+    rows = filled(small, "1", "2", "3")
+    for row, realism in zip(rows[1:4], ("7", "NA", "10"), strict=True):
+        row[4] = realism
+    rows[4][5:] = ["7,5", "größer; schneller"]
+    enter(small, typed(small, rows, delimiter=";"))
+    codes = [row[2] for row in rows[1:4]]
+    log = read_log(small[0].log_file("R1", "test"))
+    answered = {
+        (e.fields["question"], e.fields["code"]): e.fields["answer"]
+        for e in log
+        if e.kind == "answered"
+    }
+    assert answered == {
+        ("realism", codes[0]): 7,
+        ("realism", codes[1]): None,
+        ("realism", codes[2]): 10,
+        ("tired", None): 7.5,
+        ("words", None): "größer; schneller",
+    }
+    assert verify_study(small[0]).is_whole
+
+
+ABOUT_THE_STUDY = """
+[[questionnaires]]
+id = "all"
+title = "The study"
+when = "study"
+
+[[questionnaires.questions]]
+id = "again"
+text = "Would you take part again?"
+type = "choice"
+choices = ["yes", "no"]
+
+[schedule]
+"""
+
+
+def test_a_rater_is_asked_about_the_study_on_the_sheet_of_the_last_session(
+    new_study: New,
+) -> None:
+    small = study, protocol = new_study(("[schedule]", ABOUT_THE_STUDY))
+    assert blank(small)[-1][1] == "3"  # R1 has a retest to come
+    assert "After the study" in (study.sheets / "sheets.html").read_text("utf-8")
+    enter(small, typed(small, filled(small, "1", "2", "3")))
+    rows = filled(small, "1", "2", "3", session="retest")
+    assert rows[-1][1] == "study"
+    rows[-1][4] = "yes"
+    file = typed(small, rows, name="b.csv")
+    enter_sheet(study, protocol, file, "R1", "retest", who="MK")
+    assert study_answers(study) == {"R1": {("all", "again"): "yes"}}
+    assert verify_study(study).is_whole
+    again = typed(small, [*rows, [""]], name="c.csv")
+    assert compare_sheet(study, protocol, again, "R1", "retest", who="JL") == ()
+
+
+@pytest.mark.parametrize(
+    ("row", "column", "cell", "message"),
+    [
+        (1, 3, "5", "row 2: grade: needed one of 0, 1, 1+, 2, 3, 4, or NA where there "
+         "is none, got '5'"),
+        (1, 3, "1,0", "row 2: grade: needed one of 0, 1, 1+, 2, 3, 4, or NA where "
+         "there is none, got '1,0'"),
+        (2, 3, "", "row 3: grade: needed one of 0, 1, 1+, 2, 3, 4, or NA where there "
+         "is none, got an empty cell"),
+        (3, 4, "11", "row 4: arm.realism: needed a whole number, 1 to 10, got '11' "
+         "(NA: was left out)"),
+        (3, 4, "", "row 4: arm.realism: needed a whole number, 1 to 10, got none "
+         "(NA: was left out)"),
+        (1, 5, "3", "row 2: end.tired: needed an empty cell in this row, got '3'"),
+        (4, 3, "2", "row 5: grade: needed of presentations, got '2'"),
+        (4, 5, "101", "row 5: end.tired: needed a number, 0 to 100, got '101' (NA: was "
+         "left out)"),
+        (0, 4, "realism", "needed the columns sheet, position, code, grade, "
+         "arm.realism, end.tired, end.words, got realism too"),
+        (0, 6, "", "needed the columns sheet, position, code, grade, arm.realism, "
+         "end.tired, end.words, got no end.words"),
+        (0, 6, "grade", "row 1: needed each column once, got grade twice"),
+        (0, 3, "note", "row 1: needed the columns position, code, grade, got sheet, "
+         "position, code, note, arm.realism, end.tired, end.words"),
+    ],
+)  # fmt: skip
+def test_a_wrong_cell_is_named_with_its_row(
+    row: int, column: int, cell: str, message: str, new_study: New
+) -> None:
+    small = new_study(("[schedule]", QUESTIONS))
+    rows = filled(small, "1", "2", "3")
+    for each in rows[1:4]:
+        each[4] = "7"
+    rows[4][5] = "50"
+    rows[row][column] = cell
+    assert refusal(small, rows) == message
+
+
+def test_a_wrong_code_and_a_code_in_another_place_are_named(small: Small) -> None:
+    rows = filled(small, "1", "2", "3")
+    codes = [row[2] for row in rows[1:]]
+    rows[1][2] = "99X"
+    first, second = refusal(small, rows).splitlines()
+    assert first == f"row 2: code: needed {codes[0]} at position 1, got '99X'"
+    assert second.startswith("needed a row for each of 3 presentations, got none of")
+    rows[1][2], rows[2][1] = codes[0], "3"
+    first, second = refusal(small, rows).splitlines()
+    assert first == f"row 3: position: needed 2, that of code {codes[1]}, got '3'"
+
+
+def test_a_presentation_twice_or_not_at_all_is_named(small: Small) -> None:
+    rows = filled(small, "1", "2", "3")
+    assert refusal(small, [*rows, rows[2]]) == (
+        "row 5: needed each presentation once, got that of row 3 again"
+    )
+    assert refusal(small, [*rows[:2], rows[3]]) == (
+        "needed a row for each of 3 presentations, got none of position 2, code "
+        f"{rows[2][2]}: its grade is NA where there is none"
+    )
+
+
+def test_another_raters_sheet_is_refused_with_whose_it_is(small: Small) -> None:
+    others = filled(small, "1", "2", "3", rater="R2")
+    own = blank(small)
+    assert refusal(small, others) == (
+        f"row 2: needed {own[1][0]}, the sheet of rater R1 in session test, got "
+        f"{others[1][0]}, that of rater R2 in session test"
+    )
+    assert refusal(small, [row[1:] for row in others]) == (
+        "needed the sheet of rater R1 in session test, got that of rater R2 in session "
+        "test"
+    )
+
+
+def test_a_sheet_of_another_study_is_refused(small: Small, new_study: New) -> None:
+    other = new_study(('id = "three"', 'id = "four"'), name="other")
+    rows = filled(other, "1", "2", "3")
+    assert refusal(small, rows).endswith(
+        f"got {rows[1][0]}, a sheet of another study or of a schedule that was drawn "
+        "anew"
+    )
+
+
+def test_a_sheet_is_entered_once(small: Small) -> None:
+    file = typed(small, filled(small, "1", "2", "3"))
+    enter(small, file)
+    before = small[0].log_file("R1", "test").read_bytes()
+    for again in (file, typed(small, filled(small, "2", "2", "3"), name="b.csv")):
+        with pytest.raises(SessionLogError) as caught:
+            enter(small, again)
+        assert str(caught.value).startswith(
+            f"{again}: row 2: needed a presentation that was not entered yet, got "
+            "position 1, code "
+        )
+        assert "by MK from typed.csv, row 2" in str(caught.value)
+    assert small[0].log_file("R1", "test").read_bytes() == before
+
+
+def test_a_session_of_the_console_takes_no_sheet(small: Small) -> None:
+    run(small, console("\n1\n\n2\n\n3\n")[0])
+    with pytest.raises(SessionLogError, match="begun with grades = console: needed"):
+        enter(small, typed(small, filled(small, "1", "2", "3")))
+
+
+@pytest.mark.parametrize("n_events", [0, 2, 5, 9])
+def test_a_process_that_dies_in_the_middle_goes_on(
+    n_events: int, new_study: New
+) -> None:
+    small = new_study(("[schedule]", QUESTIONS))
+    rows = filled(small, "1", "2", "3")
+    for row in rows[1:4]:
+        row[4] = "7"
+    rows[4][5] = "50"
+    file = typed(small, rows)
+    log = small[0].log_file("R1", "test")
+    enter(small, file)
+    kinds = [(e.kind, dict(e.fields)) for e in read_log(log)]
+    assert len(kinds) == 10
+    lines = log.read_bytes().splitlines(keepends=True)
+    log.write_bytes(b"".join(lines[:n_events]))
+    enter(small, file)
+    assert [(e.kind, dict(e.fields)) for e in read_log(log)] == kinds
+
+
+def test_a_grade_from_paper_is_corrected_as_others_are(small: Small) -> None:
+    study, protocol = small
+    rows = filled(small, "1", "NA", "3")
+    enter(small, typed(small, rows))
+    for row, grade in zip(rows[1:3], ("1+", "2"), strict=True):
+        record_correction(
+            study,
+            protocol,
+            "R1",
+            "test",
+            code=row[2],
+            grade=grade,
+            who="JL",
+            why="typed wrongly",
+        )
+    first, late = corrections_of(study, protocol)
+    assert (first.first_grade, first.grade) == ("1", "1+")
+    assert (late.first_grade, late.grade) == (None, "2")
+    assert verify_study(study).is_whole
+
+
+AFTER = 'id = "retest"\nraters = ["R1"]\nafter = "test"\nat_least_days = 14'
+
+
+def test_days_between_sessions_are_counted_from_the_days_on_the_sheets(
+    new_study: New,
+) -> None:
+    small = study, protocol = new_study(('id = "retest"\nraters = ["R1"]', AFTER))
+    now = lambda: datetime(2026, 11, 22, 9, tzinfo=UTC)  # noqa: E731
+    enter(
+        small, typed(small, filled(small, "1", "2", "3")), on=date(2026, 11, 1), now=now
+    )
+    file = typed(small, filled(small, "1", "2", "3", session="retest"), name="b.csv")
+    with pytest.warns(
+        MasrelWarning, match="at least 14 days after session test, got 9"
+    ):
+        enter_sheet(
+            study,
+            protocol,
+            file,
+            "R1",
+            "retest",
+            who="MK",
+            on=date(2026, 11, 10),
+            now=now,
+        )
+    kinds = {e.kind: e.fields for e in read_log(study.log_file("R1", "retest"))}
+    assert kinds["held"]["on"] == "2026-11-10"
+    assert (kinds["interval"]["days"], kinds["interval"]["kept"]) == (9, False)
+    assert verify_study(study).is_whole
+
+
+def test_what_presented_the_models_is_named_and_never_simulated(small: Small) -> None:
+    file = typed(small, filled(small, "1", "2", "3"))
+    for name in ("simulated", "Simulated-arm", "", "two words"):
+        with pytest.raises(ParameterError, match=r"^device: needed a name of "):
+            enter(small, file, device=name)
+    enter(small, file, device="wam-arm")
+    assert set(ratings_from_logs(*small).table["device"]) == {"wam-arm"}
+
+
+def test_a_session_on_a_day_to_come_is_refused(small: Small) -> None:
+    file = typed(small, filled(small, "1", "2", "3"))
+    with pytest.raises(ParameterError, match=r"^on: needed a day up to "):
+        enter(small, file, on=date(9999, 1, 1))
+    assert not small[0].log_file("R1", "test").exists()
+
+
+def test_the_command_enters_and_says_so(small: Small) -> None:
+    study, _ = small
+    file = typed(small, filled(small, "1", "NA", "3"))
+    call = ["enter", str(study.root), str(file), "--rater", "R1", "--session", "test"]
+    result = CliRunner().invoke(cli, [*call, "--who", "MK", "--on", "2026-11-01"])
+    assert result.exit_code == 0, result.output
+    assert result.output == (
+        "session test of R1 is entered: 2 grades from paper, 1 missing, in "
+        f"{study.log_file('R1', 'test')}. Then: masrel ratings\n"
+    )
+    header = json.loads(study.log_file("R1", "test").read_text("utf-8").splitlines()[0])
+    assert header["fields"]["grades"] == "paper"
+
+
+CELLS = ("", "NA", "1", "1,0", "11", "-1", "7", "x", "=1+1", "\u00e9", "1" * 200)
+
+
+def with_cells_changed(rows: Rows, rng: random.Random) -> bytes:
+    """A sheet as hands that slip leave it: cells, rows and columns."""
+    head, *rows = ([*row] for row in rows)
+    for _ in range(rng.randint(1, 2)):
+        row, other = rng.choice(rows), rng.choice(rows)
+        kind, column = rng.randrange(7), rng.randrange(len(row) or 1)
+        if kind < 2 and len(row) > 4:
+            row[3 + kind] = rng.choice(("1", "2", "3", "NA"))
+        elif kind < 4:
+            row[column : column + 1] = [rng.choice((*CELLS, *other))]
+        elif kind == 4:
+            rows.insert(rng.randrange(len(rows) + 1), rng.choice((other[:], [])))
+        elif kind == 5 and len(rows) > 1:
+            rows.remove(row)
+        else:
+            rng.shuffle(rng.choice((rows, rows, row, head)))
+    text = io.StringIO(newline="")
+    csv.writer(text, delimiter=rng.choice(",,,;\t")).writerows([head, *rows])
+    return text.getvalue().encode()
+
+
+def with_bytes_changed(rows: Rows, rng: random.Random) -> bytes:
+    """A sheet that was damaged on its way."""
+    text = io.StringIO(newline="")
+    csv.writer(text).writerows(rows)
+    data = bytearray(text.getvalue().encode())
+    for _ in range(rng.randint(1, 4)):
+        start = rng.randrange(len(data) + 1)
+        new = rng.choice([b",", b";", b'"', b"\n", b"\0", b"\xe4", b"NA", b""])
+        data[start : start + rng.randint(0, 9)] = new
+    return bytes(data)
+
+
+@pytest.mark.parametrize(
+    "seeds",
+    [
+        pytest.param(range(200)),
+        pytest.param(range(200, 2200), marks=pytest.mark.long),
+    ],
+)
+def test_a_mutated_sheet_is_entered_whole_or_refused_in_words(
+    new_study: New, seeds: range
+) -> None:
+    small = study, _ = new_study(
+        ("[schedule]", QUESTIONS.replace('"session"', '"study"')),
+        ('raters = ["R1"]', 'raters = ["R2"]'),
+    )
+    rows = filled(small, "1", "2", "3")
+    for row in rows[1:4]:
+        row[4] = "7"
+    rows[4][5] = "50"
+    log, file = study.log_file("R1", "test"), study.root / "mutated.csv"
+    n_entered = 0
+    for seed in seeds:
+        rng = random.Random(seed)
+        mutate = rng.choice((with_cells_changed, with_bytes_changed))
+        file.write_bytes(mutate(rows, rng))
+        problem = None
+        try:
+            enter(small, file)
+        except MasrelError as error:
+            problem = str(error)
+        if problem is not None:
+            assert 0 < len(problem) < 5000, seed
+            assert not log.exists(), seed
+            assert not study.conduct_file.exists(), seed
+            continue
+        n_entered += 1
+        kinds = [event.kind for event in read_log(log)]
+        assert kinds == ["session", *["entered", "answered"] * 3, "complete"], seed
+        assert study_answers(study)["R1"].keys() == {("end", "tired"), ("end", "words")}
+        log.unlink()
+        study.conduct_file.unlink()
+    assert len(seeds) / 20 < n_entered < len(seeds) / 2  # both are met

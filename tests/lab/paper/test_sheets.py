@@ -1,0 +1,253 @@
+"""Printed sheets: what stands on them, what does not, and where they are cut."""
+
+import re
+import shutil
+import subprocess
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from click.testing import CliRunner
+
+from masrel.cli import cli
+from masrel.errors import ParameterError, ScheduleError
+from masrel.lab.paper import write_sheets
+from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
+from masrel.lab.schedule import read_schedule, write_schedules
+from tests.lab.paper.conftest import QUESTIONS
+
+Small = tuple[StudyPaths, Protocol]
+New = Callable[..., Small]
+
+MODELS = ("HM1", "HM3", "D1")
+
+
+def codes(study: StudyPaths, rater: str = "R1", session: str = "test") -> list[str]:
+    schedule = read_schedule(study.schedule_file(rater, session))
+    return [shown.code for shown in schedule.presentations]
+
+
+def test_every_sheet_has_its_codes_and_no_file_names_a_model(new_study: New) -> None:
+    study, protocol = new_study(("[schedule]", QUESTIONS))
+    made = write_sheets(study, protocol)
+    page = made.html.read_text(encoding="utf-8")
+    sheets = page.split('<section class="sheet">')[1:]
+    places = [("R1", "test"), ("R2", "test"), ("R1", "retest")]
+    for sheet, place in zip(sheets, places, strict=True):
+        shown = re.findall(r'<td class="code">(\w+)</td>', sheet)
+        assert shown == codes(study, *place)
+    typed = [path.read_text(encoding="utf-8") for path in made.typed]
+    for text in (page, *typed):
+        assert not any(model in text for model in MODELS)
+
+
+def test_the_page_asks_nothing_of_the_network_and_runs_nothing(small: Small) -> None:
+    page = write_sheets(*small).html.read_text(encoding="utf-8")
+    assert "default-src 'none'" in page
+    assert not re.search(r"https?:|src=|href=|url\(|@import|<script", page)
+
+
+def test_a_title_is_text_on_the_page(new_study: New) -> None:
+    study, protocol = new_study(('"Three models"', '"<script>1</script> & more"'))
+    page = write_sheets(study, protocol).html.read_text(encoding="utf-8")
+    assert "&lt;script&gt;1&lt;/script&gt; &amp; more" in page
+    assert "<script" not in page
+
+
+def test_a_sheet_is_typed_into_a_file_with_a_column_a_question(new_study: New) -> None:
+    study, protocol = new_study(("[schedule]", QUESTIONS))
+    write_sheets(study, protocol, raters=["R1"], sessions=["test"])
+    text = study.typed_file("R1", "test").read_text(encoding="utf-8")
+    _, head, *rows, last = text.splitlines()
+    assert head == "sheet,position,code,grade,arm.realism,end.tired,end.words"
+    (sheet,) = {row.split(",")[0] for row in (*rows, last)}
+    assert re.fullmatch(r"S[0-9A-F]{4}-[0-9A-F]{4}", sheet)
+    assert rows == [
+        f"{sheet},{place},{code},,,,"
+        for place, code in enumerate(codes(study), start=1)
+    ]
+    assert last == f"{sheet},session,,,,,"
+    assert not study.typed_file("R2", "test").exists()
+
+
+def test_the_same_sheets_are_the_same_bytes_and_sheets_differ(small: Small) -> None:
+    first = write_sheets(*small).html.read_bytes()
+    assert write_sheets(*small).html.read_bytes() == first
+    ids = re.findall(rb"<span>Sheet</span><strong>([^<]+)<", first)
+    assert len(ids) == len(set(ids)) == 3
+
+
+def test_what_has_been_typed_stays_and_a_blank_file_is_made_anew(
+    small: Small,
+) -> None:
+    study, protocol = small
+    write_sheets(study, protocol)
+    filled, blank = study.typed_file("R1", "test"), study.typed_file("R2", "test")
+    filled.write_text("position,code,grade\n1,77X,2\n", encoding="utf-8")
+    blank.write_text("sheet;position;code;grade\r\nS0;1;77X;\r\n;;;\r\n", "utf-8")
+    made = write_sheets(study, protocol)
+    assert made.unchanged == (filled,)
+    assert "77X,2" in filled.read_text(encoding="utf-8")
+    assert codes(study, "R2")[0] in blank.read_text(encoding="utf-8")
+
+
+def test_a_schedule_whose_sheet_was_printed_is_not_drawn_anew(small: Small) -> None:
+    study, protocol = small
+    write_sheets(study, protocol, raters=["R1"], sessions=["test"])
+    text = study.protocol.read_text("utf-8").replace("= 0.60", "= 0.55")
+    study.protocol.write_text(text, encoding="utf-8")
+    changed = read_protocol(study.protocol)
+    with pytest.raises(ScheduleError) as caught:
+        write_schedules(changed, study, redraw=True)
+    assert "because its sheet was printed" in str(caught.value)
+    assert f"Move {study.typed_file('R1', 'test')} out of the study" in str(
+        caught.value
+    )
+
+
+def test_breaks_instructions_and_the_meanings_of_grades_are_printed(
+    new_study: New,
+) -> None:
+    study, protocol = new_study(
+        (
+            "[schedule]",
+            '[occasions]\ninstructions = """Sit.\n\nMove the arm."""\nbreak_after = 2\n'
+            "break_minutes = 7.5\n\n[schedule]",
+        )
+    )
+    page = write_sheets(study, protocol).html.read_text(encoding="utf-8")
+    assert "<p>Sit.</p><p>Move the arm.</p>" in page
+    assert page.count("Break of 7.5 min") == 3  # one a sheet, none after the last
+    assert "Modified Ashworth Scale" in page
+    assert "<dt>1+</dt><dd>tone slightly up" in page
+
+
+def test_practice_comes_first_and_how_to_stretch_is_said(new_study: New) -> None:
+    rules = (
+        '[occasions]\npractice = ["HM3", "D1"]\n\n[presentation]\n'
+        'stretches = ["slow", "fast"]\n\n[schedule]'
+    )
+    study, protocol = new_study(("[schedule]", rules))
+    made = write_sheets(study, protocol, raters=["R1"], sessions=["test"])
+    page = made.html.read_text(encoding="utf-8")
+    places = [page.index(code) for code in (">P1<", ">P2<", f">{codes(study)[0]}<")]
+    assert places == sorted(places)
+    assert page.count('class="box none"') == 2 + 3
+    assert "HM3" not in page
+    assert "Stretch 1: slow, at most 10 deg/s (V1). Stretch 2: fast" in page
+    assert "says done" not in page
+    # no rating comes of practice, and none is typed
+    (typed,) = made.typed
+    assert "P1" not in typed.read_text(encoding="utf-8")
+
+
+def test_whose_sheets_there_are_not_is_said(small: Small) -> None:
+    study, protocol = small
+    with pytest.raises(ParameterError, match=r"^rater: needed one of R1, R2, got 'R9'"):
+        write_sheets(study, protocol, raters=["R9"])
+    with pytest.raises(ParameterError, match=r"^session: needed one of test, retest"):
+        write_sheets(study, protocol, sessions=["later"])
+    with pytest.raises(
+        ParameterError, match="needed a rater of the session and the site"
+    ):
+        write_sheets(study, protocol, raters=["R2"], sessions=["retest"])
+    with pytest.raises(ParameterError, match=r"^site: needed one of none, got 'north'"):
+        write_sheets(study, protocol, sites=["north"])
+    assert not study.sheets.exists()
+
+
+def test_sheets_are_of_the_schedules_that_are_drawn(new_study: New) -> None:
+    study, protocol = new_study(
+        ('[[raters]]\nid = "R2"', '[[raters]]\nid = "R2"\nsite = "north"')
+    )
+    made = write_sheets(study, protocol, sites=["north"])
+    assert made.typed == (study.typed_file("R2", "test"),)
+    study.schedule_file("R2", "test").unlink()
+    assert len(write_sheets(study, protocol).typed) == 2
+    with pytest.raises(ScheduleError, match="needed a schedule file"):
+        write_sheets(study, protocol, raters=["R2"])
+
+
+def test_the_command_says_what_to_do_next(small: Small) -> None:
+    study, _ = small
+    call = ["sheet", str(study.root), "--rater", "R1", "--session", "test"]
+    result = CliRunner().invoke(cli, call)
+    assert result.exit_code == 0, result.output
+    assert result.output == (
+        f"{study.sheets / 'sheets.html'}: 1 sheet to print. Type each into its "
+        "SESSION_RATER.csv beside it; then: masrel enter\n"
+    )
+
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+WORDS = shutil.which("pdftotext")
+TALL = """
+[[questionnaires]]
+id = "{0}"
+title = "{0}"
+when = "presentation"
+
+[[questionnaires.questions]]
+id = "{0}"
+text = "On a line of its own?"
+type = "visual-analogue"
+high_label = "ends-here"
+
+"""
+XHTML = "{http://www.w3.org/1999/xhtml}"
+
+
+def printed(page: Path, folder: Path) -> list[list[ElementTree.Element]]:
+    """The words of each page of a PDF that Chromium prints, and their places."""
+    assert CHROMIUM is not None
+    assert WORDS is not None
+    pdf, words = folder / "sheets.pdf", folder / "words.html"
+    options = [
+        *("--headless", "--no-sandbox", "--disable-gpu", "--no-first-run"),
+        *("--disable-background-networking", "--disable-component-update"),
+        *("--disable-sync", f"--user-data-dir={folder / 'profile'}"),
+        *("--no-pdf-header-footer", f"--print-to-pdf={pdf}"),
+    ]
+    call = [CHROMIUM, *options, page.as_uri()]
+    subprocess.run(call, check=True, capture_output=True, timeout=120)
+    subprocess.run([WORDS, "-bbox", str(pdf), str(words)], check=True)
+    pages = ElementTree.parse(words).iter(f"{XHTML}page")
+    found = []
+    for each in pages:
+        width, height = float(each.attrib["width"]), float(each.attrib["height"])
+        of_page = list(each.iter(f"{XHTML}word"))
+        for word in of_page:  # nothing reaches into the margin
+            assert 28 < float(word.attrib["xMin"]), word.text
+            assert float(word.attrib["xMax"]) < width - 28, word.text
+            assert 28 < float(word.attrib["yMin"]), word.text
+            assert float(word.attrib["yMax"]) < height - 28, word.text
+        found.append(of_page)
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium to print with")
+@pytest.mark.skipif(WORDS is None, reason="there is no pdftotext to read a PDF with")
+@pytest.mark.parametrize("repeats", [1, 13])
+def test_in_chromiums_pdf_no_row_is_split_and_no_code_is_missing(
+    repeats: int, new_study: New, tmp_path: Path
+) -> None:
+    tall = "".join(TALL.format(name) for name in "abcd") if repeats > 1 else ""
+    study, _ = new_study(("[schedule]", f"{tall}[schedule]\nrepeats = {repeats}"))
+    protocol = read_protocol(study.protocol)
+    made = write_sheets(study, protocol)
+    pages = [[str(word.text) for word in page] for page in printed(made.html, tmp_path)]
+    if repeats == 1:  # a page a session
+        assert len(pages) == 3
+    else:
+        assert len(pages) > 6
+    places = (("R1", "test"), ("R2", "test"), ("R1", "retest"))
+    expected = Counter(code for place in places for code in codes(study, *place))
+    words = Counter(word for page in pages for word in page)
+    assert {code: words[code] for code in expected} == expected
+    for page in pages:  # a row begins with its code, and ends with its question
+        n_rows = sum(word in expected for word in page)
+        assert page.count("NA") == n_rows
+        assert page.count("ends-here") == (4 * n_rows if repeats > 1 else 0)

@@ -1,0 +1,149 @@
+"""The bundled published study says what the paper's tables say."""
+
+import csv
+from collections import Counter
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from masrel.lab.protocol import Model, Protocol, read_protocol
+
+STUDY = Path(__file__).parents[3] / "studies" / "hess2012"
+
+# Table V of Park, Kim and Damiano (2012): per rater, grade and mean speed (deg/s)
+# of HM1 to HM4, as printed.
+TABLE_V = """
+1 122 1+ 124 2 108 3 68
+1 100 1+ 83 2 92 2 65
+1 86 1+ 70 2 88 3 64
+1+ 123 1+ 131 2 110 3 72
+1 80 1+ 70 2 77 3 60
+1 92 1 80 2 78 2 65
+1 82 1+ 86 2 73 3 61
+1 89 1 93 2 80 3 60
+"""
+
+
+@pytest.fixture(scope="module")
+def protocol() -> Protocol:
+    return read_protocol(STUDY / "protocol.toml")
+
+
+def rows(name: str) -> list[dict[str, str]]:
+    with (STUDY / "ratings" / name).open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def four(model: Model) -> tuple[Fraction, ...]:
+    values = (
+        model.catch_angle_constant_deg,
+        model.catch_torque_nms_rad,
+        model.residual_ratio,
+        model.catch_travel_deg,
+    )
+    return tuple(Fraction(str(value)) for value in values)  # the decimals as written
+
+
+def test_the_design_is_that_of_the_paper(protocol: Protocol) -> None:
+    assert protocol.scale.grades == ("0", "1", "1+", "2", "3", "4")
+    standards = {
+        m.id: m.intended_grade for m in protocol.models if m.role == "standard"
+    }
+    assert standards == {"HM1": "1", "HM2": "1+", "HM3": "2", "HM4": "3"}
+    raters = tuple(f"R{number}" for number in range(1, 9))
+    assert tuple(rater.id for rater in protocol.raters) == raters
+    sessions = {session.id: session.raters for session in protocol.sessions}
+    assert sessions == {"test": raters, "retest": raters[:3]}
+    assert "in-person" in protocol.report.sections
+
+
+def test_dummies_are_fifths_of_the_way_between_neighbouring_standards(
+    protocol: Protocol,
+) -> None:
+    standards = [four(m) for m in protocol.models if m.role == "standard"]
+    dummies = [m for m in protocol.models if m.role == "dummy"]
+    assert [m.id for m in dummies] == [f"D{number:02d}" for number in range(1, 13)]
+    assert [m.intended_grade for m in dummies] == [None] * 12
+    assert [four(m) for m in dummies] == [
+        tuple(a + Fraction(k, 5) * (b - a) for a, b in zip(low, high, strict=True))
+        for low, high in pairwise(standards)
+        for k in (1, 2, 3, 4)
+    ]
+
+
+def test_the_plan_asks_for_what_the_paper_reports(protocol: Protocol) -> None:
+    lines = [
+        (e.kind, e.coefficient, e.models, e.sessions, e.target, e.interval)
+        for e in protocol.analysis.estimates
+    ]
+    test, both = ("test",), ("test", "retest")
+    assert lines == [
+        ("inter-rater", "fleiss_kappa", "standard", test, "raters", "jackknife"),
+        ("inter-rater", "fleiss_kappa", "standard", test, "items", "posterior"),
+        ("inter-rater", "percent_agreement", "standard", test, "raters", "jackknife"),
+        ("inter-rater", "fleiss_kappa", "dummy", test, "raters", "jackknife"),
+        ("test-retest", "stratified_kappa", "standard", both, "items", "jackknife"),
+        ("test-retest", "stratified_kappa", "dummy", both, "items", "jackknife"),
+    ]
+
+
+def test_the_published_ratings_are_table_v_cell_by_cell() -> None:
+    printed = [line.split() for line in TABLE_V.strip().splitlines()]
+    expected = [
+        ("test", f"R{rater}", f"HM{model + 1}", *cells[2 * model : 2 * model + 2])
+        for rater, cells in enumerate(printed, start=1)
+        for model in range(4)
+    ]
+    columns = ("session", "rater", "model", "grade", "mean_speed_deg_s")
+    assert [tuple(row[c] for c in columns) for row in rows("published.csv")] == expected
+    assert {row["source"] for row in rows("published.csv")} == {"published"}
+
+
+def grades(table: str, column: str) -> dict[str, list[str]]:
+    found: dict[str, list[str]] = {}
+    for row in rows("in_person.csv"):
+        if row["source_table"] == table:
+            assert row["model"] == f"HM{row['subject']}"
+            found.setdefault(row["rater"], []).append(row[column])
+    return found
+
+
+def test_the_in_person_grades_are_tables_i_and_iv_with_their_absences() -> None:
+    assert grades("I", "in_person_grade") == {
+        "R1": ["1", "1+", "2", "3"],
+        "R2": ["1", "1+", "2", "2"],
+        "R3": ["", "1+", "2", "3"],
+    }
+    assert grades("I", "haptic_grade") == dict.fromkeys(["R1", "R2", "R3"], [""] * 4)
+    assert grades("IV", "in_person_grade") == {
+        "R1": ["1", "1+", "2", "3"],
+        "R2": ["1", "1+", "2", "2"],
+        "R3": ["1", "", "2", "3"],
+    }
+    assert grades("IV", "haptic_grade") == {
+        "R1": ["1", "1+", "2", "3"],
+        "R2": ["1", "1+", "2", "2"],
+        "R3": ["1", "1+", "2", "3"],
+    }
+    used = ["1", "1+", "2", "3"]  # the last line of Table I
+    for table in ("I", "IV"):
+        assert grades(table, "model_grade") == dict.fromkeys(["R1", "R2", "R3"], used)
+
+
+def test_table_iv_has_eleven_pairs_and_all_are_equal() -> None:
+    pairs = Counter(
+        row["in_person_grade"] == row["haptic_grade"]
+        for row in rows("in_person.csv")
+        if row["in_person_grade"] and row["haptic_grade"]
+    )
+    assert pairs == {True: 11}
+
+
+def test_the_haptic_grades_of_table_iv_are_those_of_table_v() -> None:
+    # Two tables of the paper that agree with each other.
+    published = {(r["rater"], r["model"]): r["grade"] for r in rows("published.csv")}
+    for row in rows("in_person.csv"):
+        if row["haptic_grade"]:
+            assert published[row["rater"], row["model"]] == row["haptic_grade"]

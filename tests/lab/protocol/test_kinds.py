@@ -1,0 +1,237 @@
+"""Models of other kinds than the spastic elbow in a protocol file."""
+
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from masrel.errors import ParameterError, ProtocolError
+from masrel.lab.elbow import MODELS, ElbowParameters
+from masrel.lab.elbow.tone import Contracture, LeadPipe
+from masrel.lab.protocol import (
+    elbow_parameters,
+    joint_model,
+    presented_hash,
+    protocol_hash,
+    read_protocol,
+)
+from tests.lab.protocol.documents import VALID, changed, write
+
+KINDS = [kind for kind in MODELS if kind != ElbowParameters.kind]
+PAGE = Path(__file__).parents[3] / "docs" / "protocol.md"
+
+
+def of_kind(kind: str, **parameters: object) -> dict[str, Any]:
+    """The valid protocol with a third model, of another kind."""
+    model: dict[str, Any] = {"id": "K", "kind": kind, "intended_grade": "2"}
+    if parameters:
+        model["parameters"] = parameters
+    return changed("models", to=[*VALID["models"], model])
+
+
+def problems_of(document: dict[str, Any], folder: Path) -> list[str]:
+    path = write(document, folder)
+    with pytest.raises(ProtocolError) as caught:
+        read_protocol(path)
+    return [p.removeprefix(f"{path}: ") for p in caught.value.problems]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_has_defaults_for_all_its_keys(kind: str, tmp_path: Path) -> None:
+    protocol = read_protocol(write(of_kind(kind), tmp_path))
+    assert joint_model(protocol, "K") == MODELS[kind]()
+    assert joint_model(protocol, "HM1") == elbow_parameters(protocol, "HM1")
+
+
+def test_keys_have_their_units_and_angles_are_degrees(tmp_path: Path) -> None:
+    document = of_kind(
+        "contracture",
+        end_angle_deg=100,
+        range_end_deg=110.0,
+        end_steepness_per_rad=9.0,
+        stiffness_nm_rad=1.5,
+        speed_threshold_deg_s=15.0,
+    )
+    protocol = read_protocol(write(document, tmp_path))
+    assert joint_model(protocol, "K") == Contracture(
+        end_angle=math.radians(100),
+        range_end=math.radians(110.0),
+        end_steepness=9.0,
+        stiffness=1.5,
+        speed_threshold=math.radians(15.0),
+    )
+
+
+def test_the_page_has_every_kind_with_its_keys_and_defaults(tmp_path: Path) -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| `([a-z-]+)` \| (`.*) \|$", text, flags=re.MULTILINE))
+    assert sorted(set(rows) & set(KINDS)) == sorted(KINDS)
+    for kind in KINDS:
+        listed = dict(re.findall(r"`(\w+)` (none|[-\d.]+)", rows[kind]))
+        numbers = {k: float(v) for k, v in listed.items() if v != "none"}
+        protocol = read_protocol(write(of_kind(kind, **numbers), tmp_path))
+        assert joint_model(protocol, "K") == MODELS[kind]()
+        # ... and one more is none of its keys
+        (problem,) = problems_of(of_kind(kind, zzz=1.0), tmp_path)
+        known = re.search(r"\((.*)\), got", problem)
+        assert known is not None
+        assert known[1].split(", ") == list(listed)
+
+
+def test_an_unknown_kind_names_those_there_are(tmp_path: Path) -> None:
+    assert problems_of(of_kind("lead-pipe-rigidty"), tmp_path) == [
+        "models[2].kind: needed one of spastic-elbow, "
+        + ", ".join(KINDS)
+        + ', got "lead-pipe-rigidty"; did you mean lead-pipe-rigidity? (id "K")'
+    ]
+
+
+def test_all_that_is_wrong_with_the_numbers_of_a_kind_comes_at_once(
+    tmp_path: Path,
+) -> None:
+    document = of_kind(
+        "lead-pipe-rigidity",
+        coulomb_torque_nm=-1.0,
+        rest_angle_deg=200.0,
+        stifness_nm_rad=1.0,
+        damping_nms_rad=0.3,
+    )
+    keys = ", ".join(
+        (
+            "range_end_deg",
+            "speed_threshold_deg_s",
+            "coulomb_torque_nm",
+            "stiffness_nm_rad",
+            "damping_nms_rad",
+            "bristle_travel_deg",
+            "rest_angle_deg",
+        )
+    )
+    assert sorted(problems_of(document, tmp_path)) == [
+        'models[2].parameters.coulomb_torque_nm: needed 0 or more, got -1.0 (id "K")',
+        "models[2].parameters.rest_angle_deg: needed 0 to 180 degrees, got 200.0 "
+        '(id "K")',
+        'models[2].parameters.stifness_nm_rad: needed a key of kind "lead-pipe-'
+        f'rigidity" ({keys}), got "stifness_nm_rad"; did you mean stiffness_nm_rad? '
+        '(id "K")',
+    ]
+
+
+def test_numbers_that_do_not_go_together_are_refused(tmp_path: Path) -> None:
+    (problem,) = problems_of(of_kind("clasp-knife", arming_angle_deg=80.0), tmp_path)
+    assert problem.startswith("models[2].parameters.arming_angle_deg: needed at most ")
+    (problem,) = problems_of(of_kind("cogwheel-rigidity", gap_share=0.0), tmp_path)
+    assert problem.startswith("models[2].parameters")
+    assert "gap_edge: needs at most half a gap" in problem
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("catch_angle_constant_deg", 120.0),
+        ("residual_ratio", 0.0),
+        ("file", "K.toml"),
+        ("constants", {"stiffness_nm_rad": 1.0}),
+    ],
+)
+def test_keys_of_a_spastic_elbow_are_not_those_of_another_kind(
+    tmp_path: Path, key: str, value: object
+) -> None:
+    document = of_kind("dystonia")
+    document["models"][2][key] = value
+    problems = problems_of(document, tmp_path)
+    if key == "file":  # ... which is read first, and is not there
+        assert problems[0].startswith("models[2].file: needed a model file")
+        return
+    where = "constants.stiffness_nm_rad" if key == "constants" else key
+    assert problems == [
+        f'models[2].{where}: needed for kind "spastic-elbow" only, got it for '
+        '"dystonia"; its numbers stand in [models.parameters] (id "K")'
+    ]
+
+
+def test_a_spastic_elbow_has_no_parameters(tmp_path: Path) -> None:
+    document = changed("models", 0, "parameters", to={"stiffness_nm_rad": 1.0})
+    assert problems_of(document, tmp_path) == [
+        "models[0].parameters: needed a kind of model that has some, got "
+        '"spastic-elbow", whose numbers stand beside its id and in constants '
+        '(id "HM1")'
+    ]
+
+
+@pytest.mark.parametrize("value", ["1", True, [1.0], {"a": 1.0}, math.inf, math.nan])
+def test_what_is_no_number_is_refused(tmp_path: Path, value: object) -> None:
+    (problem,) = problems_of(of_kind("clonus", beat_rate_hz=value), tmp_path)
+    where, needed = "models[2].parameters.beat_rate_hz", "needed a number, got "
+    assert problem.startswith(f"{where}: {needed}")
+    assert problem.endswith('(id "K")')
+
+
+def test_the_elbow_of_a_model_of_another_kind_is_refused(tmp_path: Path) -> None:
+    protocol = read_protocol(write(of_kind("clonus"), tmp_path))
+    with pytest.raises(
+        ParameterError,
+        match=r"model: needed one of kind 'spastic-elbow' \(HM1, D1\), got 'K' of kind "
+        "'clonus'",
+    ):
+        elbow_parameters(protocol, "K")
+
+
+def hashes(document: dict[str, Any], folder: Path) -> tuple[str, str]:
+    protocol = read_protocol(write(document, folder))
+    return protocol_hash(protocol), presented_hash(protocol)
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("models", 0, "kind"), "spastic-elbow"),
+        (("models", 0, "parameters"), {}),
+        (("stretch", "largest_speed_deg_s"), 131.0),
+        (("device", "active_torque_limit_nm"), 10.0),
+        (("device", "active_energy_limit_j"), 1),
+        (("device", "active_speed_limit_deg_s"), 180.0),
+    ],
+)
+def test_what_no_protocol_could_say_before_does_not_enter_at_its_default(
+    tmp_path: Path, path: tuple[str | int, ...], value: object
+) -> None:
+    assert hashes(changed(*path, to=value), tmp_path) == hashes(VALID, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("stretch", "largest_speed_deg_s"), 120.0),
+        (("device", "active_torque_limit_nm"), 9.0),
+        (("device", "active_energy_limit_j"), 2.0),
+        (("device", "active_speed_limit_deg_s"), 170.0),
+    ],
+)
+def test_what_else_it_says_enters_both(
+    tmp_path: Path, path: tuple[str | int, ...], value: object
+) -> None:
+    before, after = hashes(VALID, tmp_path), hashes(changed(*path, to=value), tmp_path)
+    assert before[0] != after[0]
+    assert before[1] != after[1]
+
+
+def test_the_numbers_of_a_kind_enter_but_not_at_their_defaults(tmp_path: Path) -> None:
+    plain = hashes(of_kind("lead-pipe-rigidity"), tmp_path)
+    defaults = of_kind("lead-pipe-rigidity", coulomb_torque_nm=1.6, rest_angle_deg=60)
+    assert hashes(defaults, tmp_path) == plain
+    other = of_kind("lead-pipe-rigidity", coulomb_torque_nm=1.7)
+    assert hashes(other, tmp_path) != plain
+    assert hashes(of_kind("cogwheel-rigidity"), tmp_path) != plain
+
+
+def test_the_models_of_the_tone_study_are_of_every_kind() -> None:
+    folder = Path(__file__).parents[3] / "studies" / "tone"
+    protocol = read_protocol(folder / "protocol.toml")
+    assert {model.kind for model in protocol.models} == set(MODELS)
+    assert joint_model(protocol, "L2") == LeadPipe.of_updrs(2)
+    assert joint_model(protocol, "L3") == LeadPipe.of_updrs(3)
+    assert joint_model(protocol, "N0") == LeadPipe.of_updrs(0)
+    assert joint_model(protocol, "F3") == Contracture.of_severity(3)

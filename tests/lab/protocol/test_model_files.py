@@ -1,0 +1,267 @@
+"""A model file's numbers are in the protocol as if they stood there."""
+
+import copy
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from masrel.errors import ProtocolError
+from masrel.lab.elbow.identification import as_toml, model_document
+from masrel.lab.elbow.parameters import STANDARD_MODELS
+from masrel.lab.protocol import (
+    PresentationRules,
+    elbow_parameters,
+    presented_hash,
+    protocol_hash,
+    read_protocol,
+)
+from tests.lab.protocol.documents import VALID, write
+
+KEYS = (
+    "catch_angle_constant_deg",
+    "catch_torque_nms_rad",
+    "residual_ratio",
+    "catch_travel_deg",
+)
+
+
+def named(file: str = "s3.toml", **more: object) -> dict[str, Any]:
+    """The valid protocol, its first model in a file."""
+    document = copy.deepcopy(VALID)
+    for key in KEYS:
+        document["models"][0].pop(key, None)
+    document["models"][0] |= {"file": file, **more}
+    return document
+
+
+def put(folder: Path, name: str = "s3.toml", **changes: dict[str, object]) -> Path:
+    """A model file of HM3, with changes of its tables."""
+    made = model_document(STANDARD_MODELS["HM3"], simulated=True, made_from="a test")
+    for table, values in changes.items():
+        made[table] = {**made[table], **values}  # type: ignore[dict-item]
+    path = folder / name
+    path.write_text(as_toml(made), encoding="utf-8")
+    return path
+
+
+def test_a_named_model_is_the_one_in_the_file(tmp_path: Path) -> None:
+    put(tmp_path, constants={"damping_nms_rad": 0.77})
+    protocol = read_protocol(write(named(), tmp_path))
+    found = elbow_parameters(protocol, protocol.models[0].id)
+    expected = STANDARD_MODELS["HM3"]
+    assert found.damping == 0.77
+    assert found.catch_torque_constant == expected.catch_torque_constant
+    assert found.catch_angle_constant == pytest.approx(
+        expected.catch_angle_constant, rel=1e-15
+    )
+
+
+def test_a_file_keeps_the_law_its_numbers_were_fitted_with(tmp_path: Path) -> None:
+    # Q of a fit is a residual; under a study's other reading it would be another joint.
+    put(tmp_path)
+    document = named()
+    document["elbow"] = {"residual_reading": "decrease", "post_catch": "additive"}
+    protocol = read_protocol(write(document, tmp_path))
+    filed = elbow_parameters(protocol, protocol.models[0].id)
+    assert (filed.residual_reading, filed.post_catch) == ("residual", "continuous")
+    assert filed.residual_share == 0.6
+    beside = elbow_parameters(protocol, protocol.models[1].id)
+    assert (beside.residual_reading, beside.post_catch) == ("decrease", "additive")
+
+
+def test_a_file_written_before_laws_were_is_presented_as_it_was(tmp_path: Path) -> None:
+    path = put(tmp_path)
+    after = read_protocol(write(named(), tmp_path))
+    lines = path.read_text(encoding="utf-8").splitlines()
+    old = [one for one in lines if not one.startswith(("post_catch =", "residual_re"))]
+    assert len(old) == len(lines) - 2
+    path.write_text("\n".join(old), encoding="utf-8")
+    before = read_protocol(write(named(), tmp_path))
+    assert presented_hash(before) == presented_hash(after)
+
+
+def test_a_variant_in_both_places_is_refused(tmp_path: Path) -> None:
+    put(tmp_path, constants={"rest_angle_deg": 25.0})
+    document = named(constants={"rest_angle_deg": 26.0, "post_catch": "additive"})
+    with pytest.raises(ProtocolError) as raised:
+        read_protocol(write(document, tmp_path))
+    said = "\n".join(raised.value.problems)
+    assert "models[0].constants.rest_angle_deg: needed in s3.toml or here" in said
+    assert "models[0].constants.post_catch: needed in s3.toml or here" in said
+
+
+def test_a_file_says_whether_it_comes_from_simulated_recordings(tmp_path: Path) -> None:
+    put(tmp_path)
+    protocol = read_protocol(write(named(), tmp_path))
+    assert [model.simulated for model in protocol.models] == [True, False]
+    with pytest.raises(ProtocolError) as raised:
+        read_protocol(write(named(simulated=False), tmp_path))
+    (problem,) = raised.value.problems
+    assert problem.endswith(
+        "models[0].simulated: needed in s3.toml or here, got it in both"
+    )
+
+
+def test_of_a_file_that_does_not_say_it_the_protocol_may(tmp_path: Path) -> None:
+    path = put(tmp_path)
+    text = path.read_text("utf-8").replace("simulated = true\n", "")
+    path.write_text(text, "utf-8")
+    for said in (False, True):
+        protocol = read_protocol(write(named(simulated=said), tmp_path))
+        assert protocol.models[0].simulated is said
+
+
+def test_both_hashes_follow_the_numbers_in_the_file(tmp_path: Path) -> None:
+    path = write(named(), tmp_path)
+    put(tmp_path)
+    before = read_protocol(path)
+    put(tmp_path, model={"residual_ratio": 0.61})
+    after = read_protocol(path)
+    assert protocol_hash(before) != protocol_hash(after)
+    assert presented_hash(before) != presented_hash(after)
+
+
+def test_what_is_presented_does_not_depend_on_the_files_name(tmp_path: Path) -> None:
+    put(tmp_path)
+    put(tmp_path, "other.toml")
+    one = read_protocol(write(named(), tmp_path))
+    two = read_protocol(write(named("other.toml"), tmp_path))
+    assert presented_hash(one) == presented_hash(two)
+    assert protocol_hash(one) != protocol_hash(two)
+
+
+def test_numbers_in_a_file_and_in_the_protocol_are_presented_alike(
+    tmp_path: Path,
+) -> None:
+    put(tmp_path)
+    filed = read_protocol(write(named(), tmp_path))
+    model = filed.models[0]
+    inline = named()
+    entry = inline["models"][0]
+    del entry["file"]
+    entry |= {key: getattr(model, key) for key in KEYS}
+    own = model.constants
+    entry["constants"] = {
+        name: value
+        for name in own.__struct_fields__
+        if (value := getattr(own, name)) is not None
+    }
+    written = read_protocol(write(inline, tmp_path))
+    assert presented_hash(written) == presented_hash(filed)
+
+
+def test_a_protocol_without_files_has_the_hash_it_had_before_there_were_any() -> None:
+    # Schedules drawn then must not turn stale: what is not used does not enter.
+    folder = Path(__file__).parents[3] / "studies"
+    protocol = msgspec.structs.replace(
+        read_protocol(folder / "hess2012" / "protocol.toml"),
+        presentation=PresentationRules(),  # as it was then
+        questionnaires=(),
+    )
+    content = msgspec.to_builtins(protocol)
+    for model in content["models"]:
+        assert model.pop("file") is None
+        assert model.pop("simulated") is False
+        assert set(model.pop("constants").values()) == {None}
+        assert model.pop("kind") == "spastic-elbow"
+        assert model.pop("parameters") == {}
+    assert all(rater.pop("fields") == {} for rater in content["raters"])
+    assert content.pop("rater_fields") == {}
+    assert content["report"].pop("gates") == ()
+    assert content["report"].pop("formats") == ("html", "markdown")
+    assert content["stretch"].pop("largest_speed_deg_s") == 131.0
+    assert content.pop("presentation")["stretches"] == 1
+    assert content.pop("occasions")["resume"] == "always"
+    assert content.pop("questionnaires") == ()
+    for session in content["sessions"]:
+        for key in ("after", "at_least_days", "at_most_days"):
+            assert session.pop(key) is None
+        assert session.pop("order_policy") == "refuse"
+    for rater in content["raters"]:
+        assert rater.pop("site") is None
+    assert content["schedule"].pop("blocks_by") == "repeat"
+    assert content["schedule"].pop("standards_apart") is False
+    assert content["schedule"].pop("max_same_grade") is None
+    assert content["schedule"].pop("strata") == "none"
+    assert content.pop("training")["order"] == "blocked"
+    assert content["simulated_raters"].pop("hold_s") == 0.0
+    assert content["simulated_raters"].pop("hand") == "clamp"
+    assert content["elbow"].pop("rest_angle_deg") is None
+    assert content["elbow"].pop("residual_reading") == "residual"
+    assert content["elbow"].pop("catch_rise_s") == 0.0
+    assert content["device"].pop("active_torque_limit_nm") == 10.0
+    assert content["device"].pop("active_energy_limit_j") == 1.0
+    assert content["device"].pop("active_speed_limit_deg_s") == 180.0
+    assert content["device"].pop("end_ramp_ms") == 100.0
+    assert content["device"].pop("drift_limit_deg") == 3.0
+    assert content["device"].pop("drift_speed_deg_s") == 25.0
+    assert content["device"].pop("encoder_noise_deg") == 0.0
+    assert content["device"].pop("arrival_deg") == 3.0
+    assert content["device"].pop("arrival_speed_deg_s") == 5.0
+    assert content["device"].pop("arrival_ms") == 100.0
+    assert content["device"].pop("post_catch_ramp_ms") == 100.0
+    assert content["device"].pop("loose_inertia_kg_m2") == 0.06
+    assert content["device"].pop("torque_sensor") is False
+    assert content["analysis"].pop("sample_sizes") == ()
+    assert content["study"].pop("language") == "en"
+    canonical = msgspec.json.encode(content, order="sorted")
+    assert protocol_hash(protocol) == hashlib.sha256(canonical).hexdigest()
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (None, r"models\[0\].file: needed a model file, got .*s3.toml: No such file"),
+        ("x = [", r"models\[0\].file: needed a model file, got .*s3.toml"),
+        ("x = 1\n", r'models\[0\].file: needed .* format is "masrel joint model 1"'),
+        (
+            'format = "masrel joint model 1"\n[model]\nid = "X"\n',
+            r"models\[0\].file: needed keys of \[model\] among .*, got id in",
+        ),
+        (
+            'format = "masrel joint model 1"\nmodel = 5\n',
+            r"models\[0\].file: needed a table \[model\], got 5 in .*s3.toml",
+        ),
+        (
+            'format = "masrel joint model 1"\nconstants = ["damping_nms_rad"]\n',
+            r"models\[0\].file: needed a table \[constants\], got an array of 1 in",
+        ),
+    ],
+)
+def test_a_file_that_is_no_model_file_is_one_problem(
+    tmp_path: Path, content: str | None, said: str
+) -> None:
+    if content is not None:
+        (tmp_path / "s3.toml").write_text(content, encoding="utf-8")
+    with pytest.raises(ProtocolError, match=said) as raised:
+        read_protocol(write(named(), tmp_path))
+    assert len(raised.value.problems) == 1
+
+
+def test_a_number_in_both_places_is_refused(tmp_path: Path) -> None:
+    put(tmp_path)
+    document = named(residual_ratio=0.2, constants={"damping_nms_rad": 1.0})
+    with pytest.raises(ProtocolError) as raised:
+        read_protocol(write(document, tmp_path))
+    said = "\n".join(raised.value.problems)
+    assert "models[0].residual_ratio: needed in s3.toml or here" in said
+    assert "models[0].constants.damping_nms_rad: needed in s3.toml or here" in said
+
+
+def test_a_number_out_of_range_is_named_by_its_key(tmp_path: Path) -> None:
+    put(tmp_path, model={"residual_ratio": 1.5}, constants={"catch_slope_s": -1.0})
+    with pytest.raises(ProtocolError) as raised:
+        read_protocol(write(named(), tmp_path))
+    said = "\n".join(raised.value.problems)
+    assert "models[0].residual_ratio: needed a number at least 0" in said
+    assert "models[0].constants.catch_slope_s: needed a number above 0" in said
+
+
+def test_the_rule_of_catch_angles_uses_the_models_own_slope(tmp_path: Path) -> None:
+    # L 115 deg - 1.0 s · 60 deg/s = 55 deg, below the smallest catch angle
+    put(tmp_path, constants={"catch_slope_s": 1.0})
+    with pytest.raises(ProtocolError, match=r"115 - 1 \* 60 = 55"):
+        read_protocol(write(named(), tmp_path))

@@ -1,0 +1,251 @@
+"""The report as a whole: one page that stands alone, and the same in other forms."""
+
+import base64
+import csv
+import re
+from pathlib import Path
+
+import pytest
+
+from masrel.lab.analysis import analyze
+from masrel.lab.protocol import StudyPaths
+from masrel.lab.report import ReportFiles, published_claims, write_report
+from tests.lab.analysis.studies import plan, protocol_with, table_v
+from tests.lab.report.pages import (
+    ALL,
+    HOSTILE,
+    markdown_tables,
+    name_of,
+    page_of,
+    published_report,
+    simulated_report,
+)
+
+TITLES = {
+    "design": "Design",
+    "sample-size": "Sample size",
+    "grades": "Grades",
+    "agreement": "Agreement between raters",
+    "test-retest": "Test-retest agreement",
+    "categories": "Agreement on each grade",
+    "intended": "Agreement with the intended grade",
+    "confusion": "Grades given for each intended grade",
+    "in-person": "In-person and haptic grades",
+    "order": "Effects of order",
+    "speeds": "Stretching speeds",
+    "traces": "Torque traces",
+    "questionnaires": "Questionnaires",
+    "claims": "Published numbers",
+    "methods": "Methods",
+}
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+def csv_rows(path: Path) -> list[list[str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.reader(file))
+
+
+def test_the_same_inputs_give_the_same_bytes(
+    tmp_path: Path, published: ReportFiles, simulated: ReportFiles
+) -> None:
+    published_report(tmp_path / "published")
+    simulated_report(tmp_path / "simulated")
+    for first in (published, simulated):
+        name = "published" if first is published else "simulated"
+        assert len(contents(first.html.parent)) > 10
+        assert contents(tmp_path / name) == contents(first.html.parent)
+
+
+@pytest.mark.parametrize("report", ["published", "simulated"])
+def test_the_page_needs_no_other_file(
+    report: str, request: pytest.FixtureRequest
+) -> None:
+    files: ReportFiles = request.getfixturevalue(report)
+    text, page = files.html.read_text(encoding="utf-8"), page_of(files)
+    assert "http" not in text.lower()
+    assert "url(" not in text
+    assert "@import" not in text
+    assert page.tags.isdisjoint({"script", "iframe", "object", "base"})
+    pictures = [link for link in page.links if link.startswith("data:image/svg+xml")]
+    assert len(pictures) == len(page.images) > 0
+    others = set(page.links) - set(pictures)
+    assert others
+    assert all(link.startswith("#") for link in others - {"data:,"})  # no icon
+
+
+def test_the_embedded_pictures_are_the_figures_and_need_nothing_either(
+    published: ReportFiles,
+) -> None:
+    svgs = [path.read_bytes() for path in published.figures if path.suffix == ".svg"]
+    images = page_of(published).images
+    embedded = [base64.b64decode(image["src"].partition(",")[2]) for image in images]
+    assert embedded == svgs
+    for svg in svgs:
+        links = re.findall(rb'(?:href|src)="([^"]*)"', svg)
+        assert all(link.startswith(b"#") for link in links)
+
+
+def test_every_picture_is_told_in_words(published: ReportFiles) -> None:
+    for image in page_of(published).images:
+        assert len(image["alt"]) > 30
+
+
+def test_no_file_holds_a_time_of_day(published: ReportFiles) -> None:
+    folder = published.html.parent
+    for name, data in contents(folder).items():
+        if not name.endswith(".png"):
+            assert not re.search(rb"\b20\d\d-\d\d-\d\d\b|\b\d\d:\d\d:\d\d\b", data), (
+                name
+            )
+        assert b"dc:date" not in data
+        assert b"tIME" not in data
+
+
+def test_simulated_data_say_so_on_every_page_table_and_figure(
+    simulated: ReportFiles,
+) -> None:
+    page = page_of(simulated)
+    text = simulated.html.read_text(encoding="utf-8")
+    markdown = simulated.markdown.read_text(encoding="utf-8")
+    assert 'class="banner"' in text
+    assert "SIMULATED DATA" in markdown.split("\n##")[0]
+    assert len(page.captions) == len(simulated.tables) + len(page.images)
+    for caption in page.captions:
+        assert re.match(r"(Table|Figure) \d+\. Simulated data\. ", caption), caption
+    captions = re.findall(r"^\*\*(?:Table|Figure) \d+\.\*\*.*$", markdown, re.M)
+    assert len(captions) == len(page.captions)
+    assert all("**Simulated data.**" in caption for caption in captions)
+    for path in simulated.tables:
+        head, *rows = csv_rows(path)
+        assert head[-1] == "data"
+        assert {row[-1] for row in rows} == {"simulated"}, path.name
+
+
+def test_published_data_are_not_called_simulated(published: ReportFiles) -> None:
+    for path in (published.html, published.markdown):
+        text = path.read_text(encoding="utf-8")
+        assert "simulated data" not in text.lower()
+        assert "Park, Kim and Damiano (2012)" in text.split("Design")[0]
+    assert {row[-1] for path in published.tables for row in csv_rows(path)[1:]} == {
+        "published"
+    }
+
+
+def test_text_of_a_study_is_text_and_no_markup(simulated: ReportFiles) -> None:
+    page = page_of(simulated)
+    text = simulated.html.read_text(encoding="utf-8")
+    assert page.headings[0] == HOSTILE
+    assert "script" not in page.tags
+    assert "<script" not in text
+    assert text.count("</style>") == 1
+    markdown = simulated.markdown.read_text(encoding="utf-8")
+    assert "<script" not in re.sub(r"\\<", "", markdown)
+    assert HOSTILE not in markdown
+    # A cell with a "|" is still one cell.
+    rows = [row for table in markdown_tables(markdown) for row in table]
+    notes = [row[-1] for row in rows if row[0] in ("test", "retest")]
+    assert notes == [HOSTILE, HOSTILE]
+
+
+@pytest.mark.parametrize("report", ["published", "simulated"])
+def test_html_and_markdown_hold_the_same_tables(
+    report: str, request: pytest.FixtureRequest
+) -> None:
+    files: ReportFiles = request.getfixturevalue(report)
+    in_html = [
+        [[" ".join(cell.split()) for cell in row] for row in table]
+        for table in page_of(files).tables
+    ]
+    in_markdown = markdown_tables(files.markdown.read_text(encoding="utf-8"))
+
+    def plain(tables: list[list[list[str]]]) -> list[list[list[str]]]:
+        # an index is set low in HTML, and written with "_" in Markdown
+        return [[[c.replace("_", "") for c in row] for row in t] for t in tables]
+
+    assert plain(in_html) == plain(in_markdown)
+    assert len(in_html) == len(files.tables)
+
+
+@pytest.mark.parametrize("report", ["published", "simulated"])
+def test_a_page_shows_the_numbers_of_the_csv_rounded(
+    report: str, request: pytest.FixtureRequest
+) -> None:
+    files: ReportFiles = request.getfixturevalue(report)
+    n_compared = 0
+    for path, (_, *shown) in zip(files.tables, page_of(files).tables, strict=True):
+        head, *rows = csv_rows(path)
+        if name_of(path) in ("agreement", "test_retest"):
+            continue  # other columns; tests/lab/internal/report/test_estimate_table.py
+        for exact, page in zip(rows, shown, strict=True):
+            for value, cell in zip(exact[:-1], page, strict=True):
+                n_compared += 1
+                assert _is_shown_as(value, cell), (path.name, head, value, cell)
+    assert n_compared > 100
+
+
+def _is_shown_as(value: str, cell: str) -> bool:
+    if value == "":
+        return cell in ("–", "undefined")
+    if cell == value or cell == value.replace("_", ""):  # text, with a low index
+        return True
+    digits = len(cell.partition(".")[2])
+    return abs(float(cell.replace("−", "-")) - float(value)) <= 0.5000001 * 10**-digits
+
+
+def test_sections_come_in_the_protocols_order_and_no_others(tmp_path: Path) -> None:
+    files = published_report(tmp_path, "speeds", "intended")
+    _, *sections = page_of(files).headings
+    assert sections == [TITLES["speeds"], TITLES["intended"], "Provenance"]
+    assert {name_of(path) for path in files.tables} == {
+        "speeds_by_model",
+        "speeds_by_rater",
+        "intended",
+    }
+    figures = {(name_of(path), path.suffix) for path in files.figures}
+    assert figures == {("speeds", ".png"), ("speeds", ".svg")}
+
+
+def test_every_section_can_be_asked_for(published: ReportFiles) -> None:
+    _, *sections = page_of(published).headings
+    assert sections == [*(TITLES[name] for name in ALL), "Provenance"]
+
+
+def test_the_inputs_are_named_on_the_page(published: ReportFiles) -> None:
+    for path in (published.html, published.markdown):
+        text = path.read_text(encoding="utf-8")
+        for name in ("protocol", "ratings", "grades given in person"):
+            assert re.search(rf"SHA-256 of the {name}\W+.*[0-9a-f]{{64}}", text)
+
+
+def test_symbols_have_their_index_set_low(published: ReportFiles) -> None:
+    text = published.html.read_text(encoding="utf-8")
+    assert "ν<sub>L</sub>" in text
+    assert "ν_L" not in text
+
+
+def test_what_a_paper_printed_is_held_against_every_table(tmp_path: Path) -> None:
+    paths = StudyPaths(Path(__file__).parents[3] / "studies" / "hess2012")
+    protocol = protocol_with(plan(id="kappa"), sections=("claims",))
+    claims = published_claims(paths, protocol)
+    assert claims is not None
+    assert published_claims(paths, protocol_with(sections=("design",))) is None
+    analysis = analyze(protocol, table_v())
+    files = write_report(
+        protocol, table_v(), analysis, tmp_path / "report", claims=claims
+    )
+    assert files.html is not None
+    assert claims.sha256 in files.html.read_text(encoding="utf-8")
+    names = [path.name.rpartition("-")[0] for path in files.tables]
+    rows = csv_rows(files.tables[0])
+    assert len(names) == 2
+    assert {row[0] for row in rows[1:]} >= {claim.name for claim in claims.claims}
+    bare = write_report(protocol, table_v(), analysis, tmp_path / "bare")
+    assert bare.tables == ()

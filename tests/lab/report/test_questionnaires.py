@@ -1,0 +1,229 @@
+"""The section of questionnaires says how questions were answered, not by whom."""
+
+import dataclasses
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from masrel.errors import RatingsError
+from masrel.lab.analysis import QuestionSummary, analyze
+from masrel.lab.protocol import Occasions, Protocol, StudyPaths, read_protocol
+from masrel.lab.ratings import (
+    GivenAnswer,
+    StudyData,
+    answers_csv,
+    read_answers,
+    read_study_data,
+    write_answers,
+)
+from masrel.lab.report import write_report
+from tests.lab.protocol.documents import changed, write
+
+HESS = StudyPaths(Path(__file__).parents[3] / "studies" / "hess2012")
+
+
+def summaries_of(*answers: GivenAnswer) -> tuple[QuestionSummary, ...]:
+    data = read_study_data(HESS, read_protocol(HESS.protocol))
+    return analyze(data.protocol, data.ratings, answers=answers).questionnaires
+
+
+def public(data: StudyData) -> StudyData:
+    """The study with questions whose answers may stand beside their raters."""
+    asked = [
+        msgspec.structs.replace(
+            each,
+            questions=tuple(
+                msgspec.structs.replace(question, public=True)
+                for question in each.questions
+            ),
+        )
+        for each in data.protocol.questionnaires
+    ]
+    protocol = msgspec.structs.replace(data.protocol, questionnaires=tuple(asked))
+    return replace(data, protocol=protocol)
+
+
+def score(answer: int | None, rater: str = "R1") -> GivenAnswer:
+    return GivenAnswer(
+        session="test",
+        rater=rater,
+        questionnaire="realism",
+        question="score",
+        model=None,
+        repeat=None,
+        answer=answer,
+        grades_from="console",
+    )
+
+
+def test_the_published_realism_is_printed_and_its_answers_are_no_bodys(
+    tmp_path: Path,
+) -> None:
+    data = read_study_data(HESS, read_protocol(HESS.protocol))
+    assert [each.answer for each in data.answers] == [6, 7, 7, 8, 8, 8, 8, 9]
+    assert {each.rater for each in data.answers} == {None}
+    analysis = analyze(data.protocol, data.ratings, answers=data.answers)
+    files = write_report(data.protocol, data.ratings, analysis, tmp_path)
+    text = files.markdown.read_text(encoding="utf-8")
+    _, section = text.split("## Questionnaires")
+    assert "7.63 ± 0.92" in section
+    assert section.count("not the answers that were given") >= 2
+    assert "R1" not in section
+
+
+def test_models_stand_in_the_order_of_the_protocol() -> None:
+    # that of the answers says who met which when
+    came = ("HM3", "D02", "HM1")
+    answers = [dataclasses.replace(score(5), model=model) for model in came]
+    shown = [summary.model for summary in summaries_of(*answers, score(5))]
+    assert shown == ["HM1", "HM3", "D02", None]
+
+
+def test_numbers_are_summed_up_as_by_hand() -> None:
+    # mean 6, deviations -4, 0, 0, 1, 3: SD = sqrt(26 / 4)
+    answers = (2, 6, 6, 7, 9, None)
+    (summary,) = summaries_of(*(score(x, f"R{i}") for i, x in enumerate(answers)))
+    assert (summary.n, summary.n_missing) == (5, 1)
+    assert summary.mean == 6.0
+    assert summary.sd == pytest.approx((26 / 4) ** 0.5, rel=1e-15)
+    assert (summary.median, summary.least, summary.most) == (6.0, 2.0, 9.0)
+    counts = {count.label: count.n for count in summary.counts}
+    assert len(counts) == 10
+    assert [label for label, n in counts.items() if n] == ["2", "6", "7", "9"]
+
+
+def test_what_few_raters_answered_shows_nobodys_answer(tmp_path: Path) -> None:
+    data = read_study_data(HESS, read_protocol(HESS.protocol))
+    report = msgspec.structs.replace(data.protocol.report, sections=("questionnaires",))
+    protocol = msgspec.structs.replace(data.protocol, report=report)
+
+    def shown(*answers: GivenAnswer) -> tuple[QuestionSummary, str]:
+        analysis = analyze(protocol, data.ratings, answers=answers)
+        files = write_report(protocol, data.ratings, analysis, tmp_path)
+        texts = [files.markdown, *files.tables]
+        (summary,) = analysis.questionnaires
+        return summary, "".join(text.read_text(encoding="utf-8") for text in texts)
+
+    four = [score(3, f"R{i}") for i in range(4)]
+    few, page = shown(*four, *four)  # each asked twice
+    assert (few.n, few.counts) == (8, ())
+    numbers = (few.mean, few.sd, few.median, few.least, few.most)
+    assert all(math.isnan(number) for number in numbers)
+    assert "3.00" not in page
+    assert "fewer than 5 raters answered a question" in page
+    many, page = shown(*four, score(8, "R4"))
+    assert (many.n, many.mean, many.least, many.most) == (5, 4.0, 3.0, 8.0)
+    assert "4.00 ± 2.24" in page
+    assert "fewer than" not in page
+
+
+def test_one_answer_has_no_deviation_and_an_excluded_rater_none() -> None:
+    data = public(read_study_data(HESS, read_protocol(HESS.protocol)))
+    answers = (score(5), score(9, "R2"))
+    analysis = analyze(data.protocol, data.ratings, answers=answers, excluded=["R2"])
+    (summary,) = analysis.questionnaires
+    assert (summary.n, summary.mean) == (1, 5.0)
+    assert summary.sd != summary.sd
+
+
+def test_the_design_says_what_is_practised_and_when_there_are_breaks(
+    tmp_path: Path,
+) -> None:
+    data = read_study_data(HESS, read_protocol(HESS.protocol))
+    occasions = Occasions(practice=("HM1", "D02"), break_after=8)
+    report = msgspec.structs.replace(data.protocol.report, sections=("design",))
+    protocol = msgspec.structs.replace(
+        data.protocol, occasions=occasions, report=report
+    )
+    files = write_report(
+        protocol, data.ratings, analyze(protocol, data.ratings), tmp_path
+    )
+    text = files.markdown.read_text(encoding="utf-8")
+    assert "begins with practice on HM1, D02, which is not rated." in text
+    assert "A break of 5 min comes after every 8 presentations." in text
+
+
+CHOICE = {
+    "id": "again",
+    "text": "Again?",
+    "type": "choice",
+    "choices": ["yes", "no"],
+    "public": True,
+}
+ANALOGUE = {"id": "sure", "text": "Sure?", "type": "visual-analogue", "public": True}
+TEXT = {"id": "note", "text": "What?", "type": "text"}
+
+
+@pytest.fixture
+def asking(tmp_path: Path) -> Protocol:
+    questions = [CHOICE, ANALOGUE, TEXT]
+    document = changed(
+        "questionnaires",
+        to=[{"id": "q", "title": "Q", "when": "session", "questions": questions}],
+    )
+    return read_protocol(write(document, tmp_path))
+
+
+def test_choices_are_counted_analogues_are_in_tenths_and_texts_are_left_out(
+    asking: Protocol,
+) -> None:
+    from masrel.lab.analysis._question_summaries import question_summaries
+
+    def given(question: str, *answers: str | float) -> list[GivenAnswer]:
+        like = replace(score(1), questionnaire="q", question=question)
+        return [replace(like, answer=answer) for answer in answers]
+
+    again, sure, note = question_summaries(
+        asking,
+        [
+            *given("again", "no", "no", "yes"),
+            *given("sure", 0, 9.9, 10, 100),
+            *given("note", "it stuck"),
+        ],
+    )
+    assert [(c.label, c.n) for c in again.counts] == [("yes", 1), ("no", 2)]
+    assert [c.n for c in sure.counts] == [2, 1, 0, 0, 0, 0, 0, 0, 0, 1]
+    assert sure.counts[0].label == "0–10"
+    assert (note.n, note.counts) == (1, ())
+
+
+def test_answers_are_read_as_they_were_written(
+    asking: Protocol, tmp_path: Path
+) -> None:
+    answers = tuple(
+        replace(score(1), questionnaire="q", question=question, answer=answer)
+        for question, answer in (
+            ("again", "no"),
+            ("sure", 12.5),
+            ("note", '=1+1, "so"'),
+            ("note", None),
+        )
+    )
+    file = tmp_path / "answers.csv"
+    write_answers(answers, file)
+    assert "'=1+1" in file.read_text(encoding="utf-8")
+    assert read_answers(file, asking) == answers
+
+
+def test_simulated_answers_are_labelled() -> None:
+    simulated = replace(score(7), grades_from="simulated")
+    assert answers_csv((simulated,)).startswith("# SIMULATED: not answers of persons.")
+    assert "SIMULATED" not in answers_csv((score(7),))
+
+
+@pytest.mark.parametrize(
+    ("row", "problem"),
+    [
+        ("test,R1,realism,score,,,11,x", "answer: needed a whole number, 1 to 10, got"),
+        ("test,R1,realism,other,,,1,x", "question: needed one of realism.score, got"),
+        ("test,R1,realism,score,HM1,b,1,x", "repeat: needed a whole number, got 'b'"),
+    ],
+)
+def test_a_wrong_row_is_named(tmp_path: Path, row: str, problem: str) -> None:
+    file = tmp_path / "answers.csv"
+    file.write_text(answers_csv(()) + row + "\n", encoding="utf-8")
+    with pytest.raises(RatingsError, match=f"answers.csv: line 4: {problem}"):
+        read_answers(file, read_protocol(HESS.protocol))

@@ -1,0 +1,410 @@
+"""Presentations of many stretches: what is asked, kept of each, and said to a rater."""
+
+import hashlib
+import json
+import math
+import shutil
+import threading
+from collections.abc import Callable
+from functools import partialmethod
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from masrel.cli import cli
+from masrel.errors import ParameterError, RatingsError
+from masrel.lab.elbow import tardieu
+from masrel.lab.hess import SimulatedHand
+from masrel.lab.protocol import (
+    Protocol,
+    StudyPaths,
+    joint_model,
+    presented_hash,
+    read_protocol,
+)
+from masrel.lab.ratings import (
+    ratings_from_logs,
+    read_study_data,
+    read_study_ratings,
+    write_ratings,
+)
+from masrel.lab.recording import read_recording
+from masrel.lab.run import (
+    Event,
+    GradeRequest,
+    ScriptGrades,
+    SimulatedGrades,
+    StretchGrade,
+    read_log,
+    run_session,
+)
+from masrel.lab.schedule import read_schedule
+from masrel.lab.verification import verify_study
+from masrel.scales import MODIFIED_ASHWORTH
+from tests.lab.run.test_session import console, run
+
+Small = tuple[StudyPaths, Protocol]
+New = Callable[..., Small]
+OLD = Path(__file__).parent / "data" / "format_1"
+
+
+def with_rules(
+    new_study: New, *rules: str, further: str = "", name: str = "s"
+) -> Small:
+    table = "\n".join(("[presentation]", *rules))
+    return new_study(("[schedule]", f"{table}\n\n{further}[schedule]"), name=name)
+
+
+def shown(small: Small) -> list[Event]:
+    log = read_log(small[0].log_file("R1", "test"))
+    return [event for event in log if event.kind == "presented"]
+
+
+def test_each_stretch_leaves_its_facts_until_the_rater_is_done(new_study: New) -> None:
+    small = with_rules(new_study, 'stretches = "free"')
+    run(small, SimulatedGrades(small[1]))
+    counts = []
+    for event in shown(small):
+        fields = event.fields
+        assert (fields["ended"], fields["felt"], fields["fault"]) == (
+            *("done", "felt"),
+            None,
+        )
+        made = fields["stretches"]
+        assert isinstance(made, list)
+        assert [stretch["number"] for stretch in made] == list(range(1, len(made) + 1))
+        assert all(stretch["onset_s"] < stretch["end_s"] for stretch in made)
+        assert all(stretch["catch_angle_deg"] > 60.0 for stretch in made)
+        assert fields["n_stretches"] == len(made)
+        assert fields["mean_speed_deg_s"] == made[0]["mean_speed_deg_s"]
+        file = small[0].sessions / str(fields["recording"])
+        assert read_recording(file).columns["stretch"].max() == len(made)
+        counts.append(len(made))
+    assert max(counts) > 1
+
+
+@pytest.mark.parametrize(("rule", "n"), [("2", 2), ('["slow", "fast"]', 2)])
+def test_as_many_are_made_as_are_asked_for(new_study: New, rule: str, n: int) -> None:
+    small = with_rules(new_study, f"stretches = {rule}")
+    run(small, SimulatedGrades(small[1]))
+    ended = {(e.fields["ended"], e.fields["n_stretches"]) for e in shown(small)}
+    assert ended == {("stretches", n)}
+
+
+def test_a_cued_presentation_has_r1_and_r2(new_study: New) -> None:
+    small = with_rules(new_study, 'stretches = ["slow", "fast"]')
+    run(small, SimulatedGrades(small[1]))
+    schedule = read_schedule(small[0].schedule_file("R1", "test"))
+    speeds = tuple(math.radians(speed) for speed in (10.0, 60.0, 120.0))
+    for presentation, event in zip(schedule.presentations, shown(small), strict=True):
+        fields = event.fields
+        slow, fast = fields["stretches"]
+        assert (slow["cue"], fast["cue"]) == ("slow", "fast")
+        assert (slow["reached_threshold"], slow["mean_speed_deg_s"]) == (False, None)
+        exact = tardieu(joint_model(small[1], presentation.model), speeds=speeds)
+        # A simulated hand is some 2 % slower than it means to be.
+        assert fields["r1_deg"] == pytest.approx(
+            math.degrees(exact.catch_angle), abs=2.0
+        )
+        assert fields["r2_deg"] == pytest.approx(
+            math.degrees(exact.range_angle), abs=0.5
+        )
+
+
+def test_a_persons_hand_may_move_the_arm(new_study: New) -> None:
+    person = '[simulated_raters]\nhand = "person"\n\n'
+    small = new_study(("[simulated_raters]\n", person))
+    run(small, SimulatedGrades(small[1]))
+    clamp = new_study(name="clamp")
+    run(clamp, SimulatedGrades(clamp[1]))
+    assert presented_hash(small[1]) == presented_hash(clamp[1])
+    # A person takes 0.15 s to get up speed, the clamp 0.02 s
+    gently, at_once = (
+        [until_fast(study, str(event.fields["code"])) for event in shown(study)]
+        for study in (small, clamp)
+    )
+    assert min(gently) > 0.1
+    assert max(at_once) < 0.05
+
+
+def until_fast(study: Small, code: str) -> float:
+    """From a tenth to nine tenths of the speed at the catch, s."""
+    file = study[0].recording_file("R1", "test", code)
+    columns = read_recording(file).columns
+    speed = columns["velocity_deg_s"][: int(np.argmax(columns["phase"] > 0.0))]
+    return float(np.sum((speed > 0.1 * speed[-1]) & (speed < 0.9 * speed[-1]))) * 1e-3
+
+
+def test_uncued_presentations_have_neither(small: Small) -> None:
+    run(small, ScriptGrades(["1", "2", "3"]))
+    for event in shown(small):
+        assert (event.fields["r1_deg"], event.fields["r2_deg"]) == (None, None)
+        assert event.fields["n_stretches"] == 1
+
+
+SLOW = "[simulated_raters]\nmean_speed_deg_s = 12.0\nspeed_sd_deg_s = 0.0\n"
+
+
+def slowly(new_study: New) -> Small:
+    settings = ("[simulated_raters]", f'[report]\nsections = ["grades"]\n\n{SLOW}')
+    rules = ("[schedule]", '[presentation]\nstretches = "free"\n\n[schedule]')
+    return new_study(settings, rules)
+
+
+def test_a_rater_is_told_what_was_too_slow_and_may_grade_it(new_study: New) -> None:
+    small = slowly(new_study)
+    source, said = console("\n1\n\nagain\n\n2\n\n3\n")
+    run(small, source)
+    assert said.getvalue().count("too slow to feel the catch: once more?") == 4
+    assert {event.fields["felt"] for event in shown(small)} == {"below-threshold"}
+    assert ratings_from_logs(*small).table["felt"].tolist() == ["below-threshold"] * 3
+
+
+def test_a_rater_is_told_that_the_time_limit_ended_a_presentation(
+    new_study: New,
+) -> None:
+    small = with_rules(new_study, 'stretches = "free"', "time_limit_s = 1.0")
+    source, said = console("\n1\n\n2\n\n3\n")
+    run(small, source)
+    ended = [event.fields["ended"] for event in shown(small)]
+    words = "no stretch begins later than 1 s after the first movement."
+    assert said.getvalue().count(words) == ended.count("time-limit") > 0
+
+
+def test_what_was_too_slow_is_counted(new_study: New) -> None:
+    small = slowly(new_study)
+    run(small, SimulatedGrades(small[1]))
+    root = str(small[0].root)
+    said = CliRunner().invoke(cli, ["ratings", root]).output
+    assert "3 after stretches too slow to feel the catch" in said
+    said = " ".join(CliRunner().invoke(cli, ["analyze", root]).output.split())
+    assert "In 3 of 3 presentations the stretches were too slow" in said
+    out = small[0].root / "report"
+    CliRunner().invoke(cli, ["report", root, "-o", str(out), "--quiet"])
+    page = " ".join((out / "report.md").read_text(encoding="utf-8").split())
+    assert r"none reached ν\_th in 3, and none came to the catch" in page
+
+
+def test_a_grip_that_was_lost_stands_in_the_table_and_the_report(
+    small: Small, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slips = partialmethod(SimulatedHand.__init__, slip_time=0.85)  # amid most catches
+    monkeypatch.setattr(SimulatedHand, "__init__", slips)
+    source, said = console("\n1\n\n2\n\n3\n")
+    run(small, source)
+    lost = [event.fields["grip_lost"] for event in shown(small)]
+    assert True in lost
+    assert said.getvalue().count("came loose, and the model let go") == sum(lost)
+    ratings = ratings_from_logs(*small)
+    assert [row.grip_lost for row in ratings.rows] == lost
+    root = small[0].root
+    called = CliRunner().invoke(cli, ["ratings", str(root)]).output
+    assert f"{sum(lost)} after a grip that was lost: column grip_lost" in called
+    table = small[0].ratings_file.read_text(encoding="utf-8").splitlines()
+    assert sum(line.endswith(",yes") for line in table) == sum(lost)
+    CliRunner().invoke(cli, ["report", str(root), "--quiet"])
+    page = " ".join((root / "report/report.md").read_text(encoding="utf-8").split())
+    assert f"In {sum(lost)} of {len(lost)} presentations the arm came loose" in page
+
+
+def test_a_grade_may_name_the_stretch_it_rests_on(new_study: New) -> None:
+    small = with_rules(new_study, "stretches = 2")
+    source, said = console("\n1+ 2\n\n1 3\n2\n\n\n3\n")
+    run(small, source)
+    assert "Stretch the arm 2 times and bring it back each time" in said.getvalue()
+    assert "and the stretch it rests on, 1 to 2" in said.getvalue()
+    assert "'1 3' is not a grade" in said.getvalue()
+    assert "'' is not a grade" not in said.getvalue()  # an Enter too many
+    log = read_log(small[0].log_file("R1", "test"))
+    grades = [e.fields for e in log if e.kind == "grade"]
+    assert [(g["grade"], g["stretch"]) for g in grades] == [
+        *(("1+", 2), ("2", None)),
+        ("3", None),
+    ]
+    ratings = ratings_from_logs(*small)
+    first = ratings.table[ratings.table["grade"] == "1+"].iloc[0]
+    assert first["graded_stretch"] == 2
+    low, high = first["min_speed_deg_s"], first["max_speed_deg_s"]
+    assert sorted(first["speeds_deg_s"]) == [low, high]
+    assert first["mean_speed_deg_s"] == pytest.approx((low + high) / 2)
+    path = small[0].ratings_file
+    write_ratings(ratings, path)
+    assert read_study_ratings(path, MODIFIED_ASHWORTH).table.equals(ratings.table)
+
+
+def test_no_grade_rests_on_a_stretch_that_was_not_made(small: Small) -> None:
+    class Program(ScriptGrades):
+        def grade(self, request: GradeRequest) -> StretchGrade:
+            return StretchGrade(grade="1", stretch=request.n_stretches + 1)
+
+    with pytest.raises(ParameterError, match=r"stretch of .*: needed one of 1, from 1"):
+        run(small, Program([]))
+
+
+def test_a_program_says_done(new_study: New) -> None:
+    small = with_rules(new_study, 'stretches = "free"')
+
+    class Program(ScriptGrades):
+        def make_ready(self, request: GradeRequest) -> None:
+            assert request.status is not None
+            request.status.done()
+
+    run(small, Program(["1", "2", "3"]))
+    for event in shown(small):
+        assert (event.fields["ended"], event.fields["n_stretches"]) == ("done", 0)
+        assert event.fields["felt"] == "below-threshold"
+    assert ratings_from_logs(*small).table["n_stretches"].tolist() == [0, 0, 0]
+
+
+@pytest.mark.filterwarnings("ignore::masrel.errors.OverrunWarning")
+def test_it_may_say_so_from_another_thread(new_study: New) -> None:
+    # However late a busy machine is, that shall not end the presentation.
+    lenient = "[device]\nmissed_ticks_limit = 100000\nwatchdog_ms = 100.0\n\n"
+    small = with_rules(new_study, 'stretches = "free"', further=lenient)
+
+    class Program(ScriptGrades):
+        def make_ready(self, request: GradeRequest) -> None:
+            assert request.status is not None
+            threading.Timer(0.3, request.status.done).start()
+
+    run_session(*small, "R1", "test", grades=Program(["1", "2", "3"]), clock="real")
+    assert {event.fields["ended"] for event in shown(small)} == {"done"}
+
+
+def test_a_button_is_asked_of_a_device_that_has_one(new_study: New) -> None:
+    rules = ("stretches = 2", 'done_with = "button"')
+    simulated = with_rules(new_study, *rules)
+    run(simulated, SimulatedGrades(simulated[1]))
+    puck = '[device]\nbackend = "puck"\npuck_interface = "virtual"\n\n'
+    small = with_rules(new_study, *rules, further=puck, name="other")
+    message = (
+        r"device.backend: needed one with a button \(simulated\), as "
+        r"presentation.done_with asks for, got 'puck'"
+    )
+    with pytest.raises(ParameterError, match=message):
+        run(small, SimulatedGrades(small[1]))
+    checked = CliRunner().invoke(cli, ["check", str(small[0].root)])
+    assert checked.exit_code == 2
+    assert "device.backend: needed one with a button" in checked.output
+
+
+def test_a_session_of_format_1_is_read_and_finished(tmp_path: Path) -> None:
+    shutil.copytree(OLD, tmp_path / "study")
+    study = StudyPaths(tmp_path / "study")
+    protocol = read_protocol(study.protocol)
+    before = ratings_from_logs(study, protocol).table
+    assert before["grade"].tolist() == ["1", None, None]
+    assert before["n_stretches"].tolist()[:2] == [1, 1]
+    lines = study.log_file("R1", "test").read_bytes()
+    source, _ = console("\n2\n\n3\n")
+    run_session(study, protocol, "R1", "test", grades=source, clock="simulated")
+    assert study.log_file("R1", "test").read_bytes().startswith(lines)
+    after = ratings_from_logs(study, protocol).table
+    assert after["grade"].tolist() == ["1", "2", "3"]
+    assert after["mean_speed_deg_s"][0] == before["mean_speed_deg_s"][0]
+
+
+@pytest.mark.parametrize("n_columns", [7, 15])
+def test_a_table_of_format_1_is_what_its_logs_say(
+    tmp_path: Path, n_columns: int
+) -> None:
+    shutil.copytree(OLD, tmp_path / "study")
+    study = StudyPaths(tmp_path / "study")
+    write_ratings(
+        ratings_from_logs(study, read_protocol(study.protocol)), study.ratings_file
+    )
+    lines = study.ratings_file.read_text(encoding="utf-8").splitlines()
+    cut = [",".join(line.split(",")[:n_columns]) for line in lines]
+    cut.remove("# format: 2")
+    study.ratings_file.write_text("\n".join(cut) + "\n", encoding="utf-8")
+    for verb in ("analyze", "verify", "check"):
+        done = CliRunner().invoke(cli, [verb, str(study.root)])
+        assert "is not what the session logs say" not in done.output
+        assert done.exit_code == 0, done.output
+    # and so is an analysis that was made when it was the table
+    sha256 = hashlib.sha256(study.ratings_file.read_bytes()).hexdigest()
+    analysis = study.analysis_file.read_text()
+    now = json.loads(analysis)["inputs"]["ratings_sha256"]
+    study.analysis_file.write_text(analysis.replace(now, sha256))
+    assert verify_study(study).is_whole
+    study.ratings_file.write_text("\n".join(cut[:-1]) + "\n", encoding="utf-8")
+    with pytest.raises(RatingsError, match="is not what the session logs say"):
+        read_study_data(study, read_protocol(study.protocol))
+
+
+def test_nothing_of_a_rehearsal_is_a_rating(new_study: New) -> None:
+    small = with_rules(new_study, 'stretches = "free"')
+    study, protocol = small
+    call = ["run", str(study.root), "--rater", "R1", "--session", "test", "--rehearse"]
+    simulated = [*call, "--grades", "simulated"]
+    for number in (1, 2):
+        done = CliRunner().invoke(cli, simulated)
+        assert done.exit_code == 0, done.output
+        assert "REHEARSAL: nothing of it enters the ratings" in done.output
+        assert "none is a rating of the study" in done.output
+        folder = study.root / "rehearsals" / str(number)
+        log = read_log(folder / "rehearsal_test_R1.jsonl")
+        assert log[0].fields["rehearsal"] is True
+        codes = [event.fields["code"] for event in log if event.kind == "grade"]
+        session = read_schedule(study.schedule_file("R1", "test")).presentations
+        assert codes != [presentation.code for presentation in session]
+        for file in folder.rglob("*.npz"):
+            assert read_recording(file).facts["rehearsal"] is True
+    assert not study.sessions.exists()
+    run(small, SimulatedGrades(protocol))
+    assert len(ratings_from_logs(study, protocol).table) == 3
+    refused = CliRunner().invoke(cli, [*call, "--correct", "X"])
+    assert "--rehearse presents models, and --correct none" in refused.output
+
+
+def test_a_rehearsal_among_the_sessions_is_refused(new_study: New) -> None:
+    small = with_rules(new_study, "stretches = 2")
+    run(small, SimulatedGrades(small[1]), rehearsal=True)
+    study = small[0]
+    log = study.root / "rehearsals" / "1" / "rehearsal_test_R1.jsonl"
+    study.sessions.mkdir()
+    log.rename(study.log_file("R1", "test"))
+    with pytest.raises(
+        ValueError, match="needed the log of a session, got that of a r"
+    ):
+        ratings_from_logs(*small)
+
+
+def test_a_rehearsal_that_was_stopped_is_gone_on_with(small: Small) -> None:
+    source, said = console("\n1\n\nstop\n")
+    with pytest.raises(RuntimeError, match="presentation 2 of 3"):
+        run(small, source, rehearsal=True)
+    assert "REHEARSAL, no rating of the study. Presentation 1 of 3" in said.getvalue()
+    summary = run(small, console("\n2\n\n3\n")[0], rehearsal=True)
+    assert (summary.n_graded_before, summary.rehearsal) == (1, True)
+    assert summary.log_file.parent.name == "1"
+
+
+def rehearsed(small: Small) -> list[object]:
+    # the codes of a whole rehearsal, in order
+    log = run(small, SimulatedGrades(small[1]), rehearsal=True).log_file
+    return [e.fields["code"] for e in read_log(log) if e.kind == "grade"]
+
+
+def test_a_rehearsal_is_drawn_from_the_secret(small: Small, tmp_path: Path) -> None:
+    other = (StudyPaths(tmp_path / "other"), small[1])
+    same = (StudyPaths(tmp_path / "same"), small[1])
+    shutil.copytree(small[0].root, same[0].root)
+    other[0].root.mkdir()  # it draws a secret of its own
+    codes = rehearsed(small)
+    assert rehearsed(same) == codes
+    assert rehearsed(other) != codes
+    assert other[0].secret_file.is_file()
+
+
+def test_a_rehearsal_of_another_secret_is_left_and_another_begun(small: Small) -> None:
+    with pytest.raises(RuntimeError, match="presentation 2 of 3"):
+        run(small, console("\n1\n\nstop\n")[0], rehearsal=True)
+    before = small[0].root / "rehearsals" / "1" / "rehearsal_test_R1.jsonl"
+    lines = before.read_bytes()
+    small[0].published_secret_file.unlink()
+    summary = run(small, SimulatedGrades(small[1]), rehearsal=True)
+    assert (summary.n_graded_before, summary.log_file.parent.name) == (0, "2")
+    assert before.read_bytes() == lines

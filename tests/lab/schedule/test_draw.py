@@ -1,0 +1,189 @@
+"""A draw is what its rule says, uniform, blinded, and nobody else's business."""
+
+import itertools
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import masrel
+from masrel.errors import ScheduleError
+from masrel.lab.protocol import presented_hash, protocol_hash, read_protocol
+from masrel.lab.schedule import Schedule, check_schedule, draw_schedule
+from tests.lab.internal.schedule.test_stream import words_of
+from tests.lab.schedule.studies import protocol_of
+
+PUBLISHED = Path(__file__).parents[3] / "studies" / "hess2012" / "protocol.toml"
+
+
+def order(schedule: Schedule) -> list[str]:
+    return [shown.model for shown in schedule.presentations]
+
+
+def codes(schedule: Schedule) -> list[str]:
+    return [shown.code for shown in schedule.presentations]
+
+
+# Derived from the rule alone: see the test that follows.
+GOLDEN_ORDER = "D03 D07 HM3 D01 D06 D10 D11 D08 D12 D04 D05 D02 D09 HM4 HM2 HM1"
+GOLDEN_CODES = "56D 67C 65N 53W 27T 47W 54U 23K 17M 93K 50T 00H 06B 81D 66C 49Y"
+
+
+def test_the_draw_of_a_fixed_seed_never_changes() -> None:
+    drawn = draw_schedule(read_protocol(PUBLISHED), "R1", "test")
+    assert order(drawn) == GOLDEN_ORDER.split()
+    assert codes(drawn) == GOLDEN_CODES.split()
+
+
+def test_the_draw_is_what_the_rule_gives_in_python_integers() -> None:
+    # Fisher and Yates from the last place down, each index a word modulo its range
+    # (a word is rejected with probability below 16 / 2**64, so none is here).
+    words = words_of('["masrel",2012,"schedule","test","R1"]')
+    models = ["HM1", "HM2", "HM3", "HM4", *(f"D{n:02d}" for n in range(1, 13))]
+    for i in range(15, 0, -1):
+        j = next(words) % (i + 1)
+        models[i], models[j] = models[j], models[i]
+    assert models == GOLDEN_ORDER.split()
+    # Two digits and one of 18 letters; no two of the first 16 are the same.
+    drawn = itertools.islice(words_of('["masrel",2012,"codes","test","R1"]'), 16)
+    letters = "ABCDFGHJKMNPTUVWXY"
+    names = [f"{w % 1800 // 18:02d}{letters[w % 1800 % 18]}" for w in drawn]
+    assert names == GOLDEN_CODES.split()
+
+
+def test_provenance_is_that_of_the_protocol() -> None:
+    protocol = protocol_of(seed=77)
+    drawn = draw_schedule(protocol, "R2", "test")
+    assert (drawn.study, drawn.rater, drawn.session) == ("tiny", "R2", "test")
+    assert (drawn.seed, drawn.scheme) == (77, "random-order")
+    assert drawn.protocol_sha256 == protocol_hash(protocol)
+    assert drawn.presented_sha256 == presented_hash(protocol)
+    assert drawn.masrel_version == masrel.__version__
+
+
+@given(
+    seed=st.integers(0, 2**63 - 1),
+    n_models=st.integers(1, 40),
+    repeats=st.integers(1, 5),
+)
+def test_every_model_comes_once_per_repeat_under_codes_that_differ(
+    seed: int, n_models: int, repeats: int
+) -> None:
+    names = tuple(f"M{n}" for n in range(n_models))
+    protocol = protocol_of(models=names, seed=seed, repeats=repeats)
+    drawn = draw_schedule(protocol, "R1", "test")
+    shown = Counter((each.model, each.repeat) for each in drawn.presentations)
+    expected = itertools.product(names, range(1, repeats + 1))
+    assert shown == Counter(expected)
+    positions = [each.position for each in drawn.presentations]
+    assert positions == list(range(1, n_models * repeats + 1))
+    assert len(set(codes(drawn))) == n_models * repeats
+    check_schedule(drawn, protocol)
+
+
+def test_adding_raters_and_sessions_moves_nobody_elses_schedule() -> None:
+    few = protocol_of(raters=("R2",))
+    many = protocol_of(raters=("R1", "R2", "R3"), sessions=("before", "test", "after"))
+    before, after = (draw_schedule(each, "R2", "test") for each in (few, many))
+    assert before.presentations == after.presentations
+    check_schedule(before, many)
+
+
+def test_raters_and_sessions_have_orders_of_their_own() -> None:
+    protocol = read_protocol(PUBLISHED)
+    places = [(r, s.id) for s in protocol.sessions for r in s.raters]
+    orders = {tuple(order(draw_schedule(protocol, *place))) for place in places}
+    assert len(orders) == len(places) == 11
+
+
+def test_every_order_is_equally_likely_over_raters() -> None:
+    # Chi-square with 5 degrees of freedom over 6 orders of 3 models and 1200 raters:
+    # above 30.9 with probability 1e-5. Everything is fixed: it holds for good or not.
+    raters = tuple(f"R{n}" for n in range(1200))
+    protocol = protocol_of(models=("A", "B", "C"), raters=raters)
+    counts = Counter(
+        tuple(order(draw_schedule(protocol, rater, "test"))) for rater in raters
+    )
+    assert len(counts) == 6
+    assert sum((count - 200) ** 2 / 200 for count in counts.values()) < 30.9
+
+
+@pytest.mark.slow
+def test_a_code_says_nothing_about_model_or_place() -> None:
+    # Over 2000 raters, the rank of a model's code among the four of a session is
+    # uniform: mean 2.5 with standard error sqrt(1.25 / 2000) = 0.025. Eight means,
+    # each beyond 5 standard errors with probability 6e-7: false alarm below 5e-6.
+    raters = tuple(f"R{n}" for n in range(2000))
+    protocol = protocol_of(raters=raters)
+    by_model: dict[str, list[int]] = {}
+    by_place: dict[int, list[int]] = {}
+    for rater in raters:
+        drawn = draw_schedule(protocol, rater, "test")
+        rank = {code: i for i, code in enumerate(sorted(codes(drawn)), start=1)}
+        for shown in drawn.presentations:
+            by_model.setdefault(shown.model, []).append(rank[shown.code])
+            by_place.setdefault(shown.position, []).append(rank[shown.code])
+    for ranks in [*by_model.values(), *by_place.values()]:
+        assert len(ranks) == 2000
+        assert abs(np.mean(ranks) - 2.5) < 5 * (1.25 / 2000) ** 0.5
+
+
+def test_a_code_does_not_stand_for_a_model_over_raters() -> None:
+    # The share of pairs of raters that meet one model under one code, 1 in 1800 by
+    # chance: 200 raters and 16 models are 318 400 pairs, 177 expected, standard
+    # deviation about 13; 260 is more than 6 of them away.
+    raters = tuple(f"R{n}" for n in range(200))
+    models = tuple(f"M{n}" for n in range(16))
+    protocol = protocol_of(models=models, raters=raters)
+    shared = Counter(
+        (shown.model, shown.code)
+        for rater in raters
+        for shown in draw_schedule(protocol, rater, "test").presentations
+    )
+    assert 100 < sum(n * (n - 1) // 2 for n in shared.values()) < 260
+
+
+def test_no_code_is_the_id_of_a_model() -> None:
+    # All codes of one letter taken as ids: none of them is drawn for any rater.
+    names = tuple(f"{n:02d}k" for n in range(100))
+    protocol = protocol_of(models=names, repeats=5)
+    drawn = codes(draw_schedule(protocol, "R1", "test"))
+    assert len(drawn) == 500
+    assert [code for code in drawn if code.endswith("K")] == []
+
+
+def test_a_session_or_rater_the_protocol_does_not_have_is_refused() -> None:
+    protocol = protocol_of()
+    with pytest.raises(ScheduleError, match="session: needed one of test, got 'x'"):
+        draw_schedule(protocol, "R1", "x")
+    with pytest.raises(ScheduleError, match="rater: needed one of R1, R2 for session"):
+        draw_schedule(protocol, "R9", "test")
+
+
+@pytest.mark.parametrize(
+    ("other", "message"),
+    [
+        (protocol_of(seed=2), "before a change"),
+        (protocol_of(models=("HM1", "HM2")), "before a change"),
+        (protocol_of(repeats=2), "before a change"),
+        (protocol_of(study="other"), "needed study other, got tiny"),
+        (protocol_of(raters=("R2",)), "rater: needed one of R2"),
+        (protocol_of(sessions=("again",)), "session: needed one of again"),
+    ],
+)
+def test_a_schedule_that_no_longer_fits_is_refused(other: object, message: str) -> None:
+    drawn = draw_schedule(protocol_of(), "R1", "test")
+    with pytest.raises(ScheduleError, match=message):
+        check_schedule(drawn, other)  # type: ignore[arg-type]
+
+
+def test_wording_a_title_better_makes_no_schedule_stale() -> None:
+    protocol = protocol_of()
+    drawn = draw_schedule(protocol, "R1", "test")
+    reworded = protocol_of(title="A better title")
+    assert protocol_hash(reworded) != protocol_hash(protocol)
+    check_schedule(drawn, reworded)
+    assert draw_schedule(reworded, "R1", "test").presentations == drawn.presentations

@@ -1,0 +1,202 @@
+"""A server that is killed at any moment loses no grade, doubles none, and no tick."""
+
+import random
+import threading
+import time
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+
+from masrel.lab.protocol import StudyPaths
+from masrel.lab.recording import read_recording
+from masrel.lab.run import Event, read_log
+from tests.faults import Faults
+from tests.lab.serve.desks import OCCASIONS, PATIENCE_S, samples_in, small_study
+from tests.lab.serve.served import Served
+
+pytestmark = pytest.mark.skipif(
+    not Path("/proc").is_dir(), reason="needs /proc to see which processes are left"
+)
+
+START_S = 1.5  # longer than it takes to start
+TAP_S, STRETCH_S = 0.03, 0.6  # until an answer is on disk, until a model is presented
+GRADES = ("0", "1", "1+", "2", "3", "4")
+
+
+class Tablet:
+    """A rater's tablet, which sends an answer until the server says what became of it.
+
+    Each tap of a grade is another one, so that one that is lost or doubled shows.
+    """
+
+    def __init__(self, browser: httpx.Client, rng: random.Random) -> None:
+        self._browser = browser
+        self._rng = rng
+        self._tap: dict[str, Any] | None = None  # what no answer came to yet
+        self._code = ""
+        self.n_taps = 0
+        self.entered: dict[str, str] = {}  # grade by code: the server said so
+        self.tapped: dict[str, list[str]] = {}
+
+    def step(self) -> str:
+        """Send what is to be sent, or look what is asked -> the screen."""
+        if self._tap is not None:
+            response = self._browser.post("/rater/answer", json=self._tap)
+            if response.status_code == 429:
+                time.sleep(0.1)
+                return "busy"
+            assert response.status_code in (200, 409), response.text
+            answer = self._tap["answer"]
+            if response.status_code == 200 and "grade" in answer:
+                self.entered[self._code] = answer["grade"]
+            self._tap = None
+            state = response.json()["state"]
+        else:
+            state = self._browser.get("/rater/state").json()
+            time.sleep(0.03)
+        if state.get("ask"):
+            self._tap = {"ask": state["ask"], "answer": self._answer(state)}
+            self.n_taps += 1
+        return str(state.get("screen"))
+
+    def _answer(self, state: dict[str, Any]) -> dict[str, Any]:
+        self._code = state["code"]
+        if state["screen"] == "grade":
+            grade = self._rng.choice(GRADES)
+            self.tapped.setdefault(self._code, []).append(grade)
+            return {"grade": grade, "stretch": None}
+        answers: dict[str, dict[str, Any]] = {
+            "ready": {"begin": True},
+            "fault": {"again": True},
+            "question": {"answer": 60},
+        }
+        return answers.get(state["screen"], {"go_on": True})
+
+
+def taken(study: StudyPaths) -> dict[str, int]:
+    """Samples of the presentation that goes on, by its file."""
+    return {file.stem: samples_in(file) for file in study.sessions.glob("*/*.partial")}
+
+
+def rest(server: Served) -> None:
+    """Return when the process of the session has ended by itself."""
+    until = time.monotonic() + PATIENCE_S
+    while server.sessions():
+        assert time.monotonic() < until, "the session goes on without its server"
+        time.sleep(0.01)
+
+
+def check_recordings(study: StudyPaths, before: dict[str, int]) -> None:
+    """Hold every sample that was taken against the recordings."""
+    assert not list(study.sessions.glob("*/*.partial"))
+    log = log_of(study)
+    named = {str(e.fields["recording"]) for e in log if "recording" in e.fields}
+    there = {f"test_R1/{file.name}" for file in study.sessions.glob("*/*.npz")}
+    assert there == named
+    for file in study.sessions.glob("*/*.npz"):
+        recording = read_recording(file)
+        assert recording.n_samples >= before.get(file.stem, 0)
+        assert np.all(np.diff(recording.columns["time_s"]) > 0.0)
+        # The arm is at rest; of one stopped before it began nothing was ever sent.
+        assert not recording.columns["command_torque_nm"][-1:].any()
+
+
+@dataclass(frozen=True)
+class Moment:
+    """When a server is killed: some time after a tap, or after it started."""
+
+    n_taps: int  # 0: none
+    seconds: float
+
+    @classmethod
+    def drawn(cls, rng: random.Random) -> "Moment":
+        """One of those that matter, each as likely as the others."""
+        kind = rng.choice(("start", "tap", "tap", "stretch", "stretch"))
+        if kind == "start":
+            return cls(0, rng.uniform(0.0, START_S))
+        longest = TAP_S if kind == "tap" else STRETCH_S
+        return cls(rng.randint(1, 4), rng.uniform(0.0, longest))
+
+
+def run_until_killed(server: Served, tablet: Tablet, moment: Moment) -> bool:
+    """Serve and answer until the server is killed -> whether the session is over."""
+    process = server.start()
+    killing = threading.Timer(moment.seconds, server.kill, (process,))
+    tablet.n_taps = 0
+    while not killing.finished.is_set():
+        if tablet.n_taps >= moment.n_taps and killing.ident is None:
+            killing.start()
+        try:
+            if tablet.step() == "over":
+                break
+        except httpx.TransportError:
+            time.sleep(0.01)  # it has not begun to listen, or was killed
+    killing.cancel()
+    server.kill(process)
+    before = taken(server.study)
+    rest(server)
+    log = server.study.log_file("R1", "test")
+    if not log.exists():
+        return False
+    check_recordings(server.study, before)
+    return log_of(server.study)[-1].kind == "complete"
+
+
+def log_of(study: StudyPaths) -> tuple[Event, ...]:
+    return read_log(study.log_file("R1", "test"))
+
+
+def check_grades(study: StudyPaths, tablet: Tablet) -> None:
+    """Hold the log against what was tapped, and what the server said was entered."""
+    log = log_of(study)
+    graded = [e for e in log if e.kind in ("grade", "practice-grade")]
+    grades = {str(e.fields["code"]): str(e.fields["grade"]) for e in graded}
+    assert len(grades) == len(graded) == 5
+    assert tablet.entered.items() <= grades.items()
+    for code, grade in grades.items():
+        assert grade in tablet.tapped[code]
+
+
+@pytest.mark.parametrize(
+    "n_kills",
+    [
+        pytest.param(20, marks=pytest.mark.slow),
+        pytest.param(200, marks=[pytest.mark.long, pytest.mark.faults]),
+    ],
+)
+def test_killed_at_any_moment_no_grade_is_lost_or_doubled(
+    tmp_path: Path, n_kills: int, faults: Faults
+) -> None:
+    rng, n_left = random.Random(n_kills), n_kills
+    words: list[object] = []  # of faults
+    while n_left:
+        study = small_study(tmp_path / f"study_{n_left}", OCCASIONS, quick=True)
+        with closing(Served(study)) as server:
+            n_left = session_killed(server, rng, n_left, faults)
+        words += [e.fields["words"] for e in log_of(study) if e.kind == "fault"]
+    # who was at the arm when the server died was not left with its torque
+    assert "emergency stop: server gone" in words
+
+
+def session_killed(
+    server: Served, rng: random.Random, n_left: int, faults: Faults
+) -> int:
+    """Take a session to its end, its server killed on the way -> kills left."""
+    process = server.start()
+    with closing(server.browser()) as browser:
+        server.kill(process)
+        rest(server)
+        tablet, is_over = Tablet(browser, rng), False
+        while n_left and not is_over:
+            with faults("a server killed at a random moment of a session"):
+                is_over = run_until_killed(server, tablet, Moment.drawn(rng))
+            n_left -= 1
+        if not is_over:
+            run_until_killed(server, tablet, Moment(0, PATIENCE_S))
+    check_grades(server.study, tablet)
+    return n_left

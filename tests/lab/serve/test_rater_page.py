@@ -1,0 +1,367 @@
+"""The rater's page: what it shows and takes, to whom, and what it never says."""
+
+import asyncio
+import json
+import re
+import tomllib
+from pathlib import Path
+from typing import Any, get_args, get_type_hints
+
+import pytest
+
+import masrel.lab.serve
+from masrel.errors import MasrelError
+from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.protocol.definition import Study
+from masrel.lab.run import read_log
+from masrel.lab.run._presenter import ClockName
+from masrel.lab.serve._desk import Desk
+from masrel.lab.serve._words import words_in
+from masrel.scales import PUBLISHED_SCALES
+from tests.lab.serve.desks import OCCASIONS, kinds, small_study
+from tests.lab.serve.tablets import Tablet, seen, with_tablets
+
+LANGUAGES = get_args(get_type_hints(Study)["language"])
+BROWSER = Path(masrel.lab.serve.__file__).with_name("static")
+
+THRICE = ("stretches = 1", "stretches = 3")
+QUESTIONS = """
+[[questionnaires]]
+id = "person"
+title = "About you"
+when = "session"
+
+[[questionnaires.questions]]
+id = "score"
+text = "How real?"
+type = "visual-analogue"
+low_label = "not at all"
+high_label = "as a patient"
+
+[[questionnaires.questions]]
+id = "sure"
+text = "How sure?"
+type = "whole"
+low = 0
+high = 10
+
+[[questionnaires.questions]]
+id = "hand"
+text = "Which hand?"
+type = "choice"
+choices = ["right", "left"]
+
+[[questionnaires.questions]]
+id = "remark"
+text = "<b>Anything</b> else?"
+type = "text"
+required = false
+"""
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> StudyPaths:
+    return small_study(tmp_path / "study", OCCASIONS)
+
+
+def in_language(study: StudyPaths, language: str) -> None:
+    text = study.protocol.read_text()
+    changed = text.replace("[study]\n", f'[study]\nlanguage = "{language}"\n')
+    study.protocol.write_text(changed)
+
+
+# What no answer to a rater's tablet may have in it: models, what they are made of and
+# meant to be, orders, and who else rates.
+SECRETS = (
+    *(r"HM\d", r"\bR2\b", r"\bR3\b", "model_id", "intended", "catch_angle", "catch_t"),
+    *("residual", "stiffness", "damping", "seed", "repeats", r"\b20240\b", "nms_rad"),
+    *("dummy", r"\b130(\.0)?\b", r"\b115(\.0)?\b", r"\bsamples\b", r"\.partial"),
+)
+
+
+@pytest.mark.parametrize(
+    "clock", ["simulated", pytest.param("real", marks=pytest.mark.slow)]
+)
+def test_nothing_that_a_tablet_is_sent_says_what_is_presented(
+    tmp_path: Path, clock: ClockName
+) -> None:
+    study = small_study(tmp_path / "study", OCCASIONS, quick=True)
+    tablets: list[Tablet] = []
+
+    async def act(desk: Desk, mine: Tablet, other: Tablet) -> None:
+        tablets.extend((mine, other))
+        await desk.start("R1", "test")
+        async with mine.listening(), other.listening() as events:
+            await mine.until("break")
+            state = await mine.until("ready")
+            code, why = state["last"]["code"], "wrong button"
+            assert (await mine.post("correct", code=code, grade="3", why=why))[0] == 200
+            assert (await mine.post("correct", code="xx", grade="3", why=why))[0] == 409
+            for wrong in ({"begin": 1}, {"skip": "HM"}, {}):
+                body = {"ask": state["ask"], "answer": wrong}
+                assert (await mine.post("answer", **body))[0] == 422
+            assert (await mine.until("over"))["how"] == "complete"
+            await seen(events, "waiting")
+
+    with_tablets(study, act, "R1", "R2", clock=clock)
+    assert {"practised", "presented", "correction", "answered"} <= {*kinds(study)}
+    for tablet, more in zip(tablets, ((), (r"\bR1\b", "code")), strict=True):
+        sent = "\n".join(tablet.sent)
+        words = sent.partition('id="words">')[0] + sent.partition("</html>")[2]
+        for secret in (*SECRETS, *more):
+            assert not re.search(secret, words), secret
+        assert tablet.sent
+
+
+def test_another_raters_tablet_sees_no_state_and_cannot_act(study: StudyPaths) -> None:
+    async def act(desk: Desk, mine: Tablet, other: Tablet) -> None:
+        await desk.start("R1", "test")
+        state = await mine.until("ready")
+        shown = await other.state()
+        assert {key: shown[key] for key in ("screen", "session", "ask")} == {
+            **{"screen": "other", "session": None, "ask": None}
+        }
+        assert set(shown) == {"screen", "session", "ask", "server", "version"}
+        body = {"ask": state["ask"], "answer": {"begin": True}}
+        status, refusal = await other.post("answer", **body)
+        assert (status, refusal["state"]["screen"]) == (403, "other")
+        assert (await other.post("done"))[0] == 403
+        last = {"code": state["code"], "grade": "1", "why": "x"}
+        assert (await other.post("correct", **last))[0] == 409
+        assert (await mine.state())["ask"] == state["ask"]
+        await desk.leave()
+        assert (await other.state())["screen"] == "waiting"
+        assert (await mine.state())["screen"] == "over"
+
+    with_tablets(study, act, "R1", "R2")
+
+
+def test_a_failed_session_says_nothing_of_its_model(
+    study: StudyPaths, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = "protocol.toml: models[0] (HM1): needed another angle"
+    over = {"screen": "over", "how": "failed", "text": text, "rater": "R1"}
+
+    async def act(desk: Desk, tablet: Tablet, new: Tablet) -> None:
+        await desk.start("R1", "test")
+        await tablet.until("instructions")
+        await desk.leave()
+        monkeypatch.setattr(desk, "_over", over)
+        state = await tablet.state()
+        assert (state["screen"], state["how"]) == ("over", "failed")
+        assert "HM1" not in "".join(tablet.sent)
+        assert (await new.state())["screen"] == "waiting"
+        await desk.start("R2", "test")
+        await new.until("instructions")  # it has not become the first rater's
+
+    with_tablets(study, act, "R1", None)
+
+
+def test_a_stream_says_that_it_is_there(
+    study: StudyPaths, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("masrel.lab.serve._rater_routes.BEAT_S", 0.01)
+
+    async def act(_: Desk, tablet: Tablet) -> None:
+        async with tablet.listening() as events:
+            while ("beat", {}) not in events:
+                await asyncio.sleep(0.01)
+            assert events[0][1]["screen"] == "waiting"
+
+    with_tablets(study, act, None)
+
+
+@pytest.mark.slow
+def test_a_tablet_that_is_nobodys_becomes_the_first_raters(study: StudyPaths) -> None:
+    async def act(desk: Desk, tablet: Tablet) -> None:
+        assert (await tablet.state())["screen"] == "waiting"
+        await desk.start("R2", "test")
+        await tablet.until("instructions")
+        await desk.leave()
+        await desk.start("R1", "test")
+        assert (await tablet.state())["screen"] == "other"
+
+    with_tablets(study, act, None)
+
+
+def test_two_tablets_one_acts_and_the_other_is_told(study: StudyPaths) -> None:
+    async def act(desk: Desk, one: Tablet, two: Tablet) -> None:
+        await desk.start("R1", "test")
+        async with two.listening() as events:
+            state = await one.until("grade")
+            first = one.post("answer", ask=state["ask"], answer={"grade": "1"})
+            second = two.post("answer", ask=state["ask"], answer={"grade": "3"})
+            results = await asyncio.gather(first, second)
+            assert sorted(status for status, _ in results) == [200, 409]
+            assert results[0][1]["state"]["screen"] == "ready"
+            told = next(body for status, body in results if status == 409)
+            assert told["why"] == "this was answered already"
+            before = len(events)
+            state = await one.answer(results[0][1]["state"], begin=True)
+            while len(events) == before:
+                await asyncio.sleep(0.01)
+            latest = events[-1][1]
+            assert (latest["screen"], latest["ask"]) == (state["screen"], state["ask"])
+
+    with_tablets(study, act, "R1", "R1")
+    assert kinds(study).count("practice-grade") == 1
+
+
+@pytest.mark.slow
+def test_a_grade_is_on_disk_when_its_answer_comes(study: StudyPaths) -> None:
+    async def act(desk: Desk, tablet: Tablet) -> None:
+        await desk.start("R1", "test")
+        for n in range(3):
+            state = await tablet.until("grade")
+            await tablet.answer(state, grade="1+", stretch=None)
+            log = read_log(study.log_file("R1", "test"))
+            grades = [e for e in log if e.kind in ("grade", "practice-grade")]
+            assert len(grades) == 1 + n
+            await tablet.answer(state, grade="1+", stretch=None)  # it was offline
+
+    with_tablets(study, act, "R1")
+
+
+@pytest.mark.slow
+def test_every_kind_of_question_is_shown_and_answered(tmp_path: Path) -> None:
+    study = small_study(tmp_path / "study", QUESTIONS)
+    given = {"score": 42, "sure": 7, "hand": "left", "remark": None}
+    wrong: dict[str, Any] = {"score": 101, "sure": 2.5, "hand": "foot", "remark": 3}
+
+    async def act(desk: Desk, tablet: Tablet) -> None:
+        await desk.start("R1", "test")
+        for number, (name, value) in enumerate(given.items(), start=1):
+            state = await tablet.until("question")
+            assert (state["number"], state["n_questions"]) == (number, 4)
+            assert state["question"] == f"person.{name}"
+            body = {"ask": state["ask"], "answer": {"answer": wrong[name]}}
+            status, refusal = await tablet.post("answer", **body)
+            assert (status, refusal["state"]["ask"]) == (422, state["ask"])
+            await tablet.answer(state, answer=value)
+        await tablet.until("over")
+
+    with_tablets(study, act, "R1")
+    log = read_log(study.log_file("R1", "test"))
+    answers = {
+        e.fields["question"]: e.fields["answer"] for e in log if e.kind == "answered"
+    }
+    assert answers == given
+
+
+@pytest.mark.slow
+def test_the_break_counts_down_and_may_be_left_earlier(study: StudyPaths) -> None:
+    async def act(desk: Desk, tablet: Tablet) -> None:
+        await desk.start("R1", "test")
+        first = await tablet.until("break")
+        assert 0 < first["seconds_left"] <= 6.0
+        await asyncio.sleep(0.25)
+        assert (await tablet.state())["seconds_left"] < first["seconds_left"]
+        assert (await tablet.answer(first, go_on=True))["screen"] == "ready"
+
+    with_tablets(study, act, "R1")
+
+
+@pytest.mark.slow
+def test_done_ends_what_is_presented_and_nothing_that_comes_later(
+    tmp_path: Path,
+) -> None:
+    study = small_study(tmp_path / "study", "", THRICE, quick=True)
+
+    async def act(desk: Desk, tablet: Tablet) -> None:
+        await desk.start("R1", "test")
+        async with tablet.listening() as events:
+            await tablet.answer(await tablet.until("ready"), begin=True)
+            shown = await tablet.until("presenting")
+            names = ("code", "position", "practice", "again")
+            which = {name: shown[name] for name in names}
+            for name, other in (("code", "no"), ("position", 9), ("again", True)):
+                assert (await tablet.post("done", **{**which, name: other}))[0] == 409
+            while ("stretches", {"n_over": 1}) not in events:
+                await asyncio.sleep(0.05)
+            assert (await tablet.state())["screen"] == "presenting"
+            assert (await tablet.post("done", **which))[0] == 200
+            await tablet.until("grade")
+            assert (await tablet.post("done", **which))[0] == 409
+
+    with_tablets(study, act, "R1", clock="real")
+
+
+@pytest.mark.slow
+def test_the_emergency_stop_of_any_tablet_ends_a_presentation(tmp_path: Path) -> None:
+    study = small_study(tmp_path / "study", quick=True)
+
+    async def act(desk: Desk, mine: Tablet, other: Tablet) -> None:
+        await desk.start("R1", "test")
+        await mine.answer(await mine.until("ready"), begin=True)
+        await mine.until("presenting")
+        assert (await other.post("stop"))[0] == 200
+        state = await mine.until("fault")
+        assert state["why"].startswith("emergency stop")
+        status, _ = await mine.post("answer", ask=state["ask"], answer={"skip": " "})
+        assert status == 422
+
+    with_tablets(study, act, "R1", "R2", clock="real")
+
+
+def test_a_page_is_in_the_language_of_the_study(study: StudyPaths) -> None:
+    in_language(study, "de")
+
+    async def act(_: Desk, tablet: Tablet) -> None:
+        page = await tablet.open()
+        assert '<html lang="de">' in page
+        assert ">Not-Halt</button>" in page
+        assert json.loads(re.search(r'id="words">(.*?)</script>', page)[1]) == words_in(  # type: ignore[index]
+            "de"
+        )
+
+    with_tablets(study, act, None)
+
+
+def test_a_language_without_words_is_refused(study: StudyPaths) -> None:
+    in_language(study, "xx")
+    with pytest.raises(
+        MasrelError, match=r"study.language: needed .*'de'.*got 'xx'|xx"
+    ):
+        read_protocol(study.protocol)
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_language_has_all_words_with_the_same_places(language: str) -> None:
+    english, words = words_in("en"), dict(words_in(language))
+    meanings = words.pop("meanings", {})
+    assert list(words) == list(english)
+    for key, text in english.items():
+        places = re.findall(r"\{\w+\}", text)
+        assert sorted(re.findall(r"\{\w+\}", words[key])) == sorted(places), key
+        assert words[key].strip() == words[key] != ""
+    if language != "en":  # which masrel.scales has
+        assert meanings == {
+            each.scale.name: {
+                grade: meanings[each.scale.name][grade] for grade in each.meanings
+            }
+            for each in PUBLISHED_SCALES.values()
+            if each.meanings
+        }
+
+
+def test_there_are_words_for_all_that_the_page_says_and_for_nothing_else() -> None:
+    folder = BROWSER.with_name("words")
+    assert sorted(path.stem for path in folder.glob("*.toml")) == sorted(LANGUAGES)
+    script = "".join(path.read_text() for path in BROWSER.glob("rater*.js"))
+    page = BROWSER.with_name("templates").joinpath("rater.html").read_text()
+    used = {*re.findall(r"\bwords\.(\w+)", page), *re.findall(r'"(\w+)"', script)}
+    used |= {"slow", "fast"}  # as the protocol calls them
+    for how in ("complete", "stopped", "failed"):
+        used |= {f"over_{how}", f"over_{how}_title"}
+    known = set(tomllib.loads((folder / "en.toml").read_text()))
+    assert known <= used
+    assert set(re.findall(r'\bw\("(\w+)"', script)) <= known
+
+
+def test_scripts_make_no_markup_of_texts_and_leave_no_host() -> None:
+    for path in BROWSER.glob("*.*"):
+        text = path.read_text()
+        assert not re.search(
+            r"innerHTML|outerHTML|insertAdjacent|document\.write", text
+        )
+        assert not re.search(r"https?://|\beval\(|new Function", text), path.name
