@@ -1,7 +1,7 @@
-"""Files of a study as they are read: regular, of a bounded size and depth.
+"""What comes in: rules that it breaks, and files as they are read.
 
-No pipe or device holds a verb up, no file fills the memory, and no nesting or number
-ends in an error of the parser.
+Files are regular, of a bounded size and depth. No pipe or device holds a command up, no
+file fills the memory, and no nesting or number ends in an error of the parser.
 """
 
 import errno
@@ -13,6 +13,8 @@ import stat
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
+
+from masrel.errors import ParameterError
 
 # The most bytes of a protocol, a model file, a schedule, a sheet, facts of a recording
 MAX_SMALL = 1_000_000
@@ -38,6 +40,13 @@ _LONG_KEY = re.compile(
 _CSV_FORMAT = re.compile(r"# *format: *([^\s,;]{1,18})")
 _MAX_LISTED = 40
 _MAX_BITS = 1024  # of a whole number: what is longer cannot always be shown
+
+
+def refuse(*rules: tuple[object, str]) -> None:
+    """Raise for the first rule that is broken: whether it is, and what is said."""
+    for is_broken, sentence in rules:
+        if is_broken:
+            raise ParameterError(sentence)
 
 
 def read_regular(path: Path, *, most: int) -> bytes:

@@ -1,16 +1,33 @@
-"""What a paper prints of an agreement, checked; and files with one claim a row."""
+"""What a paper prints of an agreement, checked; and files with one claim a row.
+
+Every value between the ends of an interval is printed as the same text, and whether the
+ends are as well depends on the rule for ties. All is exact: ends are fractions.
+"""
 
 import csv
+import re
 from dataclasses import dataclass, fields
-from io import StringIO
+from fractions import Fraction
+from itertools import product
+from math import ceil, floor
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from masrel._input import MAX_TABLE, listed, not_utf8, read_regular
-from masrel.audit._printed import RULES, PrintedNumber, Rule, parse_printed
-from masrel.errors import MasrelError, ParameterError, RatingsError
+from masrel._input import MAX_TABLE, listed, not_utf8, read_regular, refuse
+from masrel.errors import ParameterError, RatingsError
+
+Rule = Literal["half_even", "half_up"]
+"""What becomes of a tie: the even neighbour, or the one further from 0."""
+
+RULES: tuple[Rule, ...] = ("half_even", "half_up")
+
+Window = tuple[int, int]
+"""The least and the greatest whole number that is allowed; none where it is less."""
+
+_NUMBER = re.compile(r"-?(\d+\.?\d*|\.\d+)", re.ASCII)
+_MAX_DECIMALS = 12
 
 AuditWeights = Literal["identity", "linear", "quadratic"]
 """Weights of printed coefficients."""
@@ -33,8 +50,78 @@ _PRINTED = {  # the least, the greatest, an example
     "p": (0, 1, "0.003"),
 }
 _MARGINS = ("margins_1", "margins_2")
+_NEEDED = ("n_items", "n_categories")
 UNCERTAINTY = ("standard_error", "low", "high", "p")
 """What may be printed beside the kappa of two raters."""
+
+
+class Bounds(NamedTuple):
+    """The values that are rounded to one text."""
+
+    low: Fraction
+    high: Fraction
+    has_low: bool  # whether the end itself is one of them
+    has_high: bool
+
+
+@dataclass(frozen=True, slots=True)
+class PrintedNumber:
+    """A number with the decimals that it was printed with."""
+
+    units: int  # the number in units of its last decimal
+    value: Fraction
+    half_unit: Fraction  # how far a value may lie from the number
+
+    def bounds(self, rule: Rule) -> Bounds:
+        """Return the values that the rule rounds to the number."""
+        if rule == "half_even":
+            has_low = has_high = self.units % 2 == 0
+        else:  # away from 0: of 0 neither end, of others the end nearer to 0
+            has_low, has_high = self.units > 0, self.units < 0
+        half = self.half_unit
+        return Bounds(self.value - half, self.value + half, has_low, has_high)
+
+
+def _parse_printed(
+    text: object, where: str, low: int, high: int, example: str
+) -> PrintedNumber:
+    """Return a printed number between two limits; `where` begins the message."""
+    plain = text.strip().replace("−", "-") if isinstance(text, str) else ""
+    decimals = len(plain.partition(".")[2])
+    is_number = _NUMBER.fullmatch(plain) is not None
+    value = Fraction(plain if is_number else 0)
+    got = f"got {text!r}"
+    refuse(
+        (
+            not isinstance(text, str),
+            f"{where}: needs a text such as {example!r}, since its decimals count, "
+            f"{got}",
+        ),
+        (
+            not is_number,
+            f"{where}: needs a number with a decimal point and no unit, such as "
+            f"{example!r}, {got}",
+        ),
+        (
+            decimals > _MAX_DECIMALS,
+            f"{where}: needs at most {_MAX_DECIMALS} decimals, {got}",
+        ),
+        (
+            not low <= value <= high,
+            f"{where}: needs a number from {low} to {high}, {got}",
+        ),
+    )
+    unit = Fraction(1, 10**decimals)
+    return PrintedNumber(int(value / unit), value, unit / 2)
+
+
+def whole_numbers(bounds: Bounds) -> Window:
+    """Return the whole numbers within bounds, and at those ends that count."""
+    low, high, has_low, has_high = bounds
+    return (
+        ceil(low) if has_low else floor(low) + 1,
+        floor(high) if has_high else ceil(high) - 1,
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,69 +188,81 @@ class Claim:
     def __post_init__(self) -> None:
         """Check all of it."""
         for key, (least, most) in _COUNTS.items():
-            if key == "n_unrated":
-                most = min(most, self.n_items - 1)
-            _check_count(key, getattr(self, key), least, most)
-        if self.agreement is None and self.kappa is None:
-            raise ParameterError(
-                "agreement, kappa: needs at least one of them, got neither"
+            count = getattr(self, key)
+            most = min(most, self.n_items - 1) if key == "n_unrated" else most
+            is_whole = isinstance(count, int | np.integer) and count is not True
+            needed = f"needs a whole number from {least} to {most}"
+            is_in = is_whole and least <= count <= most
+            refuse((not is_in, f"{key}: {needed}, got {count!r}"))
+        refuse(
+            (
+                self.agreement is None and self.kappa is None,
+                "agreement, kappa: needs at least one of them, got neither",
             )
+        )
         printed = self.printed()
-        for key in ("agreement_weights", "kappa_weights"):
-            check_weights(key, getattr(self, key), (*WEIGHTS, "any"))
-        if self.rounding not in (*RULES, "either"):
-            raise ParameterError(
-                f"rounding: needs half_even, half_up or either, got {self.rounding!r}"
+        check_weights("agreement_weights", self.agreement_weights, (*WEIGHTS, "any"))
+        check_weights("kappa_weights", self.kappa_weights, (*WEIGHTS, "any"))
+        refuse(
+            (
+                self.rounding not in (*RULES, "either"),
+                f"rounding: needs half_even, half_up or either, got {self.rounding!r}",
             )
-        for key in _MARGINS:
-            self._check_margins(key, getattr(self, key))
+        )
+        self._check_margins("margins_1", self.margins_1)
+        self._check_margins("margins_2", self.margins_2)
         self._check_uncertainty(printed)
 
     def _check_margins(self, key: str, margins: tuple[int, ...] | None) -> None:
         if margins is None:
             return
-        if self.n_raters != 2:
-            raise ParameterError(f"{key}: needs two raters, got {self.n_raters}")
         shown = ";".join(map(str, margins))
         sums = range(self.n_items - self.n_unrated, self.n_items + 1)
-        if len(margins) != self.n_categories or min(margins) < 0:
-            raise ParameterError(
-                f"{key}: needs {self.n_categories} counts, one a category, got {shown}"
-            )
-        if sum(margins) not in sums:
-            raise ParameterError(
+        refuse(
+            (self.n_raters != 2, f"{key}: needs two raters, got {self.n_raters}"),
+            (
+                len(margins) != self.n_categories or min(margins) < 0,
+                f"{key}: needs {self.n_categories} counts, one a category, got {shown}",
+            ),
+            (
+                sum(margins) not in sums,
                 f"{key}: needs counts that sum to n_items, {self.n_items}, got "
-                f"{shown}, which sum to {sum(margins)}"
-            )
+                f"{shown}, which sum to {sum(margins)}",
+            ),
+        )
 
     def _check_uncertainty(self, printed: dict[str, PrintedNumber]) -> None:
-        for key in UNCERTAINTY:
-            if key in printed and (self.n_raters != 2 or self.kappa is None):
-                raise ParameterError(f"{key}: needs the kappa of two raters beside it")
-        for absent, other in (("low", "high"), ("high", "low")):
-            if other in printed and absent not in printed:
-                raise ParameterError(f"{absent}: needed beside {other}, got none")
-        if not 0.5 <= self.level < 1:
-            raise ParameterError(
-                f"level: needs a number from 0.5 to below 1, got {self.level!r}"
-            )
-        if self.low is not None and printed["low"].value > printed["high"].value:
-            raise ParameterError(
-                f"low: needs to be no higher than high, {self.high}, got {self.low}"
-            )
+        is_kappa_of_two = self.n_raters == 2 and self.kappa is not None
+        low, high = printed.get("low"), printed.get("high")
+        refuse(
+            *(
+                (
+                    key in printed and not is_kappa_of_two,
+                    f"{key}: needs the kappa of two raters beside it",
+                )
+                for key in UNCERTAINTY
+            ),
+            (high and not low, "low: needed beside high, got none"),
+            (low and not high, "high: needed beside low, got none"),
+            (
+                not 0.5 <= self.level < 1,
+                f"level: needs a number from 0.5 to below 1, got {self.level!r}",
+            ),
+            (
+                low and high and low.value > high.value,
+                f"low: needs to be no higher than high, {self.high}, got {self.low}",
+            ),
+        )
 
     def printed(self) -> dict[str, PrintedNumber]:
         """Return the numbers that are printed, by their names here."""
         numbers = {}
         for key, (low, high, example) in _PRINTED.items():
             text = getattr(self, key)
+            if key == "p" and isinstance(text, str):
+                text = text.removeprefix("<")
             if text is not None:
-                text = (
-                    text.removeprefix("<") if key == "p" and str(text) == text else text
-                )
-                numbers[key] = parse_printed(
-                    text, key, low=low, high=high, example=example
-                )
+                numbers[key] = _parse_printed(text, key, low, high, example)
         return numbers
 
     @property
@@ -185,7 +284,7 @@ class Claim:
 
     def weights(self) -> list[tuple[AuditWeights, AuditWeights]]:
         """Return the weights of agreement and of kappa that it may be read with."""
-        pairs = []
+        known = []
         for number, name in (
             (self.agreement, self.agreement_weights),
             (self.kappa, self.kappa_weights),
@@ -193,24 +292,15 @@ class Claim:
             # of two categories all weights are alike
             is_one = number is None or (name == "any" and self.n_categories == 2)
             chosen = "identity" if is_one else name
-            pairs.append([w for w in WEIGHTS if chosen in (w, "any")])
-        return [(a, k) for a in pairs[0] for k in pairs[1]]
-
-
-def _check_count(name: str, count: object, least: int, most: int) -> None:
-    is_whole = isinstance(count, int | np.integer) and not isinstance(count, bool)
-    if not is_whole or not least <= count <= most:  # type: ignore[operator]
-        raise ParameterError(
-            f"{name}: needs a whole number from {least} to {most}, got {count!r}"
-        )
+            known.append([w for w in WEIGHTS if chosen in (w, "any")])
+        agreement, kappa = known
+        return list(product(agreement, kappa))
 
 
 def check_weights(name: str, weights: str, known: tuple[str, ...] = WEIGHTS) -> None:
     """Refuse weights that cannot be audited."""
-    if weights not in known:
-        raise ParameterError(
-            f"{name}: needs one of {', '.join(known)}, got {weights!r}"
-        )
+    needed = f"{name}: needs one of {', '.join(known)}"
+    refuse((weights not in known, f"{needed}, got {weights!r}"))
 
 
 def read_claims(file: Path) -> tuple[Claim, ...]:
@@ -237,62 +327,62 @@ def read_claims(file: Path) -> tuple[Claim, ...]:
         If it cannot be read.
     """
     try:
-        text = read_regular(file, most=MAX_TABLE).decode("utf-8-sig")
+        return _claims_of(read_regular(file, most=MAX_TABLE).decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise RatingsError(f"{file}: {not_utf8(error)}") from error
+    except (ParameterError, csv.Error) as error:
+        raise RatingsError(f"{file}: {error}") from error
+
+
+def _claims_of(text: str) -> tuple[Claim, ...]:
     lines = [
         (number, line)
         for number, line in enumerate(text.splitlines(), start=1)
         if line.strip(" ,;") and not line.startswith("#")
     ]
-    if len(lines) < 2:
-        raise RatingsError(
-            f"{file}: needs a line of column names and a row a claim, got "
-            f"{len(lines)} lines"
-        )
+    needed = f"needs a line of column names and a row a claim, got {len(lines)} lines"
+    refuse((len(lines) < 2, needed))
     separator = ";" if lines[0][1].count(";") > lines[0][1].count(",") else ","
-    try:
-        rows = [next(csv.reader(StringIO(t), delimiter=separator)) for _, t in lines]
-    except csv.Error as error:
-        raise RatingsError(f"{file}: needs CSV, got what is none: {error}") from error
+    rows = [next(csv.reader([line], delimiter=separator)) for _, line in lines]
     head = [name.strip() for name in rows[0]]
-    known, needed = [field.name for field in fields(Claim)], ("n_items", "n_categories")
-    if strays := [name for name in head if name not in known]:
-        raise RatingsError(
-            f"{file}: needs columns among {', '.join(known)}, got {listed(strays)}"
-        )
-    if not set(head).issuperset(needed) or len(set(head)) < len(head):
-        raise RatingsError(
-            f"{file}: needs the columns {', '.join(needed)}, and each column once, "
-            f"got {listed(head)}"
-        )
+    known = [field.name for field in fields(Claim)]
+    strays = [name for name in head if name not in known]
+    are_there = set(head).issuperset(_NEEDED) and len(set(head)) == len(head)
+    refuse(
+        (strays, f"needs columns among {', '.join(known)}, got {listed(strays)}"),
+        (
+            not are_there,
+            f"needs the columns {', '.join(_NEEDED)}, and each column once, got "
+            f"{listed(head)}",
+        ),
+    )
     return tuple(
-        _claim(f"{file}: row {number}", number, head, row)
+        _claim_of_row(number, head, row)
         for (number, _), row in zip(lines[1:], rows[1:], strict=True)
     )
 
 
-def _claim(where: str, number: int, head: list[str], row: list[str]) -> Claim:
-    if len(row) != len(head):
-        raise RatingsError(
-            f"{where}: needs {len(head)} cells, as many as there are columns, got "
-            f"{len(row)}"
+def _claim_of_row(number: int, head: list[str], row: list[str]) -> Claim:
+    refuse(
+        (
+            len(row) != len(head),
+            f"row {number}: needs {len(head)} cells, as many as there are columns, got "
+            f"{len(row)}",
         )
-    cells = {
-        name: text.strip() for name, text in zip(head, row, strict=True) if text.strip()
-    }
-    for name in ("n_items", "n_categories"):
-        if name not in cells:
-            raise RatingsError(f"{where}, column {name}: needs a number, got nothing")
+    )
+    cells = dict(zip(head, map(str.strip, row), strict=True))
+    texts = {name: text for name, text in cells.items() if text}
     try:
-        return claim_of({"name": f"row {number}"} | cells)
-    except MasrelError as error:  # its message begins with the parameter
-        raise RatingsError(f"{where}, column {error}") from error
+        return claim_of({"name": f"row {number}"} | texts)
+    except ParameterError as error:  # its message begins with the parameter
+        raise ParameterError(f"row {number}, column {error}") from error
 
 
 def claim_of(texts: dict[str, str]) -> Claim:
     """Return a claim from the texts of its parameters."""
-    values: dict[str, object] = dict(texts)
+    values: dict[str, Any] = dict(texts)
+    for name in _NEEDED:
+        refuse((name not in texts, f"{name}: needed, got nothing"))
     for key, text in texts.items():
         if key in _COUNTS:
             values[key] = _whole(key, text)
@@ -300,16 +390,11 @@ def claim_of(texts: dict[str, str]) -> Claim:
             parts = text.replace(";", " ").split()
             values[key] = tuple(_whole(key, part) for part in parts)
         elif key == "level":
-            try:
-                values[key] = float(text)
-            except ValueError:
-                raise ParameterError(
-                    f"level: needs a number such as 0.95, got {text!r}"
-                ) from None
-    return Claim(**values)  # type: ignore[arg-type]
+            values[key] = float(_parse_printed(text, key, 0, 1, "0.95").value)
+    return Claim(**values)
 
 
 def _whole(key: str, text: str) -> int:
-    if not (text.isascii() and text.isdecimal() and len(text) < 10):
-        raise ParameterError(f"{key}: needs a whole number, got {text!r}")
+    is_whole = text.isascii() and text.isdecimal() and len(text) < 10
+    refuse((not is_whole, f"{key}: needs a whole number, got {text!r}"))
     return int(text)

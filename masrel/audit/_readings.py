@@ -5,7 +5,7 @@ kappa plus and minus a normal quantile of it, and p that of kappa over it. All t
 floats: a printed number fits where it is nearer than half of its last decimal.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
 from statistics import NormalDist
@@ -19,21 +19,18 @@ from masrel.audit._claims import (
     UNCERTAINTY,
     AuditWeights,
     Claim,
+    PrintedNumber,
     check_weights,
 )
-from masrel.audit._printed import PrintedNumber
 from masrel.audit._search import (
     MAX_COUNTED,
     N_EXAMPLES,
-    CellRows,
     Integers,
-    SquareTables,
-    WorkLimitError,
-    as_rows,
-    count_tables,
     disagreement,
-    matrix_of,
+    search_tables,
 )
+
+CellRows = tuple[tuple[int, ...], ...]
 
 CountStatus = Literal["exact", "at least", "cannot tell"]
 
@@ -134,14 +131,9 @@ class ConsistentTables:
 
 def count_text(n_tables: int | None, status: CountStatus) -> str:
     """Return a count of tables in words."""
-    if n_tables is None:
-        return "cannot tell"
-    number = f"{n_tables:,}".replace(",", " ")
-    if status == "at least":
-        return f"at least {number} tables"
-    if n_tables < 2:
-        return "one table" if n_tables else "no table"
-    return f"{number} tables"
+    few = {None: "cannot tell", 0: "no table", 1: "one table"}
+    number = f"{n_tables or 0:,} tables".replace(",", " ")
+    return f"at least {number}" if status == "at least" else few.get(n_tables, number)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,47 +162,49 @@ class ClaimAudit:
     def is_possible(self) -> bool | None:
         """Whether any reading leaves a table; None if it cannot be told."""
         numbers = [reading.n_tables for reading in self.readings]
-        if any(numbers):
-            return True
-        return None if None in numbers else False
+        return any(numbers) or (None if None in numbers else False)
 
     @property
     def sentence(self) -> str:
         """What came out, in a sentence that accuses nobody."""
         claim, n = self.claim, len(self.readings)
         items = "1 item" if claim.n_items == 1 else f"{claim.n_items} items"
-        table = f"of {items} in {claim.n_categories} categories"
-        if claim.n_raters > 2:
-            table += f" by {claim.n_raters} raters"
+        by = f" by {claim.n_raters} raters" if claim.n_raters > 2 else ""
+        table = f"table of {items} in {claim.n_categories} categories{by}"
         both = "both " if claim.agreement and claim.kappa else ""
         what = f"{both}{_numbers(claim)}{_beside(claim)}"
         if self.is_possible is None:
             return (
-                f"cannot tell whether any table {table} gives {what}: the bound on "
-                "work was met first"
+                f"cannot tell whether any {table} gives {what}: the bound on work was "
+                "met first"
             )
         if not self.is_possible:
             tried = "the one reading" if n == 1 else f"any of the {n} readings"
-            return f"no table {table} gives {what}, by {tried} tried"
+            return f"no {table} gives {what}, by {tried} tried"
         some = [reading for reading in self.readings if reading.n_tables]
         count = _range_text(some)
         verb = "gives" if count == "one table" else "give"
-        by = "" if len(some) == n else f", by {len(some)} of {n} readings"
-        agreed = {n for reading in some for n in reading.n_agreed}
-        in_them = ""
-        if agreed and all(reading.n_agreed for reading in some):
-            ends = " to ".join(map(str, sorted({min(agreed), max(agreed)})))
-            in_them = f"; in them the raters agree on {ends} of {claim.n_items}"
-        return f"{count} {table} {verb} {what}{by}{in_them}"
+        read = "" if len(some) == n else f", by {len(some)} of {n} readings"
+        return (
+            f"{count}{table.removeprefix('table')} {verb} {what}{read}"
+            f"{_agreed_text(claim, some)}"
+        )
+
+
+def _agreed_text(claim: Claim, readings: list[Reading]) -> str:
+    # on how many items raters agree, where all readings say it
+    agreed = [reading.n_agreed for reading in readings]
+    if not all(agreed):
+        return ""
+    ends = sorted({min(map(min, agreed)), max(map(max, agreed))})
+    shown = " to ".join(map(str, ends))
+    return f"; in them the raters agree on {shown} of {claim.n_items}"
 
 
 def _numbers(claim: Claim) -> str:
     # percentage and kappa in words
-    texts = {
-        f"{claim.agreement} % agreement": claim.agreement,
-        f"κ {claim.kappa}": claim.kappa,
-    }
-    return " and ".join(name for name, text in texts.items() if text is not None)
+    words = {"{} % agreement": claim.agreement, "κ {}": claim.kappa}
+    return " and ".join(name.format(text) for name, text in words.items() if text)
 
 
 def _beside(claim: Claim) -> str:
@@ -312,20 +306,24 @@ def consistent_tables(
 
 def _answer(claim: Claim) -> ConsistentTables:
     # of a claim whose weights are named, by its percentage and kappa alone
-    count = count_tables(claim)
-    agreed = tuple(sorted(count.n_agreed)) if count.is_whole else ()
-    whole = _reading(claim, count.numbers[None], count.is_whole, "either", agreed)
+    result = search_tables(claim)
+    agreed = tuple(sorted(result.n_agreed)) if result.is_whole else ()
+    whole, *readings = (
+        _reading(claim, result.numbers[rule], result.is_whole, rule or "either", agreed)
+        for rule in (None, *claim.rules)
+    )
     return ConsistentTables(
         n_tables=whole.n_tables,
         status=whole.status,
-        examples=tuple(count.examples),
-        readings=tuple(
-            _reading(claim, count.numbers[rule], count.is_whole, rule, agreed)
-            for rule in claim.rules
-        ),
+        examples=_as_rows(result.tables),
+        readings=tuple(readings),
         n_agreed=agreed,
-        n_visited=count.n_visited,
+        n_visited=result.n_visited,
     )
+
+
+def _as_rows(tables: Iterable[Integers]) -> tuple[CellRows, ...]:
+    return tuple(tuple(map(tuple, table.tolist())) for table in tables)
 
 
 def _reading(
@@ -383,20 +381,15 @@ def audit_claim(claim: Claim) -> ClaimAudit:
     """
     readings: list[Reading] = []
     examples: tuple[CellRows, ...] = ()
-    bare = _bare(claim)
+    read = _by_rounding if claim == _bare(claim) else _one_by_one
     for n_absent, weights in product(range(claim.n_unrated + 1), claim.weights()):
-        n_items = claim.n_items - n_absent
-        if claim == bare:
-            result = _answer(_named(bare, weights, n_items))
-            rows, tables = _by_rounding(claim, result), result.examples
-        else:
-            rows, tables = _looked_at(claim, _named(claim, weights, n_items))
+        rows, tables = read(claim, _named(claim, weights, claim.n_items - n_absent))
         readings += rows
         examples = examples or tables
     audit = ClaimAudit(claim=claim, readings=tuple(readings), examples=examples)
-    if audit.is_possible is not False:
-        return audit
-    return replace(audit, alone=_alone(claim, _named(bare, claim.weights()[0])))
+    return (
+        audit if audit.is_possible is not False else replace(audit, alone=_alone(claim))
+    )
 
 
 def _bare(claim: Claim) -> Claim:
@@ -405,9 +398,8 @@ def _bare(claim: Claim) -> Claim:
     return replace(claim, **absent)  # type: ignore[arg-type]
 
 
-def _named(claim: Claim, weights: _Weights, n_items: int | None = None) -> Claim:
+def _named(claim: Claim, weights: _Weights, n_items: int) -> Claim:
     # a claim read by named weights, of so many items that have both ratings
-    n_items = n_items or claim.n_items
     # margins of more items than are left say nothing of those that are
     first, second = (
         margins if margins is not None and sum(margins) == n_items else None
@@ -424,46 +416,48 @@ def _named(claim: Claim, weights: _Weights, n_items: int | None = None) -> Claim
     )
 
 
-def _alone(claim: Claim, bare: Claim) -> dict[str, ConsistentTables]:
+def _alone(claim: Claim) -> dict[str, ConsistentTables]:
     # by the first weights: which of the numbers it is that no table gives
-    alone = {}
+    bare = _named(_bare(claim), claim.weights()[0], claim.n_items)
+    parts = {}
     if claim.agreement is not None and claim.kappa is not None:
-        alone[f"{claim.agreement} % agreement"] = _answer(replace(bare, kappa=None))
-        alone[f"κ {claim.kappa}"] = _answer(replace(bare, agreement=None))
+        parts[f"{claim.agreement} % agreement"] = replace(bare, kappa=None)
+        parts[f"κ {claim.kappa}"] = replace(bare, agreement=None)
     if claim != _bare(claim):
-        alone[_numbers(claim)] = _answer(bare)
-    return alone
+        parts[_numbers(claim)] = bare
+    return {name: _answer(part) for name, part in parts.items()}
 
 
-def _by_rounding(claim: Claim, result: ConsistentTables) -> list[Reading]:
+_Read = tuple[list[Reading], tuple[CellRows, ...]]  # readings, examples of the first
+
+
+def _by_rounding(claim: Claim, named: Claim) -> _Read:
     # one reading where both rules lead to the same
-    first, *others = result.readings
-    if all((r.n_tables, r.status) == (first.n_tables, first.status) for r in others):
-        return [replace(first, rounding=claim.rounding)]
-    return list(result.readings)
+    result = _answer(named)
+    if len({(r.n_tables, r.status) for r in result.readings}) == 1:
+        return [replace(result.readings[0], rounding=claim.rounding)], result.examples
+    return list(result.readings), result.examples
 
 
-def _looked_at(
-    claim: Claim, named: Claim
-) -> tuple[list[Reading], tuple[CellRows, ...]]:
+def _one_by_one(claim: Claim, named: Claim) -> _Read:
     # readings of margins, errors and p, from tables made one by one
-    tables, is_whole = _listed(named)
-    is_whole = is_whole or claim.excludes_kappa
-    printed = claim.printed()
+    result = search_tables(named, n_made=MAX_COUNTED)
+    is_whole = result.is_whole or claim.excludes_kappa
+    q, printed = claim.n_categories, claim.printed()
+    tables = np.array(result.tables, dtype=np.int64).reshape(-1, q, q)
     values = (
         _errors(tables, named.kappa_weights) if printed.keys() & UNCERTAINTY else {}
     )
-    has_error = printed.keys() & {"standard_error", "low"}
+    errors = _ERRORS if printed.keys() & {"standard_error", "low"} else (None,)
+    tests = _TESTS if "p" in printed else (None,)
     readings: list[Reading] = []
     examples: tuple[CellRows, ...] = ()
-    for error, test in product(
-        _ERRORS if has_error else (None,), _TESTS if claim.p is not None else (None,)
-    ):
+    for error, test in product(errors, tests):
         fits = np.ones(len(tables), dtype=bool)
         if error is not None:
-            fits &= _has_error(claim, printed, values["kappa"], values[error])
+            fits &= _has_error(claim, values["kappa"], values[error])
         if test is not None:
-            fits &= _has_p(claim, printed["p"], values, test)
+            fits &= _has_p(claim, values, test)
         agreed = np.unique(np.trace(tables[fits], axis1=1, axis2=2)).tolist()
         reading = _reading(
             named,
@@ -473,30 +467,15 @@ def _looked_at(
             tuple(agreed) if is_whole else (),
         )
         readings.append(replace(reading, error=error, test=test))
-        examples = examples or tuple(as_rows(tables[fits][:N_EXAMPLES]))
+        examples = examples or _as_rows(tables[fits][:N_EXAMPLES])
     return readings, examples
-
-
-def _listed(claim: Claim) -> tuple[Integers, bool]:
-    # the tables that have percentage, kappa and margins, and whether it is all of them
-    q = claim.n_categories
-    blocks, n = [np.zeros((0, q, q), dtype=np.int64)], 0
-    try:
-        for block in SquareTables(claim).tables():
-            blocks.append(block)
-            n += len(block)
-            if n >= MAX_COUNTED:
-                break
-    except WorkLimitError:
-        return np.concatenate(blocks), False
-    return np.concatenate(blocks)[:MAX_COUNTED], n < MAX_COUNTED
 
 
 def _errors(tables: Integers, weights: str) -> dict[str, _Floats]:
     # kappa of every table with the standard errors that programs print; w = 1 - v/v_max
     estimates = [cohen_kappa(count_table(t), weights=weights) for t in tables]
     delta = np.array([estimate.standard_error for estimate in estimates])
-    v = matrix_of(disagreement(weights, tables.shape[1])).astype(float)
+    v = disagreement(weights, tables.shape[1]).astype(float)
     w = 1 - v / v.max()
     n = tables.sum(axis=(1, 2))
     p = tables / n[:, None, None]
@@ -518,36 +497,33 @@ def _errors(tables: Integers, weights: str) -> dict[str, _Floats]:
         }
 
 
-def _has_error(
-    claim: Claim, printed: dict[str, PrintedNumber], kappa: _Floats, error: _Floats
-) -> _Flags:
-    fits = np.ones(len(kappa), dtype=bool)
-    if "standard_error" in printed:
-        fits &= _near(error, printed["standard_error"])
-    if "low" in printed:
-        reach = _NORMAL.inv_cdf(0.5 + claim.level / 2) * error
-        fits &= _near(kappa - reach, printed["low"], -1.0)
-        fits &= _near(kappa + reach, printed["high"], 1.0)
-    return fits
+def _has_error(claim: Claim, kappa: _Floats, error: _Floats) -> _Flags:
+    reach = _NORMAL.inv_cdf(0.5 + claim.level / 2) * error
+    expected = {"standard_error": error, "low": kappa - reach, "high": kappa + reach}
+    ends = {"low": -1.0, "high": 1.0}
+    fits = [
+        _near(expected[key], number, ends.get(key))
+        for key, number in claim.printed().items()
+        if key in expected
+    ]
+    return np.asarray(np.all(fits, axis=0))
 
 
-def _has_p(
-    claim: Claim, printed: PrintedNumber, values: dict[str, _Floats], test: str
-) -> _Flags:
+def _has_p(claim: Claim, values: dict[str, _Floats], test: str) -> _Flags:
+    printed = claim.printed()["p"]
     error, sides = _TESTS[test]
     with np.errstate(divide="ignore", invalid="ignore"):
         z = values["kappa"] / values[error]
     above = np.array([1 - _NORMAL.cdf(value) for value in z])
     p = above if sides == 1 else 2 * np.minimum(above, 1 - above)
     if str(claim.p).startswith("<"):
-        return p < float(printed.value)
+        return np.asarray(p < float(printed.value))
     return _near(p, printed)
 
 
 def _near(values: _Floats, printed: PrintedNumber, end: float | None = None) -> _Flags:
     # end: of the scale, where intervals may have been cut off
     reach = float(printed.half_unit) + _SLACK
-    near = abs(values - float(printed.value)) <= reach
-    if end is not None and float(printed.value) == end:
-        near |= values * end > 1
-    return near
+    is_end = end is not None and float(printed.value) == end
+    is_cut = values * (end or 1.0) > 1 if is_end else False
+    return np.asarray((abs(values - float(printed.value)) <= reach) | is_cut)

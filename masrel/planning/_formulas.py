@@ -27,9 +27,10 @@ from statistics import NormalDist
 import numpy as np
 from scipy.special import gammaln, roots_jacobi
 
+from masrel._input import refuse
 from masrel.planning._planned_design import ONE_WAY, Design
 from masrel.planning._studies import icc_ratio
-from masrel.planning._study_plan import FORMULAS, chance_of, refuse
+from masrel.planning._study_plan import FORMULAS, chance_of
 from masrel.planning._truth import Floats, probabilities, rows_of
 
 _PRIOR_NODES = 80

@@ -11,10 +11,11 @@ from functools import cached_property
 
 import numpy as np
 
+from masrel._input import refuse
 from masrel.agreement import CodedRatings, Coefficient, coefficient
 from masrel.errors import MasrelWarning, ParameterError
 from masrel.intervals._problem import IntervalProblem, pose_problem
-from masrel.planning._study_plan import RATER_SHARE, LatentModel, Study, refuse
+from masrel.planning._study_plan import RATER_SHARE, LatentModel, Study
 from masrel.planning._truth import (
     Floats,
     Integers,

@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, Literal
 
+from masrel._input import refuse
 from masrel.errors import ParameterError
 from masrel.planning._formulas import (
     check_has_numbers,
@@ -29,7 +30,6 @@ from masrel.planning._study_plan import (
     is_met,
     number_of,
     reached_words,
-    refuse,
 )
 
 _FEWEST_ITEMS, _MAX_ITEMS, _MAX_RATERS = 2, 100_000, 60

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.special import fdtr, fdtri, gammaln, ndtri, stdtrit
 
+from masrel._input import refuse
 from masrel.agreement import CodedRatings
 from masrel.agreement.icc import _absolute_ends
 from masrel.errors import MasrelWarning
@@ -23,7 +24,6 @@ from masrel.planning._study_plan import (
     has_limits,
     limits_of,
     number_of_limits,
-    refuse,
 )
 from masrel.planning._truth import Floats, Integers, draw_ratings
 

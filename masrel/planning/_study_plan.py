@@ -8,6 +8,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from masrel._input import refuse
 from masrel.agreement import Label, WeightsLike
 from masrel.errors import ParameterError
 from masrel.estimates import Target
@@ -22,13 +23,6 @@ FORMULAS = ("wald", "goodness-of-fit")
 RATER_SHARE = 1 / 3  # of the error of ICC(A,1) that raters' levels make
 _OF_ITEMS_ALONE = ("normal", "analytic", "posterior")
 _REACHED = 1e-9
-
-
-def refuse(*rules: tuple[object, str]) -> None:
-    """Raise for the first rule that is broken: whether it is, and what is said."""
-    for is_broken, sentence in rules:
-        if is_broken:
-            raise ParameterError(sentence)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln, ndtr, ndtri
 
+from masrel._input import refuse
 from masrel.agreement import Label, WeightsLike, code_ratings
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Target
 from masrel.intervals import estimate
-from masrel.planning._study_plan import LatentModel, Study, refuse
+from masrel.planning._study_plan import LatentModel, Study
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
