@@ -293,10 +293,13 @@ def as_document(result: Estimate | Interval) -> dict[str, object]:
 
 
 def _plain(value: object) -> object:
+    """Return a value of a result as JSON has it."""
     if isinstance(value, Interval | Estimate):
         return as_document(value)
     if isinstance(value, float) and not math.isfinite(value):
         return None
-    if isinstance(value, tuple):
+    if isinstance(value, dict):
+        return {key: _plain(part) for key, part in value.items()}
+    if isinstance(value, tuple | list):
         return [_plain(part) for part in value]
     return value

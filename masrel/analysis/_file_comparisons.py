@@ -16,15 +16,15 @@ from masrel.agreement import CodedRatings, Coefficient, Significance, holm
 from masrel.analysis._file_estimates import (
     Answer,
     EstimateOptions,
-    Note,
     Row,
+    coded_part,
+    note,
     on_grades,
+    parts_of,
 )
-from masrel.analysis._file_questions import coded_part, label, part_names
 from masrel.errors import MasrelError, ParameterError, RatingsError
 from masrel.estimates import Estimate, as_document
 from masrel.ratings import RatingsFile, RatingsPart
-from masrel.scales import Scale
 
 # Tests that all groups agree as well.
 FLEISS = "Fleiss' weighted χ²"
@@ -54,9 +54,11 @@ def _groups_of(parts: Sequence[RatingsPart]) -> _Groups:
     coded = [coded_part(part, "--compare") for part in parts]
     rated = [_rated_rows(*both) for both in zip(parts, coded, strict=True)]
     items = [frozenset(rows) for rows in rated]
-    has_clusters = any(part.clusters for part in parts)
     n_shared = len(frozenset.intersection(*items))
-    if len(set(items)) == len(parts) and not _share_clusters(parts):
+    has_clusters = any(part.clusters for part in parts)
+    of_parts = [set(part.clusters) for part in parts]
+    share_clusters = len(set().union(*of_parts)) < sum(map(len, of_parts))
+    if len(set(items)) == len(parts) and not share_clusters:
         return _Groups(
             sets=tuple(coded),
             is_dependent=False,
@@ -64,61 +66,40 @@ def _groups_of(parts: Sequence[RatingsPart]) -> _Groups:
             same_items=False,
             clusters=tuple(part.clusters for part in parts) if has_clusters else None,
         )
-    starts: dict[frozenset[str], tuple[int, list[str]]] = {}
-    n_rows = 0
+    # a row for each item of each set of items that groups have
+    rows_of: dict[tuple[frozenset[str], str], int] = {}
     for names, rows in zip(items, rated, strict=True):
-        if names not in starts:
-            starts[names] = n_rows, list(rows)
-            n_rows += len(rows)
-    placed = []  # first row of each group, and which of its own rows come there
-    for names, rows in zip(items, rated, strict=True):
-        start, order = starts[names]
-        placed.append((start, [rows[item] for item in order]))
+        for item in rows:
+            rows_of.setdefault((names, item), len(rows_of))
+    sets = []
+    clusters: dict[int, str] = {}
+    for part, ratings, names, rows in zip(parts, coded, items, rated, strict=True):
+        at = [rows_of[names, item] for item in rows]
+        codes = np.full((len(rows_of), ratings.codes.shape[1]), -1, ratings.codes.dtype)
+        codes[at] = ratings.codes[list(rows.values())]
+        sets.append(replace(ratings, codes=codes))
+        for row, (item, place) in zip(at, rows.items(), strict=True):
+            cluster = part.clusters[place] if part.clusters else ""
+            if clusters.setdefault(row, cluster) != cluster:
+                raise RatingsError(
+                    f"--compare: item {item!r} needs one cluster in all groups, got "
+                    f"{clusters[row]!r} and {cluster!r}"
+                )
     return _Groups(
-        sets=tuple(
-            _in_rows(ratings, *rows, n_rows)
-            for ratings, rows in zip(coded, placed, strict=True)
-        ),
+        sets=tuple(sets),
         is_dependent=True,
         n_shared=n_shared,
-        same_items=len(starts) == 1,
-        clusters=_row_clusters(parts, placed, n_rows) if has_clusters else None,
+        same_items=len(set(items)) == 1,
+        clusters=tuple(map(clusters.__getitem__, range(len(rows_of))))
+        if has_clusters
+        else None,
     )
-
-
-def _in_rows(
-    ratings: CodedRatings, start: int, places: Sequence[int], n_rows: int
-) -> CodedRatings:
-    # with gaps for items of other groups
-    codes = np.full((n_rows, ratings.codes.shape[1]), -1, ratings.codes.dtype)
-    codes[start : start + len(places)] = ratings.codes[places]
-    return replace(ratings, codes=codes)
-
-
-def _row_clusters(
-    parts: Sequence[RatingsPart], placed: Sequence[tuple[int, list[int]]], n_rows: int
-) -> tuple[str, ...]:
-    clusters = [""] * n_rows
-    for part, (start, places) in zip(parts, placed, strict=True):
-        for row, place in enumerate(places, start):
-            if clusters[row] not in ("", part.clusters[place]):
-                raise RatingsError(
-                    f"--compare: item {part.items[place]!r} needs one cluster in all "
-                    f"groups, got {clusters[row]!r} and {part.clusters[place]!r}"
-                )
-            clusters[row] = part.clusters[place]
-    return tuple(clusters)
 
 
 def _rated_rows(part: RatingsPart, coded: CodedRatings) -> dict[str, int]:
     # item to its row; an item that nobody rated is none
     rated = np.max(coded.codes, axis=1) >= 0
     return {item: row for row, item in enumerate(part.items) if rated[row]}
-
-
-def _share_clusters(parts: Sequence[RatingsPart]) -> bool:
-    of_parts = [set(part.clusters) for part in parts]
-    return len(set().union(*of_parts)) < sum(map(len, of_parts))
 
 
 def difference_rows(
@@ -130,40 +111,40 @@ def difference_rows(
             "--compare: needs two groups or more, so --by with the column that tells "
             "them apart"
         )
-    names = [label(part_names(file, part).values()) for part in file.parts]
     pairs = {
-        (names[one], names[other]): _groups_of((file.parts[one], file.parts[other]))
-        for one, other in itertools.combinations(range(len(file.parts)), 2)
+        (first, second): _groups_of((one, other))
+        for (one, first, _), (other, second, _) in itertools.combinations(
+            parts_of(file), 2
+        )
     }
     # one that was named is refused rather than left out
     can = [of for of in entries if of.formula is not None or not options.takes_all]
-    without = ", ".join(entry.title for entry in entries if entry not in can)
-    every = [
-        row for entry in can for row in _differences(entry, pairs, options, file.scale)
-    ]
-    notes = _difference_notes(pairs, options.level)
+    rows = [row for of in can for row in _differences(of, file, pairs, options)]
+    notes = list(_difference_notes(pairs, options.level))
+    if without := ", ".join(entry.title for entry in entries if entry not in can):
+        notes.append(note("without", titles=without))
     return Answer(
         name="differences",
-        rows=[row for row, _ in every],
-        shown=[shown for _, shown in every],
-        notes=(*notes, *([Note("without", {"titles": without})] if without else [])),
+        rows=[row for row, _ in rows],
+        shown=[shown for _, shown in rows],
+        notes=tuple(notes),
         is_single=len(pairs) == 1,
     )
 
 
 def _differences(
     entry: Coefficient,
+    file: RatingsFile,
     pairs: Mapping[tuple[str, str], _Groups],
     options: EstimateOptions,
-    scale: Scale,
 ) -> Iterator[tuple[Row, Row]]:
     # the row of every pair, and what a table shows of it
     from masrel.intervals import difference, difference_test
 
-    results = []
-    for names, groups in pairs.items():
+    rows: list[tuple[Row, Row]] = []
+    for (first, second), groups in pairs.items():
         design = "dependent" if groups.is_dependent else "independent"
-        ratings = [on_grades(of, entry, scale) for of in groups.sets]
+        ratings = [on_grades(of, entry, file) for of in groups.sets]
         of_pair: Any = {
             "design": design,
             "weights": options.weights_of(entry),
@@ -173,28 +154,29 @@ def _differences(
             estimate = difference(entry, *ratings, level=options.level, **of_pair)
             test = difference_test(entry, *ratings, **of_pair)
         except MasrelError as error:
-            raise type(error)(f"--compare: {' and '.join(names)}: {error}") from error
-        results.append((names, groups, design, estimate, test))
-    adjusted = holm([test.p_value for *_, test in results])
-    for (names, groups, design, estimate, test), p in zip(
-        results, adjusted, strict=True
-    ):
-        first, second = names
-        row = {
+            raise type(error)(f"--compare: {first} and {second}: {error}") from error
+        row: Row = {
             "first": first,
             "second": second,
             "design": design,
             **as_document(estimate),
-            "coefficient": estimate.coefficient.removeprefix("difference of "),
+            "coefficient": entry.name,
             "t": test.statistic,
             "df": test.df[0],
             "p_value": test.p_value,
-            "p_holm": p,
+            "p_holm": math.nan,
             "test_reason": test.reason,
         }
-        titles = {"title": options.title(entry), "group": f"{first} and {second}"}
-        items = "the same" if groups.same_items else "others"
-        yield row, {**row, **titles, "items": items, **_shown(estimate, test)}
+        shown = {
+            "title": options.title(entry),
+            "group": f"{first} and {second}",
+            "items": "the same" if groups.same_items else "others",
+            **_shown(estimate, test),
+        }
+        rows.append((row, shown))
+    adjusted = holm([row["p_value"] for row, _ in rows])
+    for (row, shown), p in zip(rows, adjusted, strict=True):
+        yield row | {"p_holm": p}, row | {"p_holm": p} | shown
 
 
 def _shown(estimate: Estimate, test: Significance) -> Row:
@@ -215,19 +197,18 @@ def _shown(estimate: Estimate, test: Significance) -> Row:
 
 def _difference_notes(
     pairs: Mapping[tuple[str, str], _Groups], level: float
-) -> Iterator[Note]:
+) -> Iterator[str]:
     groups = pairs.values()
     is_clustered = any(of.clusters is not None for of in groups)
     unit = "clusters" if is_clustered else "items"
-    yield Note(f"difference_of_{unit}", {"level": level})
+    yield note(f"difference_of_{unit}", level=level)
     if len(pairs) > 1:
-        yield Note("holm", {"n": len(pairs)})
+        yield note("holm", n=len(pairs))
     if any(of.is_dependent for of in groups):
-        yield Note(f"shared_{unit}")
+        yield note(f"shared_{unit}")
     for (first, second), of in pairs.items():
         if not of.same_items and of.n_shared:
-            values = {"first": first, "second": second, "n": of.n_shared}
-            yield Note("same_names", values)
+            yield note("same_names", first=first, second=second, n=of.n_shared)
 
 
 def equality_rows(
@@ -235,11 +216,11 @@ def equality_rows(
 ) -> Answer:
     """Return the tests that all groups have the same coefficient, for each of them."""
     groups = _groups_of(file.parts)
-    rows, shown, kinds, undefined = [], [], [], []
+    rows, shown, notes, undefined = [], [], [], []
     for entry in entries:
         if entry.formula is None:  # the differences say it
             continue
-        of_entry = tuple(on_grades(of, entry, file.scale) for of in groups.sets)
+        of_entry = tuple(on_grades(of, entry, file) for of in groups.sets)
         of_groups = replace(groups, sets=of_entry)
         for test, result in _equality_tests(entry, of_groups, options):
             rows.append(
@@ -256,15 +237,15 @@ def equality_rows(
                 }
             )
             shown.append({**rows[-1], "title": options.title(entry), "test": test})
-            kinds.append(test)
+            notes.append(note(test))
             if result.reason is not None:
-                values = {"of": entry.title, "reason": result.reason}
-                undefined.append(Note("undefined", values))
+                why = note("undefined", of=entry.title, reason=result.reason)
+                undefined.append(why)
     return Answer(
         name="equality",
         rows=rows,
         shown=shown,
-        notes=(*map(Note, dict.fromkeys(kinds)), *undefined),
+        notes=(*dict.fromkeys(notes), *undefined),
     )
 
 

@@ -1,15 +1,13 @@
-"""Estimates of any file of ratings: which coefficients, with which interval and bound.
+"""Questions about a file of ratings, and estimates: coefficients with intervals.
 
-In: a part of the file, and how estimates are made. Out: a row for every coefficient.
+In: a `RatingsFile` and how estimates are made. Out: a row for every coefficient.
 """
 
-import math
-import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
-from masrel.errors import MasrelError, MasrelWarning, ParameterError
+from masrel.errors import MasrelError, ParameterError, RatingsError
 from masrel.estimates import Estimate, Interval, Target
 
 if TYPE_CHECKING:
@@ -21,8 +19,7 @@ if TYPE_CHECKING:
         Metric,
         WeightName,
     )
-    from masrel.ratings import RatingsPart
-    from masrel.scales import Scale
+    from masrel.ratings import RatingsFile, RatingsPart
 
 _Ratings = TypeVar("_Ratings", bound="CodedRatings | CountedRatings")
 
@@ -35,8 +32,17 @@ OF_MEASUREMENTS = ("icc_a1", "lin_ccc")
 _OF_METRIC = "krippendorff_alpha"
 """The coefficient that has metrics."""
 
+_OF_SESSIONS = ("stratified_kappa", "pooled_kappa")
+"""Coefficients of each rater's grades of two sessions."""
+
 _SURE = 0.95  # probability with which the true value reaches the word for it
 _SURE_TWO_SIDED = 0.90  # the level of which the lower end alone is as sure
+
+# What is asked for as a coefficient and is a table of its own
+_TABLES = {
+    **dict.fromkeys(("mcnemar", "bowker", "stuart_maxwell", "bhapkar"), "--symmetry"),
+    "bland_altman": "--limits-of-agreement",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,10 +79,6 @@ class EstimateOptions:
             return self.coefficients
         return list(self.usual) if self.metric is None else [_OF_METRIC]
 
-    def by_metric(self, entry: "Coefficient") -> "Coefficient":
-        """Return the coefficient by the metric that was chosen, if it has metrics."""
-        return entry.by_metric(self.metric) if entry.name == _OF_METRIC else entry
-
     def weights_of(self, entry: "Coefficient") -> "WeightName":
         """Return the weights, of a coefficient that takes any."""
         return self.weights if entry.weighted else "identity"
@@ -103,26 +105,93 @@ class EstimateOptions:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AgreementRow:
-    """One estimate, and what to say of it that is not in it."""
+class Questions:
+    """What is asked beside the agreement between raters: a table each."""
 
-    # group, title: of what (such as a session), and which coefficient
-    group: str
-    title: str
-    estimate: Estimate
-    # what it lacks of what was requested, and what was assumed
-    notes: tuple[str, ...] = ()
-    # what the true value reaches with 95 % by its interval; None if there is none, or
-    # no word is to be named
-    lower_bound: float | None = None
+    retest: bool
+    each_category: bool
+    symmetry: bool
+    indices: bool
+    compare: bool
+    diagnose: bool
+    reference: str | None
+    limits_of_agreement: bool
+    unit: str | None
 
+    def checked(
+        self, options: EstimateOptions, by: str | None, clusters: str | None
+    ) -> EstimateOptions:
+        """Return what is estimated between raters, with the defaults of the tables."""
+        for name in options.names:
+            if option := _TABLES.get(name.lower().replace("-", "_")):
+                raise ParameterError(
+                    f"--coefficients: needed coefficients, got {name!r}: {option} has "
+                    "that table"
+                )
+        names = [of.name for of in fields(self) if getattr(self, of.name)]
+        by_items = [name for name in names if name != "compare"]
+        other = f"--{by_items[0].replace('_', '-')}" if by_items else None
+        target = f"--target {options.target}"
+        of_raters = options.target in ("raters", "both")
+        refusals = (
+            (
+                self.reference is not None and not self.diagnose,
+                "--reference: belongs to --diagnose, got it alone",
+            ),
+            (
+                self.unit is not None and not self.limits_of_agreement,
+                "--unit: belongs to --limits-of-agreement, got it alone",
+            ),
+            (
+                self.diagnose and self.limits_of_agreement,
+                "--diagnose and --limits-of-agreement: each has a figure, so needs one "
+                "of them, got both",
+            ),
+            (
+                self.diagnose and of_raters,
+                "--diagnose: is of these raters, so its intervals generalise to other "
+                f"items: --target items or none, got {target}",
+            ),
+            (
+                clusters is not None and other is not None,
+                f"--clusters: {other} takes every item by itself, so needs one of "
+                "them, got both",
+            ),
+            (
+                clusters is not None and of_raters,
+                "--clusters: what is left out is a cluster of items, so it takes "
+                f"--target items, got {target}",
+            ),
+            (
+                self.compare and by is None,
+                "--compare: needs --by with the column that tells the groups apart",
+            ),
+            (
+                self.compare and of_raters,
+                "--compare: a difference generalises to other items, so it takes "
+                f"--target items, got {target}",
+            ),
+        )
+        for is_wrong, message in refusals:
+            if is_wrong:
+                raise ParameterError(message)
+        if self.compare or clusters is not None:
+            return replace(options, target="items")
+        if self.limits_of_agreement and options.weights == "identity":
+            # weights are those of a kappa
+            return replace(options, usual=OF_MEASUREMENTS)
+        return options
 
-@dataclass(frozen=True, slots=True)
-class Note:
-    """What a reader must know of a table, as data; `masrel.tables` has the words."""
-
-    kind: str
-    values: Mapping[str, object] = field(default_factory=dict)
+    def between_raters(
+        self, file: "RatingsFile", options: EstimateOptions
+    ) -> EstimateOptions | None:
+        """Return what is estimated between raters; None where that is nothing."""
+        if self.retest and all(len(part.raters) == 1 for part in file.parts):
+            return None
+        if not self.retest or options.coefficients is None:
+            return options
+        rest = [name for name in options.coefficients if name not in _OF_SESSIONS]
+        return replace(options, coefficients=rest) if rest else None
 
 
 Row = dict[str, Any]
@@ -130,76 +199,251 @@ Row = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class AgreementRow:
+    """One estimate, and what to say of it that is not in it."""
+
+    keys: Mapping[str, str | None]  # what tells it from others; None for all of them
+    title: str  # the coefficient
+    estimate: Estimate
+    # what it lacks of what was requested, and what was assumed
+    notes: tuple[str, ...] = ()
+    # what the true value reaches with 95 % by its interval; None if there is none, or
+    # no word is to be named
+    lower_bound: float | None = None
+
+    @property
+    def group(self) -> str:
+        """What it is called, from the group down."""
+        return ": ".join("all" if of is None else of for of in self.keys.values())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
     """What a question gives."""
 
     name: str  # in the JSON, and of the table
-    rows: list[Row]  # of the JSON
+    rows: list[Row] = field(default_factory=list)  # of the JSON; none of estimates
     shown: list[Row] | None = None  # rows of the table, where they are others
     # what tells parts apart: a key of the table's rows, and what it is called
     heads: Mapping[str, str] = field(default_factory=dict)
-    notes: tuple[Note, ...] = ()
+    notes: tuple[str, ...] = ()  # below the table
     of: str = ""  # what the caption says it is of
     grades: tuple[str, ...] = ()  # that have a column each
     has_reference: bool = False  # whether a rater is held against another
     is_single: bool = False  # whether there is nothing that p is adjusted for
-    # estimates, of which `rows` has what tells them apart
-    estimates: "Sequence[AgreementRow]" = ()
+    estimates: tuple[AgreementRow, ...] = ()
     # what a figure shows of each part: its name, and its result
     figure: tuple[tuple[str, Any], ...] = ()
 
 
+_TEXTS = {
+    "note": "{of}: {reason}.",
+    "undefined": "{of}: undefined: {reason}.",
+    # test and retest
+    "sessions": "{group}Each rater's grades of {first} and of {second}.",
+    "left_out": "{group}Left out: {names}.",
+    # two raters
+    "test": "{test}: whether {hypothesis}.",
+    "exact_test": "{test}: whether {hypothesis}; df: the items that changed.",
+    "pabak": "PABAK: 2 p_o − 1, which is Brennan-Prediger's coefficient of two "
+    "categories; SE: delta method, items as the sample.",
+    "on_category": "Agreement on a category: of the ratings in it, the part that met "
+    "the same of the other rater; of two categories negative and positive agreement.",
+    "largest": "Largest κ: what the margins of the raters allow.",
+    "pair": "Difference: {pair}.",
+    "limits": "Limits: mean ∓ 1.96 standard deviations, between which 95 % of "
+    "differences lie if they are normal.",
+    "exact_ends": "Low, High: {level} % CI, exact (t, noncentral t), each for itself; "
+    "both: for the two limits together, factors of tolerance; for other items like "
+    "these, rated by the same raters.",
+    # diagnosis
+    "change": "Change: of all without the rater, less that of all: above 0 the others "
+    "agree better without.",
+    "standard_error": "SE: item jackknife.",
+    "agreement": "Agreement: of the ratings in the category, the part that meets the "
+    "same of another rater.",
+    "reference": "{rater} is the reference, and in no other estimate between raters.",
+    "least": "The {n} pairs that agree least; --json has {n_all}.",
+    "no_ends": "No intervals: --target items has them.",
+    "raters_ends": "{level} % CI: t, each by itself. They generalise to other items, "
+    "rated by these raters.",
+    "pairs_ends": "{level} % CI: that of {title} of the two raters alone. They "
+    "generalise to other items, rated by these raters.",
+    "categories_ends": "{level} % CI: exact at the effective number of items. They "
+    "generalise to other items, rated by these raters.",
+    "confusion": "The columns: which share of these times the rater said so.",
+    "confusion_ends": "Intervals are in --json: exact at the effective number of "
+    "items.",
+    # comparisons
+    **{
+        f"difference_of_{units}": "Difference: the first less the second. SE, {level} "
+        f"% CI and p: {unit} jackknife, t; they generalise to other {population} like "
+        "these, graded by the same raters; raters are taken as they are, whether "
+        "groups share them or not."
+        for units, unit, population in (
+            ("items", "item", "items"),
+            ("clusters", "cluster", "clusters of items"),
+        )
+    },
+    "holm": "p (Holm): adjusted for {n} pairs, each coefficient by itself.",
+    "shared_clusters": "Groups have clusters in common, which are left out of both at "
+    "once.",
+    "shared_items": "Items the same: both groups have items of the same names, taken "
+    "for the same items, and an item is left out of both at once.",
+    "same_names": "{first} and {second}: {n} items have the same name, taken for "
+    "different items.",
+    "without": "Left out: {titles}: there is no such interval.",
+    "Fleiss' weighted χ²": "Fleiss' weighted χ²: groups of other items, by their "
+    "delta-method errors.",
+    "Donner's goodness of fit": "Donner's goodness of fit: two raters and two "
+    "categories, of one κ of all groups; it holds its level in smaller groups.",
+    "Hotelling's T² as F": "Hotelling's T² as F: groups of the same items, by their "
+    "names, or of the same clusters, by the delta method.",
+}
+
+
+def note(kind: str, **values: object) -> str:
+    """Return a note of a kind; a level in it is said in percent."""
+    if isinstance(level := values.get("level"), float):
+        values["level"] = f"{100.0 * level:g}"
+    return _TEXTS[kind].format(**values)
+
+
+# ---- parts of a file ----
+
+
+def part_names(file: "RatingsFile", part: "RatingsPart") -> dict[str, str]:
+    """Return what tells a part from the others: names of columns, and what they say."""
+    names = {}
+    if part.group is not None:
+        names[str(file.read["by"])] = part.group
+    if part.session is not None and len({other.session for other in file.parts}) > 1:
+        names[str(file.read["session"])] = part.session
+    return names
+
+
 def group_key(by: str) -> str:
     """Return what groups are called in a CSV and a record, unlike all else there."""
-    fields = set(Estimate.__dataclass_fields__) | set(Interval.__dataclass_fields__)
-    return f"group_{by}" if by in fields | {"title", "word", "words", "data"} else by
+    names = {of.name for of in (*fields(Estimate), *fields(Interval))}
+    return f"group_{by}" if by in names | {"title", "word", "words", "data"} else by
 
 
-def estimate_rows(
-    part: "RatingsPart",
-    *,
-    group: str,
-    n_raters: int,
-    scale: "Scale",
-    is_ordered: bool,
-    options: EstimateOptions,
-) -> "list[AgreementRow]":
-    """Estimate one part of the ratings, every coefficient as a row."""
-    # is_ordered: whether the order of the grades is more than the alphabet's
-    rows, refused = [], []
-    of_part = replace(options, clusters=part.clusters)
-    with warnings.catch_warnings():
-        # Every note is in the result, and so below the table or in the JSON.
-        warnings.simplefilter("ignore", MasrelWarning)
-        for entry in entries(options, n_raters, scale, is_ordered):
+def parts_of(file: "RatingsFile") -> "Iterator[tuple[RatingsPart, str, Row]]":
+    """Return every part, what it is called, and the same by keys."""
+    for part in file.parts:
+        names = part_names(file, part)
+        keys = {group_key(name): value for name, value in names.items()}
+        yield part, ": ".join(names.values()), keys
+
+
+def coded_part(part: "RatingsPart", option: str) -> "CodedRatings":
+    """Return the ratings of a part, of which it must be known who rated what."""
+    from masrel.agreement import code_ratings
+
+    try:
+        return code_ratings(part.ratings)
+    except RatingsError as error:
+        raise RatingsError(f"{option}: {error}") from error
+
+
+def heads_of(file: "RatingsFile", *others: str) -> dict[str, str]:
+    """Return the head of one column for all that tells parts, and others, apart."""
+    by = ", ".join([*part_names(file, file.parts[0]), *others])
+    return {group_key(by): by} if by else {}
+
+
+# ---- estimates ----
+
+
+def agreement(file: "RatingsFile", options: EstimateOptions) -> Answer:
+    """Return how well the raters of every part agree, every coefficient as a row."""
+    heads = heads_of(file)
+    estimates: list[AgreementRow] = []
+    for part, group, _ in parts_of(file):
+        rows, refusals = [], []
+        of_part = replace(options, clusters=part.clusters)
+        n_raters = len(part.raters) or file.read["n_raters"]
+        for entry in entries(options, n_raters, file):
             ratings = part.ratings if entry.formula is None else part.counted
-            ratings = on_grades(ratings, entry, scale)
-            row, refusal = estimate_row(entry, ratings, group, of_part)
+            ratings = on_grades(ratings, entry, file)
+            row, refusal = estimate_row(
+                entry, ratings, dict.fromkeys(heads, group), of_part
+            )
             rows.append(row)
-            refused += [] if refusal is None else [refusal]
-    if not options.takes_all and refused and len(refused) == len(rows):
-        raise refused[0]
-    return rows
+            refusals += [] if refusal is None else [refusal]
+        if not options.takes_all and refusals and len(refusals) == len(rows):
+            raise refusals[0]
+        estimates += rows
+    return Answer(
+        name="agreement",
+        heads=heads,
+        of=file.read["file"],
+        estimates=tuple(estimates),
+    )
 
 
-def on_grades(ratings: _Ratings, entry: "Coefficient", scale: "Scale") -> _Ratings:
+def entries(
+    options: EstimateOptions, n_raters: int, file: "RatingsFile"
+) -> list["Coefficient"]:
+    """Return the coefficients that are estimated, or refuse those that do not fit."""
+    from masrel.agreement import COEFFICIENTS, coefficient
+
+    if not options.takes_all and _OF_METRIC not in options.names and options.metric:
+        raise ParameterError(
+            f"--metric {options.metric}: is of {_OF_METRIC}, which is not among "
+            f"--coefficients {','.join(options.names)}"
+        )
+    every = options.takes_all
+    chosen = COEFFICIENTS.values() if every else map(coefficient, options.names)
+    fitting = [
+        of.by_metric(options.metric) if of.name == _OF_METRIC else of for of in chosen
+    ]
+    if every:
+        return [
+            entry
+            for entry in fitting
+            if entry.shape == "ratings"
+            and not entry.by_name_only
+            and n_raters <= (entry.n_raters[1] or n_raters)
+            and (file.is_ordered or not entry.needs_order)
+        ]
+    for entry in fitting:
+        if entry.shape == "pairs":
+            raise ParameterError(
+                f"--coefficients: {entry.name} takes each rater's grades of two "
+                "sessions: --session COL --retest computes it"
+            )
+        if entry.needs_order:
+            check_order(file, entry.name)
+    return fitting
+
+
+def check_order(file: "RatingsFile", what: str) -> None:
+    """Refuse what needs the order of grades, where it is the alphabet's alone."""
+    if not file.is_ordered:
+        raise ParameterError(
+            f"{what}: needs grades that are numbers or --categories with every grade "
+            f"in order, the grades met are text: {', '.join(file.scale.grades)}"
+        )
+
+
+def on_grades(ratings: _Ratings, entry: "Coefficient", file: "RatingsFile") -> _Ratings:
     """Return ratings with the text of their grades if a metric takes sets of labels."""
-    from masrel.agreement import CodedRatings
+    from masrel.agreement import CountedRatings
 
     if entry.metric not in ("jaccard", "masi"):
         return ratings
-    if isinstance(ratings, CodedRatings):
-        return replace(ratings, categories=scale.grades)
-    coded = ratings.coded
-    if coded is not None:
-        coded = replace(coded, categories=scale.grades)
-    return replace(ratings, categories=scale.grades, source=coded)
+    grades = file.scale.grades
+    if isinstance(ratings, CountedRatings) and ratings.coded is not None:
+        source = replace(ratings.coded, categories=grades)
+        return replace(ratings, categories=grades, source=source)
+    return replace(ratings, categories=grades)
 
 
 def estimate_row(
     entry: "Coefficient",
     ratings: "CodedRatings | CountedRatings",
-    group: str,
+    keys: Mapping[str, str | None],
     options: EstimateOptions,
 ) -> "tuple[AgreementRow, MasrelError | None]":
     """Return the row of a coefficient, and why it has no interval if it should."""
@@ -209,28 +453,25 @@ def estimate_row(
         by_metric = f"by its metric, without {options.weights} weights"
         unweighted = "unweighted, there are no weights for it"
         notes.append(by_metric if entry.metric else unweighted)
-    has_target = options.target is not None
     try:
-        estimate = _estimate(entry, ratings, options, options.level, has_target)
+        estimate = _estimate(entry, ratings, options, options.level)
     except MasrelError as error:
-        if not has_target or options.are_named:
+        if options.target is None or options.are_named:
             raise  # each of them must have the interval
-        none = (
-            "it is no function of sums over items" if entry.formula is None else error
-        )
-        notes.append(f"no interval: {none}")
-        refusal, has_target = error, False
-        estimate = _estimate(entry, ratings, options, options.level, has_target)
-    bound = None
-    if options.words and entry.chance_corrected:
-        bound = _surely_reached(
-            estimate.interval,
-            lambda level: (
-                _estimate(entry, ratings, options, level, has_target).interval
-            ),
-        )
+        no_sums = entry.formula is None
+        why = "it is no function of sums over items" if no_sums else error
+        notes.append(f"no interval: {why}")
+        refusal, options = error, replace(options, target=None)
+        estimate = _estimate(entry, ratings, options, options.level)
+    interval, bound = estimate.interval, None
+    if interval is not None and options.words and entry.chance_corrected:
+        # the lower end of an interval leaves out half of what is outside, a bound all
+        level = _SURE if interval.is_one_sided else _SURE_TWO_SIDED
+        if interval.reason is None and interval.level != level:
+            interval = _estimate(entry, ratings, options, level).interval or interval
+        bound = interval.low
     row = AgreementRow(
-        group=group,
+        keys=keys,
         title=options.title(entry),
         estimate=estimate,
         notes=tuple(notes),
@@ -239,76 +480,25 @@ def estimate_row(
     return row, refusal
 
 
-def category_rows(
-    part: "RatingsPart", names: Iterable[str], scale: "Scale", options: EstimateOptions
-) -> "list[AgreementRow]":
-    """Estimate how well raters tell each category of a part from all others."""
-    # names: what tells the part from others
-    head = tuple(names)
-    return [
-        _category_row(part, place, ": ".join((*head, grade)), scale, options)
-        for place, grade in enumerate(scale.grades)
-    ]
-
-
-def _category_row(
-    part: "RatingsPart",
-    place: int,
-    group: str,
-    scale: "Scale",
-    options: EstimateOptions,
-) -> AgreementRow:
-    from masrel.agreement import category_kappa, coefficient
-
-    estimate = category_kappa(part.counted, scale.values[place])
-    row = AgreementRow(group=group, title="Fleiss' κ, category", estimate=estimate)
-    if options.target is not None and estimate.reason is None:
-        # that of Fleiss' kappa of the two categories that the scale is folded to
-        folded = _folded(part, place)
-        if folded is None:
-            none = "no interval: counts do not say who rated what"
-            row = replace(row, notes=(none,))
-        else:
-            plain = replace(options, coefficients=None, weights="identity")
-            of, _ = estimate_row(coefficient("fleiss_kappa"), folded, group, plain)
-            row = replace(of, title=row.title)
-            estimate = replace(estimate, interval=of.estimate.interval)
-    return replace(row, estimate=replace(estimate, weights=scale.grades[place]))
-
-
-def _folded(part: "RatingsPart", place: int) -> "CodedRatings | None":
-    """Return the ratings on a scale of one category and the rest."""
-    import numpy as np
-
-    from masrel.agreement import CodedRatings
-
-    if not part.counted.knows_raters:
-        return None
-    coded = part.counted.coded
-    codes = np.where(coded.codes < 0, -1, coded.codes != place)
-    return CodedRatings(codes=codes, categories=("this", "other"))
-
-
 def _estimate(
     entry: "Coefficient",
     ratings: "CodedRatings | CountedRatings",
     options: EstimateOptions,
     level: float,
-    has_target: bool,
 ) -> Estimate:
     """Return the coefficient, with the interval that answers for the target."""
     weights = options.weights_of(entry)
     # Unless it was named, one that comes with an interval has it, whatever its target.
     is_done = entry.has_interval and not (options.are_named or options.clusters)
-    if options.target is None or not has_target or is_done:
+    if options.target is None or is_done:
         result = entry(
             ratings, categories=ratings.categories, weights=weights, level=level
         )
         # one that comes with the coefficient knows of no clusters
         return replace(result, interval=None) if options.clusters else result
-    from masrel import intervals
+    from masrel.intervals import estimate
 
-    return intervals.estimate(
+    return estimate(
         entry,
         ratings,
         target=options.target,
@@ -320,64 +510,3 @@ def _estimate(
         rng=options.seed,
         clusters=options.clusters or None,
     )
-
-
-def check_order(options: EstimateOptions, scale: "Scale", is_ordered: bool) -> None:
-    """Refuse weights of grades without an order."""
-    if options.weights != "identity" and not is_ordered:
-        raise ParameterError(
-            f"--weights {options.weights}: needs --categories with every grade of the "
-            f"scale in order, the grades met are text: {', '.join(scale.grades)}"
-        )
-
-
-def entries(
-    options: EstimateOptions, n_raters: int, scale: "Scale", is_ordered: bool
-) -> list["Coefficient"]:
-    """Return the coefficients that are estimated, or refuse those that do not fit."""
-    from masrel.agreement import COEFFICIENTS, coefficient
-
-    check_order(options, scale, is_ordered)
-    if options.takes_all:
-        return [
-            entry
-            for entry in map(options.by_metric, COEFFICIENTS.values())
-            if entry.shape == "ratings"
-            and not entry.by_name_only
-            and n_raters <= (entry.n_raters[1] or n_raters)
-            and (is_ordered or not entry.needs_order)
-        ]
-    if options.metric is not None and _OF_METRIC not in options.names:
-        raise ParameterError(
-            f"--metric {options.metric}: is of {_OF_METRIC}, which is not among "
-            f"--coefficients {','.join(options.names)}"
-        )
-    chosen = [options.by_metric(coefficient(name)) for name in options.names]
-    for entry in chosen:
-        if entry.shape == "pairs":
-            raise ParameterError(
-                f"--coefficients: {entry.name} takes each rater's grades of two "
-                "sessions: --session COL --retest computes it"
-            )
-        if entry.needs_order and not is_ordered:
-            raise ParameterError(
-                f"{entry.name}: needs grades that are numbers or --categories with "
-                "every grade in order, the grades met are text: "
-                f"{', '.join(scale.grades)}"
-            )
-    return chosen
-
-
-def _surely_reached(
-    interval: Interval | None, at_level: Callable[[float], Interval | None]
-) -> float | None:
-    """Return what the true value reaches with 95 %; None without an interval."""
-    # at_level: the same interval at another level
-    if interval is None:
-        return None
-    if interval.reason is not None:
-        return math.nan
-    # the lower end of an interval leaves out half of what is outside, a bound all
-    level = _SURE if interval.is_one_sided else _SURE_TWO_SIDED
-    other = interval if level == interval.level else at_level(level)
-    return math.nan if other is None else other.low

@@ -7,12 +7,13 @@ JSON has them; what tables show otherwise stands beside them.
 import itertools
 import math
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from masrel.agreement import (
     CodedRatings,
@@ -23,7 +24,7 @@ from masrel.agreement import (
     bias_index,
     bowker,
     brennan_prediger,
-    code_ratings,
+    category_kappa,
     coefficient,
     contingency_table,
     kappa_max,
@@ -33,19 +34,28 @@ from masrel.agreement import (
     specific_agreement,
     stuart_maxwell,
 )
+from masrel.analysis._file_comparisons import difference_rows, equality_rows
 from masrel.analysis._file_estimates import (
     AgreementRow,
     Answer,
     EstimateOptions,
-    Note,
+    Questions,
     Row,
-    category_rows,
+    agreement,
+    check_order,
+    coded_part,
+    entries,
     estimate_row,
     group_key,
+    heads_of,
+    note,
     on_grades,
+    part_names,
+    parts_of,
 )
 from masrel.errors import (
     MasrelError,
+    MasrelWarning,
     ParameterError,
     RatingsError,
     UndefinedStatisticWarning,
@@ -62,40 +72,75 @@ _MANY = 8  # raters beyond which only the pairs that agree least are shown
 _SHOWN_PAIRS = 20  # of these pairs
 
 
-# ---- parts of a file ----
+def answers(
+    file: RatingsFile, options: EstimateOptions, questions: Questions
+) -> tuple[RatingsFile, list[Answer]]:
+    """Return the ratings without a reference, and the answers, agreement first."""
+    sessions = list(dict.fromkeys(str(part.session) for part in file.parts))
+    if len(sessions) > 1 and not questions.retest:
+        raise RatingsError(
+            f"{file.read['file']}: holds {len(sessions)} sessions "
+            f"({', '.join(sessions)}), so that raters graded the same item more than "
+            f"once; --by {file.read['session']} estimates each"
+        )
+    if options.weights != "identity" and not file.is_ordered:
+        raise ParameterError(
+            f"--weights {options.weights}: needs --categories with every grade of the "
+            f"scale in order, the grades met are text: {', '.join(file.scale.grades)}"
+        )
+    others = file
+    if questions.reference is not None:
+        others = _without_reference(file, questions.reference)
+    between = questions.between_raters(others, options)
+    with warnings.catch_warnings():
+        # Every note is in a result, and so below its table or in the JSON.
+        warnings.simplefilter("ignore", MasrelWarning)
+        # what does not fit these tables is said first: it says most
+        further = list(_further_answers(file, others, options, between, questions))
+        first = [] if between is None else [agreement(others, between)]
+    return others, first + further
 
 
-def part_names(file: RatingsFile, part: RatingsPart) -> dict[str, str]:
-    """Return what tells a part from the others: names of columns, and what they say."""
-    names = {}
-    if part.group is not None:
-        names[str(file.read["by"])] = part.group
-    if part.session is not None and len({other.session for other in file.parts}) > 1:
-        names[str(file.read["session"])] = part.session
-    return names
+def _further_answers(
+    file: RatingsFile,
+    others: RatingsFile,
+    options: EstimateOptions,
+    between: EstimateOptions | None,
+    questions: Questions,
+) -> Iterator[Answer]:
+    # others: the ratings without a reference; between: what is estimated of raters
+    if questions.retest:
+        yield _retest(file, options)
+    if questions.each_category:
+        yield _categories(others, options)
+    if questions.diagnose:
+        yield from _diagnosis(file, options, questions.reference)
+    if questions.symmetry:
+        yield _symmetry(others)
+    if questions.indices:
+        yield _indices(others)
+    if questions.limits_of_agreement:
+        yield _limits(others, options, questions.unit)
+    if questions.compare and between is not None:
+        of_all = entries(between, _n_raters(others), others)
+        yield difference_rows(others, of_all, between)
+        if len(others.parts) > 2:  # of two the difference says it
+            yield equality_rows(others, of_all, between)
 
 
-def label(names: Iterable[str]) -> str:
-    """Return what something is called, from the group down."""
-    return ": ".join(names)
+def _n_raters(file: RatingsFile) -> int:
+    n_raters = max(len(part.raters) for part in file.parts)
+    return n_raters or int(file.read["n_raters"])
 
 
-def named(names: Sequence[str]) -> str:
-    """Return names as a note lists them."""
+def _named(names: Sequence[str]) -> str:
+    # as a note lists them
     listed = ", ".join(names[:_SHOWN])
     more = len(names) - _SHOWN
     return f"{listed} and {more} more" if more > 0 else listed
 
 
-def coded_part(part: RatingsPart, option: str) -> CodedRatings:
-    """Return the ratings of a part, of which it must be known who rated what."""
-    try:
-        return code_ratings(part.ratings)
-    except RatingsError as error:
-        raise RatingsError(f"{option}: {error}") from error
-
-
-def without_reference(file: RatingsFile, reference: str) -> RatingsFile:
+def _without_reference(file: RatingsFile, reference: str) -> RatingsFile:
     """Return the ratings of all but the rater whom the others are held against."""
     parts = []
     for part in file.parts:
@@ -116,98 +161,82 @@ def without_reference(file: RatingsFile, reference: str) -> RatingsFile:
     return replace(file, parts=tuple(parts), warnings=findings)
 
 
-def _two_raters(file: RatingsFile, part: RatingsPart, option: str) -> CodedRatings:
-    coded = coded_part(part, option)
-    if coded.codes.shape[1] != 2:
-        of_part = "".join(f"{name}: " for name in part_names(file, part).values())
-        raise RatingsError(
-            f"{option}: {of_part}needs two raters, got {coded.codes.shape[1]} "
-            f"({named(part.raters)}); --raters chooses two"
-        )
-    return coded
-
-
-def _parts(file: RatingsFile) -> Iterator[tuple[RatingsPart, str, Row]]:
-    # every part, what it is called, and the same by keys
-    for part in file.parts:
-        names = part_names(file, part)
-        yield part, label(names.values()), {group_key(k): v for k, v in names.items()}
-
-
-def _heads(file: RatingsFile) -> dict[str, str]:
-    return {group_key(name): name for name in part_names(file, file.parts[0])}
-
-
-def _head(names: Sequence[str]) -> dict[str, str]:
-    # one column for all of them
-    by = ", ".join(names)
-    return {group_key(by): by}
-
-
 # ---- each category ----
 
 
-def categories(file: RatingsFile, options: EstimateOptions) -> Answer:
+def _categories(file: RatingsFile, options: EstimateOptions) -> Answer:
     """Return how well raters tell each category from all others."""
-    keys, estimates = [], []
-    for part, _, names in _parts(file):
-        estimates += category_rows(part, names.values(), file.scale, options)
-        keys += [{**names, "category": grade} for grade in file.scale.grades]
-    return Answer(
-        name="categories",
-        rows=keys,
-        estimates=tuple(estimates),
-        heads=_head([*_heads(file).values(), "category"]),
-    )
+    rows = []
+    for part, _, names in parts_of(file):
+        for place, grade in enumerate(file.scale.grades):
+            row = AgreementRow(
+                keys={**names, "category": grade},
+                title="Fleiss' κ, category",
+                estimate=category_kappa(part.counted, file.scale.values[place]),
+            )
+            if options.target is not None and row.estimate.reason is None:
+                row = _with_interval(row, part, place, options)
+            estimate = replace(row.estimate, weights=grade)
+            rows.append(replace(row, estimate=estimate))
+    heads = heads_of(file, "category")
+    return Answer(name="categories", estimates=tuple(rows), heads=heads)
+
+
+def _with_interval(
+    row: AgreementRow, part: RatingsPart, place: int, options: EstimateOptions
+) -> AgreementRow:
+    # that of Fleiss' kappa of the two categories that the scale is folded to
+    if not part.counted.knows_raters:
+        none = "no interval: counts do not say who rated what"
+        return replace(row, notes=(none,))
+    coded = part.counted.coded
+    codes = np.where(coded.codes < 0, -1, coded.codes != place)
+    folded = CodedRatings(codes=codes, categories=("this", "other"))
+    plain = replace(options, coefficients=None, weights="identity")
+    of, _ = estimate_row(coefficient("fleiss_kappa"), folded, row.keys, plain)
+    estimate = replace(row.estimate, interval=of.estimate.interval)
+    return replace(of, title=row.title, estimate=estimate)
 
 
 # ---- two sessions ----
 
 
-def retest(file: RatingsFile, options: EstimateOptions) -> Answer:
+def _retest(file: RatingsFile, options: EstimateOptions) -> Answer:
     """Return how well raters agree with themselves, each and all together."""
-    if file.read["session"] is None:
-        raise ParameterError(
-            "--retest: needs --session with the column of the two sessions"
-        )
     by = file.read["by"]
-    keys: list[Row] = []
     estimates: list[AgreementRow] = []
-    sessions, left_out = [], []
-    groups = list(dict.fromkeys(part.group for part in file.parts))
-    for group in groups:
-        parts = [part for part in file.parts if part.group == group]
+    sessions, left_out = {}, []
+    for group in dict.fromkeys(part.group for part in file.parts):
         of_group = "" if group is None else f"{group}: "
-        first, second = _check_sessions(file, parts, of_group)
-        raters = _of_both(parts, "a rater", [part.raters for part in parts], of_group)
-        items = _of_both(parts, "an item", [part.items for part in parts], of_group)
+        parts = [part for part in file.parts if part.group == group]
+        first, second = _two_sessions(file, parts, of_group)
+        raters = _of_both(parts, "rater", of_group)
+        items = _of_both(parts, "item", of_group)
         ratings = CodedRatings(
             codes=_side_by_side(parts, items, raters), categories=file.scale.values
         )
-        rows = _retest_rows(() if group is None else (group,), raters, ratings, options)
         names = {} if by is None else {group_key(by): group}
-        of_all = [None] * (len(rows) - len(raters))
-        keys += [{**names, "rater": rater} for rater in (*raters, *of_all)]
-        estimates += rows
-        sessions.append((of_group, {"first": first, "second": second}))
-        if texts := _left_out(parts, raters, items):
-            values = {"group": of_group, "names": "; ".join(texts)}
-            left_out.append(Note("left_out", values))
+        estimates += _retest_rows(names, raters, ratings, options)
+        sessions[of_group] = {"first": first, "second": second}
+        lone = [*_left_out(parts, "rater", raters), *_left_out(parts, "item", items)]
+        if lone:
+            left_out.append(note("left_out", group=of_group, names="; ".join(lone)))
     # groups that have sessions of the same names share the note
-    are_alike = all(names == sessions[0][1] for _, names in sessions)
-    heads = {"" if are_alike else group: names for group, names in sessions}
-    notes = [Note("sessions", {"group": g, **names}) for g, names in heads.items()]
+    pairs = list(sessions.values())
+    if pairs.count(pairs[0]) == len(pairs):
+        sessions = {"": pairs[0]}
+    notes = [note("sessions", group=of, **names) for of, names in sessions.items()]
+    heads = ", ".join(["rater"] if by is None else [str(by), "rater"])
     return Answer(
         name="retest",
-        rows=keys,
         estimates=tuple(estimates),
-        heads=_head(["rater"] if by is None else [str(by), "rater"]),
+        heads={group_key(heads): heads},
         notes=(*notes, *left_out),
     )
 
 
 def _retest_rows(
-    head: Sequence[str],
+    names: dict[str, str | None],
     raters: Sequence[str],
     pairs: CodedRatings,
     options: EstimateOptions,
@@ -219,23 +248,27 @@ def _retest_rows(
     rows = []
     for place, rater in enumerate(raters):
         ratings = replace(pairs, codes=pairs.codes[:, 2 * place : 2 * place + 2])
-        name = label([*head, rater])
-        row, _ = estimate_row(coefficient("cohen_kappa"), ratings, name, alone)
+        keys = {**names, "rater": rater}
+        row, _ = estimate_row(coefficient("cohen_kappa"), ratings, keys, alone)
         estimate = replace(row.estimate, n_raters=min(row.estimate.n_raters, 1))
         rows.append(replace(row, estimate=estimate))
     of_all = ["stratified_kappa"]
     if options.takes_all or "pooled_kappa" in options.names:
         of_all.append("pooled_kappa")
-    everybody = label([*head, "all"])
+    everybody = {**names, "rater": None}
     return rows + [
         estimate_row(coefficient(name), pairs, everybody, every)[0] for name in of_all
     ]
 
 
-def _check_sessions(
+def _two_sessions(
     file: RatingsFile, parts: Sequence[RatingsPart], of_group: str
 ) -> list[str]:
     column = file.read["session"]
+    if column is None:
+        raise ParameterError(
+            "--retest: needs --session with the column of the two sessions"
+        )
     if parts[0].session is None:
         raise ParameterError(
             f"--retest: compares the sessions of column {column!r}, so that --by must "
@@ -245,35 +278,42 @@ def _check_sessions(
     if len(sessions) != 2:
         raise RatingsError(
             f"--retest: {of_group}needs two sessions in column {column!r}, got "
-            f"{len(sessions)} ({named(sessions)})"
+            f"{len(sessions)} ({_named(sessions)})"
         )
     return sessions
 
 
 def _of_both(
-    parts: Sequence[RatingsPart],
-    noun: str,
-    names: Sequence[tuple[str, ...]],
-    of_group: str,
-) -> tuple[str, ...]:
+    parts: Sequence[RatingsPart], noun: Literal["rater", "item"], of_group: str
+) -> list[str]:
     # the names that both sessions have, as they come in the first
-    again = set(names[1])
-    both = tuple(name for name in names[0] if name in again)
+    first, second = (getattr(part, f"{noun}s") for part in parts)
+    again = set(second)
+    both = [name for name in first if name in again]
     if not both:
-        each = (
-            f"{named(of)} in {part.session!r}"
-            for of, part in zip(names, parts, strict=True)
-        )
+        article = "an" if noun == "item" else "a"
         raise RatingsError(
-            f"--retest: {of_group}needs {noun} of both sessions, got "
-            f"{' and '.join(each)}"
+            f"--retest: {of_group}needs {article} {noun} of both sessions, got "
+            f"{_named(first)} in {parts[0].session!r} and {_named(second)} in "
+            f"{parts[1].session!r}"
         )
     return both
 
 
+def _left_out(
+    parts: Sequence[RatingsPart], noun: Literal["rater", "item"], both: Sequence[str]
+) -> Iterator[str]:
+    # those of one session alone, in words
+    known = set(both)
+    for part in parts:
+        lone = [name for name in getattr(part, f"{noun}s") if name not in known]
+        if lone:
+            yield f"{noun} {_named(lone)} ({part.session} only)"
+
+
 def _side_by_side(
     parts: Sequence[RatingsPart], items: Sequence[str], raters: Sequence[str]
-) -> Any:
+) -> NDArray[np.signedinteger]:
     # codes (n_items, 2 n_raters), both sessions of a rater beside each other
     codes = []
     for part in parts:
@@ -286,51 +326,55 @@ def _side_by_side(
     return np.stack(codes, axis=2).reshape(len(items), -1)
 
 
-def _left_out(
-    parts: Sequence[RatingsPart], raters: Sequence[str], items: Sequence[str]
-) -> list[str]:
-    # raters and items of one session alone, in words
-    texts, of_both = [], {"rater": set(raters), "item": set(items)}
-    for part in parts:
-        for noun, names in (("rater", part.raters), ("item", part.items)):
-            lone = [name for name in names if name not in of_both[noun]]
-            texts += [f"{noun} {named(lone)} ({part.session} only)"] if lone else []
-    return texts
-
-
 # ---- two raters ----
 
 
-def symmetry(file: RatingsFile) -> Answer:
+def _two_raters(file: RatingsFile, part: RatingsPart, option: str) -> CodedRatings:
+    coded = coded_part(part, option)
+    if coded.codes.shape[1] != 2:
+        of_part = "".join(f"{name}: " for name in part_names(file, part).values())
+        raise RatingsError(
+            f"{option}: {of_part}needs two raters, got {coded.codes.shape[1]} "
+            f"({_named(part.raters)}); --raters chooses two"
+        )
+    return coded
+
+
+def _symmetry(file: RatingsFile) -> Answer:
     """Return whether changes between categories go both ways alike often."""
     rows: list[Row] = []
     shown: list[Row] = []
-    notes: dict[str, Note] = {}
-    for part, name, keys in _parts(file):
+    notes = []
+    for part, name, keys in parts_of(file):
         for title, result in _symmetry_tests(file, part).items():
             test, _, kind = title.partition(", ")
-            why, reason = "undefined", result.reason
-            if reason is None and math.isinf(result.statistic):
-                why, reason = "note", "infinite: all items changed, and one way"
-            fields = asdict(result)
-            del fields["name"], fields["df"]
+            row = asdict(result)
+            del row["name"], row["df"]
+            row["df"] = list(result.df)
+            if result.reason is None and math.isinf(result.statistic):
+                row["reason"] = "infinite: all items changed, and one way"
             key = test.lower().replace("-", "_")
-            of_test = {**keys, "test": key, "kind": kind or None}
-            rows.append({**of_test, **fields, "df": list(result.df), "reason": reason})
+            rows.append({**keys, "test": key, "kind": kind or None, **row})
             shown.append({**rows[-1], "test": title})
             is_exact = result.distribution == "binomial"
-            values = {"test": title, "hypothesis": result.hypothesis}
-            notes[title] = Note("exact_test" if is_exact else "test", values)
-            if reason is not None:
-                of = label(filter(None, (name, title)))
-                notes[of + "?"] = Note(why, {"of": of, "reason": reason})
+            what = "exact_test" if is_exact else "test"
+            notes.append(note(what, test=title, hypothesis=result.hypothesis))
+            if row["reason"] is not None:
+                why = "note" if result.reason is None else "undefined"
+                of = ": ".join(filter(None, (name, title)))
+                notes.append(note(why, of=of, reason=row["reason"]))
     return Answer(
         name="symmetry",
         rows=rows,
         shown=shown,
         heads=_heads(file),
-        notes=tuple(notes.values()),
+        notes=tuple(dict.fromkeys(notes)),
     )
+
+
+def _heads(file: RatingsFile) -> dict[str, str]:
+    # a column for each of what tells parts apart
+    return {group_key(name): name for name in part_names(file, file.parts[0])}
 
 
 def _symmetry_tests(file: RatingsFile, part: RatingsPart) -> dict[str, Significance]:
@@ -352,54 +396,63 @@ _OF_TABLE = {
 }
 
 
-def indices(file: RatingsFile) -> Answer:
+def _indices(file: RatingsFile) -> Answer:
     """Return what the margins of two raters and two categories do to kappa."""
-    rows = [
-        {**keys, **row}
-        for part, _, keys in _parts(file)
-        for row in _indices(file, part)
-    ]
-    heads = _heads(file)
-    notes = [
-        Note("note", {"of": label([*(row[key] for key in heads), row["title"]]),
-                      "reason": row["reason"]})
-        for row in rows
-        if row["reason"] is not None
-    ]  # fmt: skip
+    rows, notes = [], []
+    for part, name, keys in parts_of(file):
+        for row in _of_margins(file, part):
+            rows.append({**keys, **row})
+            if row["reason"] is not None:
+                of = ": ".join(filter(None, (name, row["title"])))
+                notes.append(note("note", of=of, reason=row["reason"]))
     return Answer(
         name="indices",
         rows=rows,
         shown=[{**row, "index": row["title"]} for row in rows],
-        heads=heads,
-        notes=(*map(Note, ("pabak", "on_category", "largest")), *notes),
+        heads=_heads(file),
+        notes=(*map(note, ("pabak", "on_category", "largest")), *notes),
     )
 
 
-def _indices(file: RatingsFile, part: RatingsPart) -> Iterator[Row]:
+_OF_TABLE = {
+    "prevalence_index": ("Prevalence index", prevalence_index),
+    "bias_index": ("Bias index", bias_index),
+    "kappa_max": ("Largest κ", kappa_max),
+}
+
+
+def _of_margins(file: RatingsFile, part: RatingsPart) -> Iterator[Row]:
     coded, grades = _two_raters(file, part, "--indices"), file.scale.grades
     if len(grades) != 2:
         raise RatingsError(
             f"--indices: needs a scale of two categories, got {len(grades)} "
-            f"({named(grades)})"
+            f"({_named(grades)})"
         )
     table = contingency_table(coded)
-
-    def row(
-        index: str, title: str, value: float, reason: str | None, **more: Any
-    ) -> Row:
-        of = {"index": index, "title": title, "category": None, "value": value}
-        sizes = {"standard_error": None, "n_items": int(table.sum()), "reason": reason}
-        return of | sizes | more
-
+    row = {
+        "index": "pabak",
+        "title": "PABAK",
+        "category": None,
+        "value": None,
+        "standard_error": None,
+        "n_items": int(table.sum()),
+        "reason": None,
+    }
     estimate, why = _with_reason(lambda: brennan_prediger(part.counted))
     error = estimate.standard_error
-    yield row("pabak", "PABAK", estimate.value, why, standard_error=error)
+    yield row | {"value": estimate.value, "standard_error": error, "reason": why}
     for name, (title, function) in _OF_TABLE.items():
-        yield row(name, title, *_with_reason(partial(function, table)))
+        value, why = _with_reason(partial(function, table))
+        yield row | {"index": name, "title": title, "value": value, "reason": why}
     shares, why = _with_reason(lambda: specific_agreement(table))
     for grade, share in zip(grades, shares, strict=True):
-        reason, title = why if math.isnan(share) else None, f"Agreement on {grade}"
-        yield row("specific_agreement", title, share, reason, category=grade)
+        yield row | {
+            "index": "specific_agreement",
+            "title": f"Agreement on {grade}",
+            "category": grade,
+            "value": share,
+            "reason": why if math.isnan(share) else None,
+        }
 
 
 def _with_reason(call: Callable[[], _T]) -> tuple[_T, str | None]:
@@ -410,36 +463,29 @@ def _with_reason(call: Callable[[], _T]) -> tuple[_T, str | None]:
     return value, str(caught[0].message) if caught else None
 
 
-def limits(file: RatingsFile, options: EstimateOptions, unit: str | None) -> Answer:
+def _limits(file: RatingsFile, options: EstimateOptions, unit: str | None) -> Answer:
     """Return between which bounds the differences of two raters lie."""
-    if not file.is_ordered:
-        raise ParameterError(
-            "--limits-of-agreement: needs grades that are numbers or --categories with "
-            "every grade in order, the grades met are text: "
-            f"{named(file.scale.grades)}"
-        )
+    check_order(file, "--limits-of-agreement")
     rows: list[Row] = []
     shown: list[Row] = []
-    notes: dict[str, Note] = {}
-    figure = []
-    for part, name, keys in _parts(file):
+    notes, figure = [], []
+    for part, name, keys in parts_of(file):
         coded = _two_raters(file, part, "--limits-of-agreement")
         result = limits_of_agreement(coded, level=options.level)
         rows.append({**keys, **_limits_row(part, result)})
         shown += [{**keys, **row} for row in _limits_shown(result)]
-        pair = " less ".join(part.raters)
-        notes[pair] = Note("pair", {"pair": pair})
+        notes.append(note("pair", pair=" less ".join(part.raters)))
         if result.reason is not None:
-            values = {"of": f"{name}: undefined" if name else "undefined"}
-            notes[name + "?"] = Note("note", {**values, "reason": result.reason})
+            of = f"{name}: undefined" if name else "undefined"
+            notes.append(note("note", of=of, reason=result.reason))
         figure.append((name, (part.raters, result)))
-    ends = Note("limits"), Note("exact_ends", {"level": options.level})
+    ends = note("limits"), note("exact_ends", level=options.level)
     return Answer(
         name="limits_of_agreement",
         rows=rows,
         shown=shown,
         heads=_heads(file),
-        notes=(*notes.values(), *ends),
+        notes=(*dict.fromkeys(notes), *ends),
         of=unit or "",
         figure=tuple(figure),
     )
@@ -462,12 +508,12 @@ def _limits_row(part: RatingsPart, result: LimitsOfAgreement) -> Row:
 
 
 def _limits_shown(result: LimitsOfAgreement) -> Iterator[Row]:
-    pairs = zip(result.outer, result.inner, strict=True)
-    (below, lower), (above, upper) = pairs
-    for quantity, key, pair in (
-        ("Mean", "mean", (None, None)),
-        ("Lower limit", "lower", (below, lower)),
-        ("Upper limit", "upper", (upper, above)),
+    nothing = (None, None)
+    ends_of_both = tuple(zip(result.outer, result.inner, strict=True))
+    for quantity, key, both in (
+        ("Mean", "mean", nothing),
+        ("Lower limit", "lower", ends_of_both[0]),
+        ("Upper limit", "upper", ends_of_both[1][::-1]),
     ):
         interval = getattr(result, f"{key}_interval")
         yield {
@@ -475,8 +521,8 @@ def _limits_shown(result: LimitsOfAgreement) -> Iterator[Row]:
             "value": getattr(result, key),
             "low": interval.low,
             "high": interval.high,
-            "pair_low": pair[0],
-            "pair_high": pair[1],
+            "pair_low": both[0],
+            "pair_high": both[1],
             "n_items": result.n_items,
         }
 
@@ -484,26 +530,33 @@ def _limits_shown(result: LimitsOfAgreement) -> Iterator[Row]:
 # ---- raters, pairs and categories ----
 
 
-def diagnosis(
-    file: RatingsFile,
-    entry: Coefficient,
-    options: EstimateOptions,
-    reference: str | None,
-) -> list[Answer]:
+def _diagnosis(
+    file: RatingsFile, options: EstimateOptions, reference: str | None
+) -> Iterator[Answer]:
     """Return raters, pairs, categories and confusions of every part of the ratings."""
-    parts = list(_diagnoses(file, entry, options, reference))
-    results = [result for _, _, result in parts]
-    title, by = options.title(entry), ", ".join(_heads(file).values())
+    if options.takes_all or (options.coefficients is None and options.metric is None):
+        options = replace(options, coefficients=["fleiss_kappa"])
+    if len(options.names) > 1:
+        raise ParameterError(
+            "--diagnose: needs one coefficient, got --coefficients "
+            f"{','.join(options.names)}"
+        )
+    (entry,) = entries(options, _n_raters(file), file)
+    parts = [
+        (group, keys, _diagnosed(file, part, group, entry, options, reference))
+        for part, group, keys in parts_of(file)
+    ]
+    title, grades = options.title(entry), file.scale.grades
+    by = ", ".join(_heads(file).values())
     of = {"raters": title, "pairs": title, "confusion": reference or "another rater"}
-    grades = file.scale.grades
-    answers = {}
+    results = [result for *_, result in parts]
     for kind, rows_of in _DIAGNOSES.items():
         rows = [
             (group, keys, row)
             for group, keys, result in parts
             for row in rows_of(grades, result)
         ]
-        answers[kind] = Answer(
+        answer = Answer(
             name=f"diagnosis_{kind}",
             rows=[{**keys, **row} for _, keys, row in rows],
             shown=[{"group": group, **row} for group, _, row in rows],
@@ -512,75 +565,73 @@ def diagnosis(
             of=of.get(kind, ""),
             has_reference=reference is not None,
         )
-    figure = tuple((group, result) for group, _, result in parts)
-    pairs = _those_that_agree_least(answers["pairs"], len(results[0].raters))
-    answers["pairs"] = replace(pairs, figure=figure)
-    shares = [
-        {"group": group, **row}
-        for group, result in figure
-        for row in _confusion_shown(grades, result)
-    ]
-    answers["confusion"] = replace(answers["confusion"], shown=shares, grades=grades)
-    return list(answers.values())
+        if kind == "pairs":
+            figure = tuple((group, result) for group, _, result in parts)
+            answer = replace(_those_that_agree_least(answer, results), figure=figure)
+        if kind == "confusion":
+            shares = [
+                {"group": group, **row}
+                for group, _, result in parts
+                for row in _confusion_shown(grades, result)
+            ]
+            answer = replace(answer, shown=shares, grades=grades)
+        yield answer
 
 
-def _diagnoses(
+def _diagnosed(
     file: RatingsFile,
+    part: RatingsPart,
+    group: str,
     entry: Coefficient,
     options: EstimateOptions,
     reference: str | None,
-) -> "Iterator[tuple[str, Row, Diagnosis]]":
-    # what each part is called, the same by keys, and its diagnosis
+) -> "Diagnosis":
     from masrel.intervals import diagnose
 
-    for part, group, keys in _parts(file):
-        ratings = on_grades(coded_part(part, "--diagnose"), entry, file.scale)
-        try:
-            result = diagnose(
-                ratings,
-                coefficient=entry,
-                target=None if options.target is None else "items",
-                raters=part.raters,
-                reference=reference,
-                weights=options.weights_of(entry),
-                level=options.level,
-            )
-        except MasrelError as error:
-            where = f"{group}: " if group else ""
-            raise type(error)(f"--diagnose: {where}{error}") from error
-        yield group, keys, result
+    ratings = on_grades(coded_part(part, "--diagnose"), entry, file)
+    try:
+        return diagnose(
+            ratings,
+            coefficient=entry,
+            target=None if options.target is None else "items",
+            raters=part.raters,
+            reference=reference,
+            weights=options.weights_of(entry),
+            level=options.level,
+        )
+    except MasrelError as error:
+        where = f"{group}: " if group else ""
+        raise type(error)(f"--diagnose: {where}{error}") from error
 
 
 def _diagnosis_notes(
     kind: str, results: "Sequence[Diagnosis]", title: str
-) -> Iterator[Note]:
-    first = results[0]
+) -> Iterator[str]:
+    first, is_of_raters = results[0], kind == "raters"
     if kind == "confusion":
-        yield Note("confusion")
+        yield note("confusion")
         if not np.isnan(first.share_low).all():
-            yield Note("confusion_ends")
+            yield note("confusion_ends")
         return
-    is_of_raters = kind == "raters"
     if is_of_raters and first.reference is not None:
-        yield Note("reference", {"rater": first.reference})
-    if np.isnan(first.category_low).all():
+        yield note("reference", rater=first.reference)
+    if not np.isnan(first.category_low).all():
+        yield note(f"{kind}_ends", level=first.level, title=title)
         if is_of_raters:
-            yield Note("no_ends")
-        return
-    yield Note(f"{kind}_ends", {"level": first.level, "title": title})
-    if is_of_raters:
-        texts = dict.fromkeys(text for result in results for text in result.notes)
-        yield from (Note("text", {"text": text}) for text in texts)
+            texts = dict.fromkeys(text for result in results for text in result.notes)
+            yield from (f"{text}." for text in texts)
+    elif is_of_raters:
+        yield note("no_ends")
 
 
-def _those_that_agree_least(answer: Answer, n_raters: int) -> Answer:
-    if n_raters <= _MANY:
+def _those_that_agree_least(answer: Answer, results: "Sequence[Diagnosis]") -> Answer:
+    if len(results[0].raters) <= _MANY:
         return answer
     rows = answer.shown or []
     least = sorted(rows, key=lambda r: math.inf if r["value"] is None else r["value"])
-    values = {"n": len(least[:_SHOWN_PAIRS]), "n_all": len(rows)}
-    notes = (Note("least", values), *answer.notes)
-    return replace(answer, shown=least[:_SHOWN_PAIRS], notes=notes)
+    shown = least[:_SHOWN_PAIRS]
+    notes = (note("least", n=len(shown), n_all=len(rows)), *answer.notes)
+    return replace(answer, shown=shown, notes=notes)
 
 
 def _rater_rows(_: Sequence[str], result: "Diagnosis") -> Iterator[Row]:

@@ -1,16 +1,14 @@
 """Options of `masrel agree`: how estimates are made, and what is asked beside them."""
 
-from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING
-
 import click
 
-from masrel.analysis._file_estimates import OF_MEASUREMENTS, USUAL, EstimateOptions
+from masrel.analysis._file_estimates import (
+    OF_MEASUREMENTS,
+    USUAL,
+    EstimateOptions,
+    Questions,
+)
 from masrel.cli._options import grouped, split_commas
-from masrel.errors import ParameterError
-
-if TYPE_CHECKING:
-    from masrel.ratings import RatingsFile
 
 
 def _list_register(
@@ -113,119 +111,9 @@ def _register() -> str:
     return "\n".join(aligned(lines, ["left"] * 5, rule=True))
 
 
-_PAIRS = ("stratified_kappa", "pooled_kappa")
-"""Coefficients of each rater's grades of two sessions."""
-
-
-# What is asked for as a coefficient and is a table of its own
-_NO_COEFFICIENTS = {
-    **dict.fromkeys(("mcnemar", "bowker", "stuart_maxwell", "bhapkar"), "--symmetry"),
-    "bland_altman": "--limits-of-agreement",
-}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FurtherOptions:
-    """Which tables are printed beside that of agreement."""
-
-    retest: bool
-    each_category: bool
-    symmetry: bool
-    indices: bool
-    compare: bool
-    diagnose: bool
-    reference: str | None
-    limits_of_agreement: bool
-    unit: str | None
-
-    @property
-    def has_figure(self) -> bool:
-        """Whether a table has a figure of its own."""
-        return self.diagnose or self.limits_of_agreement
-
-    def record(self) -> dict[str, object]:
-        """Return the tables that were chosen, the reference and the unit."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
-        return {name: value for name, value in values.items() if value}
-
-    def checked(
-        self, options: EstimateOptions, by: str | None, clusters: str | None
-    ) -> EstimateOptions:
-        """Return what is estimated between raters, with the defaults of its tables."""
-        self._check_own(options)
-        if clusters is not None:
-            if others := [name for name in self.record() if name != "compare"]:
-                raise ParameterError(
-                    f"--clusters: --{others[0].replace('_', '-')} takes every item by "
-                    "itself, so needs one of them, got both"
-                )
-            why = "what is left out is a cluster of items"
-            options = self._of_items(options, "--clusters", why)
-        if self.compare and by is None:
-            raise ParameterError(
-                "--compare: needs --by with the column that tells the groups apart"
-            )
-        if self.compare:
-            why = "a difference generalises to other items"
-            return self._of_items(options, "--compare", why)
-        if self.limits_of_agreement and options.weights == "identity":
-            # weights are those of a kappa
-            return replace(options, usual=OF_MEASUREMENTS)
-        return options
-
-    def _check_own(self, options: EstimateOptions) -> None:
-        for name in options.names:
-            option = _NO_COEFFICIENTS.get(name.lower().replace("-", "_"))
-            if option is not None:
-                raise ParameterError(
-                    f"--coefficients: needed coefficients, got {name!r}: {option} has "
-                    "that table"
-                )
-        for option, value, other, is_there in (
-            ("--reference", self.reference, "--diagnose", self.diagnose),
-            ("--unit", self.unit, "--limits-of-agreement", self.limits_of_agreement),
-        ):
-            if value is not None and not is_there:
-                raise ParameterError(f"{option}: belongs to {other}, got it alone")
-        if self.diagnose and self.limits_of_agreement:
-            raise ParameterError(
-                "--diagnose and --limits-of-agreement: each has a figure, so needs one "
-                "of them, got both"
-            )
-        if self.diagnose and options.target in ("raters", "both"):
-            raise ParameterError(
-                "--diagnose: is of these raters, so its intervals generalise to other "
-                f"items: --target items or none, got --target {options.target}"
-            )
-
-    def _of_items(
-        self, options: EstimateOptions, option: str, why: str
-    ) -> EstimateOptions:
-        # the options for other items, which `option` takes alone
-        if options.target not in (None, "items"):
-            raise ParameterError(
-                f"{option}: {why}, so it takes --target items, got --target "
-                f"{options.target}"
-            )
-        return replace(options, target="items")
-
-    def between_raters(
-        self, file: "RatingsFile", options: EstimateOptions
-    ) -> EstimateOptions | None:
-        """Return what is estimated between raters; None where that is nothing."""
-        if not self.retest:
-            return options
-        if all(len(part.raters) == 1 for part in file.parts):
-            return None
-        if options.coefficients is None:
-            return options
-        rest = [name for name in options.coefficients if name not in _PAIRS]
-        return replace(options, coefficients=rest) if rest else None
-
-
-further_options = grouped(
-    "further",
-    FurtherOptions,
+question_options = grouped(
+    "questions",
+    Questions,
     click.option(
         "--retest",
         is_flag=True,

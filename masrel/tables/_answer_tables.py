@@ -6,11 +6,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from masrel.agreement import COEFFICIENTS, BandScale, benchmark, strength
-from masrel.analysis._file_estimates import AgreementRow, Answer, Note, Row
+from masrel.analysis._file_estimates import AgreementRow, Answer, Row, note
 from masrel.errors import ParameterError
-from masrel.estimates import Estimate, Interval, Target, as_document
+from masrel.estimates import Estimate, Interval, Target, _plain, as_document
 from masrel.tables._estimate_words import (
-    NotedRow,
     aside,
     forest_row,
     origin,
@@ -18,7 +17,6 @@ from masrel.tables._estimate_words import (
     promise,
     row_notes,
     sentence,
-    words,
 )
 from masrel.tables._tables import SIMULATED, Column, Table, capital, percent, table_of
 
@@ -125,7 +123,7 @@ _COLUMNS: dict[str, tuple[Column, ...]] = {
     ),
 }
 
-_OF_COLUMNS = ("change", "standard_error", "agreement")
+_EXPLAINED = ("change", "standard_error", "agreement")
 """Columns of diagnoses that a note explains, which has their name."""
 
 
@@ -179,38 +177,35 @@ def answer_table(
     if answer.name == "limits_of_agreement":
         of = f" ({of})" if of else ""
     shown = answer.rows if answer.shown is None else answer.shown
-    noted = [
-        NotedRow(title=row["title"], group=row["group"], texts=row["texts"])
-        for row in shown
-        if "texts" in row
-    ]
-    # what groups of rows are called in notes
-    by = ", ".join(answer.heads.values()) or None
-    if answer.name == "differences":
-        by = "groups"
-    notes, after = list(map(words, answer.notes)), []
+    notes, after = list(answer.notes), []
     if estimates:
-        shown = [_cells(row, answer.heads, bands) for row in estimates]
-        noted = [_noted(row, explain) for row in estimates]
+        shown = [_cells(row, answer.heads, bands, explain) for row in estimates]
         notes += _errors_note(estimates, in_sentences)
         notes += [] if in_sentences else _paired_note(estimates)
         after = [] if bands is None else [_words_note(estimates, bands)]
+    columns = _columns(answer, shown, bands)
     is_diagnosis = answer.name.startswith("diagnosis")
-    table = table_of(
+    if is_diagnosis:
+        of_page = [
+            c.key for c in columns if any(r.get(c.key) is not None for r in shown)
+        ]
+        notes = [*(note(key) for key in _EXPLAINED if key in of_page), *notes]
+    # what groups of rows are called in notes
+    by = "groups" if answer.name == "differences" else ", ".join(answer.heads.values())
+    return table_of(
         answer.name,
         _CAPTIONS[answer.name].format(of=of),
-        _columns(answer, shown, bands),
+        columns,
         shown,
         hide_empty=is_diagnosis and not answer.grades,
         in_units=tuple(at for at, row in enumerate(estimates) if _is_in_units(row)),
-        notes=(*notes, *row_notes(noted, by), *after),
+        notes=(
+            *notes,
+            *row_notes([row for row in shown if "texts" in row], by),
+            *after,
+        ),
         data=data,
     )
-    if not is_diagnosis:
-        return table
-    on_page = [c.key for c in table.columns if c.where != "csv"]
-    explained = [words(Note(key)) for key in _OF_COLUMNS if key in on_page]
-    return replace(table, notes=(*explained, *table.notes))
 
 
 def _columns(
@@ -241,26 +236,18 @@ def answer_documents(
     answer: Answer, bands: BandScale | None
 ) -> list[dict[str, object]]:
     """Return the rows of an answer for JSON: ``nan`` and infinities as None."""
-    if not answer.estimates:
-        return [{key: _plain(value) for key, value in r.items()} for r in answer.rows]
-    return [
+    of_estimates = [
         {
-            **keys,
+            **row.keys,
             **as_document(row.estimate),
             **({} if bands is None else {"word": _word(row, bands)}),
             "notes": [*row.notes, *_why_null(row.estimate)],
         }
-        for keys, row in zip(answer.rows, answer.estimates, strict=True)
+        for row in answer.estimates
     ]
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, dict):
-        return {key: _plain(part) for key, part in value.items()}
-    if isinstance(value, list | tuple):
-        return list(map(_plain, value))
-    is_lost = isinstance(value, float) and not math.isfinite(value)
-    return None if is_lost else value
+    return of_estimates or [
+        {key: _plain(value) for key, value in row.items()} for row in answer.rows
+    ]
 
 
 def _is_in_units(row: AgreementRow) -> bool:
@@ -268,18 +255,32 @@ def _is_in_units(row: AgreementRow) -> bool:
     return entry is not None and entry.in_units
 
 
-def _cells(row: AgreementRow, heads: Mapping[str, str], bands: BandScale | None) -> Row:
+def _cells(
+    row: AgreementRow,
+    heads: Mapping[str, str],
+    bands: BandScale | None,
+    explain: bool,
+) -> Row:
+    # what columns show, and the texts of notes: how the interval was made, what to know
+    # of it, and why a value is undefined
     estimate, interval = row.estimate, row.estimate.interval
-    cells = {key: getattr(estimate, key) for key in _OF_ESTIMATE}
+    cells: Row = {key: getattr(estimate, key) for key in _OF_ESTIMATE}
+    cells |= dict.fromkeys(heads, row.group)
+    cells |= {"title": row.title, "group": row.group, "interval_texts": None}
+    cells["standard_error"] = estimate.standard_error if _has_error(estimate) else None
+    cells["words"] = None if bands is None else _word(row, bands)
+    undefined = [] if estimate.reason is None else [f"undefined: {estimate.reason}"]
+    cells["texts"] = [*undefined, *row.notes]
     if interval is not None:
         cells |= {key: getattr(interval, key) for key in _OF_INTERVAL}
-    return {
-        **cells,
-        "title": row.title,
-        "standard_error": estimate.standard_error if _has_error(estimate) else None,
-        "words": None if bands is None else _word(row, bands),
-        **dict.fromkeys(heads, row.group),
-    }
+        texts = []
+        if interval.reason is None:
+            texts.append(_interval_note(interval, explain))
+        elif interval.reason != estimate.reason:
+            texts.append(f"no interval ({interval.method}): {interval.reason}")
+        brief = filter(None, map(_brief, interval.notes))
+        cells["interval_texts"] = [*texts, *(interval.notes if explain else brief)]
+    return cells
 
 
 def _has_error(estimate: Estimate) -> bool:
@@ -334,28 +335,6 @@ def _paired_note(rows: Sequence[AgreementRow]) -> list[str]:
         return [f"{count} items have {pair}." for count in counts.values()]
     of_groups = ", ".join(f"{count} ({group})" for group, count in counts.items())
     return [f"Items that have {pair}: {of_groups}."]
-
-
-def _noted(row: AgreementRow, explain: bool) -> NotedRow:
-    # how its interval was made, what to know of it, and why a value is undefined
-    estimate, interval = row.estimate, row.estimate.interval
-    texts = [] if estimate.reason is None else [f"undefined: {estimate.reason}"]
-    texts += row.notes
-    of_interval = None
-    if interval is not None:
-        of_interval = []
-        if interval.reason is None:
-            of_interval.append(_interval_note(interval, explain))
-        elif interval.reason != estimate.reason:
-            of_interval.append(f"no interval ({interval.method}): {interval.reason}")
-        brief = filter(None, map(_brief, interval.notes))
-        of_interval += interval.notes if explain else brief
-    return NotedRow(
-        title=row.title,
-        group=row.group,
-        texts=tuple(texts),
-        interval_texts=None if of_interval is None else tuple(of_interval),
-    )
 
 
 def _brief(note: str) -> str:

@@ -2,13 +2,11 @@
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from masrel.agreement import COEFFICIENTS
-from masrel.analysis._file_estimates import Note
 from masrel.estimates import Estimate, Interval
 from masrel.tables._tables import (
     UNDEFINED,
@@ -204,104 +202,18 @@ def _apa(value: float) -> str:
     return text.removeprefix("0") if value >= 0.0 else text.replace("−0.", "−.")
 
 
-_TEXTS = {
-    "text": "{text}.",
-    "note": "{of}: {reason}.",
-    "undefined": "{of}: undefined: {reason}.",
-    # test and retest
-    "sessions": "{group}Each rater's grades of {first} and of {second}.",
-    "left_out": "{group}Left out: {names}.",
-    # two raters
-    "test": "{test}: whether {hypothesis}.",
-    "exact_test": "{test}: whether {hypothesis}; df: the items that changed.",
-    "pabak": "PABAK: 2 p_o − 1, which is Brennan-Prediger's coefficient of two "
-    "categories; SE: delta method, items as the sample.",
-    "on_category": "Agreement on a category: of the ratings in it, the part that met "
-    "the same of the other rater; of two categories negative and positive agreement.",
-    "largest": "Largest κ: what the margins of the raters allow.",
-    "pair": "Difference: {pair}.",
-    "limits": "Limits: mean ∓ 1.96 standard deviations, between which 95 % of "
-    "differences lie if they are normal.",
-    "exact_ends": "Low, High: {level} % CI, exact (t, noncentral t), each for itself; "
-    "both: for the two limits together, factors of tolerance; for other items like "
-    "these, rated by the same raters.",
-    # diagnosis
-    "change": "Change: of all without the rater, less that of all: above 0 the others "
-    "agree better without.",
-    "standard_error": "SE: item jackknife.",
-    "agreement": "Agreement: of the ratings in the category, the part that meets the "
-    "same of another rater.",
-    "reference": "{rater} is the reference, and in no other estimate between raters.",
-    "least": "The {n} pairs that agree least; --json has {n_all}.",
-    "no_ends": "No intervals: --target items has them.",
-    "raters_ends": "{level} % CI: t, each by itself. They generalise to other items, "
-    "rated by these raters.",
-    "pairs_ends": "{level} % CI: that of {title} of the two raters alone. They "
-    "generalise to other items, rated by these raters.",
-    "categories_ends": "{level} % CI: exact at the effective number of items. They "
-    "generalise to other items, rated by these raters.",
-    "confusion": "The columns: which share of these times the rater said so.",
-    "confusion_ends": "Intervals are in --json: exact at the effective number of "
-    "items.",
-    # comparisons
-    **{
-        f"difference_of_{units}": "Difference: the first less the second. SE, {level} "
-        f"% CI and p: {unit} jackknife, t; they generalise to other {population} like "
-        "these, graded by the same raters; raters are taken as they are, whether "
-        "groups share them or not."
-        for units, unit, population in (
-            ("items", "item", "items"),
-            ("clusters", "cluster", "clusters of items"),
-        )
-    },
-    "holm": "p (Holm): adjusted for {n} pairs, each coefficient by itself.",
-    "shared_clusters": "Groups have clusters in common, which are left out of both at "
-    "once.",
-    "shared_items": "Items the same: both groups have items of the same names, taken "
-    "for the same items, and an item is left out of both at once.",
-    "same_names": "{first} and {second}: {n} items have the same name, taken for "
-    "different items.",
-    "without": "Left out: {titles}: there is no such interval.",
-    "Fleiss' weighted χ²": "Fleiss' weighted χ²: groups of other items, by their "
-    "delta-method errors.",
-    "Donner's goodness of fit": "Donner's goodness of fit: two raters and two "
-    "categories, of one κ of all groups; it holds its level in smaller groups.",
-    "Hotelling's T² as F": "Hotelling's T² as F: groups of the same items, by their "
-    "names, or of the same clusters, by the delta method.",
-}
-
-
-def words(note: Note) -> str:
-    """Return the sentence of a note."""
-    values = dict(note.values)
-    if isinstance(level := values.get("level"), float):
-        values["level"] = percent(level)
-    return _TEXTS[note.kind].format(**values)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NotedRow:
-    """What there is to say of a row."""
-
-    # title, group: which coefficient, and of what
-    title: str
-    group: str
-    texts: tuple[str, ...]  # without the end of the sentence
-    # the same of its interval; None where it has none
-    interval_texts: tuple[str, ...] | None = ()
-
-
-def row_notes(rows: Sequence[NotedRow], by: str | None) -> tuple[str, ...]:
+def row_notes(rows: Sequence[Mapping[str, Any]], by: str) -> tuple[str, ...]:
     """Return the notes on rows, what is of the same rows as one note."""
     # A note names its rows, unless it holds for all that it could be of.
-    # by: what groups are called, if there are any
-    rows_of: dict[tuple[str, bool], list[NotedRow]] = {}
+    # rows: each with its title, its group, and its texts without the end of the
+    # sentence: of it, and of its interval if it has one; by: what groups are called
+    rows_of: dict[tuple[str, bool], list[Mapping[str, Any]]] = {}
     for row in rows:
-        for text in row.texts:
+        for text in row["texts"]:
             rows_of.setdefault((text, False), []).append(row)
-        for text in row.interval_texts or ():
+        for text in row.get("interval_texts") or ():
             rows_of.setdefault((text, True), []).append(row)
-    n_intervals = sum(row.interval_texts is not None for row in rows)
+    n_intervals = sum(row.get("interval_texts") is not None for row in rows)
     texts_of: dict[str, list[str]] = {}
     for (text, is_of_interval), subset in rows_of.items():
         is_of_all = len(subset) == (n_intervals if is_of_interval else len(rows))
@@ -313,17 +225,23 @@ def row_notes(rows: Sequence[NotedRow], by: str | None) -> tuple[str, ...]:
     )
 
 
-def _names(subset: Sequence[NotedRow], rows: Sequence[NotedRow], by: str | None) -> str:
+def _names(
+    subset: Sequence[Mapping[str, Any]], rows: Sequence[Mapping[str, Any]], by: str
+) -> str:
     # The coefficients that a note holds for, with their groups unless it holds for all;
     # three or more that follow each other in the table by the first and the last. The
     # groups alone where it holds for every coefficient of them.
-    every, some = _groups_by_title(rows), _groups_by_title(subset)
+    every: dict[str, list[str]] = {}
+    some: dict[str, list[str]] = {}
+    for groups_of, of in ((every, rows), (some, subset)):
+        for row in of:
+            groups_of.setdefault(row["title"], []).append(row["group"])
     names: list[str] = []
     for groups, of_groups in itertools.groupby(every, key=some.get):
         titles = list(of_groups)
         if groups is None:
             continue
-        if by is not None and len(titles) == len(every):
+        if by and len(titles) == len(every):
             # of several levels, as North: test, the names say enough
             return (
                 "; ".join(groups) if "," in by else f"{capital(by)} {', '.join(groups)}"
@@ -334,10 +252,3 @@ def _names(subset: Sequence[NotedRow], rows: Sequence[NotedRow], by: str | None)
             titles = [f"{titles[0]} to {titles[-1]}"]
         names += [f"{title}{which}" for title in titles]
     return "; ".join(names)
-
-
-def _groups_by_title(rows: Sequence[NotedRow]) -> dict[str, list[str]]:
-    groups: dict[str, list[str]] = {}
-    for row in rows:
-        groups.setdefault(row.title, []).append(row.group)
-    return groups
