@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from masrel.planning import LatentModel, Plan, Study, precision, sample_size
-from masrel.planning._planned_design import design_of
 from masrel.planning._studies import numbers_of, simulated
+from masrel.planning._truth import design_of
 
 DOCS = Path(__file__).parents[1]
 PAGE, FIGURE = DOCS / "planning_designs.md", DOCS / "figures" / "planning_error.png"

@@ -6,8 +6,7 @@ simulated with its Monte Carlo error.
 """
 
 from masrel.planning._sizes import plan_grid, precision, sample_size
-from masrel.planning._study_plan import LatentModel, Plan, Study
-from masrel.planning._truth import Pilot, pilot
+from masrel.planning._study_plan import LatentModel, Pilot, Plan, Study, pilot
 
 __all__ = [
     "LatentModel",

@@ -25,15 +25,12 @@ import math
 from statistics import NormalDist
 
 import numpy as np
-from scipy.special import gammaln, roots_jacobi
 
 from masrel._input import refuse
-from masrel.planning._planned_design import ONE_WAY, Design
-from masrel.planning._studies import icc_ratio
+from masrel.planning._studies import all_studies, icc_ratio
 from masrel.planning._study_plan import FORMULAS, chance_of
-from masrel.planning._truth import Floats, probabilities, rows_of
+from masrel.planning._truth import ONE_WAY, Design, Floats, probabilities, rows_of
 
-_PRIOR_NODES = 80
 _NORMAL = NormalDist()
 
 
@@ -159,35 +156,33 @@ def fit_numbers(design: Design) -> dict[str, float]:
         return {}
     if study.prior is None:
         return {"power": _fit_power(design, study.null)}
+    from scipy.stats import beta  # slow to load
+
+    null = study.null
     # O'Hagan, Stevens and Campbell (2005)
-    a, b = study.prior
-    nodes, weight = roots_jacobi(_PRIOR_NODES, b - 1.0, a - 1.0)
-    each = [design.at_value(0.5 * (x + 1.0)) for x in nodes.tolist()]
-    powers = [_fit_power(of_value, study.null) for of_value in each]
-    return {"power": float(weight @ powers / weight.sum())}
+    power = beta(*study.prior).expect(
+        lambda value: _fit_power(design.at_value(value), null), epsrel=1e-10
+    )
+    return {"power": float(power)}
 
 
+@np.errstate(invalid="ignore", divide="ignore")
 def _fit_power(design: Design, null: float) -> float:
     """Return the exact power of the test of two raters and two categories [2]_."""
-    # cells: both name the second category, one does, none. The prevalence is estimated.
-    n = design.n_items
-    second, one = np.triu_indices(n + 1)
-    one = one - second  # both ≥ 0 and their sum ≤ n
-    freq = np.column_stack([n - second - one, one, second])
-    logs = gammaln(n + 1) - gammaln(freq + 1.0).sum(1) + freq @ np.log(_cells(design))
-    share = (one + 2 * second) / (2 * n)
-    chance = share * (1.0 - share)
-    error = chance * null
-    expected = n * np.column_stack(
-        [(1 - share) ** 2 + error, 2 * (chance - error), share**2 + error]
-    )
-    with np.errstate(invalid="ignore", divide="ignore"):
+    n, power = design.n_items, 0.0
+    # cells: none names the second category, one does, both. Its share is estimated.
+    for freq, p in all_studies(n, _cells(design)):
+        share = (freq[:, 1] + 2 * freq[:, 2]) / (2 * n)
+        chance = share * (1.0 - share)
+        error = chance * null
+        cells = [(1 - share) ** 2 + error, 2 * (chance - error), share**2 + error]
+        expected = n * np.column_stack(cells)
         chi_square = ((freq - expected) ** 2 / expected).sum(axis=1)
-        kappa = 1.0 - one / (2 * n * chance)
-        rejects = chi_square > _z(design) ** 2
+        rejects = (chance > 0) & (chi_square > _z(design) ** 2)
         if design.study.sides == 1:
-            rejects &= kappa > null
-    return float(np.exp(logs)[rejects & (chance > 0)].sum())
+            rejects &= 1.0 - freq[:, 1] / (2 * n * chance) > null
+        power += float(p[rejects].sum())
+    return power
 
 
 # -- intraclass correlations ----------------------------------------------------------

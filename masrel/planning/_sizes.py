@@ -3,9 +3,8 @@
 import itertools
 import math
 from bisect import bisect_left
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any, Literal
 
 from masrel._input import refuse
@@ -16,7 +15,6 @@ from masrel.planning._formulas import (
     numbers_by_formula,
     size_by_formula,
 )
-from masrel.planning._planned_design import Design, design_of
 from masrel.planning._studies import shown
 from masrel.planning._study_plan import (
     FORMULAS,
@@ -31,6 +29,7 @@ from masrel.planning._study_plan import (
     number_of,
     reached_words,
 )
+from masrel.planning._truth import Design, design_of
 
 _FEWEST_ITEMS, _MAX_ITEMS, _MAX_RATERS = 2, 100_000, 60
 _FAR = 1.3  # times a size: where a formula asks for more, the size does not do
@@ -294,8 +293,12 @@ def _plan_of(design: Design, progress: Progress | None = None) -> Plan:
         *("coefficient", "n_items", "n_raters", "target", "interval", "level"),
         *("sides", "p_missing", "half_width", "lower", "upper", "null"),
     )
-    make: Callable[..., Plan] = partial(
-        Plan,
+    is_formula = study.method in FORMULAS
+    numbers, errors, n_studies = (
+        (numbers_by_formula(design), {}, 0) if is_formula else shown(design, progress)
+    )
+    by_studies = "simulation" if n_studies else "exact"
+    plan = Plan(
         **{name: getattr(study, name) for name in repeated},
         value=design.value,
         weights=study.weights if isinstance(study.weights, str) else "custom",
@@ -303,19 +306,16 @@ def _plan_of(design: Design, progress: Progress | None = None) -> Plan:
         prevalences=model.prevalences,
         table=model.table,
         cost=design.cost(design.n_items, design.n_raters),
-    )
-    if study.method in FORMULAS:
-        return make(method=study.method, **numbers_by_formula(design))
-    numbers, errors, n_studies = shown(design, progress)
-    plan = make(
-        method="simulation" if n_studies else "exact",
-        **numbers,
+        method=study.method if is_formula else by_studies,
         monte_carlo_error=errors.get(number_of(study), 0.0),
         errors=errors,
         n_studies=n_studies,
         seed=study.seed if n_studies else None,
+        **numbers,  # type: ignore[arg-type]
     )
-    return replace(plan, reaches_aim=is_met(study, plan)) if has_aim(study) else plan
+    if is_formula or not has_aim(study):
+        return plan
+    return replace(plan, reaches_aim=is_met(study, plan))
 
 
 def _reaching(plan: Plan) -> Plan:
@@ -330,24 +330,23 @@ class _Search:
     def __init__(self, design: Design, progress: Progress | None = None) -> None:
         self.design, self._progress = design, progress
         self._plans: dict[int, Plan] = {}
-        self._of_items = design.study.n_items is None
-        self._name, self.highest = "raters", _MAX_RATERS
-        self.lowest = design.min_raters
-        if self._of_items:
+        self._name, self.lowest, self.highest = "raters", design.min_raters, _MAX_RATERS
+        if design.study.n_items is None:
             self._name, self.highest = "items", _MAX_ITEMS
             self.lowest = _FEWEST_ITEMS + design.is_icc
 
     def _sizes(self, n: int) -> tuple[int, int]:
         known = (self.design.n_items, self.design.n_raters)
-        return (n, known[1]) if self._of_items else (known[0], n)
+        return (n, known[1]) if self._name == "items" else (known[0], n)
 
-    def _design(self, n: int) -> Design:
-        return self.design.of_size(*self._sizes(n))
+    def _cost(self, n: int) -> float:
+        return self.design.cost(*self._sizes(n))
 
     def at(self, n: int) -> Plan:
         """Return the plan of a size, computed once."""
         if n not in self._plans:
-            self._plans[n] = _plan_of(self._design(n), self._progress)
+            design = self.design.of_size(*self._sizes(n))
+            self._plans[n] = _plan_of(design, self._progress)
         return self._plans[n]
 
     def reached(self) -> Plan:
@@ -375,19 +374,19 @@ class _Search:
 
     def up_to(self, highest: int) -> Plan:
         """Return the plan of the smallest size that is no larger than one."""
-        study, n = self.design.study, None
-        guess = items_nearby(self.design) if self._of_items else self.lowest
-        if guess <= _FAR * highest:
-            n = _smallest(
-                lambda size: bool(self.at(size).reaches_aim),
-                guess=min(max(guess, self.lowest), highest),
-                lowest=self.lowest,
-                highest=highest,
-            )
-        if n is not None:
-            return self._stable(n)
+        study, is_items = self.design.study, self._name == "items"
+        guess = items_nearby(self.design) if is_items else self.lowest
+        # near the guess: low does not reach the aim, but for the lowest; high may
+        low, high = self.lowest, min(max(guess, self.lowest), highest)
+        if guess > _FAR * highest:
+            low = highest + 1
+        while low <= highest and not self.at(high).reaches_aim:
+            low, high = high + 1, min(2 * high, highest)
+        if low <= highest:
+            sizes = range(low, high)
+            return self._stable(low + bisect_left(sizes, True, key=self._is_met))
         n = highest
-        if self._of_items and not self._design(20).has_rows:
+        if is_items and not self.design.of_size(*self._sizes(20)).has_rows:
             n = min(n, 200)  # a study of so many whose ratings are drawn one by one
         best, (name, words) = self.at(n), aim_words(study)
         note = (
@@ -396,28 +395,28 @@ class _Search:
         )
         return replace(best, notes=(note,), reaches_aim=False)
 
+    def _is_met(self, n: int) -> bool:
+        return bool(self.at(n).reaches_aim)
+
     def _stable(self, n: int) -> Plan:
         # An exact chance goes up and down with n: from where on it holds.
-        plan = self.at(n)
-        is_smooth = chance_of(self.design.study) is None or plan.method != "exact"
-        if is_smooth or self.design.is_icc or not self._of_items:
+        plan, study = self.at(n), self.design.study
+        is_smooth = chance_of(study) is None or plan.method != "exact"
+        if is_smooth or self.design.is_icc or self._name == "raters":
             return plan
         around = range(max(self.lowest, int(0.85 * n)), int(1.25 * n) + 2)
-        if sum(self._design(size).n_tables for size in around) > _MAX_SCAN:
+        designs = (self.design.of_size(*self._sizes(size)) for size in around)
+        if sum(design.n_tables for design in designs) > _MAX_SCAN:
             note = "larger sizes were not looked at: a chance can fall with one more"
             return replace(plan, notes=(note,))
-        met = [size for size in around if self.at(size).reaches_aim]
-        stable = 1 + max((size for size in around if size not in met), default=n - 1)
-        if met[0] == stable:
-            return self.at(stable)
+        first = next(size for size in around if self._is_met(size))
+        stable = 1 + max((n for n in around if not self._is_met(n)), default=n - 1)
         note = (
-            f"{met[0]} {self._name} reach it first, but {stable - 1} do not: the "
+            f"{first} {self._name} reach it first, but {stable - 1} do not: the "
             "chance goes up and down"
         )
-        return replace(self.at(stable), notes=(note,))
-
-    def _cost(self, n: int) -> float:
-        return self.design.cost(*self._sizes(n))
+        notes = () if first == stable else (note,)
+        return replace(self.at(stable), notes=notes)
 
     def affordable(self, limit: float) -> int | None:
         """Return the largest size that costs no more than a limit, if any does."""
@@ -439,18 +438,6 @@ class _Search:
             )
         )
         return n
-
-
-def _smallest(
-    is_met: Callable[[int], bool], *, guess: int, lowest: int, highest: int
-) -> int | None:
-    """Return the smallest size that meets an aim, found near a guess."""
-    low, high = lowest, guess
-    while not is_met(high):
-        if high == highest:
-            return None
-        low, high = high + 1, min(2 * high, highest)
-    return low + bisect_left(range(low, high), True, key=is_met)
 
 
 # -- both sizes, by what they cost ----------------------------------------------------
@@ -476,7 +463,8 @@ def _cheapest(design: Design, progress: Progress | None) -> Plan:
         plan = search.at(n)
         if plan.reaches_aim:
             plan = search.up_to(n)
-        if plan.cost <= limit and (best is None or _gain(study, plan, best) >= 0.0):
+        is_best = best is None or _merit(study, plan) >= _merit(study, best)
+        if plan.cost <= limit and is_best:
             best, n_worse = plan, 0
             if plan.reaches_aim:  # too few raters may reach nothing: they do not count
                 limit, is_counted = plan.cost * _CHEAPER, True
@@ -498,14 +486,11 @@ def _cheapest(design: Design, progress: Progress | None) -> Plan:
     return best
 
 
-def _gain(study: Study, plan: Plan, best: Plan) -> float:
-    # what the aim is worth, then the price of a study that reaches it
-    if plan.reaches_aim and best.reaches_aim:
-        return best.cost - plan.cost
-    if plan.reaches_aim is not best.reaches_aim:
-        return 1.0 if plan.reaches_aim else -1.0
-    more = getattr(plan, number_of(study)) - getattr(best, number_of(study))
-    return float(-more if chance_of(study) is None else more)
+def _merit(study: Study, plan: Plan) -> tuple[bool, float]:
+    # the price of a study that reaches its aim, else how near it comes
+    number = getattr(plan, number_of(study))
+    nearness = -number if chance_of(study) is None else number
+    return bool(plan.reaches_aim), -plan.cost if plan.reaches_aim else nearness
 
 
 def _check_prices(study: Study) -> None:

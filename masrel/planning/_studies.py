@@ -18,14 +18,16 @@ from masrel.agreement import CodedRatings
 from masrel.agreement.icc import _absolute_ends
 from masrel.errors import MasrelWarning
 from masrel.intervals import estimate
-from masrel.planning._planned_design import AGREEMENT, MAX_TABLES, ONE_WAY, Design
-from masrel.planning._study_plan import (
-    Progress,
-    has_limits,
-    limits_of,
-    number_of_limits,
+from masrel.planning._study_plan import Progress, limits_of
+from masrel.planning._truth import (
+    AGREEMENT,
+    MAX_TABLES,
+    ONE_WAY,
+    Design,
+    Floats,
+    Integers,
+    draw_ratings,
 )
-from masrel.planning._truth import Floats, Integers, draw_ratings
 
 # numbers, their Monte Carlo errors, and how many studies were drawn
 Shown = tuple[dict[str, float], dict[str, float], int]
@@ -66,17 +68,18 @@ def shown(design: Design, progress: Progress | None = None) -> Shown:
             f'{listed} of them; "simulation" needs no list',
         )
     )
-    n, total = design.n_items, np.zeros((3, len(NUMBERS)))
-    log_p = np.log(np.maximum(design.p, 1e-300))
-    for freq in _tables(n, len(design.rows)):
-        logs = gammaln(n + 1) - gammaln(freq + 1.0).sum(axis=1) + freq @ log_p
-        total += moments(design, _of_freq(design, freq), np.exp(logs))
+    total = np.zeros((3, len(NUMBERS)))
+    for freq, p in all_studies(design.n_items, design.p):
+        total += _moments(design, outcomes_of(design, design.rows, freq), p)
     return numbers_of(total)[0], {}, 0
 
 
 def _drawn(design: Design, progress: Progress | None) -> Shown:
     # until the Monte Carlo errors are small, or as many as were asked for
-    is_resampled = design.study.interval == "bootstrap"
+    is_resampled, n_studies = (
+        design.study.interval == "bootstrap",
+        design.study.n_studies,
+    )
     of_chosen = _RESAMPLED_TASK if is_resampled else _CHOSEN_TASK
     size, factor = (of_chosen, 2.0) if design.is_chosen else (_TASK, 1.0)
     total, task, n_tasks = np.zeros((3, len(NUMBERS))), 0, 1
@@ -88,9 +91,8 @@ def _drawn(design: Design, progress: Progress | None) -> Shown:
         half = numbers.get("expected_half_width", 0.0) or math.inf
         small = {"expected_half_width": _RELATIVE * half, **_SMALL}
         ratio = max(errors.get(name, 0.0) / small[name] for name in small) / factor
-        n_tasks = min(max(task, math.ceil(ratio**2 * task)), _MAX_TASKS)
-        if design.study.n_studies is not None:
-            n_tasks = -(-design.study.n_studies // size)
+        needed = min(max(task, math.ceil(ratio**2 * task)), _MAX_TASKS)
+        n_tasks = needed if n_studies is None else -(-n_studies // size)
         if progress is not None:
             progress(task * size, n_tasks * size)
     return numbers, errors, task * size
@@ -100,18 +102,18 @@ def simulated(design: Design, rng: np.random.Generator, n_studies: int) -> Float
     """Return moments of studies that are drawn, in blocks of about one size."""
     if design.is_icc:
         drawn = _drawn_agreement(design, rng, n_studies)
-        return moments(design, drawn, np.ones(n_studies))
+        return _moments(design, drawn, np.ones(n_studies))
     total, has_rows = np.zeros((3, len(NUMBERS))), design.has_rows
-    size = len(design.rows) if has_rows else design.n_items * design.n_raters
+    size = design.n_rows if has_rows else design.n_items * design.n_raters
     block = max(1, 2 * _PLACES // size)
     for start in range(0, n_studies, block):
         n = min(block, n_studies - start)
-        outcomes = (
-            _of_freq(design, rng.multinomial(design.n_items, design.p, size=n))
-            if has_rows
-            else of_codes(design, draw(design, rng, n))
-        )
-        total += moments(design, outcomes, np.ones(n))
+        if has_rows:
+            freq = rng.multinomial(design.n_items, design.p, size=n)
+            outcomes = outcomes_of(design, design.rows, freq)
+        else:
+            outcomes = outcomes_of(design, draw(design, rng, n))
+        total += _moments(design, outcomes, np.ones(n))
     return total
 
 
@@ -124,22 +126,22 @@ def draw(design: Design, rng: np.random.Generator, n: int) -> Integers:
     return pairs.reshape(n, design.n_items, 2 * design.n_raters)
 
 
-def _of_freq(design: Design, freq: Integers) -> Floats:
-    # how often each distinct row occurs (n_studies, n_rows) -> (n_studies, 3)
-    if not design.is_chosen:
-        return _wald(design, freq.astype(np.float64), design.rows)
-    distinct, place = np.unique(freq, axis=0, return_inverse=True)
-    known = [_chosen(design, design.rows.repeat(row, axis=0)) for row in distinct]
-    return np.array(known)[place.ravel()]
-
-
-def of_codes(design: Design, codes: Integers) -> Floats:
-    """Return half-width, low and high of studies (n_studies, n_items, n_raters)."""
+def outcomes_of(
+    design: Design, codes: Integers, freq: Integers | None = None
+) -> Floats:
+    """Return half-width, low and high of studies, (n_studies, 3)."""
+    # ratings of each (n_studies, n_items, n_columns), or how often each distinct row
+    # (n_rows, n_columns) occurs in it (n_studies, n_rows)
     if design.leaves_raters_out:
         return _raters_left_out(design, codes)
-    if design.is_chosen:
+    if not design.is_chosen:
+        weight = np.ones(codes.shape[:2]) if freq is None else freq.astype(np.float64)
+        return _wald(design, weight, codes)
+    if freq is None:
         return np.array([_chosen(design, study) for study in codes])
-    return _wald(design, np.ones(codes.shape[:2]), codes)
+    distinct, place = np.unique(freq, axis=0, return_inverse=True)
+    chosen = [_chosen(design, codes.repeat(row, axis=0)) for row in distinct]
+    return np.array(chosen)[place.ravel()]
 
 
 @np.errstate(invalid="ignore")  # 0/0 where a study has no coefficient
@@ -147,7 +149,9 @@ def _wald(design: Design, weight: Floats, codes: Integers) -> Floats:
     # weight (n_studies, n_rows); rows that all studies have, or each its own
     features, rows = design.features(codes), "rf" if codes.ndim == 2 else "srf"
     sums = np.einsum(f"sr,{rows}->sf", weight, features, optimize=True)
-    u = np.einsum(f"sf,{rows}->sr", design.slopes(sums), features, optimize=True)
+    u = np.einsum(
+        f"sf,{rows}->sr", design.problem.slopes(sums), features, optimize=True
+    )
     is_rated = features.any(axis=-1)
     # a pair of ratings of an item; in a retest of one rater
     is_pair = design.entry.shape == "pairs"
@@ -165,7 +169,7 @@ def _wald(design: Design, weight: Floats, codes: Integers) -> Floats:
     is_cut = design.study.interval == "analytic"
     if is_cut:  # there is none without spread
         half = np.where((error > 0.0) & (n_paired > 1), half, np.nan)
-    return _around(design, design.values(sums), half, is_cut=is_cut)
+    return _around(design, design.problem.values(sums), half, is_cut=is_cut)
 
 
 def _around(design: Design, value: Floats, half: Floats, *, is_cut: bool) -> Floats:
@@ -178,12 +182,15 @@ def _around(design: Design, value: Floats, half: Floats, *, is_cut: bool) -> Flo
     return np.column_stack([0.5 * (high - low), low, high])
 
 
+@np.errstate(invalid="ignore")
 def _raters_left_out(design: Design, codes: Integers) -> Floats:
     # The rater jackknife of `intervals` for all studies at once; what that leaves
     # undefined or without spread is left to the choice of `intervals`, one by one.
     r = design.n_raters
     every = [codes, *(np.delete(codes, rater, axis=2) for rater in range(r))]
-    value, *without = (design.values(design.features(of).sum(axis=1)) for of in every)
+    value, *without = (
+        design.problem.values(design.features(of).sum(axis=1)) for of in every
+    )
     variance = (r - 1) ** 2 / r * np.var(without, axis=0, ddof=1)
     half = stdtrit(r - 1, 0.5 + 0.5 * design.level) * np.sqrt(variance)
     if design.study.interval == "t":
@@ -221,9 +228,11 @@ def _events(design: Design, outcomes: Floats) -> Floats:
     # whether a study reaches each aim, and holds the truth, (n_studies, 3)
     study, (half, low, high) = design.study, outcomes.T
     events = dict.fromkeys(EVENTS, np.full(len(half), math.nan))
-    if has_limits(study):
+    if study.lower is not None or study.upper is not None:
         lower, upper = limits_of(study)
-        events[number_of_limits(study)] = (low >= lower) & (high <= upper)
+        is_power = study.power is not None and study.null is None
+        name = "power" if is_power else "assurance"
+        events[name] = (low >= lower) & (high <= upper)
     if study.half_width is not None:
         events["assurance"] = half <= study.half_width * (1.0 + _LEAST)
     if study.null is not None:  # the end on the side of the null lies beyond it
@@ -233,7 +242,7 @@ def _events(design: Design, outcomes: Floats) -> Floats:
     return np.column_stack(list(events.values()))
 
 
-def moments(design: Design, outcomes: Floats, weight: Floats) -> Floats:
+def _moments(design: Design, outcomes: Floats, weight: Floats) -> Floats:
     """Return sums of weights, of every number and of its square, (3, n_numbers)."""
     is_defined = ~np.isnan(outcomes[:, :1])
     x = np.column_stack([outcomes, _events(design, outcomes), ~is_defined])
@@ -254,6 +263,14 @@ def numbers_of(moments: Floats) -> tuple[dict[str, float], dict[str, float]]:
 def _named(names: Sequence[str], numbers: Floats) -> dict[str, float]:
     every = zip(names, numbers.tolist(), strict=True)
     return {name: number for name, number in every if not math.isnan(number)}
+
+
+def all_studies(n: int, p: Floats) -> Iterator[tuple[Integers, Floats]]:
+    """Yield how often each row occurs in every study, and how probable that is."""
+    log_p = np.log(np.maximum(p, 1e-300))
+    for freq in _tables(n, len(p)):
+        logs = gammaln(n + 1) - gammaln(freq + 1.0).sum(axis=1) + freq @ log_p
+        yield freq, np.exp(logs)
 
 
 def _tables(n: int, n_cells: int) -> Iterator[Integers]:
@@ -282,9 +299,19 @@ def icc_ratio(r: float, k: int) -> float:
 
 def _exact_icc(design: Design) -> dict[str, float]:
     # ICC(1) and ICC(C,1), from the F distribution of the ratio of mean squares
-    f, weight = _ratios(design)
-    numbers, _ = numbers_of(moments(design, _of_ratios(design, f), weight))
-    return {**numbers, **_named(EVENTS, _probabilities_of_events(design, f))}
+    from scipy.stats import f as f_distribution  # slow to load
+
+    degrees, theta = _degrees(design), icc_ratio(design.value, design.n_raters)
+    # log of F/θ on a grid that holds all but 1e-15 of it, by the trapezoid rule
+    low, high = np.log(fdtri(*degrees, [1e-15, 1 - 1e-15])).tolist()
+    ratio = np.exp(np.linspace(low, high, _NODES))
+    weight = ratio * f_distribution.pdf(ratio, *degrees)
+    outcomes = _of_ratios(design, theta * ratio)
+    numbers, _ = numbers_of(_moments(design, outcomes, weight / weight.sum()))
+    return {
+        **numbers,
+        **_named(EVENTS, _probabilities_of_events(design, theta * ratio)),
+    }
 
 
 def _degrees(design: Design) -> tuple[float, float]:
@@ -292,21 +319,6 @@ def _degrees(design: Design) -> tuple[float, float]:
     n, k = design.n_items, design.n_raters
     is_one_way = design.study.coefficient == ONE_WAY
     return float(n - 1), float(n * (k - 1) if is_one_way else (n - 1) * (k - 1))
-
-
-def _ratios(design: Design) -> tuple[Floats, Floats]:
-    """Return ratios F of mean squares on a grid, and how probable each is."""
-    first, second = _degrees(design)
-    # log of F/θ on a grid that holds all but 1e-15 of it
-    ends = np.log(fdtri(first, second, [1e-15, 1 - 1e-15]))
-    x = np.linspace(float(ends[0]), float(ends[1]), _NODES)
-    # density of log F, by the trapezoid rule
-    logs = 0.5 * first * (x + math.log(first / second))
-    logs -= 0.5 * (first + second) * np.log1p(first / second * np.exp(x))
-    logs += gammaln(0.5 * (first + second)) - gammaln(0.5 * first)
-    weight = np.exp(logs - gammaln(0.5 * second))
-    theta = icc_ratio(design.value, design.n_raters)
-    return theta * np.exp(x), weight / weight.sum()
 
 
 def _of_ratios(design: Design, f: Floats) -> Floats:

@@ -1,7 +1,8 @@
-"""A study to be planned, as it is declared, and the plan that comes of it."""
+"""A study to be planned, as it is declared; the plan that comes of it; and a pilot."""
 
 import itertools
 import math
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Literal, get_args
@@ -9,9 +10,10 @@ from typing import Literal, get_args
 import numpy as np
 
 from masrel._input import refuse
-from masrel.agreement import Label, WeightsLike
-from masrel.errors import ParameterError
-from masrel.estimates import Target
+from masrel.agreement import Label, WeightsLike, code_ratings
+from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
+from masrel.estimates import Estimate, Target
+from masrel.intervals import estimate
 
 Method = Literal["auto", "wald", "goodness-of-fit", "exact", "simulation"]
 Interval = Literal[
@@ -251,10 +253,8 @@ def _check_together(study: Study) -> None:
 
 
 def _seed(rng: np.random.Generator | int | None) -> int:
-    if rng is None:
-        rng = np.random.default_rng()
-    if isinstance(rng, np.random.Generator):
-        return int(rng.integers(2**63))
+    if rng is None or isinstance(rng, np.random.Generator):
+        return int(np.random.default_rng(rng).integers(2**63))
     is_seed = isinstance(rng, int | np.integer) and rng >= 0
     refuse((not is_seed, f"rng: needs a seed of at least 0, got {rng!r}"))
     return int(rng)
@@ -376,11 +376,6 @@ class Plan:
 # -- aims -----------------------------------------------------------------------------
 
 
-def has_limits(study: Study) -> bool:
-    """Whether ends of the interval are aimed at."""
-    return study.lower is not None or study.upper is not None
-
-
 def limits_of(study: Study) -> tuple[float, float]:
     """Return the limits of the interval, infinite where there is none."""
     low = -math.inf if study.lower is None else study.lower
@@ -389,8 +384,8 @@ def limits_of(study: Study) -> tuple[float, float]:
 
 def has_aim(study: Study) -> bool:
     """Whether a study is to show something."""
-    of_interval = study.half_width is not None or has_limits(study)
-    return of_interval or study.power is not None
+    aims = (study.half_width, study.lower, study.upper, study.power)
+    return any(aim is not None for aim in aims)
 
 
 def chance_of(study: Study) -> float | None:
@@ -400,15 +395,8 @@ def chance_of(study: Study) -> float | None:
 
 def number_of(study: Study) -> str:
     """Return the name of the number of a plan that is aimed at."""
-    if study.power is not None:
-        return "power"
-    return "expected_half_width" if study.assurance is None else "assurance"
-
-
-def number_of_limits(study: Study) -> str:
-    """Return the name of the chance of an interval inside the limits."""
-    is_power = study.power is not None and study.null is None
-    return "power" if is_power else "assurance"
+    of_assurance = "expected_half_width" if study.assurance is None else "assurance"
+    return of_assurance if study.power is None else "power"
 
 
 def is_met(study: Study, plan: Plan) -> bool:
@@ -416,10 +404,10 @@ def is_met(study: Study, plan: Plan) -> bool:
     number, chance = getattr(plan, number_of(study)), chance_of(study)
     if chance is not None:
         return bool(number >= chance - _REACHED)
-    if study.half_width is not None:
-        return bool(number <= study.half_width * (1.0 + _REACHED))
+    widest = math.inf if study.half_width is None else study.half_width
     low, high = limits_of(study)
-    return low <= plan.expected_low and plan.expected_high <= high
+    is_inside = low <= plan.expected_low and plan.expected_high <= high
+    return is_inside and bool(number <= widest * (1.0 + _REACHED))
 
 
 def aim_words(study: Study) -> tuple[str, str]:
@@ -439,7 +427,7 @@ def reached_words(study: Study, plan: Plan) -> str:
     name = number_of(study)
     if chance_of(study) is not None:
         return f"{name} {getattr(plan, name):.3f}"
-    if has_limits(study):
+    if study.half_width is None and limits_of(study) != (-math.inf, math.inf):
         low, high = plan.expected_low, plan.expected_high
         return f"an expected interval of {low:.3f} to {high:.3f}"
     return f"an expected half-width of {plan.expected_half_width:.3f}"
@@ -447,7 +435,8 @@ def reached_words(study: Study, plan: Plan) -> str:
 
 def check_one_aim(study: Study) -> None:
     """Check that a study whose size is solved for has one aim, and all of it."""
-    limits, null, power = has_limits(study), study.null, study.power
+    null, power = study.null, study.power
+    limits = study.lower is not None or study.upper is not None
     n_aims = limits + (study.half_width is not None) + (null is not None)
     refuse(
         (
@@ -471,4 +460,91 @@ def check_one_aim(study: Study) -> None:
             study.assurance is not None and not has_aim(study),
             "assurance: needs half_width, lower or upper",
         ),
+    )
+
+
+# -- what a pilot says ----------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pilot:
+    """A pilot, as a plan takes it.
+
+    Attributes
+    ----------
+    estimate : Estimate
+        The coefficient with its interval, which says how little a pilot may know.
+    categories : tuple of str, int or float
+        The scale.
+    prevalences : tuple of float
+        Share of each category among the ratings.
+    p_missing : float
+        Share of the item × rater table without a rating.
+    """
+
+    estimate: Estimate
+    categories: tuple[Label, ...]
+    prevalences: tuple[float, ...]
+    p_missing: float
+
+
+def pilot(
+    coefficient: str,
+    ratings: object,
+    *,
+    target: Target,
+    weights: WeightsLike = "identity",
+    categories: Sequence[Label] | None = None,
+    level: float = 0.95,
+) -> Pilot:
+    """Return what a pilot's ratings say of the study that is planned.
+
+    Parameters
+    ----------
+    coefficient : str
+        Name in the register.
+    ratings : array_like or DataFrame, shape (n_items, n_raters)
+        The pilot's ratings, as the coefficient takes them.
+    target : {"items", "raters", "both"}
+        What a new study would draw anew.
+    weights : str or Weights, optional
+        As of the coefficient.
+    categories : sequence of str, int or float, optional
+        The scale in order; the categories met unless given.
+    level : float, optional
+        Of the interval.
+
+    Returns
+    -------
+    Pilot
+        Coefficient, prevalences and share of missing ratings.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are no table of them, or the coefficient is undefined in them.
+    ParameterError
+        If an option does not fit the coefficient.
+
+    Examples
+    --------
+    >>> made = pilot("fleiss_kappa", [[0, 0], [0, 1], [1, 1], [1, 1]], target="items")
+    >>> round(made.estimate.value, 3), made.prevalences, made.p_missing
+    (0.467, (0.375, 0.625), 0.0)
+    """
+    coded = code_ratings(ratings, categories)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UndefinedStatisticWarning)  # it is an error
+        result = estimate(
+            coefficient, coded, target=target, weights=weights, level=level
+        )
+    if result.reason is not None:
+        raise RatingsError(f"pilot: {coefficient} is undefined in it: {result.reason}")
+    codes = coded.codes
+    counts = np.bincount(codes[codes >= 0], minlength=len(coded.categories))
+    return Pilot(
+        estimate=result,
+        categories=tuple(coded.categories),
+        prevalences=tuple((counts / counts.sum()).tolist()),
+        p_missing=float((codes < 0).mean()),
     )

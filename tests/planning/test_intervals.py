@@ -9,8 +9,8 @@ import pytest
 from masrel.errors import ParameterError
 from masrel.intervals import estimate
 from masrel.planning import Study, precision
-from masrel.planning._planned_design import design_of
-from masrel.planning._studies import draw, of_codes
+from masrel.planning._studies import draw, outcomes_of
+from masrel.planning._truth import design_of
 
 SCALE = (0, 1, 3)  # numbers that are not evenly spaced: weights go by them
 MIXTURE: dict[str, Any] = {
@@ -52,7 +52,7 @@ def test_it_is_that_of_masrel_intervals(
     )
     design = design_of(study)
     codes = draw(design, np.random.default_rng(3), 3)
-    for drawn, outcome in zip(codes, of_codes(design, codes), strict=True):
+    for drawn, outcome in zip(codes, outcomes_of(design, codes), strict=True):
         grades: Any = [[SCALE[x] if x >= 0 else None for x in row] for row in drawn]
         if name == "pooled_kappa":
             grades = [[row[2 * k : 2 * k + 2] for row in grades] for k in range(3)]

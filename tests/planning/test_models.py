@@ -9,8 +9,8 @@ import pytest
 
 from masrel.agreement import CodedRatings, coefficient
 from masrel.planning import Study, precision
-from masrel.planning._planned_design import design_of
 from masrel.planning._studies import draw
+from masrel.planning._truth import design_of
 
 MODELS = ["mixture", "dirichlet-multinomial", "latent"]
 

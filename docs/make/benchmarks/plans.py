@@ -16,7 +16,7 @@ from docs.make.benchmarks.parts import write_part
 from masrel.agreement import fleiss_kappa
 from masrel.planning import Study
 from masrel.planning import _studies as masrel_studies
-from masrel.planning._planned_design import Design, design_of
+from masrel.planning._truth import Design, design_of
 
 PAGE = Path(__file__).parents[2] / "benchmarks.md"
 N_STUDIES, N_LOOPED = 1_000_000, 2_000
