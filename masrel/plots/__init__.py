@@ -4,18 +4,41 @@ In: what to draw, as plain frozen values. Out: PNG, SVG or PDF, the same bytes f
 same values.
 """
 
-from typing import TYPE_CHECKING
+import importlib
+from collections.abc import Sequence
 
-if TYPE_CHECKING:
-    from masrel.plots._style import draw
+from masrel.plots._drawn_values import Content, Drawn, Form
 
 __all__ = ["draw"]
 
 
-def __getattr__(name: str) -> object:
-    # matplotlib is loaded when something is drawn
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from masrel.plots import _style
+def draw(
+    content: Content | Drawn,
+    *,
+    stamp: str,
+    forms: Sequence[Form] = ("png", "svg"),
+) -> dict[Form, bytes]:
+    """Draw values in the house style.
 
-    return getattr(_style, name)
+    Parameters
+    ----------
+    content : Content or Drawn
+        What is drawn.
+    stamp : str
+        The line that says where the data come from; none if empty.
+    forms : sequence of {"png", "svg", "pdf"}, optional
+        Which files to make.
+
+    Returns
+    -------
+    dict of str to bytes
+        Each form's file.
+    """
+    # matplotlib is loaded when something is drawn
+    from masrel.plots._style import finished, house_style
+
+    with house_style():
+        module, _, function = content.drawer.partition(":")
+        # one figure loads what no other needs
+        drawer = getattr(importlib.import_module(module), function)
+        return finished(drawer(*content.arguments), stamp=stamp, forms=forms)

@@ -5,7 +5,6 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -57,8 +56,15 @@ def latent_figure(scale: "LatentTrait", grades: Sequence[str]) -> Figure:
         "latent scale, in standard deviations of a rating (0: mean of these items, "
         "or no bias)"
     )
+    level = percent(scale.items[0].interval.level)
+    credible = f"{level} % credible interval"
     figure.legend(
-        handles=_legend(scale.items[0].interval.level),
+        handles=[
+            Line2D([], [], linestyle="none", label="posterior median", **_DOT),
+            Line2D([], [], color=BLACK, label=credible, **_INTERVAL),
+            Line2D([], [], label="threshold between grades", **_THRESHOLD),
+            Patch(facecolor=BLUE, alpha=0.18, label="± the rater's noise"),
+        ],
         loc="outside lower center",
         ncols=3,
         fontsize=8,
@@ -122,13 +128,3 @@ def _name_grades(axes: Axes, grades: Sequence[str], ends: Sequence[float]) -> No
                 va="bottom",
                 weight="bold",
             )
-
-
-def _legend(level: float) -> list[Artist]:
-    label = f"{percent(level)} % credible interval"
-    return [
-        Line2D([], [], linestyle="none", label="posterior median", **_DOT),
-        Line2D([], [], color=BLACK, label=label, **_INTERVAL),
-        Line2D([], [], label="threshold between grades", **_THRESHOLD),
-        Patch(facecolor=BLUE, alpha=0.18, label="± the rater's noise"),
-    ]

@@ -10,13 +10,12 @@ import sys
 
 __all__ = ["mpl"]
 
-_is_loaded = "matplotlib" in sys.modules
-_backend = os.environ.pop("MPLBACKEND", None)
-try:
-    import matplotlib as mpl
-finally:
-    if _backend is not None:
-        os.environ["MPLBACKEND"] = _backend
-if _backend is not None and not _is_loaded:
+_backend = None
+if "matplotlib" not in sys.modules:
+    _backend = os.environ.pop("MPLBACKEND", None)
+import matplotlib as mpl  # noqa: E402 - the environment is looked at first
+
+if _backend is not None:
+    os.environ["MPLBACKEND"] = _backend
     with contextlib.suppress(ValueError):
         mpl.rcParams["backend"] = _backend

@@ -1,9 +1,7 @@
 """Agreement of every two raters as a heatmap, and what each rater adds beside it."""
 
 import math
-import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +10,6 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
-from matplotlib.textpath import TextPath
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
@@ -27,226 +24,135 @@ _Floats = NDArray[np.float64]
 # from little to full agreement: lighter to darker in a grey print, too
 _COLOURS = LinearSegmentedColormap.from_list(
     "agreement", ["#F7FBFF", "#9ECAE1", "#4292C6", "#08519C", "#08306B"]
-)
-_NO_PAIR = "#E8E8E8"
+).with_extremes(bad="#E8E8E8")
 
 _CELLS = ((8, 0.42), (14, 0.33), (40, 0.2), (10_000, 0.13))  # raters, inches of a cell
 _MAX_NUMBERS = 14  # raters up to which numbers are written in the cells
-# inches: of the panel at the right and what is before it, below and above both, and of
-# the narrowest bar of colours
-_PANEL, _BETWEEN, _BELOW, _STAMP, _MIN_BAR = 2.3, 0.35, 0.95, 0.25, 1.4
-_GAP = 0.35  # of a cell, before the column of the reference
+# inches: of the panel at the right, of what is below all, and of a letter of 9 points
+_PANEL, _BELOW, _LETTER = 2.3, 1.1, 0.07
 
 _DOT: dict[str, Any] = {"marker": "o", "color": BLACK, "linestyle": "none"}
-_ZERO: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "linestyle": DASHES}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RaterPairs:
-    """How well every two raters of a group agree, and what each of them adds."""
-
-    title: str  # the coefficient
-    raters: tuple[str, ...]  # first on top
-    # by rater and rater, and then with the reference if there is one; ``nan`` for none
-    pairs: _Floats
-    reference: str | None
-    changes: _Floats  # by rater, of the coefficient of all without
-    change_ends: _Floats  # (n_raters, 2)
-    level: float  # of the intervals
-
-    @classmethod
-    def of(cls, title: str, result: "Diagnosis") -> "RaterPairs":
-        """Return a diagnosis with the raters who agree best with the others first."""
-        means = np.where(np.isnan(result.mean_values), -math.inf, result.mean_values)
-        order = np.argsort(-means, kind="stable")
-        pairs = result.pair_values[np.ix_(order, order)]
-        if result.reference is not None:
-            pairs = np.column_stack([pairs, result.reference_values[order]])
-        ends = np.column_stack([result.change_low, result.change_high])
-        return cls(
-            title=title,
-            raters=tuple(result.raters[place] for place in order),
-            pairs=pairs,
-            reference=result.reference,
-            changes=result.changes[order],
-            change_ends=ends[order],
-            level=result.level,
-        )
-
-
-class _Layout:
-    """Where the map of a group and the panel beside it are, in inches."""
-
-    # so that cells stay square, and rows of both the same
-    def __init__(self, group: RaterPairs) -> None:
-        r = len(group.raters)
-        self.cell = next(inches for most, inches in _CELLS if r <= most)
-        self.letters = 9.0 if self.cell > 0.25 else 7.5 if self.cell > 0.15 else 6.0
-        names = [*group.raters, *filter(None, [group.reference])]
-        self.labels = [short_name(name) for name in names]
-        self.room = max(_width(label, self.letters) for label in self.labels) + 0.12
-        self.across = self.cell * (r if group.reference is None else r + 1.0 + _GAP)
-        self.has_panel = bool(np.isfinite(group.changes).any())
-        left = self.room + max(self.across, _MIN_BAR) + _BETWEEN
-        self.width = left + _PANEL + 0.2 if self.has_panel else left
-        above = max(self.room, 0.5 * self.has_panel) + _STAMP
-        self.height = above + self.cell * r + _BELOW
+_LINE: dict[str, Any] = {"color": BLUE, "linewidth": 1.8}
 
 
 def rater_figure(parts: "Sequence[tuple[str, Diagnosis]]", title: str) -> Figure:
     """Return a heatmap of pairs a group, with the change without each rater beside."""
     # parts: each with its name; title: the coefficient
-    return pairs_figure(
-        [
-            RaterPairs.of(f"{title} ({name})" if name else title, result)
-            for name, result in parts
-        ]
+    sizes = [len(result.raters) for _, result in parts]
+    cell = next(inches for most, inches in _CELLS if max(sizes) <= most)
+    letters = 9.0 if cell > 0.25 else 7.5 if cell > 0.15 else 6.0
+    names = [short_name(name) for _, result in parts for name in result.raters]
+    room = max(map(len, names)) * _LETTER * letters / 9.0 + 0.35
+    changes = np.concatenate([result.changes for _, result in parts])
+    widths = [cell * (max(sizes) + (parts[0][1].reference is not None))]
+    widths += [_PANEL] if np.isfinite(changes).any() else []
+    height = cell * sum(sizes) + room * len(parts) + _BELOW
+    figure = Figure(figsize=(sum(widths) + room, height))
+    grid = figure.subplots(
+        len(parts), len(widths), squeeze=False, width_ratios=widths, height_ratios=sizes
     )
-
-
-def pairs_figure(groups: Sequence[RaterPairs]) -> Figure:
-    """Return the figure of groups."""
-    layouts = [_Layout(group) for group in groups]
-    below = sum(at.height for at in layouts)
-    figure = Figure(figsize=(max(at.width for at in layouts), below))
-    for group, at in zip(groups, layouts, strict=True):
-        below -= at.height
-        _group(figure, group, at, below)
+    values = [_pairs(result) for _, result in parts]
+    lowest = math.floor(10.0 * min(np.nanmin(of, initial=0.9) for of in values)) / 10.0
+    for (name, result), of_part, (axes, *panels) in zip(
+        parts, values, grid, strict=True
+    ):
+        order = _best_first(result)
+        image = _heatmap(axes, result, of_part[order], lowest, letters)
+        axes.set_ylabel(name)
+        for panel in panels:
+            _influence(panel, result, order, cell)
+    bar = axes.inset_axes(
+        (0.0, -0.27 / (cell * sizes[-1]), 1.0, 0.11 / cell / sizes[-1])
+    )
+    figure.colorbar(image, cax=bar, orientation="horizontal", label=f"{title} of pairs")
+    for panel in panels:
+        panel.set_xlabel(
+            "change without the rater\n(right of 0: the others agree better)"
+        )
+        level = percent(parts[0][1].level)
+        figure.legend(
+            handles=[
+                Line2D([], [], label="estimate", **_DOT),
+                Line2D([], [], label=f"{level} % confidence interval", **_LINE),
+            ][: 1 + bool(np.isfinite(result.change_low).any())],
+            loc="outside lower center",
+            ncols=2,
+            fontsize=8,
+        )
     return figure
 
 
-def _group(figure: Figure, group: RaterPairs, at: _Layout, below: float) -> None:
-    # below: inches of the figure below the group
-    width, height = figure.get_size_inches()
-    high = at.cell * len(group.raters)
-
-    def axes(left: float, bottom: float, wide: float, high: float) -> Axes:
-        return figure.add_axes(
-            (left / width, (below + bottom) / height, wide / width, high / height)
-        )
-
-    image = _heatmap(
-        axes(at.room, _BELOW, at.across, high), group, at.labels, at.letters
-    )
-    bar = figure.colorbar(
-        image,
-        cax=axes(at.room, _BELOW - 0.27, max(at.across, _MIN_BAR), 0.12),
-        orientation="horizontal",
-    )
-    bar.set_label(f"{group.title} of two raters")
-    bar.outline.set_visible(False)
-    if at.has_panel:
-        left = at.room + max(at.across, 1.5) + _BETWEEN
-        _influence(axes(left, _BELOW, _PANEL, high), group, at.cell)
+def _best_first(result: "Diagnosis") -> NDArray[np.intp]:
+    # the raters who agree best with the others first
+    means = np.where(np.isnan(result.mean_values), -math.inf, result.mean_values)
+    return np.argsort(-means, kind="stable")
 
 
-def _width(text: str, size: float) -> float:
-    # of a text in inches
-    return float(TextPath((0.0, 0.0), text, size=size).get_extents().width) / 72.0
+def _pairs(result: "Diagnosis") -> _Floats:
+    # by rater, columns in their order, and then with the reference if there is one
+    values = result.pair_values[:, _best_first(result)]
+    if result.reference is None:
+        return values
+    return np.column_stack([values, result.reference_values])
 
 
 def _heatmap(
-    axes: Axes, content: RaterPairs, labels: list[str], size: float
+    axes: Axes, result: "Diagnosis", values: _Floats, lowest: float, letters: float
 ) -> AxesImage:
-    r = len(content.raters)
-    values = content.pairs
-    every = values[~np.isnan(values)]
-    lowest = math.floor(10.0 * min(every.min(initial=1.0), 0.9)) / 10.0
-    look: dict[str, Any] = {
-        "cmap": _COLOURS.with_extremes(bad=_NO_PAIR),
-        "vmin": lowest,
-        "vmax": 1.0,
-        "aspect": "auto",
-        "interpolation": "nearest",
-    }
-    image = axes.imshow(np.ma.masked_invalid(values[:, :r]), **look)
-    places = list(map(float, range(r)))
-    right = r - 0.5
-    if content.reference is not None:
-        start = r - 0.5 + _GAP
-        axes.imshow(
-            np.ma.masked_invalid(values[:, r:]),
-            extent=(start, start + 1.0, r - 0.5, -0.5),
-            **look,
-        )
-        places.append(start + 0.5)
-        right = start + 1.0
-    axes.set_xlim(-0.5, right)
-    axes.set_ylim(r - 0.5, -0.5)
-    for spine in axes.spines.values():
-        spine.set_visible(False)
-    axes.set_xticks(places, labels, rotation=90, fontsize=size)
-    axes.set_yticks(range(r), labels[:r], fontsize=size)
+    n_rows, n_columns = values.shape
+    image = axes.imshow(
+        values,
+        cmap=_COLOURS,
+        vmin=lowest,
+        vmax=1.0,
+        aspect="auto",
+        interpolation="nearest",
+    )
+    names = [short_name(result.raters[place]) for place in _best_first(result)]
+    others = [] if result.reference is None else [short_name(result.reference)]
+    axes.set_xticks(range(n_columns), [*names, *others], rotation=90, fontsize=letters)
+    axes.set_yticks(range(n_rows), names, fontsize=letters)
     axes.xaxis.tick_top()
     axes.tick_params(length=0)
-    _lines(axes, r)
-    if r <= _MAX_NUMBERS:
-        _numbers(axes, values, places, lowest)
+    axes.spines[:].set_visible(False)
+    # white between the cells, so that each is seen by itself
+    width = 1.0 if n_rows <= _MAX_NUMBERS else 0.4
+    axes.hlines(
+        np.arange(0.5, n_rows - 1.0), -0.5, n_columns - 0.5, "w", linewidth=width
+    )
+    axes.vlines(
+        np.arange(0.5, n_columns - 1.0), -0.5, n_rows - 0.5, "w", linewidth=width
+    )
+    if n_columns > n_rows:
+        axes.axvline(n_rows - 0.5, color="w", linewidth=6.0)
+    if n_rows <= _MAX_NUMBERS:
+        for (row, column), value in np.ndenumerate(values):
+            if not math.isnan(value):
+                is_dark = value - lowest > 0.55 * (1.0 - lowest)
+                text = number(float(value), 2).replace("0.", ".", 1)
+                axes.text(
+                    column,
+                    row,
+                    text,
+                    ha="center",
+                    va="center",
+                    fontsize=8,
+                    color="white" if is_dark else BLACK,
+                )
     return image
 
 
-def _lines(axes: Axes, r: int) -> None:
-    # white between the cells, so that each is seen by itself
-    between = np.arange(0.5, r - 1.0)
-    look: dict[str, Any] = {"color": "white", "linewidth": 1.0 if r <= 14 else 0.4}
-    axes.hlines(between, *axes.get_xlim(), **look)
-    axes.vlines(between, -0.5, r - 0.5, **look)
-
-
-def _numbers(axes: Axes, values: _Floats, places: list[float], lowest: float) -> None:
-    for row, of_row in enumerate(values):
-        for place, value in zip(places, of_row.tolist(), strict=True):
-            if math.isnan(value):
-                continue
-            is_dark = (value - lowest) / (1.0 - lowest) > 0.55
-            axes.text(
-                place,
-                row,
-                number(value, 2).replace("0.", ".", 1),
-                ha="center",
-                va="center",
-                fontsize=8,
-                color="white" if is_dark else BLACK,
-            )
-
-
-def _influence(axes: Axes, content: RaterPairs, cell: float) -> None:
-    size = 4.5 if cell > 0.25 else 3.5
-    for row, change in enumerate(content.changes):
-        low, high = content.change_ends[row]
-        if math.isfinite(low):
-            axes.plot(
-                [low, high],
-                [row, row],
-                color=BLUE,
-                linewidth=1.8 if cell > 0.15 else 1.0,
-            )
-        if math.isfinite(change):
-            axes.plot([change], [row], markersize=size, **_DOT)
-    axes.set_ylim(len(content.changes) - 0.5, -0.5)
-    axes.axvline(0.0, **_ZERO, zorder=0.5)
+def _influence(
+    axes: Axes, result: "Diagnosis", order: NDArray[np.intp], cell: float
+) -> None:
+    places = np.arange(len(order))
+    ends = result.change_low[order], result.change_high[order]
+    axes.hlines(places, *ends, **_LINE)
+    axes.plot(result.changes[order], places, markersize=min(12.0 * cell, 4.5), **_DOT)
+    axes.set_ylim(len(order) - 0.5, -0.5)
+    axes.axvline(0.0, color=GREY, linewidth=0.8, linestyle=DASHES, zorder=0.5)
     axes.grid(axis="x")
     axes.set_yticks([])
     axes.xaxis.set_major_locator(MaxNLocator(5))
     axes.spines["left"].set_visible(False)
     axes.margins(x=0.08)
-    axes.set_xlabel(
-        textwrap.fill(f"change of {content.title} without the rater", 38)
-        + "\n(right of 0: the others agree better)"
-    )
-    if any(math.isfinite(low) for low, _ in content.change_ends):
-        axes.legend(
-            handles=[
-                Line2D([], [], markersize=size, label="estimate", **_DOT),
-                Line2D(
-                    [],
-                    [],
-                    color=BLUE,
-                    linewidth=1.8,
-                    label=f"{percent(content.level)} % confidence interval",
-                ),
-            ],
-            loc="lower center",
-            bbox_to_anchor=(0.5, 1.0),
-            fontsize=8,
-        )

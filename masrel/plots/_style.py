@@ -4,7 +4,6 @@ Colours are Okabe and Ito's, which colour-blind readers tell apart; shapes, line
 styles and text repeat what the colours say, so that a grey print loses nothing.
 """
 
-import importlib
 import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -16,7 +15,7 @@ from masrel.plots._matplotlib import mpl
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from masrel.plots import _drawn_values as data
+from masrel.plots._drawn_values import Form
 from masrel.plots._picture import arrange, files_of
 
 if TYPE_CHECKING:
@@ -88,39 +87,9 @@ def house_style(*, parse_math: bool = False) -> Iterator[None]:
         yield
 
 
-def draw(
-    content: data.Content | data.Drawn,
-    *,
-    stamp: str,
-    forms: Sequence[data.Form] = ("png", "svg"),
-) -> dict[data.Form, bytes]:
-    """Draw values in the house style.
-
-    Parameters
-    ----------
-    content : Content or Drawn
-        What is drawn.
-    stamp : str
-        The line that says where the data come from; none if empty.
-    forms : sequence of {"png", "svg", "pdf"}, optional
-        Which files to make.
-
-    Returns
-    -------
-    dict of str to bytes
-        Each form's file.
-    """
-    with house_style():
-        module, _, function = content.drawer.partition(":")
-        # imported here: one figure loads what no other needs
-        drawer = getattr(importlib.import_module(module), function)
-        figure = drawer(*content.arguments)
-        return finished(figure, stamp=stamp, forms=forms)
-
-
 def finished(
-    figure: Figure, *, stamp: str, forms: Sequence[data.Form] = ("png", "svg")
-) -> dict[data.Form, bytes]:
+    figure: Figure, *, stamp: str, forms: Sequence[Form] = ("png", "svg")
+) -> dict[Form, bytes]:
     """Return the files of a figure of the house style, under its stamp."""
     arrange(figure, _stamp(figure, stamp) if stamp else None)
     return files_of(figure, forms)

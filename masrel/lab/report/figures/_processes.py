@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from masrel.plots import draw
 from masrel.plots._drawn_values import Form
-from masrel.plots._style import draw
 
 if TYPE_CHECKING:
     from masrel.lab.report._material import Drawing

@@ -9,6 +9,7 @@ import pytest
 from matplotlib.axes import Axes
 
 from masrel.estimates import Distribution, Interval
+from masrel.intervals import Diagnosis, diagnose
 from masrel.lab.report._figure_data import (
     GradeGrid,
     GradesByAim,
@@ -25,7 +26,8 @@ from masrel.lab.report.figures._trace_figures import trace_figure
 from masrel.plots import draw
 from masrel.plots._drawn_values import Drawn, Forest, ForestRow
 from masrel.plots._forest import forest_figure
-from masrel.plots._rater_pairs import RaterPairs, pairs_figure
+from masrel.plots._picture import arrange
+from masrel.plots._rater_pairs import rater_figure
 from masrel.plots._style import STYLE, house_style
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -91,24 +93,15 @@ def panel() -> TracePanel:
     return TracePanel(title="HM1", stretches=(stretch, stretch))
 
 
-def pairs(n_raters: int, reference: str | None = None) -> RaterPairs:
-    values = np.linspace(-0.2, 1.0, n_raters * n_raters).reshape(n_raters, n_raters)
-    values[np.diag_indices(n_raters)] = np.nan
+def diagnosis(n_raters: int, reference: str | None = None) -> Diagnosis:
+    rng = np.random.default_rng(3)
+    items = np.arange(20) % 3
+    drawn = rng.integers(0, 3, (20, n_raters))
+    ratings = np.where(rng.random(drawn.shape) < 0.7, items[:, None], drawn)
+    names = [f"R{k}" for k in range(n_raters)]
     if reference is not None:
-        values = np.column_stack([values, values[:, 0]])
-    return RaterPairs(
-        title="Fleiss' κ",
-        raters=tuple(f"R{k}" for k in range(n_raters)),
-        pairs=values,
-        reference=reference,
-        changes=0.01 * np.arange(n_raters) - 0.02,
-        change_ends=0.01 * np.arange(n_raters)[:, None] - [0.05, 0.0],
-        level=0.95,
-    )
-
-
-def drawn_pairs(*groups: RaterPairs) -> Drawn:
-    return Drawn("masrel.plots._rater_pairs:pairs_figure", (groups,))
+        names[-1] = reference
+    return diagnose(ratings, target="items", raters=names, reference=reference)
 
 
 DRAWINGS = {
@@ -124,7 +117,10 @@ DRAWINGS = {
         raters=("R1", "R2"),
         slowest=60.0,
     ),
-    "pairs": drawn_pairs(pairs(3)),
+    "pairs": Drawn(
+        "masrel.plots._rater_pairs:rater_figure",
+        ((("", diagnosis(3)),), "Fleiss' κ"),
+    ),
     "traces": TraceColumns(panels=(panel(),)),
 }
 
@@ -265,12 +261,16 @@ def test_pairs_are_written_in_their_cells_and_long_names_are_shortened(
     monkeypatch.setitem(STYLE, "svg.fonttype", "none")
     few = svg_of("pairs", "").decode()
     assert few.count(">R0</text>") == 2  # of the row and of the column
-    assert few.count(">−.05</text>") == 1
+    first = f"{diagnosis(3).pair_values[0, 1]:.2f}".removeprefix("0")
+    assert few.count(f">{first}</text>") >= 2
     assert ">95 % confidence interval</text>" in few
-    of_many = pairs(15, reference="a long name " * 4)
-    many = draw(drawn_pairs(of_many), stamp="", forms=("svg",))["svg"].decode()
+    long = Drawn(
+        "masrel.plots._rater_pairs:rater_figure",
+        ((("", diagnosis(16, "a long name " * 4)),), "κ"),
+    )
+    many = draw(long, stamp="", forms=("svg",))["svg"].decode()
     assert ">a long nam…" in many
-    assert ">.05</text>" not in many
+    assert f">{first}</text>" not in many
 
 
 def test_a_stretch_that_a_grade_rests_on_is_ringed_and_drawn_thicker() -> None:
@@ -297,30 +297,25 @@ def test_a_stretch_that_a_grade_rests_on_is_ringed_and_drawn_thicker() -> None:
     assert widths[1] > 2.0 * widths[0]
 
 
-def test_two_raters_have_a_map_and_nothing_beside_it() -> None:
-    nan = float("nan")
-    content = RaterPairs(
-        title="Scott's π",
-        raters=("A", "B"),
-        pairs=np.array([[nan, 0.5], [0.5, nan]]),
-        reference=None,
-        changes=np.full(2, nan),
-        change_ends=np.full((2, 2), nan),
-        level=0.95,
-    )
-    assert len(pairs_figure([content]).axes) == 2  # the map and its colours
-    assert len(pairs_figure([pairs(3)]).axes) == 3
-
-
-def test_every_group_has_its_map_one_below_the_other() -> None:
-    figure = pairs_figure([pairs(3), pairs(12, reference="Gold")])
+@pytest.mark.parametrize(
+    ("n_raters", "reference", "n_panels"), [(2, None, 1), (3, None, 2), (13, "Gold", 2)]
+)
+def test_every_group_has_its_map_and_what_raters_change_beside_it(
+    n_raters: int, reference: str | None, n_panels: int
+) -> None:
+    parts = [("A", diagnosis(n_raters, reference)), ("B", diagnosis(n_raters))]
+    with house_style():
+        figure = rater_figure(parts[:1] if reference else parts, "Fleiss' κ")
     maps = [axes for axes in figure.axes if axes.images]
-    first, *second = (axes.get_position() for axes in maps)
-    assert len(second) == 1
-    assert second[0].y1 < first.y0
-    cells = (first.height / 3, second[0].height / 12)
-    inches = figure.get_figheight()
-    assert [cell * inches for cell in cells] == pytest.approx([0.42, 0.33])
+    assert len(figure.axes) == len(maps) * n_panels
+    arrange(figure, None)
+    cells = [axes.get_position() for axes in maps]
+    assert [of.y1 for of in cells] == sorted((of.y1 for of in cells), reverse=True)
+    across, down = figure.get_size_inches() / maps[0].images[0].get_array().shape[::-1]
+    # nearly squares, where they are more than the scale of colours needs
+    assert n_raters == 2 or cells[0].width * across == pytest.approx(
+        cells[0].height * down, rel=0.3
+    )
 
 
 def test_the_part_as_intended_stands_beside_its_row() -> None:
