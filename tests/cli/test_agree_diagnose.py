@@ -1,8 +1,6 @@
 """masrel agree --diagnose and --clusters: as computed by the library, and refusals."""
 
-import csv
 import json
-import re
 from pathlib import Path
 from typing import Any
 
@@ -101,45 +99,6 @@ def test_the_reference_is_in_no_estimate_between_raters(
     for row in with_it["diagnosis_raters"]:
         assert row["without"] - row["change"] == pytest.approx(estimate["value"])
     assert with_it["notes"] == []  # not that Gold counts as a rater
-    two = ("--raters", "Kim,Lee,Gold", "--symmetry")
-    tables = [
-        record(masrel, wide, *two, "--diagnose", "--reference", "Gold"),
-        record(masrel, wide, "--raters", "Kim,Lee", "--symmetry"),
-    ]
-    assert tables[0]["symmetry"] == tables[1]["symmetry"]
-
-
-def test_a_reference_is_left_out_of_the_differences_of_groups(
-    masrel: Caller, wide: Path
-) -> None:
-    call = (wide, "--by", "site", "--coefficients", "fleiss_kappa", "--compare")
-    with_it = record(masrel, *call, "--diagnose", "--reference", "Gold")
-    assert (
-        with_it["differences"]
-        == record(masrel, *call, "--ignore", "Gold")["differences"]
-    )
-
-
-def test_groups_are_diagnosed_each_and_without_a_target_there_are_no_intervals(
-    masrel: Caller, wide: Path
-) -> None:
-    document = record(masrel, wide, "--by", "site", "--diagnose")
-    assert [row["site"] for row in document["diagnosis_raters"]] == 4 * ["north"] + (
-        4 * ["south"]
-    )
-    assert all(row["low"] is None for row in document["diagnosis_raters"])
-    out = masrel("agree", wide, "--by", "site", "--diagnose").out
-    assert "No intervals: --target items has them." in out
-    below = out.split("What each rater adds", 1)[1]
-    assert re.search(r" (SE|Low|High)\b", below) is None
-    tables = [
-        list(csv.DictReader(part.splitlines()))
-        for part in masrel(
-            "agree", wide, "--by", "site", "--diagnose", "--csv"
-        ).out.split("\n\n")
-    ]
-    assert [len(rows) for rows in tables] == [4, 8, 12, 6, 24]
-    assert tables[1][0]["group"] == "north"
 
 
 def test_of_many_raters_the_pairs_that_agree_least_are_shown(
@@ -159,16 +118,6 @@ def test_of_many_raters_the_pairs_that_agree_least_are_shown(
     lowest = min(row["value"] for row in document["diagnosis_pairs"])
     below = out.split("every two raters\n")[1].splitlines()
     assert below[2].split()[2].replace("−", "-") == f"{lowest:.3f}"
-
-
-@pytest.mark.parametrize("target", [(), ("--target", "items")])
-def test_the_figure_of_a_diagnosis_needs_no_interval(
-    masrel: Caller, wide: Path, tmp_path: Path, target: tuple[str, ...]
-) -> None:
-    figure = tmp_path / "pairs.svg"
-    arguments = ("--ignore", "site", "--diagnose", "--figure", figure, *target)
-    assert masrel("agree", wide, *arguments).code in (0, None)
-    assert figure.read_bytes().startswith(b"<?xml")
 
 
 @pytest.mark.parametrize("option", ["--diagnose", "--compare"])
@@ -205,13 +154,6 @@ def test_clusters_are_left_out_as_in_the_library(masrel: Caller, sites: Path) ->
     assert row["standard_error"] == expected.standard_error
     assert row["interval"]["low"] == expected.interval.low
     assert row["interval"]["unit"] == "clusters"
-    assert document["read"]["n_clusters"] == 18
-    out = masrel("agree", sites, *names).out
-    assert "in 18 clusters by 'patient'" in out.replace("\n  ", " ")
-    assert "SE: delta method, clusters as the sample." in out
-    explained = masrel("agree", sites, *names, "--explain").out.replace("\n  ", " ")
-    assert "if these raters graded other clusters of items like these" in explained
-    assert "(from leaving out one cluster of items at a time)" in explained
 
 
 def test_groups_with_clusters_in_common_are_compared_cluster_by_cluster(
@@ -241,18 +183,3 @@ def test_groups_with_clusters_in_common_are_compared_cluster_by_cluster(
     assert row["value"] == pytest.approx(expected.value, rel=1e-12)
     assert row["interval"]["low"] == pytest.approx(expected.interval.low, rel=1e-12)
     assert row["design"] == "dependent"
-    out = masrel("agree", sites, *names, "--compare").out
-    assert "Groups have clusters in common" in out
-
-
-def test_a_category_that_nobody_met_has_no_row_of_confusions(
-    masrel: Caller, wide: Path
-) -> None:
-    call = (wide, "--ignore", "site", "--categories", "a,b,c,d", "--diagnose")
-    cells = record(masrel, *call)["diagnosis_confusion"]
-    assert sum(cell["of"] == "d" for cell in cells) == 4 * len(NAMES)
-    _, below = masrel("agree", *call).out.split("What each rater said")
-    rows = [line.split()[:2] for line in below.splitlines()[3:]]
-    assert [row for row in rows if row[0] in NAMES] == [
-        [name, grade] for name in NAMES for grade in "abc"
-    ]

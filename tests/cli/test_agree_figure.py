@@ -1,7 +1,5 @@
 """masrel agree --figure: what is drawn, where to, and what is refused."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -57,19 +55,6 @@ def test_only_a_figure_loads_what_draws(tmp_path: Path, draws: bool) -> None:
     assert ("matplotlib" in loaded) == draws
 
 
-def test_json_alone_on_stdout_leaves_room_for_a_figure(tmp_path: Path) -> None:
-    call = [sys.executable, "-m", "masrel", "agree", str(TABLE_V), "--json", "-"]
-    figure = ["--target", "items", "--figure", str(tmp_path / "kappa.svg")]
-    plain, drawn = (
-        subprocess.run(
-            [*call, *more], capture_output=True, encoding="utf-8", check=True
-        )
-        for more in (figure[:2], figure)
-    )
-    assert plain.stdout == drawn.stdout
-    assert "figure: " in drawn.stderr
-
-
 @pytest.mark.usefixtures("readable")
 def test_the_figure_says_what_the_table_says(masrel: Caller, tmp_path: Path) -> None:
     file = tmp_path / "all.svg"
@@ -100,11 +85,3 @@ def test_simulated_sessions_are_headed_and_labelled(
     svg = file.read_text("utf-8")
     for words in ("SIMULATED DATA", ">first<", ">second<", "resamples"):
         assert words in svg
-
-
-@pytest.mark.usefixtures("readable")
-def test_a_bound_is_said_to_be_one(masrel: Caller, tmp_path: Path) -> None:
-    ratings, file = tmp_path / "wide.csv", tmp_path / "drawn.svg"
-    ratings.write_text("item,A,B\n1,1,1\n2,2,2\n3,3,3\n4,1,1\n", encoding="utf-8")
-    masrel("agree", ratings, "--target", "items", "--figure", file)
-    assert "one-sided" in file.read_text("utf-8")

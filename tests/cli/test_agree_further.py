@@ -3,8 +3,6 @@
 import csv
 import itertools
 import json
-import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -14,7 +12,7 @@ import pytest
 from scipy import stats
 
 from masrel import intervals
-from masrel.agreement import holm, strength
+from masrel.agreement import holm
 from tests.agreement.test_category import DIAGNOSES, PATIENTS, RATINGS
 from tests.cli.process import Caller
 
@@ -121,22 +119,6 @@ def test_retest_by_hand_whatever_the_order_of_the_rows(
     assert {row["n_items"] for row in rows} == {3}
 
 
-def test_retest_of_a_wide_file_is_that_of_a_long_one(
-    masrel: Caller, tmp_path: Path, sessions: Path
-) -> None:
-    rows = [
-        (session, f"I{item}", *(pairs[item][place] for pairs in PAIRS.values()))
-        for place, session in enumerate(("test", "retest"))
-        for item in range(3)
-    ]
-    wide = write(tmp_path / "wide.csv", "session,item,R1,R2,R3", rows)
-    both = [
-        record(masrel, path, "--session", "session", "--retest")["retest"]
-        for path in (sessions, wide)
-    ]
-    assert both[0] == both[1]
-
-
 def test_retest_has_intervals_of_the_library(masrel: Caller, sessions: Path) -> None:
     names = ("--session", "session", "--retest", "--target", "items")
     rows = record(masrel, sessions, *names, "--interval", "jackknife")["retest"]
@@ -151,48 +133,6 @@ def test_retest_has_intervals_of_the_library(masrel: Caller, sessions: Path) -> 
             interval.high,
         )
         assert row["interval"]["method"] == interval.method
-
-
-def test_other_raters_have_no_say_in_the_kappa_of_one(
-    masrel: Caller, sessions: Path
-) -> None:
-    rows = record(
-        masrel, sessions, "--session", "session", "--retest", "--target", "raters"
-    )["retest"]
-    assert [row["interval"] is None for row in rows] == [True, True, True, False]
-    assert rows[3]["interval"]["target"] == "raters"
-
-
-def test_a_rater_and_an_item_of_one_session_are_left_out_and_named(
-    masrel: Caller, tmp_path: Path, sessions: Path
-) -> None:
-    expected = record(masrel, sessions, "--session", "session", "--retest")["retest"]
-    more = [("test", "R9", "I0", "a"), ("retest", "R1", "I7", "b")]
-    rows = [*more[:1], *retest_rows(), *more[1:]]
-    path = write(tmp_path / "more.csv", "session,rater,item,grade", rows)
-    names = ("--session", "session", "--retest")
-    assert record(masrel, path, *names)["retest"] == expected
-    out = masrel("agree", path, *names).out
-    assert "Left out: rater R9 (test only); item I7 (retest only)." in out
-
-
-def test_the_first_table_estimates_each_session(masrel: Caller, sessions: Path) -> None:
-    found = record(masrel, sessions, "--session", "session", "--retest")
-    expected = record(masrel, sessions, "--by", "session")
-    assert found["estimates"] == expected["estimates"]
-    assert found["options"] == {**expected["options"], "by": None}
-
-
-def test_one_rater_alone_has_a_retest_and_nothing_between_raters(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    rows = [row for row in retest_rows() if row[1] == "R1"]
-    path = write(tmp_path / "one.csv", "session,rater,item,grade", rows)
-    document = record(masrel, path, "--session", "session", "--retest")
-    assert document["estimates"] == []
-    assert [row["value"] for row in document["retest"]] == [0.4, 0.4]
-    out = masrel("agree", path, "--session", "session", "--retest").out
-    assert out.startswith("Agreement of raters with themselves\nRead CSV")
 
 
 def test_retest_of_groups_is_one_of_each(masrel: Caller, tmp_path: Path) -> None:
@@ -252,19 +192,6 @@ def test_the_interval_of_a_category_is_that_of_the_folded_ratings(
         )
 
 
-def test_a_category_that_nobody_used_says_so(masrel: Caller, sessions: Path) -> None:
-    found = record(
-        masrel,
-        *(sessions, "--by", "session", "--categories", "a,b,c", "--each-category"),
-        *("--target", "items"),
-    )["categories"]
-    unused = [row for row in found if row["category"] == "c"]
-    assert [row["session"] for row in unused] == ["test", "retest"]
-    for row in unused:
-        assert (row["value"], row["interval"]) == (None, None)
-        assert "0/0" in row["reason"]
-
-
 # --- two raters
 
 
@@ -290,16 +217,6 @@ def test_tests_of_symmetry_by_hand(
     for row, x in zip(found, statistics, strict=True):
         assert row["p_value"] == pytest.approx(stats.chi2.sf(x, row["df"][0]))
         assert (row["n_items"], row["reason"]) == (44, None)
-
-
-def test_two_categories_have_mcnemars_test(masrel: Caller, tmp_path: Path) -> None:
-    # one change of six the other way: p = 2 (1 + 6)/2⁶; corrected (|1 - 5| - 1)²/6
-    path = write(tmp_path / "w.csv", "item,K,L", pairs_of([[10, 5], [1, 10]], "ab"))
-    exact, corrected, bowker, *_ = record(masrel, path, "--symmetry")["symmetry"]
-    assert (exact["test"], exact["kind"]) == ("mcnemar", "exact")
-    assert (exact["statistic"], exact["df"], exact["p_value"]) == (1.0, [6.0], 7 / 32)
-    assert (corrected["kind"], corrected["statistic"]) == ("corrected", 9 / 6)
-    assert bowker["statistic"] == 16 / 6
 
 
 def test_indices_by_hand(masrel: Caller, tmp_path: Path) -> None:
@@ -370,21 +287,6 @@ def test_differences_of_clinics_are_those_of_the_library(
     assert {e["interval"]["target"] for e in document["estimates"]} == {"items"}
 
 
-def test_clinics_compare_as_welchs_t_test_does(masrel: Caller, clinics: Path) -> None:
-    found = record(
-        masrel,
-        *(clinics, "--by", "clinic", "--compare"),
-        *("--coefficients", "percent_agreement"),
-    )["differences"]
-    for row in found:
-        both = [
-            [float(a == b) for a, b in grades_of(clinics, row[side])]
-            for side in ("first", "second")
-        ]
-        expected = stats.ttest_ind(*both, equal_var=False)
-        assert row["p_value"] == pytest.approx(expected.pvalue, rel=1e-9)
-
-
 def test_groups_of_the_same_items_are_compared_item_by_item(
     masrel: Caller, tmp_path: Path
 ) -> None:
@@ -404,21 +306,6 @@ def test_groups_of_the_same_items_are_compared_item_by_item(
     assert row["t"] == pytest.approx(expected.statistic, rel=1e-9)
     assert row["p_value"] == pytest.approx(expected.pvalue, rel=1e-9)
     assert row["p_holm"] == row["p_value"]
-    out = masrel("agree", path, *names).out
-    assert "Items the same" in out
-    assert "Holm" not in out  # of one pair there is nothing to adjust
-    assert ",p_holm" in masrel("agree", path, *names, "--csv").out
-
-
-def test_a_difference_without_spread_is_null_with_its_reason(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    rows = [(g, f"{g}{n}", p, p) for g in "AB" for n, p in enumerate("abab")]
-    path = write(tmp_path / "w.csv", "g,item,Kim,Lee", rows)
-    for row in record(masrel, path, "--by", "g", "--compare")["differences"]:
-        assert (row["value"], row["p_value"], row["p_holm"]) == (0.0, None, None)
-        assert row["test_reason"] == row["interval"]["reason"]
-        assert "leaves the difference as it is" in row["test_reason"]
 
 
 def three_groups(folder: Path, *, same_items: bool) -> Path:
@@ -450,8 +337,6 @@ def test_three_groups_of_other_items_are_tested_for_equality(
     away = values - precision @ values / precision.sum()
     assert tests[0]["statistic"] == pytest.approx(precision @ away**2, rel=1e-12)
     assert tests[0]["df"] == [2.0]
-    shown = masrel("agree", path, *names).out
-    assert "Fleiss' weighted χ²: groups of other items" in shown
 
 
 def test_three_groups_of_the_same_items_are_tested_by_hotellings_t2(
@@ -471,66 +356,3 @@ def test_three_groups_of_the_same_items_are_tested_by_hotellings_t2(
     assert test["statistic"] == pytest.approx(expected.statistic, rel=1e-12)
     assert test["df"] == [2.0, 38.0]
     assert test["p_value"] == pytest.approx(expected.p_value, rel=1e-12)
-
-
-# --- how they are shown
-
-ALL = ("--by", "clinic", "--each-category", "--symmetry", "--indices", "--compare")
-
-
-def test_text_csv_and_latex_have_every_table(masrel: Caller, clinics: Path) -> None:
-    names = ["categories", "symmetry", "indices", "differences", "equality"]
-    document = record(masrel, clinics, *ALL)
-    assert [key for key in document if key in names] == names
-    assert len(masrel("agree", clinics, *ALL).out.split("\n\n")) == 6
-    latex = masrel("agree", clinics, *ALL, "--latex").out
-    assert [f"\\label{{tab:{name}}}" in latex for name in names] == [True] * 5
-    assert latex.count(r"\begin{table}") == latex.count(r"\end{table}") == 6
-    tables = [
-        list(csv.DictReader(part.splitlines()))
-        for part in masrel("agree", clinics, *ALL, "--csv").out.split("\n\n")
-    ]
-    assert len(tables) == 6
-    for name, rows in zip(names, tables[1:], strict=True):
-        assert len(rows) == len(document[name])
-    for row, found in zip(tables[4], document["differences"], strict=True):
-        assert float(row["difference"]) == found["value"]
-        assert float(row["p_holm"]) == found["p_holm"]
-        assert row["coefficient"] == found["coefficient"]
-
-
-def test_without_the_options_nothing_of_them_is_loaded(clinics: Path) -> None:
-    code = (
-        "import sys; from masrel.cli import main\n"
-        f"sys.argv = ['masrel', 'agree', {str(clinics)!r}, '--by', 'clinic']\n"
-        "try: main()\n"
-        "except SystemExit: pass\n"
-        "print([name for name in sys.modules if name.startswith('scipy')\n"
-        "       or name.endswith('masrel.intervals')])"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.splitlines()[-1] == "[]"
-
-
-def test_words_reach_the_tables_of_estimates(masrel: Caller, tmp_path: Path) -> None:
-    rng = np.random.default_rng(3)
-    rows = [
-        (session, item, *((item % 3 + (rng.random(2) < 0.3)) % 3).tolist())
-        for session in ("test", "retest")
-        for item in range(30)
-    ]
-    path = write(tmp_path / "r.csv", "session,item,A,B", rows)
-    call = ("agree", path, "--session", "session", "--retest", "--each-category")
-    call = (*call, "--words", "altman", "--json", "-")
-    plain = json.loads(masrel(*call).out)
-    for key in ("retest", "categories"):
-        for one in plain[key]:  # of a normal law without an interval
-            reached = one["value"] - stats.norm.ppf(0.95) * one["standard_error"]
-            assert one["word"] == strength(reached, scale="altman")
-    shown = json.loads(masrel(*call, "--target", "items", "--level", "0.9").out)
-    for key in ("retest", "categories"):
-        for one in shown[key]:
-            low = one["interval"]["low"]
-            assert one["word"] == strength(low, scale="altman")

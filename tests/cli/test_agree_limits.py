@@ -53,58 +53,6 @@ def test_limits_come_with_coefficients_of_measurements(
     assert concordance["interval"]["low"] == lin_ccc(PAIRS).interval.low
 
 
-def test_measurements_are_warned_of_where_equal_numbers_are_counted(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    file = tmp_path / "angles.csv"
-    rows = "".join(f"p{k},{k + 0.25},{k + 0.5}\n" for k in range(20))
-    file.write_text("item,Kim,Lee\n" + rows, encoding="utf-8")
-    warning = "40 different numbers in 40 ratings look like measurements"
-    for call in ((), ("--coefficients", "icc_a1,scott_pi"), ("--metric", "nominal")):
-        assert warning in masrel("agree", file, *call).out
-    for call in (
-        ("--limits-of-agreement",),
-        ("--coefficients", "icc_a1"),
-        ("--metric", "interval"),
-        ("--weights", "quadratic"),
-    ):
-        assert warning not in masrel("agree", file, *call).out
-
-
-def test_figure_has_the_limits_with_their_unit(masrel: Caller, pairs: Path) -> None:
-    file = pairs.parent / "limits.svg"
-    call = ("agree", pairs, "--limits-of-agreement", "--unit", "deg")
-    done = masrel(*call, "--figure", file)
-    assert done.code == 0
-    assert f"figure: {file}" in done.err
-    assert file.read_text("utf-8").startswith("<?xml")
-
-
-def test_each_group_has_its_limits(masrel: Caller, tmp_path: Path) -> None:
-    file = tmp_path / "clinics.csv"
-    rows = "".join(
-        f"{clinic},{clinic}{i},{a},{b}\n"
-        for clinic in ("North", "South")
-        for i, (a, b) in enumerate(PAIRS)
-    )
-    file.write_text("clinic,item,Kim,Lee\n" + rows, encoding="utf-8")
-    call = ("agree", file, "--by", "clinic", "--limits-of-agreement", "--json", "-")
-    records = json.loads(masrel(*call).out)["limits_of_agreement"]
-    assert [record["clinic"] for record in records] == ["North", "South"]
-
-
-def test_estimates_in_units_have_rows_and_sentences(
-    masrel: Caller, pairs: Path
-) -> None:
-    call = ("agree", pairs, "--coefficients", "lin_ccc,sem,mdc_consistency")
-    out = masrel(*call).out
-    for title in ("Lin's concordance", "SEM", "MDC95, consistency"):
-        assert title in out
-    said = masrel(*call, "--sentence").out
-    assert "SEM = 0." in said  # a number in units keeps its zero
-    assert "Lin's concordance = ." in said
-
-
 def test_estimates_in_small_units_keep_their_digits(
     masrel: Caller, tmp_path: Path
 ) -> None:

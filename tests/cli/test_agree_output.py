@@ -1,13 +1,11 @@
 """masrel agree: what it prints of its estimates, form by form."""
 
 import csv
-import hashlib
 import io
 import json
 import os
 import re
 import shlex
-import shutil
 import subprocess
 import sys
 import warnings
@@ -15,8 +13,7 @@ from pathlib import Path
 
 import pytest
 
-import masrel as package
-from masrel.agreement import COEFFICIENTS, strength
+from masrel.agreement import strength
 from masrel.intervals import estimate
 from masrel.ratings import read_ratings
 from tests.cli.process import Caller, Done
@@ -52,46 +49,6 @@ def table(done: Done) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(done.out)))
 
 
-# The record.
-
-
-def test_a_record_says_what_was_computed_from_what(masrel: Caller, wide: Path) -> None:
-    call = ("--target", "items", "--interval", "bootstrap", "--seed", 3)
-    more = ("--resamples", 500, "--level", 0.9, "--words", "altman")
-    made = document(masrel("agree", wide, *call, *more, "--json", "-"))
-    assert made["masrel"] == package.__version__
-    assert made["file"] == str(wide)
-    assert made["sha256"] == hashlib.sha256(wide.read_bytes()).hexdigest()
-    assert made["options"] == {
-        "coefficients": ["percent_agreement", "fleiss_kappa"],
-        "weights": "identity",
-        "target": "items",
-        "interval": "bootstrap",
-        "level": 0.9,
-        "resamples": 500,
-        "seed": 3,
-        "words": "altman",
-        "by": None,
-    }
-    assert made["scale"]["grades"] == ["0", "1", "1+", "2", "3", "4"]
-    assert made["scale"]["values"] == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
-    assert made["read"]["raters"] == ["Kim", "Lee", "Ann"]
-    assert made["read"]["scale"]["declared"] is False
-
-
-def test_estimates_are_called_what_the_register_calls_them(
-    masrel: Caller, wide: Path
-) -> None:
-    call = ("agree", wide, "--coefficients", "all")
-    made = document(masrel(*call, "--json", "-"))["estimates"]
-    rows = table(masrel(*call, "--csv"))
-    for one, row in zip(made, rows, strict=True):
-        entry = COEFFICIENTS[one["coefficient"]]
-        assert (row["coefficient"], row["title"]) == (entry.name, entry.title)
-        assert row["weights"] == one["weights"]
-        assert not one["coefficient"].startswith("icc") or row["weights"] == "identity"
-
-
 def test_what_is_null_has_its_reason(masrel: Caller, tmp_path: Path) -> None:
     path = written(tmp_path, "item,A,B\n1,1,4\n2,4,1\n3,2,3\n4,3,2\n")
     call = ("--coefficients", "all", "--target", "items", "--interval", "analytic")
@@ -109,37 +66,6 @@ def test_what_is_null_has_its_reason(masrel: Caller, tmp_path: Path) -> None:
 
 
 # A table as CSV and LaTeX.
-
-
-def latex(masrel: Caller, folder: Path) -> str:
-    path = written(folder, SESSIONS.replace("first", "50%_{&}~#$^\\"), "a_b&c%.csv")
-    call = ("agree", path, "--by", "session", "--coefficients", "all", "--words")
-    return masrel(*call, "altman", "--target", "items", "--latex", "--explain").out
-
-
-def compiled(folder: Path, text: str) -> str:
-    """Return the log of pdflatex, or skip where there is none."""
-    engine = shutil.which("pdflatex")
-    if engine is None:
-        pytest.skip("pdflatex is not installed")
-    page = written(
-        folder,
-        "\\documentclass{article}\\usepackage{booktabs,longtable}\n"
-        f"\\begin{{document}}\n{text}Table~\\ref{{tab:agreement}}\n\\end{{document}}\n",
-        "page.tex",
-    )
-    done = subprocess.run(
-        [engine, "-halt-on-error", "-interaction=nonstopmode", page.name],
-        cwd=folder, capture_output=True, check=False,
-    )  # fmt: skip
-    log = done.stdout.decode("utf-8", "replace")
-    assert done.returncode == 0, log[-2000:]
-    return log
-
-
-@pytest.mark.slow
-def test_latex_compiles(masrel: Caller, tmp_path: Path) -> None:
-    compiled(tmp_path, latex(masrel, tmp_path))
 
 
 # After the end of a line LaTeX reads [ and * as its own; > and | are other letters in
@@ -164,19 +90,6 @@ def test_latex_of_many_groups_is_a_table_of_pages(
     assert out.count("\\toprule") == 2  # on the first page, and on all others
 
 
-@pytest.mark.slow
-def test_latex_of_many_groups_compiles(masrel: Caller, tmp_path: Path) -> None:
-    groups = [*GROUPS, *map(str, range(60))]
-    rows = [f'"{g}",{i},{i % 2},{i // 2 % 2}' for g in groups for i in range(4)]
-    path = written(tmp_path, "\n".join(["ward,item,A,B", *rows]) + "\n")
-    call = ("agree", path, "--by", "ward", "--each-category", "--symmetry", "--latex")
-    log = compiled(tmp_path, masrel(*call).out)
-    pages = re.search(r"\((\d+) pages", log)
-    assert pages is not None
-    assert int(pages[1]) > 3
-    assert "Float too large" not in log
-
-
 # Notes below a table.
 
 
@@ -186,9 +99,6 @@ def notes(done: Done) -> list[str]:
     rule = next(k for k, line in enumerate(lines) if line.startswith("---"))
     rows = [k for k, line in enumerate(lines) if k > rule and re.search(r" \d+$", line)]
     return lines[rows[-1] + 1 :]
-
-
-# Items 1 to 4 of each clinic have one rating, of A; the others have two or three.
 
 
 @pytest.mark.parametrize(("columns", "most"), [(None, 88), ("60", 60), ("300", 100)])
@@ -246,9 +156,6 @@ def test_a_word_follows_the_interval_that_is_shown(
     assert "by its interval (one-sided)" in masrel(*call, *more, "--csv").err
 
 
-# Sentences.
-
-
 # The offer of an interval.
 
 
@@ -272,37 +179,7 @@ def test_the_command_that_is_offered_gives_an_interval(
     assert "no interval" not in done.err
 
 
-def test_nothing_is_offered_for_what_came_through_a_pipe(
-    masrel: Caller, wide: Path
-) -> None:
-    assert "no interval" in masrel("agree", wide).err
-    reading, writing = os.pipe()
-    os.write(writing, wide.read_bytes())
-    os.close(writing)
-    done = masrel("agree", f"/dev/fd/{reading}")
-    os.close(reading)
-    assert (done.code, done.err) == (0, "")
-
-
 # The register, and what was probably meant.
-
-
-def test_the_register_is_listed_without_a_file(masrel: Caller) -> None:
-    done = masrel("agree", "--coefficients", "list")
-    assert (done.code, done.err) == (0, "")
-    names = [line.split("  ")[0] for line in done.out.splitlines()[2:]]
-    assert names == list(COEFFICIENTS)
-    for words in ("Fleiss' κ", "2 or more", "ICC(A,1)", "any", "none"):
-        assert words in done.out
-
-
-def test_a_coefficient_can_be_asked_for_by_another_name(
-    masrel: Caller, wide: Path
-) -> None:
-    assert "bennett_s, randolph_kappa" in masrel("agree", "--coefficients", "list").out
-    rows = table(masrel("agree", wide, "--coefficients", "maxwell_re", "--csv"))
-    same = table(masrel("agree", wide, "--coefficients", "brennan_prediger", "--csv"))
-    assert rows == same
 
 
 def test_verbs_and_options_are_guessed(masrel: Caller, wide: Path) -> None:
@@ -332,6 +209,3 @@ def test_a_shell_completes_verbs_and_options(wide: Path) -> None:
     assert "plain,agree" in completed("masrel", "ag")
     assert "plain,--coefficients" in completed("masrel", "agree", str(wide), "--co")
     assert "plain,items" in completed("masrel", "agree", str(wide), "--target", "i")
-
-
-# Grades without an order.

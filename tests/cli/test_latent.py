@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from masrel.plots._style import STYLE
-from tests.architecture.test_imports import loaded_after
 from tests.cli.process import Caller
 
 SAMPLER = "masrel.intervals.latent._sampler"
@@ -50,24 +49,6 @@ def wide(tmp_path: Path) -> Path:
     return file
 
 
-def test_the_table_says_all_there_is_with_the_other_prior_beside(
-    masrel: Caller, wide: Path
-) -> None:
-    done = masrel("latent", wide, "--items", "fixed", "--quiet")
-    assert (done.code, done.err) == (0, "")
-    lines = done.out.splitlines()
-    assert lines[0] == f"Latent-trait model of the ratings in {wide}"
-    for start in (
-        "kappa ", "severity           A", "threshold          1+ | 2",
-        "bias               Lee", "noise              Ann",
-        "share of variance  items", "Kappa: agreement of two new raters on these",
-        "Other prior: share of the items ~ Beta(1, 1)", "The model makes ratings",
-    ):  # fmt: skip
-        assert any(line.startswith(start) for line in lines), start
-    assert "told by its grade 1+" in done.out
-    assert "seed 0." in lines[-1]
-
-
 def test_json_and_csv_keep_every_digit_and_repeat(masrel: Caller, wide: Path) -> None:
     one, two = (
         masrel("latent", wide, "--items", "fixed", "--json", "-", "--seed", 3)
@@ -88,14 +69,6 @@ def test_json_and_csv_keep_every_digit_and_repeat(masrel: Caller, wide: Path) ->
     assert float(rows[0]["other_low"]) == found["other"]["kappa"]["interval"]["low"]
 
 
-def test_one_prior_has_no_other_and_random_items_speak_of_new_ones(
-    masrel: Caller, wide: Path
-) -> None:
-    done = masrel("latent", wide, "--items", "random", "--one-prior", "--quiet")
-    assert "Other prior" not in done.out
-    assert "two new raters on new items like these" in done.out
-
-
 def test_the_figure_shows_items_thresholds_and_raters(
     masrel: Caller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -110,11 +83,6 @@ def test_the_figure_shows_items_thresholds_and_raters(
     drawn = figure.read_text("utf-8")
     for words in ("SIMULATED DATA", "severity", "2 | 3", "bias of raters"):
         assert words in drawn
-
-
-def test_progress_is_shown_at_a_terminal(masrel: Caller, wide: Path) -> None:
-    done = masrel.at_a_terminal("latent", wide, "--items", "fixed", "--one-prior")
-    assert "sampling" in done.err
 
 
 def test_without_a_terminal_a_line_says_how_long_and_others_how_far(
@@ -159,22 +127,3 @@ def test_what_cannot_be_done_is_one_sentence(
     assert done.out == ""
     assert said in done.err
     assert done.err.count("\n") == 1
-
-
-def test_too_few_steps_are_a_failed_run(
-    masrel: Caller, wide: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(f"{SAMPLER}.MIN_ESS", 1e9)
-    monkeypatch.setattr(
-        "masrel.intervals.latent._trait.latent_trait.__kwdefaults__",
-        {**_defaults(), "max_steps": 50},
-    )
-    done = masrel("latent", wide, "--items", "fixed", "--quiet")
-    assert done.code == 1
-    assert "more steps are needed" in done.err
-
-
-def test_help_and_a_table_load_nothing_that_draws() -> None:
-    code = "from masrel.cli import cli\ncli(['latent', '--help'])"
-    heavy = {"matplotlib", "emcee", "scipy", "pandas", "arviz_stats"}
-    assert loaded_after(code) & heavy == set()
