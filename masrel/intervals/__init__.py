@@ -7,16 +7,17 @@ In: a coefficient's name, its ratings, and the `target` population. Out: an
 from typing import TYPE_CHECKING
 
 from masrel.intervals.analytic import analytic
-from masrel.intervals.auto import estimate
 from masrel.intervals.bootstrap import bootstrap
+from masrel.intervals.choose import estimate
 from masrel.intervals.contrasts import (
     Differences,
     difference,
     difference_test,
     differences,
+    donner_test,
+    equality_test,
 )
 from masrel.intervals.diagnosis import Diagnosis, diagnose
-from masrel.intervals.equality import donner_test, equality_test
 from masrel.intervals.jackknife import jackknife
 from masrel.intervals.posterior import posterior
 from masrel.intervals.quantity import Quantity

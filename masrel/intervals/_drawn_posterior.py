@@ -16,9 +16,9 @@ from masrel.agreement._engine import Floats
 from masrel.errors import ParameterError
 from masrel.estimates import Distribution, Interval
 from masrel.intervals._dirichlet_multinomial import DirichletMultinomial
-from masrel.intervals._problem import IntervalProblem, recorded_generator
-from masrel.intervals._resamples import Resamples, distinct_features
+from masrel.intervals._question import IntervalProblem, recorded_generator
 from masrel.intervals._rho import PRIOR_SHAPES, Prior, RhoPosterior
+from masrel.intervals.bootstrap import _distinct_features, _Resamples
 
 MIN_DRAWS = 100
 DEFAULT_DRAWS, SEED = 2_000, 1
@@ -55,7 +55,7 @@ def alike_interval(
     pairs = np.indices((q, q)).reshape(2, -1)
     weights = (1.0 - rho) * shares[:, pairs[0]] * shares[:, pairs[1]]
     weights[:, pairs[0] == pairs[1]] += rho * shares
-    rows = problem.features(dataclasses.replace(problem.coded, codes=pairs.T))
+    rows = problem.features(pairs.T)
     values = problem.values(_WITHOUT_END * (weights @ rows))
     interval = _interval(problem, values, method, prior.description, one_sided)
     return dataclasses.replace(interval, seed=seed)
@@ -74,7 +74,7 @@ def patterns_interval(
     if reason is not None:
         return _undefined(problem, reason, method)
     generator, seed = recorded_generator(rng)
-    rows, often = distinct_features(problem.rows, problem.freq)
+    rows, often = _distinct_features(problem.rows, problem.freq)
     added, worth = _prior_patterns(problem)
     rows, shapes = np.concatenate([rows, added]), np.concatenate([often, worth])
     n_left, values, size = _checked(n_draws), [], max(1, _AT_ONCE // shapes.size)
@@ -159,10 +159,7 @@ def _prior_patterns(problem: IntervalProblem) -> tuple[Floats, Floats]:
     most, one = np.array(list(permutations(range(q), 2))).T
     codes = np.repeat(alike[most], r, axis=0)  # (q (q - 1) r, r)
     codes[np.arange(len(codes)), np.tile(np.arange(r), most.size)] = np.repeat(one, r)
-    of_alike, of_one = (
-        problem.features(dataclasses.replace(problem.coded, codes=rows))
-        for rows in (alike, codes)
-    )
+    of_alike, of_one = (problem.features(rows) for rows in (alike, codes))
     of_one = of_one.reshape(most.size, r, -1).mean(axis=1)
     worth = np.repeat([0.5 * _WORTH / q, 0.5 * _WORTH / most.size], [q, most.size])
     return np.concatenate([of_alike, of_one]), worth
@@ -177,7 +174,7 @@ def _interval(
 ) -> Interval:
     drawn = values[np.isfinite(values)]
     tail = (1.0 - problem.level) * (1.0 if one_sided else 0.5)
-    draws = Resamples.of(drawn)
+    draws = _Resamples.of(drawn)
     low, high = (
         (draws.quantile(share), draws.error(share)) for share in (tail, 1.0 - tail)
     )

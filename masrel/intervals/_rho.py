@@ -13,7 +13,6 @@ from masrel.agreement._engine import Floats
 from masrel.errors import ParameterError
 from masrel.estimates import Distribution, Interval
 from masrel.intervals._dirichlet_multinomial import DirichletMultinomial, RhoDensity
-from masrel.intervals._problem import IntervalProblem
 from masrel.intervals._quadrature import (
     TOLERANCE,
     LineDistribution,
@@ -21,6 +20,7 @@ from masrel.intervals._quadrature import (
     line_distribution,
     solve_quantile,
 )
+from masrel.intervals._question import IntervalProblem
 
 PriorName = Literal["uniform", "jeffreys"]
 """Prior of ρ: U(0, 1), or Beta(1/2, 1/2), the prior of Jeffreys for a probability."""

@@ -11,7 +11,7 @@ from masrel.agreement._engine import Floats
 from masrel.agreement._weights import MANY
 from masrel.errors import ParameterError
 from masrel.estimates import Interval
-from masrel.intervals._problem import IntervalProblem, recorded_generator
+from masrel.intervals._question import IntervalProblem, recorded_generator
 from masrel.intervals._rho import FEW_ITEMS, extended
 from masrel.intervals._table_quadrature import (
     CHANCE_AGREEMENT,
@@ -210,7 +210,7 @@ def _check(problem: IntervalProblem, n_draws: int) -> None:
 def _table(problem: IntervalProblem) -> tuple[Floats, int]:
     # -> items per pair of categories, (n_categories, n_categories), and those of one
     # rating that matter otherwise
-    codes, freq = problem.patterns.codes, problem.freq
+    codes, freq = problem.codes, problem.freq
     paired = (codes >= 0).all(axis=1)
     cells = np.zeros((problem.coded.n_categories,) * 2)
     cells[tuple(codes[paired].T)] = freq[paired]  # distinct rows: one a cell

@@ -1,21 +1,31 @@
-"""Analytic intervals from the delta-method standard error: other items, same raters."""
+"""Analytic intervals from a standard error: other items, same raters."""
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Literal, get_args
+from typing import Literal
 
-from masrel.agreement import Label, Metric, WeightsLike
-from masrel.agreement._engine import NO_SPREAD, ONE_PAIR
+import numpy as np
+
+from masrel.agreement import COEFFICIENTS, Label, Metric, WeightsLike
+from masrel.agreement._engine import (
+    NO_SPREAD,
+    ONE_PAIR,
+    disagreement_within,
+    standard_error,
+)
+from masrel.agreement.category import _null_error
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval, Target, Unit
-from masrel.intervals._clusters import ClusterSums, clustered_error, clusters_of
-from masrel.intervals._conventions import Convention, error_by
-from masrel.intervals._problem import (
+from masrel.intervals._question import (
     HELD,
+    ClusterSums,
+    Integers,
     IntervalProblem,
     Statistic,
+    check_one_of,
+    cluster_codes,
     pose_problem,
     warn_small,
 )
@@ -30,7 +40,10 @@ _METHODS: dict[_Distribution, str] = {
     "fisher": "t(n-1) on Fisher's z",
 }
 
-_NAMES: dict[Convention, str] = {
+_Convention = Literal["irrcac", "spss", "over_n"]
+"""Whose standard error an interval is made of, where it is not our own."""
+
+_NAMES: dict[_Convention, str] = {
     "irrcac": "irrCAC's error",
     "spss": "SPSS's error",
     "over_n": "delta method over n",
@@ -47,7 +60,7 @@ def analytic(
     metric: Metric | None = None,
     level: float = 0.95,
     distribution: _Distribution = "t",
-    convention: Convention | None = None,
+    convention: _Convention | None = None,
     clusters: object = None,
 ) -> Interval:
     """Compute an interval from a standard error.
@@ -134,15 +147,8 @@ def analytic(
     >>> round(interval.low, 3), round(interval.high, 3)
     (0.171, 0.829)
     """
-    if distribution not in get_args(_Distribution):
-        raise ParameterError(
-            f"distribution: needs one of {', '.join(get_args(_Distribution))}, "
-            f"got {distribution!r}"
-        )
-    if convention not in (None, *_NAMES):
-        raise ParameterError(
-            f"convention: needs one of {', '.join(_NAMES)}, got {convention!r}"
-        )
+    check_one_of("distribution", distribution, _METHODS)
+    check_one_of("convention", convention or "over_n", _NAMES)
     problem = pose_problem(
         coefficient,
         ratings,
@@ -151,7 +157,6 @@ def analytic(
         weights=weights,
         metric=metric,
         level=level,
-        delta=convention is None and clusters is None,
     )
     if target != "items":
         raise ParameterError(
@@ -163,72 +168,130 @@ def analytic(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UndefinedStatisticWarning)  # given below
         estimate = problem.entry(problem.coded, weights=weights)
-    method = f"delta method, {_METHODS[distribution]}"
+    unit: Unit | None = None
+    method, error = "delta method", estimate.standard_error
+    n, n_items = estimate.n_items_paired, estimate.n_items
     if convention is not None:
-        method = f"{_NAMES[convention]}, {_METHODS[distribution]}"
-        if estimate.reason is None and estimate.n_items > 1:
-            error = error_by(convention, problem, estimate)
-            estimate = replace(estimate, standard_error=error)
-    n_clusters = None
+        method, error = _NAMES[convention], _error_by(convention, problem, estimate)
+    method = f"{method}, {_METHODS[distribution]}"
     if clusters is not None:
         if convention is not None:
             raise ParameterError(f'clusters: needs no convention, got "{convention}"')
-        codes = clusters_of(problem, clusters)
-        n_clusters = ClusterSums.of(problem, codes).n_paired
-        if estimate.reason is None and n_clusters > 1:
-            by_cluster = clustered_error(problem, codes)
-            estimate = replace(estimate, standard_error=by_cluster)
-    return _interval_around_estimate(
-        problem, estimate, distribution, method, n_clusters
-    )
-
-
-def _interval_around_estimate(
-    problem: IntervalProblem,
-    estimate: Estimate,
-    distribution: _Distribution,
-    method: str,
-    n_clusters: int | None,
-) -> Interval:
-    unit: Unit | None = None
-    if n_clusters is not None:
         method, unit = f"{method}, of clusters", "clusters"
-    reason = _why_undefined(estimate, n_clusters)
-    if reason is not None:
-        return problem.undefined(reason, method=method, unit=unit)
-    df = estimate.n_items_paired - 1
-    if n_clusters is not None:
-        df = n_clusters - 1
-        notes = warn_small(n_clusters, 10, "clusters")
-    else:
-        notes = warn_small(df + 1, 10, "items", estimate.n_items)
+        error, n = _clustered_error(problem, cluster_codes(problem, clusters))
     lowest = None
     if distribution in ("logit", "fisher"):
         # artanh x is half the logit of (x + 1)/2, so that both give the same ends
         lowest = problem.entry.lowest if distribution == "logit" else -1.0
-        if not lowest < estimate.value < 1.0:
-            reason = "the estimate is not inside the ends of the parameter space"
-            return problem.undefined(reason, method=method, unit=unit)
-    if distribution == "normal":
-        from scipy.special import ndtri  # loaded only when an interval needs it
-
-        quantile = float(ndtri(0.5 + 0.5 * problem.level))
-    else:
-        quantile = problem.student_t(df)
-    half = quantile * estimate.standard_error
-    return problem.around(
-        estimate.value, half, lowest=lowest, method=method, unit=unit, notes=notes
-    )
+    reason = estimate.reason or _why_undefined(estimate, error, n, lowest)
+    if reason is not None:
+        return problem.undefined(reason, method=method, unit=unit)
+    notes = warn_small(n, 10, unit or "items", None if unit else n_items)
+    df = math.inf if distribution == "normal" else n - 1
+    return problem.by_t(error, df, lowest=lowest, method=method, unit=unit, notes=notes)
 
 
-def _why_undefined(estimate: Estimate, n_clusters: int | None) -> str | None:
-    """Return why there is no interval, if there is none."""
-    if estimate.reason is not None:
-        return estimate.reason
+def _why_undefined(
+    estimate: Estimate, error: float, n: int, lowest: float | None
+) -> str | None:
     if estimate.n_items_paired < 2:
         return ONE_PAIR
-    if math.isnan(estimate.standard_error):
-        return "with one of the raters left out the estimate is undefined"
-    if n_clusters is not None and n_clusters < 2:
+    if n < 2:
         return "one cluster has no standard error"
-    return None if estimate.standard_error > 0.0 else NO_SPREAD
+    if not error > 0.0:
+        return NO_SPREAD
+    if lowest is not None and not lowest < estimate.value < 1.0:
+        return "the estimate is not inside the ends of the parameter space"
+    return None
+
+
+def _clustered_error(problem: IntervalProblem, clusters: Integers) -> tuple[float, int]:
+    """Return the delta-method error with clusters as the sample, and how many."""
+    # √[n/(n - 1) Σ_c s_c²], s_c the sum of the influences of a cluster's items:
+    # Vanbelle, S. (2017). Comparing dependent kappa coefficients obtained on multilevel
+    # data. Biometrical Journal, 59(5), 1016-1034. https://doi.org/10.1002/bimj.201600093
+    of = ClusterSums.of(problem, clusters)
+    moves = of.sums[of.known] @ problem.slopes(problem.sums)
+    return standard_error(moves, np.ones(len(moves), dtype=np.int64), None), of.n_paired
+
+
+# -- standard errors as other programs print them --------------------------------------
+
+
+def _over_n(problem: IntervalProblem, estimate: Estimate) -> float:
+    # items with a pair in a test-retest: others are no part of that sample
+    n = problem.n_items if problem.entry.shape == "pairs" else estimate.n_items
+    return estimate.standard_error * math.sqrt((n - 1) / n)
+
+
+def _irrcac(problem: IntervalProblem, estimate: Estimate) -> float:
+    # it takes n u_i + κ (s_i n/n' - 1), s_i = 1 with a pair, as n' items have
+    moves = problem.item_features.dot(problem.slopes(problem.sums))
+    paired = (problem.codes >= 0).sum(axis=1) > 1
+    moves += estimate.value * (paired / estimate.n_items_paired - 1.0 / problem.n_items)
+    return standard_error(moves, problem.freq, None)
+
+
+def _irrcac_of_alpha(problem: IntervalProblem, _estimate: Estimate) -> float:
+    # Of the m items with r_i ≥ 2 ratings, r the mean of those and n their sum, with P
+    # the agreement and p_e what irrCAC takes for chance,
+    #   x_i = [P_i - p_a (r_i - r)/r - p_e - 2 (1 - α') (e_i - p_e)] / (1 - p_e),
+    #   P_i = Σ_k n_ik (Σ_l w_kl n_il - 1) / (r (r_i - 1)),  P' their mean,
+    #   e_i = Σ_k n_ik Σ_l w_kl p_l / r - p_e (r_i - r)/r,   α' = (P' - p_e)/(1 - p_e),
+    #   p_a = P' + (1 - P')/n,   SE² = Σ (x_i - α')² / (m (m - 1)).
+    # It takes the factor of alpha for small samples into p_a, and out of all else.
+    # every item that matters has a pair of ratings
+    codes, v, freq = problem.codes[problem.freq > 0], problem.v, problem.freq
+    freq = freq[freq > 0]
+    rated = codes >= 0
+    size = rated.sum(axis=1)
+    m, n = int(freq.sum()), float(freq @ size)
+    mean = n / m
+    often = np.broadcast_to(freq[:, None], codes.shape)[rated]
+    p = np.bincount(codes[rated], often, minlength=len(v)) / n
+    others = p @ v
+    p_e = 1.0 - others @ p
+    within = disagreement_within(codes, v, None)
+    of_items = size / mean - within / (mean * (size - 1.0))
+    agreement = freq @ of_items / m
+    p_a = agreement + (1.0 - agreement) / n
+    alpha = (agreement - p_e) / (1.0 - p_e)
+    excess = (size - mean) / mean
+    between = np.where(rated, others[codes], 0.0).sum(axis=1)
+    chance = (size - between) / mean - p_e * excess
+    x = of_items - p_a * excess - p_e - 2.0 * (1.0 - alpha) * (chance - p_e)
+    squares = freq @ (x / (1.0 - p_e) - alpha) ** 2
+    return math.sqrt(squares / (m * (m - 1.0)))
+
+
+def _null(problem: IntervalProblem, _estimate: Estimate) -> float:
+    return _null_error(problem.item_counts(), problem.n_raters)
+
+
+_RATERS_ALIKE = ("percent_agreement", "fleiss_kappa", "brennan_prediger", "gwet_ac")
+
+_ErrorOf = Callable[[IntervalProblem, Estimate], float]
+
+_ERRORS: dict[str, dict[str, _ErrorOf]] = {
+    "irrcac": {
+        **dict.fromkeys((*_RATERS_ALIKE, "conger_kappa"), _irrcac),
+        "krippendorff_alpha": _irrcac_of_alpha,
+        **dict.fromkeys(("cohen_kappa", "scott_pi"), _over_n),
+    },
+    # of several raters that of the hypothesis that κ is 0: Fleiss, Nee, Landis (1979)
+    "spss": {"cohen_kappa": _over_n, "fleiss_kappa": _null},
+    "over_n": dict.fromkeys(COEFFICIENTS, _over_n),
+}
+
+
+def _error_by(
+    convention: _Convention, problem: IntervalProblem, estimate: Estimate
+) -> float:
+    function = _ERRORS[convention].get(problem.entry.name)
+    if function is None or (function is _null and not problem.unweighted):
+        raise ParameterError(
+            f'convention: "{convention}" has no error of {problem.entry.title} with '
+            f"these weights; it has one of {', '.join(_ERRORS[convention])}"
+        )
+    is_defined = estimate.reason is None and estimate.n_items > 1
+    return function(problem, estimate) if is_defined else math.nan

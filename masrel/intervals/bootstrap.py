@@ -8,30 +8,26 @@ from statistics import NormalDist
 from typing import Literal, cast, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
+from masrel._input import refuse
 from masrel.agreement import Label, Metric, WeightsLike
+from masrel.agreement._distances import Distances
 from masrel.agreement._engine import Floats
 from masrel.agreement._labels import shown
 from masrel.errors import ParameterError
 from masrel.estimates import Distribution, Interval, Target
-from masrel.intervals._clusters import ClusterSums, clusters_of
-from masrel.intervals._problem import (
+from masrel.intervals._question import (
     ROUNDING,
+    ClusterSums,
     Integers,
     IntervalProblem,
     Statistic,
-    check_rng,
+    check_one_of,
+    cluster_codes,
     pose_problem,
     recorded_generator,
     warn_small,
-)
-from masrel.intervals._resamples import (
-    MAX_ALL,
-    Resamples,
-    all_resamples,
-    count_compositions,
-    distinct_features,
-    draw_resamples,
 )
 
 _Kind = Literal["percentile", "basic", "bca", "studentized"]
@@ -41,6 +37,8 @@ _Exact = Literal["auto"] | bool
 """Whether all resamples are taken: always, never, or if there are few enough."""
 
 _NO_SPREAD = 1e-9  # of the standard error of the estimate: rounding, not spread
+_MAX_ALL = 300_000  # distinct resamples that are all taken rather than drawn
+_AT_ONCE = 1 << 20  # numbers held at once while values are computed
 
 
 def bootstrap(
@@ -79,7 +77,7 @@ def bootstrap(
     level : float, optional
         Nominal level.
     n_resamples : int, optional
-        Resamples where they are drawn, at least 100.
+        _Resamples where they are drawn, at least 100.
     kind : {"percentile", "basic", "bca", "studentized"}
         How endpoints come from the resamples.
     exact : {"auto", True, False}, optional
@@ -119,7 +117,7 @@ def bootstrap(
 
     Notes
     -----
-    Resamples on which the coefficient is undefined, such as one item drawn n times,
+    _Resamples on which the coefficient is undefined, such as one item drawn n times,
     are left out and counted in `n_undefined`; the probabilities of the others are
     scaled up to 1. An exact interval counts distinct resamples there, and a note says
     how probable they are. When raters are resampled, a rater is never paired with a
@@ -160,8 +158,24 @@ def bootstrap(
     >>> interval.seed, interval.n_resamples, interval.low < 0.5 < interval.high
     (1, 10000, True)
     """
-    _check_options(kind, exact, n_resamples)
-    check_rng(rng)
+    check_one_of("kind", kind, get_args(_Kind))
+    is_whole = isinstance(n_resamples, int | np.integer)
+    refuse(
+        (
+            not (exact is True or exact is False or exact == "auto"),
+            f'exact: needs "auto", True or False, got {exact!r}',
+        ),
+        (
+            not is_whole or isinstance(n_resamples, bool) or n_resamples < 100,
+            "n_resamples: needs a whole number of at least 100, got "
+            f"{shown(n_resamples)}",
+        ),
+        (
+            kind == "studentized" and target != "items",
+            'kind: "studentized" needs the standard error of every resample, which '
+            'there is for target "items" alone',
+        ),
+    )
     problem = pose_problem(
         coefficient,
         ratings,
@@ -171,74 +185,76 @@ def bootstrap(
         metric=metric,
         level=level,
     )
-    units = _units(problem, clusters)
+    of_items = target == "items" or clusters is not None
+    units = _item_units(problem, clusters) if of_items else _rater_units(problem)
     method = f"{kind} bootstrap{units.words}"
-    if kind == "studentized" and units.rows is None:
-        raise ParameterError(
-            'kind: "studentized" needs the standard error of every resample, which '
-            'there is for target "items" alone'
-        )
-    value, error = problem.value, math.nan
-    values = units.values
-    reason = "the estimate itself is undefined" if math.isnan(value) else None
+    values, error = units.values, math.nan
+    reason = "the estimate itself is undefined" if math.isnan(problem.value) else None
     if reason is None and kind == "studentized":
-        (error,) = _standard_errors(
+        error = _standard_errors(
             problem, units, units.freqs[0][None].astype(np.float64)
-        )
+        )[0]
         values = partial(_studentized, problem, units, error)
         if not error > ROUNDING:
             reason = "the estimate has no standard error to studentize by"
     if reason is not None:
         return problem.undefined(reason, method=method, unit=target)
-    n_distinct = math.prod(
-        count_compositions(int(of.sum()), of.size) for of in units.freqs
-    )
-    seed = None
-    if exact is not False and n_distinct <= MAX_ALL:
-        resamples = all_resamples(units.freqs, values, units.width)
+    resamples, n_distinct, seed = _resampled(units, values, exact, n_resamples, rng)
+    words = f"bootstrap distribution, {n_resamples - resamples.n_undefined} resamples"
+    if resamples.n_drawn is None:
         method += ", exact"
         words = f"exact bootstrap distribution, {n_distinct} resamples"
-    elif exact is True:
-        raise ParameterError(
-            f"exact: there are more than {MAX_ALL} distinct resamples, too many; draw "
-            "some of them instead"
-        )
-    else:
-        generator, seed = recorded_generator(rng)
-        resamples = draw_resamples(
-            units.freqs, values, units.width, n_resamples, generator
-        )
-        n_defined = n_resamples - resamples.n_undefined
-        words = f"bootstrap distribution, {n_defined} resamples"
-    skew = _acceleration(problem, units) if kind == "bca" else 0.0
-    ends = _ends(kind, problem, resamples, error, skew)
+    ends = _ends(kind, problem, units, resamples, error)
     if isinstance(ends, str):
         return problem.undefined(ends, method=method, unit=target)
     (low, high), errors = ends
     notes = (*units.notes, *_notes(resamples, n_distinct, low == high))
-    return replace(
+    interval = replace(
         problem.confidence(low, high, method=method, unit=target, notes=notes),
         n_resamples=resamples.n_drawn,
         n_undefined=resamples.n_undefined,
         monte_carlo_error=None if resamples.n_drawn is None else errors,
         seed=seed,
-        distribution=None if kind == "studentized" else _distribution(resamples, words),
     )
+    if kind == "studentized":
+        return interval
+    for array in (resamples.values, resamples.weights):
+        array.flags.writeable = False
+    distribution = Distribution(
+        values=resamples.values,
+        weights=resamples.weights,
+        continuous=False,
+        words=words,
+    )
+    return replace(interval, distribution=distribution)
 
 
-def _check_options(kind: _Kind, exact: _Exact, n_resamples: int) -> None:
-    if kind not in get_args(_Kind):
+def _resampled(
+    units: "_Units",
+    values: Callable[..., Floats],
+    exact: _Exact,
+    n_resamples: int,
+    rng: np.random.Generator | int | None,
+) -> tuple["_Resamples", int, int | None]:
+    """Return values of resamples, how many distinct ones there are, and the seed."""
+    if rng is not None:
+        recorded_generator(rng)  # or an error, even where nothing is drawn
+    n_distinct = math.prod(
+        _count_compositions(int(of.sum()), of.size) for of in units.freqs
+    )
+    if exact is not False and n_distinct <= _MAX_ALL:
+        return _all_resamples(units.freqs, values, units.width), n_distinct, None
+    if exact is True:
         raise ParameterError(
-            f"kind: needs one of {', '.join(get_args(_Kind))}, got {kind!r}"
+            f"exact: there are more than {_MAX_ALL} distinct resamples, too many; draw "
+            "some of them instead"
         )
-    if not (exact is True or exact is False or exact == "auto"):
-        raise ParameterError(f'exact: needs "auto", True or False, got {exact!r}')
-    is_whole = isinstance(n_resamples, int | np.integer)
-    if not is_whole or isinstance(n_resamples, bool) or n_resamples < 100:
-        raise ParameterError(
-            f"n_resamples: needs a whole number of at least 100, "
-            f"got {shown(n_resamples)}"
-        )
+    generator, seed = recorded_generator(rng)
+    drawn = _draw_resamples(units.freqs, values, units.width, n_resamples, generator)
+    return drawn, n_distinct, seed
+
+
+# -- what is drawn ---------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -249,80 +265,82 @@ class _Units:
     freqs: tuple[Integers, ...] = field(repr=False)
     # how often each is drawn, (b, n_units) of each sample, to values (b,)
     values: Callable[..., Floats]
+    # the values without one of the units, of each sample, (n_units,)
+    without: Callable[[], tuple[Floats, ...]]
     rows: Floats | None = field(default=None, repr=False)  # features of items, clusters
     width: int  # numbers that one resample takes
-    notes: tuple[str, ...] = ()  # that they are few
+    notes: tuple[str, ...]  # that they are few
     words: str = ""
 
 
-def _units(problem: IntervalProblem, clusters: object) -> _Units:
-    """Return what is resampled, with a warning where there is little of it."""
-    if clusters is not None:
-        sums = ClusterSums.of(problem, clusters_of(problem, clusters))
-        n = int(sums.known.sum())
-        few = warn_small(sums.n_paired, 16, "clusters", n)
-        freq = np.ones(n, dtype=np.int64)
-        units = _rows_drawn(problem, sums.sums[sums.known], freq, few)
-        return replace(units, words=f" of {n} clusters")
-    if problem.target == "items":
+def _item_units(problem: IntervalProblem, clusters: object) -> _Units:
+    """Return items, or clusters of them, with a warning where there are few."""
+    rows, freq, words = problem.rows, problem.freq, ""
+    if clusters is None:
         few = warn_small(problem.n_paired_items, 16, "items", problem.n_items)
-        return _rows_drawn(problem, problem.rows, problem.freq, few)
-    n_raters = problem.patterns.codes.shape[1]
-    raters = np.ones(n_raters, dtype=np.int64)
-    sums_of = problem.rater_sums()  # or an error
-    few = warn_small(problem.n_paired_raters, 5, "raters", problem.n_raters)
-    if problem.target == "raters":
-        return _Units(
-            freqs=(raters,),
-            values=lambda counts: problem.values(sums_of(counts)),
-            width=n_raters + problem.sums.size,
-            notes=few,
-        )
-    few_items = warn_small(problem.n_paired_items, 16, "items", problem.n_items)
+    else:
+        sums = ClusterSums.of(problem, cluster_codes(problem, clusters))
+        rows, freq = sums.sums, sums.known.astype(np.int64)
+        few = warn_small(sums.n_paired, 16, "clusters", int(freq.sum()))
+        words = f" of {freq.sum()} clusters"
+    rows, freq = _distinct_features(rows, freq)
     return _Units(
-        freqs=(problem.freq, raters),
-        values=problem.crossed_values(),
-        width=problem.freq.size * (3 * len(problem.v) + 6) + n_raters,
+        freqs=(freq,),
+        values=lambda counts: problem.values(counts @ rows),
+        without=lambda: (problem.values(problem.sums - rows),),
+        rows=rows,
+        width=freq.size + 4 * rows.shape[1],
+        notes=few,
+        words=words,
+    )
+
+
+def _rater_units(problem: IntervalProblem) -> _Units:
+    """Return raters, or items and raters, with a warning where there are few."""
+    formula, v, (fewest, most) = problem.formula, problem.v, problem.entry.n_raters
+    if isinstance(v, Distances):
+        raise ParameterError(
+            f"target: raters of {len(v)} different grades are left out, but not "
+            "resampled; use the jackknife"
+        )
+    if formula.rater_sums is None or formula.crossed_sums is None or most == fewest:
+        raise ParameterError(
+            f"target: raters of {problem.entry.title} cannot be resampled without "
+            "pairing a rater with a copy of itself"
+        )
+    is_item = problem.freq > 0
+    codes, freq = problem.codes[is_item], problem.freq[is_item]
+    few = warn_small(problem.n_paired_raters, 5, "raters", problem.n_raters)
+    sums_of = formula.rater_sums(codes, freq, v)
+    raters = _Units(
+        freqs=(np.ones(codes.shape[1], dtype=np.int64),),
+        values=lambda taken: problem.values(sums_of(taken)),
+        without=lambda: (problem.values(sums_of(1.0 - np.eye(codes.shape[1]))),),
+        width=codes.shape[1] + problem.sums.size,
+        notes=few,
+    )
+    if problem.target == "raters":
+        return raters
+    few_items = warn_small(problem.n_paired_items, 16, "items", problem.n_items)
+    crossed, rows = formula.crossed_sums(codes, v), problem.rows[is_item]
+    return _Units(
+        freqs=(freq, *raters.freqs),
+        values=lambda items, taken: problem.values(crossed(items, taken)),
+        without=lambda: (problem.values(problem.sums - rows), *raters.without()),
+        width=freq.size * (3 * len(v) + 6) + codes.shape[1],
         notes=(*few_items, *few),
         words=" of items and raters",
     )
 
 
-def _rows_drawn(
-    problem: IntervalProblem, rows: Floats, freq: Integers, few: tuple[str, ...]
-) -> _Units:
-    """Return items or clusters with their features."""
-    rows, freq = distinct_features(rows, freq)
-    return _Units(
-        freqs=(freq,),
-        values=lambda counts: problem.values(counts @ rows),
-        rows=rows,
-        width=freq.size + 4 * rows.shape[1],
-        notes=few,
-    )
-
-
-def _acceleration(problem: IntervalProblem, units: _Units) -> float:
-    """Return a sixth of the skewness of a sum of what the units move."""
-    # of independent samples, with l/n ≈ (n - 1)/n (mean - value without one)
-    # [Efron and Tibshirani (1993), (14.15), for one]
-    cubes = squares = 0.0
-    all_there = [freq.astype(np.float64) for freq in units.freqs]
-    for k, freq in enumerate(all_there):
-        if units.rows is not None:
-            values = problem.values_without(problem.sums, units.rows)
-        else:
-            without = [np.tile(of, (freq.size, 1)) for of in all_there]
-            without[k] = without[k] - np.eye(freq.size)
-            values = units.values(*without)
-        known = ~np.isnan(values)
-        values, freq = values[known], freq[known]
-        n = freq.sum()
-        if n > 0:
-            moves = (n - 1.0) / n * (freq @ values / n - values)
-            cubes += float(freq @ moves**3)
-            squares += float(freq @ moves**2)
-    return cubes / (6.0 * squares**1.5) if squares > 0.0 else 0.0
+def _distinct_features(rows: Floats, freq: Integers) -> tuple[Floats, Integers]:
+    """Put items, or clusters, with equal features together; those of none go."""
+    rows, freq = rows[freq > 0], freq[freq > 0]
+    order = np.lexsort(rows.T[::-1])
+    is_first = np.ones(len(rows), dtype=bool)
+    is_first[1:] = (rows[order[1:]] != rows[order[:-1]]).any(axis=1)
+    first = np.flatnonzero(is_first)
+    return rows[order[first]], np.add.reduceat(freq[order], first)
 
 
 def _standard_errors(problem: IntervalProblem, units: _Units, counts: Floats) -> Floats:
@@ -347,18 +365,17 @@ def _studentized(
     return np.where(has_none & ~np.isnan(off), infinite, ratio)
 
 
-_Ends = tuple[tuple[float, float], tuple[float, float]]
-"""The ends of an interval, and their Monte Carlo errors."""
+# -- the ends --------------------------------------------------------------------------
 
 
 def _ends(
     kind: _Kind,
     problem: IntervalProblem,
-    resamples: Resamples,
+    units: _Units,
+    resamples: "_Resamples",
     error: float,
-    skew: float,
-) -> _Ends | str:
-    """Return the ends, or why there are none."""
+) -> tuple[tuple[float, float], tuple[float, float]] | str:
+    """Return the ends and their Monte Carlo errors, or why there are none."""
     # [1] Efron, B., Tibshirani, R. J. (1993). An Introduction to the Bootstrap.
     # [2] Davison, A. C., Hinkley, D. V. (1997). Bootstrap Methods and their
     # Application.
@@ -366,49 +383,52 @@ def _ends(
     if not (values.size and values[-1] - values[0] > ROUNDING):
         return "every resample gives the same value or none, so there is no spread"
     tail, share = 0.5 * (1.0 - problem.level), 0.5
-    levels, pulls = (tail, 1.0 - tail), (0.0, 0.0)
+    positions, pulls = [tail, 1.0 - tail], [0.0, 0.0]
     if kind == "bca":
         share = resamples.share_below(value)
         if not 0.0 < share < 1.0:
             return "all resamples lie on one side of the estimate, so BCa has no bias"
-        levels = _bca_levels(problem.level, share, skew)
-        step = 1e-4 * min(share, 1.0 - share)
-        after, before = (
-            np.array(_bca_levels(problem.level, share + by, skew))
-            for by in (step, -step)
-        )
-        pulls = tuple(((after - before) / (2.0 * step)).tolist())
-    first, last = (resamples.quantile(at) for at in levels)
-    errors = [
-        resamples.error(at, pull, share) for at, pull in zip(levels, pulls, strict=True)
-    ]
+        normal, skew = NormalDist(), _acceleration(units)
+        bias = normal.inv_cdf(share)  # z0, (14.14) of [1]
+        for k, z in enumerate(map(normal.inv_cdf, positions)):
+            stretch = 1.0 - skew * (bias + z)
+            if stretch <= 0.0:  # beyond its pole (14.10) says nothing: the last value
+                positions[k] = 0.0 if bias + z < 0.0 else 1.0
+                continue
+            moved = bias + (bias + z) / stretch  # (14.10)
+            positions[k] = 0.5 * math.erfc(-moved / math.sqrt(2.0))
+            # the derivative of this in the share of resamples below the estimate
+            slope = (1.0 + stretch**-2.0) * normal.pdf(moved)
+            pulls[k] = slope / normal.pdf(bias)
+    first, last = map(resamples.quantile, positions)
+    off, off_last = map(resamples.error, positions, pulls, (share, share))
     if kind in ("percentile", "bca"):  # (13.3) and (14.9) of [1]
-        return (first, last), (errors[0], errors[1])
-    scale = 1.0 if kind == "basic" else error
-    mirrored = (scale * errors[1], scale * errors[0])
+        return (first, last), (off, off_last)
     if kind == "basic":  # (5.6) of [2]
-        return (2.0 * value - last, 2.0 * value - first), mirrored
-    return (value - error * last, value - error * first), mirrored  # (12.22) of [1]
+        return (2.0 * value - last, 2.0 * value - first), (off_last, off)
+    # (12.22) of [1]
+    mirrored = (error * off_last, error * off)
+    return (value - error * last, value - error * first), mirrored
 
 
-def _bca_levels(level: float, share: float, skew: float) -> tuple[float, float]:
-    """Return which quantiles of the resamples are the ends of a BCa interval."""
-    # [1] Efron, B., Tibshirani, R. J. (1993). An Introduction to the Bootstrap, ch. 14.
-    normal = NormalDist()
-    bias = normal.inv_cdf(share)  # z0, (14.14) of [1]
-    tail = 0.5 * (1.0 - level)
-    ends = []
-    for z in (normal.inv_cdf(tail), normal.inv_cdf(1.0 - tail)):
-        stretch = 1.0 - skew * (bias + z)
-        if stretch <= 0.0:  # beyond its pole (14.10) says nothing: the last value
-            ends.append(0.0 if bias + z < 0.0 else 1.0)
-            continue
-        moved = bias + (bias + z) / stretch  # (14.10)
-        ends.append(0.5 * math.erfc(-moved / math.sqrt(2.0)))
-    return ends[0], ends[1]
+def _acceleration(units: _Units) -> float:
+    """Return a sixth of the skewness of a sum of what the units move."""
+    # of independent samples, with l/n ≈ (n - 1)/n (mean - value without one)
+    # [Efron and Tibshirani (1993), (14.15), for one]
+    cubes = squares = 0.0
+    for freq, values in zip(units.freqs, units.without(), strict=True):
+        known = ~np.isnan(values)
+        values, freq = values[known], freq[known]
+        n = max(int(freq.sum()), 1)
+        moves = (n - 1.0) / n * (freq @ values / n - values)
+        cubes += float(freq @ moves**3)
+        squares += float(freq @ moves**2)
+    return cubes / (6.0 * squares**1.5) if squares > 0.0 else 0.0
 
 
-def _notes(resamples: Resamples, n_distinct: int, one_value: bool) -> tuple[str, ...]:
+def _notes(
+    resamples: "_Resamples", n_distinct: int, one_value: bool
+) -> tuple[str, ...]:
     """Return what is to be known of the resamples."""
     notes = []
     if resamples.n_undefined and resamples.n_drawn is None:
@@ -430,12 +450,145 @@ def _notes(resamples: Resamples, n_distinct: int, one_value: bool) -> tuple[str,
     return tuple(notes)
 
 
-def _distribution(resamples: Resamples, words: str) -> Distribution:
-    for array in (resamples.values, resamples.weights):
-        array.flags.writeable = False
-    return Distribution(
-        values=resamples.values,
-        weights=resamples.weights,
-        continuous=False,
-        words=words,
-    )
+# -- values of resamples with their probabilities --------------------------------------
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Resamples:
+    """Distinct values, ascending, with their probabilities."""
+
+    values: Floats = field(repr=False)  # none undefined
+    weights: Floats = field(repr=False)  # sum to 1
+    cumulative: Floats = field(repr=False)
+    n_drawn: int | None  # None if all were taken
+    n_undefined: int
+    p_undefined: float  # their probability
+
+    @classmethod
+    def of(cls, values: Floats, weights: Floats | None = None) -> "_Resamples":
+        """Leave out what is undefined, sort values, and put equal ones together."""
+        # values, weights (n_resamples,); without weights they are drawn
+        n_drawn = values.size if weights is None else None
+        weights = np.ones(values.size) if weights is None else weights
+        n_undefined = int(np.isnan(values).sum())
+        order = np.argsort(values)  # what is undefined comes last
+        order, undefined = np.split(order, [values.size - n_undefined])
+        lost = float(weights[undefined].sum() / max(weights.sum(), 1.0))
+        values, weights = values[order], weights[order] / weights[order].sum()
+        is_new = np.ones(values.size, dtype=bool)
+        with np.errstate(invalid="ignore"):  # two infinite values are the same
+            smaller = np.clip(np.minimum(abs(values[1:]), abs(values[:-1])), 1.0, 1e300)
+            is_new[1:] = np.diff(values) > ROUNDING * smaller
+        first = np.flatnonzero(is_new)
+        values, weights = values[first], np.add.reduceat(weights, first)
+        return cls(
+            values=values,
+            weights=weights,
+            cumulative=np.cumsum(weights),
+            n_drawn=n_drawn,
+            n_undefined=n_undefined,
+            p_undefined=lost,
+        )
+
+    def quantile(self, position: float) -> float:
+        """Return the least value whose probability adds up to a position."""
+        # Where it adds up to just that, any value up to the next would do: it is the
+        # middle of the two, so that mirrored values have mirrored quantiles. This is
+        # definition 2 of Hyndman and Fan (1996), https://doi.org/10.2307/2684934.
+        last = self.values.size - 1
+        at = min(int(np.searchsorted(self.cumulative, position - ROUNDING)), last)
+        value = float(self.values[at])
+        if at < last and abs(float(self.cumulative[at]) - position) <= ROUNDING:
+            return 0.5 * (value + float(self.values[at + 1]))
+        return value
+
+    def share_below(self, value: float) -> float:
+        """Return the probability of less than a value, and half that of the value."""
+        off = ROUNDING * max(1.0, abs(value))
+        ends = np.searchsorted(self.values, (value - off, value + off))
+        below, up_to = (float(self.cumulative[at - 1]) if at else 0.0 for at in ends)
+        return 0.5 * (below + up_to)
+
+    def error(self, position: float, pull: float = 0.0, share: float = 0.5) -> float:
+        """Return the Monte Carlo error of a quantile of what was drawn.
+
+        Its position moves by `pull` with the share of resamples below the estimate.
+        """
+        # Var[1(x ≤ q) - pull 1(x < estimate)], as the two are nested
+        joint = min(position, share) - position * share
+        n, plain = max(self.n_drawn or 1, 1), position * (1.0 - position)
+        variance = plain - 2.0 * pull * joint + pull**2 * share * (1.0 - share)
+        off = math.sqrt(max(variance, 0.0) / n)
+        # times the slope of the quantile, from twice as far as it is off by itself
+        reach = 2.0 * math.sqrt(plain / n)
+        ends = max(position - reach, 0.0), min(position + reach, 1.0)
+        low, high = (self.quantile(end) for end in ends)
+        return off * (high - low) / (ends[1] - ends[0]) if low < high else 0.0
+
+
+def _count_compositions(n: int, n_units: int) -> int:
+    """Return how many distinct resamples of n there are of some distinct units."""
+    fewer = min(n, n_units - 1)
+    # of so many they are more than anybody counts
+    return math.comb(n + n_units - 1, fewer) if fewer < 30 else 10**15
+
+
+def _compositions(freq: Integers) -> tuple[NDArray[np.int32], Floats]:
+    """Return how often each unit is in every resample, and its probability."""
+    # freq (n_units,) -> (n_resamples, n_units), (n_resamples,)
+    # n! Π share^t / t! in logarithms, so that no n over- or underflows.
+    n = int(freq.sum())
+    steps = np.log(np.maximum(np.arange(n + 1), 1))
+    factorials = np.cumsum(steps, dtype=np.longdouble).astype(np.float64)
+    left = np.array([n], dtype=np.int32)  # draws that are left to the next units
+    logs = np.array([factorials[n]])
+    columns: list[NDArray[np.int32]] = []
+    for share in freq[:-1] / n:
+        n_choices = left + 1
+        parent = np.repeat(np.arange(left.size), n_choices)
+        first = np.cumsum(n_choices) - n_choices
+        drawn = (np.arange(parent.size) - first[parent]).astype(np.int32)
+        columns = [column[parent] for column in columns] + [drawn]
+        left = left[parent] - drawn
+        logs = logs[parent] + (drawn * math.log(share) - factorials[drawn])
+    logs = logs + (left * math.log(freq[-1] / n) - factorials[left])
+    return np.column_stack([*columns, left]), np.exp(logs)
+
+
+def _all_resamples(
+    freqs: Sequence[Integers], values: Callable[..., Floats], width: int
+) -> _Resamples:
+    """Take every distinct resample once, of each sample by itself."""
+    counts, weights = zip(*map(_compositions, freqs), strict=True)
+    places = np.indices([len(of) for of in counts]).reshape(len(counts), -1)
+    of_blocks = [
+        values(*(of[at] * 1.0 for of, at in zip(counts, block, strict=True)))
+        for block in np.array_split(
+            places, 1 + places.shape[1] * width // _AT_ONCE, axis=1
+        )
+    ]
+    probabilities = [of[at] for of, at in zip(weights, places, strict=True)]
+    return _Resamples.of(np.concatenate(of_blocks), np.prod(probabilities, axis=0))
+
+
+def _draw_resamples(
+    freqs: Sequence[Integers],
+    values: Callable[..., Floats],
+    width: int,
+    n_resamples: int,
+    generator: np.random.Generator,
+) -> _Resamples:
+    """Draw as many of each sample as there are, with replacement."""
+    size = max(1, _AT_ONCE // width)
+    of_blocks = [
+        values(
+            *(
+                generator.multinomial(
+                    of.sum(), of / of.sum(), size=min(size, n_resamples - start)
+                ).astype(np.float64)
+                for of in freqs
+            )
+        )
+        for start in range(0, n_resamples, size)
+    ]
+    return _Resamples.of(np.concatenate(of_blocks))

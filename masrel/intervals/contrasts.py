@@ -3,30 +3,35 @@
 One engine: the coefficient of every set of ratings without each item, or each cluster.
 How these move together is the jackknife's covariance of the coefficients: a difference
 of two, all differences of several, and the test that all are the same follow from it.
+Beside them stand two tests that independent coefficients are the same.
 """
 
 import itertools
 import math
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from functools import partial
+from typing import Any, Literal, get_args
 
 import numpy as np
 
-from masrel.agreement import Label, Metric, Significance, WeightsLike
+from masrel.agreement import Label, Metric, Significance, WeightsLike, count_ratings
 from masrel.agreement._engine import Floats
 from masrel.agreement._labels import is_row
+from masrel.agreement._rows import item_counts
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval
-from masrel.intervals._clusters import ClusterSums, cluster_codes, clusters_of
-from masrel.intervals._max_t import MaxT
-from masrel.intervals._problem import (
-    Integers,
+from masrel.intervals._question import (
+    ClusterSums,
     IntervalProblem,
     Statistic,
+    check_one_of,
+    cluster_codes,
     pose_problem,
+    student_t,
     warn_small,
+    warn_user,
 )
 from masrel.intervals.jackknife import _variance_of
 
@@ -45,6 +50,9 @@ _METHODS: dict[_Simultaneous, str] = {
     "scheffe": "Hotelling's T²",
 }
 _FLAT = 1e-12  # of the largest variance: a direction in which nothing varies
+_ANGLES = 1 << 13  # of a half turn
+_DIRECTIONS = 1 << 15
+_SAME = "all coefficients are the same"
 
 
 def difference(
@@ -130,12 +138,35 @@ def difference(
         coefficient, first, second, design, categories, weights, level, clusters
     )
     one, other = compared.estimates
+    unit, value, reason = compared.unit, one.value - other.value, compared.reason
+    method = f"{unit.removesuffix('s')} jackknife of the difference, t"
+    smaller = min(compared.problems, key=lambda problem: problem.n_paired_items)
+    if reason is not None:
+        interval = smaller.undefined(reason, method=method, unit=unit)
+    else:
+        half = student_t(level, compared.df) * compared.error
+        n_items = smaller.n_items if unit == "items" else None
+        notes = warn_small(compared.n_units, 10, unit, n_items)
+        width = 1.0 - min(problem.min_value for problem in compared.problems)
+        if value - half < -width or value + half > width:
+            space = f"[{-width:g}, {width:g}]"
+            notes += (f"cut at the ends of the parameter space {space}",)
+        interval = Interval(
+            low=max(value - half, -width),
+            high=min(value + half, width),
+            level=level,
+            kind="confidence",
+            method=method,
+            target="items",
+            unit=unit,
+            notes=notes,
+        )
     return Estimate(
         coefficient=f"difference of {one.coefficient}",
         weights=one.weights,
-        value=compared.value,
+        value=value,
         standard_error=compared.error,
-        interval=_interval(compared),
+        interval=interval,
         observed=one.observed - other.observed,
         chance=one.chance - other.chance,
         n_items=min(one.n_items, other.n_items),
@@ -210,26 +241,14 @@ def difference_test(
     compared = _compare(
         coefficient, first, second, design, categories, weights, 0.5, clusters
     )
-    statistic = p = math.nan
-    if compared.reason is not None:
-        warnings.warn(
-            f"the test of a difference is undefined: {compared.reason}",
-            UndefinedStatisticWarning,
-            stacklevel=2,
-        )
-    else:
-        from scipy.special import stdtr  # loaded only when a p-value is needed
-
-        statistic = compared.value / compared.error
-        p = min(1.0, 2.0 * float(stdtr(compared.df, -abs(statistic))))
-    return Significance(
-        name="difference_test",
-        hypothesis="both coefficients are the same",
-        statistic=statistic,
-        distribution="t",
-        df=(compared.df,),
-        p_value=p,
-        n_items=min(e.n_items for e in compared.estimates),
+    one, other = compared.estimates
+    return _tested(
+        "difference_test",
+        "both coefficients are the same",
+        "t",
+        (compared.df,),
+        min(one.n_items, other.n_items),
+        statistic=(one.value - other.value) / (compared.error or math.nan),
         reason=compared.reason,
     )
 
@@ -240,7 +259,6 @@ class _Compared:
 
     problems: list[IntervalProblem]
     estimates: list[Estimate]
-    value: float  # the first less the second
     error: float
     df: float
     reason: str | None  # why there is neither interval nor test, or None
@@ -259,10 +277,7 @@ def _compare(
     clusters: object,
 ) -> _Compared:
     """Check both sets of ratings, and estimate their difference and its variance."""
-    if design not in get_args(_Design):
-        raise ParameterError(
-            f"design: needs one of {', '.join(get_args(_Design))}, got {design!r}"
-        )
+    check_one_of("design", design, get_args(_Design))
     problems = [
         pose_problem(
             coefficient,
@@ -275,67 +290,60 @@ def _compare(
         for ratings in (first, second)
     ]
     if design == "dependent":
-        units = _same_units(problems, clusters)
-        joint = _Joint.of(problems, [units, units])
-        variance, df, n = joint.variance(0, 1), float(joint.n - 1), joint.n
+        _check_same_items(problems, clusters)
+        joints = [_Joint.of(problems, clusters)]
+        variance, df = joints[0].variance(0, 1), joints[0].n - 1.0
     else:
-        pair = [clusters] * 2 if clusters is None else _cluster_pair(clusters)
+        _check_other_clusters(clusters)
+        pair: Any = [None, None] if clusters is None else clusters
         joints = [
-            _Joint.of([problem], [_units_of(problem, of)])
-            for problem, of in zip(problems, pair, strict=True)
+            _Joint.of([problem], of) for problem, of in zip(problems, pair, strict=True)
         ]
-        variance, df = _satterthwaite([(of.variance(0), of.n - 1) for of in joints])
-        n = min(of.n for of in joints)
+        parts = [joint.variance(0) for joint in joints]
+        variance, df = sum(parts), min(joint.n - 1.0 for joint in joints)
+        if variance > 0.0:  # Satterthwaite's degrees of freedom
+            df = variance**2 / sum(
+                part**2 / max(joint.n - 1, 1)
+                for part, joint in zip(parts, joints, strict=True)
+            )
     unit: _Units = "items" if clusters is None else "clusters"
     one, other = (problem.entry(problem.coded, weights=weights) for problem in problems)
+    reason = one.reason or other.reason
+    if reason is None and math.isnan(variance):
+        reason = f"with one {unit.removesuffix('s')} left out an estimate is undefined"
+    elif reason is None and variance == 0.0:
+        reason = (
+            f"leaving out any {unit.removesuffix('s')} leaves the difference as it is"
+        )
     return _Compared(
         problems=problems,
         estimates=[one, other],
-        value=one.value - other.value,
         error=math.sqrt(variance),
         df=df,
-        reason=one.reason or other.reason or _no_variance(variance, unit),
+        reason=reason,
         unit=unit,
-        n_units=n,
+        n_units=min(joint.n for joint in joints),
     )
 
 
-def _no_variance(variance: float, unit: _Units) -> str | None:
-    left_out = unit.removesuffix("s")
-    if math.isnan(variance):
-        return f"with one {left_out} left out an estimate is undefined"
-    if variance == 0.0:
-        return f"leaving out any {left_out} leaves the difference as it is"
-    return None
-
-
-def _same_units(problems: Sequence[IntervalProblem], clusters: object) -> Integers:
-    """Return the unit of every item of two sets, which must be the same items."""
+def _check_same_items(problems: Sequence[IntervalProblem], clusters: object) -> None:
     one, other = (problem.coded.codes for problem in problems)
     if len(one) != len(other):
         raise RatingsError(
             f"design: dependent ratings need the same items, got {len(one)} and "
             f"{len(other)}"
         )
-    if clusters is not None:
-        return clusters_of(problems[0], clusters)
     is_in_one = (one >= 0).any(axis=1) != (other >= 0).any(axis=1)
-    if is_in_one.any():
+    if clusters is None and is_in_one.any():
         raise RatingsError(
             "design: dependent ratings need both for every item, row "
             f"{int(is_in_one.argmax())} has ratings in one of them only"
         )
-    return np.arange(len(one))
 
 
-def _units_of(problem: IntervalProblem, clusters: object) -> Integers:
+def _check_other_clusters(clusters: object) -> None:
     if clusters is None:
-        return np.arange(len(problem.coded.codes))
-    return clusters_of(problem, clusters)
-
-
-def _cluster_pair(clusters: object) -> Sequence[object]:
-    """Check the clusters of independent ratings, which must be different ones."""
+        return
     if not isinstance(clusters, Sequence) or len(clusters) != 2:
         raise ParameterError(
             "clusters: independent ratings need a pair of sequences, one label an item"
@@ -345,15 +353,6 @@ def _cluster_pair(clusters: object) -> Sequence[object]:
             "clusters: independent ratings need other clusters, got "
             f"{min(map(str, shared))!r} in both"
         )
-    return clusters
-
-
-def _satterthwaite(parts: Sequence[tuple[float, int]]) -> tuple[float, float]:
-    """Return the sum of variances, and its degrees of freedom [2]_."""
-    variance = sum(part for part, _ in parts)
-    if not variance > 0.0:
-        return variance, float(min(df for _, df in parts))
-    return variance, variance**2 / sum(part**2 / max(df, 1) for part, df in parts)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -364,17 +363,15 @@ class _Joint:
     n: int  # those with a pair of ratings, of the set that has the fewest
 
     @classmethod
-    def of(
-        cls, problems: Sequence[IntervalProblem], units: Sequence[Integers]
-    ) -> "_Joint":
-        """Leave out each unit; `units` are those of the items of each set."""
-        sums = [
-            ClusterSums.of(problem, of)
-            for problem, of in zip(problems, units, strict=True)
-        ]
+    def of(cls, problems: Sequence[IntervalProblem], clusters: object) -> "_Joint":
+        """Leave out each item, or each cluster, of all sets at once."""
+        units = np.arange(len(problems[0].coded.codes))
+        if clusters is not None:
+            units = cluster_codes(problems[0], clusters)
+        sums = [ClusterSums.of(problem, units) for problem in problems]
         matters = np.any([of.known for of in sums], axis=0)
         without = [
-            problem.values_without(problem.sums, of.sums[matters])
+            problem.values(problem.sums - of.sums[matters])
             for problem, of in zip(problems, sums, strict=True)
         ]
         return cls(without=np.array(without), n=min(of.n_paired for of in sums))
@@ -395,29 +392,7 @@ class _Joint:
         return np.asarray((self.n - 1) / self.n * (moved @ moved.T))
 
 
-def _interval(compared: _Compared) -> Interval:
-    unit = compared.unit
-    method = f"{unit.removesuffix('s')} jackknife of the difference, t"
-    problems, value = compared.problems, compared.value
-    smaller = min(problems, key=lambda problem: problem.n_paired_items)
-    if compared.reason is not None:
-        return smaller.undefined(compared.reason, method=method, unit=unit)
-    half = smaller.student_t(compared.df) * compared.error
-    n_items = smaller.n_items if unit == "items" else None
-    notes = warn_small(compared.n_units, 10, unit, n_items)
-    width = 1.0 - min(problem.min_value for problem in problems)  # of its space
-    if value - half < -width or value + half > width:
-        notes += (f"cut at the ends of the parameter space [{-width:g}, {width:g}]",)
-    return Interval(
-        low=max(value - half, -width),
-        high=min(value + half, width),
-        level=smaller.level,
-        kind="confidence",
-        method=method,
-        target="items",
-        unit=unit,
-        notes=notes,
-    )
+# -- all differences of several --------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -578,12 +553,13 @@ def differences(
     first - second: 0.600 [0.300, 0.900], p = 0.000237
     differences: 16.39, F(1, 39), p = 0.000237
     """
-    if simultaneous not in get_args(_Simultaneous):
-        raise ParameterError(
-            f"simultaneous: needs one of {', '.join(get_args(_Simultaneous))}, "
-            f"got {simultaneous!r}"
-        )
-    names, tables = _named_sets(sets)
+    check_one_of("simultaneous", simultaneous, _METHODS)
+    if isinstance(sets, str) or not isinstance(sets, Iterable):
+        raise ParameterError(f"sets: needs ratings of two sets or more, got {sets!r}")
+    named = dict(sets) if isinstance(sets, Mapping) else dict(enumerate(sets))
+    names = tuple(map(str, named))
+    if len(names) < 2:
+        raise ParameterError(f"sets: needs two or more, got {len(names)}")
     problems = [
         pose_problem(
             coefficient,
@@ -594,10 +570,16 @@ def differences(
             metric=metric,
             level=level,
         )
-        for ratings in tables
+        for ratings in named.values()
     ]
-    units = _units_of_all(problems, names, clusters)
-    joint = _Joint.of(problems, [units] * len(problems))
+    n_items = [len(problem.coded.codes) for problem in problems]
+    for name, n in zip(names, n_items, strict=True):
+        if n != n_items[0]:
+            raise RatingsError(
+                f"sets: need the same items, got {n_items[0]} in {names[0]!r} and {n} "
+                f"in {name!r}"
+            )
+    joint = _Joint.of(problems, clusters)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UndefinedStatisticWarning)  # given below
         estimates = tuple(
@@ -606,13 +588,26 @@ def differences(
     unit: _Units = "items" if clusters is None else "clusters"
     reason = _why_undefined(estimates, names, joint, unit)
     notes = () if reason is not None else warn_small(joint.n, 10, unit)
-    if reason is not None:
-        warnings.warn(
-            f"differences are undefined: {reason}",
-            UndefinedStatisticWarning,
-            stacklevel=2,
-        )
-    arrays, quantile = _all_pairs(joint, estimates, level, simultaneous, reason)
+    each = np.array([estimate.value for estimate in estimates])
+    values, errors = each[:, None] - each, np.zeros((len(each),) * 2)
+    for i, j in itertools.combinations(range(len(each)), 2):
+        errors[i, j] = errors[j, i] = math.sqrt(joint.variance(i, j))
+    quantile, p_values = math.nan, np.full_like(errors, math.nan)
+    if reason is None and errors.any():
+        quantile, p_values = _adjusted(joint, values, errors, level, simultaneous)
+    half = np.where(errors > 0.0, quantile * errors, math.nan)
+    alone = np.sqrt(np.diag(joint.covariance))
+    with np.errstate(invalid="ignore"):
+        correlation = joint.covariance / np.outer(alone, alone)
+    arrays = {
+        "standard_errors": alone,
+        "correlation": correlation,
+        "values": values,
+        "errors": errors,
+        "low": values - half,
+        "high": values + half,
+        "p_values": p_values,
+    }
     for array in arrays.values():
         array.setflags(write=False)
     return Differences(
@@ -622,41 +617,12 @@ def differences(
         level=level,
         method=f"{unit.removesuffix('s')} jackknife, {_METHODS[simultaneous]}",
         quantile=quantile,
-        equality=_hotelling(arrays["values"], joint, reason),
+        equality=_hotelling(each, joint, reason),
         n_units=joint.n,
         unit=unit,
         notes=notes,
         reason=reason,
     )
-
-
-def _named_sets(
-    sets: "Sequence[object] | Mapping[str, object]",
-) -> tuple[tuple[str, ...], list[object]]:
-    if isinstance(sets, Mapping):
-        names, tables = tuple(map(str, sets)), list(sets.values())
-    elif isinstance(sets, str) or not isinstance(sets, Iterable):
-        raise ParameterError(f"sets: needs ratings of two sets or more, got {sets!r}")
-    else:
-        tables = list(sets)
-        names = tuple(str(place) for place in range(len(tables)))
-    if len(tables) < 2:
-        raise ParameterError(f"sets: needs two or more, got {len(tables)}")
-    return names, tables
-
-
-def _units_of_all(
-    problems: Sequence[IntervalProblem], names: Sequence[str], clusters: object
-) -> Integers:
-    """Return the unit of every item, the same in all sets."""
-    n_items = len(problems[0].coded.codes)
-    for problem, name in zip(problems, names, strict=True):
-        if len(problem.coded.codes) != n_items:
-            raise RatingsError(
-                f"sets: need the same items, got {n_items} in {names[0]!r} and "
-                f"{len(problem.coded.codes)} in {name!r}"
-            )
-    return np.arange(n_items) if clusters is None else cluster_codes(clusters, n_items)
 
 
 def _why_undefined(
@@ -674,39 +640,6 @@ def _why_undefined(
     return None
 
 
-def _all_pairs(
-    joint: _Joint,
-    estimates: Sequence[Estimate],
-    level: float,
-    simultaneous: _Simultaneous,
-    reason: str | None,
-) -> tuple[dict[str, Floats], float]:
-    """Return the matrices of `Differences`, and the quantile of all intervals."""
-    covariance, g = joint.covariance, len(estimates)
-    each = np.array([estimate.value for estimate in estimates])
-    values = each[:, None] - each
-    errors = np.zeros((g, g))
-    for i, j in itertools.combinations(range(g), 2):
-        errors[i, j] = errors[j, i] = math.sqrt(joint.variance(i, j))
-    quantile, p_values = math.nan, np.full((g, g), math.nan)
-    if reason is None:
-        quantile, p_values = _adjusted(joint, values, errors, level, simultaneous)
-    half = np.where(errors > 0.0, quantile * errors, math.nan)
-    alone = np.sqrt(np.diag(covariance))
-    with np.errstate(invalid="ignore"):
-        correlation = covariance / np.outer(alone, alone)
-    arrays = {
-        "standard_errors": alone,
-        "correlation": correlation,
-        "values": values,
-        "errors": errors,
-        "low": values - half,
-        "high": values + half,
-        "p_values": p_values,
-    }
-    return arrays, quantile
-
-
 def _adjusted(
     joint: _Joint,
     values: Floats,
@@ -715,17 +648,16 @@ def _adjusted(
     simultaneous: _Simultaneous,
 ) -> tuple[float, Floats]:
     """Return the quantile of all intervals, and the adjusted p-values."""
-    from scipy.special import fdtrc, fdtri, stdtr, stdtrit
+    from scipy.optimize import brentq
+    from scipy.special import fdtrc, fdtri, stdtr
 
     g, df = len(values), joint.n - 1.0
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = np.abs(np.where(errors > 0.0, values / errors, math.nan))
-    pairs = [pair for pair in itertools.combinations(range(g), 2) if errors[pair] > 0]
-    if not pairs:
-        return math.nan, t
-    if simultaneous == "bonferroni":
-        quantile = float(stdtrit(df, 1.0 - 0.5 * (1.0 - level) / len(pairs)))
-        return quantile, np.minimum(1.0, 2.0 * len(pairs) * stdtr(df, -t))
+    t = np.abs(values / np.where(errors > 0.0, errors, math.nan))
+    one, other = np.nonzero(np.triu(errors) > 0.0)
+    if simultaneous == "bonferroni" or len(one) == 1:  # of two sets they are the same
+        m = len(one)
+        quantile = student_t(1.0 - (1.0 - level) / m, df)
+        return quantile, np.minimum(1.0, 2.0 * m * stdtr(df, -t))
     if simultaneous == "scheffe":
         rest = df + 2.0 - g  # K - g + 1
         if rest <= 0.0:
@@ -735,49 +667,286 @@ def _adjusted(
         return quantile, fdtrc(g - 1.0, rest, t**2 / factor)
     sizes, axes = np.linalg.eigh(joint.covariance)
     root = axes * np.sqrt(np.maximum(sizes, 0.0))  # root @ root.T is the covariance
-    distribution = MaxT(
-        np.array([(root[i] - root[j]) / errors[i, j] for i, j in pairs]), df
-    )
+    contrasts = (root[one] - root[other]) / errors[one, other][:, None]
+    exceeded, rank = _largest_t(contrasts, df)
     p_values = np.full_like(t, math.nan)
-    for i, j in pairs:
-        p_values[i, j] = p_values[j, i] = distribution.exceeded(t[i, j])
-    return distribution.quantile(level), p_values
+    p_values[one, other] = p_values[other, one] = [exceeded(x) for x in t[one, other]]
+    # between that of one statistic and that of every contrast there is
+    low = student_t(level, df)
+    high = math.sqrt(rank * float(fdtri(rank, df, level)))
+    if exceeded(low) <= 1.0 - level:  # all statistics are one, but for rounding
+        return low, p_values
+    quantile = brentq(
+        lambda x: exceeded(x) - (1.0 - level), low, max(low, high) + 1e-9, xtol=1e-9
+    )
+    return float(quantile), p_values
+
+
+def _largest_t(contrasts: Floats, df: float) -> tuple[Callable[[float], float], int]:
+    """Return the probability that the largest |a_k·Z|/S exceeds a number, and a rank.
+
+    Z is normal and S² a χ² over its degrees of freedom, so that |Z|²/(p S²) has an F
+    distribution whatever the direction of Z: only directions are summed over. Of one
+    or two dimensions that is exact; of more the directions are those of a lattice,
+    the same every time.
+    """
+    # Takes contrasts a (n_statistics, n_dimensions), of unit length
+    from scipy.special import fdtrc, ndtri
+
+    _, sizes, turned = np.linalg.svd(contrasts, full_matrices=False)
+    rank = int((sizes > _FLAT * max(sizes.max(), 1.0)).sum())
+    if rank <= 2:
+        angles = (np.arange(_ANGLES) + 0.5) * (math.pi / _ANGLES)
+        directions = np.column_stack([np.cos(angles), np.sin(angles)])[:, :rank]
+    else:
+        # a Kronecker lattice: multiples of powers of the root of x^(rank + 1) = x + 1
+        root = np.roots([1.0, *[0.0] * (rank - 1), -1.0, -1.0]).real.max()
+        steps = root ** -np.arange(1.0, rank + 1.0)
+        places = (0.5 + np.arange(1, _DIRECTIONS + 1)[:, None] * steps) % 1.0
+        directions = ndtri(np.clip(places, 1e-12, 1.0 - 1e-12))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    largest = np.zeros(len(directions))
+    for contrast in contrasts @ turned[:rank].T:
+        np.maximum(largest, abs(directions @ contrast), out=largest)
+
+    def exceeded(quantile: float) -> float:
+        return float(fdtrc(rank, df, (quantile / largest) ** 2 / rank).mean())
+
+    return exceeded, rank
 
 
 def _hotelling(values: Floats, joint: _Joint, reason: str | None) -> Significance:
     """Test that all coefficients are the same: T² = (Cκ)ᵀ (C V Cᵀ)⁻¹ Cκ."""
-    from scipy.special import fdtrc
-
-    name, g, n = "differences", len(values), joint.n
-    statistic = p = math.nan
+    g, n, v, statistic = len(values), joint.n, joint.covariance, math.nan
     df = (g - 1.0, n - g + 1.0)
+    if reason is None and n < g:
+        reason = f"{g} coefficients need at least {g} items or clusters, got {n}"
     if reason is None:
         # C takes each from the first
-        away = values[1:, 0]
-        v = joint.covariance
-        of_away = v[1:, 1:] - v[1:, :1] - v[:1, 1:] + v[0, 0]
-        sizes, axes = np.linalg.eigh(of_away)
-        if n < g:
-            reason = f"{g} coefficients need at least {g} items or clusters, got {n}"
-        elif sizes[0] <= _FLAT * np.abs(v).max():
+        sizes, axes = np.linalg.eigh(v[1:, 1:] - v[1:, :1] - v[:1, 1:] + v[0, 0])
+        if sizes[0] <= _FLAT * np.abs(v).max():
             reason = "some of the coefficients never differ, or always as much"
         else:
-            t_squared = float(((axes.T @ away) ** 2 / sizes).sum())
+            t_squared = float(((axes.T @ (values[1:] - values[0])) ** 2 / sizes).sum())
             statistic = t_squared * (n - g + 1.0) / ((n - 1.0) * (g - 1.0))
-            p = float(fdtrc(*df, statistic))
-        if reason is not None:
-            warnings.warn(
-                f"the test of equality is undefined: {reason}",
-                UndefinedStatisticWarning,
-                stacklevel=4,
-            )
+    return _tested("differences", _SAME, "F", df, n, statistic, reason)
+
+
+# -- independent coefficients ----------------------------------------------------------
+
+
+def equality_test(estimates: Sequence[Estimate]) -> Significance:
+    """Test whether independent coefficients are the same: Fleiss' weighted χ².
+
+    Parameters
+    ----------
+    estimates : sequence of Estimate, length 2 or more
+        The same coefficient of groups of other items, each with its standard error.
+
+    Returns
+    -------
+    Significance
+        Σ (κ_g - κ̄)² / SE_g², with κ̄ the mean weighted by 1 / SE_g², and its p-value
+        from χ² with one degree less than there are groups. `n_items` are those of all
+        groups.
+
+    Raises
+    ------
+    ParameterError
+        If there are fewer than two, or they are of different coefficients.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If a coefficient is undefined, or its standard error is 0.
+
+    Notes
+    -----
+    It takes any coefficient, weights and number of raters, and any standard error:
+    that of clustered items, too. It needs large groups: with 40 to 100 items each it
+    rejects a true hypothesis in some 7 % of studies instead of 5. Of two raters and
+    two categories `donner_test` holds its level in smaller ones.
+
+    References
+    ----------
+    .. [1] Fleiss, J. L. (1981). Statistical Methods for Rates and Proportions, 2nd
+       ed., ch. 13. Wiley.
+
+    Examples
+    --------
+    >>> from masrel.agreement import cohen_kappa, count_table
+    >>> tables = [[[40, 6], [5, 29]], [[55, 20], [15, 30]], [[20, 3], [4, 8]]]
+    >>> print(equality_test([cohen_kappa(count_table(table)) for table in tables]))
+    equality_test: 7.971, chi-squared(2), p = 0.0186
+    """
+    checked: list[Any] = list(estimates) if is_row(estimates) else [estimates]
+    if len(checked) < 2 or not all(isinstance(e, Estimate) for e in checked):
+        raise ParameterError(
+            "estimates: needs two or more of type Estimate, got "
+            f"{', '.join(type(e).__name__ for e in checked) or 'none'}"
+        )
+    kinds = {(e.coefficient, e.weights): None for e in checked}
+    if len(kinds) > 1:
+        of_kinds = (f"{name} ({weights})" for name, weights in kinds)
+        raise ParameterError(
+            f"estimates: needs one coefficient of all, got {', '.join(of_kinds)}"
+        )
+    n_items = sum(e.n_items for e in checked)
+    test = partial(
+        _tested, "equality_test", _SAME, "chi-squared", (len(checked) - 1.0,), n_items
+    )
+    for place, e in enumerate(checked):
+        if e.reason is not None:
+            return test(reason=f"estimate {place}: {e.reason}")
+        if not e.standard_error > 0.0:
+            reason = f"estimate {place}: its standard error is {e.standard_error:g}"
+            return test(reason=reason)
+    values = np.array([e.value for e in checked])
+    precision = np.array([e.standard_error for e in checked]) ** -2.0
+    away = values - precision @ values / precision.sum()
+    return test(statistic=float(precision @ away**2))
+
+
+def donner_test(
+    groups: Sequence[object], *, categories: Sequence[Label] | None = None
+) -> Significance:
+    """Test whether independent kappas of two raters and two categories are the same.
+
+    Parameters
+    ----------
+    groups : sequence of ratings, length 2 or more
+        Each of its own items and two raters, ``(n_items, 2)`` labels, or what
+        `count_table` makes of a contingency table; items with a missing rating are
+        left out.
+    categories : sequence, optional
+        The two categories; those met when not given.
+
+    Returns
+    -------
+    Significance
+        The goodness of fit of one intraclass kappa to how many items of each group
+        have both ratings in the first category, in the second, or one in each, each
+        group with its own prevalence: χ² with one degree less than there are groups.
+
+    Raises
+    ------
+    ParameterError
+        If there are fewer than two groups.
+    RatingsError
+        If ratings are not of two raters and two categories.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If a group has ratings of one category alone, or none.
+
+    Notes
+    -----
+    The intraclass kappa is Scott's π: the raters are taken to use both categories
+    alike. At kappas of about .6 in four groups of 45 to 100 items it rejected a true
+    hypothesis in 5.0 % of 20 000 simulated studies, and Fleiss' weighted χ²
+    (`equality_test`) in 6.8 %: for two raters and two categories take this one, for
+    all else that.
+
+    References
+    ----------
+    .. [1] Donner, A., Eliasziw, M., Klar, N. (1996). Testing the homogeneity of kappa
+       statistics. Biometrics, 52(1), 176-183. https://doi.org/10.2307/2533154
+
+    Examples
+    --------
+    >>> from masrel.agreement import count_table
+    >>> tables = [[[40, 6], [5, 29]], [[55, 20], [15, 30]], [[20, 3], [4, 8]]]
+    >>> print(donner_test([count_table(table) for table in tables]))
+    donner_test: 7.047, chi-squared(2), p = 0.0295
+    """
+    if not is_row(groups):
+        raise ParameterError(
+            f"groups: needs the ratings of two groups or more, got {groups!r}"
+        )
+    tables = [_concordance(ratings, k, categories) for k, ratings in enumerate(groups)]
+    if len(tables) < 2:
+        raise ParameterError(f"groups: needs two or more, got {len(tables)}")
+    observed = np.array(tables, dtype=np.float64)  # (n_groups, 3): both, one, neither
+    n_items = observed.sum(axis=1)
+    df, n = (len(tables) - 1.0,), int(n_items.sum())
+    test = partial(_tested, "donner_test", _SAME, "chi-squared", df, n)
+    for place, (both, one, neither) in enumerate(tables):
+        if one == 0 and 0 in (both, neither):
+            reason = f"group {place}: its ratings are of one category"
+            return test(reason=reason)
+    p = (2.0 * observed[:, 0] + observed[:, 1]) / (2.0 * n_items)
+    between = p * (1.0 - p)
+    kappa = 1.0 - observed[:, 1] / (2.0 * n_items * between)
+    pooled = float((n_items * between) @ kappa / (n_items @ between))  # (2) of [1]
+    shares = np.column_stack(
+        [
+            p * p + pooled * between,
+            2.0 * between * (1.0 - pooled),
+            (1.0 - p) ** 2 + pooled * between,
+        ]
+    )
+    expected = n_items[:, None] * shares
+    if not (expected > 0.0).all():
+        reason = "both raters of all groups agree on every item, or never"
+        return test(reason=reason)
+    return test(statistic=float(((observed - expected) ** 2 / expected).sum()))
+
+
+def _concordance(
+    ratings: object, place: int, categories: Sequence[Label] | None
+) -> tuple[int, int, int]:
+    # items with both, one and no rating in the first category
+    try:
+        counted = count_ratings(ratings, categories)
+    except RatingsError as error:
+        raise RatingsError(f"groups: group {place}: {error}") from error
+    used, freq = counted.n_categories, counted.freq
+    rows = item_counts(counted.codes, max(used, 1), counted.repeats)
+    if used == 0:
+        raise RatingsError(f"groups: group {place}: needs a rating, got none")
+    if used > 2 or rows.sum(axis=1).max(initial=0) > 2:
+        raise RatingsError(
+            f"groups: group {place}: needs two raters and two categories, got "
+            f"{counted.n_raters} and {used}"
+        )
+    first = rows[:, 0]
+    second = rows[:, 1] if used == 2 else np.zeros_like(first)
+    is_whole = first + second == 2
+    both, one, neither = (
+        int(freq[is_whole & (first == number)].sum()) for number in (2, 1, 0)
+    )
+    return both, one, neither
+
+
+def _tested(
+    name: str,
+    hypothesis: str,
+    distribution: str,
+    df: tuple[float, ...],
+    n_items: int,
+    statistic: float = math.nan,
+    reason: str | None = None,
+) -> Significance:
+    """Return a statistic with its p-value, or warn why there is none."""
+    from scipy.special import chdtrc, fdtrc, stdtr  # loaded only for a p-value
+
+    if reason is not None:
+        warn_user(f"undefined {name}: {reason}", UndefinedStatisticWarning)
+        statistic = p = math.nan
+    elif distribution == "t":
+        p = min(1.0, 2.0 * float(stdtr(df[0], -abs(statistic))))
+    elif distribution == "F":
+        p = float(fdtrc(df[0], df[1], statistic))
+    else:
+        p = float(chdtrc(df[0], statistic))
     return Significance(
         name=name,
-        hypothesis="all coefficients are the same",
+        hypothesis=hypothesis,
         statistic=statistic,
-        distribution="F",
+        distribution=distribution,
         df=df,
         p_value=p,
-        n_items=n,
+        n_items=n_items,
         reason=reason,
     )

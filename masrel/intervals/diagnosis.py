@@ -1,5 +1,6 @@
 """Which rater, which pair of raters, which category: where agreement is lost."""
 
+import itertools
 import math
 import warnings
 from collections.abc import Iterable, Sequence
@@ -9,28 +10,22 @@ from typing import Literal
 
 import numpy as np
 
-from masrel.agreement import CodedRatings, Label, Metric, WeightsLike
+from masrel.agreement import Label, Metric, WeightsLike
 from masrel.agreement._engine import Array, Floats, Integers, divide
-from masrel.agreement._rows import distinct_rows
+from masrel.agreement._rows import distinct_rows, item_counts
 from masrel.agreement._weights import MANY
 from masrel.errors import MasrelWarning, ParameterError
 from masrel.estimates import Estimate
-from masrel.intervals._confusion import (
-    PairCounts,
-    category_arrays,
-    confusion_arrays,
-)
-from masrel.intervals._problem import (
+from masrel.intervals._question import (
     IntervalProblem,
     Statistic,
     find_entry,
+    of_rows,
     pose_problem,
-    rows_problem,
+    student_t,
     warn_small,
 )
-from masrel.intervals.jackknife import _variance_of
-
-_MAX_KEYS = 1 << 22  # rows that can differ, up to which equal ones are put together
+from masrel.intervals.jackknife import _variance_of, _without_raters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -236,26 +231,31 @@ def diagnose(
             f"got {coded.n_categories}; for measurements there are limits of agreement "
             "and ICC"
         )
-    pose = partial(pose_problem, entry, target="items", weights=weights, level=level)
-    problem = everybody = pose(coded, categories=None)
+    pose = partial(
+        pose_problem,
+        entry,
+        target="items",
+        categories=None,
+        weights=weights,
+        level=level,
+    )
+    problem = everybody = pose(coded)
     names = _names(ratings, raters, coded.codes.shape[1])
     right = None if reference is None else _place(reference, names)
     others = [place for place in range(len(names)) if place != right]
     if right is not None:
-        rest = replace(coded, codes=coded.codes[:, others])
-        problem = pose(rest, categories=None)
+        problem = pose(replace(coded, codes=coded.codes[:, others]))
     estimate = entry(problem.coded, weights=weights)
     at = None if target is None else level
     notes = () if at is None else warn_small(estimate.n_items, 10, "items")
-    codes, freq = _counted_rows(coded)
-    counts = PairCounts.of(codes, freq, coded.n_categories)
+    codes, freq = distinct_rows(coded.codes, coded.n_categories)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MasrelWarning)  # the arrays say it
         arrays = {
-            **_of_raters(_pairs(everybody, counts, at), others, right),
+            **_of_pairs(everybody, codes, freq, others, right, at),
             **_changes(problem, codes[:, others], freq, at),
-            **category_arrays(codes, freq, counts, others, at),
-            **confusion_arrays(codes, freq, counts, others, right, at),
+            **_category_arrays(codes[:, others], freq, coded.n_categories, at),
+            **_confusions(codes, freq, coded.n_categories, others, right, at),
         }
     for array in arrays.values():
         array.setflags(write=False)
@@ -302,51 +302,47 @@ def _place(reference: str | int, names: Sequence[str]) -> int:
     )
 
 
-def _counted_rows(coded: CodedRatings) -> tuple[Integers, Integers]:
-    """Return rows of ratings and how often each occurs, or all where many differ."""
-    # -> (n_rows, n_raters), (n_rows,)
-    codes = coded.codes
-    if (coded.n_categories + 1) ** codes.shape[1] <= _MAX_KEYS:
-        return distinct_rows(codes, coded.n_categories)
-    return codes, np.ones(len(codes), dtype=np.int64)
-
-
-def _pairs(
-    problem: IntervalProblem, counts: PairCounts, level: float | None
-) -> tuple[Floats, Integers]:
-    """Return value, low and high of every pair, (3, n_raters, n_raters), and items."""
-    r = counts.n_raters
-    pairs = np.full((3, r, r), math.nan)
-    if level is not None:
-        # Imported here: values alone load no scipy.
-        from masrel.intervals._choice import choose_interval
-    for one, other in counts.pairs():
-        of_pair = rows_problem(problem, *counts.of_pair(one, other))
-        pairs[0, one, other] = of_pair.value
-        if level is not None:
-            interval, _ = choose_interval(of_pair, unweighted=of_pair.unweighted)
-            pairs[1:, one, other] = interval.low, interval.high
-    return np.fmax(pairs, pairs.transpose(0, 2, 1)), counts.shared()
-
-
-def _of_raters(
-    pairs: tuple[Floats, Integers], others: Sequence[int], right: int | None
+def _of_pairs(
+    problem: IntervalProblem,
+    codes: Integers,
+    freq: Integers,
+    others: Sequence[int],
+    right: int | None,
+    level: float | None,
 ) -> dict[str, Array]:
     """Return what pairs say of the raters, and of each with the reference."""
-    values, items = pairs
-    among = values[:, others][:, :, others]
+    r, size = codes.shape[1], problem.coded.n_categories + 1
+    pairs = np.full((3, r, r), math.nan)  # value, low and high
+    items = np.zeros((r, r), dtype=np.int64)  # that both rated
+    if level is not None:
+        # Imported here: values alone load no scipy.
+        from masrel.intervals.choose import _choose_interval
+    for one, other in itertools.combinations(range(r), 2):
+        # ratings of the one by those of the other; the first of either is missing
+        places = (codes[:, one] + 1) * size + codes[:, other] + 1
+        table = np.bincount(places, freq, minlength=size * size).reshape(size, size)
+        items[one, other] = items[other, one] = table[1:, 1:].sum()
+        table[0, 0] = 0.0  # rated by neither
+        rows = np.argwhere(table > 0.0)
+        of_pair = of_rows(problem, rows - 1, table[tuple(rows.T)].astype(np.int64))
+        pairs[0, one, other] = of_pair.value
+        if level is not None:
+            interval, _ = _choose_interval(of_pair)
+            pairs[1:, one, other] = interval.low, interval.high
+    items[np.diag_indices(r)] = freq @ (codes >= 0)
+    pairs = np.fmax(pairs, pairs.transpose(0, 2, 1))
+    among = pairs[:, others][:, :, others]
     defined = ~np.isnan(among[0])
     reference = np.full((3, len(others)), math.nan)
     if right is not None:
-        reference = values[:, others, right]
+        reference = pairs[:, others, right]
     return {
         "pair_values": among[0],
         "pair_low": among[1],
         "pair_high": among[2],
         "pair_items": items[np.ix_(others, others)],
         "mean_values": divide(
-            np.where(defined, among[0], 0.0).sum(axis=1),
-            defined.sum(axis=1).astype(np.float64),
+            np.where(defined, among[0], 0.0).sum(axis=1), defined.sum(axis=1) * 1.0
         ),
         "reference_values": reference[0],
         "reference_low": reference[1],
@@ -358,24 +354,23 @@ def _changes(
     problem: IntervalProblem, codes: Integers, freq: Integers, level: float | None
 ) -> dict[str, Array]:
     """Return the coefficient without each rater, and how much that differs."""
-    r = codes.shape[1]
-    without, errors, half = (np.full(r, math.nan) for _ in range(3))
+    without, errors, half = (np.full(codes.shape[1], math.nan) for _ in range(3))
     active = np.flatnonzero((codes >= 0).any(axis=0))
-    rows = problem.features(replace(problem.coded, codes=codes[:, active]))
-    sums, n_paired = freq @ rows, _n_paired(rows, codes, freq)
-    moved = problem.values_without(sums, rows) if level is not None else np.empty(0)
-    for column, rater in enumerate(active if len(active) > 2 else ()):
-        rest = np.delete(codes[:, active], column, axis=1)
-        others = problem.features(replace(problem.coded, codes=rest))
-        of_others = freq @ others
-        without[rater] = problem.values(of_others)
+    everyone = of_rows(problem, codes[:, active], freq)
+    moved = everyone.values(everyone.sums - everyone.rows)
+    rated = everyone.codes >= 0
+    left_out = _without_raters(everyone) if len(active) > 2 else ()
+    for rater, is_rated, (sums, rows) in zip(active, rated.T, left_out, strict=False):
+        without[rater] = everyone.values(sums)
         if level is not None:
             # as `difference` of the same items, without the rater and with
-            change = problem.values_without(of_others, others) - moved
-            n = min(n_paired, _n_paired(others, rest, freq))
-            matters = rows.any(axis=1) | others.any(axis=1)
-            errors[rater] = math.sqrt(_variance_of(change[matters], freq[matters], n))
-            half[rater] = problem.student_t(n - 1) * errors[rater]
+            change = everyone.values(sums - rows) - moved
+            matters = rows.any(axis=1)
+            has_pair = matters & (rated.sum(axis=1) - is_rated > 1)
+            n = min(everyone.n_paired_items, int(freq @ has_pair))
+            often = freq * (matters | (everyone.freq > 0))
+            errors[rater] = math.sqrt(_variance_of(change, often, n))
+            half[rater] = student_t(level, n - 1) * errors[rater]
     changes = without - problem.value
     half[errors == 0.0] = math.nan  # leaving out any item leaves it as it is
     return {
@@ -387,6 +382,113 @@ def _changes(
     }
 
 
-def _n_paired(rows: Floats, codes: Integers, freq: Integers) -> int:
-    """Return how many items matter that have a pair of ratings."""
-    return int(freq @ (rows.any(axis=1) & ((codes >= 0).sum(axis=1) > 1)))
+# -- categories, and shares of ratings -------------------------------------------------
+
+
+def _category_arrays(
+    codes: Integers, freq: Integers, n_categories: int, level: float | None
+) -> dict[str, Array]:
+    """Return how often each category is used, and how often raters agree on it."""
+    chosen = item_counts(codes, n_categories).astype(np.float64)  # (n_rows, q)
+    met = np.maximum(chosen.sum(axis=1, keepdims=True) - 1.0, 0.0)  # others of the item
+    same, pairs = chosen * (chosen - 1.0), chosen * met
+    low, high = np.full((2, n_categories), np.nan)
+    if level is not None:
+        low, high = _share_interval(
+            level,
+            parts=freq @ same,
+            wholes=freq @ pairs,
+            squares=freq @ same**2,
+            products=freq @ (same * pairs),
+            whole_squares=freq @ pairs**2,
+            n_items=freq @ (pairs > 0.0).astype(np.float64),
+        )
+    return {
+        "category_counts": (freq @ chosen).astype(np.int64),
+        "category_values": divide(freq @ same, freq @ pairs),
+        "category_low": low,
+        "category_high": high,
+    }
+
+
+def _confusions(
+    codes: Integers,
+    freq: Integers,
+    n_categories: int,
+    others: Sequence[int],
+    right: int | None,
+    level: float | None,
+) -> dict[str, Array]:
+    """Return what ratings of others, or of the reference, each rater's ratings met."""
+    shape = (len(others), n_categories, n_categories)
+    confusion, (low, high) = np.zeros(shape), np.full((2, *shape), np.nan)
+    wide = shape[1:]  # a row of a table has one whole
+    held_against = others if right is None else [right]
+    met = item_counts(codes[:, held_against], n_categories).astype(np.float64)
+    for place, rater in enumerate(others):
+        mine = item_counts(codes[:, [rater]], n_categories)
+        # of other raters, or of the reference: (n_rows, n_categories)
+        of_others = met - mine if right is None else met
+        weighed = (mine * freq[:, None]).astype(np.float64)
+        confusion[place] = of_others.T @ weighed
+        if level is None:
+            continue
+        squares = (of_others**2).T @ weighed  # Σ a², which is Σ ab
+        n_items = ((of_others > 0.0).T.astype(np.float64) @ weighed).sum(axis=1)
+        wholes = confusion[place].sum(axis=1)
+        low[place], high[place] = _share_interval(
+            level,
+            parts=confusion[place],
+            wholes=np.broadcast_to(wholes[:, None], wide),
+            squares=squares,
+            products=squares,
+            whole_squares=np.broadcast_to(squares.sum(axis=1)[:, None], wide),
+            n_items=np.broadcast_to(n_items[:, None], wide),
+        )
+    rows = np.broadcast_to(confusion.sum(axis=2, keepdims=True), shape)
+    return {
+        "confusion": confusion.astype(np.int64),
+        "shares": divide(confusion, rows),
+        "share_low": low,
+        "share_high": high,
+    }
+
+
+def _share_interval(
+    level: float,
+    *,
+    parts: Floats,
+    wholes: Floats,
+    squares: Floats,
+    products: Floats,
+    whole_squares: Floats,
+    n_items: Floats,
+) -> tuple[Floats, Floats]:
+    """Return Clopper and Pearson's intervals of shares at the effective size [1]."""
+    # Takes sums over items of parts a of wholes b: Σ a, Σ b, Σ a², Σ ab, Σ b², and how
+    # many items have b > 0; an array has one for each share
+    # [1] Korn, E. L., Graubard, B. I. (1998). Confidence intervals for proportions with
+    # small expected number of positive counts estimated from survey data. Survey
+    # Methodology 24, 193-201.
+    from scipy.special import betaincinv, stdtrit
+
+    share = divide(parts, wholes)
+    # Σa/Σb = s varies by Σ (a - s b)² / (Σb)², that of m single ones by s(1 - s)/m
+    variance = divide(
+        squares - 2.0 * share * products + share * share * whole_squares, wholes**2
+    )
+    varies = variance > 1e-12 * share * (1.0 - share)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        size = np.where(varies, share * (1.0 - share) / variance, n_items)
+        # the variance is known from the items: by t, not from as many single ones
+        upper = 0.5 + 0.5 * level
+        many = stdtrit(np.maximum(wholes - 1.0, 1.0), upper)
+        few = stdtrit(np.maximum(n_items - 1.0, 1.0), upper)
+        size = np.minimum(size * (many / few) ** 2, wholes)
+        x = share * size
+        low = betaincinv(np.maximum(x, 1e-300), size - x + 1.0, 1.0 - upper)
+        high = betaincinv(x + 1.0, np.maximum(size - x, 1e-300), upper)
+    low = np.where(share <= 0.0, 0.0, low)
+    high = np.where(share >= 1.0, 1.0, high)
+    none = np.isnan(share)
+    return np.where(none, np.nan, low), np.where(none, np.nan, high)

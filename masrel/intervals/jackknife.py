@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,18 +10,17 @@ from masrel.agreement import Label, Metric, WeightsLike
 from masrel.agreement._engine import Floats
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target, Unit
-from masrel.intervals._clusters import ClusterSums, clusters_of
-from masrel.intervals._problem import (
+from masrel.intervals._question import (
     COLUMNS,
     ROUNDING,
+    ClusterSums,
     Integers,
     IntervalProblem,
     Statistic,
+    cluster_codes,
     pose_problem,
     warn_small,
 )
-
-_UNITS = {"items": ("items",), "raters": ("raters",), "both": ("items", "raters")}
 
 
 def jackknife(
@@ -113,101 +112,80 @@ def jackknife(
         metric=metric,
         level=level,
     )
-    if clusters is not None:
-        codes = clusters_of(problem, clusters)
-        jackknifed = _jackknife_variance(problem, codes)
-        return _interval_around_estimate(problem, jackknifed, "clusters")
-    return _interval_around_estimate(problem, _jackknife_variance(problem))
-
-
-def _interval_around_estimate(
-    problem: IntervalProblem,
-    jackknifed: "_JackknifeVariance",
-    target: Unit | None = None,
-) -> Interval:
-    # target: what was left out, where that is not what the question is about
-    target = target or problem.target
-    unit = "two-way" if target == "both" else target.removesuffix("s")
-    if jackknifed.reason is not None:
-        return problem.undefined(
-            jackknifed.reason, method=f"{unit} jackknife", unit=target
-        )
-    half = problem.student_t(jackknifed.df) * math.sqrt(jackknifed.variance)
-    return problem.confidence(
-        problem.value - half,
-        problem.value + half,
-        method=f"{unit} jackknife, t({jackknifed.df:g})",
-        unit=target,
-        notes=jackknifed.notes,
-    )
+    codes = None if clusters is None else cluster_codes(problem, clusters)
+    return _leave_out(problem, codes).interval()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _JackknifeVariance:
+class _LeftOut:
     """How much an estimate moves when units are left out one at a time."""
 
+    problem: IntervalProblem
+    unit: Unit  # what was left out
     variance: float  # ``nan`` when undefined
     df: float  # its degrees of freedom
-    notes: tuple[str, ...] = ()  # what is small
-    reason: str | None = None  # why it makes no interval, or None
+    notes: tuple[str, ...]  # what is small
+    reason: str | None  # why it makes no interval, or None
+
+    def interval(self, *, lowest: float | None = None) -> Interval:
+        """Return an interval around the value, or on the logit above `lowest`."""
+        unit = "two-way" if self.unit == "both" else self.unit.removesuffix("s")
+        if self.reason is not None:
+            method = f"{unit} jackknife"
+            return self.problem.undefined(self.reason, method=method, unit=self.unit)
+        scale = "" if lowest is None else " on the logit"
+        return self.problem.by_t(
+            math.sqrt(self.variance),
+            self.df,
+            lowest=lowest,
+            method=f"{unit} jackknife, t({self.df:g}){scale}",
+            unit=self.unit,
+            notes=self.notes,
+        )
 
 
-def _jackknife_variance(
-    problem: IntervalProblem, clusters: Integers | None = None
-) -> _JackknifeVariance:
+def _leave_out(problem: IntervalProblem, clusters: Integers | None = None) -> _LeftOut:
     """Leave out items, raters, or both, as the target says, or clusters of items."""
-    if math.isnan(problem.value):
-        reason = "the estimate itself is undefined"
-        return _JackknifeVariance(variance=math.nan, df=math.nan, reason=reason)
-    variance, df = 0.0, problem.max_df
+    target: Unit = problem.target if clusters is None else "clusters"
+    units: tuple[Unit, ...] = (target,)
+    if target == "both":
+        units = ("items", "raters")
+    variance, df, reason = 0.0, problem.max_df, None
     notes: tuple[str, ...] = ()
-    units = _UNITS[problem.target] if clusters is None else ("clusters",)
+    if math.isnan(problem.value):
+        variance, units, reason = math.nan, (), "the estimate itself is undefined"
     for unit in units:
-        replicates, freq, n = _without_one(problem, unit, clusters)
-        if np.isnan(replicates).any():
+        if unit == "items":
+            values, freq = problem.values(problem.sums - problem.rows), problem.freq
+            n = problem.n_paired_items
+        elif clusters is not None:
+            left = ClusterSums.of(problem, clusters)
+            values = problem.values(problem.sums - left.sums[left.known])
+            freq, n = np.ones(len(values), dtype=np.int64), left.n_paired
+        else:
+            values = np.array(
+                [problem.values(sums) for sums, _ in _without_raters(problem)]
+            )
+            freq, n = np.ones(len(values), dtype=np.int64), problem.n_paired_raters
+        variance += _variance_of(values, freq, n)
+        if np.isnan(values).any():
             reason = f"with one of the {unit} left out the estimate is undefined"
-            return _JackknifeVariance(variance=math.nan, df=math.nan, reason=reason)
-        variance += _variance_of(replicates, freq, n)
+            break
         # Satterthwaite's degrees for a sum would lie above the fewer ones.
         df = min(df, n - 1)
         notes += warn_small(n, 5 if unit == "raters" else 10, unit, int(freq.sum()))
-    if not variance > 0.0:
+    if reason is None and not variance > 0.0:
         reason = (
             f"leaving out any of the {' or '.join(units)} leaves the estimate as it "
             "is, so the jackknife cannot say how uncertain it is"
         )
-        return _JackknifeVariance(variance=0.0, df=math.nan, notes=notes, reason=reason)
-    return _JackknifeVariance(variance=variance, df=df, notes=notes)
-
-
-def _without_one(
-    problem: IntervalProblem, unit: str, clusters: Integers | None
-) -> tuple[Floats, Integers, int]:
-    """Return estimates without a unit, how often each, and units that have a pair."""
-    if unit == "items":
-        values = problem.values_without(problem.sums, problem.rows)
-        return values, problem.freq, problem.n_paired_items
-    if clusters is not None:
-        made = ClusterSums.of(problem, clusters)
-        values, n = made.values_without(problem), made.n_paired
-    else:
-        of_raters = [problem.values(sums) for sums, _ in _rows_without_rater(problem)]
-        values, n = np.array(of_raters, dtype=np.float64), problem.n_paired_raters
-    return values, np.ones(len(values), dtype=np.int64), n
-
-
-def _logit_interval(problem: IntervalProblem, codes: Integers) -> Interval:
-    """Leave out clusters of items, on a scale without ends."""
-    jackknifed = _jackknife_variance(problem, codes)
-    if jackknifed.reason is not None:
-        return _interval_around_estimate(problem, jackknifed, "clusters")
-    return problem.around(
-        problem.value,
-        problem.student_t(jackknifed.df) * math.sqrt(jackknifed.variance),
-        lowest=problem.entry.lowest,
-        method=f"cluster jackknife, t({jackknifed.df:g}) on the logit",
-        unit="clusters",
-        notes=jackknifed.notes,
+    return _LeftOut(
+        problem=problem,
+        unit=target,
+        variance=variance,
+        df=df,
+        notes=notes,
+        reason=reason,
     )
 
 
@@ -224,33 +202,30 @@ def _variance_of(replicates: Floats, freq: Integers, n: int) -> float:
     return 0.0 if math.sqrt(variance) <= ROUNDING else variance
 
 
-def _rows_without_rater(problem: IntervalProblem) -> Iterator[tuple[Floats, Floats]]:
-    """Return sums, and features of the patterns, without one rater after the other."""
-    # -> (n_features,), (n_patterns, n_features), made anew, because pairs of raters go.
+def _without_raters(problem: IntervalProblem) -> Iterator[tuple[Floats, Floats]]:
+    """Return sums, and features of the rows, without one rater after the other."""
+    # -> (n_features,), (n_rows, n_features), made anew, because pairs of raters go.
     # Items that not every rater rated may matter once the one is gone who did not.
     width = COLUMNS[problem.entry.shape]
-    codes, freq = problem.distinct.codes, problem.distinct_freq
-    n_raters = codes.shape[1] // width
     fewest = 2 if width == 2 else 3
-    if n_raters < fewest:
+    if problem.n_raters < fewest:
         raise ParameterError(
             f'target: "{problem.target}" needs at least {fewest} raters, because one '
-            f"is left out; got {n_raters}"
+            f"is left out; got {problem.n_raters}"
         )
-    for rater in range(n_raters):
-        rest = np.delete(codes, np.s_[rater * width : (rater + 1) * width], axis=1)
-        rows = problem.features(replace(problem.distinct, codes=rest))
-        matters = rows.any(axis=1)
-        yield freq[matters] @ rows[matters], rows[problem.matters]
+    for first in range(0, problem.codes.shape[1], width):
+        left_out = np.s_[first : first + width]
+        rows = problem.features(np.delete(problem.codes, left_out, axis=1))
+        yield problem.often @ rows, rows
 
 
 def _variance_of_cells(problem: IntervalProblem) -> float:
     """Return the variance that leaving out items and leaving out raters both hold."""
     # that of a rater on an item, (n - 1)(r - 1)/(n r) Σ_ij (κ_-i-j - κ_-i - κ_-j + κ)²
-    without_item = problem.values_without(problem.sums, problem.rows)
+    without_item = problem.values(problem.sums - problem.rows)
     cells = 0.0
-    for sums, rows in _rows_without_rater(problem):
-        without_both = problem.values_without(sums, rows)
+    for sums, rows in _without_raters(problem):
+        without_both = problem.values(sums - rows)
         cell = without_both - without_item - float(problem.values(sums)) + problem.value
         cells += float(problem.freq @ cell**2)
     n, r = problem.n_paired_items, problem.n_paired_raters

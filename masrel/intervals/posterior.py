@@ -8,7 +8,7 @@ import numpy as np
 from masrel.agreement import Label
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
-from masrel.intervals._problem import IntervalProblem, Statistic, pose_problem
+from masrel.intervals._question import IntervalProblem, Statistic, pose_problem
 
 if TYPE_CHECKING:
     from masrel.agreement import WeightsLike

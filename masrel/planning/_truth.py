@@ -20,7 +20,7 @@ from scipy.special import gammaln, ndtr, ndtri
 from masrel._input import refuse
 from masrel.agreement import CodedRatings, Coefficient, Label, coefficient
 from masrel.errors import MasrelWarning, ParameterError
-from masrel.intervals._problem import IntervalProblem, pose_problem
+from masrel.intervals._question import IntervalProblem, pose_problem
 from masrel.planning._study_plan import RATER_SHARE, LatentModel, Study
 
 Floats = NDArray[np.float64]
@@ -451,7 +451,7 @@ class Design:
     def features(self, codes: Integers) -> Floats:
         """Return features of ratings (…, n_raters), (…, n_features)."""
         rows = codes.reshape(-1, codes.shape[-1])
-        features = self.problem.features(replace(self.problem.coded, codes=rows))
+        features = self.problem.features(rows)
         return features.reshape(*codes.shape[:-1], -1)
 
     @np.errstate(invalid="ignore")  # 0/0 where there is no coefficient

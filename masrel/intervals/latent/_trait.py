@@ -13,7 +13,7 @@ from masrel.agreement._labels import Codes
 from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Distribution, Estimate, Interval, Target
 from masrel.intervals._mcmc import quantile_error
-from masrel.intervals._problem import recorded_generator
+from masrel.intervals._question import recorded_generator
 from masrel.intervals.latent._density import LatentDensity, LatentPrior
 from masrel.intervals.latent._implied import (
     Items,

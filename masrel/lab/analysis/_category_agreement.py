@@ -7,7 +7,7 @@ import numpy as np
 
 from masrel.agreement import category_kappa, code_ratings
 from masrel.errors import MasrelWarning
-from masrel.intervals._confusion import PairCounts, category_arrays
+from masrel.intervals.diagnosis import _category_arrays
 from masrel.lab.analysis._results import PlannedEstimate
 from masrel.lab.ratings import Ratings, rating_matrix
 
@@ -33,10 +33,9 @@ def category_agreement(
     grades = ratings.scale.grades
     codes = code_ratings(matrix.grades, grades).codes
     freq = np.ones(len(codes), dtype=np.int64)
-    counts, raters = PairCounts.of(codes, freq, len(grades)), range(codes.shape[1])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MasrelWarning)  # a grade that nobody gave
-        arrays = category_arrays(codes, freq, counts, raters, level)
+        arrays = _category_arrays(codes, freq, len(grades), level)
         kappas = [
             category_kappa(matrix.grades, grade, categories=grades).value
             for grade in grades

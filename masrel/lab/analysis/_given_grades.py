@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from masrel.intervals._confusion import share_interval
+from masrel.intervals.diagnosis import _share_interval
 from masrel.lab.protocol import Protocol
 from masrel.lab.ratings import Ratings
 
@@ -56,7 +56,7 @@ def _of_aim(
     # of each rater how many grades, and how many of them the intended one
     wholes = every.sum(axis=1).astype(np.float64)
     parts = every[:, grades.index(aim)].astype(np.float64)
-    low, high = share_interval(
+    low, high = _share_interval(
         level,
         parts=parts.sum(keepdims=True),
         wholes=wholes.sum(keepdims=True),

@@ -1,0 +1,494 @@
+"""One question about a coefficient, checked once, as every interval method takes it.
+
+In: a coefficient, ratings, and the population asked about. Out: an `IntervalProblem`.
+"""
+
+import math
+import re
+import sys
+import warnings
+from collections.abc import Callable, Collection, Hashable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.agreement import (
+    CodedRatings,
+    Coefficient,
+    CountedRatings,
+    Label,
+    Metric,
+    WeightsLike,
+    coefficient,
+    count_ratings,
+)
+from masrel.agreement._distances import Line
+from masrel.agreement._engine import Features, Floats, Formula, check_level
+from masrel.agreement._labels import Codes, is_missing, is_row
+from masrel.agreement._rows import distinct_rows, item_counts
+from masrel.agreement._weights import as_line, declared_weights
+from masrel.errors import (
+    ParameterError,
+    SmallSampleWarning,
+    UndefinedStatisticWarning,
+)
+from masrel.estimates import Estimate, Interval, Target, Unit
+
+Integers = NDArray[np.int64]
+
+Statistic = str | Callable[..., Estimate] | Coefficient
+"""A coefficient: its name, its public function, or its entry in the register."""
+
+HELD = (
+    "the ordinal metric, which depends on the ratings, is held as it was found in all "
+    "of them"
+)
+
+_MAX_PLACES = 1 << 23  # numbers of features that are held at once
+_FEW_GRADES = 128  # up to which the features of every item are held
+_MAX_REMADE = 40  # categories up to which that metric is made anew from their pairs
+
+COLUMNS = {"ratings": 1, "pairs": 2}
+"""Columns of codes that a rater has, by what a coefficient takes."""
+
+ROUNDING = 1e-12
+"""Values of a coefficient, or probabilities, nearer than this are the same."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class IntervalProblem:
+    """A coefficient, its data as sums of features, and the question about it."""
+
+    # A coefficient is a function of sums over items of a few features of each, so that
+    # a resample, or leaving an item out, changes the sums and nothing else.
+    entry: Coefficient
+    formula: Formula
+    v: Any  # disagreement of two categories, as the formula takes it
+    unweighted: bool  # whether every miss counts in full
+    target: Target
+    level: float
+    coded: CodedRatings  # all ratings, item by item
+    item_codes: Codes  # the same of raters who matter, (n_items, n_columns)
+    codes: Codes  # the distinct rows of these, (n_rows, n_columns)
+    often: Integers  # how often each occurs, (n_rows,)
+    freq: Integers  # the same, but 0 of a row that changes no sum: it is no item
+    item_features: Features  # of each row
+    sums: Floats  # of features over all items, (n_features,)
+    value: float  # the estimate; ``nan`` when undefined
+    n_items: int  # that matter: of those, an item of one rating tells of chance only
+    # those with a pair of ratings, which degrees of freedom and rules for few count
+    n_paired_items: int
+    min_value: float  # where intervals are cut
+    is_too_large: bool  # to hold the features of all items
+    notes: tuple[str, ...] = ()  # of every interval
+    max_df: float = math.inf  # degrees of freedom, where other parts have as few
+
+    @cached_property
+    def rows(self) -> Floats:
+        """The features of each row, (n_rows, n_features)."""
+        return self.features(self.codes)
+
+    @property
+    def n_raters(self) -> int:
+        """Raters who matter."""
+        return int(self.codes.shape[1]) // COLUMNS[self.entry.shape]
+
+    @property
+    def n_paired_raters(self) -> int:
+        """Raters with a rating of an item that has a pair of ratings."""
+        if self.entry.shape == "pairs":
+            return self.n_raters
+        rated = self.codes[self.freq > 0] >= 0
+        return int(rated[rated.sum(axis=1) >= 2].any(axis=0).sum())
+
+    def item_counts(self) -> Integers:
+        """Count the raters of each category for every item that matters."""
+        # -> (n_items, n_categories), equal items together
+        counts = item_counts(self.codes, self.coded.n_categories)
+        return counts.repeat(self.freq, axis=0)
+
+    def features(self, codes: Codes) -> Floats:
+        """Return the features of rows of codes, (n_rows, n_features)."""
+        if self.is_too_large:
+            raise ParameterError(
+                f"ratings: {len(self.coded.codes)} items of {self.coded.n_categories} "
+                f"different grades are too many for an interval of {self.formula.title}"
+                " that counts each of them; kappas by Cohen, Conger, Fleiss and Light "
+                "and alpha with quadratic weights count none, nor does "
+                'method="analytic" for other items; intraclass correlations (ICC) take '
+                "measurements as they are"
+            )
+        return self.formula.features(codes, self.v).rows()
+
+    def values(self, sums: Floats) -> Floats:
+        """Return the coefficient for sums of shape (..., n_features)."""
+        return self.formula.value(sums, self.v)
+
+    def slopes(self, sums: Floats) -> Floats:
+        """Return the derivatives of the coefficient in sums (..., n_features)."""
+        with np.errstate(invalid="ignore", divide="ignore"):  # undefined ones
+            slope = self.formula.slope(sums, self.v)
+        return np.where(np.isfinite(slope), slope, math.nan)
+
+    def by_t(
+        self,
+        error: float,
+        df: float,
+        *,
+        lowest: float | None = None,
+        method: str,
+        unit: Unit | None,
+        notes: Sequence[str] = (),
+    ) -> Interval:
+        """Return an interval by Student's t, or by the normal of infinite degrees.
+
+        With `lowest` it is symmetric on the logit of the place between that and 1; at
+        either end itself there is none.
+        """
+        half = student_t(self.level, df) * error
+        low, high = self.value - half, self.value + half
+        if lowest is not None and lowest < self.value < 1.0:
+            from scipy.special import expit, logit
+
+            # The error is divided by the slope of the logit, and the ends are taken
+            # back, so that they stay inside.
+            width = 1.0 - lowest
+            share = (self.value - lowest) / width
+            half /= width * share * (1.0 - share)
+            ends = np.array([logit(share) - half, logit(share) + half])
+            low, high = (lowest + width * expit(ends)).tolist()
+        return self.confidence(low, high, method=method, unit=unit, notes=notes)
+
+    def confidence(
+        self,
+        low: float,
+        high: float,
+        *,
+        method: str,
+        unit: Unit | None,
+        notes: Sequence[str] = (),
+    ) -> Interval:
+        """Return a confidence interval, cut at the ends of the parameter space."""
+        if low < self.min_value or high > 1.0:
+            space = f"[{self.min_value:g}, 1]"
+            notes = (*notes, f"cut at the end of the parameter space {space}")
+        return Interval(
+            # resamples of items and raters can leave both ends below the space
+            low=min(max(low, self.min_value), 1.0),
+            high=max(min(high, 1.0), self.min_value),
+            level=self.level,
+            kind="confidence",
+            method=method,
+            target=self.target,
+            unit=unit,
+            notes=(*notes, *self.notes),
+        )
+
+    def undefined(self, reason: str, *, method: str, unit: Unit | None) -> Interval:
+        """Return an interval of ``nan`` that says why, with a warning."""
+        message = f"{method} interval of {self.entry.title} is undefined: {reason}"
+        warn_user(message, UndefinedStatisticWarning)
+        return Interval(
+            low=math.nan,
+            high=math.nan,
+            level=self.level,
+            kind="confidence",
+            method=method,
+            target=self.target,
+            unit=unit,
+            reason=reason,
+        )
+
+
+def student_t(level: float, df: float) -> float:
+    """Return the two-sided quantile of Student's t; that of the normal for inf."""
+    from scipy.special import ndtri, stdtrit  # loaded only when an interval needs it
+
+    upper = 0.5 + 0.5 * level
+    return float(ndtri(upper) if math.isinf(df) else stdtrit(df, upper))
+
+
+def pose_problem(
+    statistic: Statistic,
+    ratings: object,
+    *,
+    target: Target,
+    categories: Sequence[Label] | None,
+    weights: "WeightsLike",
+    level: float,
+    metric: Metric | None = None,
+) -> IntervalProblem:
+    """Check a question and prepare its data."""
+    entry = find_entry(statistic, metric)
+    check_one_of("target", target, get_args(Target))
+    check_level(level)
+    coded = _coded(entry, ratings, target, categories)
+    formula = entry.formula
+    notes: tuple[str, ...] = ()
+    if formula is None:
+        raise ParameterError(
+            f"coefficient: {entry.title} is no function of sums over items: there is "
+            "no such interval of it"
+        )
+    if entry.metric is None:
+        made = declared_weights(weights, coded.categories, declared=coded.declared)
+    else:
+        made = entry.disagreement(coded, weights)
+    if entry.metric == "ordinal" and coded.n_categories > _MAX_REMADE:
+        formula, notes = coefficient(entry.name).formula or formula, (HELD,)
+    item_codes, codes, often = _who_matters(entry, formula, made.v, coded)
+    v, n_rows = made.v, max(len(item_codes), len(made.v))
+    features = formula.features(codes[:1], v)
+    is_too_large = (
+        len(v) > _FEW_GRADES
+        and n_rows * (len(features.dense) + features.n) > _MAX_PLACES
+    )
+    line = as_line(made, coded.categories) if is_too_large else None
+    by_nodes = None if line is None else _by_nodes(formula, line)
+    if by_nodes is not None:
+        formula, v, is_too_large = by_nodes, line, False
+    return IntervalProblem(
+        entry=entry,
+        formula=formula,
+        v=v,
+        unweighted=made.counts_misses,
+        target=target,
+        level=level,
+        coded=coded,
+        item_codes=item_codes,
+        is_too_large=is_too_large,
+        notes=notes,
+        **_of_rows(entry, formula, v, codes, often),
+    )
+
+
+def _coded(
+    entry: Coefficient,
+    ratings: object,
+    target: Target,
+    categories: Sequence[Label] | None,
+) -> CodedRatings:
+    """Code the ratings of as many raters as the coefficient takes."""
+    if isinstance(ratings, CountedRatings) and not (
+        ratings.knows_raters or entry.tells_raters_apart
+    ):
+        if target != "items":
+            raise ParameterError(
+                "target: counts do not say who rated what, so that an interval "
+                f'generalises to other "items"; got "{target}"'
+            )
+        coded = count_ratings(ratings, categories).coded
+    else:
+        coded = entry.code(ratings, categories)
+    fewest, most = entry.n_raters
+    n_raters = coded.codes.shape[1]
+    if most is not None and n_raters > most:
+        n_raters = coded.n_raters  # those without any rating are none
+    if entry.shape == "ratings" and not fewest <= n_raters <= (most or n_raters):
+        needed = f"{fewest}" if most == fewest else f"at least {fewest}"
+        raise ParameterError(f"{entry.title} needs {needed} raters, got {n_raters}")
+    return coded
+
+
+def _who_matters(
+    entry: Coefficient, formula: Formula, v: Any, coded: CodedRatings
+) -> tuple[Codes, Codes, Integers]:
+    """Return codes of raters who matter, their distinct rows, and how often each is."""
+    # A rater without a rating in a row that matters, or a pair in a test-retest, is no
+    # rater; so the same intervals follow whether such rows and columns are there.
+    width, fewest, item_codes = COLUMNS[entry.shape], entry.n_raters[0], coded.codes
+    rated = (item_codes >= 0).any(axis=0)  # (n_columns,)
+    if width == 1 and fewest <= rated.sum() < rated.size:
+        item_codes = item_codes[:, rated]
+    while True:
+        codes, often = distinct_rows(item_codes, coded.n_categories)
+        there = codes[formula.features(codes, v).matters] >= 0
+        shape = (len(there), codes.shape[1] // width, width)
+        rates = there.reshape(shape).all(axis=2).any(axis=0)  # (n_raters,)
+        if rates.all() or rates.sum() < fewest:
+            return item_codes, codes, often
+        item_codes = item_codes[:, rates.repeat(width)]
+
+
+def of_rows(problem: IntervalProblem, codes: Codes, often: Integers) -> IntervalProblem:
+    """Return the same question of distinct rows of ratings that occur so often."""
+    parts = _of_rows(problem.entry, problem.formula, problem.v, codes, often)
+    coded = replace(problem.coded, codes=codes)
+    return replace(problem, coded=coded, item_codes=codes, **parts)
+
+
+def _of_rows(
+    entry: Coefficient, formula: Formula, v: Any, codes: Codes, often: Integers
+) -> dict[str, Any]:
+    """Return what distinct rows and their features make of a question."""
+    features = formula.features(codes, v)
+    freq, sums = often * features.matters, features.sums(often)
+    value = float(formula.value(sums, v))
+    # weights, or items of a single rating, can bring a coefficient below -1
+    min_value = entry.lowest if value >= entry.lowest else -math.inf
+    return {
+        "codes": codes,
+        "often": often,
+        "freq": freq,
+        "item_features": features,
+        "sums": sums,
+        "value": value,
+        "n_items": int(freq.sum()),
+        # a pair is of one rater in a test-retest, where rows without do not matter
+        "n_paired_items": int(freq @ ((codes >= 0).sum(axis=1) >= 2)),
+        "min_value": min_value,
+    }
+
+
+def _by_nodes(formula: Formula, line: Line) -> Formula | None:
+    """Return the formula with all ratings shared out among three nodes.
+
+    Where v is the square of a distance, the nodes stand for any number of grades.
+    """
+    nodes = None if formula.needs_categories else line.nodes()
+    if nodes is None:
+        return None
+    shares, v = nodes
+
+    def features(codes: Codes, _v: Any, repeats: Integers | None = None) -> Features:
+        made = formula.features(codes, line, repeats)
+        slot, grade = np.divmod(made.places, len(shares))
+        places = 3 * slot[:, :, None] + np.arange(3)
+        values = made.values[:, :, None] * shares[grade]
+        flat = len(codes), 3 * slot.shape[1]
+        n = 3 * made.n // len(shares)
+        return Features(made.dense, places.reshape(flat), values.reshape(flat), n)
+
+    def disagreements(sums: Floats, _v: Any) -> tuple[Floats, Floats]:
+        d_o, d_e = formula.disagreements(sums, v)
+        return d_o, np.where(d_e > ROUNDING * v.max(), d_e, 0.0)  # 0 is rounded here
+
+    return replace(
+        formula,
+        features=features,
+        disagreements=disagreements,
+        slope=lambda sums, _v: formula.slope(sums, v),
+        rater_sums=None,
+        crossed_sums=None,
+    )
+
+
+def check_one_of(option: str, value: object, known: Collection[str]) -> None:
+    """Check an option that is one of some words."""
+    if value not in known:
+        raise ParameterError(
+            f"{option}: needs one of {', '.join(known)}, got {value!r}"
+        )
+
+
+def find_entry(statistic: Statistic, metric: Metric | None = None) -> Coefficient:
+    """Return the entry of a name or a public function in the register."""
+    if not isinstance(statistic, Coefficient):
+        if not isinstance(statistic, str):
+            statistic = str(getattr(statistic, "__name__", repr(statistic)))
+        statistic = coefficient(statistic)
+    return statistic if metric is None else statistic.by_metric(metric)
+
+
+# -- clusters of items -----------------------------------------------------------------
+
+
+def cluster_codes(problem: IntervalProblem, clusters: object) -> Integers:
+    """Return which cluster every item belongs to, as numbers from 0, (n_items,)."""
+    n_items = len(problem.coded.codes)
+    if problem.target != "items":
+        raise ParameterError(
+            "clusters: what is left out, or drawn anew, is a cluster of items, so "
+            f'target "items"; got "{problem.target}"'
+        )
+    if not is_row(clusters):
+        raise ParameterError(
+            f"clusters: needs one label an item, got {type(clusters).__name__}"
+        )
+    labels = list(clusters)
+    if len(labels) != n_items:
+        raise ParameterError(
+            f"clusters: needs one label an item, {n_items}, got {len(labels)}"
+        )
+    numbers: dict[Hashable, int] = {}
+    for item, label in enumerate(labels):
+        if is_missing(label) or not isinstance(label, Hashable) or label == "":
+            raise ParameterError(
+                f"clusters: item {item} needs the label of its cluster, got {label!r}"
+            )
+        numbers.setdefault(label, len(numbers))
+    return np.array([numbers[label] for label in labels])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ClusterSums:
+    """The features of items added up over each cluster."""
+
+    sums: Floats  # (n_clusters, n_features)
+    known: NDArray[np.bool_]  # those that the coefficient knows of, (n_clusters,)
+    n_paired: int  # clusters with a pair of ratings of an item
+
+    @classmethod
+    def of(cls, problem: IntervalProblem, clusters: Integers) -> "ClusterSums":
+        """Add up items whose clusters are numbers from 0."""
+        # Takes clusters (n_items,)
+        features = problem.features(problem.item_codes)
+        matters = features.any(axis=1)
+        paired = matters & ((problem.item_codes >= 0).sum(axis=1) > 1)
+        n = int(clusters.max(initial=-1)) + 1
+        sums = np.zeros((n, len(problem.sums)))
+        np.add.at(sums, clusters, features)
+        return cls(
+            sums=sums,
+            known=np.bincount(clusters[matters], minlength=n) > 0,
+            n_paired=len(np.unique(clusters[paired])),
+        )
+
+
+# -- what is small, and what is random -------------------------------------------------
+
+
+def warn_small(
+    count: int, minimum: int, what: str, of: int | None = None
+) -> tuple[str, ...]:
+    """Warn below a number of items or raters, and return the note of it."""
+    if count >= minimum:
+        return ()
+    if of is not None and of > count:  # as many are there, few of them with a pair
+        what += " with a pair of ratings"
+    if count == 1:
+        what = singular(what)
+    note = f"{count} {what}: below {minimum} the interval may cover less than it says"
+    warn_user(note, SmallSampleWarning)
+    return (note,)
+
+
+def warn_user(message: str, category: type[Warning]) -> None:
+    """Warn whoever called this package."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back and frame.f_globals.get("__package__") == __package__:
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, category, stacklevel=level)
+
+
+def singular(what: str) -> str:
+    """Return for one what is said in the plural."""
+    return re.sub(r"s\b", "", what, count=1)  # "items with ratings": the first alone
+
+
+def recorded_generator(
+    rng: np.random.Generator | int | None,
+) -> tuple[np.random.Generator, int | None]:
+    """Return a generator and the seed that repeats it."""
+    if isinstance(rng, np.random.Generator):
+        return rng, None  # its owner knows where it began
+    if rng is None:
+        rng = int(np.random.SeedSequence().generate_state(1, np.uint64)[0] >> 1)
+    if isinstance(rng, bool) or not isinstance(rng, int | np.integer) or rng < 0:
+        raise ParameterError(
+            f"rng: needs a numpy Generator or an integer of at least 0, got {rng!r}"
+        )
+    return np.random.default_rng(int(rng)), int(rng)

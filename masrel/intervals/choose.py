@@ -1,0 +1,376 @@
+"""An estimate with the interval that its question and its size call for.
+
+Which covers best is known from the study of coverage in the docs.
+
+Other items. A posterior covers best where there are
+
+- few: less than 10 items, and less than 10 raters;
+- rare categories: less than 30 items, and less than half of all, have a rating outside
+  the commonest category;
+- no spread: leaving out any item changes nothing, or next to nothing.
+
+It is that of the Dirichlet-multinomial model for Fleiss' kappa, Scott's pi and
+Krippendorff's alpha, and for every unweighted coefficient where categories are rare,
+since chance agreement then hardly depends on who the raters are, or where few items are
+graded by more than two, which say more of raters alike than of each pattern. For others
+it is that of the table of two raters or of the patterns of any number, as it is for all
+above 2000 items. Elsewhere the item jackknife on a logit, its upper end lifted below 30
+items.
+
+Other raters. The rater jackknife; without spread the posterior, for those of the model.
+
+Both. What the two of them say, joined.
+
+Other clusters of items. The cluster jackknife on a logit; that it may cover less where
+categories are rare is noted.
+
+Items and raters are counted that have a pair of ratings.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+
+from masrel.agreement import CountedRatings, Label
+from masrel.agreement._engine import standard_error
+from masrel.errors import ParameterError
+from masrel.estimates import Estimate, Interval, Target
+from masrel.intervals._question import (
+    Integers,
+    IntervalProblem,
+    Statistic,
+    check_one_of,
+    cluster_codes,
+    find_entry,
+    pose_problem,
+    singular,
+    student_t,
+    warn_small,
+)
+from masrel.intervals.analytic import _clustered_error, analytic
+from masrel.intervals.bootstrap import bootstrap
+from masrel.intervals.jackknife import _leave_out, _variance_of_cells, jackknife
+from masrel.intervals.posterior import _RHO_COEFFICIENTS, posterior
+
+if TYPE_CHECKING:
+    from masrel.agreement import Metric, WeightsLike
+
+_Method = Literal["auto", "analytic", "jackknife", "bootstrap", "posterior"]
+"""Kinds of intervals; "auto" chooses one by target and size."""
+
+_FEW = 10  # items, and raters, below which a posterior covers best
+_SEVERAL = 30  # items, below which a jackknife alone ends too low
+_ACCIDENT = 0.003  # of (1 - κ) / ratings: a variance below it is no information
+_OUTSIDE = "items with a rating outside the commonest category"
+_MANY = 2_000  # items, above which the model's polynomials take long
+_MANY_RATERS = 10  # among whom careless ones are seldom missing
+_CARELESS = (
+    "careless raters are not covered, of whom so few may include none: where one rater "
+    "in five is careless, 95 % intervals of 5 raters held in about 70 % of studies"
+)
+_OTHERS = {"items": "items", "raters": "raters", "both": "items and raters"}
+
+
+def estimate(
+    coefficient: Statistic,
+    ratings: object,
+    *,
+    target: Target,
+    method: _Method = "auto",
+    categories: Sequence[Label] | None = None,
+    weights: "WeightsLike" = "identity",
+    metric: "Metric | None" = None,
+    level: float = 0.95,
+    n_resamples: int = 10_000,
+    rng: np.random.Generator | int | None = None,
+    clusters: object = None,
+) -> Estimate:
+    """Estimate a coefficient with an interval that answers a stated question.
+
+    Parameters
+    ----------
+    coefficient : str or callable
+        Name of a coefficient, or its public function.
+    ratings : nested sequence, array_like or DataFrame
+        What the coefficient takes.
+    target : {"items", "raters", "both"}
+        What a new study would draw anew. There is no default.
+    method : {"auto", "analytic", "jackknife", "bootstrap", "posterior"}, optional
+        Kind of interval; "auto" chooses by target and size, and a note says what and
+        why. The functions of the same names have more options.
+    categories : sequence, optional
+        The declared scale in order.
+    weights : str or array_like, optional
+        How much two categories agree; see `declared_weights`.
+    metric : str, optional
+        Krippendorff's difference function in place of weights; see
+        `krippendorff_alpha`, which alone takes one.
+    level : float, optional
+        Nominal level.
+    n_resamples : int, optional
+        _Resamples of a bootstrap, where they are drawn.
+    rng : Generator or int, optional
+        Where randomness comes from, for methods that draw.
+    clusters : sequence of labels, length n_items, optional
+        The cluster of every item, such as the patient of a site: what a new study
+        would draw anew, with `target` "items" and `method` "auto", "analytic" or
+        "jackknife". Each item by itself when not given.
+
+    Returns
+    -------
+    Estimate
+        The coefficient with its interval; with clusters its standard error is of
+        these, too.
+
+    Raises
+    ------
+    ParameterError
+        If an option is invalid, or the coefficient has no such interval.
+    RatingsError
+        If the ratings do not fit the coefficient.
+
+    Warns
+    -----
+    SmallSampleWarning
+        If the interval rests on too little.
+    UndefinedStatisticWarning
+        If the estimate or the interval is undefined.
+
+    Examples
+    --------
+    >>> ratings = [["a", "a", "a"], ["a", "b", "a"], ["b", "b", "b"]] * 4
+    >>> result = estimate("fleiss_kappa", ratings, target="items")
+    >>> result.interval.method
+    'item jackknife, t(11) on the logit'
+    """
+    check_one_of("method", method, get_args(_Method))
+    entry = find_entry(coefficient, metric)
+    check_one_of("target", target, get_args(Target))
+    there_is = entry.interval_target
+    if method == "auto" and there_is not in (None, target):
+        raise ParameterError(
+            f"target: the interval of {entry.title} generalises to other "
+            f'{_OTHERS[str(there_is)]}, which is "{there_is}", and it has no other; '
+            f'got "{target}"'
+        )
+    if clusters is not None and method in ("bootstrap", "posterior"):
+        raise ParameterError(
+            f'clusters: needs method "auto", "analytic" or "jackknife", got "{method}"'
+        )
+    if entry.formula is None:
+        result = entry(ratings, categories=categories, weights=weights, level=level)
+    else:
+        is_counted = isinstance(ratings, CountedRatings)
+        # coded once, for all that follows
+        ratings = ratings if is_counted else entry.code(ratings, categories)
+        result = entry(ratings, categories=categories, weights=weights)
+        categories = None  # the ratings have them by now
+    if method == "auto" and there_is is not None and clusters is None:
+        return result
+    ask = partial(
+        pose_problem,
+        target=target,
+        categories=categories,
+        weights=weights,
+        level=level,
+    )
+    if clusters is not None:
+        problem = ask(entry, ratings)
+        clusters = cluster_codes(problem, clusters)
+        if result.reason is None:
+            error, _ = _clustered_error(problem, clusters)
+            result = replace(result, standard_error=error)
+    if method == "auto":
+        interval, why = _chosen(ask(entry, ratings), clusters)
+        others = _OTHERS[target] if clusters is None else "clusters of items"
+        notes = (f"chosen for other {others}: {why}", *interval.notes)
+        interval = replace(interval, target=target, notes=notes)
+    else:
+        function = {
+            "analytic": partial(analytic, clusters=clusters),
+            "jackknife": partial(jackknife, clusters=clusters),
+            "bootstrap": partial(bootstrap, n_resamples=n_resamples, rng=rng),
+            "posterior": partial(posterior, rng=rng),
+        }[method]
+        interval = function(entry, ratings, **ask.keywords)
+    if interval.target != "items" and result.n_raters < _MANY_RATERS:
+        interval = replace(interval, notes=(*interval.notes, _CARELESS))
+    return replace(result, interval=interval)
+
+
+def _chosen(
+    problem: IntervalProblem, clusters: Integers | None
+) -> tuple[Interval, str]:
+    """Compute the interval that covers best, where clusters may be what is sampled."""
+    if clusters is not None:
+        # no posterior knows of them
+        interval = _leave_out(problem, clusters).interval(lowest=problem.entry.lowest)
+        outside, rare = _outside_commonest(problem)
+        if interval.reason is None and rare:
+            notes = warn_small(outside, _SEVERAL, _OUTSIDE)
+            interval = replace(interval, notes=(*notes, *interval.notes))
+        return interval, "left out, on a scale without ends"
+    if problem.is_too_large and problem.target == "items":
+        moves = problem.item_features.dot(problem.slopes(problem.sums))
+        error = standard_error(moves, problem.freq, None)
+        df, method = problem.n_paired_items - 1, "delta method, t(n-1)"
+        why = "too many different grades to leave items out one by one"
+        return problem.by_t(error, df, method=method, unit=None), why
+    return _choose_interval(problem)
+
+
+def _choose_interval(problem: IntervalProblem) -> tuple[Interval, str]:
+    """Compute the interval that covers best, and say what it is and why."""
+    if problem.entry.shape == "pairs":
+        why = "items leave with the pairs of all their raters"
+        return _leave_out(problem).interval(), why
+    if problem.n_paired_items == 0:
+        return _leave_out(problem).interval(), "no item has ratings of two raters"
+    if problem.target == "both":
+        return _other_items_and_raters(problem)
+    few = problem.n_paired_items < _FEW and problem.n_paired_raters < _FEW
+    outside, rare = _outside_commonest(problem)
+    interval = None
+    if (few or rare) and problem.target != "raters":
+        # of more than two raters; two have a table of their own
+        alike = not few or problem.n_paired_raters > 2
+        interval = _posterior(problem, alike)
+    if interval is None:
+        return _jackknife_with_spread(problem)
+    if few:
+        why = f"few items ({problem.n_paired_items}), where it covers best"
+        return interval, why
+    # below so many no method covers everywhere
+    notes = warn_small(outside, 5 if problem.unweighted else _SEVERAL, _OUTSIDE)
+    what = singular(_OUTSIDE) if outside == 1 else _OUTSIDE
+    why = f"categories are rare ({outside} {what}), where it covers best"
+    return replace(interval, notes=(*notes, *interval.notes)), why
+
+
+def _jackknife_with_spread(problem: IntervalProblem) -> tuple[Interval, str]:
+    """Leave items out, or raters, unless that says nothing."""
+    n_items, target = problem.n_paired_items, problem.target
+    modelled = problem.unweighted and problem.entry.name in _RHO_COEFFICIENTS
+    sizes = (problem.codes >= 0).sum(axis=1)
+    n_ratings = int(problem.freq @ np.where(sizes > 1, sizes, 0))
+    left_out = _leave_out(problem)
+    # an accident of few disagreements gives as much
+    accident = _ACCIDENT * (1.0 - problem.value) / n_ratings if modelled else 0.0
+    if not left_out.variance > accident:
+        if modelled or target == "items":
+            interval = _posterior(problem, False)
+            if interval is not None:
+                why = "leaving any out says next to nothing, so that a model must"
+                return interval, why
+        return left_out.interval(), "the spread of the units left out"
+    if target == "raters":
+        return left_out.interval(), "raters left out, one at a time"
+    lowest, per_item = problem.entry.lowest, n_ratings / n_items
+    if modelled and per_item > 1.0:
+        # An intraclass correlation of r raters is at least -1/(r - 1): its logit is
+        # Fisher's transformation, ln[(1 + (r - 1) κ) / (1 - κ)].
+        lowest = -1.0 / (per_item - 1.0)
+    interval = left_out.interval(lowest=lowest)
+    if modelled and n_items < _SEVERAL:
+        interval = _lift(problem, interval)
+    return interval, "items left out, on a scale without ends"
+
+
+def _outside_commonest(problem: IntervalProblem) -> tuple[int, bool]:
+    """Count items not all of one category, and say whether they are few."""
+    codes = problem.codes  # (n_rows, n_raters)
+    rated = codes >= 0
+    freq = np.broadcast_to(problem.freq[:, None], codes.shape)
+    commonest = np.bincount(codes[rated], weights=freq[rated]).argmax()
+    is_outside = (rated & (codes != commonest)).any(axis=1)
+    outside = int(problem.freq @ (is_outside & (rated.sum(axis=1) >= 2)))
+    return outside, outside < _SEVERAL and 2 * outside < problem.n_paired_items
+
+
+def _posterior(problem: IntervalProblem, alike: bool) -> Interval | None:
+    """Compute the posterior, one-sided where the estimate is perfect or undefined."""
+    # imported here: they load scipy
+    from masrel.intervals._drawn_posterior import (
+        DEFAULT_DRAWS,
+        SEED,
+        alike_interval,
+        nothing_to_learn,
+        patterns_interval,
+    )
+    from masrel.intervals._rho import DEFAULT_PRIOR, default_rho_interval, extended
+    from masrel.intervals._table_quadrature import CHANCE_AGREEMENT
+    from masrel.intervals._two_raters import applies_to, default_table_interval
+
+    if nothing_to_learn(problem):
+        return None
+    name, unweighted = problem.entry.name, problem.unweighted
+    chance, small = CHANCE_AGREEMENT.get(name), problem.n_paired_items <= _MANY
+    alike = alike and unweighted and chance is not None and small
+    is_rho = alike and chance in ("pooled", "margins")
+    if is_rho or (small and unweighted and name in _RHO_COEFFICIENTS):
+        return default_rho_interval(problem)
+    if not alike and small and applies_to(problem):
+        return default_table_interval(problem)
+    one_sided = not problem.value < 1.0
+    drawn = partial(alike_interval, prior=DEFAULT_PRIOR) if alike else patterns_interval
+    interval = drawn(problem, n_draws=DEFAULT_DRAWS, rng=SEED, one_sided=one_sided)
+    return interval if one_sided else extended(problem, interval)
+
+
+def _lift(problem: IntervalProblem, interval: Interval) -> Interval:
+    # An estimate of few items is skewed: low where its error is low, too. The posterior
+    # knows, but trusts many raters too much where κ is low; halfway covers with either.
+    from masrel.intervals._rho import DEFAULT_PRIOR, RhoPosterior
+
+    counts = problem.item_counts()
+    high = RhoPosterior.of(counts, DEFAULT_PRIOR, problem.level).high
+    if not high > interval.high:
+        return interval
+    note = (
+        f"the upper end, {interval.high:.3f}, is lifted halfway to that of the "
+        f"Dirichlet-multinomial posterior, {high:.3f}: with few items an estimate "
+        "that is low by chance has a low error, too"
+    )
+    halfway = 0.5 * (interval.high + high)
+    return replace(interval, high=halfway, notes=(*interval.notes, note))
+
+
+def _other_items_and_raters(problem: IntervalProblem) -> tuple[Interval, str]:
+    # Either end is as far from the estimate as other items alone, and as other raters
+    # alone, would put it: these distances squared and added, less what both hold of the
+    # disagreement of a rater on an item, which is never taken as more than either has.
+    # So the variance is below neither; nor is an end inside either interval. With the
+    # fewer degrees of freedom of the two, in both, the answer is no surer than either.
+    df = min(problem.n_paired_items, problem.n_paired_raters) - 1
+    if df < 1:
+        reason = "one item with two ratings does not say how items differ"
+        method = "items and raters left out"
+        return problem.undefined(reason, method=method, unit="both"), "one item"
+    common = student_t(problem.level, df) ** 2 * _variance_of_cells(problem)
+    parts = (replace(problem, target=of, max_df=df) for of in ("items", "raters"))
+    items, raters = (_choose_interval(of)[0] for of in parts)
+    why = "what items left out and raters left out move"
+    for part in (items, raters):
+        if part.reason is not None:
+            return part, why
+    if (items.low, items.high) == (raters.low, raters.high):
+        return items, why  # nothing moves, and the same model must say what that hides
+    ends = np.array([[items.low, items.high], [raters.low, raters.high]])
+    of_items, of_raters = np.maximum((ends - problem.value) * (-1.0, 1.0), 0.0) ** 2
+    both = np.minimum(of_items, of_raters)
+    low, high = np.sqrt(of_items + of_raters - np.minimum(common, both)).tolist()
+    interval = problem.confidence(
+        problem.value - low,
+        problem.value + high,
+        method=f"{items.method}, and {raters.method}",
+        unit="both",
+        notes=[
+            note if f" {of}: below" in note else f"{of}: {note}"
+            for of, part in (("items", items), ("raters", raters))
+            for note in part.notes
+        ],
+    )
+    return interval, why
