@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from masrel._input import refuse
 from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.cli._paths import note_inputs
 from masrel.errors import ParameterError
@@ -103,19 +104,15 @@ def audit(
 def _claims(source: Path, texts: _Texts) -> "tuple[Claim, ...]":
     from masrel.audit import read_claims
 
-    if texts:
-        raise ParameterError(
-            f"{source}: has claims of its own, so it needs no option that has one"
-        )
+    needed = "has claims of its own, so it needs no option that has one"
+    refuse((texts, f"{source}: {needed}"))
     file = source
     if source.is_dir():
         from masrel.lab.protocol import StudyPaths
 
         file = StudyPaths(source).claims_file
-        if not file.exists():
-            raise ParameterError(
-                f"{source}: needs a file of claims, ratings/claims.csv, got none"
-            )
+        needed = "needs a file of claims, ratings/claims.csv, got none"
+        refuse((not file.exists(), f"{source}: {needed}"))
     note_inputs(file)
     return read_claims(file)
 
@@ -128,12 +125,9 @@ def _claim(texts: _Texts) -> "Claim":
     ends = texts.get("interval", ())
     values |= dict(zip(("low", "high"), ends, strict=False))
     try:
-        for name in ("n_items", "n_categories"):
-            if name not in values:
-                raise ParameterError(f"{name}: needed without a SOURCE, got none")
         for name, other in _BESIDE.items():
-            if name in texts and other not in texts:
-                raise ParameterError(f"{name}: needs --{other} beside it, got none")
+            alone = name in texts and other not in texts
+            refuse((alone, f"{name}: needs --{other} beside it, got none"))
         return claim_of(values)
     except ParameterError as error:  # its message begins with the parameter
         names, _, rest = str(error).partition(":")

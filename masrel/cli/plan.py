@@ -1,15 +1,16 @@
 """``masrel plan``: how large a study must be, and what a study can show."""
 
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from masrel._input import refuse
 from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.cli._paths import InputFile
 from masrel.cli._progress import Progress, progress
-from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
     from masrel.planning import Plan
@@ -21,141 +22,123 @@ _NOT_OF_STUDIES = (  # what a protocol says
 )
 
 
-class _Numbers(click.ParamType):  # type: ignore[type-arg]
-    """Numbers separated by commas, or first:last:step."""
-
-    name = "numbers"
-
-    def __init__(self, number: type, n: int | None = None) -> None:
-        self._number, self._n = number, n
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> list[float]:
-        try:
-            numbers = self._range(value) if ":" in value else value.split(",")
-            numbers = [self._number(part) for part in numbers]
-        except ValueError:
-            self.fail(f"needs numbers as 10,20 or 10:50:10, got {value!r}", param, ctx)
-        if self._n not in (None, len(numbers)):
-            self.fail(f"needs {self._n} numbers, got {len(numbers)}", param, ctx)
-        return numbers
-
-    def _range(self, text: str) -> Any:
-        first, last, step = map(self._number, text.split(":"))
-        n_steps = int((last - first) / step + 1e-9) if step > 0 else -1
-        if n_steps < 0:
-            raise ValueError
-        return [round(first + k * step, 12) for k in range(n_steps + 1)]
+def _floats(text: str, number: type = float) -> list[Any]:
+    """Return numbers separated by commas, or first:last:step."""
+    try:
+        numbers = [number(part) for part in re.split("[,:]", text)]
+        if ":" in text:
+            first, last, step = numbers
+            n_steps = int((last - first) / step + 1e-9)
+            numbers = [number(round(first + k * step, 12)) for k in range(n_steps + 1)]
+    except (ValueError, ZeroDivisionError):
+        numbers = []
+    if not numbers:
+        raise click.BadParameter(f"needs numbers as 10,20 or 10:50:10, got {text!r}")
+    return numbers
 
 
-class _Prevalences(_Numbers):
-    """Shares of categories, several of them, or the rows of a table."""
+def _whole_numbers(text: str) -> list[int]:
+    return _floats(text, int)
 
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> Any:
-        rows = value.split(";")
-        shares = [super(_Prevalences, self).convert(row, param, ctx) for row in rows]
-        return shares if len(shares) > 1 else shares[0]
+
+def _prices(text: str) -> list[float]:
+    prices = _floats(text)
+    if len(prices) != 3:
+        raise click.BadParameter(f"needs 3 numbers, got {len(prices)}")
+    return prices
+
+
+def _prevalences(text: str) -> list[Any]:
+    """Return shares of categories, several of them, or the rows of a table."""
+    rows = [_floats(row) for row in text.split(";")]
+    return rows if len(rows) > 1 else rows[0]
 
 
 _INTERVALS = ("auto", "analytic", "jackknife", "bootstrap", "posterior", "t", "normal")
 _METHODS = ("auto", "exact", "simulation", "wald", "goodness-of-fit")
 _MODELS = ("mixture", "dirichlet-multinomial", "latent", "table")
-_FLOATS, _WHOLE = _Numbers(float), _Numbers(int)
-
-_OPTIONS: tuple[tuple[str, str | None, Mapping[str, Any], str], ...] = (
-    # option, field of `Study` where it is called otherwise, what it takes, what it says
-    ("--coefficient", None, {}, "Its name.  [default: fleiss_kappa]"),
-    (
-        "--pilot",
-        None,
-        {"type": InputFile(path_type=Path), "metavar": "FILE"},
-        "Ratings of which value, prevalences and missing share are taken, unless they "
-        "are arguments.",
-    ),
-    ("--value", None, {"type": _FLOATS}, "True coefficient, or several."),
-    ("--items", "n_items", {"type": _WHOLE}, "How many, as 30, 20,40 or 20:60:10."),
-    (
-        "--raters",
-        "n_raters",
-        {"type": _WHOLE},
-        "The same. One of both is solved for where it is left out; with --prices both "
-        "are.",
-    ),
-    ("--categories", None, {"type": int}, "How many, each as frequent."),
-    (
-        "--prevalences",
-        None,
-        {"type": _Prevalences(float), "metavar": "SHARES"},
-        "Of the categories, as 0.7,0.3; several with ;, or the rows of a table.",
-    ),
-    ("--weights", None, {}, "[default: identity]"),
-    (
-        "--model",
-        None,
-        {"type": click.Choice(_MODELS)},
-        "How the ratings of an item come about.",
-    ),
-    (
-        "--target",
-        None,
-        {"type": click.Choice(["items", "raters", "both"])},
-        "What a new study would draw anew.",
-    ),
-    ("--missing", "p_missing", {"type": float}, "Share of ratings missing."),
-    ("--level", None, {"type": float}, "[default: 0.95]"),
-    ("--sides", None, {"type": int}, "1 or 2.  [default: 2]"),
-    ("--half-width", None, {"type": float}, "Aim: half the interval's width."),
-    ("--lower", None, {"type": float}, "Aim: no end below this."),
-    ("--upper", None, {"type": float}, "Aim: no end above this."),
-    ("--null", None, {"type": float}, "Aim: this is excluded, with --power."),
-    ("--power", None, {"type": float}, "Chance to exclude --null."),
-    ("--assurance", None, {"type": float}, "Chance to reach the aim."),
-    ("--max-cost", None, {"type": float}, "What the study may cost."),
-    (
-        "--prices",
-        None,
-        {"type": _Numbers(float, 3)},
-        "Of an item, a rater, a rating.  [default: 0,0,1]",
-    ),
-    (
-        "--interval",
-        None,
-        {"type": click.Choice(_INTERVALS)},
-        "What an analysis computes, or estimate ± quantile · standard error (t, "
-        "normal).  [default: auto]",
-    ),
-    ("--method", None, {"type": click.Choice(_METHODS)}, "[default: auto]"),
-    ("--seed", "rng", {"type": click.IntRange(min=0)}, "[default: 0]"),
-    (
-        "--studies",
-        "n_studies",
-        {"type": click.IntRange(min=1)},
-        "How many are simulated.  [default: as many as the error needs]",
-    ),
-    (
-        "--executor",
-        None,
-        {"type": click.Choice(["dask"])},
-        "Who plans a grid, in place of this process.",
-    ),
-    ("--scheduler", None, {"metavar": "ADDRESS"}, "Of a Dask cluster."),
-)
-
-
-def _study_options(command: Any) -> Any:
-    """Give a command every option that a study is declared by."""
-    for name, field, takes, text in reversed(_OPTIONS):
-        names = (name,) if field is None else (name, field)
-        command = click.option(*names, help=text, **takes)(command)
-    return command
 
 
 @click.command("plan")
 @click.argument("study", required=False, type=InputFile(path_type=Path))
-@_study_options
+@click.option("--coefficient", help="Its name.  [default: fleiss_kappa]")
+@click.option(
+    "--pilot",
+    type=InputFile(path_type=Path),
+    metavar="FILE",
+    help="Ratings of which value, prevalences and missing share are taken, unless they "
+    "are arguments.",
+)
+@click.option(
+    "--value", type=_floats, metavar="NUMBERS", help="True coefficient, or several."
+)
+@click.option(
+    "--items",
+    "n_items",
+    type=_whole_numbers,
+    metavar="NUMBERS",
+    help="How many, as 30, 20,40 or 20:60:10.",
+)
+@click.option(
+    "--raters",
+    "n_raters",
+    type=_whole_numbers,
+    metavar="NUMBERS",
+    help="The same. One of both is solved for where it is left out; with --prices both "
+    "are.",
+)
+@click.option("--categories", type=int, help="How many, each as frequent.")
+@click.option(
+    "--prevalences",
+    type=_prevalences,
+    metavar="SHARES",
+    help="Of the categories, as 0.7,0.3; several with ;, or the rows of a table.",
+)
+@click.option("--weights", help="[default: identity]")
+@click.option(
+    "--model", type=click.Choice(_MODELS), help="How the ratings of an item come about."
+)
+@click.option(
+    "--target",
+    type=click.Choice(["items", "raters", "both"]),
+    help="What a new study would draw anew.",
+)
+@click.option("--missing", "p_missing", type=float, help="Share of ratings missing.")
+@click.option("--level", type=float, help="[default: 0.95]")
+@click.option("--sides", type=int, help="1 or 2.  [default: 2]")
+@click.option("--half-width", type=float, help="Aim: half the interval's width.")
+@click.option("--lower", type=float, help="Aim: no end below this.")
+@click.option("--upper", type=float, help="Aim: no end above this.")
+@click.option("--null", type=float, help="Aim: this is excluded, with --power.")
+@click.option("--power", type=float, help="Chance to exclude --null.")
+@click.option("--assurance", type=float, help="Chance to reach the aim.")
+@click.option("--max-cost", type=float, help="What the study may cost.")
+@click.option(
+    "--prices",
+    type=_prices,
+    metavar="NUMBERS",
+    help="Of an item, a rater, a rating.  [default: 0,0,1]",
+)
+@click.option(
+    "--interval",
+    type=click.Choice(_INTERVALS),
+    help="What an analysis computes, or estimate ± quantile · standard error (t, "
+    "normal).  [default: auto]",
+)
+@click.option("--method", type=click.Choice(_METHODS), help="[default: auto]")
+@click.option("--seed", "rng", type=click.IntRange(min=0), help="[default: 0]")
+@click.option(
+    "--studies",
+    "n_studies",
+    type=click.IntRange(min=1),
+    help="How many are simulated.  [default: as many as the error needs]",
+)
+@click.option(
+    "--executor",
+    type=click.Choice(["dask"]),
+    help="Who plans a grid, in place of this process.",
+)
+@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster.")
 @click.option("--toml", is_flag=True, help="Print lines for a protocol instead.")
 @output_options(
     json="Write every number here; - prints them, and nothing else, on stdout.",
@@ -175,11 +158,17 @@ def plan(study: Path | None, toml: bool, output: OutputOptions, **options: Any) 
     """
     arguments = {key: value for key, value in options.items() if value is not None}
     labels, plans = _plans(study, {"rng": 0, **arguments}, is_quiet=output.quiet)
-    if toml and len(set(labels)) < len(labels):
-        raise ParameterError("--toml: needs one --value for each line of a study")
     sizes = ({one.n_items for one in plans}, {one.n_raters for one in plans})
-    if output.figure is not None and max(map(len, sizes)) < 2:
-        raise ParameterError("--figure: needs several --items or --raters, as 20:60:10")
+    refuse(
+        (
+            toml and len(set(labels)) < len(labels),
+            "--toml: needs one --value for each line of a study",
+        ),
+        (
+            output.figure is not None and max(map(len, sizes)) < 2,
+            "--figure: needs several --items or --raters, as 20:60:10",
+        ),
+    )
     from masrel.tables import _planning_tables as tables
 
     printed = zip(plans, labels or (None,) * len(plans), strict=True)
@@ -216,8 +205,8 @@ def _of_options(arguments: dict[str, Any], bar: Progress) -> "tuple[Plan, ...]":
     ranges = {name: arguments.pop(name) for name in _RANGES if name in arguments}
     if _is_grid(arguments, ranges):
         _refuse(arguments, ("max_cost",), "is not of a grid, whose rows have costs")
-        if arguments.pop("method", "auto") != "auto":
-            raise ParameterError("--method: a grid is by auto, exact where it can be")
+        is_other = arguments.pop("method", "auto") != "auto"
+        refuse((is_other, "--method: a grid is by auto, exact where it can be"))
         names = ("prevalences", "executor", "scheduler")
         ranges |= {name: arguments.pop(name) for name in names if name in arguments}
         return plan_grid(Study(**arguments), **ranges, progress=bar.reach)
@@ -233,30 +222,22 @@ def _is_grid(arguments: dict[str, Any], ranges: dict[str, Any]) -> bool:
     # several sizes or truths, or an aim at a known size
     several = any(len(values) > 1 for values in ranges.values())
     is_known = {"n_items", "n_raters"} <= ranges.keys()
-    has_chance = "power" in arguments or "assurance" in arguments
-    shares = (
-        [0.0]
-        if arguments.get("model") == "table"
-        else arguments.get("prevalences", [0.0])
-    )
-    is_rows = isinstance(shares[0], list)
+    has_chance = not arguments.keys().isdisjoint({"power", "assurance"})
+    is_rows = isinstance(arguments.get("prevalences", [0.0])[0], list)
+    is_rows = is_rows and arguments.get("model") != "table"
     return several or is_rows or (is_known and has_chance) or "executor" in arguments
 
 
 def _refuse(arguments: dict[str, Any], names: Iterable[str], why: str) -> None:
     """Refuse options that were given where they mean nothing."""
-    for name in names:
-        if name in arguments:
-            option = name.removeprefix("n_").replace("_", "-")
-            raise ParameterError(f"--{option}: {why}")
+    options = {name: name.removeprefix("n_").replace("_", "-") for name in names}
+    refuse(*((name in arguments, f"--{options[name]}: {why}") for name in options))
 
 
 def _with_pilot(arguments: dict[str, Any]) -> dict[str, Any]:
     # what nobody gave is what a pilot had
-    if "target" not in arguments:
-        raise ParameterError(
-            "--target: needs items, raters or both: what a new study draws anew"
-        )
+    needed = "--target: needs items, raters or both: what a new study draws anew"
+    refuse(("target" not in arguments, needed))
     arguments = {"coefficient": "fleiss_kappa", **arguments}
     if (path := arguments.pop("pilot", None)) is None:
         return arguments
@@ -264,20 +245,14 @@ def _with_pilot(arguments: dict[str, Any]) -> dict[str, Any]:
     from masrel.ratings import read_ratings
 
     parts = read_ratings(path).parts
-    if len(parts) != 1:
-        raise ParameterError(
-            f"--pilot: needs the ratings of one group and session, {path} has "
-            f"{len(parts)}"
-        )
+    needed = f"--pilot: needs the ratings of one group and session, {path} has "
+    refuse((len(parts) != 1, f"{needed}{len(parts)}"))
     names = ("coefficient", "target", "weights", "level")
     of_pilot = {name: arguments[name] for name in names if name in arguments}
     made = pilot(ratings=parts[0].ratings, **of_pilot)
     click.echo(f"pilot {path}: {made.estimate}", err=True)
-    had: dict[str, Any] = {
-        "categories": made.categories,
-        "prevalences": [*made.prevalences],
-        "p_missing": made.p_missing,
-    }
-    if of_pilot["coefficient"].startswith("icc"):
-        had = {}
-    return {"value": [made.estimate.value], **had, **arguments}
+    had: dict[str, Any] = {"value": [made.estimate.value]}
+    if not arguments["coefficient"].startswith("icc"):
+        had |= {"categories": made.categories, "prevalences": [*made.prevalences]}
+        had["p_missing"] = made.p_missing
+    return {**had, **arguments}

@@ -53,25 +53,3 @@ class Forest(Content):
 
     rows: tuple[ForestRow, ...]  # first on top
     axis_label: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PlanCurve:
-    """What studies of so many raters, or items, can show, by the number of others."""
-
-    label: str
-    sizes: tuple[int, ...]
-    numbers: tuple[float, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PlanCurves(Content):
-    """Plans of many sizes."""
-
-    drawer: ClassVar[str] = "masrel.plots._planning_figure:planning_figure"
-
-    title: str
-    what: str  # the number
-    over: str  # "items" or "raters"
-    limit: float | None  # what it is to reach
-    curves: tuple[PlanCurve, ...]

@@ -119,8 +119,8 @@ def _ends(numbers: tuple[int, ...]) -> str | None:
 def _number(reading: Reading) -> str:
     if reading.n_tables is None:
         return "cannot tell"
-    number = in_thousands(reading.n_tables)
-    return f"at least {number}" if reading.status == "at least" else number
+    at_least = "at least " if reading.status == "at least" else ""
+    return at_least + in_thousands(reading.n_tables)
 
 
 def _examples_note(audit: ClaimAudit) -> tuple[str, ...]:

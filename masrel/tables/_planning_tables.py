@@ -1,20 +1,21 @@
 """Plans as a table, a sentence for a protocol, JSON, TOML, and a curve."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
+from typing import Any
 
 from masrel.agreement import coefficient
 from masrel.planning import Plan
-from masrel.plots._drawn_values import PlanCurve, PlanCurves
+from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import (
     Column,
     Table,
-    Value,
     number,
     percent,
     rounded,
     significant,
+    table_of,
 )
 
 _TARGETS = {"items": "items", "raters": "raters", "both": "items and raters"}
@@ -24,39 +25,25 @@ _COMPUTED = ("expected_half_width", "expected_low", "expected_high")
 _CHANCES = ("assurance", "power", "coverage")
 
 
-def _column(key: str, heading: str | None = None, digits: int | None = 3) -> Column:
-    return Column(key=key, heading=key if heading is None else heading, digits=digits)
-
-
-def _text(key: str, heading: str) -> Column:
-    return Column(key=key, heading=heading, align="left")
-
-
-# columns after that of lines, and what they show of a plan: None where there is nothing
-_COLUMNS: tuple[tuple[Column, Callable[[Plan], Value]], ...] = (
-    (_text("interval", "interval"), lambda plan: plan.interval),
-    (_text("target", "for other"), lambda plan: _TARGETS[plan.target]),
-    (
-        _text("prevalences", "prevalences"),
-        lambda plan: ", ".join(significant(share, 3) for share in plan.prevalences),
-    ),
-    (_column("value", "κ or ICC"), lambda plan: plan.value),
-    (_column("n_items", "items", None), lambda plan: plan.n_items),
-    (_column("n_raters", "raters", None), lambda plan: plan.n_raters),
-    (_column("half_width", "half-width"), lambda plan: plan.expected_half_width),
-    (_column("low"), lambda plan: plan.expected_low),
-    (_column("high"), lambda plan: plan.expected_high),
-    (_column("assurance"), lambda plan: plan.assurance),
-    (_column("power"), lambda plan: plan.power),
-    (_column("coverage"), lambda plan: plan.coverage),
-    (_column("p_undefined", "undefined"), lambda plan: plan.p_undefined),
-    (_text("reaches", "reaches the aim"), lambda plan: _REACHES[plan.reaches_aim]),
-    (_column("cost", digits=0), lambda plan: plan.cost),
-    (
-        _column("monte_carlo_error", "Monte Carlo error", 4),
-        lambda plan: plan.monte_carlo_error if plan.n_studies else None,
-    ),
-    (_text("method", "method"), lambda plan: plan.method),
+_COLUMNS = (
+    Column(key="line", heading="line of the plan", align="left"),
+    Column(key="interval", heading="interval", align="left"),
+    Column(key="target", heading="for other", align="left"),
+    Column(key="prevalences", heading="prevalences", align="left"),
+    Column(key="value", heading="κ or ICC", digits=3),
+    Column(key="n_items", heading="items"),
+    Column(key="n_raters", heading="raters"),
+    Column(key="half_width", heading="half-width", digits=3),
+    Column(key="low", heading="low", digits=3),
+    Column(key="high", heading="high", digits=3),
+    Column(key="assurance", heading="assurance", digits=3),
+    Column(key="power", heading="power", digits=3),
+    Column(key="coverage", heading="coverage", digits=3),
+    Column(key="p_undefined", heading="undefined", digits=3),
+    Column(key="reaches", heading="reaches the aim", align="left"),
+    Column(key="cost", heading="cost", digits=0),
+    Column(key="monte_carlo_error", heading="Monte Carlo error", digits=4),
+    Column(key="method", heading="method", align="left"),
 )
 
 
@@ -70,30 +57,43 @@ def planning_table(plans: Sequence[Plan], *, labels: Sequence[str] = ()) -> Tabl
         if not labels
         else "What the study can show, by line of its plan"
     )
-    shown: dict[Column, Sequence[Value]]
-    shown = {_text("line", "line of the plan"): list(labels)} if labels else {}
+    lines: Sequence[str | None] = labels or [None] * len(plans)
+    rows = [_row(p) | {"line": line} for p, line in zip(plans, lines, strict=True)]
     # of one plan that reaches its aim that is not said, nor what all plans share
     hidden = {"reaches"} if len(plans) == 1 and first.reaches_aim else set()
     hidden |= set() if labels else {"interval", "target"}
     hidden |= (
         {"prevalences"} if len({plan.prevalences for plan in plans}) < 2 else set()
     )
-    for column, value_of in _COLUMNS:
-        values = [None if _is_nan(value_of(plan)) else value_of(plan) for plan in plans]
-        if column.key not in hidden and any(value is not None for value in values):
-            shown[column] = values
-    return Table(
-        name="plan",
-        caption=caption,
-        columns=tuple(shown),
-        rows=tuple(zip(*shown.values(), strict=True)),
-        notes=_notes(plans),
-        data="foreign",
-    )
+    columns = [
+        column
+        for column in _COLUMNS
+        if column.key not in hidden
+        and any(row.get(column.key) is not None for row in rows)
+    ]
+    notes = _notes(plans)
+    return table_of("plan", caption, columns, rows, notes=notes, data="foreign")
 
 
-def _is_nan(value: object) -> bool:
-    return isinstance(value, float) and math.isnan(value)
+def _row(plan: Plan) -> dict[str, Any]:
+    values = _values(plan)
+    return values | {
+        "target": _TARGETS[plan.target],
+        "prevalences": ", ".join(significant(share, 3) for share in plan.prevalences),
+        "reaches": _REACHES[plan.reaches_aim],
+        "half_width": values["expected_half_width"],
+        "low": values["expected_low"],
+        "high": values["expected_high"],
+        "monte_carlo_error": plan.monte_carlo_error if plan.n_studies else None,
+    }
+
+
+def _values(plan: Plan) -> dict[str, Any]:
+    # None for what is not computed
+    return {
+        key: None if isinstance(value, float) and math.isnan(value) else value
+        for key, value in asdict(plan).items()
+    }
 
 
 def _notes(plans: Sequence[Plan]) -> tuple[str, ...]:
@@ -175,12 +175,7 @@ def _model(plan: Plan) -> str:
 
 def planning_document(plans: Sequence[Plan]) -> dict[str, object]:
     """Return plans as JSON has them: every digit, null for what is not computed."""
-    return {
-        "plans": [
-            {key: None if _is_nan(x) else x for key, x in asdict(plan).items()}
-            for plan in plans
-        ]
-    }
+    return {"plans": list(map(_values, plans))}
 
 
 def planning_toml(plan: Plan, *, line: str | None = None) -> str:
@@ -246,7 +241,7 @@ def _toml_values(plan: Plan) -> Iterator[tuple[str, str]]:
             yield key, str(value)
 
 
-def planning_curves(plans: Sequence[Plan], aim: Mapping[str, float]) -> PlanCurves:
+def planning_curves(plans: Sequence[Plan], aim: Mapping[str, float]) -> Drawn:
     """Return what plans aim at, else their half-width, over items or over raters."""
     has_power = not any(math.isnan(plan.power) for plan in plans)
     name = "power" if has_power else "expected_half_width"
@@ -254,21 +249,17 @@ def planning_curves(plans: Sequence[Plan], aim: Mapping[str, float]) -> PlanCurv
     several = len({plan.value for plan in plans}) > 1
     over_items = len({plan.n_items for plan in plans}) > 1
     over, other = ("items", "raters") if over_items else ("raters", "items")
-    groups: dict[tuple[int, float, tuple[float, ...]], list[Plan]] = {}
+    curves: dict[tuple[int, float, tuple[float, ...]], list[tuple[int, float]]] = {}
     for plan in plans:
         key = (getattr(plan, f"n_{other}"), plan.value, plan.prevalences)
-        groups.setdefault(key, []).append(plan)
-    return PlanCurves(
-        title=coefficient(plans[0].coefficient).title,
-        what=name.replace("_", " ").replace("half ", "half-"),
-        over=over,
-        limit=aim.get(name, plans[0].half_width),
-        curves=tuple(
-            PlanCurve(
-                label=f"{n} {other}" + (f", {significant(value)}" if several else ""),
-                sizes=tuple(getattr(plan, f"n_{over}") for plan in group),
-                numbers=tuple(getattr(plan, name) for plan in group),
-            )
-            for (n, value, _), group in groups.items()
-        ),
+        point = (getattr(plan, f"n_{over}"), getattr(plan, name))
+        curves.setdefault(key, []).append(point)
+    labelled = [
+        (f"{n} {other}" + (f", {significant(value)}" if several else ""), points)
+        for (n, value, _), points in curves.items()
+    ]
+    limit = aim.get(name, plans[0].half_width)
+    return Drawn(
+        "masrel.plots._planning_figure:planning_figure",
+        (coefficient(plans[0].coefficient).title, name, over, limit, labelled),
     )
