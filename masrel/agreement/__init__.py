@@ -18,26 +18,32 @@ from masrel.agreement._weights import (
     WeightsLike,
     declared_weights,
 )
-from masrel.agreement.benchmarks import Band, BandScale, bands, benchmark, strength
-from masrel.agreement.bland_altman import LimitsOfAgreement, limits_of_agreement
+from masrel.agreement.benchmarks import (
+    Alternative,
+    Band,
+    BandScale,
+    bands,
+    benchmark,
+    equivalence_p_value,
+    holm,
+    p_value,
+    strength,
+)
 from masrel.agreement.category import category_kappa, fleiss_null
-from masrel.agreement.concordance import lin_ccc
-from masrel.agreement.conger import conger_kappa
-from masrel.agreement.contingency import (
+from masrel.agreement.change import (
     McnemarKind,
     bhapkar,
+    bias_index,
     bowker,
     contingency_table,
-    mcnemar,
-    stuart_maxwell,
-)
-from masrel.agreement.icc import IccForm, icc, icc_f_test, robinson_a
-from masrel.agreement.indices import (
-    bias_index,
     kappa_max,
+    mcnemar,
     prevalence_index,
     specific_agreement,
+    stuart_maxwell,
 )
+from masrel.agreement.conger import conger_kappa
+from masrel.agreement.icc import IccForm, icc, icc_f_test, robinson_a
 from masrel.agreement.kappas import (
     brennan_prediger,
     fleiss_kappa,
@@ -47,7 +53,14 @@ from masrel.agreement.kappas import (
 )
 from masrel.agreement.kendall import kendall_w, kendall_w_test
 from masrel.agreement.krippendorff import Metric, krippendorff_alpha
-from masrel.agreement.measurement import ErrorKind, mdc, sem
+from masrel.agreement.measurement import (
+    ErrorKind,
+    LimitsOfAgreement,
+    limits_of_agreement,
+    lin_ccc,
+    mdc,
+    sem,
+)
 from masrel.agreement.pairs import (
     Deletion,
     cohen_kappa,
@@ -56,12 +69,6 @@ from masrel.agreement.pairs import (
     stratified_kappa,
 )
 from masrel.agreement.registry import COEFFICIENTS, Coefficient, Property, coefficient
-from masrel.agreement.significance import (
-    Alternative,
-    equivalence_p_value,
-    holm,
-    p_value,
-)
 from masrel.estimates import Significance
 
 __all__ = [

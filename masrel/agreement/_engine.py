@@ -9,7 +9,7 @@ jackknife, the bootstrap and clusters follow from these three.
 import math
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement._data import refuse_measurements
-from masrel.agreement._labels import Codes, shown
+from masrel.agreement._labels import Codes, Label, shown
 from masrel.agreement._rows import CountedRatings, item_counts
 from masrel.agreement._weights import (
     NO_PAIR,
@@ -26,7 +26,7 @@ from masrel.agreement._weights import (
     declared_weights,
 )
 from masrel.errors import ParameterError, UndefinedStatisticWarning
-from masrel.estimates import Estimate
+from masrel.estimates import Estimate, Interval
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -255,6 +255,13 @@ def check_level(level: float) -> None:
         raise ParameterError(f"level: needs (0, 1), got {shown(level)}")
 
 
+def check_option(name: str, value: object, options: Collection[object]) -> None:
+    """Check that an argument is one of its options."""
+    if value not in options:
+        known = ", ".join(map(str, options))
+        raise ParameterError(f"{name}: needs one of {known}, got {value!r}")
+
+
 def check_population(population: int, n_items: int) -> None:
     """Check the size of a finite population."""
     if not isinstance(population, int | np.integer) or population < max(n_items, 1):
@@ -272,3 +279,42 @@ def undefined(title: str, reason: str) -> str:
     message = f"{title} is undefined: {reason}"
     warnings.warn(message, UndefinedStatisticWarning, stacklevel=level)
     return reason
+
+
+def measured(
+    name: str,
+    values: Floats,
+    categories: Sequence[Label] | None,
+    value: float,
+    *,
+    weights: str = "identity",
+    standard_error: float = math.nan,
+    interval: Interval | None = None,
+    reason: str | None = None,
+) -> Estimate:
+    """Return an estimate made of numbers, (n_items, n_raters), not of categories."""
+    rated = ~np.isnan(values)
+    return Estimate(
+        coefficient=name,
+        weights=weights,
+        value=value,
+        standard_error=standard_error,
+        interval=interval,
+        observed=math.nan,
+        chance=math.nan,
+        n_items=values.shape[0],
+        n_items_paired=int((rated.sum(axis=1) > 1).sum()),
+        n_raters=values.shape[1],
+        n_categories=len(
+            np.unique(values[rated]) if categories is None else categories
+        ),
+        reason=reason,
+    )
+
+
+def deviations(values: Floats) -> tuple[Floats, float]:
+    """Return ratings less the first, over a power of two, and that power."""
+    # whole ratings stay exact, a common offset costs no digits, and squares are floats
+    exponent = int(np.frexp(np.nanmax(np.abs(values)))[1]) - 1
+    scaled = np.ldexp(values, -exponent)
+    return scaled - scaled[~np.isnan(scaled)][0], math.ldexp(1.0, exponent)

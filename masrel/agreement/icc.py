@@ -7,19 +7,21 @@ maximum likelihood, and the interval is read from its profile.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement._data import complete_values, rated_part, rating_values
-from masrel.agreement._engine import check_level, undefined
+from masrel.agreement._engine import (
+    check_level,
+    check_option,
+    deviations,
+    measured,
+    undefined,
+)
 from masrel.agreement._labels import Label
-from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, Significance, Target
-
-if TYPE_CHECKING:
-    from masrel.agreement._reml import Components
 
 IccForm = Literal["ICC(1)", "ICC(1,k)", "ICC(C,1)", "ICC(C,k)", "ICC(A,1)", "ICC(A,k)"]
 """One-way; consistency and absolute agreement; of one rating and of the mean of k."""
@@ -34,10 +36,8 @@ _NAMES: dict[IccForm, str] = {
 }
 """Form to its name in the register."""
 
-_Numbers = float | NDArray[np.float64]
-
-_SQUARABLE = 400
-"""Binary exponent up to which squares, and sums and products of them, are floats."""
+_Answer = tuple[float, Interval | None, str | None]
+"""Value, interval and why there is none."""
 
 
 def icc(
@@ -125,40 +125,14 @@ def icc(
     >>> round(icc(table).value, 2)
     0.3
     """
-    _check(form, level)
+    check_option("form", form, get_args(IccForm))
+    check_level(level)
     values = rated_part(rating_values(ratings, categories))
-    if np.isnan(values).any():
-        value, interval, reason = _with_gaps(values, form, level)
-    else:
-        anova = _Anova.of(values)
-        reason = _reason(values, anova, form)
-        value, interval = math.nan, None
-        if reason is None:
-            value = anova.value(form)
-            interval = _interval(anova, form, level)
-    n_items, n_raters = values.shape
-    return Estimate(
-        coefficient=_NAMES[form],
-        weights="identity",
-        value=value,
-        standard_error=math.nan,
-        interval=interval,
-        observed=math.nan,
-        chance=math.nan,
-        n_items=n_items,
-        n_items_paired=int(((~np.isnan(values)).sum(axis=1) > 1).sum()),
-        n_raters=n_raters,
-        n_categories=_n_categories(values, categories),
-        reason=reason,
+    answer = _with_gaps if np.isnan(values).any() else _without_gaps
+    value, interval, reason = answer(values, form, level)
+    return measured(
+        _NAMES[form], values, categories, value, interval=interval, reason=reason
     )
-
-
-def _n_categories(
-    values: NDArray[np.float64], categories: Sequence[Label] | None
-) -> int:
-    if categories is not None:
-        return len(categories)
-    return len(np.unique(values[~np.isnan(values)]))
 
 
 def icc_f_test(
@@ -207,24 +181,23 @@ def icc_f_test(
     >>> print(icc_f_test(table))
     icc_f_test: 11.03, F(5, 15), p = 0.000135
     """
-    _check(form, 0.5)
+    check_option("form", form, get_args(IccForm))
     values = complete_values(ratings, categories)
     anova = _Anova.of(values)
     reason = _reason(values, anova, form.replace(",k)", ",1)"))
     statistic = p = math.nan
-    df = anova.df(form)
     if reason is None:
         from scipy.special import fdtrc
 
         error = anova.error(form)
         statistic = math.inf if error == 0.0 else anova.items / error
-        p = float(fdtrc(*df, statistic))
+        p = float(fdtrc(*anova.df(form), statistic))
     return Significance(
         name="icc_f_test",
         hypothesis="the items do not differ",
         statistic=statistic,
         distribution="F",
-        df=df,
+        df=anova.df(form),
         p_value=p,
         n_items=len(values),
         reason=reason,
@@ -276,92 +249,48 @@ def robinson_a(
     """
     values = complete_values(ratings, categories)
     anova = _Anova.of(values)
-    n, k = values.shape
     reason, value = None, math.nan
-    if n < 2 or k < 2:
+    if min(values.shape) < 2:
         why = "fewer than two items or raters in the items that every rater rated"
         reason = undefined("Robinson's A", why)
-    elif (total := anova.ss_items + anova.ss_residual) == 0.0:
+    elif (total := anova.items + (anova.k - 1) * anova.residual) == 0.0:
         reason = undefined("Robinson's A", "0/0: no variance but between raters")
     else:
-        value = anova.ss_items / total
-    return Estimate(
-        coefficient="robinson_a",
-        weights="quadratic",
-        value=value,
-        standard_error=math.nan,
-        observed=math.nan,
-        chance=math.nan,
-        n_items=n,
-        n_items_paired=n if k > 1 else 0,
-        n_raters=k,
-        n_categories=len(np.unique(values)) if categories is None else len(categories),
-        reason=reason,
+        value = anova.items / total  # squares over (n - 1)
+    return measured(
+        "robinson_a", values, categories, value, weights="quadratic", reason=reason
     )
-
-
-def _check(form: str, level: float) -> None:
-    if form not in get_args(IccForm):
-        raise ParameterError(
-            f"form: needs one of {', '.join(get_args(IccForm))}, got {form!r}"
-        )
-    check_level(level)
-
-
-def _reason(
-    values: NDArray[np.float64], anova: "_Anova", form: str = "ICC(1)"
-) -> str | None:
-    if values.shape[0] < 2:
-        return undefined(form, "fewer than two items are rated by every rater")
-    if values.shape[1] < 2:
-        return undefined(form, "fewer than two raters")
-    if anova.items == 0.0 and anova.error(form) == 0.0:
-        return undefined(form, "0/0: neither items nor ratings of an item differ")
-    if anova.denominator(form) == 0.0:
-        return undefined(form, "division by 0: the total variance is estimated as 0")
-    return None
 
 
 @dataclass(frozen=True, slots=True)
 class _Anova:
-    # mean squares of [1], of items, raters, residual, and within items; sums of squares
-    # are times (n k)²; of the ratings over `unit`, 1 unless their squares are no floats
+    # mean squares of [1], of items, raters, residual, and within items, in unit²
     n: int
     k: int
     items: float
     raters: float
     residual: float
     within: float
-    ss_items: float
-    ss_residual: float
-    unit: float = 1.0
+    unit: float
 
     @classmethod
     def of(cls, values: NDArray[np.float64]) -> "_Anova":
         n, k = values.shape
         if n < 2 or k < 2:
-            return cls(n, k, *[math.nan] * 6)
-        # Deviations times n k, which are whole, and so exact, for whole ratings; from
-        # the first rating, so that a common offset of all costs no digits.
-        values, unit = _squarable(values)
-        x = values - values[0, 0]
+            return cls(n, k, *[math.nan] * 5)
+        # deviations times n k are whole, and so exact, for whole ratings
+        x, unit = deviations(values)
         of_items, of_raters = x.sum(axis=1, keepdims=True), x.sum(axis=0, keepdims=True)
-        total = x.sum()
-        rows, columns = n * of_items - total, k * of_raters - total
+        rows, columns = n * of_items - x.sum(), k * of_raters - x.sum()
         within = n * (k * x - of_items)
-        residual = within - columns
-        ss_items = float(k * (rows**2).sum())
-        ss_residual = float((residual**2).sum())
         scale = float(n * k) ** 2
         return cls(
             n,
             k,
-            ss_items / (scale * (n - 1)),
-            float(n * (columns**2).sum()) / (scale * (k - 1)),
-            ss_residual / (scale * ((n - 1) * (k - 1))),
-            float((within**2).sum()) / (scale * (n * (k - 1))),
-            ss_items,
-            ss_residual,
+            float(k * (rows**2).sum() / (scale * (n - 1))),
+            float(n * (columns**2).sum() / (scale * (k - 1))),
+            float(((within - columns) ** 2).sum() / (scale * ((n - 1) * (k - 1)))),
+            float((within**2).sum() / (scale * (n * (k - 1)))),
             unit,
         )
 
@@ -385,68 +314,27 @@ class _Anova:
         return (self.items - self.error(form)) / self.denominator(form)
 
 
-def _squarable(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """Return values whose squares are floats, and the power of two they are over."""
-    exponent = int(np.frexp(np.abs(values).max())[1]) - 1
-    if -_SQUARABLE < exponent < _SQUARABLE:
-        return values, 1.0
-    return np.ldexp(values, -exponent), math.ldexp(1.0, exponent)
+def _reason(
+    values: NDArray[np.float64], anova: _Anova, form: str = "ICC(1)"
+) -> str | None:
+    if values.shape[0] < 2:
+        return undefined(form, "fewer than two items are rated by every rater")
+    if values.shape[1] < 2:
+        return undefined(form, "fewer than two raters")
+    if anova.items == 0.0 and anova.error(form) == 0.0:
+        return undefined(form, "0/0: neither items nor ratings of an item differ")
+    if anova.denominator(form) == 0.0:
+        return undefined(form, "division by 0: the total variance is estimated as 0")
+    return None
 
 
-def _with_gaps(
-    values: NDArray[np.float64], form: IccForm, level: float
-) -> tuple[float, Interval | None, str | None]:
-    """Return value, interval and reason of a table with missing ratings."""
-    from masrel.agreement._icc_profile import icc_ends
-    from masrel.agreement._reml import crossed_components, nested_components
-
-    one_way = form.startswith("ICC(1")
-    components = (nested_components if one_way else crossed_components)(values)
-    if components.reason is not None:
-        return math.nan, None, undefined(form, components.reason)
-    absolute = form.startswith("ICC(A")
-    error = components.residual + (components.raters if absolute else 0.0)
-    if components.items == 0.0 and error == 0.0:
-        why = "0/0: neither items nor ratings of an item differ"
-        return math.nan, None, undefined(form, why)
-    k = components.n_raters if form.endswith("k)") else 1
-    low, high = icc_ends(components, absolute=absolute, level=level)
+def _without_gaps(values: NDArray[np.float64], form: IccForm, level: float) -> _Answer:
+    """Return value, interval and reason by mean squares."""
+    anova = _Anova.of(values)
+    if reason := _reason(values, anova, form):
+        return math.nan, None, reason
+    low, high, reason = _ends(anova, form, level)
     interval = Interval(
-        low=_stepped_up(low, k),
-        high=_stepped_up(high, k),
-        level=level,
-        kind="confidence",
-        method="REML, profile likelihood",
-        target=_target_of(form),
-        notes=_gap_notes(components, form),
-    )
-    return components.items / (components.items + error / k), interval, None
-
-
-def _gap_notes(components: "Components", form: str) -> tuple[str, ...]:
-    """Return what to know of an estimate from a table with gaps."""
-    notes = [components.words]
-    if form.endswith("k)"):
-        mean = components.n_ratings / components.n_items
-        notes.append(
-            f"k is the {components.n_raters} raters of the table; an item has "
-            f"{mean:.3g} ratings on average"
-        )
-    return tuple(notes)
-
-
-def _interval(anova: _Anova, form: IccForm, level: float) -> Interval:
-    reason = None
-    if form.startswith("ICC(A"):
-        reason = _without_interval(anova, form)
-        low, high = (math.nan, math.nan) if reason else _absolute(anova, level)
-        if reason is None and math.isnan(low):
-            reason = "Satterthwaite's degrees of freedom are too few"
-    else:
-        low, high = _ratio(anova, form, level)
-    if form.endswith("k)"):
-        low, high = _stepped_up(low, anova.k), _stepped_up(high, anova.k)
-    return Interval(
         low=low,
         high=high,
         level=level,
@@ -455,70 +343,53 @@ def _interval(anova: _Anova, form: IccForm, level: float) -> Interval:
         target=_target_of(form),
         reason=reason,
     )
+    return anova.value(form), interval, None
 
 
-def _target_of(form: IccForm) -> Target:
-    """Return what the interval generalises to."""
-    # Consistency leaves out what raters differ by in level: their variance is in no
-    # mean square of its interval. In the others raters are a sample, too.
-    return "items" if form.startswith("ICC(C") else "both"
+def _ends(
+    anova: _Anova, form: IccForm, level: float
+) -> tuple[float, float, str | None]:
+    """Return the ends of the interval, and why there are none."""
+    from scipy.special import fdtri
 
-
-def _without_interval(anova: _Anova, form: str) -> str | None:
-    # why absolute agreement has no interval, or None
-    if not anova.denominator("ICC(A,1)") > 0.0:
-        return "the total variance is estimated as less than 0"
-    if form == "ICC(A,k)" and not anova.denominator(form) > 0.0:
-        return "the variance of the raters' mean is estimated as less than 0"
-    return None
-
-
-def _stepped_up(rho: float, k: int) -> float:
-    # Spearman and Brown's k ρ / (1 + (k - 1) ρ), which falls to -∞ at ρ = -1/(k - 1);
-    # an end of the interval that lies beyond is no bound
-    denominator = 1.0 + (k - 1) * rho
-    return -math.inf if denominator <= 0.0 else k * rho / denominator
-
-
-def _ratio(anova: _Anova, form: str, level: float) -> tuple[float, float]:
-    # Table 7 of [1]: F over its upper and lower quantiles, for a single rating
-    error = anova.error(form)
-    if error == 0.0:
-        return 1.0, 1.0
-    f = anova.items / error
-    first, second = anova.df(form)
-    upper = 0.5 + 0.5 * level
-    lowest = f / _f_quantile(first, second, upper)
-    highest = f * _f_quantile(second, first, upper)
-    k = anova.k
-    return (lowest - 1) / (lowest + k - 1), (highest - 1) / (highest + k - 1)
-
-
-def _absolute(anova: _Anova, level: float) -> tuple[float, float]:
-    rho = anova.value("ICC(A,1)")
-    if rho == 1.0:
-        return 1.0, 1.0
-    squares = (anova.items, anova.raters, anova.residual)
-    low, high = _absolute_ends(anova.n, anova.k, squares, rho, level)
-    return float(low), float(high)
+    k, error, upper = anova.k, anova.error(form), 0.5 + 0.5 * level
+    absolute = form.startswith("ICC(A")
+    if error == 0.0 and not (absolute and anova.raters > 0.0):
+        return 1.0, 1.0, None
+    if absolute:
+        if not anova.denominator("ICC(A,1)") > 0.0:
+            return math.nan, math.nan, "the total variance is estimated as less than 0"
+        if not anova.denominator(form) > 0.0:
+            why = "the variance of the raters' mean is estimated as less than 0"
+            return math.nan, math.nan, why
+        squares = (anova.items, anova.raters, anova.residual)
+        rho = anova.value("ICC(A,1)")
+        low, high = map(float, _absolute_ends(anova.n, k, squares, rho, level))
+    else:
+        # Table 7 of [1]: F over its upper and lower quantiles, for a single rating
+        first, second = anova.df(form)
+        lowest = anova.items / error / float(fdtri(first, second, upper))
+        highest = anova.items / error * float(fdtri(second, first, upper))
+        low, high = ((f - 1) / (f + k - 1) for f in (lowest, highest))
+    if math.isnan(low):
+        return low, high, "Satterthwaite's degrees of freedom are too few"
+    if form.endswith("k)"):
+        low, high = _stepped_up(low, k), _stepped_up(high, k)
+    return low, high, None
 
 
 def _absolute_ends(
-    n: int,
-    k: int,
-    squares: "tuple[_Numbers, _Numbers, _Numbers]",
-    rho: "_Numbers",
-    level: float,
-) -> "tuple[_Numbers, _Numbers]":
-    """Return the ends of ICC(A,1) below 1, of one table or of many."""
+    n: int, k: int, squares: tuple[Any, Any, Any], rho: Any, level: float
+) -> tuple[Any, Any]:
+    """Return the ends of ICC(A,1), of one table or of many; ``nan`` without any."""
     # Table 7 of [1], Case 2A and 3A, with Satterthwaite's degrees at ICC(A,1); squares
     # are the mean ones of items, raters and residual, each a number or (...)
     from scipy.special import fdtri
 
     rows, columns, error = squares
+    # times (1 - ρ), so that ρ may be 1
+    a, b = k * rho / n, (1 - rho) + k * rho * (n - 1) / n
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        a = k * rho / (n * (1 - rho))
-        b = 1 + k * rho * (n - 1) / (n * (1 - rho))
         df = np.divide(
             (a * columns + b * error) ** 2,
             (a * columns) ** 2 / (k - 1) + (b * error) ** 2 / ((n - 1) * (k - 1)),
@@ -533,7 +404,47 @@ def _absolute_ends(
     return np.where(holds, low, np.nan), np.where(holds, high, np.nan)
 
 
-def _f_quantile(first: float, second: float, share: float) -> float:
-    from scipy.special import fdtri
+def _with_gaps(values: NDArray[np.float64], form: IccForm, level: float) -> _Answer:
+    """Return value, interval and reason by restricted maximum likelihood."""
+    from masrel.agreement._mixed import components
 
-    return float(fdtri(first, second, share))
+    fit = components(values, has_raters=not form.startswith("ICC(1"))
+    if isinstance(fit, str):
+        return math.nan, None, undefined(form, fit)
+    absolute = form.startswith("ICC(A")
+    error = fit.residual + (fit.raters if absolute else 0.0)
+    if fit.items == 0.0 and error == 0.0:
+        why = "0/0: neither items nor ratings of an item differ"
+        return math.nan, None, undefined(form, why)
+    k, notes = 1, [fit.words]
+    if form.endswith("k)"):
+        k = fit.n_raters
+        notes.append(
+            f"k is the {k} raters of the table; an item has "
+            f"{fit.n_ratings / fit.n_items:.3g} ratings on average"
+        )
+    low, high = fit.icc_ends(absolute=absolute, level=level)
+    interval = Interval(
+        low=_stepped_up(low, k),
+        high=_stepped_up(high, k),
+        level=level,
+        kind="confidence",
+        method="REML, profile likelihood",
+        target=_target_of(form),
+        notes=tuple(notes),
+    )
+    return fit.items / (fit.items + error / k), interval, None
+
+
+def _target_of(form: IccForm) -> Target:
+    """Return what the interval generalises to."""
+    # Consistency leaves out what raters differ by in level: their variance is in no
+    # mean square of its interval. In the others raters are a sample, too.
+    return "items" if form.startswith("ICC(C") else "both"
+
+
+def _stepped_up(rho: float, k: int) -> float:
+    # Spearman and Brown's k ρ / (1 + (k - 1) ρ), which falls to -∞ at ρ = -1/(k - 1);
+    # an end of the interval that lies beyond is no bound
+    denominator = 1.0 + (k - 1) * rho
+    return -math.inf if denominator <= 0.0 else k * rho / denominator

@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement._data import complete_values
-from masrel.agreement._engine import undefined
+from masrel.agreement._engine import measured, undefined
 from masrel.agreement._labels import Label
 from masrel.estimates import Estimate, Significance
 
@@ -63,21 +62,10 @@ def kendall_w(
     0.4444444444444444
     """
     values = complete_values(ratings, categories)
-    ranks = _Ranks.of(values)
-    reason = _reason(values, ranks, ties=ties)
-    value = math.nan if reason else ranks.numerator / ranks.denominator(ties=ties)
-    return Estimate(
-        coefficient="kendall_w",
-        weights="tie-corrected" if ties else "uncorrected",
-        value=value,
-        standard_error=math.nan,
-        observed=math.nan,
-        chance=math.nan,
-        n_items=ranks.n,
-        n_items_paired=ranks.n if ranks.m > 1 else 0,
-        n_raters=ranks.m,
-        n_categories=len(np.unique(values)) if categories is None else len(categories),
-        reason=reason,
+    value, reason = _w(values, ties=ties)
+    weights = "tie-corrected" if ties else "uncorrected"
+    return measured(
+        "kendall_w", values, categories, value, weights=weights, reason=reason
     )
 
 
@@ -116,62 +104,46 @@ def kendall_w_test(
     kendall_w_test: 2.667, chi-squared(2), p = 0.264
     """
     values = complete_values(ratings, categories)
-    ranks = _Ranks.of(values)
-    reason = _reason(values, ranks, ties=ties)
+    n, m = values.shape
+    w, reason = _w(values, ties=ties)
     statistic = p = math.nan
     if reason is None:
         from scipy.special import chdtrc
 
-        statistic = (
-            ranks.m * (ranks.n - 1) * ranks.numerator / ranks.denominator(ties=ties)
-        )
-        p = float(chdtrc(ranks.n - 1, statistic))
+        statistic = m * (n - 1) * w
+        p = float(chdtrc(n - 1, statistic))
     return Significance(
         name="kendall_w_test",
         hypothesis="the raters' orders are unrelated",
         statistic=statistic,
         distribution="chi-squared",
-        df=(float(max(ranks.n - 1, 0)),),
+        df=(float(max(n - 1, 0)),),
         p_value=p,
-        n_items=ranks.n,
+        n_items=n,
         reason=reason,
     )
 
 
-def _reason(values: NDArray[np.float64], ranks: "_Ranks", *, ties: bool) -> str | None:
-    if values.shape[0] < 2:
+def _w(values: NDArray[np.float64], *, ties: bool) -> tuple[float, str | None]:
+    """Return W, or why there is none."""
+    n, m = values.shape
+    if n < 2:
         why = "fewer than two items are rated by every rater"
-        return undefined("Kendall's W", why)
-    if values.shape[1] < 2:
-        return undefined("Kendall's W", "fewer than two raters")
-    if ranks.denominator(ties=ties) == 0:
-        return undefined("Kendall's W", "0/0: every rater gives all items one rating")
-    return None
-
-
-@dataclass(frozen=True, slots=True)
-class _Ranks:
-    # Doubled ranks, so that those of ties are whole; W = numerator / denominator, as in
-    # [2].
-    n: int
-    m: int
-    numerator: int
-    ties: int  # Σ (t³ - t) over the ties of all raters
-
-    @classmethod
-    def of(cls, values: NDArray[np.float64]) -> "_Ranks":
-        n, m = values.shape
-        sums, ties = np.zeros(n, dtype=np.int64), 0
-        for column in values.T:
-            _, place, freq = np.unique(column, return_inverse=True, return_counts=True)
-            # the mean rank of a tie, doubled: those below twice, then t + 1
-            doubled = 2 * (np.cumsum(freq) - freq) + freq + 1
-            sums += doubled[place]
-            ties += sum(t**3 - t for t in freq.tolist())
-        mean = m * (n + 1)  # of doubled rank sums
-        return cls(n, m, 3 * sum((s - mean) ** 2 for s in sums.tolist()), ties)
-
-    def denominator(self, *, ties: bool) -> int:
-        # 12 S / (m² (n³ - n) - m ΣT); S of doubled ranks is four times as large
-        whole = self.m**2 * (self.n**3 - self.n)
-        return whole - self.m * self.ties if ties else whole
+        return math.nan, undefined("Kendall's W", why)
+    if m < 2:
+        return math.nan, undefined("Kendall's W", "fewer than two raters")
+    # ranks are doubled, so that those of ties are whole, and S four times as large
+    sums, tied = np.zeros(n, dtype=np.int64), 0
+    for column in values.T:
+        _, place, freq = np.unique(column, return_inverse=True, return_counts=True)
+        # the mean rank of a tie, doubled: those below twice, then t + 1
+        sums += (2 * (np.cumsum(freq) - freq) + freq + 1)[place]
+        tied += sum(t**3 - t for t in freq.tolist())
+    # 12 S / (m² (n³ - n) - m ΣT), as in [2], in whole numbers of any size
+    numerator = 3 * sum((s - m * (n + 1)) ** 2 for s in sums.tolist())
+    whole = m**2 * (n**3 - n)
+    denominator = whole - m * tied if ties else whole
+    if denominator == 0:
+        why = "0/0: every rater gives all items one rating"
+        return math.nan, undefined("Kendall's W", why)
+    return numerator / denominator, None

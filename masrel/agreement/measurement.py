@@ -1,28 +1,42 @@
-"""Error in the units of the ratings: of one measurement, and of a change."""
+"""How far measurements lie apart: their error, limits of agreement, concordance."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, get_args
+from dataclasses import dataclass, field
+from statistics import NormalDist
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement._data import rated_part, rating_values
-from masrel.agreement._engine import check_level, undefined
+from masrel.agreement._data import complete_values, rated_part, rating_values
+from masrel.agreement._engine import (
+    NO_SPREAD,
+    check_level,
+    check_option,
+    deviations,
+    measured,
+    undefined,
+)
 from masrel.agreement._labels import Label
-from masrel.agreement.icc import _Anova, _n_categories
-from masrel.errors import ParameterError
+from masrel.agreement.icc import _Anova
+from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Estimate, Interval
 
-if TYPE_CHECKING:
-    from masrel.agreement._reml import Components
+_Floats = NDArray[np.float64]
 
 ErrorKind = Literal["agreement", "consistency"]
 """Whether what raters differ by on average is error, or not."""
 
 _CHANGE = 1.96 * math.sqrt(2.0)
 """From the error of one rating to the change of two that chance exceeds in 5 %."""
+
+_FEW = 3
+"""Items from which on Lin's concordance has an error."""
+
+_NODES, _FARTHEST = 96, 8.5
+"""Of Gauss and Legendre's rule over what the mean can be: nodes, and standard errors
+beyond which there is nothing to add."""
 
 
 def sem(
@@ -143,129 +157,100 @@ def _error(
     categories: Sequence[Label] | None,
     level: float,
 ) -> Estimate:
-    if kind not in get_args(ErrorKind):
-        raise ParameterError(
-            f"kind: needs one of {', '.join(get_args(ErrorKind))}, got {kind!r}"
-        )
+    check_option("kind", kind, get_args(ErrorKind))
     check_level(level)
     values = rated_part(rating_values(ratings, categories))
-    squares, reason = _squares(values)
-    title = {"sem": "the standard error of measurement", "mdc": "MDC95"}[name]
-    value, interval = math.nan, None
-    if squares is None:
-        reason = undefined(title, str(reason))
+    squares = _squares(values)
+    value, interval, reason = math.nan, None, None
+    if isinstance(squares, str):
+        title = {"sem": "the standard error of measurement", "mdc": "MDC95"}[name]
+        reason = undefined(title, squares)
     else:
-        scale = factor * squares.unit
-        value = scale * math.sqrt(squares.variance(kind))
-        interval = _interval(squares, kind, scale, level)
-    n_items, n_raters = values.shape
-    return Estimate(
-        coefficient=name if kind == "agreement" else f"{name}_{kind}",
-        weights="identity",
-        value=value,
-        standard_error=math.nan,
-        interval=interval,
-        observed=math.nan,
-        chance=math.nan,
-        n_items=n_items,
-        n_items_paired=int(((~np.isnan(values)).sum(axis=1) > 1).sum()),
-        n_raters=n_raters,
-        n_categories=_n_categories(values, categories),
-        reason=reason,
-    )
+        scale, parts = factor * squares.unit, squares.parts(kind)
+        variance = sum(square for square, _ in parts)
+        value = scale * math.sqrt(variance)
+        low, high, why = _variance_ends(parts, variance, level)
+        method = "χ²" if kind == "consistency" else "modified large sample, χ²"
+        interval = Interval(
+            low=scale * math.sqrt(low),
+            high=scale * math.sqrt(high),
+            level=level,
+            kind="confidence",
+            method=f"REML, {method}" if squares.notes else method,
+            target="items" if kind == "consistency" else "both",
+            notes=squares.notes,
+            reason=why,
+        )
+    name = name if kind == "agreement" else f"{name}_{kind}"
+    return measured(name, values, categories, value, interval=interval, reason=reason)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Squares:
-    """Mean squares of raters and residual, in unit², and what they make together."""
+    """Mean squares of raters and residual, in unit², with degrees of freedom."""
 
     raters: float
     residual: float
     df_raters: float
     df_residual: float
     n: float  # items of a rater: the first is residual + n times that of raters
-    together: float  # the variances of raters and residual
     unit: float
     notes: tuple[str, ...] = ()
 
-    def variance(self, kind: ErrorKind) -> float:
-        """Return the variance of the error."""
-        return self.together if kind == "agreement" else self.residual
+    def parts(self, kind: ErrorKind) -> list[tuple[float, float]]:
+        """Return what adds up to the variance of the error, and how free each is."""
+        if kind == "consistency":
+            return [(self.residual, self.df_residual)]
+        share = 1.0 / self.n
+        return [
+            (share * self.raters, self.df_raters),
+            ((1.0 - share) * self.residual, self.df_residual),
+        ]
 
 
-def _squares(values: NDArray[np.float64]) -> tuple[_Squares | None, str | None]:
-    # the squares, or why there are none
+def _squares(values: _Floats) -> _Squares | str:
+    """Return the squares, or why there are none."""
     n, k = values.shape
     if n < 2 or k < 2:
-        return None, "fewer than two items" if n < 2 else "fewer than two raters"
-    if np.isnan(values).any():
-        from masrel.agreement._reml import crossed_components
+        return "fewer than two items" if n < 2 else "fewer than two raters"
+    if not np.isnan(values).any():
+        anova = _Anova.of(values)
+        return _Squares(
+            raters=anova.raters,
+            residual=anova.residual,
+            df_raters=k - 1.0,
+            df_residual=(n - 1.0) * (k - 1.0),
+            n=float(n),
+            unit=anova.unit,
+        )
+    from masrel.agreement._mixed import components
 
-        components = crossed_components(values)
-        if components.reason is not None:
-            return None, components.reason
-        return _equivalent(components), None
-    anova = _Anova.of(values)
-    return _Squares(
-        raters=anova.raters,
-        residual=anova.residual,
-        df_raters=k - 1.0,
-        df_residual=(n - 1.0) * (k - 1.0),
-        n=float(n),
-        together=anova.within,  # (MS_raters + (n - 1) MS_residual) / n
-        unit=anova.unit,
-    ), None
-
-
-def _equivalent(components: "Components") -> _Squares:
-    """Return the squares of the complete table that would say as much."""
-    # With covariance V of the variances, n = -V_ee / V_re makes σ²_e + n σ²_r and σ²_e
-    # uncorrelated; of a complete table it is its number of items.
-    c, v = components, components.covariance
-    n, df_raters, df_residual = 1.0, c.n_raters - 1.0, math.inf
-    if c.residual > 0.0:
+    fit = components(values, has_raters=True)
+    if isinstance(fit, str):
+        return fit
+    # Of the complete table that would say as much. With covariance V of the variances,
+    # m = -V_ee / V_re makes σ²_e + m σ²_r and σ²_e uncorrelated; of a complete table it
+    # is its number of items.
+    m, df_raters, df_residual = 1.0, k - 1.0, math.inf
+    if fit.residual > 0.0:
+        v = fit.covariance()
         # no more than all items, whatever rounding leaves of a tiny V_re
-        n = float(v[2, 2] / max(-v[1, 2], v[2, 2] / c.n_items))
-        df_residual = float(2.0 * c.residual**2 / v[2, 2])
-        noise = float(n**2 * v[1, 1] - v[2, 2])
-        df_raters = 2.0 * (c.residual + n * c.raters) ** 2 / noise
+        m = float(v[2, 2] / max(-v[1, 2], v[2, 2] / n))
+        df_residual = float(2.0 * fit.residual**2 / v[2, 2])
+        noise = float(m**2 * v[1, 1] - v[2, 2])
+        df_raters = 2.0 * (fit.residual + m * fit.raters) ** 2 / noise
     return _Squares(
-        raters=c.residual + n * c.raters,
-        residual=c.residual,
+        raters=fit.residual + m * fit.raters,
+        residual=fit.residual,
         df_raters=df_raters,
         df_residual=df_residual,
-        n=n,
-        together=c.raters + c.residual,
-        unit=c.unit,
-        notes=(c.words,),
+        n=m,
+        unit=fit.unit,
+        notes=(fit.words,),
     )
 
 
-def _interval(
-    squares: _Squares, kind: ErrorKind, scale: float, level: float
-) -> Interval:
-    parts = [(squares.residual, squares.df_residual)]
-    if kind == "agreement":
-        share = 1.0 / squares.n
-        parts = [
-            (share * squares.raters, squares.df_raters),
-            ((1.0 - share) * squares.residual, squares.df_residual),
-        ]
-    low, high, reason = _ends(parts, squares.variance(kind), level)
-    method = "χ²" if kind == "consistency" else "modified large sample, χ²"
-    return Interval(
-        low=scale * math.sqrt(low),
-        high=scale * math.sqrt(high),
-        level=level,
-        kind="confidence",
-        method=f"REML, {method}" if squares.notes else method,
-        target="items" if kind == "consistency" else "both",
-        notes=squares.notes,
-        reason=reason,
-    )
-
-
-def _ends(
+def _variance_ends(
     parts: list[tuple[float, float]], variance: float, level: float
 ) -> tuple[float, float, str | None]:
     # Equations (1.3) and (1.4) of [2]; of a single part they are those of χ².
@@ -283,3 +268,372 @@ def _ends(
         down += (shrink * square) ** 2
         up += (stretch * square) ** 2
     return max(variance - math.sqrt(down), 0.0), variance + math.sqrt(up), None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LimitsOfAgreement:
+    """Between which bounds the differences of two raters lie.
+
+    Attributes
+    ----------
+    mean, sd : float
+        Mean and standard deviation of the differences, first less second.
+    lower, upper : float
+        The limits: mean ∓ z sd; ``nan`` when undefined.
+    share : float
+        Of the differences that are to lie between the limits.
+    mean_interval, lower_interval, upper_interval : Interval
+        Exact intervals, each for itself.
+    inner, outer : tuple of float
+        Bounds of both limits together: a share of the differences lies within the
+        inner and outside the outer ones with probability (1 - level) / 2 each.
+    averages, differences : ndarray, shape (n_items,)
+        Mean and difference of the two ratings of each item.
+    n_items : int
+        Items that both raters rated.
+    reason : str or None
+        Why they are undefined, or None.
+    """
+
+    mean: float
+    sd: float
+    lower: float
+    upper: float
+    share: float
+    mean_interval: Interval
+    lower_interval: Interval
+    upper_interval: Interval
+    inner: tuple[float, float]
+    outer: tuple[float, float]
+    averages: _Floats = field(compare=False, repr=False)
+    differences: _Floats = field(compare=False, repr=False)
+    n_items: int
+    reason: str | None = None
+
+
+def limits_of_agreement(
+    ratings: object,
+    *,
+    categories: Sequence[Label] | None = None,
+    share: float = 0.95,
+    level: float = 0.95,
+) -> LimitsOfAgreement:
+    """Estimate the limits of agreement of two raters.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, 2)
+        Numbers, or labels of a declared scale; None and ``nan`` are missing.
+    categories : sequence of str, int or float, optional
+        The declared scale in order: numbers count by value, text by rank. Needed for
+        text.
+    share : float, optional
+        Of the differences that are to lie between the limits.
+    level : float, optional
+        Level of the intervals.
+
+    Returns
+    -------
+    LimitsOfAgreement
+        Mean difference and limits with their intervals, for other items like these.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table, or text without categories.
+    ParameterError
+        If the share or the level is not within (0, 1).
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If fewer than two items have both ratings.
+
+    Notes
+    -----
+    Differences are taken to be normal, with the same mean and spread whatever is
+    rated, and each item to be rated once by each rater. The interval of a limit is
+    exact: its ends are quantiles of a noncentral t; those of both limits together are
+    factors of tolerance [2]_. Items with a missing rating are left out.
+
+    References
+    ----------
+    .. [1] Bland, J. M., Altman, D. G. (1999). Measuring agreement in method comparison
+       studies. Statistical Methods in Medical Research, 8(2), 135-160.
+       https://doi.org/10.1177/096228029900800204
+    .. [2] Carkeet, A. (2015). Exact parametric confidence intervals for Bland-Altman
+       limits of agreement. Optometry and Vision Science, 92(3), e71-e80.
+       https://doi.org/10.1097/OPX.0000000000000513
+
+    Examples
+    --------
+    >>> limits = limits_of_agreement([[9, 8], [5, 7], [4, 4], [8, 7]])
+    >>> print(f"{limits.mean:.2f}, {limits.lower:.2f} to {limits.upper:.2f}")
+    0.00, -2.77 to 2.77
+    """
+    for name, value in (("share", share), ("level", level)):
+        if not 0.0 < value < 1.0:
+            raise ParameterError(f"{name}: needs (0, 1), got {value}")
+    values = complete_values(ratings, categories)
+    if values.shape[1] != 2:
+        raise RatingsError(
+            "limits of agreement: need the ratings of two raters, got "
+            f"{values.shape[1]}: choose two"
+        )
+    first, second = values[:, 0], values[:, 1]
+    differences, averages = first - second, first + 0.5 * (second - first)
+    for array in (differences, averages):
+        array.setflags(write=False)
+    n, z = len(differences), NormalDist().inv_cdf(0.5 + 0.5 * share)
+    mean = sd = math.nan
+    reason, widths = None, [math.nan] * 5
+    if n < 2:
+        why = "fewer than two items are rated by both raters"
+        reason = undefined("the limits of agreement", why)
+    else:
+        mean, sd = float(differences.mean()), float(differences.std(ddof=1))
+        widths = _widths(n, share, level)
+    middle, near, far, inner, outer = (width * sd for width in widths)
+
+    def interval(low: float, high: float, method: str) -> Interval:
+        return Interval(
+            low=mean + low,
+            high=mean + high,
+            level=level,
+            kind="confidence",
+            method=method,
+            target="items",
+            reason=reason,
+        )
+
+    return LimitsOfAgreement(
+        mean=mean,
+        sd=sd,
+        lower=mean - z * sd,
+        upper=mean + z * sd,
+        share=share,
+        mean_interval=interval(-middle, middle, f"t({n - 1})"),
+        lower_interval=interval(-far, -near, f"noncentral t({n - 1})"),
+        upper_interval=interval(near, far, f"noncentral t({n - 1})"),
+        inner=(mean - inner, mean + inner),
+        outer=(mean - outer, mean + outer),
+        averages=averages,
+        differences=differences,
+        n_items=n,
+        reason=reason,
+    )
+
+
+def _widths(n: int, share: float, level: float) -> list[float]:
+    """Return how many standard deviations from the mean the ends are."""
+    # of the mean; near and far of a limit; inner and outer of both
+    from scipy.special import nctdtrit, stdtrit
+
+    df, root, tail = n - 1, math.sqrt(n), 0.5 - 0.5 * level
+    shift = root * NormalDist().inv_cdf(0.5 + 0.5 * share)
+    return [
+        float(stdtrit(df, 1.0 - tail)) / root,
+        float(nctdtrit(df, shift, tail)) / root,
+        float(nctdtrit(df, shift, 1.0 - tail)) / root,
+        _tolerance_factor(n, share, tail),
+        _tolerance_factor(n, share, 1.0 - tail),
+    ]
+
+
+def _tolerance_factor(n: int, share: float, confidence: float) -> float:
+    """Return k for which mean ∓ k sd hold a share with such confidence."""
+    from scipy.optimize import brentq
+    from scipy.special import chdtr, chndtrix
+
+    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    off = 0.5 * _FARTHEST * (nodes + 1.0)  # of the mean, in its standard errors
+    density = _FARTHEST * weights * np.exp(-0.5 * off**2) / math.sqrt(2.0 * math.pi)
+    # r² for which a standard normal lies within off ∓ r in such a share
+    squares = chndtrix(share, 1, off**2 / n)
+
+    def excess(log_k: float) -> float:
+        # the standard deviation is at least r / k
+        lacks = density @ chdtr(n - 1, (n - 1) * squares * math.exp(-2.0 * log_k))
+        return 1.0 - float(lacks) - confidence
+
+    return math.exp(brentq(excess, -50.0, 50.0, xtol=1e-14, rtol=1e-15))
+
+
+def lin_ccc(
+    ratings: object,
+    *,
+    categories: Sequence[Label] | None = None,
+    level: float = 0.95,
+) -> Estimate:
+    """Estimate Lin's concordance correlation coefficient.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Numbers, or labels of a declared scale; None and ``nan`` are missing.
+    categories : sequence of str, int or float, optional
+        The declared scale in order: numbers count by value, text by rank. Needed for
+        text.
+    level : float, optional
+        Level of the interval.
+
+    Returns
+    -------
+    Estimate
+        The coefficient, with its standard error and an interval on Fisher's z that
+        generalises to other items. Observed and chance agreement do not exist.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table, or text without categories.
+    ParameterError
+        If the level is not within (0, 1).
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If there are fewer than two complete items or raters, or all ratings are the
+        same; the value is then ``nan``.
+
+    Notes
+    -----
+    Of two raters 2 s_xy / (s_x² + s_y² + (x̄ - ȳ)²), with moments over n; the error is
+    that of [1]_ with the erratum, over n - 2. Of more raters the overall coefficient of
+    [2]_, in which numerators and denominators of all pairs are added up; the error is
+    then the delta method's, and the interval a jackknife of items with t. Items with a
+    missing rating are left out.
+
+    References
+    ----------
+    .. [1] Lin, L. I.-K. (1989). A concordance correlation coefficient to evaluate
+       reproducibility. Biometrics, 45(1), 255-268. https://doi.org/10.2307/2532051;
+       erratum (2000), 56(1), 324-325.
+    .. [2] Barnhart, H. X., Haber, M., Song, J. (2002). Overall concordance correlation
+       coefficient for evaluating agreement among multiple observers. Biometrics, 58(4),
+       1020-1027. https://doi.org/10.1111/j.0006-341X.2002.01020.x
+
+    Examples
+    --------
+    >>> round(lin_ccc([[1, 2], [3, 3], [5, 7]]).value, 4)
+    0.8
+    """
+    check_level(level)
+    values = complete_values(ratings, categories)
+    value, error, interval = math.nan, math.nan, None
+    reason = _reason(values)
+    if reason is not None:
+        undefined("Lin's concordance", reason)
+    else:
+        scaled, _ = deviations(values)
+        value, error = _concordance(scaled)
+        interval = _interval(scaled, value, error, level)
+    return measured(
+        "lin_ccc",
+        values,
+        categories,
+        value,
+        standard_error=error,
+        interval=interval,
+        reason=reason,
+    )
+
+
+def _reason(values: _Floats) -> str | None:
+    if values.shape[0] < 2:
+        return "fewer than two items are rated by every rater"
+    if values.shape[1] < 2:
+        return "fewer than two raters"
+    return "0/0: all ratings are the same" if np.ptp(values) == 0.0 else None
+
+
+def _concordance(values: _Floats) -> tuple[float, float]:
+    """Return the coefficient and its error."""
+    # 1 - Σ (x_j - x_l)² within items over that between them, and its delta method
+    n, k = values.shape
+    means = values.mean(axis=0)
+    x, levels = values - means, means - means.mean()
+    within = _within(values)
+    # (k - 1) Σ_j σ_j² + Σ_{j<l} (μ_j - μ_l)², and what each item adds to it
+    between = k * float((levels**2).sum())
+    pull = (k - 1) * (x**2).sum(axis=1) + 2.0 * k * x @ levels
+    whole = float(pull.mean()) + between
+    ratio = float(within.mean()) / whole
+    if n < _FEW:
+        return 1.0 - ratio, math.nan
+    if k == 2:
+        return 1.0 - ratio, _error_of_two(values, 1.0 - ratio)
+    influence = (within - ratio * (pull + between)) / whole
+    return 1.0 - ratio, math.sqrt(float((influence**2).sum()) / (n * (n - 1)))
+
+
+def _error_of_two(values: _Floats, rho: float) -> float:
+    # that of [1], here without a division by r
+    (xx, xy), (_, yy) = np.cov(values.T, ddof=0)
+    if xx == 0.0 or yy == 0.0:
+        return math.nan
+    shift2 = float(np.diff(values.mean(axis=0))[0] ** 2)
+    r2 = min(xy**2 / (xx * yy), 1.0)
+    bias = 2.0 * math.sqrt(xx * yy) / (xx + yy + shift2)  # ρ = r · bias
+    u2 = shift2 / math.sqrt(xx * yy)
+    variance = (
+        bias**2 * (1.0 - r2) * (1.0 - rho**2)
+        + 2.0 * rho**2 * (1.0 - rho) * bias * u2
+        - 0.5 * rho**2 * bias**2 * u2**2
+    )
+    return math.sqrt(max(variance, 0.0) / (len(values) - 2))
+
+
+def _within(values: _Floats) -> _Floats:
+    """Return the squared differences of all pairs of raters, added up, of each item."""
+    # Σ_{j<l} (x_j - x_l)² = k Σ_j (x_j - x̄)²
+    means = values.mean(axis=1, keepdims=True)
+    return np.asarray(values.shape[1] * ((values - means) ** 2).sum(axis=1))
+
+
+def _without_each(values: _Floats) -> _Floats:
+    """Return the overall coefficient without each item."""
+    n, k = values.shape
+    x = values - values.mean()
+    within = _within(x)
+    means = (x.sum(axis=0) - x) / (n - 1)  # (n, k)
+    variances = ((x**2).sum(axis=0) - x**2) / (n - 1) - means**2
+    levels = means - means.mean(axis=1, keepdims=True)
+    whole = (k - 1) * variances.sum(axis=1) + k * (levels**2).sum(axis=1)
+    return np.asarray(1.0 - (within.sum() - within) / (n - 1) / whole)
+
+
+def _interval(values: _Floats, value: float, error: float, level: float) -> Interval:
+    """Return the interval, on Fisher's z."""
+    n, k = values.shape
+    low = high = value
+    reason = None
+    if math.isnan(error):
+        low = high = math.nan
+        reason = "no error: fewer than three items, or a rater without variance"
+    elif abs(value) < 1.0 and error < 1e-15:  # of rounding
+        low, high, reason = math.nan, math.nan, NO_SPREAD
+    elif abs(value) < 1.0:
+        z = math.atanh(value)
+        if k == 2:
+            quantile = NormalDist().inv_cdf(0.5 + 0.5 * level)
+            width = quantile * error / (1.0 - value**2)
+        else:
+            from scipy.special import stdtrit
+
+            limit = np.nextafter(1.0, 0.0)  # without an item all may be perfect
+            each = np.arctanh(np.clip(_without_each(values), -limit, limit))
+            squares = float(((each - each.mean()) ** 2).sum())
+            quantile = float(stdtrit(n - 1, 0.5 + 0.5 * level))
+            width = quantile * math.sqrt((n - 1) / n * squares)
+        low, high = math.tanh(z - width), math.tanh(z + width)
+    return Interval(
+        low=low,
+        high=high,
+        level=level,
+        kind="confidence",
+        method="Fisher's z" if k == 2 else f"item jackknife, t({n - 1}) on Fisher's z",
+        target="items",
+        unit=None if k == 2 else "items",
+        reason=reason,
+    )

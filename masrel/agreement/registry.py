@@ -11,7 +11,6 @@ from masrel.agreement._engine import Formula
 from masrel.agreement._labels import Label, shown
 from masrel.agreement._rows import count_ratings
 from masrel.agreement._weights import Weights, WeightsLike, is_identity
-from masrel.agreement.concordance import lin_ccc
 from masrel.agreement.conger import _CONGER, conger_kappa
 from masrel.agreement.icc import _NAMES as ICC_NAMES
 from masrel.agreement.icc import _target_of as icc_target
@@ -37,7 +36,7 @@ from masrel.agreement.krippendorff import (
     _metric_weights,
     krippendorff_alpha,
 )
-from masrel.agreement.measurement import ErrorKind, mdc, sem
+from masrel.agreement.measurement import ErrorKind, lin_ccc, mdc, sem
 from masrel.agreement.pairs import (
     _COHEN,
     _LIGHT,

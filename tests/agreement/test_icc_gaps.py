@@ -282,24 +282,6 @@ def test_raters_who_never_meet_are_estimated_from_what_they_gave() -> None:
     assert icc(ratings).value == pytest.approx(expected, rel=1e-6)
 
 
-def test_a_step_inverts_one_real_matrix(monkeypatch: pytest.MonkeyPatch) -> None:
-    # those of the raters: the grid solves, and slopes come from that of the step
-    inverted = []
-    inverse = np.linalg.inv
-
-    def counting(a: np.ndarray) -> np.ndarray:
-        inverted.append((np.iscomplexobj(a), a.size // a.shape[-1] ** 2))
-        return np.asarray(inverse(a))
-
-    rng = np.random.default_rng(5)
-    ratings = rng.normal(size=(60, 1)) + rng.normal(size=(60, 20))
-    ratings[rng.random((60, 20)) < 0.3] = np.nan
-    expected = icc(ratings).value
-    monkeypatch.setattr(np.linalg, "inv", counting)
-    assert icc(ratings).value == expected
-    assert set(inverted) == {(False, 1)}
-
-
 def test_estimate_takes_a_table_with_gaps() -> None:
     ratings = SETTINGS["icc_missing-02"]["data"]
     result = estimate("icc_a1", ratings, target="both")

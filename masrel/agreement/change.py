@@ -1,4 +1,4 @@
-"""Two ratings of the same items as a table, and tests of change between them."""
+"""Two ratings of the same items as a table: tests of change, and what margins do."""
 
 import math
 from collections.abc import Sequence
@@ -7,17 +7,17 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel.agreement._engine import undefined
+from masrel.agreement._engine import check_option, undefined
 from masrel.agreement._labels import Label
 from masrel.agreement._rows import (
     check_table,
+    check_two_by_two,
     pair_table,
     two_raters,
 )
-from masrel.errors import CountsError, ParameterError
+from masrel.agreement._weights import NO_CHANCE, NO_PAIR
+from masrel.errors import CountsError
 from masrel.estimates import Significance
-
-_MAX_SUMMED = 1_000  # changes up to which binomial probabilities are summed
 
 McnemarKind = Literal["exact", "uncorrected", "corrected"]
 """The binomial distribution, or chi-squared without or with continuity correction."""
@@ -91,7 +91,7 @@ def mcnemar(table: ArrayLike, *, kind: McnemarKind = "exact") -> Significance:
     --------
     One of six changes goes the other way: p = 2 (1 + 6)/2⁶.
 
-    >>> mcnemar([[10, 5], [1, 10]]).p_value
+    >>> round(mcnemar([[10, 5], [1, 10]]).p_value, 5)
     0.21875
     """
     cells = check_table(table)
@@ -99,35 +99,25 @@ def mcnemar(table: ArrayLike, *, kind: McnemarKind = "exact") -> Significance:
         raise CountsError(
             f"table: mcnemar needs 2 × 2, got {len(cells)} × {len(cells)}"
         )
-    if kind not in get_args(McnemarKind):
-        raise ParameterError(
-            f"kind: needs one of {', '.join(get_args(McnemarKind))}, got {kind!r}"
-        )
+    check_option("kind", kind, get_args(McnemarKind))
     b, c = int(cells[0, 1]), int(cells[1, 0])
-    n_items = int(cells.sum())
-    hypothesis = "changes go both ways alike often"
-    if kind == "exact":
-        return Significance(
-            name="mcnemar",
-            hypothesis=hypothesis,
-            statistic=float(min(b, c)),
-            distribution="binomial",
-            df=(float(b + c),),
-            p_value=_both_tails(min(b, c), b + c),
-            n_items=n_items,
-        )
-    shift = max(abs(b - c) - 1, 0) if kind == "corrected" else abs(b - c)
-    return _chi_squared("mcnemar", hypothesis, shift * shift, b + c, 1, n_items)
-
-
-def _both_tails(fewer: int, n: int) -> float:
-    # 2 P(X ≤ fewer), X ~ Binomial(n, 1/2), at most 1
-    if n <= _MAX_SUMMED:
-        tail = sum(math.comb(n, k) for k in range(fewer + 1))
-        return min(1.0, float(2 * tail / 2**n))
+    hypothesis, n_items = "changes go both ways alike often", int(cells.sum())
+    if kind != "exact":
+        shift = max(abs(b - c) - 1, 0) if kind == "corrected" else abs(b - c)
+        statistic = shift**2 / (b + c) if b + c else math.nan
+        return _chi_squared("mcnemar", hypothesis, statistic, 1, n_items)
     from scipy.special import bdtr
 
-    return min(1.0, 2.0 * float(bdtr(fewer, n, 0.5)))
+    # 2 P(X ≤ the smaller), X ~ Binomial(b + c, 1/2), at most 1
+    return Significance(
+        name="mcnemar",
+        hypothesis=hypothesis,
+        statistic=float(min(b, c)),
+        distribution="binomial",
+        df=(float(b + c),),
+        p_value=min(1.0, 2.0 * float(bdtr(min(b, c), b + c, 0.5))),
+        n_items=n_items,
+    )
 
 
 def bowker(table: ArrayLike) -> Significance:
@@ -165,23 +155,14 @@ def bowker(table: ArrayLike) -> Significance:
     >>> print(bowker([[10, 5, 0], [1, 10, 2], [0, 4, 8]]))
     bowker: 3.333, chi-squared(2), p = 0.189
     """
-    cells: list[list[int]] = check_table(table).tolist()
-    pairs = [
-        (cells[k][other], cells[other][k])
-        for k in range(len(cells))
-        for other in range(k)
-        if cells[k][other] + cells[other][k]
-    ]
-    common = math.lcm(*[b + c for b, c in pairs])
-    numerator = sum((b - c) ** 2 * (common // (b + c)) for b, c in pairs)
-    return _chi_squared(
-        "bowker",
-        "the table is symmetric",
-        numerator,
-        common if pairs else 0,
-        len(pairs),
-        sum(map(sum, cells)),
-    )
+    cells = check_table(table)
+    pairs = np.triu_indices(len(cells), 1)
+    b, c = cells[pairs], cells.T[pairs]
+    changed = b + c > 0
+    b, c = b[changed], c[changed]
+    statistic = float(((b - c) ** 2 / (b + c)).sum())
+    hypothesis = "the table is symmetric"
+    return _chi_squared("bowker", hypothesis, statistic, len(b), int(cells.sum()))
 
 
 def stuart_maxwell(table: ArrayLike) -> Significance:
@@ -225,14 +206,8 @@ def stuart_maxwell(table: ArrayLike) -> Significance:
     """
     cells = check_table(table)
     statistic, df = _margin_statistic(cells)
-    return _chi_squared(
-        "stuart_maxwell",
-        "both ratings have the same margins",
-        statistic,
-        1 if df else 0,
-        df,
-        int(cells.sum()),
-    )
+    hypothesis = "both ratings have the same margins"
+    return _chi_squared("stuart_maxwell", hypothesis, statistic, df, int(cells.sum()))
 
 
 def bhapkar(table: ArrayLike) -> Significance:
@@ -276,69 +251,35 @@ def bhapkar(table: ArrayLike) -> Significance:
     cells = check_table(table)
     n = int(cells.sum())
     statistic, df = _margin_statistic(cells)
-    if df and statistic < n:
-        statistic = statistic / (1.0 - statistic / n)
-    elif df:
-        statistic = math.inf
-    return _chi_squared(
-        "bhapkar",
-        "both ratings have the same margins",
-        statistic,
-        1 if df else 0,
-        df,
-        n,
-    )
+    # all items changed one way, but for rounding
+    is_infinite = df > 0 and statistic >= n * (1.0 - 1e-12)
+    statistic = math.inf if is_infinite else statistic / (1.0 - statistic / max(n, 1))
+    hypothesis = "both ratings have the same margins"
+    return _chi_squared("bhapkar", hypothesis, statistic, df, n)
 
 
 def _margin_statistic(cells: NDArray[np.int64]) -> tuple[float, int]:
-    # d' V⁻¹ d, d = t_k. - t_.k, V_kk = t_k. + t_.k - 2 t_kk and V_kl = -t_kl - t_lk.
+    # d' V⁻ d, d = t_k. - t_.k, V_kk = t_k. + t_.k - 2 t_kk and V_kl = -t_kl - t_lk.
     # V is the Laplacian of the graph of changes: it is singular once per group of
-    # categories that changes connect, and each group can do without one of its own.
+    # categories that changes connect, and d adds up to 0 in each.
     changes = cells + cells.T
     np.fill_diagonal(changes, 0)
     laplacian = np.diag(changes.sum(axis=1)) - changes
-    shift = cells.sum(axis=1) - cells.sum(axis=0)
-    statistic, df = 0.0, 0
-    for group in _groups(changes):
-        rest = group[1:]
-        if rest:
-            part = laplacian[np.ix_(rest, rest)].astype(np.float64)
-            d = shift[rest].astype(np.float64)
-            statistic += float(d @ np.linalg.solve(part, d))
-            df += len(rest)
-    return statistic, df
-
-
-def _groups(changes: NDArray[np.int64]) -> list[list[int]]:
-    # categories connected by changes, directly or by way of others
-    left, groups = set(range(len(changes))), []
-    while left:
-        group, fresh = set(), {min(left)}
-        while fresh:
-            group |= fresh
-            met = np.flatnonzero(changes[sorted(fresh)].any(axis=0)).tolist()
-            fresh = set(met) - group
-        left -= group
-        groups.append(sorted(group))
-    return groups
+    d = cells.sum(axis=1) - cells.sum(axis=0)
+    solution, _, df, _ = np.linalg.lstsq(laplacian, d, rcond=1e-12)
+    return float(d @ solution), int(df)
 
 
 def _chi_squared(
-    name: str,
-    hypothesis: str,
-    numerator: float,
-    denominator: int,
-    df: int,
-    n_items: int,
+    name: str, hypothesis: str, statistic: float, df: int, n_items: int
 ) -> Significance:
-    """Refer a ratio of two ratings' changes to chi-squared."""
+    """Refer a statistic of two ratings' changes to chi-squared."""
     from scipy.special import chdtrc
 
-    if denominator == 0:  # an empty sum is 0; of no degrees of freedom it says nothing
-        statistic, p = 0.0 if df == 0 else math.nan, math.nan
+    reason, p = None, math.nan
+    if df == 0 or math.isnan(statistic):
         reason = undefined(name, "0/0: no item changed")
     else:
-        statistic, reason = numerator / denominator, None
         p = float(chdtrc(df, statistic))
     return Significance(
         name=name,
@@ -350,3 +291,176 @@ def _chi_squared(
         n_items=n_items,
         reason=reason,
     )
+
+
+def prevalence_index(table: ArrayLike) -> float:
+    r"""Return how unequally often both raters choose the same of two categories.
+
+    Parameters
+    ----------
+    table : array_like of int, shape (2, 2)
+        Items per category of the first (rows) and second rater (columns).
+
+    Returns
+    -------
+    float
+        \|a - d\| / n with a and d on the diagonal, within [0, 1]; the larger, the
+        smaller kappa at the same agreement. ``nan`` without items.
+
+    Raises
+    ------
+    CountsError
+        If it is not a 2 × 2 table of counts.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If there is no item.
+
+    References
+    ----------
+    .. [1] Byrt, T., Bishop, J., Carlin, J. B. (1993). Bias, prevalence and kappa.
+       Journal of Clinical Epidemiology, 46(5), 423-429.
+       https://doi.org/10.1016/0895-4356(93)90018-V
+
+    Examples
+    --------
+    >>> prevalence_index([[20, 5], [5, 10]])
+    0.25
+    """
+    (a, b), (c, d) = check_two_by_two(table)
+    n = a + b + c + d
+    return abs(a - d) / n if n else _no_item("the prevalence index")
+
+
+def bias_index(table: ArrayLike) -> float:
+    r"""Return how much more often one rater chooses a category than the other.
+
+    Parameters
+    ----------
+    table : array_like of int, shape (2, 2)
+        Items per category of the first (rows) and second rater (columns).
+
+    Returns
+    -------
+    float
+        \|b - c\| / n with b and c off the diagonal, within [0, 1]; ``nan`` without
+        items.
+
+    Raises
+    ------
+    CountsError
+        If it is not a 2 × 2 table of counts.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If there is no item.
+
+    References
+    ----------
+    .. [1] Byrt, T., Bishop, J., Carlin, J. B. (1993); see `prevalence_index`.
+
+    Examples
+    --------
+    >>> bias_index([[20, 6], [4, 10]])
+    0.05
+    """
+    (a, b), (c, d) = check_two_by_two(table)
+    n = a + b + c + d
+    return abs(b - c) / n if n else _no_item("the bias index")
+
+
+def kappa_max(table: ArrayLike) -> float:
+    """Return the largest Cohen's kappa that the margins of two raters allow.
+
+    Parameters
+    ----------
+    table : array_like of int, shape (n_categories, n_categories)
+        Items per category of the first (rows) and second rater (columns).
+
+    Returns
+    -------
+    float
+        1 only if both raters have the same margins; ``nan`` where kappa is undefined.
+
+    Raises
+    ------
+    CountsError
+        If it is not a square table of counts.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If there is no item, or both raters used one and the same category.
+
+    References
+    ----------
+    .. [1] Cohen, J. (1960), eq. (5); see `cohen_kappa`.
+
+    Examples
+    --------
+    >>> kappa_max([[20, 5], [10, 15]])
+    0.8
+    """
+    cells = check_table(table)
+    # whole numbers of Python, of which products have all their digits
+    first, second = cells.sum(axis=1).tolist(), cells.sum(axis=0).tolist()
+    n = sum(first)
+    if n == 0:
+        return _no_item("the largest kappa")
+    agreeing = sum(map(min, first, second))
+    by_chance = sum(r * c for r, c in zip(first, second, strict=True))
+    if by_chance == n * n:
+        undefined("the largest kappa", NO_CHANCE)
+        return math.nan
+    return float((n * agreeing - by_chance) / (n * n - by_chance))
+
+
+def specific_agreement(table: ArrayLike) -> tuple[float, ...]:
+    """Return for each category how often a rating of it meets the same of the other.
+
+    Parameters
+    ----------
+    table : array_like of int, shape (n_categories, n_categories)
+        Items per category of the first (rows) and second rater (columns).
+
+    Returns
+    -------
+    tuple of float, length n_categories
+        2 t_kk / (t_k. + t_.k), within [0, 1]; ``nan`` for a category that nobody used.
+        Of two categories, negative and positive agreement.
+
+    Raises
+    ------
+    CountsError
+        If it is not a square table of counts.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If nobody used a category.
+
+    References
+    ----------
+    .. [1] Cicchetti, D. V., Feinstein, A. R. (1990). High agreement but low kappa: II.
+       Resolving the paradoxes. Journal of Clinical Epidemiology, 43(6), 551-558.
+       https://doi.org/10.1016/0895-4356(90)90159-M
+
+    Examples
+    --------
+    >>> specific_agreement([[20, 5], [5, 10]])
+    (0.8, 0.6666666666666666)
+    """
+    cells = check_table(table)
+    used = (cells.sum(axis=0) + cells.sum(axis=1)).tolist()
+    if not all(used):
+        unused = used.index(0) + 1
+        undefined(f"specific agreement on category {unused}", "0/0: nobody used it")
+    twice = (2 * cells.diagonal()).tolist()
+    return tuple(t / n if n else math.nan for t, n in zip(twice, used, strict=True))
+
+
+def _no_item(title: str) -> float:
+    undefined(title, NO_PAIR)
+    return math.nan

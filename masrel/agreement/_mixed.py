@@ -1,0 +1,293 @@
+"""Variances of items, raters and residual from ratings with gaps.
+
+A rating is μ + item + rater + residual, all three random and normal; the variances are
+those of highest restricted likelihood. Items with as many ratings enter together as
+sums: after one pass over the ratings only matrices of raters by raters are left.
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq, minimize, minimize_scalar, root
+from scipy.special import chdtri, expit, fdtri
+
+from masrel.agreement._engine import deviations
+
+_Floats = NDArray[np.float64]
+_Numbers = NDArray[Any]  # real, or complex for slopes
+
+_EXACT = 1e-24
+"""Residual sum of squares, as a share of all, that is the rounding of a perfect fit."""
+
+_TINY = 1e-30
+"""Imaginary step of which the square is nothing: slopes then have no rounding."""
+
+_NONE = 5e-5
+"""√ratio of a variance that no ratings tell from 0: to 1e-8 it makes no difference."""
+
+_LOW, _LOWEST = -7.0, -50.0
+"""Logits of a correlation of next to nothing, and of one as good as 0."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Likelihood:
+    """The restricted likelihood at ratios of variances to the residual's."""
+
+    # Sums of products are of the raters, in k contrasts of which the first is their
+    # mean, and of the ratings less the levels of raters: of what these are within
+    # items, and of their sums over items of so many ratings. Nothing large cancels.
+    sizes: _Floats  # (g,): ratings of an item
+    freq: _Floats  # (g,): items of that size
+    between: _Floats  # (g, k + 1, k + 1)
+    within: _Floats  # (k + 1, k + 1)
+    basis: _Floats  # (k + 1, 2): μ and the ratings, made of these
+    n_ratings: int
+    has_raters: bool
+
+    def parts(self, ratios: _Numbers) -> tuple[_Numbers, _Numbers]:
+        """Return log |V| + log μ'V⁻¹μ, and y'Py, at ratios of items and raters."""
+        # (m, 2) -> (m,), (m,)
+        of_items, of_raters = ratios.T[:, :, None]  # (m, 1) each
+        shrink = 1.0 + of_items * self.sizes
+        weights = 1.0 / (self.sizes * shrink)
+        gram = self.within + np.tensordot(weights, self.between, 1)  # (m, k + 1, k + 1)
+        # by Woodbury's formula: gram (I + ratio gram)⁻¹ where raters are rows
+        system = of_raters[..., None] * gram
+        system[:, -1] = 0.0
+        system += np.eye(len(self.basis))
+        sums = self.basis.T @ gram @ np.linalg.solve(system, self.basis)
+        sign, log_det = np.linalg.slogdet(system)
+        of_mean = sums[:, 0, 0]
+        squares = sums[:, 1, 1] - sums[:, 0, 1] * sums[:, 1, 0] / of_mean
+        log_det = log_det + np.log(sign) + np.log(of_mean)
+        determinants: _Numbers = np.log(shrink) @ self.freq + log_det
+        return determinants, squares
+
+    def deviance(self, ratios: _Numbers) -> _Numbers:
+        """Return -2 log of the restricted likelihood, whatever the residual is."""
+        determinants, squares = self.parts(ratios)
+        # all is rounding where raters are so far from the likeliest
+        squares = np.where(squares.real > 0.0, squares, np.inf)
+        return np.asarray(determinants + (self.n_ratings - 1) * np.log(squares))
+
+    def at(self, u: _Numbers) -> _Numbers:
+        """Return the deviance at ratios sinh² u, which may be 0 and very large."""
+        # (m, 1 or 2), the raters' being 0 where they are not told -> (m,)
+        ratios = np.zeros((len(u), 2), dtype=u.dtype)
+        ratios[:, : u.shape[1]] = np.sinh(u) ** 2
+        return self.deviance(ratios)
+
+    def _height(self, u: _Floats) -> float:
+        return float(self.at(u[None])[0])
+
+    def slopes(self, u: _Floats) -> _Floats:
+        """Return those of the deviance at one u, by the complex step."""
+        steps = u + 1j * _TINY * np.eye(len(u))
+        return np.asarray(self.at(steps).imag / _TINY)
+
+    def maximum(self, precision: float) -> _Floats:
+        """Return the ratios (2,) of highest likelihood."""
+        # from the best of a grid, the first of those that differ by rounding; ratios
+        # are about as large as 1 / residual at most
+        axis = _u_of(np.geomspace(1e-4, 30.0 * max(1.0, precision), 8))
+        starts = np.array(list(product(axis, repeat=1 + self.has_raters)))
+        start = starts[np.argmin(self.at(starts).round(9))]
+        near = minimize(self._height, start, jac=self.slopes, method="BFGS").x
+        u = root(self.slopes, near, tol=1e-13).x
+        ratios = np.zeros(2)
+        ratios[: len(u)] = np.where(np.abs(u) < _NONE, 0.0, np.sinh(u) ** 2)
+        return ratios
+
+    def information(self, ratios: _Floats) -> _Floats:
+        """Return tr(P V_i P V_j) of items, raters and residual, times residual²."""
+
+        def slopes(ratios: _Floats) -> _Floats:
+            steps = ratios + 1j * _TINY * np.eye(2)
+            return np.asarray(self.parts(steps)[0].imag / _TINY)
+
+        # P V P = P gives those of the residual from slopes and curvatures of the
+        # determinants, here by differences over a step that is small but for rounding
+        least = 1.0 / self.sizes.max(), len(self.basis) / self.n_ratings
+        step = np.diag(1e-5 * (ratios + least))
+        ways = [slopes(ratios + h) - slopes(ratios - h) for h in step]
+        traces = np.empty((3, 3))
+        traces[:2, :2] = -np.array(ways) / (2.0 * step.sum(axis=0)[:, None])
+        slope = slopes(ratios)
+        traces[2, :2] = traces[:2, 2] = slope - traces[:2, :2] @ ratios
+        traces[2, 2] = self.n_ratings - 1 - ratios @ slope - ratios @ traces[:2, 2]
+        return traces
+
+    def profile(self, logit: float, absolute: bool, last: float) -> float:
+        """Return the deviance where the correlation has a logit, raters likeliest."""
+        odds = math.exp(logit)
+
+        def at(u: Any) -> Any:
+            of_raters = np.sinh(np.atleast_1d(u)) ** 2
+            of_items = odds * (1.0 + absolute * of_raters)
+            return self.deviance(np.column_stack([of_items, of_raters]))
+
+        if not self.has_raters:
+            return float(at(0.0)[0])
+        # there may be more than one valley
+        around = last * np.geomspace(1e-2, 1e2, 9)
+        grid = _u_of(np.sort([0.0, *np.geomspace(1e-4, 1e4, 24), *around]))
+        best = int(np.argmin(at(grid)))
+        ends = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
+        valley = minimize_scalar(
+            lambda u: at(u)[0], bounds=ends, method="bounded", options={"xatol": 1e-8}
+        )
+        return float(min(valley.fun, at(0.0)[0]))
+
+
+def _u_of(ratios: _Floats) -> _Floats:
+    return np.asarray(np.arcsinh(np.sqrt(ratios)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Components:
+    """Variances of items, raters (0 where there are none) and residual, in unit²."""
+
+    items: float
+    raters: float
+    residual: float
+    n_items: int
+    n_raters: int
+    n_ratings: int
+    unit: float  # in those of the ratings
+    has_raters: bool  # whether they are told from the residual
+    ratios: _Floats = field(default_factory=lambda: np.zeros(2))
+    likelihood: _Likelihood | None = None  # None without residual
+
+    @property
+    def words(self) -> str:
+        """How they were estimated, and what they are."""
+        parts = {"items": self.items, "raters": self.raters, "residual": self.residual}
+        if not self.has_raters:
+            del parts["raters"]
+        listed = [
+            f"{name} {value * self.unit * self.unit:.4g}"
+            + " (the least it can be)" * (value == 0.0)
+            for name, value in parts.items()
+        ]
+        return f"ratings are missing; variances by REML: {', '.join(listed)}"
+
+    def covariance(self) -> _Floats:
+        """Return that of the three estimates, (3, 3), from the expected information."""
+        if self.likelihood is None:
+            return np.full((3, 3), math.nan)
+        information = self.likelihood.information(self.ratios)
+        return np.asarray(2.0 * self.residual**2 * np.linalg.inv(information))
+
+    def icc_ends(self, *, absolute: bool, level: float) -> tuple[float, float]:
+        """Return the ends of the interval of a single rating's correlation."""
+        # absolute: whether the variance of raters counts as error
+        if self.likelihood is None:
+            return self._ends_without_residual(absolute, level)
+        profile, last = self.likelihood.profile, float(self.ratios[1])
+        least = float(self.likelihood.deviance(self.ratios[None])[0])
+        highest = least + float(chdtri(1, 1.0 - level))
+        odds = float(self.ratios[0]) / (1.0 + absolute * last)
+        best = max(math.log(odds), _LOWEST) if odds > 0.0 else _LOWEST
+
+        def above(logit: float) -> float:
+            return profile(logit, absolute, last) - highest
+
+        def end(inner: float, outer: float, step: float) -> float:
+            while above(outer) < 0.0:
+                inner, outer, step = outer, outer + 2.0 * step, 2.0 * step
+            logit = brentq(above, inner, outer, xtol=1e-12, rtol=1e-14)
+            return float(expit(logit))
+
+        low = 0.0 if above(_LOWEST) <= 0.0 else end(best, best - 1.0, -1.0)
+        return low, end(best, max(best, _LOW) + 1.0, 1.0)
+
+    def _ends_without_residual(
+        self, absolute: bool, level: float
+    ) -> tuple[float, float]:
+        # of two variances that are known but for their degrees of freedom
+        if not absolute or self.raters == 0.0:
+            return 1.0, 1.0
+        of_items, of_raters = self.n_items - 1, self.n_raters - 1
+        upper = 0.5 + 0.5 * level
+        ratio = self.items / self.raters
+        low = ratio / float(fdtri(of_items, of_raters, upper))
+        high = ratio * float(fdtri(of_raters, of_items, upper))
+        return low / (1.0 + low), high / (1.0 + high)
+
+
+def components(values: _Floats, *, has_raters: bool) -> Components | str:
+    """Return the variances of a table with gaps, or why there are none."""
+    # values (n_items, n_raters), nan where there is no rating; without raters these
+    # are part of the residual
+    rated = ~np.isnan(values)
+    sizes, n_ratings = rated.sum(axis=1), int(rated.sum())
+    if (sizes < 2).all():
+        return "no item has two ratings"
+    scaled, unit = deviations(values)
+    centred = np.where(rated, scaled - np.nanmean(scaled), 0.0)
+    # items, and raters where these are told, as fixed effects
+    weight = rated / sizes[:, None]
+    laplacian = np.diag(rated.sum(axis=0)) - rated.T @ weight
+    rest = centred - rated * (weight * centred).sum(axis=1, keepdims=True)
+    levels, rank = np.zeros(values.shape[1]), 0
+    if has_raters:
+        levels, _, rank, _ = np.linalg.lstsq(laplacian, rest.sum(axis=0), rcond=1e-10)
+        rest -= rated * (levels - (weight @ levels)[:, None])
+    df = n_ratings - len(values) - int(rank)
+    if df < 1 and centred.any():
+        what = "raters" if has_raters else "items"
+        return f"too few ratings to tell {what} from the residual"
+    fit = Components(
+        items=0.0,
+        raters=0.0,
+        residual=0.0,
+        n_items=len(values),
+        n_raters=len(levels),
+        n_ratings=n_ratings,
+        unit=unit,
+        has_raters=has_raters,
+    )
+    squares, none = float((rest**2).sum()), _EXACT * float((centred**2).sum())
+    if squares <= none:
+        # items and raters are known but for a constant, and their variances simple
+        if levels @ laplacian @ levels <= none:
+            levels[:] = 0.0
+        elif rank < len(levels) - 1:
+            return "no residual, and raters whom no item links"
+        means = (rated * (centred - levels)).sum(axis=1) / sizes
+        of_items, of_raters = float(means.var(ddof=1)), float(levels.var(ddof=1))
+        of_items = of_items if of_items > none else 0.0
+        return replace(fit, items=of_items, raters=of_raters)
+    axes, _ = np.linalg.qr(np.column_stack([np.ones(len(levels)), np.eye(len(levels))]))
+    within = np.zeros((len(levels) + 1, len(levels) + 1))
+    within[:-1, :-1] = axes.T @ laplacian @ axes
+    within[-1, :-1] = within[:-1, -1] = axes.T @ rest.sum(axis=0)
+    within[0] = within[:, 0] = 0.0  # items have no mean of raters within
+    within[-1, -1] = squares
+    sums = np.column_stack([rated @ axes, (rated * (centred - levels)).sum(axis=1)])
+    basis = np.column_stack([axes.T @ np.ones(len(levels)), axes.T @ levels])
+    distinct, freq = np.unique(sizes, return_counts=True)
+    of_size = [sums[sizes == size] for size in distinct]
+    likelihood = _Likelihood(
+        sizes=distinct.astype(float),
+        freq=freq.astype(float),
+        between=np.array([items.T @ items for items in of_size]),
+        within=within,
+        basis=np.vstack([basis, [0.0, 1.0]]),
+        n_ratings=n_ratings,
+        has_raters=has_raters,
+    )
+    ratios = likelihood.maximum(df * float((centred**2).max()) / squares)
+    residual = float(likelihood.parts(ratios[None])[1][0]) / (n_ratings - 1)
+    return replace(
+        fit,
+        items=float(ratios[0]) * residual,
+        raters=float(ratios[1]) * residual,
+        residual=residual,
+        ratios=ratios,
+        likelihood=likelihood,
+    )
