@@ -139,7 +139,7 @@ def _differences(
     options: EstimateOptions,
 ) -> Iterator[tuple[Row, Row]]:
     # the row of every pair, and what a table shows of it
-    from masrel.intervals import difference, difference_test
+    from masrel.intervals.contrasts import difference, difference_test
 
     rows: list[tuple[Row, Row]] = []
     for (first, second), groups in pairs.items():
@@ -252,7 +252,9 @@ def equality_rows(
 def _equality_tests(
     entry: Coefficient, groups: _Groups, options: EstimateOptions
 ) -> Iterator[tuple[str, Significance]]:
-    from masrel.intervals import differences, donner_test, equality_test, estimate
+    from masrel.intervals.auto import estimate
+    from masrel.intervals.contrasts import differences
+    from masrel.intervals.equality import donner_test, equality_test
 
     weights, clusters = options.weights_of(entry), groups.clusters
     if groups.is_dependent:

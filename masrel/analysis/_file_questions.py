@@ -63,7 +63,7 @@ from masrel.errors import (
 from masrel.ratings import RatingsFile, RatingsPart
 
 if TYPE_CHECKING:
-    from masrel.intervals import Diagnosis
+    from masrel.intervals.diagnosis import Diagnosis
 
 _T = TypeVar("_T")
 
@@ -586,7 +586,7 @@ def _diagnosed(
     options: EstimateOptions,
     reference: str | None,
 ) -> "Diagnosis":
-    from masrel.intervals import diagnose
+    from masrel.intervals.diagnosis import diagnose
 
     ratings = on_grades(coded_part(part, "--diagnose"), entry, file)
     try:

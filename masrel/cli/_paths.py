@@ -1,6 +1,7 @@
 """Files that a call names: what is written is never what is read, nor a record."""
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -59,29 +60,23 @@ class FileInFolder(OutputFile):
 
 def note_inputs(*paths: Path) -> None:
     """Refuse outputs of the call that would take the place of these files."""
-    for path in paths:
-        _noted(_INPUTS).append(path)
-        if path.suffix == ".npz":  # the facts of a recording
-            _noted(_INPUTS).append(path.with_suffix(".json"))
-    _compare()
+    # the facts of a recording are read with it
+    facts = [path.with_suffix(".json") for path in paths if path.suffix == ".npz"]
+    _compare(_INPUTS, [*paths, *facts])
 
 
 def refuse_inputs(*paths: Path) -> None:
     """Refuse to write these files if the call reads one of them."""
-    _noted(_OUTPUTS).extend(paths)
-    _compare()
+    _compare(_OUTPUTS, paths)
 
 
-def _noted(key: str) -> list[Path]:
-    # of this call: options are converted in the order in which they were typed
+def _compare(key: str, more: Sequence[Path]) -> None:
+    # with all of this call: options are converted in the order in which they were typed
     ctx = click.get_current_context(silent=True)
-    paths: list[Path] = [] if ctx is None else ctx.meta.setdefault(key, [])
-    return paths
-
-
-def _compare() -> None:
-    inputs = {path.resolve() for path in _noted(_INPUTS)}
-    for path in _noted(_OUTPUTS):
+    paths: dict[str, list[Path]] = {} if ctx is None else ctx.meta
+    paths.setdefault(key, []).extend(more)
+    inputs = {path.resolve() for path in paths.get(_INPUTS, ())}
+    for path in paths.get(_OUTPUTS, ()):
         if path.parent.resolve() / path.name in inputs or path.resolve() in inputs:
             raise ParameterError(
                 f"{path}: needs another file to write, this one is read"

@@ -135,8 +135,7 @@ def _sample(
     import pandas as pd
 
     from masrel.agreement import code_ratings
-    from masrel.intervals import latent_trait
-    from masrel.intervals.latent._trait import expected_seconds
+    from masrel.intervals.latent._trait import expected_seconds, latent_trait
 
     codes = code_ratings(part.ratings).codes
     grades = np.array([*ratings.scale.grades, None], dtype=object)[codes]

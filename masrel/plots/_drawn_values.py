@@ -37,9 +37,9 @@ class ForestRow:
     # label, detail: what is estimated; how and for whom, or nothing
     label: str
     detail: str = ""
-    value: float | None  # None where there is no finite one
+    value: float | None = None  # None where there is no finite one
     # None where its ends are not finite; drawn with its distribution if it has one
-    interval: "Interval | None"
+    interval: "Interval | None" = None
     text: str  # the numbers, or why there are none, as shown at the right
     has_zero: bool = True  # whether 0 is what chance gives, so that it is marked
     group: str = ""  # heading above the first row of those that share it

@@ -353,14 +353,12 @@ def _interval_note(interval: Interval, explain: bool) -> str:
     if interval.kind == "credible":
         kind = "credible bound" if interval.is_one_sided else "credible interval"
     name = f"{percent(interval.level)} % {kind}, {interval.method}"
-    population = _POPULATIONS[interval.target]
-    if interval.unit == "clusters":
-        population = f"clusters of {population}"
-    to = f"generalises to other {population} like these"
-    if not explain:
-        return f"{name}: {to}"
-    promised = promise(interval, "item")
-    return f"{name}{origin(interval, 'item')}: {to}: {promised}"
+    clusters = "clusters of " if interval.unit == "clusters" else ""
+    population = clusters + _POPULATIONS[interval.target]
+    to = f": generalises to other {population} like these"
+    if explain:
+        return f"{name}{origin(interval, 'item')}{to}: {promise(interval, 'item')}"
+    return name + to
 
 
 def _words_note(rows: Sequence[AgreementRow], bands: BandScale) -> str:
@@ -396,20 +394,14 @@ def agreement_sentences(answer: Answer, *, bands: BandScale | None, data: str) -
 
 def _why_null(estimate: Estimate) -> list[str]:
     # why a number of a record is null, where neither `reason` says it
-    interval, names = estimate.interval, ""
-    if math.isnan(estimate.standard_error):
-        names = (
-            "standard_error"
-            if _has_error(estimate)
-            else "standard_error, observed, chance"
-        )
-    elif math.isnan(estimate.observed):
-        names = "observed, chance"
+    numbers = ("standard_error", "observed", "chance")
+    nulls = [name for name in numbers if math.isnan(getattr(estimate, name))]
     why = []
-    if names and estimate.reason is None:
-        is_error = names == "standard_error"
+    if nulls and estimate.reason is None:
+        is_error = nulls == ["standard_error"]
         who = "one item" if is_error else COEFFICIENTS[estimate.coefficient].title
-        why.append(f"{names}: null, {who} has none")
+        why.append(f"{', '.join(nulls)}: null, {who} has none")
+    interval = estimate.interval
     ends = () if interval is None else (("low", interval.low), ("high", interval.high))
     return why + [
         f"interval.{name}: null, there is no bound"

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Literal
 from masrel.agreement import COEFFICIENTS
 from masrel.estimates import Estimate, Interval
 from masrel.tables._tables import (
-    UNDEFINED,
     capital,
     counted,
     interval_text,
@@ -23,84 +22,46 @@ if TYPE_CHECKING:
 Noun = Literal["model", "item"]
 """What is rated: a haptic model in a study, any item elsewhere."""
 
-TARGETS = {
-    "raters": "other raters",
-    "items": "other models",
-    "both": "other raters and models",
-}
-"""Target of an interval to what it generalises to."""
-
 _POPULATIONS = {
-    "raters": "the same {}s were put to other raters like these",
-    "items": "these raters graded other {}s like these",
-    "both": "other raters graded other {}s, both like these",
+    "raters": "the same {} were put to other raters like these",
+    "items": "these raters graded other {} like these",
+    "both": "other raters graded other {}, both like these",
 }
-
-NOT_THERE = "not in these data"
-"""What is shown where a plan's estimate is not."""
 
 _WIDENED = "and the spread of raters"
 """End of the method of a posterior that was widened by what raters differ by."""
 
 
-def coefficient_name(coefficient: str, weights: str = "identity") -> str:
-    """Return a coefficient's name for a reader."""
-    title = COEFFICIENTS[coefficient].title
-    if weights != "identity":
-        title = f"{title}, {weights} weights"
-    # A share as all others are: 1 is all, not 100.
-    return f"{title} (0–1)" if coefficient == "percent_agreement" else title
-
-
 def forest_row(
-    label: str, estimate: Estimate | None, *, detail: str = "", group: str = ""
+    label: str, estimate: Estimate, *, detail: str = "", group: str = ""
 ) -> "ForestRow":
-    """Return the row of an estimate in a forest, or one that says there is none."""
+    """Return the row of an estimate in a forest."""
     from masrel.plots._drawn_values import ForestRow  # a table has no figure
 
-    value = interval = None
-    text, has_zero = NOT_THERE, False
-    if estimate is not None:
-        text, interval = UNDEFINED, estimate.interval
-        if math.isfinite(estimate.value):
-            value = estimate.value
-            text = number(value, 3)
-            if interval is not None:
-                text += f" {interval_text(interval.low, interval.high)}"
-        if interval is not None and not math.isfinite(interval.high - interval.low):
-            interval = None
-        # 0 is what chance gives of an ICC and a κ; not of a share, nor of an order
-        has_zero = COEFFICIENTS[estimate.coefficient].chance_corrected
+    value, interval = estimate.value, estimate.interval
+    text = number(value, 3)
+    if interval is not None and not math.isnan(value):
+        text += f" {interval_text(interval.low, interval.high)}"
+    if interval is not None and not math.isfinite(interval.high - interval.low):
+        interval = None
     return ForestRow(
         label=label,
         detail=detail,
-        value=value,
+        value=None if math.isnan(value) else value,
         interval=interval,
         text=text,
-        has_zero=has_zero,
+        # 0 is what chance gives of an ICC and a κ; not of a share, nor of an order
+        has_zero=COEFFICIENTS[estimate.coefficient].chance_corrected,
         group=group,
     )
-
-
-def interval_name(interval: Interval) -> str:
-    """Return level, kind and method of an interval."""
-    return f"{percent(interval.level)} % {interval.kind}, {interval.method}"
-
-
-def meaning(interval: Interval, noun: Noun) -> str:
-    """Return in one sentence what an interval promises and what it was made from."""
-    kind = "bound" if interval.is_one_sided else "interval"
-    name = f"{interval.kind.capitalize()} {kind}"
-    return f"{name}{origin(interval, noun)}: {promise(interval, noun)}."
 
 
 def promise(interval: Interval, noun: Noun) -> str:
     """Return what an interval promises, and of whom."""
     level = f"{percent(interval.level)} %"
     # clusters are drawn anew with the items in them
-    of_whom = f"cluster of {noun}" if interval.unit == "clusters" else noun
-    population = _POPULATIONS[interval.target].replace("{}", of_whom)
-    population = population.replace(f"cluster of {noun}s", f"clusters of {noun}s")
+    plural = f"clusters of {noun}s" if interval.unit == "clusters" else f"{noun}s"
+    population = _POPULATIONS[interval.target].format(plural)
     if interval.kind == "confidence":
         return (
             f"if {population}, again and again, about {level} of the intervals made "
@@ -122,24 +83,22 @@ def promise(interval: Interval, noun: Noun) -> str:
 
 def origin(interval: Interval, noun: Noun) -> str:
     """Return in brackets what the ends of an interval came from."""
-    units = {
-        "items": f"{noun}s",
-        "raters": "raters",
-        "both": f"{noun}s and raters",
-        "clusters": f"clusters of {noun}s",
-    }
     if interval.method.endswith(_WIDENED):
         return " (a posterior, made wider by what raters differ by)"
     if interval.unit is None:
         return ""
+    one = {"items": noun, "raters": "rater", "clusters": f"cluster of {noun}s"}
+    many = {
+        "items": f"{noun}s",
+        "raters": "raters",
+        "both": f"{noun}s and raters",
+        "clusters": f"clusters of {noun}s",
+    }[interval.unit]
     if "bootstrap" in interval.method:
-        return f" (from {units[interval.unit]} drawn with replacement)"
+        return f" (from {many} drawn with replacement)"
     if interval.unit == "both":
-        return f" (from leaving out {noun}s and raters, one at a time)"
-    if interval.unit == "clusters":
-        return f" (from leaving out one cluster of {noun}s at a time)"
-    one = units[interval.unit].removesuffix("s")
-    return f" (from leaving out one {one} at a time)"
+        return f" (from leaving out {many}, one at a time)"
+    return f" (from leaving out one {one[interval.unit]} at a time)"
 
 
 def aside(interval: Interval) -> str:

@@ -21,7 +21,8 @@ from masrel.lab.checklist._rater_facts import rater_characteristics, rater_flow
 from masrel.lab.ratings import Rating
 from masrel.lab.report._design import beside_presentations, stretches_asked_for
 from masrel.lab.report._sample_size import size_sentence
-from masrel.tables._estimate_words import TARGETS, coefficient_name, sentence
+from masrel.lab.report._sentences import TARGETS, coefficient_name
+from masrel.tables._estimate_words import sentence
 from masrel.tables._tables import counted, percent
 
 _Source = Literal["protocol", "logs", "ratings"]

@@ -15,16 +15,15 @@ from masrel.estimates import Estimate, Interval
 from masrel.lab.analysis import PlannedEstimate
 from masrel.lab.report._figure_data import MANY_RATERS
 from masrel.lab.report._material import Drawing, Material, Paragraph, Section
-from masrel.plots._drawn_values import Forest
-from masrel.tables._estimate_words import (
+from masrel.lab.report._sentences import (
     NOT_THERE,
     TARGETS,
-    aside,
     coefficient_name,
-    forest_row,
     interval_name,
     meaning,
 )
+from masrel.plots._drawn_values import Forest, ForestRow
+from masrel.tables._estimate_words import aside, forest_row
 from masrel.tables._tables import (
     Column,
     Table,
@@ -105,7 +104,7 @@ def estimates_section(material: Material, kind: str) -> Section:
         rows = _few_of_many(every)
         file = name.replace("-", "_")
         intervals = [row.interval for row in rows if row.interval is not None]
-        meanings = dict.fromkeys(meaning(interval, "model") for interval in intervals)
+        meanings = dict.fromkeys(meaning(interval) for interval in intervals)
         table = estimate_table(rows, name=file, caption=caption, data=material.data)
         if len(rows) < len(every):
             full = estimate_table(every, name=file, caption=caption, data=material.data)
@@ -280,7 +279,10 @@ def _forest(
             looks = (interval.kind, aside(interval), TARGETS[interval.target])
             detail += f"; {', '.join(text for text in looks if text)}"
         label = f"{row.coefficient}, {row.name}"
-        lines.append(forest_row(label, estimate, detail=detail))
+        line = ForestRow(label=label, detail=detail, text=NOT_THERE, has_zero=False)
+        if estimate is not None:
+            line = forest_row(label, estimate, detail=detail)
+        lines.append(line)
     texts = "; ".join(f"{line.label}: {line.text}" for line in lines)
     return Drawing(
         name=name,

@@ -9,8 +9,7 @@ from collections.abc import Iterator, Sequence
 from masrel.estimates import Estimate, Interval
 from masrel.lab.analysis import Analysis, IntendedAgreement, PlannedEstimate
 from masrel.lab.protocol import EstimatePlan
-from masrel.lab.report._sentences import sentence
-from masrel.tables._estimate_words import coefficient_name
+from masrel.lab.report._sentences import coefficient_name, sentence
 from masrel.tables._tables import counted, number, percent
 
 

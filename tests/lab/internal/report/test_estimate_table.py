@@ -16,8 +16,9 @@ from masrel.lab.report._agreement import (
     estimates_section,
 )
 from masrel.lab.report._material import Drawing, Paragraph, gather
+from masrel.lab.report._sentences import coefficient_name, interval_name
 from masrel.plots._drawn_values import Forest
-from masrel.tables._estimate_words import coefficient_name, forest_row, interval_name
+from masrel.tables._estimate_words import forest_row
 from masrel.tables._tables import Table, as_csv, as_text, page_cells
 from tests.lab.analysis.studies import plan, protocol_with, table_v
 
@@ -176,14 +177,12 @@ def test_what_is_not_finite_is_not_drawn() -> None:
     assert forest_row("a", estimate(value=nan)).text == "undefined"
     ends = forest_row("a", estimate(interval=interval(low=nan)))
     assert (ends.interval, ends.text) == (None, "0.626 [undefined]")
-    assert forest_row("a", None).text == "not in these data"
 
 
 def test_zero_is_marked_of_what_is_corrected_for_chance() -> None:
     assert forest_row("a", estimate()).has_zero
     assert forest_row("a", estimate(coefficient="icc_a1")).has_zero
     assert not forest_row("a", estimate(coefficient="percent_agreement")).has_zero
-    assert not forest_row("a", None).has_zero
 
 
 def test_percent_agreement_is_said_to_be_a_share() -> None:

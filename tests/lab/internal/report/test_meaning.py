@@ -5,7 +5,8 @@ from typing import Any
 import pytest
 
 from masrel.estimates import Interval
-from masrel.tables._estimate_words import aside, meaning
+from masrel.lab.report._sentences import meaning
+from masrel.tables._estimate_words import aside
 
 
 def interval(kind: str, method: str, target: str, unit: str | None = None) -> Interval:
