@@ -1,18 +1,26 @@
-"""Generated studies have the moments and the kappa they claim.
-
-Random comparisons allow 5 standard errors: a false alarm in 1.7 million each; the
-generator is fixed.
-"""
+"""The models, and the engine that judges their studies."""
 
 import numpy as np
 import pytest
 
-from docs.make.coverage.latent import STEP, LatentTrait, fixed
+from docs.make.coverage.case import Case
+from docs.make.coverage.latent import LatentTrait
+from docs.make.coverage.methods import of_items, of_raters, two_way
 from docs.make.coverage.multinomial import DirichletMultinomial, urn
+from docs.make.coverage.simulate import TARGETS
 from docs.make.coverage.spread import spread_of
-from docs.make.coverage.studies import Design, Floats, drawn, kappa_of_items
+from docs.make.coverage.studies import (
+    Design,
+    Floats,
+    Model,
+    Target,
+    drawn,
+    kappa_of_items,
+)
+from masrel.agreement import fleiss_kappa
+from masrel.intervals import jackknife, posterior
 
-MODELS = (DirichletMultinomial, LatentTrait)
+POPULATIONS = (DirichletMultinomial, LatentTrait)
 KAPPAS = (0.2, 0.6, 0.9)
 
 
@@ -45,19 +53,6 @@ def test_kappa_of_fixed_items_by_hand() -> None:
 
 
 @pytest.mark.parametrize("kappa", KAPPAS)
-def test_dirichlet_vectors_have_their_moments(
-    kappa: float, rng: np.random.Generator
-) -> None:
-    # E p_k = π_k; var p_k = π_k (1 - π_k) / (1 + A), and 1/(1 + A) is kappa
-    model = DirichletMultinomial(kappa=kappa)
-    shares = np.array(model.shares)
-    vectors = model.probabilities(40_000, 1, rng)[:, 0]
-    assert np.isfinite(vectors).all()
-    assert near(vectors, shares)
-    assert near((vectors - shares) ** 2, shares * (1 - shares) * kappa)
-
-
-@pytest.mark.parametrize("kappa", KAPPAS)
 def test_an_urn_gives_the_same_law_as_dirichlet_vectors(
     kappa: float, rng: np.random.Generator
 ) -> None:
@@ -78,7 +73,7 @@ def test_an_urn_gives_the_same_law_as_dirichlet_vectors(
 
 
 @pytest.mark.parametrize("kappa", KAPPAS)
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", POPULATIONS)
 def test_large_studies_have_the_kappa_of_the_population(
     model: type[DirichletMultinomial | LatentTrait],
     kappa: float,
@@ -92,47 +87,85 @@ def test_large_studies_have_the_kappa_of_the_population(
         assert np.mean(studies.truth) == pytest.approx(kappa, abs=0.02)
 
 
-@pytest.mark.parametrize("kappa", KAPPAS)
-@pytest.mark.parametrize("model", MODELS)
-def test_many_raters_find_the_kappa_of_fixed_items(
-    model: type[DirichletMultinomial | LatentTrait],
-    kappa: float,
-    rng: np.random.Generator,
-) -> None:
-    design = Design(n_items=6, n_raters=1_000)
-    studies = model(kappa=kappa).draw(60, design, "raters", rng)
-    off = spread_of(studies).value - studies.truth
-    assert near(off, 0.0) or abs(off.mean()) < 0.003  # bias of the order of 1/r
-    if model is LatentTrait:
-        assert studies.truth == pytest.approx(kappa, abs=1e-10)
+pytestmark = pytest.mark.filterwarnings("ignore::masrel.errors.MasrelWarning")
+SIZE = 40
+MODELS = (DirichletMultinomial(kappa=0.5), LatentTrait(kappa=0.5))
+DESIGNS = (
+    Design(n_items=4, n_raters=3),
+    Design(n_items=6, n_raters=5),
+    Design(n_items=15, n_raters=8),
+)
 
 
-def test_quadratures_do_not_depend_on_their_step(rng: np.random.Generator) -> None:
-    for kappa in KAPPAS:
-        model = LatentTrait(kappa=kappa, bias=1.0)
-        scale = model.scale()
-        assert model.of_all(scale, step=STEP / 3) == pytest.approx(kappa, abs=1e-9)
-        biases = rng.normal(0.0, scale, (5, 8))
-        finer = model.of_raters(scale, biases, step=STEP / 3)
-        assert model.of_raters(scale, biases) == pytest.approx(finer, abs=1e-9)
+@pytest.fixture(
+    params=[(m, d) for m in MODELS for d in DESIGNS],
+    ids=lambda param: f"{type(param[0]).__name__}, {param[1]}",
+)
+def case(request: pytest.FixtureRequest) -> Case:
+    model: Model
+    model, design = request.param
+    rng = np.random.Generator(np.random.PCG64(11))
+    return Case.of(model.draw(SIZE, design, "both", rng))
 
 
-def test_kappa_of_named_raters_by_simulation(rng: np.random.Generator) -> None:
-    model = LatentTrait(kappa=0.6, bias=1.0)
-    scale = model.scale()
-    biases = np.array([[-0.4, 0.1, 0.5]])
-    n = 200_000
-    seen = rng.normal(size=(n, 1)) + biases + rng.normal(0.0, scale, (n, 3))
-    codes = np.searchsorted(model.thresholds, seen)
-    pairs = [codes[:, i] == codes[:, j] for i, j in ((0, 1), (0, 2), (1, 2))]
-    own = np.mean(pairs, axis=0)
-    shares = np.bincount(codes.ravel(), minlength=4) / codes.size
-    chance = float((shares**2).sum())
-    found = (own.mean() - chance) / (1.0 - chance)
-    error = own.std() / np.sqrt(n) / (1.0 - chance)
-    assert abs(found - model.of_raters(scale, biases)[0]) < 5.0 * error
+def tables(case: Case) -> list[list[list[int]]]:
+    return [table.tolist() for table in case.studies.codes]
 
 
-def test_fixed_items_span_the_scale() -> None:
-    # Φ(z) = 1/8, 3/8, 5/8, 7/8
-    assert fixed(4) == pytest.approx([-1.1503494, -0.3186394, 0.3186394, 1.1503494])
+def test_values_and_errors(case: Case) -> None:
+    scale = range(case.studies.n_categories)
+    found = [fleiss_kappa(table, categories=scale) for table in tables(case)]
+    values = [estimate.value for estimate in found]
+    errors = [estimate.standard_error for estimate in found]
+    assert case.value == pytest.approx(values, abs=1e-13, nan_ok=True)
+    assert case.spread.error == pytest.approx(errors, abs=1e-13, nan_ok=True)
+
+
+def test_kappa_without_an_item_and_a_rater(case: Case) -> None:
+    # the interaction of both, from kappas of tables with the row and column deleted
+    n, r = case.n, case.r
+    for s, codes in enumerate(case.studies.codes[:5]):
+        own = np.empty((n, r))
+        for i in range(n):
+            for j in range(r):
+                left = [
+                    codes,
+                    np.delete(codes, i, axis=0),
+                    np.delete(codes, j, axis=1),
+                    np.delete(np.delete(codes, i, axis=0), j, axis=1),
+                ]
+                k = [fleiss_kappa(t.tolist(), categories=range(5)).value for t in left]
+                own[i, j] = k[3] - k[1] - k[2] + k[0]
+        expected = (n - 1) * (r - 1) / (n * r) * float((own**2).sum())
+        assert case.spread.of_cells[s] == pytest.approx(
+            expected, abs=1e-13, nan_ok=True
+        )
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_jackknives(case: Case, target: Target) -> None:
+    ours = {
+        "items": of_items(case, "plain", stopgap=False),
+        "raters": of_raters(case, "plain", stopgap=False),
+        "both": two_way(case, "plain", stopgap=False),
+    }[target]
+    scale = range(case.studies.n_categories)
+    n_defined = 0
+    for table, low, high in zip(tables(case), ours.low, ours.high, strict=True):
+        found = jackknife("fleiss_kappa", table, target=target, categories=scale)
+        if found.reason is None:
+            n_defined += 1
+            assert (found.low, found.high) == pytest.approx((low, high), abs=1e-12)
+    assert n_defined > SIZE / 3
+
+
+def test_posteriors(case: Case) -> None:
+    scale = range(case.studies.n_categories)
+    for s, table in enumerate(tables(case)[:15]):
+        found = posterior("fleiss_kappa", table, target="items", categories=scale)
+        ours = case.posterior.p025[s], case.posterior.p975[s]
+        assert (found.low, found.high) == pytest.approx(ours, abs=2e-5)
+        wide = posterior(
+            "fleiss_kappa", table, target="items", categories=scale, level=0.9
+        )
+        assert wide.low == pytest.approx(case.posterior.p05[s], abs=2e-5)

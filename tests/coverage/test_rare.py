@@ -39,16 +39,6 @@ def test_raters_alike_have_the_kappa_and_the_shares(
             assert truth == pytest.approx(kappa, abs=1e-9)
 
 
-def test_raters_unlike_choose_the_rarer_category_more_and_less() -> None:
-    table = population("unlike", (0.95, 0.05), 0.6, 3)
-    margins = table.shares @ (table.patterns == 1)
-    assert margins == pytest.approx([0.025, 0.05, 0.075], rel=1e-3)
-    double = population("double coding", (0.95, 0.05), 0.6, 2)
-    by_both = (double.patterns >= 0).all(axis=1)
-    assert double.shares[by_both].sum() == pytest.approx(0.2)
-    assert double.shares.sum() == pytest.approx(1.0)
-
-
 @pytest.mark.parametrize(
     ("kind", "shares", "n_raters", "n_items"),
     [

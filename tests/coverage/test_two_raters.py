@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from docs.make.coverage.simulate import KAPPAS
-from docs.make.coverage.tables import COEFFICIENTS, MODELS, Tables, cohen
+from docs.make.coverage.tables import COEFFICIENTS, MODELS, cohen
 from docs.make.coverage.two_raters import (
     Question,
     all_questions,
-    count,
     draw,
     intervals,
 )
@@ -66,20 +65,3 @@ def test_all_that_the_study_asks_is_registered_and_asked_once() -> None:
     questions = list(all_questions())
     assert len(set(questions)) == len(questions) == 150
     assert {name.partition(",")[0] for name in COEFFICIENTS} <= set(REGISTER)
-
-
-def test_a_plain_jackknife_would_fail() -> None:
-    found = count(Question("cohen_kappa", 4, "latent trait", 16, 0.9), 300)
-    assert found["jackknife"].coverage < 0.85 < 0.93 < found["default"].coverage
-
-
-def test_the_jackknife_leaves_items_out_one_by_one() -> None:
-    counts = np.array([[[3.0, 1.0], [0.0, 2.0]]])
-    tables = Tables(counts, cohen, np.random.default_rng(1))
-    pairs = rows(counts[0])
-    left = [
-        float(cohen(np.histogram2d(*np.delete(pairs, i, axis=0).T, bins=2)[0]))
-        for i in range(6)
-    ]
-    by_hand = 5.0 * float(np.var(left))
-    assert tables.jackknife[0] == pytest.approx(by_hand, rel=1e-12)

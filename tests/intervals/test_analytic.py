@@ -1,19 +1,22 @@
-"""Delta-method intervals: printed values, a hand-worked one, coverage, refusals."""
+"""Delta-method intervals, ours and as other programs print them."""
 
+import json
 import math
 import warnings
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from masrel.agreement import fleiss_kappa, percent_agreement
+from masrel.agreement import cohen_kappa, count_table, fleiss_kappa, percent_agreement
 from masrel.errors import (
-    ParameterError,
-    RatingsError,
-    SmallSampleWarning,
+    MasrelWarning,
     UndefinedStatisticWarning,
 )
+from masrel.estimates import Interval
 from masrel.intervals import analytic
+from tests.agreement.oracles import datasets
 from tests.intervals.data import SCALE, TABLE_V, dirichlet_multinomial
 
 few = pytest.mark.filterwarnings("ignore::masrel.errors.SmallSampleWarning")
@@ -67,16 +70,6 @@ def test_logit_interval_by_hand() -> None:
     )
 
 
-@few
-def test_a_higher_level_is_wider() -> None:
-    ends = [
-        analytic("fleiss_kappa", TABLE_V, target="items", level=level)
-        for level in (0.5, 0.8, 0.9)
-    ]
-    assert ends[0].low > ends[1].low > ends[2].low
-    assert ends[0].high < ends[1].high < ends[2].high
-
-
 def test_coverage_is_what_it_says() -> None:
     # 800 studies of 30 items × 3 raters, kappa .6. Known coverage 94 %, so 752 with a
     # standard deviation of 6.7; outside 725 to 779 once in 17 000 runs of other seeds.
@@ -90,17 +83,6 @@ def test_coverage_is_what_it_says() -> None:
     assert 725 <= covered <= 779
 
 
-def test_few_items_are_warned_of() -> None:
-    with pytest.warns(SmallSampleWarning, match="4 items: below 10"):
-        analytic("fleiss_kappa", TABLE_V, target="items")
-
-
-def test_other_raters_are_not_its_question() -> None:
-    for target in ("raters", "both"):
-        with pytest.raises(ParameterError, match=f'"{target}"'):
-            analytic("fleiss_kappa", TABLE_V, target=target)  # type: ignore[arg-type]
-
-
 def test_no_spread_gives_no_interval_and_a_reason() -> None:
     perfect = [["a", "a"], ["b", "b"]] * 10
     with pytest.warns(UndefinedStatisticWarning, match="standard error is 0"):
@@ -110,58 +92,108 @@ def test_no_spread_gives_no_interval_and_a_reason() -> None:
     assert "does not mean" in (found.reason or "")
 
 
-@pytest.mark.parametrize(
-    ("ratings", "reason"),
-    [
-        ([["a", "a"], ["a", "a"]], "0/0"),
-        ([["a", None], [None, "a"]], "two raters"),
-        ([["a", "b", "b"]], "one item"),
-    ],
-)
-def test_an_undefined_estimate_has_no_interval(
-    ratings: list[list[str | None]], reason: str
-) -> None:
-    with pytest.warns(UndefinedStatisticWarning):
-        found = analytic("fleiss_kappa", ratings, target="items")
-    assert math.isnan(found.low)
-    assert reason in (found.reason or "")
+FILE = Path(__file__).parents[1] / "oracles" / "published_errors.json"
+PUBLISHED: dict[str, dict[str, Any]] = json.loads(FILE.read_text("utf-8"))["errors"]
+DATA = {dataset["name"]: dataset for dataset in datasets()}
+TABLE = [[20, 5], [10, 15]]
+PAIRS = [["a", "a"]] * 20 + [["a", "b"]] * 5 + [["b", "a"]] * 10 + [["b", "b"]] * 15
+RATINGS = [list(row) for row in ("aaa", "aab", "bbb", "bcc", "cca", "aaa", "cbb")] * 2
 
 
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        ({"target": "patients"}, "target: needs one of items, raters, both"),
-        ({"target": "items", "level": 95}, r"level: needs \(0, 1\), got 95"),
-        ({"target": "items", "level": math.nan}, "level"),
-        ({"target": "items", "distribution": "cauchy"}, "distribution: needs one of t"),
-    ],
-)
-def test_a_wrong_option_is_named(options: dict[str, object], said: str) -> None:
-    with pytest.raises(ParameterError, match=said):
-        analytic("fleiss_kappa", TABLE_V, **options)  # type: ignore[arg-type]
-
-
-def test_a_wrong_coefficient_is_named() -> None:
-    with pytest.raises(ParameterError, match="needs one of percent_agreement"):
-        analytic("kappa", TABLE_V, target="items")
-    with pytest.raises(ParameterError, match="got 'len'"):
-        analytic(len, TABLE_V, target="items")  # type: ignore[arg-type]
-    with pytest.raises(ParameterError, match="needs 2 raters, got 8"):
-        analytic("cohen_kappa", TABLE_V, target="items")
-
-
-def test_target_has_no_default() -> None:
-    with pytest.raises(TypeError, match="target"):
-        analytic("fleiss_kappa", TABLE_V)  # type: ignore[call-arg]
-
-
-def test_bad_ratings_are_refused_as_by_the_coefficient() -> None:
-    with pytest.raises(RatingsError, match="row 0, column 0"):
-        analytic("fleiss_kappa", [["x", "y"]], target="items", categories=SCALE)
-
-
-def test_no_warning_comes_from_numpy() -> None:
+def quiet(*args: Any, **options: Any) -> Interval:
     with warnings.catch_warnings():
-        warnings.simplefilter("error", RuntimeWarning)
-        warnings.simplefilter("ignore", SmallSampleWarning)
-        analytic("fleiss_kappa", TABLE_V, target="items", categories=SCALE)
+        warnings.simplefilter("ignore", MasrelWarning)
+        return analytic(*args, **options)
+
+
+def half(interval: Interval) -> float:
+    return 0.5 * (interval.high - interval.low)
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_intervals_are_those_that_packages_print(name: str) -> None:
+    dataset = DATA[name]
+    for key, printed in PUBLISHED[name].items():
+        coefficient, _, rest = key.partition("/")
+        weights, _, variant = rest.partition("@")
+        ours = quiet(
+            coefficient,
+            dataset["ratings"],
+            target="items",
+            categories=dataset.get("categories"),
+            weights="identity" if weights == "unweighted" else weights,
+            convention="over_n" if coefficient == "cohen_kappa" else "irrcac",
+            distribution="normal" if variant in ("vcd", "psych") else "t",
+        )
+        low, high = printed["ci"]
+        if low is None:  # one usable item, of which irrCAC has an error and no ends
+            continue
+        ends = (max(low, -1.0), min(high, 1.0))
+        assert (ours.low, ours.high) == pytest.approx(ends, abs=1e-9), key
+
+
+def test_over_n_is_the_error_that_vcd_prints() -> None:
+    # Fleiss, Cohen and Everitt's of the table: √(.2016/12.5) = .126996 (vcd, psych)
+    interval = analytic(
+        "cohen_kappa", PAIRS, target="items", convention="over_n", distribution="normal"
+    )
+    assert half(interval) / 1.959964 == pytest.approx(0.126996062931, rel=1e-6)
+    ours = cohen_kappa(count_table(TABLE)).standard_error
+    assert half(interval) / 1.959964 == pytest.approx(ours * math.sqrt(0.98), rel=1e-6)
+
+
+IRRCAC = {"target": "items", "convention": "irrcac", "distribution": "normal"}
+UNITS = [
+    (1, 1, None, 1), (2, 2, 3, 2), (3, 3, 3, 3), (3, 3, 3, 3), (2, 2, 2, 2),
+    (1, 2, 3, 4), (4, 4, 4, 4), (1, 1, 2, 1), (2, 2, 2, 2), (None, 5, 5, 5),
+    (None, None, 1, 1), (None, None, 3, None),
+]  # fmt: skip
+SINGLE = [["a", "a", "a"], ["a", "a", "b"], ["a", None, None]]
+LONE = [["a", "a"], ["a", "b"], ["b", "b"], ["b", None]]
+
+
+@pytest.mark.parametrize(
+    ("name", "ratings", "error"),
+    [
+        # by hand, u_i + (2/3)(s_i n/n' - 1): 1/2 + 1/3, -1/2 + 1/3, 0 - 2/3
+        ("percent_agreement", SINGLE, math.sqrt(7 / 36)),
+        # ours are 10, -14, 6, -2 ninths; 1/9 more with a pair, 1/3 less without
+        ("conger_kappa", LONE, math.sqrt((121 + 169 + 49 + 25) / 81 / 12)),
+        # as R prints them of Krippendorff's units
+        ("percent_agreement", UNITS, 0.12561),
+        ("gwet_ac", UNITS, 0.14295),
+        ("fleiss_kappa", UNITS, 0.15302),
+    ],
+)
+def test_irrcac_counts_a_single_rating_as_disagreement(
+    name: str, ratings: list, error: float
+) -> None:
+    found = half(quiet(name, ratings, **IRRCAC, level=0.2)) / 0.253347
+    assert found == pytest.approx(error, rel=1e-4)
+
+
+def test_irrcacs_error_of_complete_ratings_is_ours_but_for_alpha() -> None:
+    for name in ("fleiss_kappa", "gwet_ac", "percent_agreement", "conger_kappa"):
+        ours = quiet(name, RATINGS, target="items", distribution="normal")
+        assert half(quiet(name, RATINGS, **IRRCAC)) == pytest.approx(half(ours))
+    # of alpha it is that of Fleiss' kappa, as the factor for small samples is left out
+    alpha, kappa = (
+        half(quiet(name, RATINGS, **IRRCAC))
+        for name in ("krippendorff_alpha", "fleiss_kappa")
+    )
+    assert alpha == pytest.approx(kappa, rel=1e-12)
+
+
+def test_spss_prints_the_error_of_the_hypothesis_that_fleiss_kappa_is_0() -> None:
+    # p = (13/20, 7/20) of ten items: SE0 = √(2 [(Σpq)² - Σpq(q - p)]/20)/Σpq
+    ratings = [["a", "a"]] * 5 + [["b", "b"]] * 2 + [["a", "b"]] * 3
+    pq = 13 * 7 / 400
+    by_hand = math.sqrt(2 * ((2 * pq) ** 2 - 0.0) / 20) / (2 * pq)
+    options: dict[str, Any] = {"convention": "spss", "distribution": "normal"}
+    interval = quiet("fleiss_kappa", ratings, target="items", **options)
+    assert half(interval) / 1.959964 == pytest.approx(by_hand, rel=1e-6)
+    of_two = quiet("cohen_kappa", PAIRS, target="items", **options)
+    same = quiet(
+        "cohen_kappa", PAIRS, target="items", **options | {"convention": "over_n"}
+    )
+    assert (of_two.low, of_two.high) == (same.low, same.high)

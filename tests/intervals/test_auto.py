@@ -3,9 +3,6 @@
 import dataclasses
 import itertools
 import math
-import re
-import subprocess
-import sys
 import warnings
 
 import numpy as np
@@ -13,17 +10,14 @@ import pytest
 from scipy.special import betaincinv, expit, logit
 from scipy.stats import t as student
 
-from masrel.agreement import COEFFICIENTS, fleiss_kappa, stratified_kappa
+from masrel.agreement import fleiss_kappa, stratified_kappa
 from masrel.errors import (
     MasrelWarning,
-    ParameterError,
     SmallSampleWarning,
-    UndefinedStatisticWarning,
 )
-from masrel.estimates import Estimate, Interval, Target
+from masrel.estimates import Interval, Target
 from masrel.intervals import bootstrap, estimate, jackknife, posterior
 from tests.intervals.data import dirichlet_multinomial
-from tests.intervals.test_analytic import SCALE, TABLE_V
 
 MEDIUM = dirichlet_multinomial(np.random.default_rng(3), 25, 4, 0.6)
 LABELS = sorted({grade for row in MEDIUM for grade in row})
@@ -162,22 +156,6 @@ def test_both_add_the_distances_less_what_they_hold_in_common(
     )
 
 
-@pytest.mark.parametrize("biased", [False, True])
-def test_few_items_and_raters_have_the_posterior(biased: bool) -> None:
-    table = [row[:4] for row in TABLE_V]
-    if biased:  # the last rater is two grades up: raters differ by more than chance
-        table = [[*row[:3], up] for row, up in zip(table, "2344", strict=True)]
-    items = chosen(table, "items", categories=SCALE)
-    plain = posterior("fleiss_kappa", table, target="items", categories=SCALE)
-    assert (items.low, items.high) == (plain.low, plain.high)
-    assert items.distribution is not None
-    assert items.distribution.continuous
-    both, raters = (chosen(table, of, categories=SCALE) for of in ("both", "raters"))  # type: ignore[arg-type]
-    assert both.low <= min(items.low, raters.low)
-    assert both.high >= max(items.high, raters.high)
-    assert (both.kind, items.kind) == ("confidence", "credible")
-
-
 @pytest.mark.parametrize("target", ["items", "raters", "both"])
 @pytest.mark.parametrize("level", [0.9, 0.95])
 def test_perfect_agreement_is_bounded_from_below_by_the_model(
@@ -192,12 +170,6 @@ def test_perfect_agreement_is_bounded_from_below_by_the_model(
     assert "rests on the prior" in found.notes[1]
 
 
-def test_one_category_has_a_bound_though_no_estimate() -> None:
-    found = chosen([["a"] * 3] * 6, "raters", categories=["a", "b"])
-    assert 0 < found.low < 0.5
-    assert found.high == 1.0
-
-
 def test_a_posterior_is_widened_to_an_estimate_that_it_leaves_out() -> None:
     # every item splits: κ < 0, where no ρ can be
     found = chosen([["a", "b"], ["b", "a"], ["a", "b"]], "items")
@@ -205,47 +177,6 @@ def test_a_posterior_is_widened_to_an_estimate_that_it_leaves_out() -> None:
     assert found.high > 0
     assert found.notes[1].startswith("the lower end is extended from 0.0")
     assert "to the estimate, -1.000, which lies outside" in found.notes[1]
-
-
-def test_a_spread_that_is_an_accident_is_none() -> None:
-    # 40 items alike and one that splits evenly: any rater left out leaves κ nearly
-    # where it was, which says nothing of raters
-    ratings = [["a"] * 4, ["b"] * 4] * 20 + [["a", "a", "b", "b"]]
-    plain = jackknife("fleiss_kappa", ratings, target="items")
-    assert plain.reason is None
-    moved = [
-        fleiss_kappa(
-            [[g for j, g in enumerate(row) if j != r] for row in ratings]
-        ).value
-        for r in range(4)
-    ]
-    assert max(moved) - min(moved) < 1e-3
-    central = posterior("fleiss_kappa", ratings, target="items")
-    found = chosen(ratings, "raters")
-    assert (found.low, found.high) == (central.low, central.high)
-
-
-@pytest.mark.parametrize("name", ["gwet_ac", "percent_agreement", "conger_kappa"])
-@pytest.mark.parametrize("target", ["items", "raters", "both"])
-def test_other_coefficients_have_a_model_of_items_only(
-    name: str, target: Target
-) -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", MasrelWarning)
-        found = estimate(name, MEDIUM, target=target, categories=LABELS)
-        none = estimate(name, PERFECT, target=target)
-    assert found.interval is not None
-    assert found.interval.low < found.value < found.interval.high
-    assert "posterior" not in found.interval.method
-    assert none.interval is not None
-    if target == "items":
-        assert 0.0 < none.interval.low < none.interval.high == 1.0
-        assert none.interval.method.endswith(
-            "patterns of ratings, 2000 draws, one-sided"
-        )
-        return
-    assert math.isnan(none.interval.low)
-    assert "leaves the estimate as it is" in (none.interval.reason or "")
 
 
 def test_retest_agreement_leaves_items_out_with_all_their_raters() -> None:
@@ -282,103 +213,7 @@ def test_a_method_by_name_is_that_method(method: str) -> None:
     )
 
 
-def test_a_bootstrap_draws_as_many_resamples_as_it_is_told() -> None:
-    ratings = np.random.default_rng(1).integers(0, 4, (60, 4))
-    found = estimate(
-        "fleiss_kappa",
-        ratings,
-        target="items",
-        method="bootstrap",
-        n_resamples=200,
-        rng=1,
-    )
-    assert found.interval is not None
-    assert found.interval.n_resamples == 200
-
-
-def test_a_coefficient_with_its_own_interval_keeps_it() -> None:
-    numbers = [[int(grade == LABELS[0]) for grade in row] for row in MEDIUM]
-    found: Estimate = estimate("icc_1", numbers, target="both", level=0.9)
-    assert found.interval is not None
-    assert (found.interval.method, found.interval.level) == ("F distribution", 0.9)
-
-
-@pytest.mark.parametrize("name", [n for n, e in COEFFICIENTS.items() if e.has_interval])
-def test_an_interval_that_comes_with_an_estimate_answers_one_question(
-    name: str,
-) -> None:
-    numbers = [[9, 2, 5, 8], [6, 1, 3, 2], [8, 4, 6, 8], [7, 1, 2, 6], [10, 5, 6, 9]]
-    entry = COEFFICIENTS[name]
-    answered = entry.interval_target
-    found = estimate(name, numbers, target=answered)  # type: ignore[arg-type]
-    assert found.interval is not None
-    assert found.interval.target == answered
-    for target in {"items", "raters", "both"} - {answered}:
-        said = f'{re.escape(entry.title)} generalises to .* "{answered}", .* "{target}"'
-        with pytest.raises(ParameterError, match=said):
-            estimate(name, numbers, target=target)  # type: ignore[arg-type]
-    with pytest.raises(ParameterError, match="target: needs one of items, raters, bot"):
-        estimate(name, numbers, target="xyz")  # type: ignore[arg-type]
-
-
-def test_wrong_options_and_two_raters_are_refused() -> None:
-    with pytest.raises(ParameterError, match="method: needs one of auto, analytic"):
-        estimate("fleiss_kappa", MEDIUM, target="items", method="best")  # type: ignore[arg-type]
-    two = [row[:2] for row in MEDIUM]
-    for target in ("raters", "both"):
-        with pytest.raises(ParameterError, match="needs at least 3 raters"):
-            estimate("fleiss_kappa", two, target=target)  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match="target"):
-        estimate("fleiss_kappa", MEDIUM)  # type: ignore[call-arg]
-
-
-def test_every_coefficient_has_an_answer_or_a_reason() -> None:
-    for entry in COEFFICIENTS.values():
-        if entry.shape == "ratings" and entry.formula is not None:
-            rows = [row[: entry.n_raters[1] or 4] for row in MEDIUM]
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", MasrelWarning)
-                found = estimate(entry, rows, target="items", categories=LABELS)
-            assert found.interval is not None
-            assert found.interval.low < found.value < found.interval.high
-
-
-def test_nothing_is_drawn_and_no_sampler_is_loaded() -> None:
-    code = (
-        "import sys\nfrom masrel.intervals import estimate\n"
-        "rows = [['a', 'b', 'a'], ['a', 'a', 'a'], ['b', 'b', 'b']] * 4\n"
-        "found = estimate('fleiss_kappa', rows, target='items')\n"
-        "print(found.interval.seed, sorted({'emcee', 'arviz_stats', 'matplotlib', "
-        "'scipy.stats', 'pandas'} & set(sys.modules)))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.strip() == "None []"
-
-
 FEW_PAIRS = [["a", "a"], ["a", "b"], ["b", "b"], ["c", "c"], ["c", "c"], ["b", "c"]]
-
-
-def test_two_raters_of_few_items_have_the_posterior_of_their_table() -> None:
-    asked = {"target": "items", "categories": list("abc")}
-    found = estimate("cohen_kappa", FEW_PAIRS, **asked).interval  # type: ignore[arg-type]
-    again = estimate("cohen_kappa", FEW_PAIRS, **asked).interval  # type: ignore[arg-type]
-    plain = posterior("cohen_kappa", FEW_PAIRS, model="table", rng=3, **asked)  # type: ignore[arg-type]
-    assert found is not None
-    assert plain.monte_carlo_error is not None
-    assert found == again  # it is drawn, always the same
-    assert found.method.startswith("Dirichlet posterior of the table of two raters")
-    assert found.notes[0].startswith("chosen for other items: few items (6)")
-    # two sets of draws: 5 errors of the one with fewer, once in a million runs
-    slack = 5.0 * 2.0 * max(plain.monte_carlo_error)
-    assert (found.low, found.high) == pytest.approx((plain.low, plain.high), abs=slack)
-
-
-def test_two_raters_of_more_items_have_the_jackknife_while_something_moves() -> None:
-    found = estimate("cohen_kappa", FEW_PAIRS * 2, target="items").interval
-    assert found is not None
-    assert found.method == "item jackknife, t(11) on the logit"
 
 
 def test_two_raters_who_always_agree_have_a_lower_bound() -> None:
@@ -391,30 +226,6 @@ def test_two_raters_who_always_agree_have_a_lower_bound() -> None:
     assert found.low == pytest.approx(rough, abs=0.02)
     assert (found.high, found.method[-9:]) == (1.0, "one-sided")
     assert any("the prior weighs" in note for note in found.notes)
-
-
-def test_the_interval_of_two_raters_holds_the_estimate() -> None:
-    # never agreeing: kappa is -1, where no posterior reaches
-    rows = [["a", "b"], ["b", "a"]] * 2
-    found = estimate("cohen_kappa", rows, target="items")
-    assert found.interval is not None
-    assert (found.value, found.interval.low) == (-1.0, -1.0)
-    assert found.interval.notes[1].startswith("the lower end is extended from ")
-
-
-@pytest.mark.parametrize("target", ["items", "raters", "both"])
-@pytest.mark.parametrize("coefficient", ["fleiss_kappa", "gwet_ac"])
-def test_a_table_without_a_rating_has_no_interval(
-    coefficient: str, target: Target
-) -> None:
-    with pytest.warns(UndefinedStatisticWarning):
-        found = estimate(
-            coefficient, [[None] * 3] * 4, target=target, categories=["a", "b"]
-        )
-    assert math.isnan(found.value)
-    assert found.interval is not None
-    assert math.isnan(found.interval.low)
-    assert found.interval.reason == "the estimate itself is undefined"
 
 
 RARE = np.zeros((50, 3), dtype=int)
@@ -473,54 +284,6 @@ def test_the_rule_counts_items_outside_the_commonest_category() -> None:
     assert "posterior" in method(19, 40)
 
 
-@pytest.mark.parametrize("name", ["gwet_ac", "percent_agreement", "brennan_prediger"])
-def test_other_coefficients_of_raters_alike_are_drawn_always_the_same(
-    name: str,
-) -> None:
-    ratings = np.vstack([RARE, [[1, 1, 1], [1, 1, 0]]])
-    found = quietly(name, ratings)
-    by_name = posterior(
-        name, ratings, target="items", model="dirichlet-multinomial", rng=2
-    )
-    assert found == quietly(name, ratings)
-    assert found.method == "Dirichlet-multinomial posterior, 2000 draws"
-    assert by_name.monte_carlo_error is not None
-    slack = 5.0 * 3.0 * max(by_name.monte_carlo_error)
-    assert (found.low, found.high) == pytest.approx(
-        (by_name.low, by_name.high), abs=slack
-    )
-
-
-def test_weights_take_the_posterior_of_the_patterns_and_a_warning() -> None:
-    ratings = np.vstack([RARE, [[2, 2, 1], [2, 1, 2]] * 3])
-    with pytest.warns(SmallSampleWarning, match="9 items with a rating outside"):
-        found = estimate("conger_kappa", ratings, target="items", weights="quadratic")
-    assert found.interval is not None
-    assert found.interval.method.startswith("Dirichlet posterior of the patterns")
-
-
-def test_one_item_outside_is_said_in_the_singular() -> None:
-    ratings = np.zeros((30, 3))
-    ratings[0, 0] = 1.0
-    one = "1 item with a rating outside the commonest category"
-    with pytest.warns(SmallSampleWarning, match=f"^{one}: below 5"):
-        found = estimate("fleiss_kappa", ratings, target="items")
-    assert found.interval is not None
-    assert f"rare ({one})" in found.interval.notes[0]
-
-
-def test_many_items_with_few_outside_take_no_polynomials() -> None:
-    ratings = np.zeros((100_000, 3), dtype=np.int8)
-    ratings[:4] = 1
-    ratings[4:6, 0] = 1
-    found = quietly("fleiss_kappa", ratings)
-    # 4 of 6 items are agreed on, kappa is 9/11
-    small = quietly("fleiss_kappa", ratings[:2_000])
-    assert "patterns" in found.method
-    assert "patterns" not in small.method
-    assert (found.low, found.high) == pytest.approx((small.low, small.high), abs=0.08)
-
-
 @pytest.mark.parametrize("target", ["raters", "both"])
 def test_few_raters_have_a_caution_of_careless_ones(target: Target) -> None:
     cautions = [
@@ -532,18 +295,6 @@ def test_few_raters_have_a_caution_of_careless_ones(target: Target) -> None:
         )
     ]
     assert [len(notes) for notes in cautions] == [1, 0, 0]
-
-
-def test_what_hardly_moves_holds_its_estimate() -> None:
-    # leaving raters out of the first says nothing; few disagree in the second
-    first = [[1, 0, 0], [0, 0, 0]]
-    second = [[a, 4] for a in (4, 1, 4, 4, 4, 4, 4, 4, 4, 4, 1, 1)]
-    for ratings, target, scale in ((first, "raters", 2), (second, "items", 5)):
-        found = chosen(ratings, target, categories=range(scale))  # type: ignore[arg-type]
-        value = fleiss_kappa(ratings, categories=range(scale)).value
-        assert found.low == pytest.approx(value, rel=1e-12)
-        assert value < 0.0
-        assert found.high > 0.5
 
 
 def by_turns(n_items: int, n_raters: int, changes: dict[int, str]) -> list[list[str]]:

@@ -1,101 +1,335 @@
-"""Bootstrap intervals against complete enumeration and another program."""
+"""Bootstraps against all draws in fractions, scipy, and themselves."""
 
 import itertools
 import math
 from collections import Counter
+from fractions import Fraction
 
 import numpy as np
 import pytest
 import scipy.stats
 
-from masrel.agreement import fleiss_kappa, percent_agreement
-from masrel.errors import (
-    ParameterError,
-    SmallSampleWarning,
-    UndefinedStatisticWarning,
-)
+from masrel.errors import UndefinedStatisticWarning
+from masrel.estimates import Interval
 from masrel.intervals import bootstrap
-from tests.intervals.data import SCALE, TABLE_V, dirichlet_multinomial
+from tests.intervals import textbook
+from tests.intervals.data import dirichlet_multinomial
+
+pytestmark = pytest.mark.filterwarnings("ignore::masrel.errors.SmallSampleWarning")
+
+FIVE = [[0, 0, 1], [1, 1, 1], [2, 1, 2], [0, 0, 0], [2, 2, 0]]
+SIX = [*FIVE, [0, 1, 0]]
+GAPS = [[0, 0, 1], [1, None, 1], [2, 1, 2], [0, 0, 0], [None, None, 2]]
+FORMULAS = {
+    "percent_agreement": textbook.percent,
+    "fleiss_kappa": textbook.fleiss,
+    "gwet_ac": textbook.gwet,
+    "krippendorff_alpha": textbook.krippendorff,
+    "cohen_kappa": textbook.cohen,
+}
+
+
+def exact(coefficient: str, table: object, **options: object) -> Interval:
+    options = {"target": "items", "categories": range(3), "exact": True, **options}
+    return bootstrap(coefficient, table, **options)  # type: ignore[arg-type]
+
+
+def columns(coefficient: str, table: textbook.Table) -> textbook.Table:
+    return [row[:2] for row in table] if coefficient == "cohen_kappa" else table
+
+
+def counted(coefficient: str, table: textbook.Table) -> textbook.Table:
+    # the items that are drawn: any with a rating, or with a pair of them
+    least = 2 if coefficient in ("cohen_kappa", "krippendorff_alpha") else 1
+    return [row for row in table if sum(g is not None for g in row) >= least]
+
+
+@pytest.mark.parametrize("coefficient", FORMULAS)
+@pytest.mark.parametrize("table", [FIVE, GAPS], ids=["complete", "gaps"])
+def test_the_law_is_that_of_all_resamples(
+    coefficient: str, table: textbook.Table
+) -> None:
+    ratings = columns(coefficient, table)
+    law = textbook.law_of_items(counted(coefficient, ratings), FORMULAS[coefficient])
+    found = exact(coefficient, ratings)
+    assert found.distribution is not None
+    assert found.distribution.values.size == len(law.values)
+    np.testing.assert_allclose(
+        found.distribution.values, [float(value) for value in law.values], atol=1e-13
+    )
+    np.testing.assert_allclose(
+        found.distribution.weights, [float(w) for w in law.weights], rtol=1e-12
+    )
+    assert found.low == pytest.approx(float(law.quantile(0.025)), abs=1e-13)
+    assert found.high == pytest.approx(float(law.quantile(0.975)), abs=1e-13)
+    assert (found.n_undefined > 0) == (law.undefined > 0)
+    if law.undefined:
+        (note,) = [note for note in found.notes if "undefined" in note]
+        assert f"probability {float(law.undefined):.2g}" in note
+
+
+def test_six_items_of_46_656_resamples() -> None:
+    law = textbook.law_of_items(SIX, textbook.fleiss)
+    for level in (0.5, 0.9, 0.95):
+        found = exact("fleiss_kappa", SIX, level=level)
+        tail = (1 - level) / 2
+        assert found.low == pytest.approx(float(law.quantile(tail)), abs=1e-13)
+        assert found.high == pytest.approx(float(law.quantile(1 - tail)), abs=1e-13)
+    mirror = exact("fleiss_kappa", SIX, kind="basic", level=0.9)
+    value = textbook.fleiss(SIX)
+    assert value is not None
+    for end, tail in ((mirror.low, 0.95), (mirror.high, 0.05)):
+        assert end == pytest.approx(float(2 * value - law.quantile(tail)), abs=1e-13)
+
+
+def test_a_position_that_is_met_exactly_gives_the_middle() -> None:
+    # Two items, agreeing and not: 0, 1/2, 1 with probability 1/4, 1/2, 1/4.
+    table = [[0, 0], [0, 1]]
+    found = exact("percent_agreement", table, level=0.5)
+    assert (found.low, found.high) == (0.25, 0.75)
+    just_inside = exact("percent_agreement", table, level=0.49)
+    assert (just_inside.low, just_inside.high) == (0.5, 0.5)
+    assert just_inside.notes[-1].startswith("both ends are one value")
+    assert not any(note.startswith("both ends") for note in found.notes)
+    beyond = exact("percent_agreement", table, level=0.51)
+    assert (beyond.low, beyond.high) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("kind", ["percentile", "basic", "bca", "studentized"])
+def test_where_resamples_differ_by_rounding_alone_there_is_no_spread(kind: str) -> None:
+    # of the pairs of every item a third agrees
+    table = [[2, 3, 2], [2, 0, 2], [1, 0, 1], [2, 1, 2], [3, 1, 3], [1, 3, 1]] * 2
+    with pytest.warns(UndefinedStatisticWarning, match="undefined: "):
+        found = bootstrap("percent_agreement", table, target="items", kind=kind)  # type: ignore[arg-type]
+    assert math.isnan(found.low)
+    assert found.reason is not None
+
+
+@pytest.mark.parametrize("coefficient", ["fleiss_kappa", "gwet_ac"])
+def test_bca_counts_half_of_the_ties(coefficient: str) -> None:
+    formula = FORMULAS[coefficient]
+    law = textbook.law_of_items(FIVE, formula)
+    value = formula(FIVE)
+    left_out = [formula(FIVE[:i] + FIVE[i + 1 :]) for i in range(5)]
+    assert value is not None
+    assert law.below(value) != law.below(value - Fraction(1, 10**9))  # there are ties
+    for level in (0.8, 0.95):
+        found = exact(coefficient, FIVE, kind="bca", level=level)
+        low, high = textbook.bca_positions(level, law.below(value), left_out)  # type: ignore[arg-type]
+        assert found.low == pytest.approx(float(law.quantile(low)), abs=1e-13)
+        assert found.high == pytest.approx(float(law.quantile(high)), abs=1e-13)
+
+
+def test_studentized_has_the_error_of_every_resample() -> None:
+    table = [[0, 0, 1], [1, 1, 1], [2, 1, 2], [0, 1, 2], [2, 2, 0]]
+    value = textbook.fleiss(table)
+    assert value is not None
+    found: Counter[float] = Counter()
+    for drawn in itertools.product(range(5), repeat=5):
+        resample = [table[i] for i in drawn]
+        kappa = textbook.fleiss(resample)
+        if kappa is None:
+            continue
+        error = textbook.fleiss_error(resample)
+        off = float(kappa - value)
+        found[round(off / error if error else math.copysign(math.inf, off), 9)] += 1
+    values = sorted(found)
+    upto = np.cumsum([found[v] for v in values]) / sum(found.values())
+    own = textbook.fleiss_error(table)
+    for level in (0.6, 0.9):
+        tail = (1 - level) / 2
+        low, high = (
+            float(value) - own * values[int(np.searchsorted(upto, at))]
+            for at in (1 - tail, tail)
+        )
+        ours = exact("fleiss_kappa", table, kind="studentized", level=level)
+        assert ours.low == pytest.approx(max(low, -1.0), abs=1e-7)
+        assert ours.high == pytest.approx(min(high, 1.0), abs=1e-7)
+
+
+def test_resamples_whose_standard_error_is_0_are_noted_with_their_probability() -> None:
+    # Two items agree and one does not. Drawn three times, the first two alone (8 of 27)
+    # or the third alone (1 of 27) give an agreement without spread, off by 1/3 or 2/3.
+    found = exact("percent_agreement", [[0, 0], [1, 1], [0, 1]], kind="studentized")
+    assert (
+        "resamples of probability 0.33 have a standard error of 0: their studentized "
+        "values are infinite"
+    ) in found.notes
+
+
+def test_clusters_are_drawn_whole() -> None:
+    groups = [FIVE[:2], FIVE[2:3], [*FIVE[3:], [0, 1, 0]], [[2, 2, 1], [1, 1, 1]]]
+    law = textbook.law_of_clusters(groups, textbook.fleiss)
+    rows = [row for group in groups for row in group]
+    labels = [name for name, group in zip("abcd", groups, strict=True) for _ in group]
+    mixed = [5, 0, 7, 2, 4, 6, 1, 3]
+    found = exact(
+        "fleiss_kappa", [rows[i] for i in mixed], clusters=[labels[i] for i in mixed]
+    )
+    assert found.method == "percentile bootstrap of 4 clusters, exact"
+    assert found.low == pytest.approx(float(law.quantile(0.025)), abs=1e-13)
+    assert found.high == pytest.approx(float(law.quantile(0.975)), abs=1e-13)
+    each = exact("fleiss_kappa", SIX, clusters=range(6))
+    alone = exact("fleiss_kappa", SIX)
+    assert (each.low, each.high) == (alone.low, alone.high)
+
+
+Row = tuple[int | None, ...]
+COMPLETE: list[Row] = [(0, 0, 1), (1, 1, 1), (0, 1, 0)]
+HOLED: list[Row] = [(0, 0, 1), (1, None, 1), (0, 1, 0)]
+
+
+def drawn(
+    name: str, items: tuple[Row, ...], raters: tuple[int, ...]
+) -> Fraction | None:
+    """The coefficient of a draw; a rater is no pair with a copy of the same one."""
+    # A pair of two copies of different raters counts as often as it is there.
+    observed, n_items, shares_of_items = Fraction(0), 0, []
+    for row in items:
+        rated = [(g, row[g]) for g in raters if row[g] is not None]
+        pairs = [
+            k == m for (g, k), (h, m) in itertools.permutations(rated, 2) if g != h
+        ]
+        if pairs:
+            observed += Fraction(sum(pairs), len(pairs))
+            n_items += 1
+        if rated:
+            count = Counter(k for _, k in rated)
+            shares_of_items.append([Fraction(count[k], len(rated)) for k in (0, 1)])
+    if not n_items:
+        return None
+    if name == "conger_kappa":
+        shares = {}
+        for g in set(raters):
+            count = Counter(row[g] for row in items if row[g] is not None)
+            if count.total():
+                shares[g] = [Fraction(count[k], count.total()) for k in (0, 1)]
+        both = [
+            sum(p * q for p, q in zip(shares[g], shares[h], strict=True))
+            for g, h in itertools.permutations([g for g in raters if g in shares], 2)
+            if g != h
+        ]
+        chance = sum(both, Fraction(0)) / len(both) if both else Fraction(1)
+    else:
+        n = len(shares_of_items)
+        chance = sum((sum(of) / n) ** 2 for of in zip(*shares_of_items, strict=True))
+    if chance == 1:
+        return None
+    return (observed / n_items - chance) / (1 - chance)
+
+
+def law(name: str, table: list[Row], *, items: bool) -> dict[Fraction, Fraction]:
+    """Every value of all draws, with its probability among those that have one."""
+    tables = itertools.product(table, repeat=3) if items else [tuple(table)]
+    values = Counter(
+        drawn(name, rows, raters)
+        for rows, raters in itertools.product(
+            tables, itertools.product(range(3), repeat=3)
+        )
+    )
+    del values[None]
+    return {k: Fraction(n, values.total()) for k, n in sorted(values.items())}  # type: ignore[type-var]
+
+
+@pytest.mark.parametrize("table", [COMPLETE, HOLED], ids=["complete", "holed"])
+@pytest.mark.parametrize("name", ["fleiss_kappa", "conger_kappa"])
+@pytest.mark.parametrize("target", ["raters", "both"])
+def test_the_law_is_that_of_every_draw(
+    name: str, table: list[Row], target: str
+) -> None:
+    expected = law(name, table, items=target == "both")
+    found = bootstrap(name, table, target=target, categories=[0, 1])  # type: ignore[arg-type]
+    assert found.seed is None
+    assert found.unit == target
+    distribution = found.distribution
+    assert distribution is not None
+    np.testing.assert_allclose(
+        distribution.values, [float(value) for value in expected], atol=1e-13
+    )
+    np.testing.assert_allclose(
+        distribution.weights, [float(weight) for weight in expected.values()], rtol=1e-9
+    )
+
+
+@pytest.mark.parametrize("name", ["conger_kappa", "gwet_ac"])
+def test_draws_come_from_that_law(name: str) -> None:
+    # 20 000 draws: a quantile of the law is met within five of its own errors, less
+    # than once in a million runs of other seeds for each of the four ends.
+    table = dirichlet_multinomial(np.random.default_rng(4), 4, 4, 0.4)
+    exact, some = (
+        bootstrap(
+            name, table, target="both", categories=range(3), level=0.8, rng=2, **options
+        )  # type: ignore[arg-type]
+        for options in ({"exact": True}, {"exact": False, "n_resamples": 20_000})
+    )
+    assert some.method == "percentile bootstrap of items and raters"
+    assert exact.method == "percentile bootstrap of items and raters, exact"
+    assert some.monte_carlo_error is not None
+    for end, error in zip(("low", "high"), some.monte_carlo_error, strict=True):
+        distance = abs(getattr(some, end) - getattr(exact, end))
+        assert distance <= 5 * error + 0.02  # the law has steps
+
 
 few = pytest.mark.filterwarnings("ignore::masrel.errors.SmallSampleWarning")
 
 
-def enumerated(table: list[list[str]]) -> tuple[list[float], list[int], int]:
-    """Return the values, weights and undefined weight of all n^n item resamples."""
-    n = len(table)
-    weights: Counter[float] = Counter()
-    undefined = 0
-    for drawn in itertools.combinations_with_replacement(range(n), n):
-        times = Counter(drawn)
-        ways = math.factorial(n)
-        for count in times.values():
-            ways //= math.factorial(count)
-        resample = [table[i] for i in drawn]
-        if len({g for row in resample for g in row if g is not None}) == 1:
-            undefined += ways
-        else:
-            weights[fleiss_kappa(resample).value] += ways
-    values = sorted(weights)
-    return values, [weights[v] for v in values], undefined
+def made(n: int, r: int, categories: int = 3) -> list[list[int]]:
+    rows = dirichlet_multinomial(np.random.default_rng(n + r), n, r, 0.5)
+    return [[min(grade, categories - 1) for grade in row] for row in rows]
 
 
 @few
-def test_item_resamples_follow_the_law_of_all_35() -> None:
-    values, weights, undefined = enumerated(TABLE_V)
-    assert (sum(weights) + undefined, undefined) == (4**4, 1)  # HM3 alone four times
-    cumulative = np.cumsum(weights) / sum(weights)
-    found = bootstrap(
-        "fleiss_kappa",
-        TABLE_V,
-        target="items",
-        exact=False,
-        n_resamples=200_000,
-        rng=11,
-    )
-    # The value whose cumulative share passes the tail is the quantile, except where a
-    # share is so near the tail that 40 000 draws may fall on either side of it.
-    for end, tail in ((found.low, 0.025), (found.high, 0.975)):
-        at = int(np.searchsorted(cumulative, tail))
-        assert abs(cumulative[at] - tail) > 5 * math.sqrt(0.025 * 0.975 / 200_000)
-        assert end == pytest.approx(values[at], abs=1e-12)
-    # 1 of 256: 781 expected, sd 28; beyond 4 sd once in 16 000 runs of other seeds.
-    assert abs(found.n_undefined - 200_000 / 256) < 112
+@pytest.mark.parametrize("kind", ["percentile", "basic", "bca", "studentized"])
+@pytest.mark.parametrize(("n", "r", "categories"), [(10, 6, 3), (60, 3, 2)])
+def test_errors_are_as_large_as_they_say(
+    kind: str, n: int, r: int, categories: int
+) -> None:
+    options = {"target": "items", "kind": kind, "categories": range(3)}
+    table = made(n, r, categories)
+    exact = bootstrap("fleiss_kappa", table, **options)  # type: ignore[arg-type]
+    assert exact.monte_carlo_error is None
+    off = []
+    for seed in range(30):
+        found = bootstrap(
+            "fleiss_kappa",
+            table,
+            exact=False,
+            rng=seed,
+            n_resamples=4000,
+            **options,  # type: ignore[arg-type]
+        )
+        assert found.monte_carlo_error is not None
+        for end in ("low", "high"):
+            error = found.monte_carlo_error[end == "high"]
+            if getattr(exact, end) not in (-1.0, 1.0):  # not cut
+                off.append((getattr(found, end) - getattr(exact, end)) / error)
+    # Root mean square of 30 or 60 standard normal numbers: outside once in 100 000 for
+    # 30; the errors themselves are known to a quarter.
+    assert 0.5 < math.sqrt(np.mean(np.square(off))) < 1.6
 
 
-@few
-def test_a_rater_is_never_paired_with_a_copy_of_itself() -> None:
-    # Three raters, all 27 resamples by hand: raters taken (a, b, c); a pair of places
-    # with the same rater is left out of the agreement.
-    table = [["1", "1", "2"], ["2", "2", "2"], ["1", "2", "1"], ["2", "2", "1"]]
-    values = []
-    for taken in itertools.product(range(3), repeat=3):
-        pairs = [
-            (i, j)
-            for i, j in itertools.permutations(range(3), 2)
-            if taken[i] != taken[j]
-        ]
-        if not pairs:
-            continue  # one rater three times: 3 of 27
-        shares = [
-            sum(row[taken[i]] == row[taken[j]] for i, j in pairs) / len(pairs)
-            for row in table
-        ]
-        values.append(sum(shares) / len(shares))
-    assert len(values) == 24
-    found = bootstrap(
-        "percent_agreement",
-        table,
-        target="raters",
-        exact=False,
-        n_resamples=20_000,
-        rng=2,
-    )
-    # Of 24, 6 are of three different raters, agreeing .5, and 6 each of two raters:
-    # .75, .5, .25. A quarter each is at either end, so the quantiles are the ends.
-    assert found.low == pytest.approx(min(values), abs=1e-12)
-    assert found.high == pytest.approx(max(values), abs=1e-12)
-    # 1/9 undefined: 2222, sd 44; beyond 4 sd once in 16 000 runs of other seeds
-    assert abs(found.n_undefined - 20_000 / 9) < 178
+def test_the_error_of_bca_has_that_of_its_bias_in_it() -> None:
+    # Without the error of the bias that of the low end would be 0.7 of the spread
+    # between seeds.
+    table = made(29, 8)
+    found = [
+        bootstrap(
+            "fleiss_kappa",
+            table,
+            target="items",
+            categories=range(3),
+            kind="bca",
+            exact=False,
+            n_resamples=1000,
+            rng=seed,
+        )
+        for seed in range(200)
+    ]
+    for end, of in (("low", 0), ("high", 1)):
+        spread = np.std([getattr(f, end) for f in found], ddof=1)
+        said = np.mean([f.monte_carlo_error[of] for f in found])  # type: ignore[index]
+        # the sd of 200 values is within 22 % of its own but once in 100 000 runs
+        assert 0.8 < said / spread < 1.25
 
 
 def test_percentile_basic_and_bca_agree_with_scipy() -> None:
@@ -130,28 +364,6 @@ def test_percentile_basic_and_bca_agree_with_scipy() -> None:
             assert abs(end - other) < 4.5 * 6 * error
 
 
-def test_basic_is_the_mirror_of_percentile() -> None:
-    table = dirichlet_multinomial(np.random.default_rng(4), 40, 4, 0.5)
-    plain = bootstrap("fleiss_kappa", table, target="items", rng=1)
-    mirror = bootstrap("fleiss_kappa", table, target="items", rng=1, kind="basic")
-    value = fleiss_kappa(table).value
-    assert mirror.low == pytest.approx(2 * value - plain.high, abs=1e-12)
-    assert mirror.high == pytest.approx(2 * value - plain.low, abs=1e-12)
-    assert mirror.monte_carlo_error == plain.monte_carlo_error[::-1]  # type: ignore[index]
-
-
-def test_monte_carlo_error_is_the_spread_between_seeds() -> None:
-    table = dirichlet_multinomial(np.random.default_rng(4), 60, 5, 0.5)
-    found = [
-        bootstrap("fleiss_kappa", table, target="items", n_resamples=2000, rng=seed)
-        for seed in range(60)
-    ]
-    spread = np.std([f.low for f in found], ddof=1)
-    said = np.mean([f.monte_carlo_error[0] for f in found])  # type: ignore[index]
-    # The sd of 60 values is within 35 % of its own: beyond once in 10 000 such runs.
-    assert 0.65 < spread / said < 1.35
-
-
 def test_seeds_repeat_and_are_recorded() -> None:
     table = dirichlet_multinomial(np.random.default_rng(4), 40, 4, 0.5)
     one = bootstrap("fleiss_kappa", table, target="items", rng=5)
@@ -175,50 +387,3 @@ def test_perfect_agreement_has_no_spread_and_says_so() -> None:
     assert math.isnan(found.low)
     with pytest.warns(UndefinedStatisticWarning, match="itself is undefined"):
         bootstrap("fleiss_kappa", [["a", "a"]] * 3, target="items", rng=0)
-
-
-def test_few_items_and_raters_are_warned_of() -> None:
-    with pytest.warns(SmallSampleWarning, match="4 items: below 16"):
-        bootstrap("fleiss_kappa", TABLE_V, target="items", rng=0)
-    table = dirichlet_multinomial(np.random.default_rng(4), 20, 3, 0.5)
-    with pytest.warns(SmallSampleWarning, match="3 raters: below 5"):
-        bootstrap("fleiss_kappa", table, target="raters", rng=0)
-
-
-@pytest.mark.parametrize(
-    ("coefficient", "options", "said"),
-    [
-        (
-            "fleiss_kappa",
-            {"target": "items", "n_resamples": 99},
-            "at least 100, got 99",
-        ),
-        ("fleiss_kappa", {"target": "items", "kind": "BCa"}, "kind: needs one of"),
-        ("fleiss_kappa", {"target": "items", "rng": -1}, "rng: needs"),
-        ("fleiss_kappa", {"target": "items", "rng": 1.5}, "got 1.5"),
-        ("fleiss_kappa", {"target": "items", "rng": True}, "got True"),
-    ],
-)
-@few
-def test_a_wrong_option_is_named(
-    coefficient: str, options: dict[str, object], said: str
-) -> None:
-    with pytest.raises(ParameterError, match=said):
-        bootstrap(coefficient, TABLE_V, categories=SCALE, **options)  # type: ignore[arg-type]
-
-
-def test_two_raters_are_never_resampled() -> None:
-    table = [["a", "a"], ["b", "b"], ["a", "b"]] * 10
-    with pytest.raises(ParameterError, match="copy of itself"):
-        bootstrap("cohen_kappa", table, target="raters", rng=0)
-
-
-@few
-def test_missing_ratings_are_resampled_with_their_items() -> None:
-    rows: list[list[str | None]] = [list(row) for row in TABLE_V]
-    rows[0][0] = rows[2][5] = None
-    values, _, _ = enumerated(rows)  # type: ignore[arg-type]
-    found = bootstrap(percent_agreement, rows, target="items")
-    assert found.low < percent_agreement(rows).value < found.high
-    kappa = bootstrap(fleiss_kappa, rows, target="items")
-    assert any(kappa.low == pytest.approx(v, abs=1e-12) for v in values)

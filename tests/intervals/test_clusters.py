@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from masrel.agreement import COEFFICIENTS
-from masrel.errors import ParameterError, RatingsError, SmallSampleWarning
+from masrel.errors import ParameterError, SmallSampleWarning
 from masrel.intervals import (
     analytic,
     difference,
@@ -82,16 +82,6 @@ def test_the_jackknife_leaves_out_every_cluster_once(name: str) -> None:
     assert found.low == pytest.approx(value - half, rel=1e-9)
     assert found.high == pytest.approx(min(value + half, 1.0), rel=1e-9)
     assert found.method == "cluster jackknife, t(14)"
-
-
-def test_items_that_are_clusters_by_themselves_change_nothing() -> None:
-    ratings, _ = drawn(20, 5)
-    labels = [f"item {k}" for k in range(len(ratings))]
-    for make in (analytic, jackknife):
-        alone = make("fleiss_kappa", ratings, target="items")
-        of_clusters = make("fleiss_kappa", ratings, target="items", clusters=labels)
-        ends = of_clusters.low, of_clusters.high
-        assert ends == pytest.approx((alone.low, alone.high), rel=1e-10)
 
 
 def test_by_default_clusters_are_left_out_on_the_logit() -> None:
@@ -189,37 +179,6 @@ def test_independent_clusters_add_their_variances() -> None:
         )
 
 
-def test_dependent_clusters_are_of_the_same_rows() -> None:
-    first, clusters = drawn(12, 11)
-    with pytest.raises(RatingsError, match="need the same items"):
-        difference(
-            "fleiss_kappa", first, first[1:], design="dependent", clusters=clusters
-        )
-
-
-@pytest.mark.parametrize("method", ["bootstrap", "posterior"])
-def test_other_methods_take_no_clusters(method: Any) -> None:
-    ratings, clusters = drawn(12, 11)
-    with pytest.raises(ParameterError, match=f'clusters: needs method .* "{method}"'):
-        estimate(
-            "fleiss_kappa", ratings, target="items", method=method, clusters=clusters
-        )
-
-
-@pytest.mark.parametrize("target", ["raters", "both"])
-def test_clusters_are_of_items(target: Any) -> None:
-    ratings, clusters = drawn(12, 11, r=3)
-    for make in (estimate, jackknife):
-        with pytest.raises(ParameterError, match=r'clusters: .* so target "items"'):
-            make("fleiss_kappa", ratings, target=target, clusters=clusters)
-
-
-def test_a_coefficient_that_is_no_function_of_sums_takes_no_clusters() -> None:
-    ratings, clusters = drawn(12, 11)
-    with pytest.raises(ParameterError, match="no function of sums over items"):
-        estimate("kendall_w", ratings, target="items", clusters=clusters)
-
-
 def test_few_clusters_are_warned_of_and_one_says_nothing() -> None:
     ratings, clusters = drawn(6, 17)
     for make in (analytic, jackknife):
@@ -251,29 +210,3 @@ def test_rare_categories_in_clusters_are_warned_of(
     assert notes == list(interval.notes[1:])
     expected = "4 items with a rating outside the commonest category: below 30 the"
     assert [note.startswith(expected) for note in notes] == [True] * is_rare
-
-
-@pytest.mark.slow
-def test_with_clusters_the_interval_covers_and_without_it_does_not() -> None:
-    # 40 clusters of eight items whose agreement is the cluster's: of 500 studies 95 %
-    # hold the kappa of many clusters, with an error of 1 %
-    def study(rng: np.random.Generator, n: int) -> NDArray[np.int64]:
-        true = rng.integers(0, 2, (n, 8, 1))
-        easy = rng.random((n, 1, 1)) < 0.6
-        seen = np.where(easy, true, rng.integers(0, 2, (n, 8, 2)))
-        return seen.reshape(-1, 2)
-
-    rng = np.random.default_rng(23)
-    clusters = np.repeat(np.arange(40), 8)
-    value = COEFFICIENTS["fleiss_kappa"](study(rng, 200_000)).value
-    held = np.zeros(2)
-    for _ in range(500):
-        ratings = study(rng, 40)
-        for k, labels in enumerate((clusters, None)):
-            interval = estimate(
-                "fleiss_kappa", ratings, target="items", clusters=labels
-            ).interval
-            assert interval is not None
-            held[k] += interval.low <= value <= interval.high
-    assert 0.92 <= held[0] / 500 <= 0.98
-    assert held[1] / 500 < 0.9

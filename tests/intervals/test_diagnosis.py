@@ -1,7 +1,6 @@
 """Diagnosis: by the functions whose numbers it puts together, by hand, and refusals."""
 
 import itertools
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -10,7 +9,6 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from masrel.agreement import COEFFICIENTS, specific_agreement
-from masrel.errors import ParameterError, SmallSampleWarning
 from masrel.intervals import diagnose, difference, estimate
 
 KINDS = [
@@ -155,14 +153,6 @@ def test_a_reference_is_left_out_of_all_else() -> None:
         )
 
 
-def test_many_copies_of_an_item_are_one_item_counted() -> None:
-    few = drawn(n=12, r=12)  # rows that differ are not put together
-    again = diagnose(np.repeat(few, 3, axis=0), categories=[0, 1, 2])
-    once = diagnose(few, categories=[0, 1, 2])
-    assert again.confusion.tolist() == (3 * once.confusion).tolist()
-    assert again.pair_values == pytest.approx(once.pair_values, nan_ok=True)
-
-
 def test_names_come_from_a_frame_and_are_shown() -> None:
     frame = pd.DataFrame(drawn()[:, :3], columns=["Kim", "Lee", "Ann"])
     found = diagnose(frame, target="items")
@@ -183,38 +173,3 @@ def test_a_rater_without_ratings_changes_nothing() -> None:
     assert np.isnan(with_it.pair_values[3]).all()
     assert np.isnan(with_it.changes[3])
     assert with_it.confusion[:3].tolist() == without.confusion.tolist()
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"target": "raters"}, 'target: .* so "items", or None'),
-        ({"raters": ["Kim"]}, "raters: needs a name for each of 4, got 1"),
-        ({"reference": "Gold"}, "reference: needs one of 0, 1, 2, 3, got 'Gold'"),
-        ({"reference": 4}, "reference: needs one of"),
-        ({"reference": True}, "reference: needs one of"),
-        ({"raters": "Kims"}, "raters: needs a name for each, got 'Kims'"),
-        ({"raters": 4}, "raters: needs a name for each, got 4"),
-        ({"level": 1.0}, "level: needs"),
-        ({"coefficient": "stratified_kappa"}, "needs one of several raters"),
-        ({"coefficient": "cohen_kappa"}, "needs 2 raters, got 4"),
-        ({"coefficient": "icc_a1"}, "no function of sums over items"),
-    ],
-)
-def test_what_does_not_fit_is_refused(options: dict[str, Any], message: str) -> None:
-    with pytest.raises(ParameterError, match=message):
-        diagnose(drawn(), **options)
-
-
-def test_measurements_have_no_table_of_confusions() -> None:
-    measured = np.random.default_rng(1).normal(size=(700, 3))
-    with pytest.raises(ParameterError, match="at most 2000 different grades, got 2100"):
-        diagnose(measured, weights="quadratic")
-
-
-def test_few_items_are_warned_of_where_there_are_intervals() -> None:
-    ratings = drawn(n=8)
-    diagnose(ratings)
-    with pytest.warns(SmallSampleWarning, match="items"):
-        found = diagnose(ratings, target="items")
-    assert found.notes

@@ -6,7 +6,6 @@ Whoever adds a method to `masrel.intervals` puts it into one of the two lists he
 import math
 import warnings
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -230,16 +229,3 @@ def test_an_interval_holds_an_estimate_below_minus_one(method: str) -> None:
         warnings.simplefilter("always", MasrelWarning)
         outcome = PROMISE[method](coefficient, ratings, **options)
     check(outcome, noted)
-
-
-def test_the_check_sees_an_interval_beside_its_estimate() -> None:
-    interval = jackknife(
-        "fleiss_kappa", [[0, 0, 1], [1, 1, 1], [2, 1, 2]] * 5, target="items"
-    )
-    check((0.5 * (interval.low + interval.high), interval))
-    for off in (interval.low - 1e-6, interval.high + 1e-6):
-        with pytest.raises(AssertionError):
-            check((off, interval))
-    nothing = replace(interval, low=math.nan, high=math.nan)
-    with pytest.raises(AssertionError):
-        check((0.5, nothing))

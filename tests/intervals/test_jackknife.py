@@ -9,17 +9,13 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from masrel.agreement import (
-    cohen_kappa,
     conger_kappa,
     fleiss_kappa,
     krippendorff_alpha,
     light_kappa,
-    percent_agreement,
     stratified_kappa,
 )
 from masrel.errors import (
-    ParameterError,
-    SmallSampleWarning,
     UndefinedStatisticWarning,
 )
 from masrel.estimates import Estimate
@@ -104,14 +100,6 @@ def test_thousands_of_measurements_are_left_out_rater_by_rater(
     assert (found.high - found.low) / 2 == pytest.approx(half, rel=1e-9)
 
 
-def test_other_coefficients_of_thousands_of_measurements_name_what_works() -> None:
-    x = _measured(3000)
-    with pytest.raises(ParameterError, match="too many"):
-        jackknife("gwet_ac", x, target="items", weights="quadratic")
-    with pytest.raises(ParameterError, match="too many"):
-        jackknife("fleiss_kappa", x, target="items", weights="linear")
-
-
 @few
 def test_leaving_out_items_is_the_loop_over_them() -> None:
     rng = np.random.default_rng(5)
@@ -137,16 +125,6 @@ def test_for_both_the_variances_add_and_degrees_are_the_fewer() -> None:
     t5 = 2.570581835636314  # of 11 and 5 degrees
     assert half == pytest.approx(t5 * math.sqrt(rows + columns), rel=1e-12)
     assert found.method == "two-way jackknife, t(5)"
-
-
-@few
-def test_the_jackknife_of_a_mean_is_the_t_interval_of_a_mean() -> None:
-    # Percent agreement of complete ratings is a mean over items, whose jackknife
-    # variance is exactly s²/n.
-    shares = np.array([21, 16, 28, 16]) / 28
-    half = 3.18244630528371 * shares.std(ddof=1) / 2
-    found = jackknife(percent_agreement, TABLE_V, target="items")
-    assert found.low == pytest.approx(81 / 112 - half, rel=1e-12)
 
 
 @few
@@ -185,22 +163,6 @@ def test_coverage_for_other_raters_is_what_it_says() -> None:
     assert 267 <= covered <= 300
 
 
-@pytest.mark.parametrize("target", ["raters", "both"])
-def test_two_raters_cannot_lose_one(target: str) -> None:
-    table = [["a", "a"], ["b", "b"], ["a", "b"]] * 4
-    with pytest.raises(ParameterError, match="at least 3 raters"):
-        jackknife("cohen_kappa", table, target=target)  # type: ignore[arg-type]
-
-
-def test_few_raters_and_items_are_warned_of() -> None:
-    table = dirichlet_multinomial(np.random.default_rng(1), 9, 4, 0.5)
-    with pytest.warns(SmallSampleWarning, match="4 raters: below 5"):
-        jackknife("fleiss_kappa", table, target="raters")
-    with pytest.warns(SmallSampleWarning, match="9 items: below 10"):
-        found = jackknife("fleiss_kappa", table, target="items")
-    assert found.notes[0].startswith("9 items")
-
-
 @pytest.mark.parametrize(
     ("table", "target", "reason"),
     [
@@ -231,15 +193,3 @@ def test_where_it_cannot_say_it_says_why(
     assert math.isnan(found.low)
     assert math.isnan(found.high)
     assert reason in (found.reason or "")
-
-
-@few
-def test_cohens_items_by_loop() -> None:
-    table = [["a", "a"], ["a", "b"], ["b", "b"], ["b", "a"], ["c", "c"], ["c", "b"]]
-    values = [cohen_kappa(without_item(table, i)).value for i in range(6)]
-    half = 2.570581835636314 * math.sqrt(variance(values))  # t(5; .975)
-    found = jackknife("cohen_kappa", table, target="items")
-    centre = cohen_kappa(table).value
-    assert (found.low, found.high) == pytest.approx(
-        (centre - half, min(centre + half, 1.0)), rel=1e-12
-    )

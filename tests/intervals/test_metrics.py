@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from masrel.agreement import COEFFICIENTS, Metric, krippendorff_alpha
-from masrel.errors import ParameterError
-from masrel.intervals import analytic, bootstrap, difference, estimate, jackknife
+from masrel.agreement import Metric, krippendorff_alpha
+from masrel.intervals import analytic, bootstrap, jackknife
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore::masrel.errors.SmallSampleWarning",
@@ -44,22 +43,6 @@ def test_the_jackknife_leaves_items_out_of_the_metric_too(metric: Metric) -> Non
 
 
 @pytest.mark.parametrize("metric", METRICS)
-def test_the_jackknife_leaves_raters_out_of_the_metric_too(metric: Metric) -> None:
-    without = [
-        krippendorff_alpha(
-            np.delete(np.array(RATINGS, float), r, axis=1),
-            categories=range(1, 6),
-            metric=metric,
-        ).value
-        for r in range(3)
-    ]
-    half = stats.t.ppf(0.975, 2) * math.sqrt(4 / 3 * np.var(without, ddof=1))
-    result = jackknife("krippendorff_alpha", RATINGS, target="raters", metric=metric)
-    value = krippendorff_alpha(RATINGS, metric=metric).value
-    assert result.low == pytest.approx(max(value - half, -1.0), rel=1e-9)
-
-
-@pytest.mark.parametrize("metric", METRICS)
 def test_every_resample_has_the_metric_of_its_ratings(metric: Metric) -> None:
     rows = [[1, 2], [3, 3], [2, 4], [4, 4]]
     values = [
@@ -85,35 +68,6 @@ def test_many_grades_hold_the_ordinal_metric_and_say_so() -> None:
     assert any("is held as it was found" in note for note in of_delta.notes)
 
 
-@pytest.mark.parametrize("method", ["auto", "analytic", "jackknife", "bootstrap"])
-@pytest.mark.parametrize("metric", METRICS)
-def test_an_estimate_by_a_metric_is_alpha_with_an_interval(
-    method: Any, metric: Metric
-) -> None:
-    plain = krippendorff_alpha(RATINGS, metric=metric)
-    result = estimate(
-        "krippendorff_alpha",
-        RATINGS,
-        target="items",
-        metric=metric,
-        method=method,
-        rng=1,
-    )
-    assert (result.value, result.weights) == (plain.value, plain.weights)
-    assert result.interval is not None
-    assert result.interval.low < result.value < result.interval.high
-    entry = COEFFICIENTS["krippendorff_alpha"].by_metric(metric)
-    assert estimate(entry, RATINGS, target="items", method=method, rng=1) == result
-
-
-def test_the_nominal_metric_is_no_weights() -> None:
-    by_metric = estimate(
-        "krippendorff_alpha", RATINGS, target="items", metric="nominal"
-    )
-    plain = estimate("krippendorff_alpha", RATINGS, target="items")
-    assert by_metric.interval == plain.interval
-
-
 def test_the_interval_metric_is_quadratic_weights() -> None:
     for target in ("items", "raters", "both"):
         options: dict[str, Any] = {"target": target, "categories": range(1, 6)}
@@ -123,57 +77,3 @@ def test_the_interval_metric_is_quadratic_weights() -> None:
         )
         assert by_metric.low == pytest.approx(weighted.low, rel=1e-9)
         assert by_metric.high == pytest.approx(weighted.high, rel=1e-9)
-
-
-def test_a_difference_by_a_metric_needs_its_entry_alone() -> None:
-    entry = COEFFICIENTS["krippendorff_alpha"].by_metric("interval")
-    other = [row[::-1] for row in RATINGS[1:]] + [[5, 1, 1]]
-    options: dict[str, Any] = {"design": "dependent", "categories": range(1, 6)}
-    result = difference(entry, RATINGS, other, **options)
-    weighted = difference(
-        "krippendorff_alpha", RATINGS, other, weights="quadratic", **options
-    )
-    assert result.value == pytest.approx(weighted.value, rel=1e-12)
-    assert result.standard_error == pytest.approx(weighted.standard_error, rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("call", "said"),
-    [
-        (
-            lambda: estimate(
-                "fleiss_kappa", RATINGS, target="items", metric="interval"
-            ),
-            "metric: is of krippendorff_alpha alone, got 'interval' for fleiss_kappa",
-        ),
-        (
-            lambda: jackknife(
-                "krippendorff_alpha",
-                RATINGS,
-                target="items",
-                metric="interval",
-                weights="linear",
-            ),
-            "weights: Krippendorff's α, interval metric takes none, got 'linear'",
-        ),
-        (
-            lambda: jackknife(
-                "krippendorff_alpha",
-                RATINGS,
-                target="items",
-                metric="intervall",  # type: ignore[arg-type]
-            ),
-            "metric: needs one of nominal, ordinal, interval, ratio, jaccard, masi",
-        ),
-        (
-            lambda: jackknife(
-                "krippendorff_alpha", [["a", "b"]], target="items", metric="interval"
-            ),
-            "categories: the interval metric needs the declared scale in order",
-        ),
-    ],
-)
-def test_what_does_not_fit_is_refused(call: Any, said: str) -> None:
-    with pytest.raises(ParameterError) as refusal:
-        call()
-    assert said in str(refusal.value)

@@ -1,9 +1,5 @@
-"""What carries nothing changes nothing: single ratings, items and raters without any.
+"""What carries nothing changes nothing, and counts are the ratings they count."""
 
-And what generalises to items and raters is never surer than what does to either.
-"""
-
-import dataclasses
 import math
 import warnings
 from collections.abc import Callable
@@ -11,13 +7,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from masrel.agreement import COEFFICIENTS, p_value
+from masrel.agreement import COEFFICIENTS, count_items, count_table, p_value
 from masrel.errors import MasrelWarning, SmallSampleWarning
 from masrel.estimates import Estimate, Interval, Target, as_document
 from masrel.intervals import (
     analytic,
     bootstrap,
-    difference,
     estimate,
     jackknife,
     posterior,
@@ -75,13 +70,6 @@ def test_single_ratings_change_no_bit_where_only_pairs_count(
     assert quiet(METHODS[method], name, FULL + SINGLES, **options) == alone
 
 
-def test_their_degrees_of_freedom_and_warnings_count_pairs() -> None:
-    with pytest.warns(SmallSampleWarning, match="^5 items: below 10"):
-        found = jackknife("cohen_kappa", FULL + SINGLES, target="items")
-    assert found.method == "item jackknife, t(4)"
-    assert found.notes[0].startswith("5 items: below 10")
-
-
 @pytest.mark.parametrize("name", ["fleiss_kappa", "gwet_ac", "brennan_prediger"])
 def test_where_they_tell_of_chance_they_are_left_out_in_turn(name: str) -> None:
     # Q: of 25 items with a single rating and 5 with two, (n - 1)/n and t count the 5
@@ -114,26 +102,6 @@ def test_p_values_count_pairs() -> None:
     # P(|t(4)| ≥ t) = 1 - s (1.5 - 0.5 s²) with s = t/√(t² + 4)
     s = t / math.sqrt(t * t + 4)
     assert p_value(found) == pytest.approx(1 - s * (1.5 - 0.5 * s * s), rel=1e-9)
-
-
-@pytest.mark.parametrize("name", PAIRS_ONLY)
-@pytest.mark.parametrize("design", ["dependent", "independent"])
-def test_a_difference_counts_pairs(name: str, design: str) -> None:
-    other: Table = [["a", "b"], ["a", "b"], ["b", "b"], ["b", "a"], ["a", "a"]]
-    options = {"design": design, "categories": ["a", "b"]}
-    alone = difference(name, FULL, other, **options)  # type: ignore[arg-type]
-    beside = difference(name, FULL + SINGLES, other + SINGLES, **options)  # type: ignore[arg-type]
-    assert beside == alone
-    assert beside.n_items_paired == 5
-
-
-def test_the_number_of_items_with_a_pair_is_in_every_result() -> None:
-    for name, entry in COEFFICIENTS.items():
-        table = [[1, 2], [2, 2], [3, 3], [2, 1], [3, None], [None, 1]]
-        ratings = [table, table] if entry.shape == "pairs" else table
-        found = entry(ratings, categories=[1, 2, 3])
-        assert (name, found.n_items_paired) == (name, 4)
-        assert as_document(found)["n_items_paired"] == 4
 
 
 def holed(table: Table) -> list[Table]:
@@ -191,22 +159,6 @@ def test_pairs_that_are_none_move_nothing(name: str) -> None:
         )
 
 
-def test_an_error_of_pooled_pairs_by_hand() -> None:
-    # One rater's pairs alone are Cohen's, whose sample are the items with a pair.
-    pairs: Table = [["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"], ["a", None]]
-    cohen = COEFFICIENTS["cohen_kappa"](pairs)
-    pooled = COEFFICIENTS["pooled_kappa"]([pairs])
-    assert pooled.standard_error == pytest.approx(cohen.standard_error, rel=1e-12)
-    assert (pooled.n_items, pooled.n_items_paired) == (5, 4)
-
-
-def test_ratings_of_no_pair_say_so() -> None:
-    found = estimate("fleiss_kappa", [["a", None], [None, "b"]], target="items")
-    assert found.interval is not None
-    assert math.isnan(found.interval.low)
-    assert "no item has ratings of two raters" in found.interval.notes[0]
-
-
 # "both": no surer than either.
 
 
@@ -243,25 +195,59 @@ def test_the_interval_for_both_holds_those_for_either(name: str) -> None:
             assert both.reason in (items.reason, raters.reason)
 
 
-@pytest.mark.parametrize("name", OF_ANY_RATERS)
-def test_so_does_the_two_way_jackknife(name: str) -> None:
-    for table in random_sets(11, 12):
-        both, items, raters = (
-            jackknife(name, table, target=of)  # type: ignore[arg-type]
-            for of in ("both", "items", "raters")
+TABLE = [[20, 5], [10, 15]]
+PAIRS = [[1, 1]] * 20 + [[1, 2]] * 5 + [[2, 1]] * 10 + [[2, 2]] * 15
+COUNTS = [[3, 0, 0], [2, 1, 0], [0, 3, 0], [0, 1, 1], [1, 0, 0]]
+RATINGS = [[1, 1, 1], [1, 1, 2], [2, 2, 2], [2, 3, None], [1, None, None]]
+NAMED = ["cohen_kappa", "scott_pi", "conger_kappa", "light_kappa"]
+UNNAMED = [
+    "percent_agreement",
+    "fleiss_kappa",
+    "brennan_prediger",
+    "gwet_ac",
+    "krippendorff_alpha",
+]
+
+
+@pytest.mark.parametrize(
+    "method", ["auto", "analytic", "jackknife", "bootstrap", "posterior"]
+)
+@pytest.mark.parametrize("name", [*NAMED, *UNNAMED])
+def test_a_table_of_two_raters_is_their_ratings(name: str, method: str) -> None:
+    of_table, of_pairs = (
+        estimate(name, ratings, target="items", method=method, rng=1, **scale)  # type: ignore[arg-type]
+        for ratings, scale in (
+            (count_table(TABLE), {}),
+            (PAIRS, {"categories": [1, 2]}),
         )
-        if both.reason is None:
-            for one in (items, raters):
-                if one.reason is None:
-                    assert both.low <= one.low + 1e-12
-                    assert both.high >= one.high - 1e-12
+    )
+    assert of_table.interval is not None
+    assert of_pairs.interval is not None
+    assert of_table.interval.method == of_pairs.interval.method
+    assert numbers(of_table) == pytest.approx(numbers(of_pairs), rel=1e-12)
 
 
-def test_both_of_table_v() -> None:
-    # items .370 to .874, raters .320 to .933; the latter at t(3) are .213 to 1.039
-    both = estimate("fleiss_kappa", TABLE_V, target="both", categories=SCALE).interval
-    assert both is not None
-    assert both.low < 0.320
-    assert both.high > 0.933
-    plain = dataclasses.replace(both, notes=())
-    assert plain.unit == plain.target == "both"
+def numbers(of: Estimate) -> list[float]:
+    """Return what an estimate says in numbers; sums may be in another order."""
+    assert of.interval is not None
+    return [
+        *(of.value, of.standard_error, of.observed, of.chance),
+        *(of.n_items, of.n_items_paired, of.n_raters),
+        *(of.interval.low, of.interval.high),
+    ]
+
+
+@pytest.mark.parametrize("method", ["auto", "analytic", "jackknife", "bootstrap"])
+@pytest.mark.parametrize("name", UNNAMED)
+def test_counts_are_the_ratings_they_count(name: str, method: str) -> None:
+    of_counts, of_ratings = (
+        estimate(name, ratings, target="items", method=method, rng=1, **scale)  # type: ignore[arg-type]
+        for ratings, scale in (
+            (count_items(COUNTS * 4), {}),
+            (RATINGS * 4, {"categories": [1, 2, 3]}),
+        )
+    )
+    assert of_counts.interval is not None
+    assert of_ratings.interval is not None
+    assert of_counts.interval.notes == of_ratings.interval.notes
+    assert numbers(of_counts) == pytest.approx(numbers(of_ratings), rel=1e-12)

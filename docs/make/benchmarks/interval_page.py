@@ -190,9 +190,9 @@ def _memory(results: Results) -> list[str]:
         "",
         "Most at once beside a million items by five raters, bytes, 10 000 resamples "
         f"of items: {shown}.",
-        "`tests/intervals/test_memory.py` holds all kinds, clusters, the jackknife and "
-        "the posterior below 300 MB; the bootstrap",
-        "also where nearly all rows differ.",
+        "`tests/intervals/test_costs.py` holds the bootstrap, the jackknife and the "
+        "delta method below 50 MB. A million clusters",
+        "or rows that nearly all differ take less than 1 GB.",
     ]
 
 

@@ -1,0 +1,242 @@
+"""What intervals load, draw, hold in memory, and warn of."""
+
+import json
+import subprocess
+import sys
+import tracemalloc
+import warnings
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from masrel.errors import SmallSampleWarning
+from masrel.estimates import Interval
+from masrel.intervals import analytic, bootstrap, difference, jackknife
+
+HEAVY = {
+    "scipy.special",
+    "scipy.stats",
+    "scipy.optimize",
+    "matplotlib",
+    "pandas",
+    "statsmodels",
+    "emcee",
+    "arviz_stats",
+}
+SPECIAL = {"scipy.special"}  # quantiles of t, gamma functions
+
+SCRIPT = """
+import json, sys, warnings
+import numpy as np
+drawn = []
+def watched(make):
+    def counted(*args, **kwargs):
+        drawn.append(make.__name__)
+        return make(*args, **kwargs)
+    return counted
+for name in ("default_rng", "SeedSequence", "random", "normal"):
+    setattr(np.random, name, watched(getattr(np.random, name)))
+warnings.simplefilter("ignore")
+from masrel.intervals import bootstrap, difference, estimate, posterior
+rows = [["a", "a", "b"], ["a", "b", "a"], ["b", "b", "b"], ["a", "a", "a"]] * TIMES
+pairs = [row[:2] for row in rows]
+found = CALL
+found = getattr(found, "interval", found)
+assert found.low < found.high
+print(json.dumps([bool(drawn), sorted(set(HEAVY) & set(sys.modules))]))
+"""
+
+
+def watched(call: str, times: int = 1) -> tuple[bool, set[str]]:
+    """Whether a generator was made, and what a fresh interpreter then holds."""
+    script = SCRIPT.replace("TIMES", str(times)).replace("CALL", call)
+    script = script.replace("set(HEAVY)", f"set({sorted(HEAVY)!r})")
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    drew, loaded = json.loads(done.stdout)
+    return drew, set(loaded)
+
+
+def estimated(method: str, target: str) -> str:
+    return f'estimate("fleiss_kappa", rows, method="{method}", target="{target}")'
+
+
+@pytest.mark.parametrize("target", ["items", "raters", "both"])
+@pytest.mark.parametrize("times", [1, 5])
+def test_the_chosen_interval_draws_nothing(target: str, times: int) -> None:
+    drew, loaded = watched(estimated("auto", target), times)
+    assert not drew
+    assert loaded <= SPECIAL
+
+
+@pytest.mark.parametrize(
+    ("method", "target"),
+    [
+        ("analytic", "items"),
+        ("jackknife", "items"),
+        ("jackknife", "raters"),
+        ("jackknife", "both"),
+        ("posterior", "items"),
+    ],
+)
+def test_a_closed_form_draws_nothing_and_loads_special_functions(
+    method: str, target: str
+) -> None:
+    assert watched(estimated(method, target)) == (False, SPECIAL)
+
+
+@pytest.mark.parametrize("target", ["items", "raters"])
+def test_a_bootstrap_of_all_resamples_draws_nothing_and_loads_numpy_alone(
+    target: str,
+) -> None:
+    assert watched(estimated("bootstrap", target)) == (False, set())
+
+
+def test_drawn_resamples_are_counted_as_drawn_and_need_no_scipy() -> None:
+    call = 'bootstrap("fleiss_kappa", rows, target="items", exact=False, rng=1)'
+    assert watched(call) == (True, set())
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        'posterior("fleiss_kappa", pairs, target="items", model="table")',
+        'difference("fleiss_kappa", rows, pairs, design="independent")',
+    ],
+)
+def test_the_other_exact_ones_draw_nothing(call: str) -> None:
+    drew, loaded = watched(call, 5)
+    assert not drew
+    assert loaded <= SPECIAL
+
+
+N_ITEMS = 1_000_000
+MOST_MB = 300.0
+FEW_MB = 50.0  # of some thousand distinct rows; the ratings alone take 5 as bytes
+
+
+def megabytes(work: Callable[[], object], *, loaded: bool = True) -> float:
+    """Return the most that was allocated at once, without what is loaded first."""
+    if loaded:
+        work()
+    tracemalloc.start()
+    try:
+        work()
+        return tracemalloc.get_traced_memory()[1] / 1e6
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.fixture(scope="module")
+def ratings() -> NDArray[np.int8]:
+    rng = np.random.default_rng(1)
+    truth = rng.integers(0, 5, (N_ITEMS, 1), dtype=np.int8)
+    other = rng.integers(0, 5, (N_ITEMS, 5), dtype=np.int8)
+    return np.where(rng.random((N_ITEMS, 5)) < 0.6, truth, other)
+
+
+@pytest.mark.parametrize(
+    ("target", "kind"),
+    [("items", "bca"), ("items", "studentized"), ("raters", "bca")],
+)
+def test_a_bootstrap_keeps_sums_and_not_resamples(
+    ratings: NDArray[np.int8], target: str, kind: str
+) -> None:
+    # the drawn items of 10 000 resamples would be 10^10 numbers
+    work = partial(
+        bootstrap,
+        "fleiss_kappa",
+        ratings,
+        target=target,  # type: ignore[arg-type]
+        categories=range(5),
+        kind=kind,  # type: ignore[arg-type]
+        exact=False,
+        rng=1,
+    )
+    assert megabytes(work) < FEW_MB
+
+
+@pytest.mark.parametrize("target", ["items", "raters", "both"])
+def test_a_jackknife_leaves_out_distinct_rows(
+    ratings: NDArray[np.int8], target: str
+) -> None:
+    work = partial(
+        jackknife,
+        "fleiss_kappa",
+        ratings,
+        target=target,  # type: ignore[arg-type]
+        categories=range(5),
+    )
+    assert megabytes(work) < FEW_MB
+
+
+def test_the_delta_method_takes_no_more(ratings: NDArray[np.int8]) -> None:
+    work = partial(
+        analytic, "fleiss_kappa", ratings, target="items", categories=range(5)
+    )
+    assert megabytes(work) < FEW_MB
+
+
+TABLE = [["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"], ["a", "a"]]
+OTHER = [["a", "b"], ["a", "b"], ["b", "b"], ["b", "a"], ["a", "a"], ["b", "b"]]
+
+METHODS: dict[str, Callable[[], object]] = {
+    "analytic": lambda: analytic("cohen_kappa", TABLE, target="items"),
+    "jackknife": lambda: jackknife("cohen_kappa", TABLE, target="items"),
+    "bootstrap": lambda: bootstrap("cohen_kappa", TABLE, target="items", rng=1),
+    "difference": lambda: difference("cohen_kappa", TABLE, OTHER, design="independent"),
+}
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_warning_points_to_who_asked(method: str) -> None:
+    with pytest.warns(SmallSampleWarning, match="5 items: below 1[06]") as caught:
+        METHODS[method]()
+    assert [warning.filename for warning in caught] == [__file__]
+    # the line within this file, not that of the test which calls it
+    first = METHODS[method].__code__.co_firstlineno
+    assert first <= caught[0].lineno <= first + 2
+
+
+@pytest.mark.parametrize(
+    ("unit", "enough"), [("items", 16), ("clusters", 16), ("raters", 5)]
+)
+def test_a_bootstrap_warns_below_enough_units(unit: str, enough: int) -> None:
+    rows = np.random.default_rng(1).integers(0, 3, (40, 40))
+    for n in (enough - 1, enough):
+        table = rows[:, :n] if unit == "raters" else rows[:n, :3]
+        options = {"target": "raters" if unit == "raters" else "items"}
+        if unit == "clusters":
+            options["clusters"] = range(n)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            interval = bootstrap(
+                "fleiss_kappa", table, categories=range(3), rng=1, **options
+            )
+        note = f"{n} {unit}: below {enough} the interval may cover less than it says"
+        assert [str(w.message) for w in caught] == [note] * (n < enough)
+        assert (note in interval.notes) == (n < enough)
+
+
+@pytest.mark.parametrize(
+    ("method", "target", "enough"),
+    [
+        (analytic, "items", 10),
+        (jackknife, "items", 10),
+        (jackknife, "raters", 5),
+    ],
+)
+def test_a_closed_form_warns_below_enough_units(
+    method: Callable[..., Interval], target: str, enough: int
+) -> None:
+    rows = np.random.default_rng(1).integers(0, 3, (40, 40))
+    for n in (enough - 1, enough):
+        table = rows[:n, :4] if target == "items" else rows[:, :n]
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            method("fleiss_kappa", table, target=target, categories=range(3))
+        assert [w.category for w in caught] == [SmallSampleWarning] * (n < enough)
