@@ -4,17 +4,14 @@ import itertools
 import json
 from collections.abc import Callable, Iterator
 from fractions import Fraction
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from masrel.agreement import cohen_kappa, count_items, count_table, fleiss_kappa
 from masrel.audit import ConsistentTables, consistent_tables
 from tests.audit.printing import (
     Rows,
-    disagreement,
     of_items,
     of_two_raters,
     rounded,
@@ -167,97 +164,6 @@ def test_no_true_table_raises_an_alarm(seeds: range) -> None:
             assert result.is_possible, (seed, claim)
 
 
-def planted(rng: np.random.Generator) -> dict[str, object]:
-    """A claim of a true table in which one number was changed."""
-    claim = random_claim(rng, "half_up", (60, 9))
-    change = str(rng.choice(["kappa", "agreement", "n_items"]))
-    if change == "n_items":
-        return claim | {"n_items": int(claim["n_items"]) - 1}
-    text = str(claim[change])
-    place = len(text) - 1 - int(rng.integers(0, 2)) * (text[-2] != ".")
-    if not text[place].isdecimal():
-        place = len(text) - 1
-    other = (int(text[place]) + int(rng.integers(1, 10))) % 10
-    return claim | {change: f"{text[:place]}{other}{text[place + 1 :]}"}
-
-
-@cache
-def sums_of_all_tables(
-    n: int, q: int, agreement_weights: str, kappa_weights: str
-) -> list[list[int]]:
-    """The sums of disagreement and the chance sum that occur."""
-    tables = np.array(every_table(n, q, 2))  # (n_tables, q, q)
-    v, w = (
-        np.array([[disagreement(name, k, m) for m in range(q)] for k in range(q)])
-        for name in (agreement_weights, kappa_weights)
-    )
-    rows, columns = tables.sum(axis=2), tables.sum(axis=1)
-    chance = np.einsum("tk,km,tm->t", rows, w, columns)
-    sums = [(tables * v).sum(axis=(1, 2)), (tables * w).sum(axis=(1, 2)), chance]
-    return np.unique(np.column_stack(sums)[chance > 0], axis=0).tolist()
-
-
-def any_table_fits(claim: dict[str, object]) -> bool:
-    n, q = int(claim["n_items"]), int(claim["n_categories"])
-    weights = str(claim["agreement_weights"]), str(claim["kappa_weights"])
-    worst = n * disagreement(weights[0], 0, q - 1)
-    printed = [str(claim[key]) for key in ("agreement", "kappa")]
-    decimals = [len(text.partition(".")[2]) for text in printed]
-    units = [round(Fraction(t) * 10**d) for t, d in zip(printed, decimals, strict=True)]
-    for s_agreement, s_kappa, chance in sums_of_all_tables(n, q, *weights):
-        values = (
-            100 * (1 - Fraction(s_agreement, worst)),
-            1 - Fraction(n * s_kappa, chance),
-        )
-        for rule in RULES:
-            both = zip(values, decimals, strict=True)
-            if [rounded(value, d, rule) for value, d in both] == units:
-                return True
-    return False
-
-
-N_PLANTED = [
-    pytest.param(range(6), id="some"),
-    pytest.param(range(6, 56), id="tenth", marks=pytest.mark.slow),
-    pytest.param(range(500), id="all", marks=pytest.mark.long),
-]
-
-
-@pytest.mark.parametrize("seeds", N_PLANTED)
-def test_impossible_claims_are_seen(seeds: range) -> None:
-    """All of them: existence is decided exactly."""
-    n_impossible = 0
-    for seed in seeds:
-        claim = planted(np.random.default_rng(seed))
-        if float(str(claim["agreement"])) > 100 or float(str(claim["kappa"])) > 1:
-            continue
-        is_possible = any_table_fits(claim)
-        n_impossible += not is_possible
-        assert consistent_tables(**claim).is_possible is is_possible, (seed, claim)
-    assert n_impossible > len(seeds) // 5
-
-
-def test_numbers_of_the_statistics_here_are_consistent() -> None:
-    table = [[11, 2, 0], [1, 9, 3], [0, 2, 12]]
-    for weights in WEIGHTS:
-        value = cohen_kappa(count_table(table), weights=weights).value
-        result = consistent_tables(
-            n_items=40,
-            n_categories=3,
-            agreement="80.00",
-            kappa=f"{value:.9f}",
-            kappa_weights=weights,
-        )
-        assert result.n_tables is not None
-        assert result.n_tables > 0
-    counts = [[4, 0], [3, 1], [0, 4], [1, 3], [0, 4], [4, 0]]
-    value = fleiss_kappa(count_items(counts)).value
-    result = consistent_tables(
-        n_items=6, n_categories=2, n_raters=4, kappa=f"{value:.9f}"
-    )
-    assert result.is_possible
-
-
 @pytest.mark.parametrize(
     ("claim", "n_visited"),
     [
@@ -299,14 +205,6 @@ def test_it_says_where_the_bound_on_work_was_met() -> None:
         "cannot tell",
     )
     assert result.is_possible is None
-
-
-def test_retest_kappa_of_the_published_study_is_ten_of_twelve() -> None:
-    # Park, Kim and Damiano (2012): .771, three raters and four models
-    for n_categories in (4, 5):
-        result = consistent_tables(n_items=12, n_categories=n_categories, kappa="0.771")
-        assert result.is_possible
-        assert result.n_agreed == (10,)
 
 
 def test_forms_in_which_numbers_are_printed() -> None:

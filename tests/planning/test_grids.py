@@ -37,29 +37,17 @@ def test_a_grid_has_the_plan_of_every_cell_once() -> None:
     )
 
 
-def test_prevalences_and_exact_cells_can_be_ranges_too() -> None:
-    study = replace(STUDY, value=0.5, n_raters=2, interval="normal")
-    shares = [[0.5, 0.5], [0.9, 0.1]]
-    plans = plan_grid(study, prevalences=shares, n_items=[20, 30])
-    assert [plan.method for plan in plans] == ["exact"] * 4
-    assert plans[0].p_undefined < plans[2].p_undefined
-
-
 def test_one_size_can_be_solved_for_in_every_cell() -> None:
     plans = plan_grid(SOLVED, value=[0.6, 0.8], n_raters=[2, 3])
     assert plans[-1] == sample_size(replace(SOLVED, value=0.8, n_raters=3))
-    assert [plan.n_raters for plan in plans] == [2, 3, 2, 3]
     (unreached,) = plan_grid(replace(SOLVED, value=0.6, n_items=10))
-    assert unreached.reaches_aim is False
-    words = "half_width: a half-width of 0.2 needs more than 60 raters"
-    assert words in unreached.notes[0]
+    assert (unreached.reaches_aim, unreached.n_raters) == (False, 60)
 
 
 def test_grids_aim_at_chances_as_a_single_plan_does() -> None:
     ranges: dict[str, Any] = {"value": 0.6, "n_items": [40, 80], "n_raters": [2, 3]}
     plans = plan_grid(replace(SOLVED, assurance=0.8), **ranges)
     assert [p.reaches_aim for p in plans] == [p.assurance >= 0.8 for p in plans]
-    assert {plan.reaches_aim for plan in plans} == {True, False}
     inside = replace(SOLVED, half_width=None, lower=0.3, upper=0.9)
     powers = plan_grid(replace(inside, power=0.5), **ranges)  # equivalence
     plans = plan_grid(inside, **ranges)
@@ -67,24 +55,18 @@ def test_grids_aim_at_chances_as_a_single_plan_does() -> None:
 
 
 @pytest.mark.parametrize(
-    ("study", "options", "words"),
+    ("study", "options", "name"),
     [
-        (STUDY, {}, "n_items, n_raters: a grid needs one of them"),
-        (replace(STUDY, half_width=None), {"n_items": 9}, "half_width: needs an aim,"),
-        (STUDY, {**RANGES, "executor": "slurm"}, 'executor: needs "dask"'),
-        (STUDY, {**RANGES, "scheduler": "x:1"}, 'scheduler: is of executor "dask"'),
-        (replace(STUDY, method="wald"), RANGES, "method: a grid is by auto"),
+        (STUDY, {}, "n_items, n_raters"),
+        (replace(STUDY, half_width=None), {"n_items": 9}, "half_width"),
+        (STUDY, {**RANGES, "executor": "slurm"}, "executor"),
+        (STUDY, {**RANGES, "scheduler": "x:1"}, "scheduler"),
+        (replace(STUDY, method="wald"), RANGES, "method"),
     ],
 )
-def test_bad_grids_are_refused(study: Study, options: Any, words: str) -> None:
-    with pytest.raises(ParameterError, match=words):
+def test_bad_grids_are_refused(study: Study, options: Any, name: str) -> None:
+    with pytest.raises(ParameterError, match=f"^{name}: "):
         plan_grid(study, **options)
-
-
-def test_a_scheduler_has_an_address() -> None:
-    pytest.importorskip("distributed")
-    with pytest.raises(ParameterError, match="scheduler: needs an address as tcp"):
-        plan_grid(STUDY, **RANGES, executor="dask", scheduler="nowhere")
 
 
 def test_a_missing_dask_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,7 +1,5 @@
-"""Models are probabilities of ratings: summed, drawn and enumerated alike."""
+"""Models are probabilities of ratings, summed and drawn alike."""
 
-import itertools
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -13,76 +11,6 @@ from masrel.planning._studies import draw
 from masrel.planning._truth import design_of
 
 MODELS = ["mixture", "dirichlet-multinomial", "latent"]
-
-
-def plain_probability(model: str, row: tuple[int, ...], kappa: float) -> float:
-    # of one item's ratings by named raters, two categories of prevalence .7 and .3
-    pi = (0.7, 0.3)
-    if model == "mixture":
-        one = pi[row[0]] if len(set(row)) == 1 else 0.0
-        return kappa * one + (1 - kappa) * math.prod(pi[k] for k in row)
-    scale = (1 - kappa) / kappa  # Pólya's urn
-    counts, p = [0, 0], 1.0
-    for k in row:
-        p *= (pi[k] * scale + counts[k]) / (scale + sum(counts))
-        counts[k] += 1
-    return p
-
-
-def enumerated(model: str, n_items: int, n_raters: int, name: str) -> dict[str, float]:
-    """Every study, rating by rating, with its probability."""
-    rows = list(itertools.product((0, 1), repeat=n_raters))
-    p = [plain_probability(model, row, 0.4) for row in rows]
-    total = half = narrow = 0.0
-    for study in itertools.combinations_with_replacement(range(len(rows)), n_items):
-        freq = np.bincount(study, minlength=len(rows))
-        weight = math.factorial(n_items) / math.prod(map(math.factorial, freq))
-        weight *= math.prod(p[row] for row in study)
-        ratings = [list(rows[row]) for row in study]
-        result = coefficient(name)(ratings, categories=[0, 1])
-        if result.reason is None:
-            h = 1.959963984540054 * result.standard_error
-            total, half = total + weight, half + weight * h
-            narrow += weight * (h <= 0.6)
-    return {"defined": total, "half": half / total, "narrow": narrow}
-
-
-@pytest.mark.filterwarnings("ignore::masrel.errors.UndefinedStatisticWarning")
-@pytest.mark.parametrize("model", MODELS[:2])
-@pytest.mark.parametrize(
-    ("name", "n_items", "n_raters"),
-    [("fleiss_kappa", 6, 2), ("gwet_ac", 4, 3), ("cohen_kappa", 5, 2)],
-)
-def test_the_sum_over_all_studies_is_that_of_an_enumeration(
-    model: str, name: str, n_items: int, n_raters: int
-) -> None:
-    reference = enumerated(model, n_items, n_raters, name)
-    kappa = true_value(name)
-    plan = precision(
-        Study(
-            name,
-            value=kappa,
-            prevalences=[0.7, 0.3],
-            model=model,
-            target="items",
-            n_items=n_items,
-            n_raters=n_raters,
-            half_width=0.6,
-            interval="normal",
-            method="exact",
-        )
-    )
-    assert plan.expected_half_width == pytest.approx(reference["half"], abs=1e-9)
-    assert plan.assurance == pytest.approx(reference["narrow"], abs=1e-9)
-    assert 1.0 - plan.p_undefined == pytest.approx(reference["defined"], abs=1e-9)
-
-
-def true_value(name: str) -> float:
-    # of κ = .4 in the model: .4 but for AC1, 1 - D_o / (2 p (1 - p) + ...) by hand
-    if name != "gwet_ac":
-        return 0.4
-    disagreement = 2 * 0.7 * 0.3 * (1 - 0.4)
-    return 1 - disagreement / (1 - 2 * 0.7 * 0.3)
 
 
 @pytest.mark.parametrize(
