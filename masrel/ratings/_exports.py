@@ -9,13 +9,13 @@ import csv
 import io
 import json
 import re
-import sys
 import tempfile
 import zipfile
 import zlib
 from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -43,8 +43,13 @@ _OLD_WORKBOOK = b"\xd0\xcf\x11\xe0"  # how an .xls begins, in which archives may
 _ERROR_CELL = re.compile(
     rb'<c\s[^>]*?\bt="e"[^>]*>(?:<f[^>]*?(?:/>|>[^<]*</f>))?<v>([^<]*)</v>'
 )
-_OF_ZIP = (zipfile.BadZipFile, zlib.error, EOFError)  # what reading it may raise
+# what readers of other formats raise for bytes that are not theirs
+_ANY: tuple[type[Exception], ...] = (
+    *(ValueError, TypeError, KeyError, OSError, RuntimeError, EOFError),
+    *(zipfile.BadZipFile, zlib.error),
+)
 _EXPORTED = (".json", ".jsonl", ".csv")
+_SOLID = re.compile(r"[^ \t\n\r]")
 _ENCODED = (".sav", ".zsav", ".dta", ".sas7bdat", ".xpt")  # pyreadstat takes theirs
 
 
@@ -66,46 +71,54 @@ def read_typed(
         )
     if options.sheet is not None and suffix not in _WORKBOOKS:
         raise ParameterError(f"--sheet: needed a workbook, got {facts['format']}")
-    first, header = 0, None
-    dropped: dict[str, int] = {}
+    n_above, dropped = 0, dict[str, int]()
     if options.source is not None:
-        files = _json_files(name, suffix, data)
-        frame, facts, dropped = _export(name, options.source, files, options.grade)
+        records = _records(name, suffix, data)
+        frame, facts, dropped = _export(name, options.source, records, options.grade)
     elif suffix in _WORKBOOKS:
-        header, frame, first = _workbook(name, suffix, data, options.sheet, facts)
+        frame, n_above = _workbook(name, suffix, data, options.sheet, facts)
     elif suffix in _ARROW:
-        frame = _arrow(name, suffix, data)
+        arrow = library(name, _ARROW[suffix])
+        read = partial(arrow.read_table, io.BytesIO(data))
+        frame = read_foreign(name, suffix, lambda: table_frame(read()))
     elif suffix in _PYREADSTAT:
         frame = _statistical(name, suffix, data, options.encoding, facts)
     else:
         frame = _objects(name, _json_values(name, suffix, data))
-    names = [str(column) for column in frame.columns] if header is None else header
+    return replace(sheet_of(name, sha256, frame, facts, n_above), dropped=dropped)
+
+
+def sheet_of(
+    name: str,
+    sha256: Callable[[], str],
+    frame: pd.DataFrame,
+    facts: dict[str, Any],
+    n_above: int = 0,
+) -> Sheet:
+    """Return the cells of a frame as texts; n_above: rows above the names."""
+    names = [str(column) for column in frame.columns]
     return Sheet(
         name=name,
         sha256=sha256,
         header=tuple(names),
         columns=tuple(
-            _column(name, names[place], frame.iloc[:, place])
-            for place in range(len(names))
+            column_of(name, title, frame.iloc[:, place])
+            for place, title in enumerate(names)
         ),
         facts=facts,
-        dropped=dropped,
-        line_of=lambda number: f"row {first + number + 1}",
+        unit="row",
+        line_of=lambda number: n_above + number + 1,
     )
 
 
-def _column(name: str, title: str, values: "pd.Series[Any]") -> Column:
-    # the cells of a column as text, empty where a value is missing
-    if values.dtype == object:
-        kinds = set(map(type, values))
-        nested = {list, dict, set, np.ndarray} & kinds
-        if nested:
-            where, kind = f"column {title!r}: ", nested.pop().__name__
-            raise refusal(name, "nested cell", where=where, kind=kind)
-        if {bool, np.bool_} & kinds and len(kinds) > 1:
-            # True equals 1 in Python, and is another grade
-            pairs = zip(values, values.isna(), strict=True)
-            return Column.of_cells("" if lost else value_text(v) for v, lost in pairs)
+def column_of(name: str, title: str, values: "pd.Series[Any]") -> Column:
+    """Return the cells of a column as texts, empty where a value is missing."""
+    kinds = set(map(type, values)) if values.dtype == object else set()
+    if nested := {list, dict, set, np.ndarray} & kinds:
+        where, kind = f"column {title!r}: ", nested.pop().__name__
+        raise refusal(name, "nested cell", where=where, kind=kind)
+    if {bool, np.bool_} & kinds:  # True equals 1 in Python, and is another grade
+        values = values.map(value_text, na_action="ignore")
     codes, known = pd.factorize(values, use_na_sentinel=True)
     # numpy's floats know their precision
     each: Any = known.to_numpy() if known.dtype.kind == "f" else known
@@ -113,55 +126,69 @@ def _column(name: str, title: str, values: "pd.Series[Any]") -> Column:
     return Column.of(np.where(codes < 0, len(each), codes), texts).rows(slice(None))
 
 
-def _read(
+def read_foreign(
     name: str, suffix: str, read: Callable[[], Any], *errors: type[Exception]
 ) -> Any:
-    # Readers of these formats raise what they like for bytes that are not theirs.
-    kinds: tuple[type[Exception], ...] = (ValueError, TypeError, KeyError, *errors)
-    kinds += (OSError, RuntimeError)
+    """Read by a library that raises what it likes for bytes of other formats."""
     try:
         return read()
-    except kinds as error:
+    except _ANY + errors as error:
         lines = str(error).strip().splitlines() or [type(error).__name__]
         line = lines[0][:200].rstrip(". ")
         raise refusal(name, "damaged", suffix=suffix, error=line) from error
 
 
-def _check_unpacked(name: str, suffix: str, data: bytes, most: int, do: str) -> None:
-    def size() -> int:
-        n = 0
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            for member in archive.infolist():
-                # read to its end: where that is said to be may be a lie
-                member.file_size = sys.maxsize
-                with archive.open(member) as packed:
-                    while n <= most and (block := packed.read(1 << 20)):
-                        n += len(block)
-        return n
+def _unzipped(
+    name: str,
+    suffix: str,
+    data: bytes,
+    most: int,
+    do: str,
+    chosen: re.Pattern[str],
+) -> dict[str, bytes]:
+    # the files of an archive that are chosen, if all is not more than fits the memory
+    def read() -> dict[str, bytes] | None:
+        with zipfile.ZipFile(io.BytesIO(data)) as packed:
+            if sum(member.file_size for member in packed.infolist()) > most:
+                return None
+            return {
+                file: packed.read(file)
+                for file in packed.namelist()
+                if chosen.fullmatch(file)
+            }
 
-    if _read(name, suffix, size, *_OF_ZIP) > most:
+    files = read_foreign(name, suffix, read)
+    if files is None:
         raise refusal(name, "unpacked", most=most, it="", do=do)
+    return dict(files)
 
 
 def _workbook(
     name: str, suffix: str, data: bytes, chosen: str | None, facts: dict[str, Any]
-) -> tuple[list[str], pd.DataFrame, int]:
-    # -> names, the cells below them, and how many blank rows are above
+) -> tuple[pd.DataFrame, int]:
+    # -> the cells below their names, and how many blank rows are above
     calamine = library(name, "python_calamine")
     if zipfile.is_zipfile(io.BytesIO(data)) and not data.startswith(_OLD_WORKBOOK):
         do = "save its sheet as CSV, since a large table of text is read piece by piece"
-        _check_unpacked(name, suffix, data, _MAX_WORKBOOK, do)
+        sheets = re.compile(r"xl/worksheets/.*\.xml")  # not of .ods
+        files = _unzipped(name, suffix, data, _MAX_WORKBOOK, do, sheets)
+        # errors of formulas, such as #N/A, which calamine gives as empty cells
+        errors = Counter(e for xml in files.values() for e in _ERROR_CELL.findall(xml))
+        if errors:
+            facts["errors"] = {
+                e.decode("utf-8", "replace"): n for e, n in errors.items()
+            }
 
-    def sheets() -> dict[str, Any]:
+    def stored() -> dict[str, Any]:
         book = calamine.CalamineWorkbook.from_filelike(io.BytesIO(data))
         names = list(map(str, book.sheet_names))
         meant = [n for n in names if chosen in (None, n)]
         return dict.fromkeys(names) | {n: book.get_sheet_by_name(n) for n in meant}
 
-    stored = _read(name, suffix, sheets, calamine.CalamineError)
-    if chosen is not None and chosen not in stored:
-        raise refusal(name, "no sheet", sheet=chosen, sheets=", ".join(stored))
-    meant = {n: cells for n, cells in stored.items() if cells is not None}
+    sheets_of = read_foreign(name, suffix, stored, calamine.CalamineError)
+    if chosen is not None and chosen not in sheets_of:
+        raise refusal(name, "no sheet", sheet=chosen, sheets=", ".join(sheets_of))
+    meant = {n: cells for n, cells in sheets_of.items() if cells is not None}
     filled = {n: cells for n, cells in meant.items() if cells.start is not None}
     if len(filled) > 1:
         raise refusal(name, "sheets", sheets=", ".join(filled))
@@ -171,38 +198,17 @@ def _workbook(
     frame = pd.DataFrame(cells.to_python(skip_empty_area=True), dtype=object)
     # a column without name and cells is a space between others
     frame = frame.loc[:, (frame != "").any(axis=0)]
-    if errors := _read(name, suffix, lambda: _error_cells(suffix, data), *_OF_ZIP):
-        facts["errors"] = errors
-    return [value_text(cell) for cell in frame.iloc[0]], frame[1:], cells.start[0]
+    return frame[1:].set_axis([*map(value_text, frame.iloc[0])], axis=1), cells.start[0]
 
 
-def _error_cells(suffix: str, data: bytes) -> dict[str, int]:
-    # errors of formulas in any sheet, such as #N/A, which calamine gives as empty
-    if suffix not in (".xlsx", ".xlsm"):
-        return {}
-    errors: Counter[str] = Counter()
-    with zipfile.ZipFile(io.BytesIO(data)) as packed:
-        for member in packed.namelist():
-            if member.startswith("xl/worksheets/") and member.endswith(".xml"):
-                texts = _ERROR_CELL.findall(packed.read(member))
-                errors.update(text.decode("utf-8", "replace") for text in texts)
-    return dict(errors)
-
-
-def _arrow(name: str, suffix: str, data: bytes) -> pd.DataFrame:
-    module = library(name, _ARROW[suffix])
-
-    def read() -> pd.DataFrame:
-        # whole numbers beside missing ones stay whole, however many digits they have
-        table = module.read_table(io.BytesIO(data))
-        frame: pd.DataFrame = table.to_pandas(integer_object_nulls=True)
-        return frame
-
-    frame: pd.DataFrame = _read(name, suffix, read)
+def table_frame(table: Any) -> pd.DataFrame:
+    """Return a table of Arrow as a frame, the names of rows that pandas keeps first."""
+    # whole numbers beside missing ones stay whole, however many digits they have
+    frame: pd.DataFrame = table.to_pandas(integer_object_nulls=True)
     if isinstance(frame.index, pd.RangeIndex) and frame.index.name is None:
         return frame
-    names = [str(name or "") for name in frame.index.names]  # of rows, as items have
-    return pd.DataFrame(frame.reset_index(names=names, allow_duplicates=True))
+    names = [str(name or "") for name in frame.index.names]
+    return frame.reset_index(names=names, allow_duplicates=True)
 
 
 def _statistical(
@@ -216,7 +222,7 @@ def _statistical(
     with tempfile.TemporaryDirectory() as folder:  # it reads no bytes, but files
         file = Path(folder) / f"data{suffix}"
         file.write_bytes(data)
-        frame, about = _read(
+        frame, about = read_foreign(
             name,
             suffix,
             lambda: getattr(pyreadstat, _PYREADSTAT[suffix])(str(file), **text),
@@ -235,63 +241,33 @@ def _statistical(
 # ---- JSON ----
 
 
-def _json_files(name: str, suffix: str, data: bytes) -> list[tuple[str, list[Any]]]:
-    # an export's files, each by its name without the ending, "" where it is one alone
-    if not data.startswith(b"PK\3\4"):  # a pipe has no name that says .zip
-        return [("", _json_values(name, suffix, data))]
-    _check_unpacked(name, suffix, data, MAX_UNPACKED, "unpack it and leave files out")
-    files = []
-    with zipfile.ZipFile(io.BytesIO(data)) as packed:
-        for path in map(Path, packed.namelist()):
-            kind = path.suffix.lower()
-            # a Mac adds a folder to every archive
-            if kind in _EXPORTED and path.parts[0] != "__MACOSX":
-                content = packed.read(path.as_posix())
-                where = f"{name}: {path.as_posix()}"
-                files.append((path.stem, _json_values(where, kind, content)))
-    if not files:
-        raise refusal(name, "no export", suffixes=", ".join(_EXPORTED))
-    return files
-
-
 def _json_values(name: str, suffix: str, data: bytes) -> list[Any]:
     # values of JSON, of JSON lines whatever the name ends with, or rows of a CSV file
     try:
-        text = data.decode("utf-8-sig")
+        text = data.decode("utf-8-sig").rstrip()
         if suffix == ".csv":
             return list(csv.DictReader(io.StringIO(text, newline="")))
     except UnicodeDecodeError as error:
         raise refusal(name, "no utf-8", error=error) from error
     except csv.Error as error:
         raise refusal(name, "no table", error=error) from error
-    if suffix != ".jsonl":
-        try:
-            values = _parsed(name, text)
-            return values if isinstance(values, list) else [values]
-        except json.JSONDecodeError as error:
-            if not error.msg.startswith("Extra data"):
-                facts = {"line": error.lineno, "error": error.msg}
-                raise refusal(name, "no JSON", **facts) from error
-    values = []
-    for number, line in enumerate(text.split("\n"), start=1):
-        try:
-            if line.strip():
-                values.append(_parsed(f"{name}: line {number}", line))
-        except json.JSONDecodeError as error:
-            raise refusal(name, "no JSON", line=number, error=error.msg) from error
-    return values
+    values, place = [], 0
+    parse = json.JSONDecoder(object_pairs_hook=partial(_object, name)).raw_decode
+    try:
+        while begun := _SOLID.search(text, place):
+            value, place = parse(text, begun.start())
+            values.append(value)
+    except json.JSONDecodeError as error:
+        raise refusal(name, "no JSON", line=error.lineno, error=error.msg) from error
+    return values[0] if len(values) == 1 and isinstance(values[0], list) else values
 
 
-def _parsed(name: str, text: str) -> Any:
-    def pairs(items: list[tuple[str, Any]]) -> dict[str, Any]:
-        value = dict(items)
-        if len(value) < len(items):  # the json module would keep the last in silence
-            keys = [key for key, _ in items]
-            double = next(key for key in keys if keys.count(key) > 1)
-            raise refusal(name, "same key", key=double)
-        return value
-
-    return json.loads(text, object_pairs_hook=pairs)
+def _object(name: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    value = dict(pairs)
+    if len(value) < len(pairs):  # the json module would keep the last in silence
+        keys = Counter(key for key, _ in pairs)
+        raise refusal(name, "same key", key=keys.most_common(1)[0][0])
+    return value
 
 
 def _objects(name: str, values: list[Any]) -> pd.DataFrame:
@@ -314,6 +290,23 @@ def _objects(name: str, values: list[Any]) -> pd.DataFrame:
 # ---- annotation tools ----
 
 _Records = list[tuple[str, dict[str, Any]]]  # name of the file, or "", and a record
+
+
+def _records(name: str, suffix: str, data: bytes) -> list[tuple[str, Any]]:
+    # the values of an export, each with the name of its file in an archive
+    if not data.startswith(b"PK\3\4"):  # a pipe has no name that says .zip
+        return [("", value) for value in _json_values(name, suffix, data)]
+    do = "unpack it and leave files out"
+    # a Mac adds a folder to every archive
+    chosen = re.compile(r"(?!__MACOSX/).*\.(jsonl?|csv)", re.IGNORECASE)
+    files = _unzipped(name, ".zip", data, MAX_UNPACKED, do, chosen)
+    if not files:
+        raise refusal(name, "no export", suffixes=", ".join(_EXPORTED))
+    return [
+        (Path(file).stem, value)
+        for file, content in files.items()
+        for value in _json_values(f"{name}: {file}", Path(file).suffix.lower(), content)
+    ]
 
 
 @dataclass(slots=True)
@@ -368,14 +361,13 @@ class _Ratings:
 
 
 def _export(
-    name: str, source: str, files: list[tuple[str, list[Any]]], grade: str | None
+    name: str, source: str, records: list[tuple[str, Any]], grade: str | None
 ) -> tuple[pd.DataFrame, dict[str, Any], dict[str, int]]:
     # columns item, rater, the grade, and text where it has any; its facts, and why
     # annotations are left out
     if source not in _TOOLS:
         raise ParameterError(f"--from: needed {', '.join(_TOOLS)}, got {source!r}")
     ratings = _Ratings(name, grade)
-    records = [(who, value) for who, values in files for value in values]
     if not records or not all(isinstance(value, dict) for _, value in records):
         raise ratings.error(f"needed the records of {source}, got no list of objects")
     try:
@@ -387,9 +379,9 @@ def _export(
         ) from error
     if not ratings.rows:
         raise ratings.error(f"needed ratings of {of}, got none")
-    names = ["item", "rater", grade or "grade", "text"]
     if grade in ("item", "rater"):
         raise ratings.error(f"--grade: a field cannot be called {grade!r} here")
+    names = ["item", "rater", grade or "grade", "text"]
     frame = pd.DataFrame(ratings.rows, columns=names, dtype=object)
     if frame.iloc[:, 3].isna().all() or grade == "text":
         frame = frame.iloc[:, :3]

@@ -55,19 +55,67 @@ class ReadingOptions:
             if value != getattr(ReadingOptions(), name)
         }
 
+    @property
+    def whole(self) -> list[str]:
+        """The options that need the whole file in memory."""
+        names = ("by", "session", "clusters", "counts", "table")
+        options = [f"--{name}" for name in names if getattr(self, name)]
+        is_kept = self.repeated == "error"
+        return options + ([] if is_kept else [f"--repeated {self.repeated}"])
+
     def mark(self) -> str | None:
         """Return the separator of cells, None for the file to tell."""
         names = {"auto": None, "tab": "\t", "\\t": "\t", "space": " ", "blanks": " "}
-        mark = names.get(self.delimiter, self.delimiter)
-        if mark is not None and len(mark) != 1:
-            raise ParameterError(
-                f"--delimiter: needed auto, one letter, tab or blanks, got {mark!r}"
-            )
-        if len(self.decimal) != 1 or self.decimal in "+-0123456789eE":
-            raise ParameterError(
-                f"--decimal: needed one letter such as a comma, got {self.decimal!r}"
-            )
-        return mark
+        return names.get(self.delimiter, self.delimiter)
+
+    def check(self) -> None:
+        """Refuse what is wrong whatever the file is."""
+        mark, is_counted = self.mark(), self.counts or self.table
+        is_long = bool(self.rater or self.grade)
+        for is_wrong, text in (
+            (
+                mark is not None and len(mark) != 1,
+                f"--delimiter: needed auto, one letter, tab or blanks, got {mark!r}",
+            ),
+            (
+                len(self.decimal) != 1 or self.decimal in "+-0123456789eE",
+                f"--decimal: needed one letter such as a comma, got {self.decimal!r}",
+            ),
+            (
+                self.stream and self.whole,
+                f"{', '.join(self.whole[:1])}: needs the whole file in memory, and not "
+                "--stream",
+            ),
+            (
+                self.counts and self.table,
+                "--counts, --table: needed one of them, got both",
+            ),
+            (
+                self.session and is_counted,
+                "--session: counts do not say who rated what; --by tells groups apart",
+            ),
+            (
+                self.clusters and is_counted,
+                "--clusters: counts do not say which item is which, so needs ratings",
+            ),
+            (
+                self.missing_codes and is_counted,
+                "--missing: names grades that are missing, and cells of "
+                f"--{'counts' if self.counts else 'table'} are numbers of ratings; got "
+                f"{', '.join(self.missing_codes)}",
+            ),
+            (
+                self.raters and is_long,
+                "--raters names the columns of a wide table, --rater and --grade those "
+                "of a long one: needed one kind, got both",
+            ),
+            (
+                self.no_item and self.item,
+                "--item, --no-item: needed one of them, got both",
+            ),
+        ):
+            if is_wrong:
+                raise ParameterError(text)
 
 
 class Finding(str):
@@ -186,7 +234,6 @@ _TEXTS = {
     "two roles": "{options}: needed each column once, got {column!r} twice",
     "role twice": "{where}: needed one column for the {role}, got {names}: --{role} "
     "chooses one, --ignore leaves a column aside",
-    "same column": "needed different columns for item, rater and grade, got {names}",
     "unknown role": "{where}: looks like one row a rating ({known}): needs {needed}, "
     "{columns}; if its columns are raters, --raters names them, if they are items, "
     "--transpose",

@@ -23,7 +23,7 @@ from masrel.ratings._findings import (
     listed,
     quoted,
 )
-from masrel.ratings._sheet import Codes, Sheet, plain
+from masrel.ratings._sheet import Codes, Column, Sheet, first_rows, plain
 from masrel.scales import MODIFIED_ASHWORTH, Scale
 
 # Whole numbers that programs write for "missing", where they lie far from the others.
@@ -87,7 +87,29 @@ def is_number(text: str) -> bool:
     return bool(_NUMBER.fullmatch(text)) and math.isfinite(float(text))
 
 
-def read_grades(
+def graded(
+    sheet: Sheet, places: Sequence[int], options: ReadingOptions
+) -> tuple[Column, Grades]:
+    """Return the cells of some columns, row by row, and which grades they are."""
+    columns = [sheet.columns[place] for place in places]
+    number: dict[str, int] = {}
+    codes = np.empty((len(sheet.numbers), len(places)), dtype=np.int64)
+    for k, column in enumerate(columns):
+        of_text = [number.setdefault(text, len(number)) for text in column.texts]
+        codes[:, k] = np.array(of_text, dtype=np.int64)[column.codes]
+    cells = Column(codes.ravel(), list(number)).rows(slice(None))
+    first = first_rows(cells.codes, len(cells.texts))
+
+    def where(text: int) -> str:
+        row, k = divmod(int(first[text]), len(places))
+        return f"{sheet.where(row)}, column {sheet.header[places[k]]!r}"
+
+    weights = np.repeat(sheet.n_rows, len(places))
+    n_cells = np.bincount(cells.codes, weights, len(cells.texts)).astype(np.int64)
+    return cells, _read_grades(sheet, cells.texts, n_cells, options, where)
+
+
+def _read_grades(
     sheet: Sheet,
     texts: Sequence[str],
     freq: Codes,

@@ -1,15 +1,13 @@
 """Which column of a sheet is what: named by the caller, else by its usual name."""
 
 import re
-from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from masrel.errors import ParameterError, RatingsError
+from masrel.errors import RatingsError
 from masrel.ratings._findings import (
     USUAL_MISSING,
     Finding,
@@ -18,7 +16,7 @@ from masrel.ratings._findings import (
     quoted,
 )
 from masrel.ratings._grade_texts import is_number, normal_form, spelled_alike
-from masrel.ratings._sheet import Codes, Sheet
+from masrel.ratings._sheet import Codes, Column, Sheet
 from masrel.scales import Scale
 
 Kind = Literal["long", "wide", "counts", "table"]
@@ -40,7 +38,13 @@ USUAL_NAMES = {
 STUDY_COLUMNS = ("session", "rater", "model", "repeat", "grade")
 """Columns of a table that `masrel ratings` writes; it has others, too."""
 
-_ROLES = ("rater", "grade", "session", "by", "clusters")
+# Options that name columns, and which two may name the same: groups may be sessions,
+# raters, or part of the items' names, as clusters may be.
+_NAMED = ("raters", "ignore", "item", "rater", "grade", "session", "by", "clusters")
+_MAY_BE_BOTH = (
+    *({"by", "session"}, {"by", "rater"}, {"by", "item"}, {"by", "clusters"}),
+    {"clusters", "item"},
+)
 
 # Names of columns that are seldom those of raters.
 _NO_RATER = re.compile(
@@ -73,9 +77,8 @@ class Layout:
 
     kind: Kind
     item: tuple[int, ...]  # none where rows are items without names
-    raters: tuple[int, ...] = ()  # of a wide table; categories of a table of counts
-    rater: int = -1  # of a long table, as the grade
-    grade: int = -1
+    raters: tuple[int, ...]  # the one with their names, of a long table; or categories
+    grades: tuple[int, ...]  # the one that has them, of a long table; else the raters'
     session: int | None = None
     by: int | None = None
     clusters: int | None = None
@@ -85,89 +88,53 @@ class Layout:
     @property
     def used(self) -> set[int | None]:
         """The columns that are something."""
-        named = {self.rater, self.grade, self.session, self.by, self.clusters}
-        return {*self.item, *self.raters, *named}
+        named = {self.session, self.by, self.clusters}
+        return {*self.item, *self.raters, *self.grades, *named}
 
 
 def find_layout(sheet: Sheet, options: ReadingOptions) -> Layout:
     """Decide which column is what, or say which option would."""
-    options = _resolved(sheet, options)
-    place = {name: k for k, name in enumerate(sheet.header)}
-    taken = {place[name] for name in options.ignore}
-    by = None if options.by is None else place[options.by]
-    session = _role(sheet, "session", options.session, taken)
-    clusters = None if options.clusters is None else place[options.clusters]
-    taken |= {k for k in (by, session) if k is not None}
-    if clusters is not None and options.clusters not in options.item:
-        taken.add(clusters)
-    if options.counts or options.table:
-        layout = _wide(sheet, "counts" if options.counts else "table", options, taken)
-        return replace(layout, by=by)
-    # the corner of a transposed table names its rows, which are now its columns
-    is_wide = bool(options.raters) or options.no_item
-    is_wide |= sheet.is_transposed and not (options.rater or options.grade)
-    long = None if is_wide else _long(sheet, options, taken)
-    layout = long or _wide(sheet, "wide", options, taken)
-    return replace(layout, session=session, by=by, clusters=clusters)
-
-
-def _resolved(sheet: Sheet, options: ReadingOptions) -> ReadingOptions:
-    # the options with every name checked
+    named = {
+        option: _columns_of(sheet, option, getattr(options, option))
+        for option in _NAMED
+        if getattr(options, option)
+    }
+    _refuse_two_roles(sheet, named)
+    taken = set(named.get("ignore", ()))
+    session = named.get("session") or _usual(sheet, "session", taken)
+    by, clusters = named.get("by", ()), named.get("clusters", ())
+    taken |= {*session, *by, *clusters} - ({*clusters} & {*named.get("item", ())})
     is_counted = options.counts or options.table
-    is_long = bool(options.rater or options.grade)
-    for is_wrong, text in (
-        (
-            options.counts and options.table,
-            "--counts, --table: needed one of them, got both",
-        ),
-        (
-            options.session and is_counted,
-            "--session: counts do not say who rated what; --by tells groups apart",
-        ),
-        (
-            options.clusters and is_counted,
-            "--clusters: counts do not say which item is which, so needs ratings",
-        ),
-        (
-            options.raters and is_long,
-            "--raters names the columns of a wide table, --rater and --grade those of "
-            "a long one: needed one kind, got both",
-        ),
-        (
-            options.no_item and options.item,
-            "--item, --no-item: needed one of them, got both",
-        ),
-    ):
-        if is_wrong:
-            raise ParameterError(text)
-    for role in _ROLES:
-        name: str | None = getattr(options, role)
-        if name is not None and name not in sheet.header:
-            raise _no_column(sheet, f"--{role}", name)
-    options = replace(
-        options,
-        item=_names(sheet, "--item", options.item),
-        raters=_names(sheet, "--raters", options.raters),
-        ignore=_names(sheet, "--ignore", options.ignore),
+    # the corner of a transposed table names its rows, which are now its columns
+    is_wide = is_counted or "raters" in named or options.no_item
+    is_wide |= sheet.is_transposed and not {"rater", "grade"} & named.keys()
+    layout = None if is_wide else _long(sheet, named, taken)
+    if layout is None:
+        layout = _wide(sheet, options, named, taken)
+    return replace(
+        layout,
+        session=None if is_counted or not session else session[0],
+        by=by[0] if by else None,
+        clusters=clusters[0] if clusters else None,
     )
-    _refuse_two_roles(sheet, options)
-    return options
 
 
-def _names(sheet: Sheet, option: str, values: Sequence[str]) -> tuple[str, ...]:
-    # the columns that an option names, between commas or one a value
-    names: list[str] = []
-    for value in values:
-        parts = value.split(",")
+def _columns_of(
+    sheet: Sheet, option: str, values: str | Sequence[str]
+) -> tuple[int, ...]:
+    # the columns that an option names: one, or several between commas or one a value
+    several = [[values]] if isinstance(values, str) else [v.split(",") for v in values]
+    places: list[int] = []
+    for parts in several:
         while parts:
             # the longest name first: names of columns may hold commas
             joined = [",".join(parts[:n]).strip() for n in range(len(parts), 0, -1)]
             name = next((name for name in joined if name in sheet.header), None)
             if name is None:
-                raise _no_column(sheet, option, joined[-1])
-            names.append(name)
+                raise _no_column(sheet, f"--{option}", joined[-1])
+            places.append(sheet.header.index(name))
             parts = parts[len(parts) - joined.index(name) :]
-    return tuple(names)
+    return tuple(places)
 
 
 def _no_column(sheet: Sheet, option: str, name: str) -> RatingsError:
@@ -181,94 +148,122 @@ def _no_column(sheet: Sheet, option: str, name: str) -> RatingsError:
     )
 
 
-def _refuse_two_roles(sheet: Sheet, options: ReadingOptions) -> None:
-    # groups may be sessions, or part of the items' names, as clusters may be
-    roles: dict[str, list[str]] = defaultdict(list)
-    for option in ("raters", "ignore", "item"):
-        for name in getattr(options, option):
-            roles[name].append(f"--{option}")
-    for role in _ROLES:
-        if getattr(options, role) is not None:
-            roles[getattr(options, role)].append(f"--{role}")
-    allowed = {"--item", "--session", "--by", "--rater"}
-    for name, (first, *others) in roles.items():
-        for other in others:
-            both = {first, other}
-            is_part = both in ({"--clusters", "--item"}, {"--clusters", "--by"})
-            is_part |= "--by" in both and both <= allowed and first != other
-            if not is_part:
-                named = ", ".join(dict.fromkeys([first, other]))
-                raise sheet.refuse("two roles", options=named, column=name)
+def _refuse_two_roles(sheet: Sheet, named: dict[str, tuple[int, ...]]) -> None:
+    options_of: dict[int, list[str]] = {}
+    for option, places in named.items():
+        for place in places:
+            for other in options_of.setdefault(place, []):
+                if {other, option} not in _MAY_BE_BOTH:
+                    both = ", ".join(f"--{o}" for o in dict.fromkeys([other, option]))
+                    name = sheet.header[place]
+                    raise sheet.refuse("two roles", options=both, column=name)
+            options_of[place].append(option)
 
 
-def _role(sheet: Sheet, role: str, name: str | None, taken: set[int]) -> int | None:
-    # the column of a role: the one that is named, else the one with a usual name
-    if name is not None:
-        return sheet.header.index(name)
+def _usual(sheet: Sheet, role: str, taken: set[int]) -> tuple[int, ...]:
+    # the column that has a usual name of a role, or none
     usual = USUAL_NAMES[role]
     named = (k for k, n in enumerate(sheet.header) if n.casefold() in usual)
-    places = [place for place in named if place not in taken]
+    places = tuple(place for place in named if place not in taken)
     if len(places) > 1:
         names = " and ".join(sheet.header[place] for place in places)
-        raise sheet.refuse("role twice", where=sheet.line_of(0), role=role, names=names)
-    return places[0] if places else None
+        raise sheet.refuse("role twice", where=sheet.at(0), role=role, names=names)
+    return places
 
 
-def _long(sheet: Sheet, options: ReadingOptions, taken: set[int]) -> Layout | None:
+def _long(
+    sheet: Sheet, named: dict[str, tuple[int, ...]], taken: set[int]
+) -> Layout | None:
     # None where the table is not long
     header = sheet.header
-    item = tuple(map(header.index, options.item))
-    named = {header.index(n) for n in (options.rater, options.grade) if n is not None}
-    taken = taken | named | {*item}
-    roles: dict[str, tuple[int, ...]] = {"item": item}
+    roles = {role: named.get(role, ()) for role in ("item", "rater", "grade")}
+    taken = taken.union(*roles.values())
     for role in ("rater", "grade"):
-        place = _role(sheet, role, getattr(options, role), taken)
-        roles[role] = () if place is None else (place,)
+        roles[role] = roles[role] or _usual(sheet, role, taken)
     if not roles["rater"] and not roles["grade"]:
         return None
-    taken = taken | {*roles["rater"], *roles["grade"]}
-    if not item and set(STUDY_COLUMNS) <= set(header):
+    taken = taken.union(*roles.values())
+    if not roles["item"] and set(STUDY_COLUMNS) <= set(header):
         roles["item"] = header.index("model"), header.index("repeat")
-    elif not item:
-        place = _role(sheet, "item", None, taken)
-        roles["item"] = () if place is None else (place,)
-    left = [k for k in range(len(header)) if k not in taken | {*roles["item"]}]
+    roles["item"] = roles["item"] or _usual(sheet, "item", taken)
+    left = set(range(len(header))) - taken.union(roles["item"])
     unknown = [role for role, places in roles.items() if not places]
     if len(unknown) == len(left) == 1:
-        roles[unknown.pop()] = (left[0],)
+        roles[unknown.pop()] = tuple(left)
     if unknown:
         known = (f"the {r} is {header[p[0]]!r}" for r, p in roles.items() if p)
         raise sheet.refuse(
             "unknown role",
-            where=sheet.line_of(0),
+            where=sheet.at(0),
             known=", ".join(known),
             needed=" and ".join(f"--{role}" for role in unknown),
             columns=f"but {listed(header, 12)}",
         )
-    every = [place for places in roles.values() for place in places]
-    if len({*every}) < len(every):
-        names = ", ".join(header[place] for place in every)
-        raise sheet.refuse("same column", names=names)
-    rater, grade = roles["rater"][0], roles["grade"][0]
-    return Layout(kind="long", item=roles["item"], rater=rater, grade=grade)
+    item, raters, grades = roles.values()
+    return Layout(kind="long", item=item, raters=raters, grades=grades)
 
 
-def _wide(sheet: Sheet, kind: Kind, options: ReadingOptions, taken: set[int]) -> Layout:
-    header = sheet.header
-    raters = tuple(map(header.index, options.raters))
-    item, is_guessed = tuple(map(header.index, options.item)), False
+def _wide(
+    sheet: Sheet,
+    options: ReadingOptions,
+    named: dict[str, tuple[int, ...]],
+    taken: set[int],
+) -> Layout:
+    # a wide table, or one of counts
+    kind: Kind = "counts" if options.counts else "table" if options.table else "wide"
+    item, raters, is_guessed = named.get("item", ()), named.get("raters", ()), False
+    places = range(len(sheet.header))
     if not item and not options.no_item:
-        others = {*taken, *raters}
-        place = None if kind == "table" else _role(sheet, "item", None, others)
-        free = [k for k in range(len(header)) if k not in others]
-        is_guessed = place is None and bool(free)
-        item = tuple(free[:1]) if place is None else (place,)
-    used = taken | {*item}
-    raters = raters or tuple(k for k in range(len(header)) if k not in used)
+        others = taken.union(raters)
+        item = () if kind == "table" else _usual(sheet, "item", others)
+        if not item:
+            item = tuple([place for place in places if place not in others][:1])
+            is_guessed = bool(item)
+    raters = raters or tuple(k for k in places if k not in taken.union(item))
     if not raters:
         what = "a rater" if kind == "wide" else "a category"
-        raise sheet.refuse("no rater", where=sheet.line_of(0), what=what)
-    return Layout(kind=kind, item=item, raters=raters, is_item_guessed=is_guessed)
+        raise sheet.refuse("no rater", where=sheet.at(0), what=what)
+    return Layout(
+        kind=kind, item=item, raters=raters, grades=raters, is_item_guessed=is_guessed
+    )
+
+
+def named(sheet: Sheet, role: str, places: Sequence[int]) -> Column:
+    """Return what items or raters are called, by one column or several together."""
+    columns = [sheet.columns[place] for place in places]
+    for place, column in zip(places, columns, strict=True):
+        for text in set(USUAL_MISSING).intersection(column.texts):
+            row = int(np.argmax(column.is_text(text)))
+            raise sheet.refuse("unnamed", sheet.where(row), place, role=role, got=text)
+    if len(columns) == 1:
+        return columns[0]
+    codes, names = together(columns)
+    return Column(codes, [" ".join(texts) for texts in names])
+
+
+def together(columns: Sequence[Column]) -> tuple[Codes, list[tuple[str, ...]]]:
+    """Return the number of every row's texts in some columns, and these texts."""
+    number: dict[tuple[int, ...], int] = {}
+    rows = zip(*(column.codes.tolist() for column in columns), strict=True)
+    codes = [number.setdefault(row, len(number)) for row in rows]
+    texts = [
+        tuple(column.texts[k] for column, k in zip(columns, row, strict=True))
+        for row in number
+    ]
+    return np.array(codes, dtype=np.int64), texts
+
+
+def rated_twice(
+    sheet: Sheet, layout: Layout, rows: Codes, item: str, rater: str, hint: str = ""
+) -> RatingsError:
+    """Return the error of a rating that is there twice."""
+    guess = ""
+    if layout.kind == "wide":
+        guess = ", --rater and --grade name the columns of one row a rating"
+    guess += ", --no-item says that no column names items" * layout.is_item_guessed
+    where = " and ".join(sheet.where(row) for row in rows.tolist())
+    facts = {"item": item, "rater": rater, "hint": hint, "guess": guess}
+    return sheet.refuse("twice", rows=where, **facts)
 
 
 # ---- what looks as if it were something else ----
@@ -312,7 +307,9 @@ def doubt_columns(
     if alone and len(names) > 1:
         findings.append(Finding("apart", columns=listed(alone), names=quoted(alone)))
     findings += _looks_counted(names, codes, scale, freq)
-    return findings + _second_header(sheet, codes, scale)
+    findings += _second_header(sheet, codes, scale)
+    unrated = np.flatnonzero((codes < 0).all(axis=0))[:_SHOWN]
+    return findings + [Finding("no grade of", rater=names[k]) for k in unrated]
 
 
 def _first_line(
@@ -360,7 +357,7 @@ def _first_column(sheet: Sheet, layout: Layout, scale: Scale) -> list[Finding]:
     facts: dict[str, Any] = {"column": name, "name": quoted([name])}
     if len(texts) < len(sheet.numbers):
         if n_in_scale == len(texts):
-            raise sheet.refuse("first column", where=sheet.line_of(0), **facts)
+            raise sheet.refuse("first column", where=sheet.at(0), **facts)
         return []  # refused as repeated
     if max(n_in_scale, n_near) < len(texts) / 2 or _ITEM_NAME.fullmatch(name):
         return []
@@ -370,7 +367,7 @@ def _first_column(sheet: Sheet, layout: Layout, scale: Scale) -> list[Finding]:
 def _unlike(codes: Codes, scale: Scale) -> set[int]:
     # columns without a grade, or a value, in common with any other
     n_grades = len(scale.grades)
-    rated = [np.flatnonzero(_counts(column, n_grades)) for column in codes.T]
+    rated = [np.unique(column[column >= 0]) for column in codes.T]
     known = np.flatnonzero([len(grades) for grades in rated])
     if len(known) < 2:
         return set()
@@ -381,10 +378,6 @@ def _unlike(codes: Codes, scale: Scale) -> set[int]:
         return set(known[n_like == 1].tolist())  # each is like itself
     n_columns = np.bincount(np.concatenate(rated), minlength=n_grades)
     return {int(k) for k in known if (n_columns[rated[k]] == 1).all()}
-
-
-def _counts(codes: Codes, n_grades: int) -> NDArray[np.int64]:
-    return np.bincount(codes + 1, minlength=n_grades + 1)[1:]
 
 
 def _looks_counted(
@@ -415,7 +408,7 @@ def _second_header(sheet: Sheet, codes: Codes, scale: Scale) -> list[Finding]:
         return []
     if all(map(is_number, scale.grades)):
         return []
-    rest = _counts(codes[1:].ravel(), len(scale.grades))
+    rest = np.bincount(codes[1:].ravel() + 1, minlength=len(scale.grades) + 1)[1:]
     n_met = np.count_nonzero(rest) + bool((codes[1:] < 0).any())
     is_known = (rest[codes[0][codes[0] >= 0]] > 0).any()
     if is_known or n_met > codes[1:].size / 2:

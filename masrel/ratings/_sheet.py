@@ -14,16 +14,15 @@ import sys
 import unicodedata
 import zipfile
 import zlib
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import date, datetime
 from decimal import Decimal
 from functools import partial
 from itertools import chain, count, islice
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +62,7 @@ _MARKS = {  # how files begin that are no text, and what their names end in
     b"%PDF": ".pdf, which is not read",
 }
 _UNPLAIN = re.compile(r"[^\x21-\x7e]")  # blanks, and letters that may have two forms
-_SNIFFED = 20, 1 << 16  # lines, and letters, that the separator is found in
+_SNIFFED = 20  # lines that the separator is found in
 _CHUNK = 1 << 14  # records that are taken apart at once
 _END = "\0"  # a record behind the last, which a quote that stays open swallows
 
@@ -79,27 +78,29 @@ class Column:
     texts: list[str]  # in the order first met, without blanks around
 
     @classmethod
-    def of(cls, codes: Codes, cells: Sequence[str]) -> "Column":
+    def of(cls, codes: Codes, cells: Iterable[str]) -> "Column":
         """Take cells that differ, some of them by blanks or Unicode forms alone."""
-        if not _UNPLAIN.search("".join(cells)):
+        if not _UNPLAIN.search("".join(cells)):  # as names and grades are, as a rule
             return cls(codes, list(cells))
         number: dict[str, int] = {}
-        places = [number.setdefault(plain(c), len(number)) for c in cells]
-        if len(number) < len(cells):
-            codes = np.array(places, dtype=np.int64)[codes]
-        return cls(codes, list(number))
+        places = [number.setdefault(plain(cell), len(number)) for cell in cells]
+        return cls(np.array(places, dtype=np.int64)[codes], list(number))
 
     @classmethod
     def of_cells(cls, cells: Iterable[str]) -> "Column":
         """Take cells row by row."""
-        number: dict[str, int] = defaultdict(count().__next__)  # a new one is the next
-        codes = np.array([number[cell] for cell in cells], dtype=np.int64)
-        return cls.of(codes, list(number))
+        number: dict[str, int] = {}
+        codes = [number.setdefault(cell, len(number)) for cell in cells]
+        return cls.of(np.array(codes, dtype=np.int64), number)
 
     def rows(self, chosen: Any) -> "Column":
-        """Return some of the rows."""
-        codes, met = first_met(self.codes[chosen])
-        return Column(codes, [self.texts[k] for k in met.tolist()])
+        """Return some of the rows, with the texts of these alone."""
+        codes = self.codes[chosen]
+        first = first_rows(codes, len(self.texts))
+        met = np.argsort(first, kind="stable")[: int((first < len(codes)).sum())]
+        rank = np.zeros(len(first), dtype=np.int64)
+        rank[met] = np.arange(len(met))
+        return Column(rank[codes], [self.texts[k] for k in met.tolist()])
 
     def is_text(self, text: str) -> NDArray[np.bool_]:
         """Return which rows hold a text."""
@@ -109,6 +110,13 @@ class Column:
     def cells(self) -> list[str]:
         """Return the text of every row."""
         return [self.texts[code] for code in self.codes.tolist()]
+
+
+def first_rows(codes: Codes, n_codes: int) -> Codes:
+    """Return where each code is met first."""
+    first = np.full(n_codes, len(codes))
+    first[codes[::-1]] = np.arange(len(codes) - 1, -1, -1)
+    return first
 
 
 def plain(text: str) -> str:
@@ -134,22 +142,6 @@ def value_text(value: Any) -> str:
     return str(value)
 
 
-def first_met(codes: Codes) -> tuple[Codes, Codes]:
-    """Return codes numbered in the order in which they are met, and which they were."""
-    first = first_rows(codes, int(codes.max(initial=-1)) + 1)
-    places = np.argsort(first, kind="stable")[: int((first < len(codes)).sum())]
-    rank = np.zeros(len(first), dtype=np.int64)
-    rank[places] = np.arange(len(places))
-    return rank[codes], places
-
-
-def first_rows(codes: Codes, n_codes: int) -> Codes:
-    """Return where each code is met first."""
-    first = np.full(n_codes, len(codes))
-    first[codes[::-1]] = np.arange(len(codes) - 1, -1, -1)
-    return first
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sheet:
     """A file as text, column by column."""
@@ -160,17 +152,28 @@ class Sheet:
     columns: tuple[Column, ...] = field(repr=False)
     # (n_rows,): number of the record of every row in the file; the names are 0
     numbers: Codes = field(default_factory=lambda: np.arange(0), repr=False)
+    freq: Codes | None = field(default=None, repr=False)  # of every row, if not once
     # format; delimiter, encoding or sheet; what codes are called
     facts: dict[str, Any] = field(default_factory=dict)
     dropped: dict[str, int] = field(default_factory=dict)  # why rows are left out
     has_header: bool = True
     is_transposed: bool = False  # whether rows and columns are exchanged
     is_simulated: bool = False  # whether a comment at its head says so
-    line_of: Callable[[int], str]  # number of a record to where it stands
+    unit: str = "line"  # in which a record is
+    line_of: Callable[[int], int]  # number of a record to the line that it is in
+
+    @property
+    def n_rows(self) -> Codes:
+        """How many rows of the file each row stands for."""
+        return np.ones_like(self.numbers) if self.freq is None else self.freq
+
+    def at(self, number: int) -> str:
+        """Return where a record, the names from 0, stands in the file."""
+        return f"{self.unit} {self.line_of(number)}"
 
     def where(self, row: int) -> str:
         """Return where a row, from 0, stands in the file."""
-        return self.line_of(int(self.numbers[row]))
+        return self.at(int(self.numbers[row]))
 
     def refuse(
         self, code: str, at: str = "", place: int | None = None, /, **facts: Any
@@ -180,6 +183,12 @@ class Sheet:
         where = f"{self.name}: {at}{column}" if at else self.name
         return refusal(where, code, **facts)
 
+    def hold(self, texts: Sequence[str]) -> NDArray[np.bool_]:
+        """Return which rows have these texts in their columns."""
+        columns = zip(self.columns, texts, strict=True)
+        same = [column.is_text(text) for column, text in columns]
+        return np.array(np.all(same, axis=0))
+
     def without(self, rows: NDArray[np.bool_], why: str) -> "Sheet":
         """Leave rows out, and say so."""
         if not rows.any():
@@ -188,69 +197,53 @@ class Sheet:
             self,
             columns=tuple(column.rows(~rows) for column in self.columns),
             numbers=self.numbers[~rows],
-            dropped={**self.dropped, why: int(rows.sum())},
+            freq=None if self.freq is None else self.freq[~rows],
+            dropped={**self.dropped, why: int(self.n_rows[rows].sum())},
         )
 
 
 def finished(sheet: Sheet, options: ReadingOptions) -> Sheet:
     """Turn a sheet as it was stored as the options say, and check its names."""
     header, columns = list(sheet.header), list(sheet.columns)
-    if options.transpose:
+    if options.transpose or options.no_header:
         cells = [[n, *c.cells()] for n, c in zip(header, columns, strict=True)]
-        records = list(zip(*cells, strict=True))
-        header = [record[0] for record in records]
-        columns = [Column.of_cells(record[1:]) for record in records]
-        sheet = replace(sheet, is_transposed=True, line_of=_column_number)
-    start = int(not options.no_header)
-    if options.no_header:
-        columns = [
-            Column.of_cells([name, *column.cells()])
-            for name, column in zip(header, columns, strict=True)
-        ]
-        header = [str(n) for n in range(1, len(columns) + 1)]
-    n_rows = len(columns[0].codes) if columns else 0
+        if options.transpose:
+            cells = list(map(list, zip(*cells, strict=True)))
+            sheet = replace(sheet, is_transposed=True, unit="column", line_of=_next)
+        if options.no_header:
+            header = [str(n) for n in range(1, len(cells) + 1)]
+        else:
+            header = [name for name, *_ in cells]
+            cells = [rest for _, *rest in cells]
+        columns = list(map(Column.of_cells, cells))
     header = [name.strip() for name in header]
     # a separator at the end of every line makes a column without name and cells
     if header and not header[-1] and set(columns[-1].texts) <= {""}:
         header, columns = header[:-1], columns[:-1]
-    _check_names(sheet, header)
+    if "" in header[1:]:  # the first may be R's or pandas' row names
+        place = header.index("", 1) + 1
+        raise sheet.refuse("no name", where=sheet.at(0), column=place)
+    if len(set(header)) < len(header):
+        twice = next(name for name, n in Counter(header).items() if n > 1)
+        raise sheet.refuse("same name", where=sheet.at(0), column=twice)
+    n_rows = len(columns[0].codes) if columns else 0
     sheet = replace(
         sheet,
         header=tuple(header),
         columns=tuple(columns),
-        numbers=np.arange(start, start + n_rows),
+        numbers=np.arange(n_rows) + (not options.no_header),
         has_header=not options.no_header,
     )
-    blank = _rows_of(sheet, [""] * len(header))
-    sheet = sheet.without(blank, "blank")
-    again = _rows_of(sheet, header)
-    if sheet.has_header and again.any():
-        raise sheet.refuse("names again", sheet.where(int(np.argmax(again))))
+    if header:
+        sheet = sheet.without(sheet.hold([""] * len(header)), "blank")
+        again = sheet.hold(header)
+        if sheet.has_header and again.any():
+            raise sheet.refuse("names again", sheet.where(int(np.argmax(again))))
     return sheet
 
 
-def _column_number(number: int) -> str:
-    return f"column {number + 1}"
-
-
-def _rows_of(sheet: Sheet, texts: Sequence[str]) -> NDArray[np.bool_]:
-    # which rows hold these texts
-    same = np.full(len(sheet.numbers), bool(texts))
-    for column, text in zip(reversed(sheet.columns), reversed(texts), strict=True):
-        if not same.any():
-            break
-        same &= column.is_text(text)
-    return same
-
-
-def _check_names(sheet: Sheet, header: Sequence[str]) -> None:
-    seen: set[str] = set()
-    for position, name in enumerate(header, start=1):
-        if not name and position > 1:  # the first may be R's or pandas' row names
-            raise sheet.refuse("no name", where=sheet.line_of(0), column=position)
-        if name in seen:
-            raise sheet.refuse("same name", where=sheet.line_of(0), column=name)
-        seen.add(name)
+def _next(number: int) -> int:
+    return number + 1
 
 
 # ---- bytes ----
@@ -274,40 +267,36 @@ def bytes_of(path: Path | str) -> bytes:
 
 def unpacked(name: str, data: bytes, *, is_export: bool) -> tuple[str, bytes]:
     """Return what is in a packed file, by its suffix: the name without it, and it."""
-    stem, suffix = name.removesuffix(Path(name).suffix), Path(name).suffix.lower()
     packed = next((e for mark, e in _PACKED.items() if data.startswith(mark)), None)
-    suffix = packed or suffix  # a pipe has no suffix
-    stem = stem if name.lower().endswith(suffix) else name
+    suffix = packed or Path(name).suffix.lower()  # a pipe has no suffix
+    inner = name[: -len(suffix)] if name.lower().endswith(suffix) else name
+    stored = io.BytesIO(data)
     try:
         if suffix == ".gz":
-            return stem, _within(name, gzip.GzipFile(fileobj=io.BytesIO(data)))
-        if suffix == ".xz":
-            return stem, _within(name, lzma.LZMAFile(io.BytesIO(data)))
-        if suffix == ".zip":
-            with zipfile.ZipFile(io.BytesIO(data)) as archive:
-                members = [m for m in archive.namelist() if not m.endswith("/")]
-                if len(members) > 1 and is_export:  # such as a file of each annotator
-                    return f"{stem}.zip", data
-                if len(members) != 1:
-                    some = ", ".join(members[:5])
-                    raise refusal(name, "members", n=len(members), members=some)
-                with archive.open(members[0]) as member:
-                    return members[0], _within(name, member)
+            data = gzip.open(stored).read(MAX_UNPACKED + 1)
+        elif suffix == ".xz":
+            data = lzma.open(stored).read(MAX_UNPACKED + 1)
+        elif suffix == ".zip":
+            archive = zipfile.ZipFile(stored)
+            members = [m for m in archive.namelist() if not m.endswith("/")]
+            if len(members) > 1 and is_export:  # such as a file of each annotator
+                return f"{inner}.zip", data
+            if len(members) != 1:
+                some = ", ".join(members[:5])
+                raise refusal(name, "members", n=len(members), members=some)
+            inner = members[0]
+            data = archive.open(inner).read(MAX_UNPACKED + 1)
+        else:
+            return name, data
     except (
         *(OSError, EOFError, zlib.error, lzma.LZMAError, zipfile.BadZipFile),
         *(RuntimeError, NotImplementedError),  # encrypted, packed in another way
     ) as error:
         raise refusal(name, "damaged", suffix=suffix, error=error) from error
-    return name, data
-
-
-def _within(name: str, packed: IO[bytes] | gzip.GzipFile) -> bytes:
-    # What is in a packed file, if it is not so much that it fills the memory
-    data = packed.read(MAX_UNPACKED + 1)
-    if len(data) > MAX_UNPACKED:
+    if len(data) > MAX_UNPACKED:  # it would fill the memory
         do = "unpack it, since a large table is read piece by piece"
         raise refusal(name, "unpacked", most=MAX_UNPACKED, it="it is ", do=do)
-    return data
+    return inner, data
 
 
 def decoded(name: str, data: bytes, encoding: str | None, n_before: int = 0) -> str:
@@ -334,7 +323,7 @@ def decoded(name: str, data: bytes, encoding: str | None, n_before: int = 0) -> 
             f"--encoding: there is none called {encoding!r}"
         ) from error
     if "\0" in text:
-        line = text.count("\n", 0, text.index("\0")) + 1
+        line = n_before + text.count("\n", 0, text.index("\0")) + 1
         hint = "; --encoding utf-16 may be right" if 0 in data[:4] else ""
         raise refusal(name, "zero byte", line=line, hint=hint)
     text = text.removeprefix("\ufeff")
@@ -344,17 +333,6 @@ def decoded(name: str, data: bytes, encoding: str | None, n_before: int = 0) -> 
 # ---- text ----
 
 
-@contextmanager
-def long_cells() -> Iterator[None]:
-    """Let the csv module read cells of any length; the limit is that of all readers."""
-    limit = csv.field_size_limit(2**31 - 1)
-    try:
-        yield
-    finally:
-        csv.field_size_limit(limit)
-
-
-@long_cells()
 def read_text(
     name: str, sha256: Callable[[], str], text: str, kind: str, options: ReadingOptions
 ) -> Sheet:
@@ -366,14 +344,15 @@ def read_text(
     text, n_before = text[start:], text.count("\n", 0, start)
     if not text.strip():
         raise refusal(name, "no records")
-    delimiter, widths = _separator(name, text, delimiter)
+    delimiter, (n_names, *below) = _separator(name, text, delimiter)
     called = DELIMITERS.get(delimiter, delimiter)
     # R's write.table has no name above its row names
-    has_row_names = len(widths) > 1 and set(widths[1:]) == {widths[0] + 1}
-    if widths[0] + has_row_names < 2:
-        first, line = text.splitlines()[0].strip()[:60], n_before + 1
+    has_row_names = bool(below) and set(below) == {n_names + 1}
+    if n_names + has_row_names < 2:
+        first = text.splitlines()[0].strip()[:60]
         mark = DELIMITERS.get(delimiter, repr(delimiter))
-        raise refusal(name, "other separator", line=line, delimiter=mark, first=first)
+        facts = {"line": n_before + 1, "delimiter": mark, "first": first}
+        raise refusal(name, "other separator", **facts)
     sheet = Sheet(
         name=name,
         sha256=sha256,
@@ -385,13 +364,18 @@ def read_text(
             "encoding": options.encoding or "utf-8",
         },
         is_simulated=any("SIMULATED" in comment for comment in comments),
-        line_of=partial(_line_of, text, delimiter, n_before),
+        line_of=partial(
+            line_of, partial(io.StringIO, text, newline=""), delimiter, n_before
+        ),
     )
-    header, columns = _columns(sheet, text, delimiter, widths[0], int(has_row_names))
+    lines = chain(io.StringIO(text, newline=""), [_END])
+    reader = reader_of(lines, delimiter)
+    header = next(record for record in reader if not _is_blank(record))
+    columns = _columns(sheet, reader, n_names + has_row_names)
     if has_row_names:
         is_last_empty = set(columns[-1].texts) <= {""}
         header = [*header, ""] if is_last_empty else ["", *header]
-    return replace(sheet, header=tuple(header), columns=tuple(columns))
+    return replace(sheet, header=tuple(header), columns=columns)
 
 
 def _comments(
@@ -408,61 +392,52 @@ def _comments(
             below = line.rstrip("\r\n")
             break
         start += len(line)
-    for candidate in [delimiter] if delimiter else [",", ";", "\t", "|"]:
-        if not comments or (candidate == " " and comments[-1].startswith("# ")):
+    for mark in [delimiter] if delimiter else [",", ";", "\t", "|"]:
+        if not comments or (mark == " " and comments[-1].startswith("# ")):
             continue
         n_cells, n_below = (
-            len(next(records([line], candidate), (0, []))[1])
-            for line in (comments[-1], below)
+            len(next(reader_of([line], mark), ())) for line in (comments[-1], below)
         )
         if 1 < n_cells == n_below:
-            if re.match(r"#\s+[^\s,;|]", comments[-1]) and candidate != "\t":
+            if re.match(r"#\s+[^\s,;|]", comments[-1]) and mark != "\t":
                 line_number = text.count("\n", 0, last) + 1
                 raise refusal(name, "comment or header", line=line_number)
             return comments[:-1], last
     return comments, start
 
 
-def _reader(lines: Iterable[str], delimiter: str) -> Any:
+def reader_of(lines: Iterable[str], delimiter: str) -> Any:
+    """Return a reader of records, by the csv module."""
+    csv.field_size_limit(2**31 - 1)  # cells may be of any length
     if delimiter == " ":  # any number of blanks or tabs, as R's write.table writes
         lines = (line.rstrip(" \t\r\n").replace("\t", " ") for line in lines)
     is_skipped = delimiter != "\t"
     return csv.reader(lines, delimiter=delimiter, skipinitialspace=is_skipped)
 
 
-def records(
-    lines: Iterable[str], delimiter: str, n_before: int = 0
-) -> Iterator[tuple[int, list[str]]]:
-    """Yield the line where each record begins, and its cells, without blank lines."""
-    reader, begins = _reader(lines, delimiter), n_before + 1
-    for record in reader:
-        if not _is_blank(record):
-            yield begins, record
-        begins = n_before + reader.line_num + 1
-
-
 def _is_blank(record: list[str]) -> bool:
     return len(record) < 2 and not "".join(record).strip(" \t")
 
 
-@long_cells()
-def _line_of(text: str, delimiter: str, n_before: int, number: int) -> str:
-    # where a record begins, looked up only for a message
-    lines = records(io.StringIO(text, newline=""), delimiter, n_before)
-    line, _ = next(islice(lines, number, None), (None, []))
-    return "the end" if line is None else f"line {line}"
+def line_of(
+    lines: Callable[[], Iterable[str]], delimiter: str, n_before: int, number: int
+) -> int:
+    """Return the line where a record begins, looked up only for a message."""
+    reader, begins = reader_of(lines(), delimiter), n_before + 1
+    for record in reader:
+        if not _is_blank(record):
+            if number == 0:
+                return begins
+            number -= 1
+        begins = n_before + reader.line_num + 1
+    return begins
 
 
 def _separator(name: str, text: str, delimiter: str | None) -> tuple[str, list[int]]:
     # what stands between cells, and how many cells the first records have
-    head, n_letters = [], 0
-    for line in filter(str.strip, io.StringIO(text, newline="")):
-        head.append(line)
-        n_letters += len(line)
-        if len(head) == _SNIFFED[0] or (len(head) > 3 and n_letters > _SNIFFED[1]):
-            break
+    head = list(islice(filter(str.strip, io.StringIO(text, newline="")), _SNIFFED))
     widths = {
-        mark: [len(record) for _, record in records(head, mark)]
+        mark: [len(record) for record in reader_of(head, mark) if not _is_blank(record)]
         for mark in ([delimiter] if delimiter else DELIMITERS)
     }
     if delimiter:
@@ -491,43 +466,45 @@ def _separator(name: str, text: str, delimiter: str | None) -> tuple[str, list[i
     return mark, widths[mark]
 
 
-def _columns(
-    sheet: Sheet, text: str, delimiter: str, n_names: int, n_more: int
-) -> tuple[list[str], list[Column]]:
-    # the names, and the cells below them, n_more than names
-    width = n_names + n_more
-    reader = _reader(chain(io.StringIO(text, newline=""), [_END]), delimiter)
-    header = next(record for record in reader if not _is_blank(record))
+def _columns(sheet: Sheet, reader: Any, width: int) -> tuple[Column, ...]:
+    # the cells below the names
     numbers: list[dict[str, int]]
-    numbers = [defaultdict(count().__next__) for _ in range(width)]
+    numbers = [defaultdict(count().__next__) for _ in range(width)]  # the next is new
     codes: list[list[Codes]] = [[np.zeros(0, dtype=np.int64)] for _ in range(width)]
-    n_rows, is_closed = 0, False
     # lists of text are no cycles, and to look for some in them takes as long as to read
     with collector_off():
-        while chunk := list(islice(reader, _CHUNK)):
-            if set(map(len, chunk)) != {width}:
-                chunk = [record for record in chunk if not _is_blank(record)]
-                is_closed = chunk[-1:] == [[_END]]
-                _check_widths(sheet, chunk[: len(chunk) - is_closed], width, n_rows)
-                chunk = chunk[: len(chunk) - is_closed]
-            for k, cells in enumerate(zip(*chunk, strict=True)):
+        for records in checked_records(sheet, reader, width):
+            for k, cells in enumerate(zip(*records, strict=True)):
                 part = map(numbers[k].__getitem__, cells)
-                codes[k].append(np.fromiter(part, np.int64, len(chunk)))
-            n_rows += len(chunk)
-    if not is_closed:
-        raise sheet.refuse("open quote", where=sheet.line_of(n_rows))
+                codes[k].append(np.fromiter(part, np.int64, len(records)))
     parts = zip(codes, numbers, strict=True)
-    return header, [Column.of(np.concatenate(c), list(n)) for c, n in parts]
+    return tuple(Column.of(np.concatenate(codes), number) for codes, number in parts)
+
+
+def checked_records(
+    sheet: Sheet, reader: Any, width: int, n_rows: int = 1
+) -> Iterator[list[list[str]]]:
+    """Yield records, many at once, or refuse the first that has other cells."""
+    # of a reader whose last line is the end's; n_rows: records above, with the names
+    is_closed = False
+    while records := list(islice(reader, _CHUNK)):
+        if set(map(len, records)) != {width}:
+            records = [record for record in records if not _is_blank(record)]
+            is_closed = records[-1:] == [[_END]]
+            records = records[: len(records) - is_closed]
+            _check_widths(sheet, records, width, n_rows)
+        yield records
+        n_rows += len(records)
+    if not is_closed:
+        raise sheet.refuse("open quote", where=sheet.at(n_rows - 1))
 
 
 def _check_widths(
-    sheet: Sheet, chunk: Sequence[list[str]], width: int, n_rows: int
+    sheet: Sheet, records: Sequence[list[str]], width: int, n_rows: int
 ) -> None:
-    for number, record in enumerate(chunk, start=n_rows + 1):
-        if record[-1].endswith(_END):
-            raise sheet.refuse("open quote", where=sheet.line_of(number))
+    for number, record in enumerate(records, n_rows):
         if len(record) != width:
-            where, cells = sheet.line_of(number), ", ".join(record)[:60]
-            raise sheet.refuse(
-                "width", where=where, width=width, n=len(record), cells=cells
-            )
+            code = "open quote" if record[-1].endswith(_END) else "width"
+            facts = {"n": len(record), "cells": ", ".join(record)[:60]}
+            where = sheet.at(number)
+            raise sheet.refuse(code, where=where, width=width, **facts)

@@ -469,7 +469,7 @@ def test_options_are_repeated_on_the_command_line(
     ("place", "options"),
     [
         ("masrel.ratings.read_ratings", ()),
-        ("masrel.ratings._large.Scan.answer", ("--stream",)),
+        ("masrel.ratings._large.groups_of", ("--stream",)),
     ],
 )
 def test_an_end_from_outside_is_one_sentence(

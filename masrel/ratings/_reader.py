@@ -1,0 +1,679 @@
+"""Any file of ratings, in whatever shape its program left it, as ratings.
+
+In: a path and what the caller says of it. Out: a `RatingsFile` with what was read. The
+stages: `_sheet` or `_exports` (a file as columns of text), `_layout` (which column is
+what), `_grade_texts` (which grade a text is), and here ratings put together item by
+rater, or tables of counts; `_large` is for files larger than memory. `_findings` has
+the texts of all that is refused or warned of.
+"""
+
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from masrel.agreement import CodedRatings, CountedRatings, count_ratings
+from masrel.agreement._labels import code_type
+from masrel.agreement._rows import count_items, count_table
+from masrel.errors import RatingsError
+from masrel.ratings._findings import (
+    Finding,
+    ReadingOptions,
+    Repeated,
+    refusal,
+)
+from masrel.ratings._grade_texts import Grades, graded, is_number
+from masrel.ratings._layout import (
+    Layout,
+    doubt_columns,
+    doubt_counts,
+    doubt_long,
+    doubt_names,
+    find_layout,
+    named,
+    numbered,
+    rated_twice,
+    together,
+    without_second_header,
+)
+from masrel.ratings._sheet import (
+    TEXT_FORMATS,
+    TYPED_FORMATS,
+    Codes,
+    Column,
+    Sheet,
+    bytes_of,
+    decoded,
+    finished,
+    read_text,
+    unpacked,
+)
+from masrel.scales import Scale
+
+if TYPE_CHECKING:
+    from masrel.ratings._large import Answer
+
+_LARGE_TEXT = 256 << 20  # bytes of text from which it is read as a stream
+_MAX_DENSE = 20_000_000  # places, items by raters, that are always kept one by one
+_MAX_SPARSE = 8  # places a rating beyond which only counts are kept
+_MAX_COUNTS = 200_000_000  # places, items by categories, of counts
+
+
+@dataclass(frozen=True, kw_only=True)
+class RatingsPart:
+    """The ratings of one group and session of a file.
+
+    Attributes
+    ----------
+    group : str or None
+        What the column of groups says of them; None where there is none.
+    session : str or None
+        Their session; None where the file has no such column.
+    items, raters : tuple of str
+        Names, in the order in which they are met; raters without a name have none.
+    clusters : tuple of str
+        The cluster of each item; empty where none are told apart.
+    ratings : CodedRatings or CountedRatings
+        The ratings on the values of the scale, item by rater; counted where only
+        counts are known, or kept because items and raters are many.
+    """
+
+    group: str | None = None
+    session: str | None = None
+    items: tuple[str, ...] = field(default=(), repr=False)
+    raters: tuple[str, ...] = field(default=(), repr=False)
+    ratings: CodedRatings | CountedRatings = field(repr=False)
+    clusters: tuple[str, ...] = field(default=(), repr=False)
+
+    @cached_property
+    def counted(self) -> CountedRatings:
+        """The ratings, counted once for several coefficients."""
+        return count_ratings(self.ratings)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RatingsFile:
+    """A file of ratings, and what was read of it.
+
+    Attributes
+    ----------
+    parts : tuple of RatingsPart
+        The ratings; one part unless groups or sessions are told apart.
+    scale : Scale
+        Its grades in order: declared, or those met.
+    is_ordered : bool
+        Whether that order is more than the alphabet's.
+    read : dict
+        What was read, ready for JSON: format, columns, grades, missing ones, scale.
+    sha256 : callable
+        Returns the hash of the file's bytes; that of a stream is read again for it.
+    warnings : tuple of Finding
+        What may have been read wrongly, and which option would tell.
+    simulated : bool
+        Whether any rating is simulated.
+    """
+
+    parts: tuple[RatingsPart, ...]
+    scale: Scale
+    is_ordered: bool
+    read: dict[str, Any] = field(repr=False)
+    sha256: Callable[[], str] = field(repr=False, compare=False)
+    warnings: tuple[Finding, ...]
+    simulated: bool
+
+
+def read_ratings(
+    path: Path | str,
+    *,
+    item: str | Sequence[str] = (),
+    rater: str | None = None,
+    grade: str | None = None,
+    raters: Sequence[str] = (),
+    ignore: Sequence[str] = (),
+    no_item: bool = False,
+    no_header: bool = False,
+    session: str | None = None,
+    by: str | None = None,
+    clusters: str | None = None,
+    repeated: Repeated = "error",
+    categories: Sequence[str] | None = None,
+    missing_codes: Sequence[str] = (),
+    decimal: str = ".",
+    delimiter: str | None = None,
+    encoding: str | None = None,
+    sheet: str | None = None,
+    transpose: bool = False,
+    counts: bool = False,
+    table: bool = False,
+    source: str | None = None,
+    stream: bool | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> RatingsFile:
+    r"""Read any file of ratings, or say in one sentence which option would.
+
+    Parameters
+    ----------
+    path : Path or str
+        The file; "-" is standard input. Text, workbooks, Parquet, Feather, JSON,
+        SPSS, Stata and SAS, packed or not; ``docs/ratings.md`` has every shape.
+    item : str or sequence of str, optional
+        Column of the items; several name an item together.
+    rater, grade : str, optional
+        Columns of a long table, one row a rating.
+    raters, ignore : sequence of str, optional
+        Columns of a wide table that are raters, and columns that are left aside.
+    no_item, no_header : bool, optional
+        Whether no column names the items; whether the first line is a row.
+    session, by : str, optional
+        Columns of the sessions, and of groups that are told apart.
+    clusters : str, optional
+        Column of the clusters that items come in, such as patients with several
+        sites: one of each item.
+    repeated : {"error", "first", "last", "mean"}, optional
+        What becomes of a second grade of an item by the same rater.
+    categories : sequence of str, optional
+        Every grade of the scale, in order; the grades met unless given.
+    missing_codes : sequence of str, optional
+        Cells that stand for a missing grade, beside empty ones and NA.
+    decimal, delimiter, encoding, sheet : str, optional
+        Decimal mark, separator of cells, encoding, and sheet of a workbook.
+    transpose : bool, optional
+        Whether a row is a rater and a column an item.
+    counts, table : bool, optional
+        Whether it is a table of counts, items by categories, or a contingency table
+        of two raters, the first of them in the rows.
+    source : str, optional
+        The annotation tool whose export it is.
+    stream : bool, optional
+        Whether DuckDB groups it to the rows of ratings that differ, so that a
+        file may be larger than memory; by its size unless given.
+    progress : callable, optional
+        Takes how many bytes of how many are read of a stream.
+
+    Returns
+    -------
+    RatingsFile
+        The ratings, and what was read.
+
+    Raises
+    ------
+    RatingsError
+        If the file is no table of ratings, or could be more than one.
+    ParameterError
+        If options contradict each other, or `categories` are no scale.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "wide.csv"
+    ...     _ = path.write_text("patient;Kim;Lee\nA;1;1+\nB;2;NA\n")
+    ...     file = read_ratings(path)
+    >>> file.scale.name, file.read["raters"], file.read["n_missing"]
+    ('MAS', ['Kim', 'Lee'], 1)
+    """
+    options = ReadingOptions(
+        item=(item,) if isinstance(item, str) else tuple(item),
+        rater=rater,
+        grade=grade,
+        raters=tuple(raters),
+        ignore=tuple(ignore),
+        no_item=no_item,
+        no_header=no_header,
+        session=session,
+        by=by,
+        clusters=clusters,
+        repeated=repeated,
+        categories=None if categories is None else tuple(categories),
+        missing_codes=tuple(missing_codes),
+        decimal=decimal,
+        delimiter=delimiter or "auto",
+        encoding=encoding,
+        sheet=sheet,
+        transpose=transpose,
+        counts=counts,
+        table=table,
+        source=source,
+        stream=stream,
+    )
+    options.check()
+    suffix, is_large = Path(path).suffix.lower(), bool(stream)
+    if stream is None and not options.whole and Path(path).is_file():
+        is_large = Path(path).stat().st_size >= _LARGE_TEXT or suffix == ".parquet"
+    if is_large:
+        streamed = _streamed(Path(path), options, progress or (lambda *_: None))
+        if streamed is not None:
+            return streamed
+    cells, findings = without_second_header(_read_sheet(path, options))
+    if not len(cells.numbers):
+        raise cells.refuse("no rows")
+    if errors := cells.facts.get("errors"):
+        shown = ", ".join(f"{text} ×{n}" for text, n in errors.items())
+        findings.append(Finding("errors", errors=shown))
+    layout = find_layout(cells, options)
+    read = _counted if layout.kind in ("counts", "table") else _rated
+    return read(cells, layout, options, findings)
+
+
+def _read_sheet(path: Path | str, options: ReadingOptions) -> Sheet:
+    """Read a file of any format as columns of text."""
+    name, data = str(path), bytes_of(path)
+    if not data:
+        raise refusal(name, "empty")
+    sha256 = partial(str, hashlib.sha256(data).hexdigest())  # which pickle takes
+    inner, data = unpacked(name, data, is_export=options.source is not None)
+    suffix = Path(inner).suffix.lower()
+    if options.source is not None or suffix in TYPED_FORMATS:
+        from masrel.ratings._exports import read_typed  # with pandas
+
+        return finished(read_typed(name, sha256, suffix, data, options), options)
+    text = decoded(name, data, options.encoding)
+    kind = TEXT_FORMATS.get(suffix, "text")
+    return finished(read_text(name, sha256, text, kind, options), options)
+
+
+def _streamed(
+    path: Path, options: ReadingOptions, progress: Callable[[int, int], None]
+) -> RatingsFile | None:
+    # by DuckDB; None if the file is to be read as a whole
+    from masrel.ratings import _large  # with pandas
+
+    source = _large.source_of(path, options)
+    if source is None:
+        if options.stream:
+            raise refusal(str(path), "no stream" if path.exists() else "absent")
+        return None
+    sheet, findings = without_second_header(source.head)
+    if findings or not len(sheet.numbers):
+        return None
+    layout = find_layout(sheet, options)
+    if layout.session is not None:
+        return None
+    try:
+        with _large.database_of(source, layout, progress) as answer:
+            return _grouped(answer, sheet, layout, options)
+    except _large.NoStreamError as error:
+        if options.stream:
+            text = f"{path}: {error}; --no-stream reads it as a whole"
+            raise RatingsError(text) from error
+        return None
+
+
+def _grouped(
+    answer: "Answer", sheet: Sheet, layout: Layout, options: ReadingOptions
+) -> RatingsFile:
+    # the rows of ratings that differ, how often each is there, and their grades
+    from masrel.ratings import _large
+
+    groups = _large.groups_of(answer, sheet, layout)
+    cells, grades = graded(groups, layout.grades, options)
+    codes, freq = grades.codes[cells.codes], groups.n_rows
+    n_cells = np.repeat(freq, len(layout.grades))
+    n_missing, *counts = np.bincount(codes + 1, n_cells, len(grades.scale.grades) + 1)
+    names, findings = [sheet.header[place] for place in layout.raters], []
+    if layout.kind == "long":
+        rater, n_rows = named(groups, "rater", layout.raters), int(freq.sum())
+        names = rater.texts
+        rows, freq = _large.patterns(answer, groups, layout, rater, codes)
+        findings = [numbered(sheet, layout)] * bool(freq.sum() == n_rows > 2)
+    else:
+        _large.refuse_repeated(answer, sheet, layout)
+        rows = codes.reshape(len(freq), -1)
+        findings = doubt_columns(sheet, layout, rows, grades.scale, freq)
+    rows, place = np.unique(rows.astype(np.int8), axis=0, return_inverse=True)
+    freq = np.bincount(place.ravel(), freq).astype(np.int64)
+    ratings = CountedRatings(codes=rows, freq=freq, categories=grades.scale.values)
+    return _file_of(
+        *(groups, layout, options, grades),
+        [RatingsPart(raters=tuple(names), ratings=ratings)],
+        np.array(counts, dtype=np.int64),
+        [*findings, *doubt_names("raters", names), Finding("stream")],
+        raters=names,
+        n_items=int(freq.sum()),
+        n_raters=len(names),
+        n_missing=int(n_missing),
+    )
+
+
+def _file_of(
+    sheet: Sheet,
+    layout: Layout,
+    options: ReadingOptions,
+    grades: Grades,
+    parts: Sequence[RatingsPart],
+    counts: Codes,
+    findings: Sequence[Finding],
+    **facts: Any,
+) -> RatingsFile:
+    """Return the ratings with the record of what was read."""
+    # counts (n_grades,): how often each grade of the scale is there; facts: the rest of
+    # the record
+    scale, header = grades.scale, sheet.header
+    of_long = (*layout.raters, *layout.grades) if layout.kind == "long" else (None,) * 2
+    roles = ("rater", "grade", "session", "by")
+    places = (*of_long, layout.session, layout.by)
+    findings = (*findings, *grades.findings)
+    record = {
+        "file": sheet.name,
+        **sheet.facts,
+        "layout": layout.kind,
+        "item": [header[place] for place in layout.item],
+        **{
+            role: None if place is None else header[place]
+            for role, place in zip(roles, places, strict=True)
+        },
+        "ignored": [name for k, name in enumerate(header) if k not in layout.used],
+        "grades": {
+            g: n for g, n in zip(scale.grades, counts.tolist(), strict=True) if n
+        },
+        "missing": grades.n_missing,
+        "merged": grades.merged,
+        "dropped": sheet.dropped,
+        "scale": {
+            "name": scale.name,
+            "grades": list(scale.grades),
+            "declared": options.categories is not None,
+        },
+        "raters": [],
+        "n_items": 0,
+        "n_raters": 0,
+        "n_ratings": int(counts.sum()),
+        "n_missing": None,  # counts do not say
+        "n_repeated": 0,
+        "repeated": None,
+        **facts,
+        "warnings": list(map(str, findings)),
+    }
+    sources = [c for n, c in zip(header, sheet.columns, strict=True) if n == "source"]
+    is_simulated = any("simulated" in column.texts for column in sources)
+    return RatingsFile(
+        parts=tuple(parts),
+        scale=scale,
+        is_ordered=grades.is_ordered,
+        read=record,
+        sha256=sheet.sha256,
+        warnings=findings,
+        simulated=sheet.is_simulated or is_simulated,
+    )
+
+
+# ---- ratings one by one ----
+
+
+def _rated(
+    sheet: Sheet, layout: Layout, options: ReadingOptions, findings: list[Finding]
+) -> RatingsFile:
+    # a long or a wide table
+    n_rows, n_raters = len(sheet.numbers), len(layout.raters)
+    row = np.arange(n_rows)
+    if layout.kind == "long":
+        item = named(sheet, "item", layout.item)
+        rater = named(sheet, "rater", layout.raters)
+        cells, grades = graded(sheet, layout.grades, options)
+        findings = findings + doubt_long(sheet, layout, item.codes, rater.codes)
+    else:
+        names = [sheet.header[place] for place in layout.raters]
+        rater = Column(np.tile(np.arange(n_raters), n_rows), names)
+        cells, grades = graded(sheet, layout.grades, options)
+        table = grades.codes[cells.codes].reshape(n_rows, n_raters)
+        findings = findings + doubt_columns(sheet, layout, table, grades.scale)
+        item = Column(row, [str(n) for n in range(1, n_rows + 1)])
+        if layout.item:
+            item = named(sheet, "item", layout.item)
+        row = np.repeat(row, n_raters)
+    findings += doubt_names("raters", rater.texts) + doubt_names("items", item.texts)
+    part, names_of_parts = _parts(sheet, layout)
+    findings += doubt_names("groups", sorted({g or "" for g, _ in names_of_parts}))
+    codes = grades.codes[cells.codes]
+    # part, item, rater, grade and row of each rating
+    ratings = [part[row], item.codes[row], rater.codes, codes, row]
+    once, scale = _one_each(sheet, layout, options, ratings, item, rater, grades.scale)
+    parts = []
+    for k, (group, session) in enumerate(names_of_parts):
+        of_part = once
+        if len(names_of_parts) > 1:
+            of_part = [values[once[0] == k] for values in once]
+        items = Column(of_part[1], item.texts).rows(slice(None))
+        raters = Column(of_part[2], rater.texts).rows(slice(None))
+        parts.append(
+            RatingsPart(
+                group=group,
+                session=session,
+                items=tuple(items.texts),
+                raters=tuple(raters.texts),
+                ratings=_puttogether(items, raters, of_part[3], scale),
+                clusters=_clusters(sheet, layout, items, of_part[4]),
+            )
+        )
+    n_repeated = len(row) - len(once[0])
+    facts: dict[str, Any] = {}
+    if layout.clusters is not None:
+        facts["clusters"] = sheet.header[layout.clusters]
+        facts["n_clusters"] = len({name for part in parts for name in part.clusters})
+    return _file_of(
+        sheet,
+        layout,
+        options,
+        replace(grades, scale=scale),
+        parts,
+        np.bincount(once[3] + 1, minlength=len(scale.grades) + 1)[1:],
+        findings,
+        raters=Column(once[2], rater.texts).rows(slice(None)).texts,
+        n_items=len(item.texts),
+        n_raters=len(rater.texts),
+        n_missing=int((codes < 0).sum()),
+        n_repeated=n_repeated,
+        repeated=options.repeated if n_repeated else None,
+        **facts,
+    )
+
+
+def _parts(
+    sheet: Sheet, layout: Layout
+) -> tuple[Codes, list[tuple[str | None, str | None]]]:
+    # the part of every row, and the group and session of every part
+    session = None if layout.session == layout.by else layout.session
+    places = [place for place in (layout.by, session) if place is not None]
+    for place in places:
+        is_empty = sheet.columns[place].is_text("")
+        if is_empty.any():
+            raise sheet.refuse("no value", sheet.where(int(np.argmax(is_empty))), place)
+    if not places:
+        return np.zeros(len(sheet.numbers), dtype=np.int64), [(None, None)]
+    codes, names = together([sheet.columns[place] for place in places])
+    group, visit = (
+        places.index(p) if p in places else None for p in (layout.by, session)
+    )
+    return codes, [
+        (None if group is None else of[group], None if visit is None else of[visit])
+        for of in names
+    ]
+
+
+def _one_each(
+    sheet: Sheet,
+    layout: Layout,
+    options: ReadingOptions,
+    ratings: list[Codes],
+    item: Column,
+    rater: Column,
+    scale: Scale,
+) -> tuple[list[Codes], Scale]:
+    # one rating of each item by each rater in each part
+    part, items, raters, grade, row = ratings
+    key = (part * len(item.texts) + items) * len(rater.texts) + raters
+    if np.diff(np.sort(key)).all():
+        return ratings, scale
+    of_key = np.unique(key, return_inverse=True)[1]
+    if options.repeated == "error":
+        first = int(np.argmax((np.bincount(of_key) > 1)[of_key]))
+        second = first + 1 + int(np.argmax(of_key[first + 1 :] == of_key[first]))
+        hint = _what_tells_apart(sheet, layout, of_key, row)
+        names = item.texts[items[first]], rater.texts[raters[first]]
+        raise rated_twice(sheet, layout, row[[first, second]], *names, hint)
+    if options.repeated == "mean":
+        grade, scale = _means(sheet, grade, of_key, scale)
+    # grades before missing ones, so that none is lost to an empty cell
+    place = np.arange(len(key)) * (-1 if options.repeated == "last" else 1)
+    order = np.lexsort((place, grade < 0, of_key))
+    chosen = np.sort(order[np.unique(of_key[order], return_index=True)[1]])
+    return [values[chosen] for values in (part, items, raters, grade, row)], scale
+
+
+def _what_tells_apart(sheet: Sheet, layout: Layout, of_key: Codes, row: Codes) -> str:
+    # the column whose cells differ wherever a rating is there twice
+    for place, column in enumerate(sheet.columns):
+        n = len(column.texts)
+        if place not in layout.used and 1 < n < len(sheet.numbers):
+            if len(np.unique(of_key * n + column.codes[row])) == len(of_key):
+                return f" (--by {sheet.header[place]!r} would)"
+    return ""
+
+
+def _means(
+    sheet: Sheet, grade: Codes, of_key: Codes, scale: Scale
+) -> tuple[Codes, Scale]:
+    # of the grades that an item has of one rater
+    if scale.name != "observed" or not all(map(is_number, scale.grades)):
+        raise sheet.refuse("means", grades=", ".join(scale.grades[:6]))
+    rated = grade >= 0
+    n_grades = np.bincount(of_key, rated)
+    values = np.where(rated, np.array(scale.values)[grade], 0)
+    mean = np.bincount(of_key, values) / np.where(n_grades, n_grades, np.nan)
+    met = np.unique(mean[n_grades > 0])
+    codes = np.where(n_grades > 0, np.searchsorted(met, mean), -1)
+    grades = tuple(f"{x:.0f}" if x.is_integer() else repr(x) for x in met.tolist())
+    return codes[of_key], Scale(name="observed", grades=grades)
+
+
+def _puttogether(
+    items: Column, raters: Column, grade: Codes, scale: Scale
+) -> CodedRatings | CountedRatings:
+    # item by rater, or counted where that were many empty places
+    shape, q = (len(items.texts), len(raters.texts)), len(scale.grades)
+
+    def laid_out() -> CodedRatings:
+        codes = np.full(shape, -1, dtype=code_type(q))
+        codes[items.codes, raters.codes] = grade
+        codes.setflags(write=False)
+        # numbers that nobody declared may be measurements rather than grades
+        is_text = not all(map(is_number, scale.grades))
+        declared = scale.name != "observed" or is_text
+        return CodedRatings(codes=codes, categories=scale.values, declared=declared)
+
+    is_dense = shape[0] * shape[1] <= max(_MAX_DENSE, _MAX_SPARSE * len(grade))
+    if is_dense or shape[0] * q > _MAX_COUNTS:
+        return laid_out()
+    rated = grade >= 0
+    keys = items.codes[rated] * q + grade[rated]
+    counts = np.bincount(keys, minlength=shape[0] * q).reshape(shape[0], q)
+    return replace(
+        count_items(counts, categories=scale.values),
+        n_known=len(np.unique(raters.codes[rated])),
+        source=laid_out,  # if who rated what must be known
+    )
+
+
+def _clusters(
+    sheet: Sheet, layout: Layout, items: Column, row: Codes
+) -> tuple[str, ...]:
+    # the cluster of every item
+    if layout.clusters is None:
+        return ()
+    cluster = named(sheet, "cluster", (layout.clusters,))
+    of_rating = cluster.codes[row]
+    of_item = np.zeros(len(items.texts), dtype=np.int64)
+    of_item[items.codes] = of_rating
+    differs = np.flatnonzero(of_item[items.codes] != of_rating)
+    if len(differs):
+        item = items.codes[differs[0]]
+        two = [int(differs[0]), int(np.flatnonzero(items.codes == item)[-1])]
+        raise sheet.refuse(
+            "two clusters",
+            rows=" and ".join(sheet.where(int(row[k])) for k in two),
+            item=items.texts[item],
+            column=sheet.header[layout.clusters],
+            both=" and ".join(repr(cluster.texts[of_rating[k]]) for k in two),
+        )
+    return tuple(cluster.texts[code] for code in of_item.tolist())
+
+
+# ---- tables of counts ----
+
+
+def _counted(
+    sheet: Sheet, layout: Layout, options: ReadingOptions, findings: list[Finding]
+) -> RatingsFile:
+    # a table of counts, or a contingency table
+    names = [sheet.header[place] for place in layout.raters]
+    table = _whole_numbers(sheet, layout)
+    findings = findings + doubt_counts(sheet, layout, table)
+    name, order = "observed", list(range(len(names)))
+    if options.categories is not None:
+        if set(options.categories) != set(names):
+            declared, known = ", ".join(options.categories), ", ".join(names)
+            raise sheet.refuse("other categories", names=known, categories=declared)
+        name, order = "declared", [names.index(name) for name in options.categories]
+    elif all(map(is_number, names)):
+        order.sort(key=lambda k: float(names[k]))
+    scale = Scale(name=name, grades=tuple(names[k] for k in order))
+    part, groups = _parts(sheet, layout)
+    findings += doubt_names("groups", sorted(group or "" for group, _ in groups))
+    if layout.kind == "table":
+        rows = _names_of_rows(sheet, layout, names)
+        table = table[np.ix_([rows.index(names[k]) for k in order], order)]
+        counted = count_table(table, categories=scale.values)
+        parts = [RatingsPart(raters=("rows", "columns"), ratings=counted)]
+        n_items, n_raters = int(table.sum()), 2
+        counts = table.sum(axis=0) + table.sum(axis=1)
+    else:
+        table = table[:, order]
+        of_item, counts = table.sum(axis=1), table.sum(axis=0)
+        n_items, n_raters = int((of_item > 0).sum()), int(of_item.max())
+        parts = [
+            RatingsPart(
+                group=group,
+                session=session,
+                ratings=count_items(table[part == k], categories=scale.values),
+            )
+            for k, (group, session) in enumerate(groups)
+        ]
+    grades = Grades(scale=scale, codes=np.arange(len(names)))
+    return _file_of(
+        *(sheet, layout, options, grades, parts, counts, findings),
+        n_items=n_items,
+        n_raters=n_raters,
+    )
+
+
+def _whole_numbers(sheet: Sheet, layout: Layout) -> Codes:
+    # -> (n_rows, n_categories)
+    table = []
+    for column in (sheet.columns[place] for place in layout.raters):
+        texts = [text or "0" for text in column.texts]
+        numbers = [float(text) if is_number(text) else -1.0 for text in texts]
+        for code, n in enumerate(numbers):
+            if not (n >= 0 and n.is_integer() and n < 2**53):
+                where = sheet.where(int(np.argmax(column.codes == code)))
+                text = column.texts[code]
+                raise sheet.refuse("count", where, kind=layout.kind, text=text)
+        table.append(np.array(numbers, dtype=np.int64)[column.codes])
+    if not any(column.any() for column in table):
+        raise sheet.refuse("no counts", kind=layout.kind)
+    return np.column_stack(table)
+
+
+def _names_of_rows(sheet: Sheet, layout: Layout, names: list[str]) -> list[str]:
+    # the categories of the rows of a contingency table
+    n_rows = len(sheet.numbers)
+    if n_rows != len(names):
+        raise sheet.refuse("rows of table", n=len(names), n_rows=n_rows)
+    rows = sheet.columns[layout.item[0]].cells() if layout.item else names
+    if set(rows) != set(names):
+        met, known = ", ".join(map(repr, rows)), ", ".join(map(repr, names))
+        raise sheet.refuse("names of table", rows=met, names=known)
+    return rows
