@@ -26,6 +26,22 @@ Unit = Literal["items", "raters", "both", "clusters"]
 """What is resampled or left out."""
 
 
+class _LongNote(str):
+    """A note of an interval that has no room below a table."""
+
+    brief: str  # what stands there in its place; empty for nothing
+
+    def __new__(cls, text: str, brief: str = "") -> "_LongNote":
+        note = super().__new__(cls, text)
+        note.brief = brief
+        return note
+
+    @classmethod
+    def of(cls, what: str, note: str) -> "_LongNote":
+        """Return a note that says what it is of."""
+        return cls(what + note, what + getattr(note, "brief", note))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Distribution:
     """How a coefficient is distributed: over resamples, or in a posterior.

@@ -16,6 +16,7 @@ from scipy.optimize import brentq, minimize, minimize_scalar, root
 from scipy.special import chdtri, expit, fdtri
 
 from masrel.agreement._engine import deviations
+from masrel.estimates import _LongNote
 
 _Floats = NDArray[np.float64]
 _Numbers = NDArray[Any]  # real, or complex for slopes
@@ -173,7 +174,8 @@ class Components:
             + " (the least it can be)" * (value == 0.0)
             for name, value in parts.items()
         ]
-        return f"ratings are missing; variances by REML: {', '.join(listed)}"
+        text = f"ratings are missing; variances by REML: {', '.join(listed)}"
+        return _LongNote(text)
 
     def covariance(self) -> _Floats:
         """Return that of the three estimates, (3, 3), from the expected information."""

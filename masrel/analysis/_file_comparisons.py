@@ -252,9 +252,8 @@ def equality_rows(
 def _equality_tests(
     entry: Coefficient, groups: _Groups, options: EstimateOptions
 ) -> Iterator[tuple[str, Significance]]:
-    from masrel.intervals.auto import estimate
-    from masrel.intervals.contrasts import differences
-    from masrel.intervals.equality import donner_test, equality_test
+    from masrel.intervals.choose import estimate
+    from masrel.intervals.contrasts import differences, donner_test, equality_test
 
     weights, clusters = options.weights_of(entry), groups.clusters
     if groups.is_dependent:

@@ -496,7 +496,7 @@ def _estimate(
         )
         # one that comes with the coefficient knows of no clusters
         return replace(result, interval=None) if options.clusters else result
-    from masrel.intervals.auto import estimate
+    from masrel.intervals.choose import estimate
 
     return estimate(
         entry,

@@ -11,7 +11,7 @@ from scipy.special import expit
 
 from masrel.agreement._engine import Floats
 from masrel.errors import ParameterError
-from masrel.estimates import Distribution, Interval
+from masrel.estimates import Distribution, Interval, _LongNote
 from masrel.intervals._dirichlet_multinomial import DirichletMultinomial, RhoDensity
 from masrel.intervals._quadrature import (
     TOLERANCE,
@@ -175,11 +175,16 @@ def prior_notes(
         by = max(abs(there.low - low), abs(there.high - high))
         if by > moved:
             moved, other, ends = by, candidate, (there.low, there.high)
-    return (
-        f"{what}, so the prior weighs: {low:.3f} to {high:.3f} with "
-        f"{prior.description}, but {ends[0]:.3f} to {ends[1]:.3f} with "
-        f"{other.description}",
+    text = (
+        f"{low:.3f} to {high:.3f} with {prior.description}, but "
+        f"{ends[0]:.3f} to {ends[1]:.3f} with {other.description}"
     )
+    return (prior_note(f"{what}, so the prior weighs", text),)
+
+
+def prior_note(what: str, ends: str) -> str:
+    """Return a note on the prior, which a table gives without its ends."""
+    return _LongNote(f"{what}: {ends}", f"{what} (--explain says by how much)")
 
 
 def default_rho_interval(problem: IntervalProblem) -> Interval:
@@ -241,10 +246,8 @@ def _lower_bound_of_rho(problem: IntervalProblem) -> Interval:
         for other in prior.others(counts.shape[1])
     ]
     there, other = max(others, key=lambda bound: abs(bound[0] - low))
-    note = (
-        f"the bound rests on the prior, too: {low:.3f} with {prior.description}, but "
-        f"{there:.3f} with {other.description}"
-    )
+    ends = f"{low:.3f} with {prior.description}, but {there:.3f} with "
+    note = prior_note("the bound rests on the prior, too", ends + other.description)
     return Interval(
         low=low,
         high=1.0,

@@ -12,7 +12,7 @@ from masrel.agreement._weights import MANY
 from masrel.errors import ParameterError
 from masrel.estimates import Interval
 from masrel.intervals._question import IntervalProblem, recorded_generator
-from masrel.intervals._rho import FEW_ITEMS, extended
+from masrel.intervals._rho import FEW_ITEMS, extended, prior_note
 from masrel.intervals._table_quadrature import (
     CHANCE_AGREEMENT,
     TablePosterior,
@@ -121,11 +121,11 @@ def table_interval(
         _, there = _posterior(
             problem, table + other.cells, generator, _NOTED_DRAWS, one_sided
         )
-        notes += (
-            f"{what}, so the prior weighs: {ends[0]:.3f} to {ends[1]:.3f} with "
-            f"{prior.description}, but {there[0]:.3f} to {there[1]:.3f} with "
-            f"{other.description}",
+        text = (
+            f"{ends[0]:.3f} to {ends[1]:.3f} with {prior.description}, but "
+            f"{there[0]:.3f} to {there[1]:.3f} with {other.description}"
         )
+        notes += (prior_note(f"{what}, so the prior weighs", text),)
     interval = _interval(problem, posterior, ends, prior, one_sided)
     return dataclasses.replace(interval, seed=seed, notes=notes)
 

@@ -37,7 +37,7 @@ import numpy as np
 from masrel.agreement import CountedRatings, Label
 from masrel.agreement._engine import standard_error
 from masrel.errors import ParameterError
-from masrel.estimates import Estimate, Interval, Target
+from masrel.estimates import Estimate, Interval, Target, _LongNote
 from masrel.intervals._question import (
     Integers,
     IntervalProblem,
@@ -186,7 +186,7 @@ def estimate(
     if method == "auto":
         interval, why = _chosen(ask(entry, ratings), clusters)
         others = _OTHERS[target] if clusters is None else "clusters of items"
-        notes = (f"chosen for other {others}: {why}", *interval.notes)
+        notes = (_LongNote(f"chosen for other {others}: {why}"), *interval.notes)
         interval = replace(interval, target=target, notes=notes)
     else:
         function = {
@@ -368,7 +368,7 @@ def _other_items_and_raters(problem: IntervalProblem) -> tuple[Interval, str]:
         method=f"{items.method}, and {raters.method}",
         unit="both",
         notes=[
-            note if f" {of}: below" in note else f"{of}: {note}"
+            note if f" {of}: below" in note else _LongNote.of(f"{of}: ", note)
             for of, part in (("items", items), ("raters", raters))
             for note in part.notes
         ],

@@ -10,7 +10,6 @@ from masrel.analysis._file_estimates import AgreementRow, Answer, Row, note
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, Target, _plain, as_document
 from masrel.tables._estimate_words import (
-    aside,
     forest_row,
     origin,
     pair_words,
@@ -152,15 +151,6 @@ _SOURCES = {
 _OF_ESTIMATE = ("coefficient", "weights", "value", "n_items", "n_raters")
 _OF_INTERVAL = ("median", "low", "high", "level", "method", "target")
 
-_CHOSEN = "chosen for other "
-"""Start of the note that says why an interval was chosen."""
-
-_PRIORS = (", so the prior weighs: ", " rests on the prior, too: ")
-"""Where a note goes on with the interval under another prior."""
-
-_VARIANCES = "ratings are missing; variances by REML: "
-"""Start of the note on the variances that an ICC is made of."""
-
 
 def answer_table(
     answer: Answer,
@@ -278,7 +268,7 @@ def _cells(
             texts.append(_interval_note(interval, explain))
         elif interval.reason != estimate.reason:
             texts.append(f"no interval ({interval.method}): {interval.reason}")
-        brief = filter(None, map(_brief, interval.notes))
+        brief = filter(None, (getattr(of, "brief", of) for of in interval.notes))
         cells["interval_texts"] = [*texts, *(interval.notes if explain else brief)]
     return cells
 
@@ -335,17 +325,6 @@ def _paired_note(rows: Sequence[AgreementRow]) -> list[str]:
         return [f"{count} items have {pair}." for count in counts.values()]
     of_groups = ", ".join(f"{count} ({group})" for group, count in counts.items())
     return [f"Items that have {pair}: {of_groups}."]
-
-
-def _brief(note: str) -> str:
-    """Return a note of an interval without what only `--explain` shows."""
-    if note.startswith((_CHOSEN, _VARIANCES)):
-        return ""
-    for start in _PRIORS:
-        before, is_there, _ = note.partition(start)
-        if is_there:
-            return f"{before}{start.removesuffix(': ')} (--explain says by how much)"
-    return note
 
 
 def _interval_note(interval: Interval, explain: bool) -> str:
@@ -434,12 +413,12 @@ def _forest_row(row: AgreementRow, target: Target, *, has_group: bool) -> "Fores
     # what neither the axis nor the legend says of the interval
     details = []
     if interval is not None:
-        details.append(aside(interval))
+        details += ["one-sided"] if interval.is_one_sided else []
         if interval.target != target:
             details.append(f"other {_POPULATIONS[interval.target]}")
     return forest_row(
         row.title,
         row.estimate,
-        detail=", ".join(filter(None, details)),
+        detail=", ".join(details),
         group=row.group if has_group else "",
     )

@@ -28,9 +28,6 @@ _POPULATIONS = {
     "both": "other raters graded other {}, both like these",
 }
 
-_WIDENED = "and the spread of raters"
-"""End of the method of a posterior that was widened by what raters differ by."""
-
 
 def forest_row(
     label: str, estimate: Estimate, *, detail: str = "", group: str = ""
@@ -83,8 +80,6 @@ def promise(interval: Interval, noun: Noun) -> str:
 
 def origin(interval: Interval, noun: Noun) -> str:
     """Return in brackets what the ends of an interval came from."""
-    if interval.method.endswith(_WIDENED):
-        return " (a posterior, made wider by what raters differ by)"
     if interval.unit is None:
         return ""
     one = {"items": noun, "raters": "rater", "clusters": f"cluster of {noun}s"}
@@ -99,15 +94,6 @@ def origin(interval: Interval, noun: Noun) -> str:
     if interval.unit == "both":
         return f" (from leaving out {many}, one at a time)"
     return f" (from leaving out one {one[interval.unit]} at a time)"
-
-
-def aside(interval: Interval) -> str:
-    """Return in few words how the ends differ from quantiles of the distribution."""
-    if interval.is_one_sided:
-        return "one-sided"
-    if interval.method.endswith(_WIDENED):
-        return "posterior, wider by the spread of raters"
-    return ""
 
 
 def pair_words(estimate: Estimate) -> str:

@@ -23,7 +23,7 @@ from masrel.lab.report._sentences import (
     meaning,
 )
 from masrel.plots._drawn_values import Forest, ForestRow
-from masrel.tables._estimate_words import aside, forest_row
+from masrel.tables._estimate_words import forest_row
 from masrel.tables._tables import (
     Column,
     Table,
@@ -276,8 +276,12 @@ def _forest(
             raters = "twice" if row.single else counted(estimate.n_raters, "rater")
             detail = f"{counted(estimate.n_items, 'model')}, {raters}"
         if interval is not None:
-            looks = (interval.kind, aside(interval), TARGETS[interval.target])
-            detail += f"; {', '.join(text for text in looks if text)}"
+            kind = (
+                f"{interval.kind}, one-sided"
+                if interval.is_one_sided
+                else interval.kind
+            )
+            detail += f"; {kind}, {TARGETS[interval.target]}"
         label = f"{row.coefficient}, {row.name}"
         line = ForestRow(label=label, detail=detail, text=NOT_THERE, has_zero=False)
         if estimate is not None:

@@ -6,7 +6,6 @@ import pytest
 
 from masrel.estimates import Interval
 from masrel.lab.report._sentences import meaning
-from masrel.tables._estimate_words import aside
 
 
 def interval(kind: str, method: str, target: str, unit: str | None = None) -> Interval:
@@ -53,10 +52,6 @@ CASES = [
 
 MADE = [
     (
-        interval("confidence", f"{POSTERIOR}, exact, and the spread of raters", "both"),
-        f" (a posterior, made wider by what raters differ by): if {BOTH},",
-    ),
-    (
         interval("confidence", "item jackknife, t(24) on the logit", "items", "items"),
         f" (from leaving out one item at a time): if {OTHER_ITEMS},",
     ),
@@ -98,8 +93,3 @@ def test_a_confidence_interval_says_how_often_it_holds(
 @pytest.mark.parametrize("given", [given for given, _ in [*CASES, *MADE]])
 def test_a_study_speaks_of_its_models(given: Interval) -> None:
     assert meaning(given, "model") == meaning(given, "item").replace("item", "model")
-
-
-def test_ends_that_are_no_quantiles_are_said_to_be_none() -> None:
-    said = {aside(given) for given, _ in [*CASES, *MADE]}
-    assert said == {"", "one-sided", "posterior, wider by the spread of raters"}
