@@ -39,7 +39,8 @@ class _LongNote(str):
     @classmethod
     def of(cls, what: str, note: str) -> "_LongNote":
         """Return a note that says what it is of."""
-        return cls(what + note, what + getattr(note, "brief", note))
+        brief = getattr(note, "brief", note)
+        return cls(what + note, what + brief if brief else "")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

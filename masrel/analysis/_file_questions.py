@@ -315,14 +315,13 @@ def _side_by_side(
     parts: Sequence[RatingsPart], items: Sequence[str], raters: Sequence[str]
 ) -> NDArray[np.signedinteger]:
     # codes (n_items, 2 n_raters), both sessions of a rater beside each other
-    codes = []
-    for part in parts:
-        row, column = (
-            {name: place for place, name in enumerate(names)}
-            for names in (part.items, part.raters)
-        )
-        places = np.ix_([row[i] for i in items], [column[r] for r in raters])
-        codes.append(coded_part(part, "--retest").codes[places])
+    import pandas as pd  # of all questions this one alone needs it
+
+    tables = [
+        pd.DataFrame(coded_part(part, "--retest").codes, part.items, part.raters)
+        for part in parts
+    ]
+    codes = [table.loc[items, raters].to_numpy() for table in tables]
     return np.stack(codes, axis=2).reshape(len(items), -1)
 
 
@@ -379,21 +378,16 @@ def _heads(file: RatingsFile) -> dict[str, str]:
 
 def _symmetry_tests(file: RatingsFile, part: RatingsPart) -> dict[str, Significance]:
     table = contingency_table(_two_raters(file, part, "--symmetry"))
-    tests: dict[str, Significance] = {}
+    of_two = {}
     if len(table) == 2:
-        tests["McNemar, exact"] = mcnemar(table)
-        tests["McNemar, corrected"] = mcnemar(table, kind="corrected")
-    tests["Bowker"] = bowker(table)
-    tests["Stuart-Maxwell"] = stuart_maxwell(table)
-    tests["Bhapkar"] = bhapkar(table)
-    return tests
-
-
-_OF_TABLE = {
-    "prevalence_index": ("Prevalence index", prevalence_index),
-    "bias_index": ("Bias index", bias_index),
-    "kappa_max": ("Largest κ", kappa_max),
-}
+        corrected = mcnemar(table, kind="corrected")
+        of_two = {"McNemar, exact": mcnemar(table), "McNemar, corrected": corrected}
+    return {
+        **of_two,
+        "Bowker": bowker(table),
+        "Stuart-Maxwell": stuart_maxwell(table),
+        "Bhapkar": bhapkar(table),
+    }
 
 
 def _indices(file: RatingsFile) -> Answer:

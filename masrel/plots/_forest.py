@@ -96,7 +96,10 @@ def forest_figure(forest: Forest) -> Figure:
     handles = _legend_handles(places)
     figure = Figure(figsize=(7.2, bottom + 0.6 + 0.17 * len(handles)))
     axes = figure.add_subplot()
-    left = max(_lowest(places), _LEFT) - 0.05
+    values = [row.value for row in forest.rows if row.value is not None]
+    ends = [row.interval.low for row in forest.rows if row.interval is not None]
+    ridges = [place.ridge.lowest for place in places if place.ridge is not None]
+    left = max(min([0.0, *values, *ends, *ridges]), _LEFT) - 0.05
     axes.set_xlim(left, _RIGHT)
     axes.set_ylim(bottom, 0.0)
     # where rows next to each other have a zero: one line for all of them
@@ -149,19 +152,6 @@ def _placed(rows: Sequence[ForestRow]) -> list[_Placed]:
             )
         )
     return places
-
-
-def _lowest(places: Sequence[_Placed]) -> float:
-    # the lowest of 0 and all that rows show
-    numbers = [0.0]
-    for place in places:
-        if place.row.value is not None:
-            numbers.append(place.row.value)
-        if place.row.interval is not None:
-            numbers.append(place.row.interval.low)
-        if place.ridge is not None:
-            numbers.append(place.ridge.lowest)
-    return min(numbers)
 
 
 def _draw_row(axes: Axes, place: _Placed, left: float) -> None:
@@ -253,19 +243,20 @@ def _draw_ridge(axes: Axes, ridge: _Ridge, *, base: float, top: float) -> None:
 
 def _ridge(distribution: Distribution) -> _Ridge:
     """Return what is drawn of a distribution."""
-    if distribution.continuous:
-        values, heights = distribution.values, distribution.weights
-        visible = values[heights > _FAINT * heights.max()]
-        return _Ridge(parts={"density": (values, heights)}, lowest=float(visible.min()))
-    values, shares = _distinct(distribution)
-    single = (shares.size <= _MAX_STEMS) | (shares >= _STEM_SHARE)
     parts: dict[_Part, tuple[_Floats, _Floats]] = {}
-    if single.any():
-        parts["stems"] = values[single], shares[single]
-    if not single.all():
-        parts["bars"] = _bars(values[~single], shares[~single])
-    edges, heights = _bars(values, shares)  # as if there were no stems
-    visible = edges[:-1][heights > _FAINT * heights.max()]
+    if distribution.continuous:
+        places, heights = distribution.values, distribution.weights
+        parts["density"] = places, heights
+    else:
+        values, shares = _distinct(distribution)
+        single = (shares.size <= _MAX_STEMS) | (shares >= _STEM_SHARE)
+        if single.any():
+            parts["stems"] = values[single], shares[single]
+        if not single.all():
+            parts["bars"] = _bars(values[~single], shares[~single])
+        edges, heights = _bars(values, shares)  # as if there were no stems
+        places = edges[:-1]
+    visible = places[heights > _FAINT * heights.max()]
     return _Ridge(parts=parts, lowest=float(visible.min()))
 
 
