@@ -62,7 +62,7 @@ def size_by_formula(design: Design) -> int:
 def items_nearby(design: Design) -> int:
     """Return about how many items a half-width needs, where a formula says it."""
     if design.is_icc:
-        return math.ceil(n_icc_width(design))
+        return math.ceil(_n_icc_width(design))
     is_wald = design.study.target == "items" and design.model.has_rows
     return math.ceil(_width_items(design)) if is_wald else 20
 
@@ -100,7 +100,7 @@ def _wald_items(design: Design) -> float:
     return ((_z(design) * sd_0 + z_b * sd_1) / (design.value - null)) ** 2
 
 
-def wald_numbers(design: Design) -> dict[str, float]:
+def _wald_numbers(design: Design) -> dict[str, float]:
     """Return half-width, ends, and power by the variance of the null value [4]_."""
     half = _z(design) * design.item_sd / math.sqrt(design.n_items)
     numbers = {
@@ -149,7 +149,7 @@ def _fit_items(design: Design) -> float:
     return _z(design) ** 2 / least
 
 
-def fit_numbers(design: Design) -> dict[str, float]:
+def _fit_numbers(design: Design) -> dict[str, float]:
     """Return the exact power, or its mean over a prior of the true value."""
     study = design.study
     if study.null is None or (design.n_raters, len(design.model.scale)) != (2, 2):
@@ -161,7 +161,7 @@ def fit_numbers(design: Design) -> dict[str, float]:
     null = study.null
     # O'Hagan, Stevens and Campbell (2005)
     power = beta(*study.prior).expect(
-        lambda value: _fit_power(design.at_value(value), null), epsrel=1e-10
+        lambda value: _fit_power(design.at_value(value), null), epsrel=1e-9
     )
     return {"power": float(power)}
 
@@ -192,7 +192,7 @@ def _icc_items(design: Design) -> float:
     study, chance = design.study, chance_of(design.study)
     limit = study.lower if study.null is None else study.null
     if chance is None:
-        return n_icc_width(design)
+        return _n_icc_width(design)
     r, k, z, z_b = design.value, design.n_raters, _z(design), _NORMAL.inv_cdf(chance)
     if limit is not None:
         # n = 1 + 2k(z_a + z_b)²/((k - 1) ln(θ/θ_0)²) of [5]_; eq. 7 of [7]_
@@ -204,7 +204,7 @@ def _icc_items(design: Design) -> float:
     return 1 + ((a * z + root) / (half * math.sqrt(2 * k * (k - 1)))) ** 2
 
 
-def n_icc_width(design: Design) -> float:
+def _n_icc_width(design: Design) -> float:
     """Return n of an expected width of ICC(1), eq. 3 of [6]_."""
     r, k, width = design.value, design.n_raters, 2.0 * _half(design)
     error = (1 - r) * (1 + (k - 1) * r)
@@ -218,11 +218,8 @@ def n_icc_width(design: Design) -> float:
 
 def numbers_by_formula(design: Design) -> dict[str, float]:
     """Return what the method's formula says of a design; nothing without one."""
-    if design.is_icc:
-        return {}
-    return (
-        wald_numbers(design) if design.study.method == "wald" else fit_numbers(design)
-    )
+    numbers = _wald_numbers if design.study.method == "wald" else _fit_numbers
+    return {} if design.is_icc else numbers(design)
 
 
 def check_has_numbers(design: Design) -> None:

@@ -5,6 +5,7 @@ Studies of an intraclass correlation are mean squares of normal ratings, the oth
 often each distinct row of ratings occurs, or the ratings themselves.
 """
 
+import itertools
 import math
 import warnings
 from collections.abc import Iterator, Sequence
@@ -267,26 +268,14 @@ def _named(names: Sequence[str], numbers: Floats) -> dict[str, float]:
 
 def all_studies(n: int, p: Floats) -> Iterator[tuple[Integers, Floats]]:
     """Yield how often each row occurs in every study, and how probable that is."""
-    log_p = np.log(np.maximum(p, 1e-300))
-    for freq in _tables(n, len(p)):
+    # n items fall between bars among as many places; some studies at a time
+    log_p, n_places = np.log(np.maximum(p, 1e-300)), n + len(p) - 1
+    bars = itertools.combinations(range(n_places), len(p) - 1)
+    while some := list(itertools.islice(bars, _PLACES // len(p))):
+        ends = np.pad(np.array(some), ((0, 0), (1, 1)), constant_values=(-1, n_places))
+        freq = np.diff(ends, axis=1) - 1
         logs = gammaln(n + 1) - gammaln(freq + 1.0).sum(axis=1) + freq @ log_p
         yield freq, np.exp(logs)
-
-
-def _tables(n: int, n_cells: int) -> Iterator[Integers]:
-    """Yield every way in which n items fall into cells, in blocks of rows."""
-    if n_cells * math.comb(n + n_cells - 1, n) > _PLACES:
-        for count in range(n + 1):
-            for rest in _tables(n - count, n_cells - 1):
-                yield np.column_stack([np.full(len(rest), count), rest])
-        return
-    # cell by cell: each row as often as there are counts left for the next cell
-    tables, left = np.zeros((1, 0), dtype=np.int64), np.array([n])
-    for _ in range(n_cells - 1):
-        row = np.repeat(np.arange(len(left)), left + 1)
-        count = np.arange(len(row)) - (np.cumsum(left + 1) - left - 1)[row]
-        tables, left = np.column_stack([tables[row], count]), left[row] - count
-    yield np.column_stack([tables, left])
 
 
 # -- intraclass correlations: mean squares of normal ratings --------------------------

@@ -225,10 +225,11 @@ _CHOICES: dict[str, tuple[object, ...]] = {
 
 def _check_together(study: Study) -> None:
     # what is in range by itself, and does not fit the rest
-    target, interval, prior = study.target, study.interval, study.prior
+    target, interval, prior = study.target, study.interval, study.prior or (1.0, 1.0)
     is_of_items = interval in _OF_ITEMS_ALONE and target != "items"
     prices = (0.0, 0.0, 1.0) if study.prices is None else study.prices
     are_prices = len(prices) == 3 and all(0.0 <= price < math.inf for price in prices)
+    are_two = len(prior) == 2 and all(0.0 < part < math.inf for part in prior)
     refuse(
         (
             study.sides == 1 and study.level <= 0.5,
@@ -240,16 +241,12 @@ def _check_together(study: Study) -> None:
             '"jackknife" are',
         ),
         (not are_prices, f"prices: needs three of at least 0, got {prices}"),
+        (not are_two, f"prior: needs two numbers above 0, got {prior}"),
+        (
+            study.prior is not None and study.method != "goodness-of-fit",
+            f'prior: is of method "goodness-of-fit" alone, got "{study.method}"',
+        ),
     )
-    if prior is not None:
-        are_two = len(prior) == 2 and all(0.0 < part < math.inf for part in prior)
-        refuse(
-            (not are_two, f"prior: needs two numbers above 0, got {prior}"),
-            (
-                study.method != "goodness-of-fit",
-                f'prior: is of method "goodness-of-fit" alone, got "{study.method}"',
-            ),
-        )
 
 
 def _seed(rng: np.random.Generator | int | None) -> int:
@@ -419,7 +416,7 @@ def aim_words(study: Study) -> tuple[str, str]:
         return "half_width", f"a half-width of {study.half_width:g}{chance}"
     ends = ["…" if x is None else f"{x:g}" for x in (study.lower, study.upper)]
     name = "upper" if study.lower is None else "lower"
-    return name, f"an interval inside [{ends[0]}, {ends[1]}]{chance}"
+    return name, f"an interval inside [{', '.join(ends)}]{chance}"
 
 
 def reached_words(study: Study, plan: Plan) -> str:

@@ -103,8 +103,8 @@ def declared_model(study: Study) -> ItemModel:
 def _shares(study: Study, *, is_table: bool) -> Floats:
     # prevalences (n_categories,), or a table (n_categories, n_categories), with sum 1
     categories, prevalences = study.categories, study.prevalences
-    if categories is None and prevalences is None:
-        raise ParameterError("categories, prevalences: need one of both, got neither")
+    are_absent = categories is None and prevalences is None
+    refuse((are_absent, "categories, prevalences: need one of both, got neither"))
     try:
         shares = np.atleast_1d(np.asarray(prevalences, dtype=np.float64))
     except (TypeError, ValueError) as error:
@@ -573,9 +573,8 @@ def _with_value(design: Design) -> Design:
             )
         )
         return replace(design, study=replace(study, value=implied))
-    if value is None:
-        raise ParameterError("value: needs the true coefficient, got none")
-    return design.at_value(value)
+    refuse((value is None, "value: needs the true coefficient, got none"))
+    return design.at_value(design.value)
 
 
 def _true_value(design: Design) -> float:
