@@ -15,7 +15,9 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel._input import refuse
 from masrel.agreement import (
+    COEFFICIENTS,
     CodedRatings,
     Coefficient,
     CountedRatings,
@@ -387,9 +389,9 @@ def check_one_of(option: str, value: object, known: Collection[str]) -> None:
 def find_entry(statistic: Statistic, metric: Metric | None = None) -> Coefficient:
     """Return the entry of a name or a public function in the register."""
     if not isinstance(statistic, Coefficient):
-        if not isinstance(statistic, str):
-            statistic = str(getattr(statistic, "__name__", repr(statistic)))
-        statistic = coefficient(statistic)
+        name = str(getattr(statistic, "__name__", statistic))
+        # another name that it has, or an error, is looked up in full
+        statistic = COEFFICIENTS[name] if name in COEFFICIENTS else coefficient(name)
     return statistic if metric is None else statistic.by_metric(metric)
 
 
@@ -399,20 +401,22 @@ def find_entry(statistic: Statistic, metric: Metric | None = None) -> Coefficien
 def cluster_codes(problem: IntervalProblem, clusters: object) -> Integers:
     """Return which cluster every item belongs to, as numbers from 0, (n_items,)."""
     n_items = len(problem.coded.codes)
-    if problem.target != "items":
-        raise ParameterError(
+    labels = list(clusters) if is_row(clusters) else []
+    refuse(
+        (
+            problem.target != "items",
             "clusters: what is left out, or drawn anew, is a cluster of items, so "
-            f'target "items"; got "{problem.target}"'
-        )
-    if not is_row(clusters):
-        raise ParameterError(
-            f"clusters: needs one label an item, got {type(clusters).__name__}"
-        )
-    labels = list(clusters)
-    if len(labels) != n_items:
-        raise ParameterError(
-            f"clusters: needs one label an item, {n_items}, got {len(labels)}"
-        )
+            f'target "items"; got "{problem.target}"',
+        ),
+        (
+            not is_row(clusters),
+            f"clusters: needs one label an item, got {type(clusters).__name__}",
+        ),
+        (
+            len(labels) != n_items,
+            f"clusters: needs one label an item, {n_items}, got {len(labels)}",
+        ),
+    )
     numbers: dict[Hashable, int] = {}
     for item, label in enumerate(labels):
         if is_missing(label) or not isinstance(label, Hashable) or label == "":

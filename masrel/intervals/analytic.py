@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from masrel._input import refuse
 from masrel.agreement import COEFFICIENTS, Label, Metric, WeightsLike
 from masrel.agreement._engine import (
     NO_SPREAD,
@@ -158,11 +159,17 @@ def analytic(
         metric=metric,
         level=level,
     )
-    if target != "items":
-        raise ParameterError(
+    refuse(
+        (
+            target != "items",
             'target: the delta method generalises to other items only, so "items"; for '
-            f'other raters, or both, use the jackknife; got "{target}"'
-        )
+            f'other raters, or both, use the jackknife; got "{target}"',
+        ),
+        (
+            clusters is not None and convention is not None,
+            f'clusters: needs no convention, got "{convention}"',
+        ),
+    )
     if problem.entry.metric == "ordinal":
         problem = replace(problem, notes=(HELD,))
     with warnings.catch_warnings():
@@ -175,8 +182,6 @@ def analytic(
         method, error = _NAMES[convention], _error_by(convention, problem, estimate)
     method = f"{method}, {_METHODS[distribution]}"
     if clusters is not None:
-        if convention is not None:
-            raise ParameterError(f'clusters: needs no convention, got "{convention}"')
         method, unit = f"{method}, of clusters", "clusters"
         error, n = _clustered_error(problem, cluster_codes(problem, clusters))
     lowest = None

@@ -1,5 +1,6 @@
 """Bootstrap intervals over items or raters: exact, or by Monte Carlo."""
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -8,7 +9,6 @@ from statistics import NormalDist
 from typing import Literal, cast, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from masrel._input import refuse
 from masrel.agreement import Label, Metric, WeightsLike
@@ -533,26 +533,20 @@ def _count_compositions(n: int, n_units: int) -> int:
     return math.comb(n + n_units - 1, fewer) if fewer < 30 else 10**15
 
 
-def _compositions(freq: Integers) -> tuple[NDArray[np.int32], Floats]:
+def _compositions(freq: Integers) -> tuple[Integers, Floats]:
     """Return how often each unit is in every resample, and its probability."""
     # freq (n_units,) -> (n_resamples, n_units), (n_resamples,)
-    # n! Π share^t / t! in logarithms, so that no n over- or underflows.
-    n = int(freq.sum())
+    n, size = int(freq.sum()), freq.size
+    # n draws in a row, with a bar wherever those of the next unit begin
+    bars = itertools.combinations(range(n + size - 1), size - 1)
+    flat = np.fromiter(itertools.chain.from_iterable(bars), dtype=np.int64)
+    bars_at = flat.reshape(-1, size - 1) if size > 1 else np.empty((1, 0), np.int64)
+    counts = np.diff(bars_at, axis=1, prepend=-1, append=n + size - 1) - 1
+    # n! Π share^t / t! in logarithms, so that no n over- or underflows
     steps = np.log(np.maximum(np.arange(n + 1), 1))
     factorials = np.cumsum(steps, dtype=np.longdouble).astype(np.float64)
-    left = np.array([n], dtype=np.int32)  # draws that are left to the next units
-    logs = np.array([factorials[n]])
-    columns: list[NDArray[np.int32]] = []
-    for share in freq[:-1] / n:
-        n_choices = left + 1
-        parent = np.repeat(np.arange(left.size), n_choices)
-        first = np.cumsum(n_choices) - n_choices
-        drawn = (np.arange(parent.size) - first[parent]).astype(np.int32)
-        columns = [column[parent] for column in columns] + [drawn]
-        left = left[parent] - drawn
-        logs = logs[parent] + (drawn * math.log(share) - factorials[drawn])
-    logs = logs + (left * math.log(freq[-1] / n) - factorials[left])
-    return np.column_stack([*columns, left]), np.exp(logs)
+    logs = counts * np.log(freq / n) - factorials[counts]
+    return counts, np.exp(factorials[n] + logs.sum(axis=1))
 
 
 def _all_resamples(

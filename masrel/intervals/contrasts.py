@@ -910,12 +910,9 @@ def _concordance(
             f"groups: group {place}: needs two raters and two categories, got "
             f"{counted.n_raters} and {used}"
         )
-    first = rows[:, 0]
-    second = rows[:, 1] if used == 2 else np.zeros_like(first)
-    is_whole = first + second == 2
-    both, one, neither = (
-        int(freq[is_whole & (first == number)].sum()) for number in (2, 1, 0)
-    )
+    is_whole = rows.sum(axis=1) == 2
+    of_first = np.bincount(rows[is_whole, 0], freq[is_whole], minlength=3)
+    both, one, neither = of_first[::-1].astype(int).tolist()
     return both, one, neither
 
 

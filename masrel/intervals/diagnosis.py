@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from masrel._input import refuse
 from masrel.agreement import Label, Metric, WeightsLike
 from masrel.agreement._engine import Array, Floats, Integers, divide
 from masrel.agreement._rows import distinct_rows, item_counts
@@ -213,17 +214,19 @@ def diagnose(
     a      30   0.667  [0.438, 0.849]
     b      30   0.667  [0.438, 0.849]
     """
-    if target not in ("items", None):
-        raise ParameterError(
-            "target: a rater, a pair and a category are those of these ratings, so "
-            f'"items", or None for no intervals; got {target!r}'
-        )
     entry = find_entry(coefficient, metric)
-    if entry.shape != "ratings":
-        raise ParameterError(
+    refuse(
+        (
+            target not in ("items", None),
+            "target: a rater, a pair and a category are those of these ratings, so "
+            f'"items", or None for no intervals; got {target!r}',
+        ),
+        (
+            entry.shape != "ratings",
             f"coefficient: needs one of several raters, and {entry.title} is of each "
-            "rater's grades of two sessions"
-        )
+            "rater's grades of two sessions",
+        ),
+    )
     coded = entry.code(ratings, categories)
     if coded.n_categories > MANY:
         raise ParameterError(
@@ -288,18 +291,14 @@ def _names(
 
 def _place(reference: str | int, names: Sequence[str]) -> int:
     """Return which rater is the reference."""
-    if isinstance(reference, str) and reference in names:
-        return names.index(reference)
-    is_place = isinstance(reference, int | np.integer)
-    if (
-        is_place
-        and not isinstance(reference, bool)
-        and 0 <= int(reference) < len(names)
-    ):
-        return int(reference)
-    raise ParameterError(
-        f"reference: needs one of {', '.join(names)}, got {reference!r}"
-    )
+    places: dict[object, int] = dict(zip(names, range(len(names)), strict=True))
+    if isinstance(reference, int | np.integer) and not isinstance(reference, bool):
+        places = {place: place for place in range(len(names))}
+    if reference not in places:
+        raise ParameterError(
+            f"reference: needs one of {', '.join(names)}, got {reference!r}"
+        )
+    return places[reference]
 
 
 def _of_pairs(
