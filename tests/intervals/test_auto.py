@@ -118,17 +118,6 @@ def test_a_lower_posterior_lowers_no_end() -> None:
     assert not any("halfway" in note for note in found.notes)
 
 
-def test_other_raters_leave_raters_out() -> None:
-    found = chosen(MEDIUM, "raters", categories=LABELS)
-    with pytest.warns(SmallSampleWarning, match="4 raters"):
-        plain = jackknife("fleiss_kappa", MEDIUM, target="raters", categories=LABELS)
-    assert (found.low, found.high, found.method) == (
-        plain.low,
-        plain.high,
-        plain.method,
-    )
-
-
 @pytest.mark.parametrize(
     "ratings", [MEDIUM, APART], ids=["cells hold more", "cells hold less"]
 )
@@ -168,6 +157,11 @@ def test_perfect_agreement_is_bounded_from_below_by_the_model(
     assert found.kind == "credible"
     assert found.method == "Dirichlet-multinomial posterior, one-sided"
     assert "rests on the prior" in found.notes[1]
+
+
+def test_perfect_agreement_of_patterns_has_a_lower_bound_too() -> None:
+    found = quietly("conger_kappa", PERFECT)
+    assert (found.high, found.method[-9:]) == (1.0, "one-sided")
 
 
 def test_a_posterior_is_widened_to_an_estimate_that_it_leaves_out() -> None:
@@ -211,9 +205,6 @@ def test_a_method_by_name_is_that_method(method: str) -> None:
     assert dataclasses.replace(found, interval=None) == fleiss_kappa(
         MEDIUM, categories=LABELS
     )
-
-
-FEW_PAIRS = [["a", "a"], ["a", "b"], ["b", "b"], ["c", "c"], ["c", "c"], ["b", "c"]]
 
 
 def test_two_raters_who_always_agree_have_a_lower_bound() -> None:

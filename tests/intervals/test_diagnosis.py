@@ -3,7 +3,6 @@
 import itertools
 
 import numpy as np
-import pandas as pd
 import pytest
 from numpy.typing import NDArray
 from scipy import stats
@@ -151,15 +150,6 @@ def test_a_reference_is_left_out_of_all_else() -> None:
         assert getattr(with_it, name) == pytest.approx(
             getattr(without, name), nan_ok=True, rel=1e-14
         )
-
-
-def test_names_come_from_a_frame_and_are_shown() -> None:
-    frame = pd.DataFrame(drawn()[:, :3], columns=["Kim", "Lee", "Ann"])
-    found = diagnose(frame, target="items")
-    assert found.raters == ("Kim", "Lee", "Ann")
-    text = str(found)
-    assert text.splitlines()[2].startswith("Kim  ")
-    assert f"{found.changes[0]:+.3f}" in text
 
 
 def test_a_rater_without_ratings_changes_nothing() -> None:

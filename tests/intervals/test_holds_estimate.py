@@ -18,7 +18,7 @@ from masrel.errors import (
     UndefinedStatisticWarning,
 )
 from masrel.estimates import Interval
-from masrel.intervals import analytic, difference, estimate, jackknife, posterior
+from masrel.intervals import analytic, difference, estimate, jackknife
 
 Outcome = tuple[float, Interval]
 Method = Callable[..., Outcome]
@@ -160,52 +160,6 @@ def test_an_interval_holds_its_estimate(
             outcome = PROMISE[method](coefficient, ratings, **options)
         check(outcome, noted)
         assert outcome[1].level == level
-
-
-@pytest.mark.parametrize("level", [0.5, 0.95, 0.999])
-@pytest.mark.parametrize("coefficient", KERNELS)
-@pytest.mark.parametrize("method", ["posterior", "estimate"])
-def test_a_credible_interval_holds_its_median(
-    method: str, coefficient: str, level: float
-) -> None:
-    # and no other has one
-    if COEFFICIENTS[coefficient].shape == "pairs":
-        return  # there is no posterior of these
-    for seed in range(3):
-        ratings, q = made(coefficient, seed)
-        options = {"target": "items", "categories": range(q), "level": level}
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", MasrelWarning)
-            if method == "posterior":
-                draws = {"n_draws": 400, "rng": 1}
-                interval = posterior(coefficient, ratings, **options, **draws)  # type: ignore[arg-type]
-            else:
-                result = estimate(coefficient, ratings, **options)  # type: ignore[arg-type]
-                assert result.interval is not None
-                interval = result.interval
-        if interval.kind == "confidence" or interval.reason is not None:
-            assert interval.median is None
-        else:
-            assert interval.median is not None
-            assert interval.low <= interval.median <= interval.high
-
-
-@pytest.mark.parametrize("level", [0.5, 0.95, 0.999])
-@pytest.mark.parametrize("coefficient", OWN)
-def test_an_interval_that_comes_with_an_estimate_holds_it(
-    coefficient: str, level: float
-) -> None:
-    rng = np.random.default_rng(7)
-    for _ in range(200):
-        n, r = rng.integers(2, 12), rng.integers(2, 6)
-        scores = rng.normal(size=(n, 1)) * rng.choice([0.1, 1.0, 5.0])
-        scores = scores + rng.normal(size=r) + rng.normal(size=(n, r))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", MasrelWarning)
-            target = COEFFICIENTS[coefficient].interval_target
-            result = estimate(coefficient, scores, target=target, level=level)  # type: ignore[arg-type]
-        assert result.interval is not None
-        check((result.value, result.interval))
 
 
 @pytest.mark.parametrize("method", PROMISE)

@@ -147,22 +147,6 @@ def test_a_retest_item_leaves_with_all_its_raters() -> None:
     assert wide.low == pytest.approx(max(centre - half, -1.0), rel=1e-10)
 
 
-def test_coverage_for_other_raters_is_what_it_says() -> None:
-    # Raters who see an item right with probability .8, else pick any of 4 grades: two
-    # agree with probability .85² + 3 · .05² = .73, chance is 1/4 when the four fixed
-    # items are one of each, so kappa = .48/.75 = .64. 300 studies of 4 items × 10
-    # raters, known coverage 93 to 98 %: fewer than 267 of 300 once in 2000 runs of
-    # other seeds at 93 %.
-    rng = np.random.default_rng(3)
-    covered = 0
-    for _ in range(300):
-        right = rng.random((4, 10)) < 0.8
-        graded = np.where(right, np.arange(4)[:, None], rng.integers(0, 4, (4, 10)))
-        found = jackknife("fleiss_kappa", graded, target="raters", categories=range(4))
-        covered += found.low <= 0.64 <= found.high
-    assert 267 <= covered <= 300
-
-
 @pytest.mark.parametrize(
     ("table", "target", "reason"),
     [

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from masrel.agreement import COEFFICIENTS, count_items, count_table, p_value
+from masrel.agreement import COEFFICIENTS, count_items, count_table
 from masrel.errors import MasrelWarning, SmallSampleWarning
 from masrel.estimates import Estimate, Interval, Target, as_document
 from masrel.intervals import (
@@ -94,14 +94,6 @@ def test_where_they_tell_of_chance_they_are_left_out_in_turn(name: str) -> None:
     low = max(-1.0, centre.value - t4 * centre.standard_error)
     assert plain.low == pytest.approx(low, rel=1e-12)
     assert plain.notes[0].startswith("5 items with a pair of ratings: below 10")
-
-
-def test_p_values_count_pairs() -> None:
-    found = COEFFICIENTS["gwet_ac"](FULL + SINGLES)
-    t = found.value / found.standard_error
-    # P(|t(4)| ≥ t) = 1 - s (1.5 - 0.5 s²) with s = t/√(t² + 4)
-    s = t / math.sqrt(t * t + 4)
-    assert p_value(found) == pytest.approx(1 - s * (1.5 - 0.5 * s * s), rel=1e-9)
 
 
 def holed(table: Table) -> list[Table]:

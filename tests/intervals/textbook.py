@@ -58,39 +58,6 @@ def gwet(table: Table) -> Fraction | None:
     return (observed - chance) / (1 - chance)
 
 
-def cohen(table: Table) -> Fraction | None:
-    """Cohen (1960) of the first two raters."""
-    pairs = [(a, b) for a, b, *_ in table if a is not None and b is not None]
-    if not pairs:
-        return None
-    n = len(pairs)
-    first, second = (Counter(pair[k] for pair in pairs) for k in (0, 1))
-    chance = sum(Fraction(first[k] * second[k], n * n) for k in range(3))
-    if chance == 1:
-        return None
-    observed = Fraction(sum(a == b for a, b in pairs), n)
-    return (observed - chance) / (1 - chance)
-
-
-def krippendorff(table: Table) -> Fraction | None:
-    """Krippendorff's alpha, nominal, from the coincidence matrix."""
-    weights: dict[tuple[int, int], Fraction] = {}
-    for row in table:
-        given = [grade for grade in row if grade is not None]
-        for pair in itertools.permutations(given, 2):
-            weights[pair] = weights.get(pair, Fraction(0)) + Fraction(1, len(given) - 1)
-    margins = [
-        sum((w for (a, _), w in weights.items() if a == k), Fraction(0))
-        for k in range(3)
-    ]
-    n = sum(margins, Fraction(0))
-    expected = sum(margins[k] * (n - margins[k]) for k in range(3))
-    if n == 0 or expected == 0:
-        return None
-    observed = sum((w for (a, b), w in weights.items() if a != b), Fraction(0))
-    return 1 - (n - 1) * observed / expected
-
-
 class Law:
     """The values of all resamples with their probabilities, in fractions."""
 
