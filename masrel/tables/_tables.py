@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from decimal import ROUND_HALF_UP, Decimal
 from typing import Any, Literal
 
-from masrel._cells import safe_cell
+from masrel._files import safe_cell
 
 SYMBOL = re.compile(r"(?<!\w)(ΔT|k|ν|θ|p)_(peak|post|th|L|start|end|o|e)(?!\w)")
 """Symbols of the model as they are written in plain text: an index after "_"."""

@@ -2,20 +2,16 @@
 
 import json
 import math
-import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
-from masrel.agreement import IccForm, icc, sem
+from masrel.agreement import IccForm, icc
 from masrel.errors import UndefinedStatisticWarning
-from masrel.intervals import estimate
 
 Floats = NDArray[np.float64]
 
@@ -129,40 +125,6 @@ def test_without_residual_by_hand() -> None:
     assert interval.low == pytest.approx(odds / (1.0 + odds), rel=1e-9)
 
 
-def test_raters_alone_leave_nothing_to_correlate() -> None:
-    # every rating is its rater's level: items differ by rounding at most
-    levels = np.array([0.1, 0.7, 1.3, 0.4])
-    ratings = np.where(np.random.default_rng(3).random((6, 4)) < 0.3, np.nan, levels)
-    assert icc(ratings, form="ICC(A,1)").value == 0.0
-    with pytest.warns(UndefinedStatisticWarning, match="0/0"):
-        assert math.isnan(icc(ratings, form="ICC(C,1)").value)
-
-
-@pytest.mark.parametrize("of_raters", [0.5, 0.0, 300.0])
-def test_errors_may_be_as_small_as_floats_tell(of_raters: float) -> None:
-    # With a residual ε times as large, 1 - ICC(C,1) becomes ε² times as large, and the
-    # rest tends to what it is of items and raters alone.
-    g = np.random.default_rng(7)
-    items, raters = g.normal(size=(40, 1)), of_raters * g.normal(size=4)
-    residual, lacks = g.normal(size=(40, 4)), g.random((40, 4)) < 0.2
-    found = {}
-    for size in (1e-3, 1e-4, 1e-6, 1e-8):
-        ratings = np.where(lacks, np.nan, items + raters + size * residual)
-        error = sem(ratings, kind="consistency")
-        agreement = icc(ratings, form="ICC(A,1)")
-        assert error.interval is not None
-        assert agreement.interval is not None
-        ends = error.interval.low, error.interval.high
-        found[size] = [e / size for e in (error.value, *ends)] + [
-            (1.0 - v) / size ** (0.0 if of_raters else 2.0)
-            for v in (agreement.value, agreement.interval.low, agreement.interval.high)
-        ]
-    for size in (1e-4, 1e-6):
-        assert found[size] == pytest.approx(found[1e-3], rel=2e-3)
-    # of an ICC of 1 - 1e-16 no digit is left
-    assert found[1e-8][:3] == pytest.approx(found[1e-3][:3], rel=2e-3)
-
-
 def test_one_way_by_hand() -> None:
     # Two items, (0, 2) and (5), a one-way likelihood of two contrasts: the difference
     # of the first two has variance 2 s, that of 5 from their mean 2 i + 3 s / 2. So
@@ -180,19 +142,6 @@ def test_a_variance_of_zero_is_said() -> None:
     assert "items 0 (the least it can be), raters 0 (the" in result.interval.notes[0]
 
 
-@pytest.mark.parametrize("form", ["ICC(1)", "ICC(A,1)", "ICC(C,1)"])
-def test_the_mean_of_k_is_stepped_up(form: IccForm) -> None:
-    ratings = table("icc_missing-02")
-    single = icc(ratings, form=form)
-    mean = icc(ratings, form="ICC(1,k)" if form == "ICC(1)" else f"{form[:5]},k)")  # type: ignore[arg-type]
-    rho = single.value
-    assert mean.value == pytest.approx(5 * rho / (1 + 4 * rho), rel=1e-12)
-    assert mean.interval is not None
-    assert mean.interval.notes[1] == (
-        "k is the 5 raters of the table; an item has 3.75 ratings on average"
-    )
-
-
 @pytest.mark.parametrize("form", SINGLE)
 def test_neither_origin_unit_nor_order_matters(form: IccForm) -> None:
     ratings = table("icc_missing-04")
@@ -207,45 +156,6 @@ def test_neither_origin_unit_nor_order_matters(form: IccForm) -> None:
         ratings[:, [3, 0, 5, 1, 4, 2]],
     ):
         assert icc(moved, form=form).value == pytest.approx(value, rel=1e-10)
-
-
-@pytest.mark.parametrize("form", SINGLE)
-def test_items_and_raters_without_a_rating_change_nothing(form: IccForm) -> None:
-    whole = np.array([[9.0, 2, 5], [6, 1, 3], [8, 4, 6], [7, 1, 2]])
-    for ratings in (whole, table("icc_missing-06")):
-        n, k = ratings.shape
-        padded = np.full((n + 2, k + 1), np.nan)
-        padded[1:-1, :k] = ratings
-        assert repr(icc(padded, form=form)) == repr(icc(ratings, form=form))
-
-
-@given(
-    st.lists(
-        st.lists(
-            st.one_of(st.none(), st.integers(1, 5)), min_size=3, max_size=3
-        ).filter(lambda row: row.count(None) < 3),
-        min_size=2,
-        max_size=6,
-    ),
-    st.sampled_from(("ICC(1)", "ICC(1,k)", "ICC(A,1)", "ICC(A,k)", "ICC(C,1)")),
-)
-@settings(max_examples=60)
-def test_a_value_is_a_share_within_its_interval_or_has_a_reason(
-    ratings: list[list[int | None]], form: IccForm
-) -> None:
-    ratings = [*ratings, [1, 2, None]]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UndefinedStatisticWarning)
-        result = icc(ratings, form=form)
-    if result.reason is not None:
-        assert math.isnan(result.value)
-        return
-    assert result.interval is not None
-    if result.interval.method != "REML, profile likelihood":
-        return  # a rater without any rating: a complete table of two
-    assert 0.0 <= result.value <= 1.0
-    assert result.interval.low <= result.value + 1e-9
-    assert result.interval.high >= result.value - 1e-9
 
 
 @pytest.mark.parametrize(
@@ -268,25 +178,6 @@ def test_undefined_with_a_reason(ratings: list[list[int | None]], why: str) -> N
     assert result.reason is not None
     assert why in result.reason
     assert result.interval is None
-
-
-def test_raters_who_never_meet_are_estimated_from_what_they_gave() -> None:
-    # two pairs of raters, each with items of its own: the variance of raters has two
-    # differences within pairs, which are 0 and large, and a residual
-    rng = np.random.default_rng(3)
-    ratings = np.full((30, 4), np.nan)
-    ratings[:15, :2] = rng.normal(size=(15, 1)) * 3 + rng.normal(size=(15, 2))
-    ratings[15:, 2:] = rng.normal(size=(15, 1)) * 3 + rng.normal(size=(15, 2)) + [0, 4]
-    (of_items, of_raters), _ = Dense(ratings, has_raters=True).best()
-    expected = of_items / (of_items + of_raters + 1.0)
-    assert icc(ratings).value == pytest.approx(expected, rel=1e-6)
-
-
-def test_estimate_takes_a_table_with_gaps() -> None:
-    ratings = SETTINGS["icc_missing-02"]["data"]
-    result = estimate("icc_a1", ratings, target="both")
-    assert result.value == pytest.approx(0.607385137, rel=1e-7)
-    assert result.interval == icc(ratings).interval
 
 
 @pytest.mark.slow

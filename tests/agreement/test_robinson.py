@@ -3,14 +3,12 @@
 import math
 from fractions import Fraction
 
-import numpy as np
-import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from masrel.agreement import icc, kendall_w, robinson_a
-from masrel.errors import RatingsError, UndefinedStatisticWarning
+from masrel.agreement import kendall_w, robinson_a
+from masrel.errors import UndefinedStatisticWarning
 from tests.agreement.undefined import assert_undefined
 
 Rows = list[list[int]]
@@ -56,12 +54,6 @@ def test_two_raters_by_hand() -> None:
     assert math.isnan(found.chance)
 
 
-def test_shrout_and_fleiss_table_worked_in_whole_numbers() -> None:
-    # SS of items 1349/24, of the residual 367/24; derived where ICC is tested.
-    expected = pytest.approx(1349 / (1349 + 367), rel=1e-15)
-    assert robinson_a(TABLE_2).value == expected
-
-
 @given(rows)
 def test_is_the_quotient_of_plain_sums(table: Rows) -> None:
     expected = plain(table)
@@ -70,31 +62,6 @@ def test_is_the_quotient_of_plain_sums(table: Rows) -> None:
         return
     assert robinson_a(table).value == pytest.approx(float(expected), rel=1e-15)
     assert 0 <= expected <= 1
-
-
-@given(rows)
-def test_of_two_raters_it_is_a_correlation(table: Rows) -> None:
-    # 1/2 + S_xy/(S_xx + S_yy): Robinson's A of two is (1 + r)/2 with the intraclass r
-    two = np.array([row[:2] for row in table], dtype=float)
-    if plain([row[:2] for row in table]) is None:
-        assert_undefined(lambda: robinson_a(two))
-        return
-    (s_xx, s_xy), (_, s_yy) = np.cov(two.T)
-    found = robinson_a(two).value
-    assert found == pytest.approx(0.5 + s_xy / (s_xx + s_yy), rel=1e-12, abs=1e-12)
-
-
-@pytest.mark.filterwarnings("ignore::masrel.errors.UndefinedStatisticWarning")
-@given(rows)
-def test_is_consistency_on_another_scale(table: Rows) -> None:
-    # ICC(C,1) = (k A - 1)/(k - 1)
-    single = icc(table, form="ICC(C,1)")
-    if single.reason is not None:
-        assert math.isnan(single.value)
-        return
-    k = len(table[0])
-    found = robinson_a(table).value
-    assert (k * found - 1) / (k - 1) == pytest.approx(single.value, abs=1e-12)
 
 
 @given(rows)
@@ -110,46 +77,6 @@ def test_of_ranks_it_is_kendalls_w(table: Rows) -> None:
         return
     w = kendall_w(table).value
     assert robinson_a(of_items).value == pytest.approx(w, rel=1e-14, abs=1e-15)
-
-
-@given(rows, st.lists(st.integers(-50, 50), min_size=5, max_size=5))
-def test_neither_levels_of_raters_nor_units_matter(
-    table: Rows, levels: list[int]
-) -> None:
-    expected = plain(table)
-    if expected is None:
-        assert_undefined(lambda: robinson_a(table))
-        return
-    moved = [
-        [-4.0 * x + level for x, level in zip(row, levels, strict=False)]
-        for row in table
-    ]
-    assert robinson_a(moved).value == pytest.approx(float(expected), abs=1e-13)
-
-
-def test_one_grade_higher_throughout_loses_nothing() -> None:
-    assert robinson_a([[1, 2, 5], [2, 3, 6], [4, 5, 8]]).value == 1.0
-
-
-def test_numbers_far_from_zero_keep_their_digits() -> None:
-    far = np.array(TABLE_2) + 2.0**50
-    assert robinson_a(far).value == robinson_a(TABLE_2).value
-
-
-def test_items_with_a_missing_rating_are_left_out() -> None:
-    holed = [*TABLE_2, [5, None, 5, 5], [float("nan"), 1, 1, 1]]
-    for table in (holed, np.array(holed, dtype=float), pd.DataFrame(holed)):
-        found = robinson_a(table)
-        assert found.value == robinson_a(TABLE_2).value
-        assert found.n_items == 6
-
-
-def test_text_counts_by_its_place_in_the_declared_scale() -> None:
-    scale = ["1", "1+", "2", "3"]
-    text = [["1", "1+"], ["1+", "3"], ["2", "2"]]
-    assert robinson_a(text, categories=scale).value == 0.75
-    with pytest.raises(RatingsError, match=r"declared scale in order.*text"):
-        robinson_a(text)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from masrel._cells import from_safe_cell, safe_cell
+from masrel._files import from_safe_cell, safe_cell
 from masrel.lab.ratings import ratings_from_rows, read_study_ratings, write_ratings
 from masrel.scales import Scale
 from tests.cli.process import Caller

@@ -9,8 +9,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from masrel._cells import safe_cell
-from masrel._files import new_file
+from masrel._files import new_file, safe_cell
 from masrel.errors import ParameterError
 from masrel.lab.report._traced_scenes import Scene
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from operator import itemgetter
 from typing import Literal
 
-from masrel._cells import safe_cell
+from masrel._files import safe_cell
 from masrel.errors import ScheduleError
 from masrel.lab.conduct import excluded_raters, rater_values, read_conduct
 from masrel.lab.progress._session_stages import (

@@ -6,8 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from masrel._cells import from_safe_cell, safe_cell
-from masrel._files import write_file
+from masrel._files import from_safe_cell, safe_cell, write_file
 from masrel._input import listed
 from masrel.errors import ParameterError
 from masrel.lab.conduct._study_answers import study_answers

@@ -9,7 +9,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-from masrel._cells import from_safe_cell
+from masrel._files import from_safe_cell
 from masrel._input import (
     MAX_TABLE,
     csv_format,
