@@ -312,7 +312,7 @@ def _left_out(
 
 
 def _side_by_side(
-    parts: Sequence[RatingsPart], items: Sequence[str], raters: Sequence[str]
+    parts: Sequence[RatingsPart], items: list[str], raters: list[str]
 ) -> NDArray[np.signedinteger]:
     # codes (n_items, 2 n_raters), both sessions of a rater beside each other
     import pandas as pd  # of all questions this one alone needs it

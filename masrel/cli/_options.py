@@ -2,9 +2,7 @@
 
 import json
 import sys
-import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import wraps
 from pathlib import Path
@@ -14,7 +12,7 @@ import click
 
 from masrel._files import write_file
 from masrel.cli._paths import FileInFolder, OutputFile
-from masrel.errors import MasrelWarning, ParameterError
+from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
     from masrel.plots._drawn_values import Content, Drawn, Form
@@ -235,24 +233,3 @@ def echo_notes(notes: Sequence[str]) -> None:
     """Print notes on stderr, one a line."""
     notes_of_call().extend(notes)
     click.echo("".join(f"{note}\n" for note in notes), err=True, nl=False)
-
-
-@contextmanager
-def warnings_as_notes() -> Iterator[None]:
-    """Show warnings of masrel as notes, each once; leave all others as they are."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        try:
-            yield
-        finally:
-            messages = {str(w.message): None for w in caught if _is_ours(w)}
-            echo_notes(tuple(f"note: {message}" for message in messages))
-    for warning in caught:
-        if not _is_ours(warning):
-            warnings.warn_explicit(
-                warning.message, warning.category, warning.filename, warning.lineno
-            )
-
-
-def _is_ours(warning: warnings.WarningMessage) -> bool:
-    return issubclass(warning.category, MasrelWarning)

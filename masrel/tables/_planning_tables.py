@@ -13,7 +13,6 @@ from masrel.tables._tables import (
     Table,
     number,
     percent,
-    rounded,
     significant,
     table_of,
 )
@@ -232,7 +231,7 @@ def _toml_values(plan: Plan) -> Iterator[tuple[str, str]]:
         "sides": plan.sides if plan.sides == 1 else None,
         **{key: getattr(plan, key) for key in aims},
         # four digits, which is more than a plan is exact to
-        **{k: rounded(x, 4) for k, x in computed.items() if not math.isnan(x)},
+        **{k: round(x, 4) for k, x in computed.items() if not math.isnan(x)},
         "method": f'"{plan.method}"',
         "n_studies": plan.n_studies or None,
         "seed": plan.seed if plan.n_studies else None,

@@ -158,11 +158,6 @@ def half_up(value: float, decimals: int) -> str:
     return text.replace("-", "−")
 
 
-def rounded(value: float, decimals: int) -> float:
-    """Return a number with so many decimals, for a file that takes numbers."""
-    return round(value, decimals)
-
-
 def significant(value: float, digits: int = 6) -> str:
     """Return a number with so many digits, whatever its size."""
     return f"{value:.{digits}g}"
@@ -188,12 +183,6 @@ def percent(share: float) -> str:
     return f"{(Decimal(repr(float(share))) * 100).normalize():f}"
 
 
-def whole_or_tenths(values: Sequence[float]) -> int:
-    """Return the decimals a column of measurements needs: 0 if all are whole."""
-    known = [value for value in values if math.isfinite(value)]
-    return 0 if all(float(value).is_integer() for value in known) else 1
-
-
 def interval_text(low: float, high: float, digits: int = 3) -> str:
     """Return the ends of an interval in brackets."""
     if math.isnan(low) or math.isnan(high):
@@ -204,13 +193,6 @@ def interval_text(low: float, high: float, digits: int = 3) -> str:
 def p_text(p: Value) -> str:
     """Return a p-value as shown: three decimals, or below the least that they show."""
     return "<0.001" if isinstance(p, float) and p < 0.0005 else number(p, 3)
-
-
-def at_ranks(values: Sequence[float]) -> dict[str, int]:
-    """Return which of many values are the least, the quartiles and the most."""
-    order = sorted(range(len(values)), key=values.__getitem__)
-    names = ("lowest", "lower quartile", "median", "upper quartile", "highest")
-    return {name: order[k * (len(order) - 1) // 4] for k, name in enumerate(names)}
 
 
 def capital(text: str) -> str:

@@ -1,6 +1,8 @@
-"""The ratings of a study, as commands read them."""
+"""The ratings of a study, as commands read them, and warnings, as they say them."""
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -8,6 +10,7 @@ import click
 
 from masrel.cli._options import echo_notes
 from masrel.cli._paths import InputFile, note_inputs
+from masrel.errors import MasrelWarning
 
 if TYPE_CHECKING:
     from masrel.lab.ratings import StudyData
@@ -39,3 +42,24 @@ def read_study(root: Path, ratings_file: Path | None) -> "StudyData":
 def echo_remarks(remarks: Sequence[str]) -> None:
     """Print on stderr what a reader of a study's ratings must know beside them."""
     echo_notes(tuple(f"note: {remark}" for remark in remarks))
+
+
+@contextmanager
+def warnings_as_notes() -> Iterator[None]:
+    """Show warnings of masrel as notes, each once; leave all others as they are."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            yield
+        finally:
+            messages = {str(w.message): None for w in caught if _is_ours(w)}
+            echo_notes(tuple(f"note: {message}" for message in messages))
+    for warning in caught:
+        if not _is_ours(warning):
+            warnings.warn_explicit(
+                warning.message, warning.category, warning.filename, warning.lineno
+            )
+
+
+def _is_ours(warning: warnings.WarningMessage) -> bool:
+    return issubclass(warning.category, MasrelWarning)

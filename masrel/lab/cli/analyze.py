@@ -6,15 +6,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli._options import (
-    STDOUT,
-    OutputOptions,
-    output_options,
-    warnings_as_notes,
-    write_json,
-)
+from masrel.cli._options import STDOUT, OutputOptions, output_options, write_json
 from masrel.lab.cli._gating import GateOptions, gate_options, verdict_of
-from masrel.lab.cli._study_options import ratings_option, read_study
+from masrel.lab.cli._study_options import ratings_option, read_study, warnings_as_notes
 
 if TYPE_CHECKING:
     from masrel.lab.analysis import Analysis

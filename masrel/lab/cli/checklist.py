@@ -4,9 +4,9 @@ from pathlib import Path
 
 import click
 
-from masrel.cli._options import warnings_as_notes
 from masrel.cli._paths import OutputFile
 from masrel.lab._once import read_once
+from masrel.lab.cli._study_options import warnings_as_notes
 from masrel.lab.protocol import StudyPaths, read_protocol
 
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli._options import warnings_as_notes
 from masrel.cli._paths import InputFile
+from masrel.lab.cli._study_options import warnings_as_notes
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 
 if TYPE_CHECKING:

@@ -9,10 +9,9 @@ from masrel.cli._options import (
     OutputOptions,
     output_options,
     split_commas,
-    warnings_as_notes,
     write_output,
 )
-from masrel.lab.cli._study_options import ratings_option, read_study
+from masrel.lab.cli._study_options import ratings_option, read_study, warnings_as_notes
 
 if TYPE_CHECKING:
     from masrel.lab.analysis import Effect, GradeRegression

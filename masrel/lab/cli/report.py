@@ -17,7 +17,6 @@ from masrel.cli._options import (
     echo_notes,
     notes_of_call,
     output_options,
-    warnings_as_notes,
     write_json,
 )
 from masrel.errors import ParameterError
@@ -25,7 +24,7 @@ from masrel.lab._cache import FOLDER, Cache
 from masrel.lab._once import read_once
 from masrel.lab.cli._comparing import CompareOptions, compare_options
 from masrel.lab.cli._gating import GateOptions, Verdict, gate_options, verdict_of
-from masrel.lab.cli._study_options import ratings_option, read_study
+from masrel.lab.cli._study_options import ratings_option, read_study, warnings_as_notes
 from masrel.lab.report._builds import Build
 from masrel.lab.report._report_folder import (
     MANIFEST,

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Literal, TypedDict
 import click
 from tqdm import tqdm
 
-from masrel.cli._options import OutputOptions, output_options, warnings_as_notes
+from masrel.cli._options import OutputOptions, output_options
+from masrel.lab.cli._study_options import warnings_as_notes
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol, scale_of
 
 if TYPE_CHECKING:

@@ -7,15 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli._options import (
-    STDOUT,
-    OutputOptions,
-    output_options,
-    warnings_as_notes,
-    write_json,
-)
+from masrel.cli._options import STDOUT, OutputOptions, output_options, write_json
 from masrel.errors import ParameterError
 from masrel.lab._once import read_once
+from masrel.lab.cli._study_options import warnings_as_notes
 from masrel.lab.protocol import StudyPaths
 
 if TYPE_CHECKING:

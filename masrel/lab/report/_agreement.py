@@ -22,17 +22,10 @@ from masrel.lab.report._sentences import (
     interval_name,
     meaning,
 )
+from masrel.lab.report._stretches import at_ranks
 from masrel.plots._drawn_values import Forest, ForestRow
 from masrel.tables._estimate_words import forest_row
-from masrel.tables._tables import (
-    Column,
-    Table,
-    Value,
-    at_ranks,
-    counted,
-    interval_text,
-    number,
-)
+from masrel.tables._tables import Column, Table, Value, counted, interval_text, number
 
 _LOOKS = (
     "confidence as lines with ends, credible as broad bars, with the posterior density "

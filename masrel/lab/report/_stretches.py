@@ -1,5 +1,6 @@
 """Section `speeds`: how fast raters stretched."""
 
+import math
 from collections.abc import Sequence
 
 from masrel.lab.analysis import Speed, Speeds, SpeedSummary
@@ -11,14 +12,7 @@ from masrel.lab.report._material import (
     Section,
     absent_section,
 )
-from masrel.tables._tables import (
-    Column,
-    Table,
-    Value,
-    at_ranks,
-    number,
-    whole_or_tenths,
-)
+from masrel.tables._tables import Column, Table, Value, number
 
 
 def speeds_section(material: Material) -> Section:
@@ -160,3 +154,16 @@ def _speed_caption(n_raters: int, speeds: Sequence[Speed]) -> str:
 def has_many(speeds: Sequence[Speed]) -> bool:
     """Say whether there was more than one stretch to a presentation."""
     return any(speed.stretch is not None and speed.stretch > 1 for speed in speeds)
+
+
+def whole_or_tenths(values: Sequence[float]) -> int:
+    """Return the decimals a column of measurements needs: 0 if all are whole."""
+    known = [value for value in values if math.isfinite(value)]
+    return 0 if all(float(value).is_integer() for value in known) else 1
+
+
+def at_ranks(values: Sequence[float]) -> dict[str, int]:
+    """Return which of many values are the least, the quartiles and the most."""
+    order = sorted(range(len(values)), key=values.__getitem__)
+    names = ("lowest", "lower quartile", "median", "upper quartile", "highest")
+    return {name: order[k * (len(order) - 1) // 4] for k, name in enumerate(names)}

@@ -36,16 +36,8 @@ from masrel.lab.report._material import (
     absent_section,
 )
 from masrel.lab.report._measured_torque import measured_blocks
-from masrel.lab.report._stretches import has_many
-from masrel.tables._tables import (
-    Column,
-    Table,
-    Value,
-    as_entered,
-    at_ranks,
-    number,
-    whole_or_tenths,
-)
+from masrel.lab.report._stretches import at_ranks, has_many, whole_or_tenths
+from masrel.tables._tables import Column, Table, Value, as_entered, number
 
 _PANELS_PER_FIGURE, _SMALL_PANELS_PER_FIGURE = 4, 24
 _N_POINTS = 200  # of a line: a panel is not much wider

@@ -7,6 +7,7 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
+from masrel.lab.report._stretches import whole_or_tenths
 from masrel.tables._latex import as_latex
 from masrel.tables._tables import (
     Column,
@@ -22,7 +23,6 @@ from masrel.tables._tables import (
     page_cells,
     percent,
     significant,
-    whole_or_tenths,
 )
 
 

@@ -4,8 +4,8 @@ import warnings
 
 import pytest
 
-from masrel.cli._options import warnings_as_notes
 from masrel.errors import SmallSampleWarning
+from masrel.lab.cli._study_options import warnings_as_notes
 
 
 def test_a_note_is_said_once_on_stderr(capsys: pytest.CaptureFixture[str]) -> None:
