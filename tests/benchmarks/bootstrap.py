@@ -6,8 +6,7 @@ installed are left out.
 
 import math
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.estimates import Interval
-from masrel.intervals import _resamples, bootstrap
+from masrel.intervals import bootstrap
 from tests.benchmarks.peers import present
 from tests.benchmarks.sidebyside import Timing, peak_megabytes, side_by_side
 
@@ -306,9 +305,7 @@ def _race(n: int, r: int, q: int, *, exact: bool, quick: bool) -> Race:
         def drawn(seed: int, size: int = size) -> tuple[float, ...]:
             return _ends(ours(exact=False, n_resamples=size, rng=seed))
 
-        points.append(measured("with a control", size, seeds, drawn, truth))
-        with _no_control():
-            points.append(measured("drawn", size, seeds, drawn, truth))
+        points.append(measured("drawn", size, seeds, drawn, truth))
     points += _peers(codes, q, truth, quick)
     return Race(name=f"{n:,} × {r}, {q} categories", points=points, floor=floor)
 
@@ -347,59 +344,6 @@ def _peers(
                 )
             )
     return points
-
-
-@contextmanager
-def _no_control() -> Iterator[None]:
-    minimum = _resamples._MIN_CONTROLLED
-    _resamples._MIN_CONTROLLED = 10**18
-    try:
-        yield
-    finally:
-        _resamples._MIN_CONTROLLED = minimum
-
-
-def gains(quick: bool) -> list[tuple[str, float, float]]:
-    """Study, and how much less error² × time the control takes for 10 000 resamples.
-
-    Errors are those between 60 seeds; the ratio of two variances of 60 is known to a
-    quarter, over two ends to a fifth.
-    """
-    found = []
-    for n, r, q in ((30, 5, 3), (100, 5, 4), (1000, 5, 4), (10_000, 5, 4)):
-        if quick and n > 100:
-            continue
-        codes = made(n, r, q)
-
-        def ends(seed: int, codes: Codes = codes, q: int = q) -> tuple[float, ...]:
-            drawn = bootstrap(
-                "fleiss_kappa",
-                codes,
-                target="items",
-                categories=range(q),
-                exact=False,
-                rng=seed,
-            )
-            return drawn.low, drawn.high
-
-        def plain(seed: int, ends: Callable[[int], tuple[float, ...]] = ends) -> object:
-            with _no_control():
-                return ends(seed)
-
-        times = side_by_side(
-            {"with": partial(ends, 1), "without": partial(plain, 1)},
-            turns=9,
-            clock=time.process_time,
-        )
-        spread = [
-            np.array([work(seed) for seed in range(60)]).var(axis=0).mean()
-            for work in (ends, plain)
-        ]
-        less = float(spread[1] / spread[0])
-        slower = times["with"].median / times["without"].median
-        found.append((f"{n:,} × {r}, {q} categories", less, less / slower))
-        print(found[-1], flush=True)
-    return found
 
 
 def memory(quick: bool) -> dict[str, float]:

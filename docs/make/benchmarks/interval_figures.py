@@ -13,7 +13,6 @@ from tests.benchmarks.posteriors import EVOLUTION, STRETCH
 LOOKS: dict[str, tuple[str, str, str]] = {
     # colour, marker, line: told apart without colour too
     "exact": ("#000000", "*", ""),
-    "with a control": ("#0072B2", "o", "-"),
     "drawn": ("#56B4E9", "v", "--"),
     "scipy, vectorized": ("#E69F00", "D", "-"),
     "scipy, loop": ("#D55E00", "s", "-"),
@@ -25,8 +24,7 @@ LOOKS: dict[str, tuple[str, str, str]] = {
 }
 WORDS = {
     "exact": "masrel, exact",
-    "with a control": "masrel, drawn",
-    "drawn": "masrel, drawn without a control",
+    "drawn": "masrel, drawn",
 }
 
 

@@ -25,7 +25,6 @@ class Results:
 
     comparisons: Sequence[Comparison]
     exact: Sequence[tuple[str, str, Timing]]
-    gains: Sequence[tuple[str, float, float]]
     posteriors: Sequence[Posterior]
     jackknives: Mapping[str, Mapping[str, Timing]]
     megabytes: Mapping[str, float]
@@ -61,7 +60,7 @@ def _bootstrap(results: Results) -> list[str]:
     text = [
         "### Bootstrap, 10 000 resamples drawn",
         "",
-        "A percentile interval of items, from ratings, drawn with a control variate. "
+        "A percentile interval of items, from ratings, drawn. "
         "Each peer is given counts, and calls a Python",
         "function of one resample; the leanest statistic is all numpy that the formula "
         "needs, without checks; vectorized, it is of",
@@ -80,24 +79,17 @@ def _bootstrap(results: Results) -> list[str]:
         ]
         text.append(f"| {line.name} | {_time(line.times[OURS])} | " + " | ".join(cells))
         text[-1] += " |"
-    gained = [f"- {name}: {less:.2g} ({net:.2g})" for name, less, net in results.gains]
     return [
         *text,
         "",
         "At 10 000 items peers draw 500 resamples, times 20.",
-        "",
-        "The control divides the squared error of 10 000 resamples by (error² × time "
-        "in parentheses; known to about a fifth):",
-        "",
-        *gained,
         "",
         "![Work against error of the bootstrap](figures/benchmark_bootstrap.png)",
         "",
         "Root mean square over seeds and both ends. In a and b the truth is the exact "
         "interval (★ and dashed: how long it takes; it draws",
         "nothing, and tests hold it to fractions within 1e-13), in c four million "
-        "resamples with a control. Below 30 items there",
-        "is no control.",
+        "resamples.",
         "",
     ]
 

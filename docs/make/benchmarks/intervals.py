@@ -11,7 +11,7 @@ from pathlib import Path
 
 import masrel
 from docs.make.benchmarks.interval_page import Results, write_page
-from tests.benchmarks.bootstrap import by_items, exact_cost, gains, memory, races
+from tests.benchmarks.bootstrap import by_items, exact_cost, memory, races
 from tests.benchmarks.jackknives import jackknives
 from tests.benchmarks.peers import present
 from tests.benchmarks.posteriors import posteriors
@@ -32,7 +32,6 @@ def main() -> None:
             comparisons=by_items(quick),
             exact=exact_cost(quick),
             posteriors=posteriors(quick),
-            gains=gains(quick),
             megabytes=memory(quick),
         )
         of_bootstrap = races(quick)
