@@ -103,20 +103,27 @@ def declared_model(study: Study) -> ItemModel:
 def _shares(study: Study, *, is_table: bool) -> Floats:
     # prevalences (n_categories,), or a table (n_categories, n_categories), with sum 1
     categories, prevalences = study.categories, study.prevalences
-    are_absent = categories is None and prevalences is None
-    refuse((are_absent, "categories, prevalences: need one of both, got neither"))
+    scale = () if categories is None else categories
+    q = scale if isinstance(scale, int) else len(scale)
+    refuse(
+        (
+            categories is None and prevalences is None,
+            "categories, prevalences: need one of both, got neither",
+        ),
+        (
+            categories is not None and q < 2,
+            f"categories: needs at least 2, got {q}",
+        ),
+    )
+    if prevalences is None:
+        prevalences = np.full(q, 1.0 / q)
     try:
         shares = np.atleast_1d(np.asarray(prevalences, dtype=np.float64))
     except (TypeError, ValueError) as error:
         raise ParameterError(
             f"prevalences: needs numbers, got {prevalences!r}"
         ) from error
-    q = len(shares)
-    if categories is not None:
-        q = categories if isinstance(categories, int) else len(categories)
-    refuse((categories is not None and q < 2, f"categories: needs at least 2, got {q}"))
-    if prevalences is None:
-        shares = np.full(q, 1.0 / q)
+    q = q or len(shares)
     needed = f"needs one of each of {q} categories, at least 2"
     if is_table:
         needed = f"a table needs the joint probabilities of two raters, {q} × {q}"
