@@ -4,10 +4,12 @@ In: item × rater labels (or counts, or a contingency table). Out: an `Estimate`
 `Significance` from a test.
 """
 
-from masrel.agreement._data import CodedRatings, code_long, code_ratings
 from masrel.agreement._labels import Label
-from masrel.agreement._rows import (
+from masrel.agreement._table import (
+    CodedRatings,
     CountedRatings,
+    code_long,
+    code_ratings,
     count_items,
     count_ratings,
     count_table,
@@ -42,10 +44,10 @@ from masrel.agreement.change import (
     specific_agreement,
     stuart_maxwell,
 )
-from masrel.agreement.conger import conger_kappa
 from masrel.agreement.icc import IccForm, icc, icc_f_test, robinson_a
 from masrel.agreement.kappas import (
     brennan_prediger,
+    conger_kappa,
     fleiss_kappa,
     gwet_ac,
     percent_agreement,

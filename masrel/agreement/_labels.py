@@ -1,10 +1,9 @@
-"""Labels of ratings, the scale they make, and rows of a list of them."""
+"""Labels of ratings: what may be one, what is missing, and the scale they make."""
 
-import contextlib
-import itertools
 import sys
 import warnings
 from collections.abc import Iterable, Mapping, Sequence, Set
+from itertools import chain
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -16,10 +15,15 @@ Label = str | int | float
 """What a grade is called: text or a number."""
 
 Codes = NDArray[np.signedinteger[Any]]
-"""Codes in the smallest integers that hold them."""
+"""Codes in the smallest integers that hold them and -(n_categories + 1)."""
 
+MISSING = -1
+"""Code of a rating that was not given."""
 
-_PLAIN = ({str}, {int})
+SET_SEPARATOR, EMPTY_SET = "; ", "∅"
+
+_NEED_NO_CARE = {str, int, type(None)}  # kinds of labels of which none is wrong
+_TEXTS_OF_NOTHING = ("nan", "None", "NaT", "<NA>")
 
 
 def shown(value: object) -> str:
@@ -28,7 +32,23 @@ def shown(value: object) -> str:
     return text if len(text) <= 80 else f"{text[:77]}..."
 
 
-SET_SEPARATOR, EMPTY_SET = "; ", "∅"
+def is_row(row: object) -> TypeGuard[Iterable[Any]]:
+    """Return whether something is a sequence of labels or of rows."""
+    # a mapping would give its keys, a set its labels in any order
+    is_iterable = isinstance(row, Iterable) and getattr(row, "ndim", 1) > 0
+    return is_iterable and not isinstance(row, str | bytes | Mapping | Set)
+
+
+def is_missing(label: object) -> bool:
+    """Return whether a label is None, ``nan``, or pandas' NA or NaT."""
+    if label is None or isinstance(label, str):
+        return label is None
+    try:
+        return not label == label
+    except TypeError:  # pandas' NA, which does not know whether it is itself
+        return True
+    except (ArithmeticError, ValueError):  # an array, a signalling nan of decimals
+        return False
 
 
 class SetText(str):
@@ -48,69 +68,41 @@ def text_of_set(labels: Set[Any]) -> SetText:
     return SetText(SET_SEPARATOR.join(elements) or EMPTY_SET)
 
 
-def is_missing(label: object) -> bool:
-    """Return whether a label is None, ``nan``, or pandas' NA or NaT."""
-    if label is None:
-        return True
-    if isinstance(label, str):
-        return False
-    try:
-        same = label == label
-    except (ArithmeticError, TypeError, ValueError):  # a signalling nan of decimals
-        return False
-    if isinstance(same, bool | np.bool_):
-        return not same
-    return same is label  # pandas' NA, which does not know whether it is itself
-
-
 def check_categories(categories: Sequence[Label]) -> tuple[Label, ...]:
     """Check a declared scale."""
-    if isinstance(categories, str) or not isinstance(categories, Iterable):
+    labels = list(categories) if is_row(categories) else []
+    if not labels:
         raise RatingsError(
-            f"categories: needs a sequence of at least one label, got {categories!r}"
+            "categories: needs a sequence of at least one label, got "
+            f"{shown(categories)}"
         )
-    declared = tuple(
-        label.item()
-        if isinstance(label, np.generic)
-        else text_of_set(label)
-        if isinstance(label, Set)
-        else label
-        for label in categories
-    )
-    if not declared:
-        raise RatingsError("categories: needs a sequence of at least one label, got ()")
-    kinds = set(map(type, declared))
-    has_nan = kinds == {float} and any(label != label for label in declared)
-    if has_nan or kinds not in (*_PLAIN, {float}):  # those need no more care
-        if any(is_missing(label) for label in declared):
+    for place, label in enumerate(labels):
+        if isinstance(label, np.generic):
+            labels[place] = label.item()
+        elif isinstance(label, Set):
+            labels[place] = text_of_set(label)
+        if is_missing(label):
             raise RatingsError("categories: a missing value cannot be a category")
-        _one_kind(declared, "categories")
-    if len(set(declared)) < len(declared):
-        repeated = [label for i, label in enumerate(declared) if label in declared[:i]]
+    _check_kinds(labels, "categories")
+    if len(set(labels)) < len(labels):
+        repeated = [label for i, label in enumerate(labels) if label in labels[:i]]
         raise RatingsError(f"categories: each label once, repeated: {repeated}")
-    return declared
+    return tuple(labels)
 
 
-def labels_met(labels: Iterable[object]) -> tuple[Label, ...]:
+def labels_met(labels: Iterable[Any]) -> tuple[Label, ...]:
     """Return the distinct labels in order: numbers by value, text by alphabet."""
-    try:
-        met: set[Any] = set(labels)
-    except TypeError as error:
-        raise RatingsError(
-            f"ratings: labels need to be text or numbers ({error})"
-        ) from error
-    if set(map(type, met)) not in _PLAIN:  # those need no more care
-        met = {label for label in met if not is_missing(label)}
-        _one_kind(met, "ratings")
+    met = {label for label in labels if not is_missing(label)}
+    _check_kinds(met, "ratings")
     return tuple(sorted(met))
 
 
-def _one_kind(labels: Iterable[Any], where: str) -> None:
-    kinds = {}
+def _check_kinds(labels: Iterable[Any], where: str) -> None:
+    kinds: dict[bool, Any] = {}
     for label in labels:
-        if not _is_label(label):
+        if not isinstance(label, Label | np.number):
             raise RatingsError(
-                f"{where}: labels need to be text or numbers, got {label!r}"
+                f"{where}: labels need to be text or numbers, got {shown(label)}"
             )
         kinds[isinstance(label, str)] = label
     if len(kinds) > 1:
@@ -120,42 +112,62 @@ def _one_kind(labels: Iterable[Any], where: str) -> None:
         )
 
 
-def _is_label(label: object) -> bool:
-    return isinstance(label, str | int | float | np.number)
+def label_codes(
+    rows: list[list[Any]], declared: tuple[Label, ...] | None
+) -> tuple[Codes, tuple[Label, ...]]:
+    """Return codes of rows of labels, and the scale: labels met unless declared."""
+    # -> (n_items, n_raters)
+    if not set(map(type, chain.from_iterable(rows))) <= _NEED_NO_CARE:
+        rows = [
+            [_plain_label(label, i, j) for j, label in enumerate(row)]
+            for i, row in enumerate(rows)
+        ]
+    known = labels_met(set(chain.from_iterable(rows))) if declared is None else declared
+    position: dict[Any, int] = {label: code for code, label in enumerate(known)}
+    position[None] = MISSING
+    try:
+        codes = [[position[label] for label in row] for row in rows]
+    except KeyError:
+        i, j = next(
+            (i, j)
+            for i, row in enumerate(rows)
+            for j, label in enumerate(row)
+            if label not in position
+        )
+        raise no_category(rows[i][j], known, i, j) from None
+    coded = np.array(codes, dtype=np.min_scalar_type(-len(known) - 1))
+    if declared is None and known and isinstance(known[0], str):
+        doubt_texts(known, coded)
+    return coded, known
 
 
-def sets_as_text(
-    rows: list[list[object]],
-) -> tuple[list[list[object]], tuple[Label, ...]]:
-    """Return rows with sets as text, and the distinct labels in order."""
-    # of a label that is neither text, number nor set, the row and column are named
-    plain = [
-        [text_of_set(label) if isinstance(label, Set) else label for label in row]
-        for row in rows
-    ]
-    for i, row in enumerate(plain):
-        for j, label in enumerate(row):
-            if not is_missing(label) and not _is_label(label):
-                raise RatingsError(
-                    f"ratings: row {i}, column {j}: labels need to be text or numbers, "
-                    f"or sets of them, got {label!r}"
-                )
-    return plain, labels_met(itertools.chain.from_iterable(plain))
+def _plain_label(label: Any, row: int, column: int) -> Any:
+    # sets as text, and None for what is missing
+    if isinstance(label, Set):
+        return text_of_set(label)
+    if is_missing(label):
+        return None
+    if not isinstance(label, Label | np.number):
+        raise RatingsError(
+            f"ratings: row {row}, column {column}: labels need to be text or numbers, "
+            f"or sets of them, got {shown(label)}"
+        )
+    return label
 
 
-_TEXTS_OF_NOTHING = frozenset({"nan", "None", "NaT", "<NA>"})
-
-
-def has_doubtful_text(labels: Sequence[Label]) -> bool:
-    """Return whether text that nobody declared may be no grades."""
-    return labels[0] == "" or not _TEXTS_OF_NOTHING.isdisjoint(labels)
+def no_category(
+    label: object, known: Sequence[Label], row: int, column: int | str
+) -> RatingsError:
+    """Return the error of a label that is none of the categories."""
+    return RatingsError(
+        f"ratings: row {row}, column {column!r}: needs one of "
+        f"{', '.join(map(repr, known))} or a missing value, got {label!r}"
+    )
 
 
 def doubt_texts(labels: Sequence[Label], codes: Codes, column: str = "") -> None:
     """Refuse "" where nobody declared it, and warn of what astype(str) leaves."""
     # codes (n_items, n_raters), or of the ratings of a column
-    if not has_doubtful_text(labels):
-        return
     if labels[0] == "":  # the first in the order of the alphabet
         row, *rest = np.argwhere(codes == 0)[0].tolist()
         raise RatingsError(
@@ -168,96 +180,18 @@ def doubt_texts(labels: Sequence[Label], codes: Codes, column: str = "") -> None
         for code, label in enumerate(labels)
         if label in _TEXTS_OF_NOTHING
     ]
-    warnings.warn(
-        f"ratings: text that looks like a missing rating counts as a grade: "
-        f"{', '.join(doubtful)}; give None for a missing rating, or declare the text "
-        "in categories",
-        RatingsWarning,
-        stacklevel=_outside(),
-    )
+    if doubtful:
+        warn_caller(
+            "ratings: text that looks like a missing rating counts as a grade: "
+            f"{', '.join(doubtful)}; give None for a missing rating, or declare the "
+            "text in categories",
+            RatingsWarning,
+        )
 
 
-def _outside() -> int:
-    # the stacklevel, from a function that calls this one, of who called the package
-    frame, level = sys._getframe(1), 1
+def warn_caller(message: str, category: type[Warning]) -> None:
+    """Warn whoever called this package."""
+    frame, level = sys._getframe(1), 2
     while frame.f_back and str(frame.f_globals.get("__name__")).startswith("masrel."):
         frame, level = frame.f_back, level + 1
-    return level
-
-
-def code_type(n_categories: int) -> type[np.signedinteger[Any]]:
-    """Return the smallest integers that hold the codes of some categories."""
-    if n_categories <= 127:
-        return np.int8
-    return np.int16 if n_categories <= 32_767 else np.int32
-
-
-def lookup(
-    label: object, position: dict[object, int], row: int, column: int | str
-) -> int:
-    """Return the code of one label."""
-    if is_missing(label):
-        return -1
-    try:
-        return position[text_of_set(label) if isinstance(label, Set) else label]
-    except (KeyError, TypeError) as error:
-        known = ", ".join(repr(k) for k in position if k is not None)
-        raise RatingsError(
-            f"ratings: row {row}, column {column!r}: needs one of {known} or a missing "
-            f"value, got {label!r}"
-        ) from error
-
-
-NOTHING = "ratings: needs at least one item and one rater, got none"
-
-
-def label_rows(
-    ratings: object, categories: Sequence[Label] | None
-) -> tuple[list[list[object]], tuple[Label, ...]]:
-    """Check the shape of a nested sequence of labels, and return its rows and scale."""
-    # Takes ratings (n_items, n_raters)
-    if type(ratings) is list and set(map(type, ratings)) == {list}:
-        rows = list(map(list, ratings))
-    else:
-        rows = _rows(ratings)
-    if len(widths := set(map(len, rows))) != 1 or 0 in widths:
-        _refuse_shape(rows)
-    if categories is not None:
-        return rows, check_categories(categories)
-    with contextlib.suppress(RatingsError):
-        return rows, labels_met(itertools.chain.from_iterable(rows))
-    return sets_as_text(rows)
-
-
-def _rows(ratings: Any) -> list[list[object]]:
-    # nested sequences -> n_items lists of labels
-    if not is_row(ratings):
-        raise RatingsError(
-            f"ratings: needs an item × rater table, got {type(ratings).__name__}"
-        )
-    rows: list[list[object]] = []
-    for row in ratings:
-        if not is_row(row):
-            raise RatingsError(
-                f"ratings: row {len(rows)} needs one rating per rater, got {row!r}"
-            )
-        rows.append(list(row))
-    return rows
-
-
-def is_row(row: object) -> TypeGuard[Iterable[Any]]:
-    """Return whether something is a sequence of labels or of rows."""
-    # a mapping would give its keys, a set its labels in any order
-    is_iterable = isinstance(row, Iterable) and getattr(row, "ndim", 1) > 0
-    return is_iterable and not isinstance(row, str | bytes | Mapping | Set)
-
-
-def _refuse_shape(rows: list[list[object]]) -> None:
-    if not rows or not rows[0]:
-        raise RatingsError(NOTHING)
-    for i, row in enumerate(rows):
-        if len(row) != len(rows[0]):
-            raise RatingsError(
-                f"ratings: row {i} needs {len(rows[0])} ratings as row 0 has, "
-                f"got {len(row)}"
-            )
+    warnings.warn(message, category, stacklevel=level)

@@ -12,13 +12,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel.agreement._distances import (
-    Differing,
-    Distances,
-    Line,
-    small_enough,
-)
-from masrel.agreement._labels import Label, is_row, shown
+from masrel.agreement._labels import Codes, Label, is_row, shown
 from masrel.errors import ParameterError, RatingsError
 
 Floats = NDArray[np.float64]
@@ -48,8 +42,6 @@ NO_CHANCE_BY_WEIGHTS = (
     "0/0: chance agreement is 1, to the weights all ratings are alike"
 )
 
-_NAMES = get_args(WeightName)
-
 # What irr, psych, vcd, scikit-learn and multiagree call some of them.
 _ALIASES: dict[str, WeightName] = {
     "unweighted": "identity",
@@ -57,6 +49,90 @@ _ALIASES: dict[str, WeightName] = {
     "equal": "linear",
     "squared": "quadratic",
 }
+
+
+_NEED_NO_ORDER = ("identity", "nominal", "jaccard", "masi")
+
+
+class Distances:
+    """v of every two categories as an operator: 1 where they differ.
+
+    It takes the place of a matrix in `p @ v` of masses p, and v of pairs of categories.
+    """
+
+    __array_ufunc__ = None  # `p @ v` is left to `__rmatmul__`
+
+    def __init__(self, n_categories: int) -> None:
+        self.n = n_categories
+
+    def __len__(self) -> int:
+        return self.n
+
+    def __rmatmul__(self, masses: Floats) -> Floats:
+        """Return Σ_l m_l v_lk, (..., n_categories)."""
+        return np.asarray(masses.sum(axis=-1, keepdims=True) - masses)
+
+    def __getitem__(self, pair: tuple[Codes, Codes]) -> Floats:
+        """Return v of pairs of categories."""
+        return np.asarray(pair[0] != pair[1], dtype=np.float64)
+
+    def sum(self) -> float:
+        """Return Σ_kl v_kl."""
+        return float((np.ones(self.n) @ self).sum())
+
+    def matrix(self) -> Floats:
+        """Return every v_kl."""
+        k = np.arange(self.n)
+        return self[k[:, None], k]
+
+
+class Line(Distances):
+    """Distances d on a line: v = (linear d + square d²) / scale."""
+
+    def __init__(
+        self, values: Floats, *, linear: float, square: float, scale: float = 1.0
+    ) -> None:
+        super().__init__(len(values))
+        # from the middle, so that sums of squares lose few digits
+        self.values = values - 0.5 * (values.min() + values.max())
+        self.linear, self.square, self.scale = linear, square, scale
+        self._order = np.argsort(values)
+
+    def __rmatmul__(self, masses: Floats) -> Floats:
+        # Σ_l m_l |x_k - x_l| = x_k (2 M_k - M) + S - 2 S_k of sums up to x_k, which are
+        # many: with some digits to spare where the machine has them
+        x, m = self.values[self._order], masses[..., self._order]
+        mass, mean = (y.sum(axis=-1, keepdims=True) for y in (m, m * x))
+        between = np.zeros(m.shape)
+        if self.linear:
+            up_to = np.cumsum(m, axis=-1, dtype=np.longdouble)
+            moment = np.cumsum(m * x, axis=-1, dtype=np.longdouble)
+            between += self.linear * (x * (2.0 * up_to - mass) + mean - 2.0 * moment)
+        if self.square:
+            squares = (m * x * x).sum(axis=-1, keepdims=True)
+            between += self.square * (x * (x * mass - 2.0 * mean) + squares)
+        dot = np.empty(m.shape)
+        dot[..., self._order] = between / self.scale
+        return dot
+
+    def __getitem__(self, pair: tuple[Codes, Codes]) -> Floats:
+        d = np.abs(self.values[pair[0]] - self.values[pair[1]])
+        return np.asarray(d * (self.linear + self.square * d) / self.scale)
+
+    def nodes(self) -> tuple[Floats, Floats] | None:
+        """Return shares L of every value in three nodes, and v of the nodes, if any.
+
+        Squares of distances are polynomials of second degree in either value, so that
+        with Lagrange's shares L_j(x), v(x, y) = Σ_ij L_i(x) v_ij L_j(y) for all x, y.
+        """
+        # -> (n_categories, 3), (3, 3)
+        half = float(abs(self.values).max())
+        if self.linear or not half:
+            return None
+        t = self.values / half
+        shares = np.stack([t * (t - 1.0) / 2.0, 1.0 - t * t, t * (t + 1.0) / 2.0])
+        at = half * np.arange(-1.0, 2.0)
+        return shares.T, self.square / self.scale * (at[:, None] - at) ** 2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,17 +150,18 @@ class Weights:
         more than 2000.
     reason : str or None
         Why the scale has no such weights, or None; no coefficient is defined then.
+    counts_misses : bool
+        Whether two different categories are a full miss, whichever they are.
+    line : Line or None
+        The same as an operator, where v are distances on a line.
     """
 
     name: str
     n_categories: int
     v: Any
     reason: str | None = None
-
-    @property
-    def counts_misses(self) -> bool:
-        """Whether two different categories are a full miss, whichever they are."""
-        return self.name in ("identity", "nominal")
+    counts_misses: bool = False
+    line: Line | None = None
 
     @property
     def no_chance(self) -> str:
@@ -95,9 +172,8 @@ class Weights:
 
     def as_floats(self) -> Floats:
         """Return w, a matrix as `weights=` takes it; ``nan`` for a reason."""
-        if isinstance(self.v, Distances):
-            return 1.0 - self.v.matrix()
-        return np.asarray(1.0 - self.v)
+        v = self.v.matrix() if isinstance(self.v, Distances) else self.v
+        return np.asarray(1.0 - v)
 
 
 WeightsLike = Weights | WeightName | ArrayLike | None
@@ -106,7 +182,7 @@ WeightsLike = Weights | WeightName | ArrayLike | None
 
 def plain_name(name: str) -> str:
     """Return the name here of weights that have another one elsewhere."""
-    return _ALIASES[name] if name in _ALIASES else name
+    return _ALIASES.get(name, name)
 
 
 def is_identity(weights: "WeightsLike") -> bool:
@@ -116,21 +192,6 @@ def is_identity(weights: "WeightsLike") -> bool:
     return weights is None or (
         isinstance(weights, str) and plain_name(weights) == "identity"
     )
-
-
-def _needs_no_order(weights: "WeightsLike") -> bool:
-    # sets have none to begin with
-    is_of_sets = isinstance(weights, Weights) and weights.name in ("jaccard", "masi")
-    return is_of_sets or is_identity(weights)
-
-
-def identity_weights(n_categories: int, name: str = "identity") -> Weights:
-    """Return the weights that count two different categories as a full miss."""
-    if n_categories > MANY:
-        v: Any = Differing(n_categories)
-    else:
-        v = 1.0 - np.eye(n_categories)
-    return Weights(name=name, n_categories=n_categories, v=v)
 
 
 def declared_weights(
@@ -193,18 +254,30 @@ def declared_weights(
            [0.5, 0. , 0.5],
            [1. , 0.5, 0. ]])
     """
-    if type(categories) is not tuple:
-        if not is_row(categories):
-            raise RatingsError(
-                "categories: needs a sequence of at least one label, got "
-                f"{shown(categories)}"
+    if type(categories) is not tuple and not is_row(categories):
+        raise RatingsError(
+            "categories: needs a sequence of at least one label, got "
+            f"{shown(categories)}"
+        )
+    categories = tuple(categories)
+    name = "identity" if weights is None else weights
+    if isinstance(name, str):
+        name = _ALIASES.get(name, name)
+        if name == "identity":
+            q = max(len(categories), 1)  # of no ratings, one category without any
+            v: Any = 1.0 - np.eye(q) if q <= MANY else Distances(q)
+            n = len(categories)
+            return Weights(name=name, n_categories=n, v=v, counts_misses=True)
+        if name not in get_args(WeightName):
+            raise ParameterError(
+                f"weights: needs one of {', '.join(get_args(WeightName))} or a matrix, "
+                f"got {name!r}"
             )
-        categories = tuple(categories)
-    if weights is None or isinstance(weights, str):
-        name = "identity" if weights is None else weights
-        return _named(name, categories, declared)
-    if not _needs_no_order(weights):
+    made = weights if isinstance(weights, Weights) else None
+    if made is None or made.name not in _NEED_NO_ORDER:
         _check_order(categories, declared)
+    if isinstance(name, str):
+        return _named(name, categories)
     if isinstance(weights, Weights):
         if weights.n_categories != len(categories):
             raise ParameterError(
@@ -212,11 +285,16 @@ def declared_weights(
                 f'"{weights.name}" of {weights.n_categories}'
             )
         return weights
-    return Weights(
-        name="custom",
-        n_categories=len(categories),
-        v=1.0 - _checked_matrix(weights, len(categories)),
-    )
+    v = 1.0 - _checked_matrix(weights, len(categories))
+    return Weights(name="custom", n_categories=len(categories), v=v)
+
+
+def _check_order(categories: Sequence[Label], declared: bool) -> None:
+    if not declared and len(categories) > 1 and isinstance(categories[0], str):
+        raise ParameterError(
+            "categories: weights need the declared scale in order, the ratings are "
+            f"text: {', '.join(map(str, categories))}"
+        )
 
 
 def _checked_matrix(weights: Any, n_categories: int) -> Floats:
@@ -236,45 +314,37 @@ def _checked_matrix(weights: Any, n_categories: int) -> Floats:
     return table.astype(np.float64)
 
 
-def _named(name: str, categories: tuple[Label, ...], declared: bool) -> Weights:
-    n, name = len(categories), plain_name(name)
-    if name not in _NAMES:
+def _named(name: str, categories: tuple[Label, ...]) -> Weights:
+    n, reason, line = len(categories), None, None
+    v: Any = np.full((1, 1), math.nan)  # of a scale that has none
+    if n == 1:
+        reason = "0/0: a scale of one category has no weights but identity"
+    elif n and name in _LINES:
+        x = np.arange(float(n)) if name == "ordinal" else spread_values(categories)
+        linear, square = _LINES[name]
+        span = float(np.ptp(x))
+        scale = span * (linear + square * span)  # the largest is 1
+        line = Line(x, linear=linear, square=square, scale=scale)
+        v = line.matrix() if n <= MANY else line
+    elif n > MANY:
         raise ParameterError(
-            f"weights: needs one of {', '.join(_NAMES)} or a matrix, got {name!r}"
+            f"weights: {name} needs a matrix of every two categories, which is made "
+            f"of at most {MANY}, got {n}; identity, linear, quadratic and ordinal need "
+            "none"
         )
-    if name == "identity":
-        return identity_weights(n)
-    reason, v = None, np.empty((0, 0))
-    if n:  # else nobody rated anything
-        _check_order(categories, declared)
-        values = category_values(categories)
-        reason = _why_none(name, values)
-    if n > MANY and reason is None:
-        return Weights(name=name, n_categories=n, v=_of_many(name, categories))
-    if n:
+    elif n:
+        values = spread_values(categories)
         v = np.full((n, n), math.nan)
-    if n and reason is None:
-        v = _MATRICES[name](values if name == "ratio" else positions(categories))
-        np.fill_diagonal(v, 0.0)  # also where a formula would be 0/0
-        largest = v.max()
-        if not largest:  # a sine of π, of values without end
-            reason = f"0/0: the values lie too far apart for {name} weights"
-        v = v / largest if largest else np.full((n, n), math.nan)
-    return Weights(name=name, n_categories=n, v=v, reason=reason)
-
-
-def _check_order(categories: Sequence[Label], declared: bool) -> None:
-    if not declared and len(categories) > 1 and isinstance(categories[0], str):
-        raise ParameterError(
-            "categories: weights need the declared scale in order, the ratings are "
-            f"text: {', '.join(map(str, categories))}"
-        )
-
-
-def _why_none(name: str, values: Floats) -> str | None:
-    if len(values) == 1:
-        return "0/0: a scale of one category has no weights but identity"
-    return NO_RATIO if name == "ratio" and sums_to_zero(values, itself=True) else None
+        if name == "ratio" and sums_to_zero(values, itself=True):
+            reason = NO_RATIO
+        else:
+            matrix = _MATRICES[name](values)
+            np.fill_diagonal(matrix, 0.0)  # also where a formula would be 0/0
+            if matrix.any():
+                v = matrix / matrix.max()
+            else:  # a sine of π
+                reason = f"0/0: the values lie too far apart for {name} weights"
+    return Weights(name=name, n_categories=n, v=v, reason=reason, line=line)
 
 
 def sums_to_zero(values: Floats, *, itself: bool) -> bool:
@@ -289,89 +359,31 @@ def category_values(categories: Sequence[Label]) -> Floats:
         return np.arange(1.0, len(categories) + 1.0)
     try:
         values = np.array(categories, dtype=np.float64)
-    except OverflowError:  # a whole number that no float holds
-        values = np.array([math.inf])
-    if not np.isfinite(values).all():
-        wrong = next(x for x in categories if not _is_finite(x))
+    except OverflowError as error:
         raise ParameterError(
-            f"categories: weights need finite numbers, got {_shortened(wrong)}"
-        )
+            f"categories: needs numbers that floats hold, got {shown(categories)}"
+        ) from error
     return values
 
 
-def _is_finite(value: Any) -> bool:
-    try:
-        return math.isfinite(float(value))
-    except OverflowError:
-        return False
-
-
-def _shortened(value: Label) -> str:
-    # whole numbers of thousands of digits are no part of a sentence
-    if isinstance(value, int) and abs(value) >= 10**20:
-        return f"a whole number of {value.bit_length()} bits"
-    return repr(value)
-
-
-def positions(categories: Sequence[Label]) -> Floats:
-    """Return the values up to a shift and a power of two, which weights do not notice.
-
-    Squares of their differences are floats.
-    """
+def spread_values(categories: Sequence[Label]) -> Floats:
+    """Return the values of categories that weights can tell apart."""
     values = category_values(categories)
-    if len(np.unique(values)) < len(values):  # large whole numbers that floats merge
-        low: Any = min(categories, key=float)
-        values = np.array([float(x - low) for x in categories])
-    return small_enough(values)
-
-
-def _of_many(name: str, categories: Sequence[Label]) -> Distances:
-    x, n = positions(categories), len(categories)
-    span = float(x.max() - x.min())
-    if name == "linear":
-        return Line(x, linear=1.0 / span)
-    if name == "quadratic":
-        return Line(x / span, square=1.0)
-    if name == "ordinal":  # d (d + 1) / (n (n - 1)) of ranks d apart
-        factor = 1.0 / (n * (n - 1.0))
-        return Line(np.arange(float(n)), linear=factor, square=factor)
-    raise ParameterError(
-        f"weights: {name} needs a matrix of every two categories, which is made of at "
-        f"most {MANY}, got {n}; identity, linear, quadratic and ordinal need none"
-    )
-
-
-def as_line(weights: Weights, categories: Sequence[Label]) -> Line | None:
-    """Return weights as an operator of distances on a line, if they are one."""
-    if isinstance(weights.v, Line):
-        return weights.v
-    if weights.name not in ("quadratic", "interval") or weights.reason is not None:
-        return None
-    x = positions(categories)
-    return Line(x if weights.name == "interval" else x / np.ptp(x), square=1.0)
+    span = float(values.max()) - float(values.min()) if len(values) > 1 else 1.0
+    if len(set(values.tolist())) < len(values) or not 1e-75 < span < 1e75:
+        raise ParameterError(
+            "categories: weights need numbers that floats tell apart, and a range of "
+            f"1e-75 to 1e75, got {shown(categories)}"
+        )
+    return values
 
 
 def _gaps(x: Floats) -> Floats:
     return np.asarray(abs(x[:, None] - x))
 
 
-def _linear(x: Floats) -> Floats:
-    return _gaps(x)
-
-
-def quadratic(x: Floats) -> Floats:
-    """Return the squares of differences."""
-    return np.asarray(_gaps(x) ** 2)
-
-
 def _radical(x: Floats) -> Floats:
     return np.asarray(np.sqrt(_gaps(x)))
-
-
-def _ordinal(x: Floats) -> Floats:
-    # of ranks d apart, C(d + 1, 2) pairs of ranks lie between, both included
-    d = _gaps(np.arange(float(len(x))))
-    return np.asarray(d * (d + 1.0) / 2.0)
 
 
 def ratio(x: Floats) -> Floats:
@@ -394,11 +406,12 @@ def _bipolar(x: Floats) -> Floats:
     return np.asarray(_gaps(x) ** 2 / ends)
 
 
+# v of two values d apart is as linear d + square d²; of ranks d apart, C(d + 1, 2)
+# pairs of ranks lie between, both included.
+_LINES = {"linear": (1.0, 0.0), "quadratic": (0.0, 1.0), "ordinal": (1.0, 1.0)}
+
 # From the values to the disagreement of every two, up to a common factor.
 _MATRICES: dict[str, Callable[[Floats], Floats]] = {
-    "linear": _linear,
-    "quadratic": quadratic,
-    "ordinal": _ordinal,
     "radical": _radical,
     "ratio": ratio,
     "circular": _circular,

@@ -7,10 +7,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement._data import code_ratings, complete, raters_who_rate
 from masrel.agreement._engine import undefined
 from masrel.agreement._labels import Label, shown
-from masrel.agreement._rows import count_items, count_ratings, item_counts
+from masrel.agreement._table import (
+    complete_rows,
+    count_items,
+    count_ratings,
+    item_counts,
+    raters_told_apart,
+)
 from masrel.agreement.kappas import fleiss_kappa
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Significance
@@ -136,13 +141,11 @@ def fleiss_null(
     >>> print(fleiss_null([["a", "a"], ["b", "b"], ["a", "b"], ["b", "b"]]))
     fleiss_null: 0.9333, normal, p = 0.351
     """
-    coded = complete(raters_who_rate(code_ratings(ratings, categories)))
-    counts, n_raters = (
-        item_counts(coded.codes, coded.n_categories),
-        coded.codes.shape[1],
-    )
+    counted = complete_rows(raters_told_apart(ratings, categories))
+    counts = item_counts(counted.codes, counted.n_categories)
+    counts, n_raters = counts.repeat(counted.freq, axis=0), counted.codes.shape[1]
     if category is not None:
-        chosen = counts[:, _place(category, coded.categories)]
+        chosen = counts[:, _place(category, counted.categories)]
         counts = np.column_stack([chosen, n_raters - chosen])
     statistic = p = math.nan
     reason = None

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from masrel.agreement._engine import check_option, undefined
 from masrel.agreement._labels import Label
-from masrel.agreement._rows import (
+from masrel.agreement._table import (
     check_table,
     check_two_by_two,
     pair_table,

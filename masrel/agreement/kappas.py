@@ -1,9 +1,10 @@
-"""Kappas of raters who are not told apart: percent, Fleiss, Scott, Brennan, Gwet.
+"""Kappas of an item × rater table: percent, Fleiss, Scott, Brennan, Gwet, Conger.
 
 Sums over items are d, s and P_k: the disagreement d of the s items with a pair of
 ratings, and the shares of each item's raters who chose category k, all in `WHOLE`
 parts. D_o = d/s, and D_e is a function of p = P / Σ_k P_k alone: a coefficient is its
 chance function, which also gives the gradient. v is the disagreement of two categories.
+Conger's kappa tells raters apart, each with shares of its own.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,15 +20,16 @@ from masrel.agreement._engine import (
     Floats,
     Formula,
     Integers,
-    disagreement_within,
+    Resampled,
     divide,
     estimate,
 )
 from masrel.agreement._labels import Codes, Label
-from masrel.agreement._rater_sums import crossed_pooled, resampled_pooled
-from masrel.agreement._rows import count_ratings, two_raters
+from masrel.agreement._table import count_ratings, raters_told_apart, two_raters
 from masrel.agreement._weights import WeightsLike
 from masrel.estimates import Estimate
+
+_MAX_PAIRS = 1 << 20  # of ratings whose disagreement is looked up at once
 
 _Chance = Callable[[Floats, Any], tuple[Floats, Floats]]
 """From p (..., q) and v to D_e (..., 1) and its gradient (..., q)."""
@@ -44,7 +46,7 @@ def _shared_margins(p: Floats, v: Any) -> tuple[Floats, Floats]:
 
 
 def _every_category_alike(p: Floats, v: Any) -> tuple[Floats, Floats]:
-    mean = v.sum() / len(v) ** 2 if len(v) else 0.0  # 1 - Σ_kl w_kl / q²
+    mean = v.sum() / len(v) ** 2  # 1 - Σ_kl w_kl / q²
     return np.full((*p.shape[:-1], 1), mean), np.zeros_like(p)
 
 
@@ -59,14 +61,19 @@ def _hard_items(p: Floats, v: Any) -> tuple[Floats, Floats]:
     return np.where(abs(d_e) < 1e-15, 0.0, d_e), -t_w * (1.0 - 2.0 * p)
 
 
-def _features(codes: Codes, v: Any, repeats: Integers | None = None) -> Features:
-    chosen = codes >= 0 if repeats is None else repeats
-    size = chosen.sum(axis=1)
-    within = disagreement_within(codes, v, repeats)
+def _item_features(codes: Codes, v: Any, repeats: Integers | None = None) -> Features:
+    # d, s, and the shares of categories of each row
+    chosen = np.asarray(codes >= 0 if repeats is None else repeats, dtype=np.float64)
+    size, within = chosen.sum(axis=1), np.empty(len(codes))
+    step = max(1, _MAX_PAIRS // codes.shape[1] ** 2)
+    for start in range(0, len(codes), step):
+        rows = slice(start, start + step)
+        pairs, often = v[codes[rows, :, None], codes[rows, None, :]], chosen[rows]
+        within[rows] = np.einsum("ig,igh,ih->i", often, pairs, often)
     d = within * (WHOLE / np.maximum(size * (size - 1.0), 1.0))
     d[size < 2] = 0.0  # also where v is nan
-    dense = np.array([d, (size > 1) * float(WHOLE)])
     shares = chosen * (WHOLE / np.maximum(size, 1.0))[:, None]
+    dense = np.array([d, (size > 1) * float(WHOLE)])
     return Features(dense, np.maximum(codes, 0), shares, len(v))
 
 
@@ -75,23 +82,40 @@ def _complete_features(
 ) -> Features:
     # of the rows that every rater rated
     whole = (codes >= 0).all(axis=1, keepdims=True)
-    return _features(np.where(whole, codes, -1), v, repeats)
+    return _item_features(np.where(whole, codes, -1), v, repeats)
 
 
-def _disagreements(chance: _Chance, sums: Floats, v: Any) -> tuple[Floats, Floats]:
-    p = divide(sums[..., 2:], sums[..., 2:].sum(axis=-1, keepdims=True))
-    return divide(sums[..., :1], sums[..., 1:2]), chance(p, v)[0]
-
-
-def _slope(chance: _Chance, sums: Floats, v: Any) -> Floats:
+def _disagreements(
+    chance: _Chance, sums: Floats, v: Any
+) -> tuple[Floats, Floats, Floats]:
     d, s, r = sums[..., :1], sums[..., 1:2], sums[..., 2:].sum(axis=-1, keepdims=True)
-    p = sums[..., 2:] / r
+    p, d_o = sums[..., 2:] / r, d / s
     d_e, of_p = chance(p, v)
     # ∂κ = -∂D_o / D_e + D_o/D_e² ∂D_e
     of_d = -1.0 / (s * d_e)
-    of_s = d / (s * s * d_e)
-    of_shares = (of_p - (of_p * p).sum(axis=-1, keepdims=True)) * (of_s * s / (d_e * r))
-    return np.concatenate([of_d, of_s, of_shares], axis=-1)
+    of_e = d_o / (d_e * d_e)
+    of_shares = (of_p - (of_p * p).sum(axis=-1, keepdims=True)) * (of_e / r)
+    return d_o, d_e, np.concatenate([of_d, -of_d * d_o, of_shares], axis=-1)
+
+
+def _resampled(codes: Codes, v: Any) -> Resampled:
+    # in whole units and not in `WHOLE` parts, which ratios do not notice
+    each = (codes[:, :, None] == np.arange(len(v))).astype(np.float64)
+    rated = (codes >= 0).astype(np.float64)  # (n_rows, n_raters)
+
+    def sums(rows: Floats, raters: Floats) -> Floats:
+        # (b, n_rows), (b, n_raters) -> (b, 2 + q)
+        counts = np.tensordot(raters, each, axes=(1, 1))  # (b, n_rows, q)
+        n = counts.sum(axis=-1)
+        # Copies of a rater agree, and disagree in nothing: only their number goes.
+        pairs = n * n - raters**2 @ rated.T
+        features = np.empty((*n.shape, 2 + len(v)))
+        features[..., 0] = divide(((counts @ v) * counts).sum(axis=-1), pairs, 0.0)
+        features[..., 1] = pairs != 0
+        features[..., 2:] = divide(counts, n[..., None], 0.0)
+        return np.asarray(np.einsum("bi,bif->bf", rows, features))
+
+    return sums
 
 
 def _pooled(name: str, title: str, chance: _Chance) -> Formula:
@@ -99,11 +123,9 @@ def _pooled(name: str, title: str, chance: _Chance) -> Formula:
     return Formula(
         name=name,
         title=title,
-        features=_features,
+        features=_item_features,
         disagreements=partial(_disagreements, chance),
-        slope=partial(_slope, chance),
-        rater_sums=resampled_pooled,
-        crossed_sums=crossed_pooled,
+        resampled=_resampled,
     )
 
 
@@ -116,12 +138,72 @@ _BRENNAN_PREDIGER = replace(
     needs_categories=True,
 )
 _GWET = replace(_pooled("gwet_ac", "Gwet's AC", _hard_items), needs_categories=True)
-_SCOTT = Formula(
+_SCOTT = replace(
+    _FLEISS,
     name="scott_pi",
     title="Scott's pi",
     features=_complete_features,
-    disagreements=_FLEISS.disagreements,
-    slope=_FLEISS.slope,
+    resampled=None,
+)
+
+# -- Conger: raters who are told apart ----------------------------------------------
+#
+# Sums over items are d and s as above, and of each rater g the number n_g of its
+# ratings and n_gk of those in category k. D_e is that of two raters: the mean of
+# p_g'V p_h, p_g = n_gk/n_g.
+
+
+def _conger_features(
+    codes: Codes, v: Any, _repeats: Integers | None = None
+) -> Features:
+    rated, q = (codes >= 0).astype(np.float64), len(v)
+    places = np.maximum(codes, 0) + q * np.arange(codes.shape[1])
+    dense = np.vstack([_item_features(codes, v).dense, rated.T])
+    return Features(dense, places, rated, q * codes.shape[1])
+
+
+def _conger_disagreements(sums: Floats, v: Any) -> tuple[Floats, Floats, Floats]:
+    d, s, n_raters = sums[..., :1], sums[..., 1:2], (sums.shape[-1] - 2) // (1 + len(v))
+    n_g = sums[..., 2 : 2 + n_raters, None]
+    n_gk = sums[..., 2 + n_raters :].reshape(*sums.shape[:-1], n_raters, len(v))
+    # A rater without ratings is taken 0 times; where raters are resampled, two have
+    # c_g c_h pairs.
+    shares, taken = (
+        divide(n_gk, n_g, 0.0),
+        divide(n_gk.sum(axis=-1, keepdims=True), n_g, 0.0),
+    )
+    n_pairs = taken.sum(axis=-2) ** 2 - (taken**2).sum(axis=-2)
+    others = (shares.sum(axis=-2, keepdims=True) - shares) @ v  # Σ_l v_kl Σ_{h≠g} p_hl
+    d_o, d_e = d / s, (others * shares).sum(axis=(-1, -2))[..., None] / n_pairs
+    # 2 Σ_l v_kl Σ_{h≠g} p_hl, less what a rater more adds to the number of pairs
+    rest = taken.sum(axis=-2, keepdims=True) - taken
+    moves = 2.0 * (others - d_e[..., None] * rest)
+    of_k = (d_o / (d_e**2 * n_pairs))[..., None] * divide(moves, n_g, 0.0)
+    of_g = -(of_k * shares).sum(axis=-1)
+    of_d = -1.0 / (s * d_e)
+    of_k = of_k.reshape(*sums.shape[:-1], n_raters * len(v))
+    return d_o, d_e, np.concatenate([of_d, -of_d * d_o, of_g, of_k], axis=-1)
+
+
+def _conger_resampled(codes: Codes, v: Any) -> Resampled:
+    pooled, rated = _resampled(codes, v), (codes >= 0).astype(np.float64)
+    chosen = (codes[:, :, None] == np.arange(len(v))).astype(np.float64)
+
+    def sums(rows: Floats, raters: Floats) -> Floats:
+        # (b, n_rows), (b, n_raters) -> (b, 2 + n_raters (1 + q))
+        of_raters = raters[..., None] * np.tensordot(rows, chosen, axes=(1, 0))
+        flat = of_raters.reshape(len(rows), -1)
+        return np.hstack([pooled(rows, raters)[:, :2], rows @ rated, flat])
+
+    return sums
+
+
+_CONGER = Formula(
+    name="conger_kappa",
+    title="Conger's kappa",
+    features=_conger_features,
+    disagreements=_conger_disagreements,
+    resampled=_conger_resampled,
 )
 
 
@@ -283,7 +365,7 @@ def brennan_prediger(
 
     Notes
     -----
-    _Chance agreement is Σ_kl w_kl / q², with q the declared categories, used or not.
+    Chance agreement is Σ_kl w_kl / q², with q the declared categories, used or not.
     With two categories it is the prevalence-adjusted bias-adjusted kappa, PABAK.
     Missing ratings as in `fleiss_kappa`.
 
@@ -342,7 +424,7 @@ def gwet_ac(
 
     Notes
     -----
-    _Chance agreement is Σ_kl w_kl / (q (q - 1)) · Σ_k p_k (1 - p_k): the declared
+    Chance agreement is Σ_kl w_kl / (q (q - 1)) · Σ_k p_k (1 - p_k): the declared
     categories count, used or not. It is small when nearly all ratings are in one
     category, where kappa falls towards 0. Missing ratings as in `fleiss_kappa`.
 
@@ -416,3 +498,63 @@ def scott_pi(
     """
     counted = two_raters(ratings, categories, _SCOTT.title)
     return estimate(_SCOTT, counted, weights, population=population)
+
+
+def conger_kappa(
+    ratings: object,
+    *,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightsLike" = "identity",
+    population: int | None = None,
+) -> Estimate:
+    """Estimate Conger's kappa from an item × rater table.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Labels or numbers; None and ``nan`` are missing.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; the labels met when not given.
+    weights : str or array_like, shape (n_categories, n_categories), optional
+        How much two categories agree; see `declared_weights`.
+    population : int, optional
+        Items there are in all, for the finite-population correction.
+
+    Returns
+    -------
+    Estimate
+        The coefficient with its standard error over items.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table.
+    ParameterError
+        If an option is invalid, or the weights do not fit the categories.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If no item has ratings of two raters, or all ratings are in one category; the
+        value is then ``nan``.
+
+    Notes
+    -----
+    Chance agreement is that of two different raters, averaged over all pairs, each
+    with the shares of its own ratings. Of two raters with complete ratings it is
+    Cohen's kappa. A rater without any rating has no shares, and is left out.
+
+    References
+    ----------
+    .. [1] Conger, A. J. (1980). Integration and generalization of kappas for multiple
+       raters. Psychological Bulletin, 88(2), 322-328.
+       https://doi.org/10.1037/0033-2909.88.2.322
+    .. [2] Gwet, K. L. (2014). Handbook of Inter-Rater Reliability, 4th ed., ch. 2.
+
+    Examples
+    --------
+    >>> conger_kappa([["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"]]).value
+    0.5
+    """
+    counted = raters_told_apart(ratings, categories)
+    return estimate(_CONGER, counted, weights, population=population)

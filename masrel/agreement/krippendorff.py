@@ -7,34 +7,32 @@ Sums over the n ratings of items with a pair are a, Σ_kl v_kl n_ik n_il / (n_i 
 import re
 from ast import literal_eval
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Literal, get_args
 
 import numpy as np
 
-from masrel.agreement._distances import Line
 from masrel.agreement._engine import (
     WHOLE,
     Features,
     Floats,
     Formula,
     Integers,
-    disagreement_within,
-    divide,
     estimate,
 )
 from masrel.agreement._labels import EMPTY_SET, Codes, Label, SetText, shown
-from masrel.agreement._rows import CountedRatings, count_ratings, item_counts
+from masrel.agreement._table import CountedRatings, count_ratings, item_counts
 from masrel.agreement._weights import (
     MANY,
+    Line,
     Weights,
     WeightsLike,
-    category_values,
-    identity_weights,
-    positions,
-    quadratic,
+    declared_weights,
     ratio,
+    spread_values,
     sums_to_zero,
 )
+from masrel.agreement.kappas import _item_features
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
 
@@ -56,25 +54,19 @@ _LIST = re.compile(
 def _features(codes: Codes, v: Any, repeats: Integers | None = None) -> Features:
     chosen = np.asarray(codes >= 0 if repeats is None else repeats, dtype=np.float64)
     size = chosen.sum(axis=1)
-    a = disagreement_within(codes, v, repeats) * (WHOLE / np.maximum(size - 1.0, 1.0))
+    a = _item_features(codes, v, repeats).dense[0] * size
     chosen[size < 2] = 0.0
     return Features(a[None], np.maximum(codes, 0), chosen, len(v))
 
 
-def _disagreements(sums: Floats, v: Any) -> tuple[Floats, Floats]:
-    a, n_k = sums[..., :1], sums[..., 1:]
-    n = n_k.sum(axis=-1, keepdims=True)
-    b = ((n_k @ v) * n_k).sum(axis=-1, keepdims=True)
-    return divide(a, WHOLE * n), divide(b, n * (n - 1.0))
-
-
-def _slope(sums: Floats, v: Any) -> Floats:
-    a, n_k = sums[..., :1], sums[..., 1:]
+def _disagreements(sums: Floats, v: Any) -> tuple[Floats, Floats, Floats]:
+    a, n_k = sums[..., :1] / WHOLE, sums[..., 1:]
     n, others = n_k.sum(axis=-1, keepdims=True), n_k @ v
     b = (others * n_k).sum(axis=-1, keepdims=True)
-    of_n = (n - 1.0) * a / (WHOLE * b * b)
-    of_k = 2.0 * of_n * others - a / (WHOLE * b)
-    return np.concatenate([(1.0 - n) / (WHOLE * b), of_k], axis=-1)
+    of_n = (n - 1.0) * a / (b * b)
+    of_k = 2.0 * of_n * others - a / b
+    of_a = (1.0 - n) / (WHOLE * b)
+    return a / n, b / (n * (n - 1.0)), np.concatenate([of_a, of_k], axis=-1)
 
 
 _ALPHA = Formula(
@@ -82,7 +74,6 @@ _ALPHA = Formula(
     title="Krippendorff's alpha",
     features=_features,
     disagreements=_disagreements,
-    slope=_slope,
 )
 
 # With the ordinal metric v is found in the ratings: sums are coincidences of grades,
@@ -103,36 +94,23 @@ def _ordinal_features(
     return Features(pairs.reshape(len(counts), -1).T, none.astype(np.int64), none, 0)
 
 
-def _coincidences(sums: Floats, v: Any) -> tuple[Floats, Floats, Floats]:
-    # coincidences o_kl, distances m_k - m_l of the middles m_k = Σ_{g<k} n_g + n_k/2,
-    # each (..., q, q), and totals n_k
-    table = sums.reshape(*sums.shape[:-1], len(v), len(v))
-    totals = table.sum(axis=-1)
-    middles = np.cumsum(totals, axis=-1) - totals / 2.0
-    return table, middles[..., :, None] - middles[..., None, :], totals
-
-
-def _ordinal_disagreements(sums: Floats, v: Any) -> tuple[Floats, Floats]:
-    table, gaps, totals = _coincidences(sums, v)
-    observed = (table * gaps**2).sum(axis=(-1, -2))[..., None]
-    expected = np.einsum("...k,...kl,...l->...", totals, gaps**2, totals)[..., None]
-    n = totals.sum(axis=-1, keepdims=True)
-    return divide(observed, n), divide(expected, n * (n - 1.0))
-
-
-def _ordinal_slope(sums: Floats, v: Any) -> Floats:
-    table, gaps, totals = _coincidences(sums, v)
-    o = (table * gaps**2).sum(axis=(-1, -2))[..., None]
-    e = np.einsum("...k,...kl,...l->...", totals, gaps**2, totals)[..., None]
-    n = totals.sum(axis=-1, keepdims=True)
-    both = table + np.swapaxes(table, -1, -2)
+def _ordinal_disagreements(sums: Floats, v: Any) -> tuple[Floats, Floats, Floats]:
+    o_kl = sums.reshape(*sums.shape[:-1], len(v), len(v))
+    n_k = o_kl.sum(axis=-1)
+    # distances m_k - m_l of the middles m_k = Σ_{g<k} n_g + n_k/2
+    middles = np.cumsum(n_k, axis=-1) - n_k / 2.0
+    gaps = middles[..., :, None] - middles[..., None, :]
+    n = n_k.sum(axis=-1, keepdims=True)
+    o = (o_kl * gaps**2).sum(axis=(-1, -2))[..., None]
+    others = np.einsum("...kl,...l->...k", gaps**2, n_k)
+    e = (others * n_k).sum(axis=-1, keepdims=True)
+    both = o_kl + np.swapaxes(o_kl, -1, -2)
     of_o = _by_middles(2.0 * (both * gaps).sum(axis=-1))
-    moved = np.einsum("...kl,...l->...k", gaps, totals)
-    of_e = _by_middles(4.0 * totals * moved)
-    of_e += 2.0 * np.einsum("...kl,...l->...k", gaps**2, totals)
-    of_k = divide((n - 1.0) * o, e * e) * of_e - divide(o + (n - 1.0) * of_o, e)
-    slope = of_k[..., None] - divide(n - 1.0, e)[..., None] * gaps**2
-    return np.asarray(slope.reshape(sums.shape))
+    of_e = _by_middles(4.0 * n_k * np.einsum("...kl,...l->...k", gaps, n_k))
+    of_e += 2.0 * others
+    of_k = (n - 1.0) * o / (e * e) * of_e - (o + (n - 1.0) * of_o) / e
+    slope = of_k[..., None] - ((n - 1.0) / e)[..., None] * gaps**2
+    return o / n, e / (n * (n - 1.0)), slope.reshape(sums.shape)
 
 
 def _by_middles(of_middles: Floats) -> Floats:
@@ -142,12 +120,8 @@ def _by_middles(of_middles: Floats) -> Floats:
     return np.asarray(later - 0.5 * of_middles)
 
 
-_ORDINAL_ALPHA = Formula(
-    name="krippendorff_alpha",
-    title="Krippendorff's alpha",
-    features=_ordinal_features,
-    disagreements=_ordinal_disagreements,
-    slope=_ordinal_slope,
+_ORDINAL_ALPHA = replace(
+    _ALPHA, features=_ordinal_features, disagreements=_ordinal_disagreements
 )
 
 
@@ -233,7 +207,6 @@ def krippendorff_alpha(
 
 
 def _check_metric(metric: str) -> None:
-    """Check the name of a metric."""
     if metric not in get_args(Metric):
         raise ParameterError(
             f"metric: needs one of {', '.join(get_args(Metric))}, got {metric!r}"
@@ -241,13 +214,13 @@ def _check_metric(metric: str) -> None:
 
 
 def _metric_weights(metric: Metric, counted: CountedRatings) -> Weights:
-    """Return the δ² of a metric, which grow without bound."""
+    # the δ² of a metric, which grow without bound
     # Krippendorff (2004), Content Analysis, 2nd ed., pp. 232-236
     _check_metric(metric)
     categories = counted.categories
     n = len(categories)
     if metric == "nominal" or n == 0:  # nobody rated anything
-        return identity_weights(n, name=metric)
+        return replace(declared_weights("identity", categories), name=metric)
     if metric in ("jaccard", "masi"):
         return Weights(name=metric, n_categories=n, v=_of_sets(metric, categories))
     if not counted.declared and isinstance(categories[0], str):
@@ -257,15 +230,17 @@ def _metric_weights(metric: Metric, counted: CountedRatings) -> Weights:
         )
     if metric == "ratio":
         return Weights(name="ratio metric", n_categories=n, v=_ratio(categories))
-    name, values = "interval", positions(categories)
     if metric == "ordinal":
         name, values = "ordinal metric", _middles(counted)
-    v: Any = Line(values, square=1.0) if n > MANY else quadratic(values)
-    return Weights(name=name, n_categories=n, v=v)
+    else:
+        name, values = "interval", spread_values(categories)
+    line = Line(values, linear=0.0, square=1.0)
+    v = line if n > MANY else line.matrix()
+    return Weights(name=name, n_categories=n, v=v, line=line)
 
 
 def _ratio(categories: Sequence[Label]) -> Floats:
-    values = category_values(categories)
+    values = spread_values(categories)
     if len(values) > MANY:
         raise ParameterError(
             "metric: ratio needs a matrix of every two categories, which is made of at "
@@ -281,13 +256,9 @@ def _ratio(categories: Sequence[Label]) -> Floats:
 
 def _middles(counted: CountedRatings) -> Floats:
     # Σ_{g<k} n_g + n_k/2: ratings up to the middle of each grade, of items with a pair
-    is_paired = counted.size > 1
-    codes = counted.codes[is_paired] + 1  # missing is 0
-    often = np.broadcast_to(counted.freq[is_paired, None], codes.shape)
-    if counted.repeats is not None:
-        often = often * counted.repeats[is_paired]
-    n_places = counted.n_categories + 1
-    totals = np.bincount(codes.ravel(), often.ravel(), minlength=n_places)[1:]
+    paired = counted.chosen(rows=counted.size > 1)
+    counts = item_counts(paired.codes, paired.n_categories, paired.repeats)
+    totals = paired.freq @ counts
     return np.asarray(np.cumsum(totals) - totals / 2.0)
 
 

@@ -9,7 +9,6 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement._data import complete_values, rated_part, rating_values
 from masrel.agreement._engine import (
     NO_SPREAD,
     check_level,
@@ -19,6 +18,7 @@ from masrel.agreement._engine import (
     undefined,
 )
 from masrel.agreement._labels import Label
+from masrel.agreement._table import complete_values, rated_part, rating_values
 from masrel.agreement.icc import _Anova
 from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Estimate, Interval

@@ -13,7 +13,6 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from masrel.agreement._data import code_pairs
 from masrel.agreement._engine import (
     Features,
     Floats,
@@ -21,11 +20,11 @@ from masrel.agreement._engine import (
     Integers,
     divide,
     estimate,
-    over,
 )
 from masrel.agreement._labels import Codes, Label
-from masrel.agreement._rows import (
+from masrel.agreement._table import (
     CountedRatings,
+    code_pairs,
     complete_rows,
     count_ratings,
     raters_told_apart,
@@ -88,74 +87,60 @@ def _parts(sums: Floats, v: Any) -> tuple[Floats, Floats, Floats, Floats]:
 def _joined(
     of_d: Floats, of_n: Floats, of_between: Floats, parts: Any, v: Any
 ) -> Floats:
-    """Join slopes in d, in n and in P'VQ of each table to those in all sums."""
+    # slopes in d, in n and in P'VQ of each table to those in all sums
     _, _, p, q = parts
     of_margins = of_between[..., None, None] * np.stack([q @ v, p @ v], axis=-2)
     flat = of_margins.reshape(*of_d.shape[:-1], 2 * math.prod(p.shape[-2:]))
     return np.concatenate([of_d, of_n, flat], axis=-1)
 
 
-def _mean_disagreements(sums: Floats, v: Any) -> tuple[Floats, Floats]:
-    d, n, p, q = _parts(sums, v)
-    return divide(d, n), divide(((p @ v) * q).sum(axis=-1), n * n)
-
-
-def _mean_slope(sums: Floats, v: Any) -> Floats:
+def _mean_of_tables(sums: Floats, v: Any) -> tuple[Floats, Floats, Floats]:
     # the mean over tables of κ = 1 - n d / P'VQ
     d, n, p, q = parts = _parts(sums, v)
     between, m = ((p @ v) * q).sum(axis=-1), n.shape[-1]
-    of_d, of_n = divide(-n, m * between), divide(-d, m * between)
-    return _joined(of_d, of_n, divide(n * d, m * between**2), parts, v)
+    of_d, of_n = -n / (m * between), -d / (m * between)
+    slope = _joined(of_d, of_n, n * d / (m * between**2), parts, v)
+    return d / n, between / (n * n), slope
 
 
-def _stratified_disagreements(sums: Floats, v: Any) -> tuple[Floats, Floats]:
-    # means over the strata with a pair, each with margins of its own
-    d, n, p, q = _parts(sums, v)
-    n_used = (n > 0).sum(axis=-1, keepdims=True)
-    d_o, d_e = over(d, n), over(((p @ v) * q).sum(axis=-1), n * n)
-    of_all = d_o.sum(axis=-1, keepdims=True), d_e.sum(axis=-1, keepdims=True)
-    return divide(of_all[0], n_used), divide(of_all[1], n_used)
-
-
-def _stratified_slope(sums: Floats, v: Any) -> Floats:
-    # κ = 1 - Σ_t d_t/n_t / Σ_t P'VQ_t/n_t²
+def _stratified(sums: Floats, v: Any) -> tuple[Floats, Floats, Floats]:
+    # κ = 1 - Σ_t d_t/n_t / Σ_t P'VQ_t/n_t²: D_o and D_e are means over the strata with
+    # a pair, each with margins of its own
     d, n, p, q = parts = _parts(sums, v)
-    d_o, d_e = over(d, n), over(((p @ v) * q).sum(axis=-1), n * n)
-    all_e = d_e.sum(axis=-1, keepdims=True)
-    ratio = divide(d_o.sum(axis=-1, keepdims=True), all_e)
-    once = divide(over(np.ones_like(n), n), all_e)
+    d_o, d_e = divide(d, n, 0.0), divide(((p @ v) * q).sum(axis=-1), n * n, 0.0)
+    all_o, all_e = d_o.sum(axis=-1, keepdims=True), d_e.sum(axis=-1, keepdims=True)
+    ratio = all_o / all_e
+    once = divide(np.ones_like(n), n, 0.0) / all_e
     of_n = once * (d_o - 2.0 * ratio * d_e)
-    return _joined(-once, of_n, over(ratio * once, n), parts, v)
+    slope = _joined(-once, of_n, divide(ratio * once, n, 0.0), parts, v)
+    n_used = (n > 0).sum(axis=-1, keepdims=True)
+    return all_o / n_used, all_e / n_used, slope
 
 
 _COHEN = Formula(
     name="cohen_kappa",
     title="Cohen's kappa",
     features=partial(_features, lambda _: np.array([[0, 1]])),
-    disagreements=_mean_disagreements,
-    slope=_mean_slope,
+    disagreements=_mean_of_tables,
 )
 _LIGHT = Formula(
     name="light_kappa",
     title="Light's kappa",
     features=partial(_features, _every_two, listwise=True),
-    disagreements=_mean_disagreements,
-    slope=_mean_slope,
+    disagreements=_mean_of_tables,
 )
 _LIGHT_PAIRWISE = replace(_LIGHT, features=partial(_features, _every_two))
 _STRATIFIED = Formula(
     name="stratified_kappa",
     title="stratified kappa",
     features=partial(_features, _own_two),
-    disagreements=_stratified_disagreements,
-    slope=_stratified_slope,
+    disagreements=_stratified,
 )
 _POOLED_PAIRS = Formula(
     name="pooled_kappa",
     title="pooled kappa",
     features=partial(_features, _own_two, together=True),
-    disagreements=_mean_disagreements,
-    slope=_mean_slope,
+    disagreements=_mean_of_tables,
 )
 
 

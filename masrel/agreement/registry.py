@@ -6,22 +6,27 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, get_args
 
-from masrel.agreement._data import CodedRatings, code_pairs, code_ratings
 from masrel.agreement._engine import Formula
 from masrel.agreement._labels import Label, shown
-from masrel.agreement._rows import count_ratings
+from masrel.agreement._table import (
+    CodedRatings,
+    code_pairs,
+    code_ratings,
+    count_ratings,
+)
 from masrel.agreement._weights import Weights, WeightsLike, is_identity
-from masrel.agreement.conger import _CONGER, conger_kappa
 from masrel.agreement.icc import _NAMES as ICC_NAMES
 from masrel.agreement.icc import _target_of as icc_target
 from masrel.agreement.icc import icc, robinson_a
 from masrel.agreement.kappas import (
     _BRENNAN_PREDIGER,
+    _CONGER,
     _FLEISS,
     _GWET,
     _PERCENT,
     _SCOTT,
     brennan_prediger,
+    conger_kappa,
     fleiss_kappa,
     gwet_ac,
     percent_agreement,
@@ -83,6 +88,8 @@ class Coefficient:
         Other names of the same number, by which it can be asked for.
     function : callable
         The public function.
+    references : tuple of str
+        What a report cites it for: keys of its BibTeX file.
     formula : Formula or None
         The coefficient from sums over items, for intervals; None where it has an
         interval of its own or none.
@@ -118,6 +125,7 @@ class Coefficient:
     name: str
     title: str
     function: Callable[..., Estimate]
+    references: tuple[str, ...]
     formula: Formula | None
     aliases: tuple[str, ...] = ()
     properties: frozenset[Property] = _EVERY
@@ -211,6 +219,7 @@ _ALL = (
         name="percent_agreement",
         title="Percent agreement",
         function=percent_agreement,
+        references=(),  # everybody knows it
         formula=_PERCENT,
         tells_raters_apart=False,
         lowest=0.0,
@@ -220,6 +229,7 @@ _ALL = (
         name="cohen_kappa",
         title="Cohen's κ",
         function=cohen_kappa,
+        references=("cohen1960",),
         formula=_COHEN,
         n_raters=(2, 2),
     ),
@@ -227,12 +237,14 @@ _ALL = (
         name="conger_kappa",
         title="Conger's κ",
         function=conger_kappa,
+        references=("conger1980",),
         formula=_CONGER,
     ),
     Coefficient(
         name="fleiss_kappa",
         title="Fleiss' κ",
         function=fleiss_kappa,
+        references=("fleiss1971",),
         formula=_FLEISS,
         tells_raters_apart=False,
     ),
@@ -240,12 +252,14 @@ _ALL = (
         name="light_kappa",
         title="Light's κ",
         function=light_kappa,
+        references=("light1971",),
         formula=_LIGHT,
     ),
     Coefficient(
         name="scott_pi",
         title="Scott's π",
         function=scott_pi,
+        references=("scott1955",),
         formula=_SCOTT,
         n_raters=(2, 2),
     ),
@@ -253,6 +267,7 @@ _ALL = (
         name="brennan_prediger",
         title="Brennan-Prediger",
         function=brennan_prediger,
+        references=("brennan1981",),
         formula=_BRENNAN_PREDIGER,
         tells_raters_apart=False,
         # Bennett, Alpert and Goldstein (1954); Maxwell (1977), of two categories, which
@@ -264,6 +279,7 @@ _ALL = (
         name="gwet_ac",
         title="Gwet's AC",
         function=gwet_ac,
+        references=("gwet2008",),
         formula=_GWET,
         tells_raters_apart=False,
         properties=_EVERY - {"unused category"},
@@ -272,6 +288,7 @@ _ALL = (
         name="krippendorff_alpha",
         title="Krippendorff's α",
         function=krippendorff_alpha,
+        references=("hayes2007",),
         formula=_ALPHA,
         tells_raters_apart=False,
         properties=_EVERY - {"items twice"},
@@ -280,6 +297,7 @@ _ALL = (
         name="stratified_kappa",
         title="Stratified κ",
         function=stratified_kappa,
+        references=("barlow1991",),
         code=code_pairs,
         formula=_STRATIFIED,
         shape="pairs",
@@ -289,6 +307,7 @@ _ALL = (
         name="pooled_kappa",
         title="Pooled κ",
         function=pooled_kappa,
+        references=("barlow1991",),
         code=code_pairs,
         formula=_POOLED_PAIRS,
         shape="pairs",
@@ -298,6 +317,7 @@ _ALL = (
         name="kendall_w",
         title="Kendall's W",
         function=kendall_w,
+        references=("kendall1939",),
         formula=None,
         properties=(_RANKS - {"items twice"}) | {"perfect agreement"},
         lowest=0.0,
@@ -308,6 +328,7 @@ _ALL = (
         name="robinson_a",
         title="Robinson's A",
         function=robinson_a,
+        references=("robinson1957",),
         formula=None,
         properties=_RANKS | {"perfect agreement"},
         lowest=0.0,
@@ -319,6 +340,7 @@ _ALL = (
             name=name,
             title=form,
             function=partial(icc, form=form),
+            references=("mcgraw1996",),
             formula=None,
             properties=(_RANKS - {"items twice"}) | {"perfect agreement"},
             lowest=-math.inf,
@@ -332,6 +354,7 @@ _ALL = (
         name="lin_ccc",
         title="Lin's concordance",
         function=lin_ccc,
+        references=("lin1989",),
         formula=None,
         properties=_RANKS | {"perfect agreement"},
         weighted=False,
@@ -343,6 +366,7 @@ _ALL = (
             name=name,
             title=title,
             function=partial(function, kind=kind),
+            references=("devet2006",),
             formula=None,
             properties=_RANKS - {"items twice"},
             lowest=0.0,

@@ -11,8 +11,8 @@ from itertools import permutations
 
 import numpy as np
 
-from masrel.agreement._distances import Distances
 from masrel.agreement._engine import Floats
+from masrel.agreement._weights import Distances
 from masrel.errors import ParameterError
 from masrel.estimates import Distribution, Interval
 from masrel.intervals._dirichlet_multinomial import DirichletMultinomial

@@ -27,11 +27,10 @@ from masrel.agreement import (
     coefficient,
     count_ratings,
 )
-from masrel.agreement._distances import Line
 from masrel.agreement._engine import Features, Floats, Formula, check_level
 from masrel.agreement._labels import Codes, is_missing, is_row
-from masrel.agreement._rows import distinct_rows, item_counts
-from masrel.agreement._weights import as_line, declared_weights
+from masrel.agreement._table import distinct_rows, item_counts
+from masrel.agreement._weights import Line, declared_weights
 from masrel.errors import (
     ParameterError,
     SmallSampleWarning,
@@ -131,9 +130,7 @@ class IntervalProblem:
 
     def slopes(self, sums: Floats) -> Floats:
         """Return the derivatives of the coefficient in sums (..., n_features)."""
-        with np.errstate(invalid="ignore", divide="ignore"):  # undefined ones
-            slope = self.formula.slope(sums, self.v)
-        return np.where(np.isfinite(slope), slope, math.nan)
+        return self.formula.slope(sums, self.v)
 
     def by_t(
         self,
@@ -248,10 +245,10 @@ def pose_problem(
         len(v) > _FEW_GRADES
         and n_rows * (len(features.dense) + features.n) > _MAX_PLACES
     )
-    line = as_line(made, coded.categories) if is_too_large else None
-    by_nodes = None if line is None else _by_nodes(formula, line)
-    if by_nodes is not None:
-        formula, v, is_too_large = by_nodes, line, False
+    if is_too_large and made.line is not None:
+        by_nodes = _by_nodes(formula, made.line)
+        if by_nodes is not None:
+            formula, v, is_too_large = by_nodes, made.line, False
     return IntervalProblem(
         entry=entry,
         formula=formula,
@@ -307,7 +304,8 @@ def _who_matters(
         item_codes = item_codes[:, rated]
     while True:
         codes, often = distinct_rows(item_codes, coded.n_categories)
-        there = codes[formula.features(codes, v).matters] >= 0
+        matter = formula.features(codes, v).summed(often)[1] > 0
+        there = codes[matter] >= 0
         shape = (len(there), codes.shape[1] // width, width)
         rates = there.reshape(shape).all(axis=2).any(axis=0)  # (n_raters,)
         if rates.all() or rates.sum() < fewest:
@@ -327,7 +325,7 @@ def _of_rows(
 ) -> dict[str, Any]:
     """Return what distinct rows and their features make of a question."""
     features = formula.features(codes, v)
-    freq, sums = often * features.matters, features.sums(often)
+    sums, freq = features.summed(often)
     value = float(formula.value(sums, v))
     # weights, or items of a single rating, can bring a coefficient below -1
     min_value = entry.lowest if value >= entry.lowest else -math.inf
@@ -364,17 +362,16 @@ def _by_nodes(formula: Formula, line: Line) -> Formula | None:
         n = 3 * made.n // len(shares)
         return Features(made.dense, places.reshape(flat), values.reshape(flat), n)
 
-    def disagreements(sums: Floats, _v: Any) -> tuple[Floats, Floats]:
-        d_o, d_e = formula.disagreements(sums, v)
-        return d_o, np.where(d_e > ROUNDING * v.max(), d_e, 0.0)  # 0 is rounded here
+    def disagreements(sums: Floats, _v: Any) -> tuple[Floats, Floats, Floats]:
+        d_o, d_e, slope = formula.disagreements(sums, v)
+        d_e = np.where(d_e > ROUNDING * v.max(), d_e, 0.0)  # 0 is rounded here
+        return d_o, d_e, slope
 
     return replace(
         formula,
         features=features,
         disagreements=disagreements,
-        slope=lambda sums, _v: formula.slope(sums, v),
-        rater_sums=None,
-        crossed_sums=None,
+        resampled=None,
     )
 
 

@@ -10,12 +10,7 @@ import numpy as np
 
 from masrel._input import refuse
 from masrel.agreement import COEFFICIENTS, Label, Metric, WeightsLike
-from masrel.agreement._engine import (
-    NO_SPREAD,
-    ONE_PAIR,
-    disagreement_within,
-    standard_error,
-)
+from masrel.agreement._engine import NO_SPREAD, ONE_PAIR, WHOLE, Features
 from masrel.agreement.category import _null_error
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval, Target, Unit
@@ -216,8 +211,11 @@ def _clustered_error(problem: IntervalProblem, clusters: Integers) -> tuple[floa
     # Vanbelle, S. (2017). Comparing dependent kappa coefficients obtained on multilevel
     # data. Biometrical Journal, 59(5), 1016-1034. https://doi.org/10.1002/bimj.201600093
     of = ClusterSums.of(problem, clusters)
-    moves = of.sums[of.known] @ problem.slopes(problem.sums)
-    return standard_error(moves, np.ones(len(moves), dtype=np.int64), None), of.n_paired
+    rows = of.sums[of.known]
+    none = np.empty((len(rows), 0))
+    features = Features(rows.T, none.astype(np.int64), none, 0)
+    once = np.ones(len(rows), dtype=np.int64)
+    return features.error(problem.slopes(problem.sums), once), of.n_paired
 
 
 # -- standard errors as other programs print them --------------------------------------
@@ -231,10 +229,10 @@ def _over_n(problem: IntervalProblem, estimate: Estimate) -> float:
 
 def _irrcac(problem: IntervalProblem, estimate: Estimate) -> float:
     # it takes n u_i + κ (s_i n/n' - 1), s_i = 1 with a pair, as n' items have
-    moves = problem.item_features.dot(problem.slopes(problem.sums))
     paired = (problem.codes >= 0).sum(axis=1) > 1
-    moves += estimate.value * (paired / estimate.n_items_paired - 1.0 / problem.n_items)
-    return standard_error(moves, problem.freq, None)
+    more = estimate.value * (paired / estimate.n_items_paired - 1.0 / problem.n_items)
+    slope = problem.slopes(problem.sums)
+    return problem.item_features.error(slope, problem.freq, more=more)
 
 
 def _irrcac_of_alpha(problem: IntervalProblem, _estimate: Estimate) -> float:
@@ -256,8 +254,9 @@ def _irrcac_of_alpha(problem: IntervalProblem, _estimate: Estimate) -> float:
     p = np.bincount(codes[rated], often, minlength=len(v)) / n
     others = p @ v
     p_e = 1.0 - others @ p
-    within = disagreement_within(codes, v, None)
-    of_items = size / mean - within / (mean * (size - 1.0))
+    # the first of alpha's features is Σ_kl v_kl n_ik n_il / (r_i - 1)
+    within = problem.item_features.dense[0, problem.freq > 0] / WHOLE
+    of_items = (size - within) / mean
     agreement = freq @ of_items / m
     p_a = agreement + (1.0 - agreement) / n
     alpha = (agreement - p_e) / (1.0 - p_e)

@@ -12,9 +12,9 @@ import numpy as np
 
 from masrel._input import refuse
 from masrel.agreement import Label, Metric, WeightsLike
-from masrel.agreement._distances import Distances
 from masrel.agreement._engine import Floats
 from masrel.agreement._labels import shown
+from masrel.agreement._weights import Distances
 from masrel.errors import ParameterError
 from masrel.estimates import Distribution, Interval, Target
 from masrel.intervals._question import (
@@ -303,7 +303,7 @@ def _rater_units(problem: IntervalProblem) -> _Units:
             f"target: raters of {len(v)} different grades are left out, but not "
             "resampled; use the jackknife"
         )
-    if formula.rater_sums is None or formula.crossed_sums is None or most == fewest:
+    if formula.resampled is None or most == fewest:
         raise ParameterError(
             f"target: raters of {problem.entry.title} cannot be resampled without "
             "pairing a rater with a copy of itself"
@@ -311,23 +311,29 @@ def _rater_units(problem: IntervalProblem) -> _Units:
     is_item = problem.freq > 0
     codes, freq = problem.codes[is_item], problem.freq[is_item]
     few = warn_small(problem.n_paired_raters, 5, "raters", problem.n_raters)
-    sums_of = formula.rater_sums(codes, freq, v)
+    sums_of = formula.resampled(codes, v)
+
+    def values(taken: Floats) -> Floats:
+        items = np.broadcast_to(1.0 * freq, (len(taken), len(freq)))
+        return problem.values(sums_of(items, taken))
+
+    width = freq.size * (3 * len(v) + 6) + codes.shape[1]
     raters = _Units(
         freqs=(np.ones(codes.shape[1], dtype=np.int64),),
-        values=lambda taken: problem.values(sums_of(taken)),
-        without=lambda: (problem.values(sums_of(1.0 - np.eye(codes.shape[1]))),),
-        width=codes.shape[1] + problem.sums.size,
+        values=values,
+        without=lambda: (values(1.0 - np.eye(codes.shape[1])),),
+        width=width,
         notes=few,
     )
     if problem.target == "raters":
         return raters
     few_items = warn_small(problem.n_paired_items, 16, "items", problem.n_items)
-    crossed, rows = formula.crossed_sums(codes, v), problem.rows[is_item]
+    rows = problem.rows[is_item]
     return _Units(
         freqs=(freq, *raters.freqs),
-        values=lambda items, taken: problem.values(crossed(items, taken)),
+        values=lambda items, taken: problem.values(sums_of(items, taken)),
         without=lambda: (problem.values(problem.sums - rows), *raters.without()),
-        width=freq.size * (3 * len(v) + 6) + codes.shape[1],
+        width=width,
         notes=(*few_items, *few),
         words=" of items and raters",
     )

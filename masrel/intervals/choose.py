@@ -35,7 +35,6 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from masrel.agreement import CountedRatings, Label
-from masrel.agreement._engine import standard_error
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, Target, _LongNote
 from masrel.intervals._question import (
@@ -214,8 +213,8 @@ def _chosen(
             interval = replace(interval, notes=(*notes, *interval.notes))
         return interval, "left out, on a scale without ends"
     if problem.is_too_large and problem.target == "items":
-        moves = problem.item_features.dot(problem.slopes(problem.sums))
-        error = standard_error(moves, problem.freq, None)
+        slope = problem.slopes(problem.sums)
+        error = problem.item_features.error(slope, problem.freq)
         df, method = problem.n_paired_items - 1, "delta method, t(n-1)"
         why = "too many different grades to leave items out one by one"
         return problem.by_t(error, df, method=method, unit=None), why

@@ -18,9 +18,8 @@ from scipy.optimize import brentq
 from scipy.special import betainc, expit, gammaln, logit
 
 from masrel.agreement import Label
-from masrel.agreement._data import code_pairs, pairs_of_raters
 from masrel.agreement._engine import Floats, check_level
-from masrel.agreement._rows import pair_table
+from masrel.agreement._table import code_pairs, pair_table
 from masrel.errors import UndefinedStatisticWarning
 from masrel.estimates import Interval, Target
 from masrel.intervals._dirichlet_multinomial import log_convolve
@@ -139,7 +138,10 @@ def retest_model(
     check_level(level)
     checked_prior = Prior.of(prior, concentration)
     coded = code_pairs(pairs, categories)
-    every = [pair_table(codes, coded.n_categories) for codes in pairs_of_raters(coded)]
+    every = [
+        pair_table(coded.codes[:, start : start + 2], coded.n_categories)
+        for start in range(0, coded.codes.shape[1], 2)
+    ]
     tables = {rater: table for rater, table in enumerate(every) if table.any()}
     if not tables:
         return _undefined("no rater has a pair of grades", checked_prior, level)

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from masrel.agreement import CodedRatings, CountedRatings, count_ratings
-from masrel.agreement._labels import code_type
-from masrel.agreement._rows import count_items, count_table
+from masrel.agreement._table import count_items, count_table
 from masrel.errors import RatingsError
 from masrel.ratings._findings import (
     Finding,
@@ -326,7 +325,12 @@ def _grouped(
         findings = doubt_columns(sheet, layout, rows, grades.scale, freq)
     rows, place = np.unique(rows.astype(np.int8), axis=0, return_inverse=True)
     freq = np.bincount(place.ravel(), freq).astype(np.int64)
-    ratings = CountedRatings(codes=rows, freq=freq, categories=grades.scale.values)
+    ratings = CountedRatings(
+        codes=rows,
+        freq=freq,
+        categories=grades.scale.values,
+        n_raters=int((rows >= 0).any(axis=0).sum()),
+    )
     return _file_of(
         *(groups, layout, options, grades),
         [RatingsPart(raters=tuple(names), ratings=ratings)],
@@ -557,7 +561,7 @@ def _puttogether(
     shape, q = (len(items.texts), len(raters.texts)), len(scale.grades)
 
     def laid_out() -> CodedRatings:
-        codes = np.full(shape, -1, dtype=code_type(q))
+        codes = np.full(shape, -1, dtype=np.min_scalar_type(-q - 1))
         codes[items.codes, raters.codes] = grade
         codes.setflags(write=False)
         # numbers that nobody declared may be measurements rather than grades
@@ -573,7 +577,7 @@ def _puttogether(
     counts = np.bincount(keys, minlength=shape[0] * q).reshape(shape[0], q)
     return replace(
         count_items(counts, categories=scale.values),
-        n_known=len(np.unique(raters.codes[rated])),
+        n_raters=len(np.unique(raters.codes[rated])),
         source=laid_out,  # if who rated what must be known
     )
 

@@ -57,7 +57,7 @@ def test_items_and_raters_without_any_rating_do_not_count() -> None:
         (np.zeros(3), None, "two dimensions"),
         ([["1", 2]], None, "text and numbers cannot be mixed"),
         ([["1", "5"]], ["1", "2"], "row 0, column 1: needs one of '1', '2'"),
-        ([["1", ["2"]]], ["1", "2"], r"row 0, column 1: needs one of"),
+        ([["1", ["2"]]], ["1", "2"], r"row 0, column 1: labels need"),
         ([[1, 2]], ["1", "2"], "row 0, column 0"),
         ([["1", "2"]], [], "at least one label"),
         ([["1", "2"]], "12", "at least one label"),

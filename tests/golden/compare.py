@@ -153,7 +153,7 @@ def _bar(place: _Place, size: float) -> float:
     # how far a number of this size may be off
     if place.kind == "value":
         # of grades that are measurements there are sums of squares, which are rounded
-        return 1e-12 * size if "/icc_" in place.path else 4.0 * math.ulp(size)
+        return 1e-12 * size if "/icc_" in place.path else 1e-14 * (1.0 + size)
     if place.kind == "standard_error":
         chance = place.around.get("chance")
         near_one = isinstance(chance, float) and 1.0 - chance < 1e-6

@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import get_args
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -251,7 +250,7 @@ def test_kernel_and_function_are_the_same_coefficient(
         coded = replace(coded, codes=coded.codes[:, rate])
     v = declared_weights(weights, LABELS).v
     assert entry.formula is not None
-    sums = entry.formula.features(coded.codes, v).sums(np.ones(len(coded.codes)))
+    sums = entry.formula.features(coded.codes, v).rows().sum(axis=0)
     value = float(entry.formula.value(sums, v))
     found = estimate(entry, table, weights=weights).value
     assert (math.isnan(value) and math.isnan(found)) or math.isclose(

@@ -11,23 +11,6 @@ from masrel.scales import PublishedScale
 
 _FILE = Path(__file__).with_name("templates") / "references.bib"
 
-_COEFFICIENTS = {
-    "cohen_kappa": ("cohen1960",),
-    "conger_kappa": ("conger1980",),
-    "fleiss_kappa": ("fleiss1971",),
-    "light_kappa": ("light1971",),
-    "scott_pi": ("scott1955",),
-    "brennan_prediger": ("brennan1981",),
-    "gwet_ac": ("gwet2008",),
-    "krippendorff_alpha": ("hayes2007",),
-    "stratified_kappa": ("barlow1991",),
-    "pooled_kappa": ("barlow1991",),
-    "kendall_w": ("kendall1939",),
-    "robinson_a": ("robinson1957",),
-    "lin_ccc": ("lin1989",),
-    "percent_agreement": (),  # everybody knows it
-}
-
 _METHODS = {
     "jackknife": "efron1981",
     "bootstrap": "efron1993",
@@ -47,11 +30,8 @@ _SCALES = {
 
 def coefficient_references(coefficient: str, weights: str) -> tuple[str, ...]:
     """Return the keys of what a coefficient is cited for."""
-    keys = _COEFFICIENTS.get(coefficient)
-    if keys is None:  # the forms of ICC, and errors in the units of the ratings
-        in_units = COEFFICIENTS[coefficient].in_units
-        keys = ("devet2006",) if in_units else ("mcgraw1996",)
     is_of_kappa = weights != "identity" and coefficient != "krippendorff_alpha"
+    keys = COEFFICIENTS[coefficient].references
     return (*keys, "cohen1968") if is_of_kappa else keys
 
 

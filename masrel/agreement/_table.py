@@ -1,0 +1,848 @@
+"""Ratings in any form, checked once: codes, and distinct rows of them.
+
+In: lists, arrays, frames, counts of items, or a table of two raters. Out:
+`CodedRatings` item by item, and `CountedRatings`, which every kappa takes.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from masrel.agreement._labels import (
+    MISSING,
+    Codes,
+    Label,
+    check_categories,
+    doubt_texts,
+    is_row,
+    label_codes,
+    labels_met,
+    no_category,
+    shown,
+)
+from masrel.agreement._weights import category_values
+from masrel.errors import CountsError, ParameterError, RatingsError
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+_NOTHING = "ratings: needs at least one item and one rater, got none"
+
+_MAX_SPAN = 1 << 14  # of whole numbers that are codes but for a shift
+_MAX_KEYS = 1 << 22  # different rows that are counted in a table rather than sorted
+_BLOCK = 1 << 14  # items at once: they stay in the cache, and BLAS starts no threads
+_MAX_PLACES = 100_000_000  # that are made of counts, where ratings are gone through
+_MAX_SIDE = 4000  # categories of a table of pairs
+_MEASURED = 0.8  # of the ratings are different numbers where those are measurements
+_UNKNOWN = -2
+
+# -- item by item ---------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CodedRatings:
+    """Ratings as positions in the declared categories.
+
+    Attributes
+    ----------
+    codes : ndarray of signed integers, shape (n_items, n_raters)
+        Position of each rating in `categories`; -1 where there is none.
+    categories : tuple of str, int or float
+        Declared categories in order.
+    declared : bool
+        False if nobody declared them, and they are the labels met.
+    """
+
+    codes: Codes = field(compare=False, repr=False)
+    categories: tuple[Label, ...]
+    declared: bool = True
+
+    @property
+    def n_items(self) -> int:
+        """Items with at least one rating."""
+        return int((self.codes >= 0).any(axis=1).sum())
+
+    @property
+    def n_items_paired(self) -> int:
+        """Items with ratings of at least two raters."""
+        return int(((self.codes >= 0).sum(axis=1) > 1).sum())
+
+    @property
+    def n_raters(self) -> int:
+        """Raters with at least one rating."""
+        return _raters_of(self.codes)
+
+    @property
+    def n_categories(self) -> int:
+        """Declared categories."""
+        return len(self.categories)
+
+
+def _raters_of(codes: Codes) -> int:
+    return int((codes >= 0).any(axis=0).sum())
+
+
+def code_ratings(
+    ratings: object, categories: Sequence[Label] | None = None
+) -> CodedRatings:
+    """Check an item × rater table of labels and turn it into codes.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Labels or numbers; None, ``nan`` and pandas' missing values are missing.
+    categories : sequence of str, int or float, optional
+        The declared scale in order. Without it, the labels met: numbers by value,
+        text by alphabet, which is an order for unweighted coefficients only.
+
+    Returns
+    -------
+    CodedRatings
+        The codes and the categories they point to.
+
+    Raises
+    ------
+    RatingsError
+        If the table is empty, ragged or not of two dimensions, a label is not
+        among the categories, or is "" and nobody declared it, or categories repeat or
+        mix text and numbers.
+
+    Warns
+    -----
+    RatingsWarning
+        If nobody declared the categories, and some labels are the text "nan", "None",
+        "NaT" or "<NA>", which ``astype(str)`` makes of a missing rating.
+
+    Examples
+    --------
+    >>> code_ratings([["1", "1+"], ["2", None]], ["1", "1+", "2"]).codes.tolist()
+    [[0, 1], [2, -1]]
+    """
+    if isinstance(ratings, CountedRatings):
+        if not ratings.knows_raters:
+            raise RatingsError(
+                "ratings: needs to know who rated what, got counts of a table"
+            )
+        ratings = ratings.coded
+    if isinstance(ratings, CodedRatings):
+        check_scale(ratings.categories, categories)
+        return ratings
+    scale = None if categories is None else check_categories(categories)
+    if type(ratings) is not np.ndarray and type(ratings) is not list:
+        ratings, scale = _plain_table(ratings, scale)
+    if isinstance(ratings, np.ndarray) and ratings.dtype.kind in "iuf":
+        if ratings.ndim != 2 or 0 in ratings.shape:
+            raise _no_table(ratings.shape)
+        lowest, highest = ratings.min(), ratings.max()
+        has_whole = ratings.dtype.kind in "iu" and int(highest) < 2**63
+        span = int(highest) - int(lowest) + 1 if has_whole else _MAX_SPAN
+        if span < _MAX_SPAN:
+            codes = np.empty(ratings.shape, dtype=np.min_scalar_type(-span - 1))
+            np.subtract(ratings, lowest, out=codes, dtype=np.int64, casting="unsafe")
+            met = np.bincount(codes[:_BLOCK].ravel(), minlength=span)
+            if not met.all():  # as a rule the first items have every grade
+                met = np.bincount(codes.ravel(), minlength=span)
+                codes = (np.cumsum(met > 0) - 1).astype(codes.dtype)[codes]
+            labels = np.flatnonzero(met) + int(lowest)
+        else:
+            labels, codes = np.unique(ratings, return_inverse=True)
+            labels, codes = labels[~np.isnan(labels)], codes.reshape(ratings.shape)
+            codes[codes == len(labels)] = MISSING
+        known: tuple[Label, ...] = tuple(labels.tolist())
+        if scale is not None:
+            codes, known = _on_scale(ratings, codes, known, scale), scale
+    else:
+        codes, known = label_codes(_rows_of(ratings), scale)
+    codes.setflags(write=False)
+    return CodedRatings(codes=codes, categories=known, declared=scale is not None)
+
+
+def _on_scale(
+    values: NDArray[Any],
+    codes: Codes,
+    known: tuple[Label, ...],
+    scale: tuple[Label, ...],
+) -> Codes:
+    # codes of numbers met -> those of a declared scale
+    position = {label: code for code, label in enumerate(scale)}
+    table = [*(position.get(label, _UNKNOWN) for label in known), MISSING]
+    codes = np.array(table, dtype=np.min_scalar_type(-len(scale) - 1))[codes]
+    if codes.min() == _UNKNOWN:
+        i, j = np.argwhere(codes == _UNKNOWN)[0].tolist()
+        raise no_category(values[i, j].item(), scale, i, j)
+    return codes
+
+
+def check_scale(known: tuple[Label, ...], categories: Sequence[Label] | None) -> None:
+    """Check that ratings which have a scale are asked for on no other."""
+    if categories is not None and check_categories(categories) != known:
+        raise ParameterError(
+            f"categories: the ratings are on the scale {known}, got {tuple(categories)}"
+        )
+
+
+def _no_table(shape: tuple[int, ...]) -> RatingsError:
+    if len(shape) != 2:
+        return RatingsError(
+            "ratings: needs two dimensions (items, raters), got "
+            f"{len(shape)} with shape {shape}"
+        )
+    return RatingsError(f"{_NOTHING}: shape {shape}")
+
+
+def _rows_of(ratings: Any) -> list[list[Any]]:
+    # an array or nested sequences -> n_items lists of labels
+    if isinstance(ratings, np.ndarray):
+        if ratings.ndim != 2 or 0 in ratings.shape:
+            raise _no_table(ratings.shape)
+        return list(ratings.tolist())
+    if not is_row(ratings):
+        raise RatingsError(
+            f"ratings: needs an item × rater table, got {type(ratings).__name__}"
+        )
+    rows: list[list[Any]] = []
+    for row in ratings:
+        if not is_row(row):
+            raise RatingsError(
+                f"ratings: row {len(rows)} needs one rating per rater, got {row!r}"
+            )
+        rows.append(list(row))
+        if len(rows[-1]) != len(rows[0]):
+            raise RatingsError(
+                f"ratings: row {len(rows) - 1} needs {len(rows[0])} ratings as row 0 "
+                f"has, got {len(rows[-1])}"
+            )
+    if not rows or not rows[0]:
+        raise RatingsError(_NOTHING)
+    return rows
+
+
+def _plain_table(
+    ratings: Any, scale: tuple[Label, ...] | None
+) -> tuple[Any, tuple[Label, ...] | None]:
+    # a frame, without importing its library, or an array of another kind, as a plain
+    # array; and the scale, which ordered categories of a frame declare
+    if not hasattr(ratings, "to_numpy"):
+        return plain_array(ratings), scale
+    if len(ratings.shape) != 2 or 0 in ratings.shape:
+        raise _no_table(ratings.shape)
+    if not hasattr(ratings, "iloc"):  # not pandas, whose own types are told apart here
+        return np.asarray(ratings.to_numpy()), scale
+    types = list(ratings.dtypes)
+    if scale is None and all(getattr(of, "ordered", False) for of in types):
+        scales = [check_categories(of.categories.tolist()) for of in types]
+        scale = scales[0] if len(set(scales)) == 1 else None
+    are_numbers = all(isinstance(of, np.dtype) and of.kind in "iuf" for of in types)
+    return ratings.to_numpy(None if are_numbers else object), scale
+
+
+def plain_array(ratings: Any) -> Any:
+    """Return a matrix or a masked array as a plain one, and all else as it is."""
+    if isinstance(ratings, np.ma.MaskedArray):
+        mask, kind = np.ma.getmaskarray(ratings), ratings.dtype.kind
+        ratings = ratings.data.astype(float if kind == "f" else object)
+        ratings[mask] = None  # nan among floats
+    return np.asarray(ratings) if isinstance(ratings, np.ndarray) else ratings
+
+
+Repeated = Literal["error", "first", "last"]
+"""What to do with a second rating of the same item by the same rater."""
+
+
+def code_long(
+    frame: Any,
+    *,
+    item: str = "item",
+    rater: str = "rater",
+    grade: str = "grade",
+    categories: Sequence[Label] | None = None,
+    repeated: Repeated = "error",
+) -> CodedRatings:
+    """Arrange a long DataFrame, one row a rating, item by rater.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        Ratings; rows whose grade is missing are missing ratings.
+    item, rater, grade : str, optional
+        Names of its columns.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; the labels met when not given.
+    repeated : {"error", "first", "last"}, optional
+        What to do when a rater rated an item more than once: refuse, or keep the
+        first or the last of them in the order of the rows.
+
+    Returns
+    -------
+    CodedRatings
+        Codes that every coefficient takes as `ratings`; items and raters in the
+        order in which they are first met.
+
+    Raises
+    ------
+    RatingsError
+        If a column is not there, an item or a rater is missing, a grade is not among
+        the categories, or is "" and nobody declared it, or a rating is repeated.
+    ParameterError
+        If `repeated` is not one of the three.
+
+    Warns
+    -----
+    RatingsWarning
+        As `code_ratings`.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> frame = pd.DataFrame({"item": ["x", "x", "y"], "rater": ["A", "B", "A"],
+    ...                       "grade": ["1", "1+", "2"]})
+    >>> code_long(frame, categories=["1", "1+", "2"]).codes.tolist()
+    [[0, 1], [2, -1]]
+    """
+    if repeated not in get_args(Repeated):
+        raise ParameterError(
+            f"repeated: needs one of {', '.join(get_args(Repeated))}, got {repeated!r}"
+        )
+    if not hasattr(frame, "columns") or not hasattr(frame, "iloc"):
+        raise RatingsError(f"frame: needs a DataFrame, got {type(frame).__name__}")
+    for name in (item, rater, grade):
+        if name not in frame.columns:
+            raise RatingsError(
+                f"ratings: needs a column {name!r}, got "
+                f"{', '.join(map(repr, frame.columns))}"
+            )
+    if not len(frame):
+        raise RatingsError(_NOTHING)
+    items, item_names = _named(frame[item], item)
+    raters, rater_names = _named(frame[rater], rater)
+    grades, known = _grades(frame[grade], grade, categories)
+    places = items * len(rater_names) + raters
+    if repeated == "error" and np.bincount(places).max() > 1:
+        raise _repeats(frame[[item, rater]])
+    codes = np.full((len(item_names), len(rater_names)), MISSING, dtype=grades.dtype)
+    order = slice(None, None, -1 if repeated == "first" else 1)  # the last one stays
+    codes.reshape(-1)[places[order]] = grades[order]
+    codes.setflags(write=False)
+    return CodedRatings(codes=codes, categories=known, declared=categories is not None)
+
+
+def _named(column: Any, name: str) -> tuple[NDArray[np.intp], Any]:
+    places, names = column.factorize()
+    if places.min() < 0:
+        raise RatingsError(
+            f"ratings: row {np.argmin(places)}, column {name!r}: needs a name, got none"
+        )
+    return places, names
+
+
+def _grades(
+    column: Any, name: str, categories: Sequence[Label] | None
+) -> tuple[Codes, tuple[Label, ...]]:
+    places, labels = column.factorize()
+    found = labels.tolist()
+    known = labels_met(found) if categories is None else check_categories(categories)
+    position = {label: code for code, label in enumerate(known)}
+    for place, label in enumerate(found):
+        if label not in position:
+            raise no_category(label, known, int(np.argmax(places == place)), name)
+    table = [*(position[label] for label in found), MISSING]
+    grades = np.array(table, dtype=np.min_scalar_type(-len(known) - 1))[places]
+    if categories is None and known and isinstance(known[0], str):
+        doubt_texts(known, grades, name)
+    return grades, known
+
+
+def _repeats(names: Any) -> RatingsError:
+    # names of items and of raters, a frame of two columns
+    again = names[names.duplicated()].drop_duplicates().to_numpy(object).tolist()
+    named = "; ".join(f"{item!r} by {rater!r}" for item, rater in again[:5])
+    return RatingsError(
+        "ratings: each rater needs to rate an item once, rated more than once: "
+        + named
+        + (f" and {len(again) - 5} more" if len(again) > 5 else "")
+        + '; repeated="first" or "last" keeps one of them'
+    )
+
+
+def code_pairs(
+    pairs: object, categories: Sequence[Label] | None = None
+) -> CodedRatings:
+    """Check pairs of ratings per rater and lay them side by side as codes."""
+    # Takes pairs (n_raters, n_items, 2)
+    if isinstance(pairs, CodedRatings):
+        return code_ratings(pairs, categories)
+    if not is_row(pairs):
+        raise RatingsError(
+            f"pairs: needs one table (items, 2) per rater, got {type(pairs).__name__}"
+        )
+    tables = [_pairs_of(table, rater) for rater, table in enumerate(pairs)]
+    if len({len(table) for table in tables}) != 1:
+        raise RatingsError(
+            "pairs: needs at least one rater, and the same items of every rater, got "
+            f"{', '.join(str(len(table)) for table in tables) or 'no'} items"
+        )
+    rows = [
+        [grade for pair in of_item for grade in pair]
+        for of_item in zip(*tables, strict=True)
+    ]
+    return code_ratings(rows, categories)
+
+
+def _pairs_of(table: object, rater: int) -> list[list[object]]:
+    # one rater's table -> n_items lists of 2 labels
+    if not is_row(table):
+        raise RatingsError(f"pairs: rater {rater} needs a table, got {shown(table)}")
+    rows = []
+    for item, pair in enumerate(table):
+        rows.append(list(pair) if is_row(pair) else [])
+        if len(rows[-1]) != 2:
+            raise RatingsError(
+                f"pairs: rater {rater}, item {item}: needs two grades, got "
+                f"{shown(pair)}"
+            )
+    return rows
+
+
+# -- distinct rows ---------------------------------------------------------------------
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class CountedRatings:
+    """Rows of ratings with how often each occurs, for several coefficients at once.
+
+    Attributes
+    ----------
+    codes : ndarray of signed integers, shape (n_rows, n_raters)
+        Position of each rating in `categories`; -1 where there is none.
+    freq : ndarray of int, shape (n_rows,)
+        How often each row occurs.
+    categories : tuple of str, int or float
+        Declared categories in order.
+    n_raters : int
+        Raters with at least one rating; of counts, the most ratings of an item.
+    declared : bool
+        False if nobody declared the categories, and they are the labels met.
+    tells_raters_apart : bool
+        False if columns are places of ratings and not raters: only counts are known.
+    repeats : ndarray of int, shape (n_rows, n_raters), or None
+        How often each code is there; None for once.
+    source : CodedRatings, callable or None
+        The ratings item by item, or a call that gives them; None to lay the rows out.
+    """
+
+    codes: Codes
+    freq: Integers
+    categories: tuple[Label, ...]
+    n_raters: int
+    declared: bool = True
+    tells_raters_apart: bool = True
+    repeats: Integers | None = None
+    source: CodedRatings | Callable[[], CodedRatings] | None = None
+
+    @property
+    def n_categories(self) -> int:
+        """Declared categories."""
+        return len(self.categories)
+
+    @property
+    def size(self) -> Integers:
+        """Ratings of each row, (n_rows,)."""
+        there = self.codes >= 0 if self.repeats is None else self.repeats
+        return np.asarray(there.sum(axis=1))
+
+    @property
+    def knows_raters(self) -> bool:
+        """Whether it is known who rated what."""
+        return self.tells_raters_apart or self.source is not None
+
+    @property
+    def coded(self) -> CodedRatings:
+        """The ratings item by item; of counts, equal items together."""
+        if self.source is None:
+            return CodedRatings(
+                codes=self._laid_out(),
+                categories=self.categories,
+                declared=self.declared,
+            )
+        if callable(self.source):
+            self.source = self.source()
+        return self.source
+
+    def _laid_out(self) -> Codes:
+        # codes whose columns are raters, or places of ratings
+        codes, n_items = self.codes, int(self.freq.sum())
+        width = (
+            codes.shape[1]
+            if self.repeats is None
+            else max(int(self.size.max(initial=0)), 2)
+        )
+        if n_items * width > _MAX_PLACES:
+            raise CountsError(
+                f"ratings: needs at most {_MAX_PLACES:.0e} to be laid out item by "
+                f"item, got {n_items} items of up to {width}"
+            )
+        if self.repeats is not None:
+            codes = np.full((len(codes), width), MISSING, dtype=codes.dtype)
+            places = np.arange(width) < self.size[:, None]
+            codes[places] = self.codes.ravel().repeat(self.repeats.ravel())
+        codes = np.repeat(codes, self.freq, axis=0)
+        codes.setflags(write=False)
+        return codes
+
+    def chosen(
+        self, raters: NDArray[np.bool_] | None = None, rows: Any = slice(None)
+    ) -> "CountedRatings":
+        """Keep some raters, or some rows."""
+        codes = (self.codes if raters is None else self.codes[:, raters])[rows]
+        return replace(
+            self,
+            codes=codes,
+            freq=self.freq[rows],
+            n_raters=_raters_of(codes),
+            repeats=None if self.repeats is None else self.repeats[rows],
+            source=None,
+        )
+
+
+def count_ratings(
+    ratings: object, categories: Sequence[Label] | None = None
+) -> CountedRatings:
+    """Check ratings once, and count distinct rows once, for several coefficients.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Labels or numbers; None and ``nan`` are missing.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; the labels met when not given.
+
+    Returns
+    -------
+    CountedRatings
+        What every coefficient takes in place of ratings.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table.
+
+    Warns
+    -----
+    RatingsWarning
+        As `code_ratings`.
+
+    Examples
+    --------
+    >>> from masrel.agreement import fleiss_kappa, gwet_ac
+    >>> counted = count_ratings([["a", "a"], ["b", "b"], ["a", "b"]])
+    >>> fleiss_kappa(counted).value == gwet_ac(counted).value
+    True
+    """
+    if isinstance(ratings, CountedRatings):
+        check_scale(ratings.categories, categories)
+        return ratings
+    coded = code_ratings(ratings, categories)
+    codes, (n_items, n_raters) = coded.codes, coded.codes.shape
+    if (len(coded.categories) + 1) ** n_raters <= min(4 * n_items, _MAX_KEYS):
+        codes, freq = distinct_rows(codes, len(coded.categories))
+    else:
+        freq = np.ones(n_items, dtype=np.int64)
+    return CountedRatings(
+        codes=codes,
+        freq=freq,
+        categories=coded.categories,
+        n_raters=int((codes >= 0).any(axis=0).sum()),
+        declared=coded.declared,
+        source=coded,
+    )
+
+
+def distinct_rows(codes: Codes, n_categories: int) -> tuple[Codes, Integers]:
+    """Put equal rows of codes together: the rows, and how often each occurs."""
+    # codes (n_items, n_raters) -> (n_distinct, n_raters), (n_distinct,)
+    (n_items, n_raters), base = codes.shape, n_categories + 1
+    if base**n_raters > 2**53:
+        return np.unique(codes, axis=0, return_counts=True)
+    # a row is one number with n_raters digits, code + 1 each
+    powers = base ** np.arange(n_raters, dtype=np.int64)
+    keys = np.empty(n_items, dtype=np.int64)
+    for start in range(0, n_items, _BLOCK):
+        rows = slice(start, start + _BLOCK)
+        keys[rows] = codes[rows].astype(np.float64) @ powers + powers.sum()
+    if base**n_raters <= min(16 * n_items, _MAX_KEYS):
+        counts = np.bincount(keys)
+        keys = np.flatnonzero(counts)
+        freq = counts[keys]
+    else:
+        keys, freq = np.unique(keys, return_counts=True)
+    return keys[:, None] // powers % base - 1, freq
+
+
+def raters_told_apart(
+    ratings: object, categories: Sequence[Label] | None = None
+) -> CountedRatings:
+    """Count ratings of raters who are told apart; those without any are left out."""
+    counted = count_ratings(ratings, categories)
+    if not counted.tells_raters_apart:
+        counted = count_ratings(code_ratings(counted))  # or an error
+    if counted.n_raters in (0, 1, counted.codes.shape[1]):  # unless two others are left
+        return counted
+    return counted.chosen(raters=np.asarray((counted.codes >= 0).any(axis=0)))
+
+
+def two_raters(
+    ratings: object, categories: Sequence[Label] | None, title: str
+) -> CountedRatings:
+    """Count the items that both of two raters rated."""
+    counted = raters_told_apart(ratings, categories)
+    n_columns = counted.codes.shape[1]
+    if n_columns != 2:
+        raise RatingsError(f"{title} needs the ratings of two raters, got {n_columns}")
+    return complete_rows(counted)
+
+
+def complete_rows(ratings: CountedRatings) -> CountedRatings:
+    """Keep the rows that every rater rated."""
+    whole = (ratings.codes >= 0).all(axis=1)
+    return ratings if whole.all() else ratings.chosen(rows=whole)
+
+
+def refuse_measurements(ratings: CodedRatings | CountedRatings) -> None:
+    """Refuse numbers of which hardly any two are alike, where only alike ones agree."""
+    n_known, n_ratings = len(ratings.categories), int((ratings.codes >= 0).sum())
+    if n_known > _MEASURED * n_ratings and not isinstance(ratings.categories[0], str):
+        raise RatingsError(
+            f"ratings: {n_known} different numbers among {n_ratings} ratings are "
+            "measurements, which hardly ever agree without weights: an intraclass "
+            'correlation (ICC) takes them as they are, and so do metric="interval" of '
+            'Krippendorff\'s alpha and weights such as "quadratic"'
+        )
+
+
+# -- counts and tables -----------------------------------------------------------------
+
+
+def pair_table(
+    codes: Codes, n_categories: int, freq: Integers | None = None
+) -> Integers:
+    """Count the pairs of two columns of codes."""
+    # codes (n_items, 2) -> (n_categories, n_categories)
+    if n_categories > _MAX_SIDE:
+        raise ParameterError(
+            f"ratings: {n_categories} different grades are too many for a table of "
+            "their pairs, which this statistic needs"
+        )
+    side = n_categories + 1
+    # Missing, -1, becomes the last row and column, which is cut off.
+    flat = codes[:, 0].astype(np.int32) * side + codes[:, 1] + side + 1
+    table = np.bincount(flat, freq, minlength=side * side).reshape(side, side)
+    return table[1:, 1:].astype(np.int64)
+
+
+def item_counts(
+    codes: Codes, n_categories: int, repeats: Integers | None = None
+) -> Integers:
+    """Count the raters of each category, row by row."""
+    # -> (n_rows, n_categories)
+    n_rows, width = len(codes), n_categories + 1  # code -1 is the first
+    places = codes + np.arange(1, width * n_rows + 1, width)[:, None]
+    often = None if repeats is None else repeats.ravel()
+    counted = np.bincount(places.ravel(), often, minlength=width * n_rows)
+    return counted.reshape(n_rows, width)[:, 1:].astype(np.int64, copy=False)
+
+
+def count_table(
+    table: ArrayLike, *, categories: Sequence[Label] | None = None
+) -> CountedRatings:
+    """Take a contingency table of two raters as counted ratings.
+
+    Parameters
+    ----------
+    table : array_like of int, shape (n_categories, n_categories)
+        Items per category of the first (rows) and of the second rater (columns).
+    categories : sequence of str, int or float, optional
+        The declared scale in order; 1 to n_categories unless given.
+
+    Returns
+    -------
+    CountedRatings
+        What every coefficient of two raters and more, and every interval, takes in
+        place of ratings.
+
+    Raises
+    ------
+    CountsError
+        If it is not a square table of counts.
+    ParameterError
+        If there are not as many categories as columns.
+
+    Examples
+    --------
+    >>> from masrel.agreement import cohen_kappa, gwet_ac
+    >>> counted = count_table([[20, 5], [10, 15]])
+    >>> cohen_kappa(counted).value
+    0.4
+    >>> gwet_ac(counted).value
+    0.40594059405940597
+    """
+    checked = check_table(table)
+    cells, freq = np.indices(checked.shape).reshape(2, -1).T, checked.ravel()
+    return CountedRatings(
+        codes=cells[freq > 0],
+        freq=freq[freq > 0],
+        categories=_column_categories(categories, len(checked)),
+        n_raters=2 if freq.any() else 0,
+    )
+
+
+def count_items(
+    counts: ArrayLike, *, categories: Sequence[Label] | None = None
+) -> CountedRatings:
+    """Take how many raters chose each category, item by item, as counted ratings.
+
+    Parameters
+    ----------
+    counts : array_like of int, shape (n_items, n_categories)
+        Raters per item and category; rows may have different sums.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; 1 to n_categories unless given.
+
+    Returns
+    -------
+    CountedRatings
+        What coefficients that do not tell raters apart take in place of ratings:
+        percent agreement, Fleiss' kappa, Brennan-Prediger's, Gwet's AC and
+        Krippendorff's alpha; so do their intervals for other items. `n_raters` is the
+        largest row sum.
+
+    Raises
+    ------
+    CountsError
+        If it is not a table of counts.
+    ParameterError
+        If there are not as many categories as columns.
+
+    Examples
+    --------
+    >>> from masrel.agreement import fleiss_kappa
+    >>> counted = count_items([[3, 0], [2, 1], [0, 3], [0, 2]])
+    >>> round(fleiss_kappa(counted).value, 3)
+    0.657
+    """
+    table = check_counts(counts)
+    n_columns = table.shape[1]
+    codes = np.arange(n_columns, dtype=np.min_scalar_type(-n_columns - 1))
+    return CountedRatings(
+        codes=np.where(table > 0, codes, codes.dtype.type(MISSING)),
+        freq=np.ones(len(table), dtype=np.int64),
+        categories=_column_categories(categories, n_columns),
+        n_raters=int(table.sum(axis=1).max()),
+        tells_raters_apart=False,
+        repeats=table,
+    )
+
+
+def check_counts(counts: ArrayLike) -> Integers:
+    """Check a table of counts."""
+    # counts (n_items, n_categories) -> (n_items, n_categories)
+    try:
+        table = np.asarray(counts)
+    except ValueError as error:
+        raise CountsError("counts: needs rows of the same length") from error
+    if table.ndim != 2 or 0 in table.shape:
+        raise CountsError(
+            "counts: needs a table (items, categories) of at least one of each, "
+            f"got shape {table.shape}"
+        )
+    if table.dtype.kind not in "iuf":
+        raise CountsError(f"counts: needs whole numbers, got {table.dtype}")
+    values = table.astype(np.float64)
+    wrong = ~((values >= 0) & (values == np.floor(values)) & (values < 2**53))
+    if wrong.any():
+        row, column = np.argwhere(wrong)[0]
+        raise CountsError(
+            f"counts: row {row}, column {column}: needs a whole number of at least 0 "
+            f"and below 2^53, got {table[row, column]}"
+        )
+    return table.astype(np.int64)
+
+
+def check_table(table: ArrayLike) -> Integers:
+    """Check a contingency table of two raters."""
+    # table (n_categories, n_categories) -> (n_categories, n_categories)
+    checked = check_counts(table)
+    if checked.shape[0] != checked.shape[1]:
+        raise CountsError(
+            f"table: needs as many rows as columns, got shape {checked.shape}"
+        )
+    return checked
+
+
+def check_two_by_two(table: ArrayLike) -> list[list[int]]:
+    """Check a contingency table of two categories."""
+    cells = check_table(table)
+    if cells.shape != (2, 2):
+        raise CountsError(f"table: needs 2 × 2, got {len(cells)} × {len(cells)}")
+    return [[int(n) for n in row] for row in cells]
+
+
+def _column_categories(
+    categories: Sequence[Label] | None, n_columns: int
+) -> tuple[Label, ...]:
+    # the declared scale of a table of counts, 1 to n_columns unless given
+    if categories is None:
+        return tuple(range(1, n_columns + 1))
+    declared = check_categories(categories)
+    if len(declared) != n_columns:
+        raise ParameterError(
+            f"categories: needs {n_columns}, one per column of counts, got "
+            f"{len(declared)}"
+        )
+    return declared
+
+
+# -- numbers ---------------------------------------------------------------------------
+
+
+def rating_values(ratings: Any, categories: Sequence[Label] | None) -> Floats:
+    """Return ratings as numbers, ``nan`` where there is none."""
+    # -> (n_items, n_raters)
+    coded = code_ratings(ratings, categories)
+    known = coded.categories
+    if not known:
+        return np.empty((0, coded.codes.shape[1]))
+    if categories is None and isinstance(known[0], str):
+        raise RatingsError(
+            "categories: needs the declared scale in order, because the ratings are "
+            f"text, such as {known[0]!r}"
+        )
+    # missing, -1, is the last
+    values = np.array([*category_values(known), np.nan])[coded.codes]
+    if np.isinf(values).any():
+        row, column = np.argwhere(np.isinf(values))[0].tolist()
+        raise RatingsError(
+            f"ratings: row {row}, column {column}: needs a finite number, got "
+            f"{values[row, column]}"
+        )
+    return values
+
+
+def complete_values(ratings: Any, categories: Sequence[Label] | None) -> Floats:
+    """Return the values of items that every rater rated who rated any."""
+    # ratings (n_items, n_raters) -> (n_complete_items, n_raters)
+    values = rating_values(ratings, categories)
+    rates = ~np.isnan(values).all(axis=0)
+    if 2 <= rates.sum() < rates.size:
+        values = values[:, rates]
+    return values[~np.isnan(values).any(axis=1)]
+
+
+def rated_part(values: Floats) -> Floats:
+    """Return the table without items and raters that have no rating."""
+    rated = ~np.isnan(values)
+    if rated.all():
+        return values
+    return np.asarray(values[np.ix_(rated.any(axis=1), rated.any(axis=0))])
