@@ -4,8 +4,7 @@ In: item × rater labels (or counts, or a contingency table). Out: an `Estimate`
 `Significance` from a test.
 """
 
-from masrel.agreement._labels import Label
-from masrel.agreement._table import (
+from masrel.agreement._codes import (
     CodedRatings,
     CountedRatings,
     code_long,
@@ -14,6 +13,7 @@ from masrel.agreement._table import (
     count_ratings,
     count_table,
 )
+from masrel.agreement._labels import Label
 from masrel.agreement._weights import (
     WeightName,
     Weights,

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel.agreement._codes import CountedRatings, refuse_measurements
 from masrel.agreement._labels import Codes, Label, shown, warn_caller
-from masrel.agreement._table import CountedRatings, refuse_measurements
 from masrel.agreement._weights import (
     NO_PAIR,
     Weights,

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.agreement._engine import undefined
-from masrel.agreement._labels import Label, shown
-from masrel.agreement._table import (
+from masrel.agreement._codes import (
     complete_rows,
     count_items,
     count_ratings,
     item_counts,
     raters_told_apart,
 )
+from masrel.agreement._engine import undefined
+from masrel.agreement._labels import Label, shown
 from masrel.agreement.kappas import fleiss_kappa
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Significance

@@ -7,14 +7,14 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel.agreement._engine import check_option, undefined
-from masrel.agreement._labels import Label
-from masrel.agreement._table import (
+from masrel.agreement._codes import (
     check_table,
     check_two_by_two,
     pair_table,
     two_raters,
 )
+from masrel.agreement._engine import check_option, undefined
+from masrel.agreement._labels import Label
 from masrel.agreement._weights import NO_CHANCE, NO_PAIR
 from masrel.errors import CountsError
 from masrel.estimates import Significance

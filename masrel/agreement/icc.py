@@ -12,6 +12,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel.agreement._codes import complete_values, rated_part, rating_values
 from masrel.agreement._engine import (
     check_level,
     check_option,
@@ -20,7 +21,6 @@ from masrel.agreement._engine import (
     undefined,
 )
 from masrel.agreement._labels import Label
-from masrel.agreement._table import complete_values, rated_part, rating_values
 from masrel.estimates import Estimate, Interval, Significance, Target
 
 IccForm = Literal["ICC(1)", "ICC(1,k)", "ICC(C,1)", "ICC(C,k)", "ICC(A,1)", "ICC(A,k)"]

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from masrel.agreement._codes import count_ratings, raters_told_apart, two_raters
 from masrel.agreement._engine import (
     WHOLE,
     Features,
@@ -25,7 +26,6 @@ from masrel.agreement._engine import (
     estimate,
 )
 from masrel.agreement._labels import Codes, Label
-from masrel.agreement._table import count_ratings, raters_told_apart, two_raters
 from masrel.agreement._weights import WeightsLike
 from masrel.estimates import Estimate
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel.agreement._codes import complete_values
 from masrel.agreement._engine import measured, undefined
 from masrel.agreement._labels import Label
-from masrel.agreement._table import complete_values
 from masrel.estimates import Estimate, Significance
 
 

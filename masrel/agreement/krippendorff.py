@@ -12,6 +12,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from masrel.agreement._codes import CountedRatings, count_ratings, item_counts
 from masrel.agreement._engine import (
     WHOLE,
     Features,
@@ -21,7 +22,6 @@ from masrel.agreement._engine import (
     estimate,
 )
 from masrel.agreement._labels import EMPTY_SET, Codes, Label, SetText, shown
-from masrel.agreement._table import CountedRatings, count_ratings, item_counts
 from masrel.agreement._weights import (
     MANY,
     Line,

@@ -9,6 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel.agreement._codes import complete_values, rated_part, rating_values
 from masrel.agreement._engine import (
     NO_SPREAD,
     check_level,
@@ -18,7 +19,6 @@ from masrel.agreement._engine import (
     undefined,
 )
 from masrel.agreement._labels import Label
-from masrel.agreement._table import complete_values, rated_part, rating_values
 from masrel.agreement.icc import _Anova
 from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Estimate, Interval

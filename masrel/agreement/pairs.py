@@ -13,6 +13,14 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from masrel.agreement._codes import (
+    CountedRatings,
+    code_pairs,
+    complete_rows,
+    count_ratings,
+    raters_told_apart,
+    two_raters,
+)
 from masrel.agreement._engine import (
     Features,
     Floats,
@@ -22,14 +30,6 @@ from masrel.agreement._engine import (
     estimate,
 )
 from masrel.agreement._labels import Codes, Label
-from masrel.agreement._table import (
-    CountedRatings,
-    code_pairs,
-    complete_rows,
-    count_ratings,
-    raters_told_apart,
-    two_raters,
-)
 from masrel.agreement._weights import NO_CHANCE, Weights, WeightsLike
 from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Estimate

@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, get_args
 
-from masrel.agreement._engine import Formula
-from masrel.agreement._labels import Label, shown
-from masrel.agreement._table import (
+from masrel.agreement._codes import (
     CodedRatings,
     code_pairs,
     code_ratings,
     count_ratings,
 )
+from masrel.agreement._engine import Formula
+from masrel.agreement._labels import Label, shown
 from masrel.agreement._weights import Weights, WeightsLike, is_identity
 from masrel.agreement.icc import _NAMES as ICC_NAMES
 from masrel.agreement.icc import _target_of as icc_target

@@ -27,9 +27,9 @@ from masrel.agreement import (
     coefficient,
     count_ratings,
 )
+from masrel.agreement._codes import distinct_rows, item_counts
 from masrel.agreement._engine import Features, Floats, Formula, check_level
 from masrel.agreement._labels import Codes, is_missing, is_row
-from masrel.agreement._table import distinct_rows, item_counts
 from masrel.agreement._weights import Line, declared_weights
 from masrel.errors import (
     ParameterError,

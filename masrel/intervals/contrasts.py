@@ -17,9 +17,9 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from masrel.agreement import Label, Metric, Significance, WeightsLike, count_ratings
+from masrel.agreement._codes import item_counts
 from masrel.agreement._engine import Floats
 from masrel.agreement._labels import is_row
-from masrel.agreement._table import item_counts
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval
 from masrel.intervals._question import (

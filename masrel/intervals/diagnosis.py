@@ -12,8 +12,8 @@ import numpy as np
 
 from masrel._input import refuse
 from masrel.agreement import Label, Metric, WeightsLike
+from masrel.agreement._codes import distinct_rows, item_counts
 from masrel.agreement._engine import Array, Floats, Integers, divide
-from masrel.agreement._table import distinct_rows, item_counts
 from masrel.agreement._weights import MANY
 from masrel.errors import MasrelWarning, ParameterError
 from masrel.estimates import Estimate

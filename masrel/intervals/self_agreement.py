@@ -18,8 +18,8 @@ from scipy.optimize import brentq
 from scipy.special import betainc, expit, gammaln, logit
 
 from masrel.agreement import Label
+from masrel.agreement._codes import code_pairs, pair_table
 from masrel.agreement._engine import Floats, check_level
-from masrel.agreement._table import code_pairs, pair_table
 from masrel.errors import UndefinedStatisticWarning
 from masrel.estimates import Interval, Target
 from masrel.intervals._dirichlet_multinomial import log_convolve

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from masrel.agreement import CodedRatings, CountedRatings, count_ratings
-from masrel.agreement._table import count_items, count_table
+from masrel.agreement._codes import count_items, count_table
 from masrel.errors import RatingsError
 from masrel.ratings._findings import (
     Finding,

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from masrel.agreement import code_long, fleiss_kappa
-from masrel.agreement._table import Repeated
+from masrel.agreement._codes import Repeated
 from masrel.errors import ParameterError, RatingsError
 
 SCALE = ["1", "1+", "2", "3"]

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from numpy.typing import NDArray
 
 from masrel.agreement import code_ratings
-from masrel.agreement._table import item_counts
+from masrel.agreement._codes import item_counts
 from masrel.intervals._dirichlet_multinomial import DirichletMultinomial, RhoDensity
 from tests.strategies import LABELS, Table, tables
 

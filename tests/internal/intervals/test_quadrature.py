@@ -5,7 +5,7 @@ import pytest
 from scipy.special import betainc, logit
 
 from masrel.agreement import code_ratings
-from masrel.agreement._table import item_counts
+from masrel.agreement._codes import item_counts
 from masrel.errors import ConvergenceError
 from masrel.intervals._quadrature import beta_nodes, line_distribution
 from masrel.intervals._rho import DEFAULT_PRIOR, RhoPosterior

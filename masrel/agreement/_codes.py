@@ -342,13 +342,13 @@ def _grades(
     column: Any, name: str, categories: Sequence[Label] | None
 ) -> tuple[Codes, tuple[Label, ...]]:
     places, labels = column.factorize()
-    found = labels.tolist()
-    known = labels_met(found) if categories is None else check_categories(categories)
+    names = labels.tolist()
+    known = labels_met(names) if categories is None else check_categories(categories)
     position = {label: code for code, label in enumerate(known)}
-    for place, label in enumerate(found):
+    for place, label in enumerate(names):
         if label not in position:
             raise no_category(label, known, int(np.argmax(places == place)), name)
-    table = [*(position[label] for label in found), MISSING]
+    table = [*(position[label] for label in names), MISSING]
     grades = np.array(table, dtype=np.min_scalar_type(-len(known) - 1))[places]
     if categories is None and known and isinstance(known[0], str):
         doubt_texts(known, grades, name)
