@@ -7,6 +7,7 @@ be wrong, and each time it is noted; whatever else looks alike is warned of.
 import math
 import re
 import unicodedata
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
@@ -23,7 +24,7 @@ from masrel.ratings._findings import (
     listed,
     quoted,
 )
-from masrel.ratings._sheet import Codes, Column, Sheet, first_rows, plain
+from masrel.ratings._sheet import Codes, Column, Sheet, plain
 from masrel.scales import MODIFIED_ASHWORTH, Scale
 
 # Whole numbers that programs write for "missing", where they lie far from the others.
@@ -32,11 +33,9 @@ _CODES = frozenset(
 ) | {-1, 999999, -999999}
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,5})?", re.ASCII)
-_NUMBER_BEGINS = frozenset("+-.0123456789")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+", re.ASCII)
 _HALF_GRADE = re.compile(r"\d+([+-]+|[A-Za-z])")  # 1+, 4-, 2a: numbers, more or less
 _INVISIBLE = re.compile("[\u200b-\u200f\u2060\ufeff\u00ad]")
-_NEEDS_CARE = re.compile(r"[\s'\"`=,.:;!]")
 # Dashes, and Cyrillic and Greek letters that look like Latin ones.
 _LOOK_ALIKE = str.maketrans(
     "‐‑‒–—―−‘’“”авекмнорстухіαικνορτυχ", "-------''\"\"abekmhopctyxiaikvoptux"
@@ -48,6 +47,7 @@ _LOOKS_MISSING = (
     "notapplicable notavailable"
 )
 _SCALE = 10  # widest span of grades of a scale, rather than of measurements
+_Refuse = Callable[..., RatingsError]  # of a code, texts, and facts
 _MANY_GRADES = 15  # of the longest usual scale: Borg's, from 6 to 20
 
 
@@ -67,21 +67,6 @@ class Grades:
         return self.scale.name != "observed" or all(map(is_number, self.scale.grades))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Met:
-    """Texts that are grades, and where they are."""
-
-    sheet: Sheet
-    freq: dict[str, int]  # text to how many cells have it
-    number: dict[str, str | None]  # text to the number it is, as Python writes it
-    where: Callable[[str], str]
-
-    def refuse(self, code: str, texts: Sequence[str], **facts: str) -> RatingsError:
-        """Return the error of some texts, where the first of them stands."""
-        at = self.where(texts[0])
-        return self.sheet.refuse(code, at, None, got=listed(texts), **facts)
-
-
 def is_number(text: str) -> bool:
     """Return whether a text is a finite decimal number in ASCII."""
     return bool(_NUMBER.fullmatch(text)) and math.isfinite(float(text))
@@ -91,72 +76,70 @@ def graded(
     sheet: Sheet, places: Sequence[int], options: ReadingOptions
 ) -> tuple[Column, Grades]:
     """Return the cells of some columns, row by row, and which grades they are."""
-    columns = [sheet.columns[place] for place in places]
     number: dict[str, int] = {}
     codes = np.empty((len(sheet.numbers), len(places)), dtype=np.int64)
-    for k, column in enumerate(columns):
+    for k, column in enumerate(sheet.columns[place] for place in places):
         of_text = [number.setdefault(text, len(number)) for text in column.texts]
         codes[:, k] = np.array(of_text, dtype=np.int64)[column.codes]
     cells = Column(codes.ravel(), list(number)).rows(slice(None))
-    first = first_rows(cells.codes, len(cells.texts))
-
-    def where(text: int) -> str:
-        row, k = divmod(int(first[text]), len(places))
-        return f"{sheet.where(row)}, column {sheet.header[places[k]]!r}"
-
     weights = np.repeat(sheet.n_rows, len(places))
     n_cells = np.bincount(cells.codes, weights, len(cells.texts)).astype(np.int64)
-    return cells, _read_grades(sheet, cells.texts, n_cells, options, where)
+    freq = dict(zip(cells.texts, n_cells.tolist(), strict=True))
+
+    def where(text: str) -> str:
+        row, k = divmod(int(np.argmax(cells.is_text(text))), len(places))
+        return f"{sheet.where(row)}, column {sheet.header[places[k]]!r}"
+
+    return cells, _grades(sheet, freq, options, where)
 
 
-def _read_grades(
+def _grades(
     sheet: Sheet,
-    texts: Sequence[str],
-    freq: Codes,
+    freq: dict[str, int],
     options: ReadingOptions,
-    where: Callable[[int], str],
+    where: Callable[[str], str],
 ) -> Grades:
-    """Decide which grade each text is; `where` says where a text first stands."""
-    # freq (n_texts,): how many cells have each
+    # the grade of each text; freq: how many cells have it
     declared, codes = _declared(options)
     # codes of missing grades; numbers among those that are named by their value
     absent = {code for code in USUAL_MISSING if code not in declared} | set(codes)
-    values = {Decimal(code) for code in codes if is_number(code)}
-    if values:
-        absent |= {t for t in texts if is_number(t) and Decimal(t) in values}
-    counted = [(t, n) for t, n in zip(texts, freq.tolist(), strict=True) if n]
-    place = {text: k for k, text in enumerate(texts)}
-    pointed, mark = dict(zip(texts, texts, strict=True)), options.decimal
-    if mark != ".":
-        pointed = {t: "" if "." in t else t.replace(mark, ".") for t in texts}
-    met = _Met(
-        sheet=sheet,
-        freq={text: n for text, n in counted if text not in absent},
-        number={text: p if is_number(p) else None for text, p in pointed.items()},
-        where=lambda text: where(place[text]),
-    )
-    if not met.freq:
+    if values := {Decimal(code) for code in codes if is_number(code)}:
+        absent |= {t for t in freq if is_number(t) and Decimal(t) in values}
+    met = {text: n for text, n in freq.items() if n and text not in absent}
+    if not met:
         raise sheet.refuse("no grades")
+
+    def refuse(code: str, texts: Sequence[str], **facts: str) -> RatingsError:
+        return sheet.refuse(code, where(texts[0]), None, got=listed(texts), **facts)
+
+    number = {text: _number(text, options.decimal) for text in met}
     findings: list[Finding] = []
     if declared:
         scale = Scale(name="declared", grades=declared)
-        grade_of = _declared_grades(met, declared)
+        grade_of = _declared_grades(number, declared, refuse)
     else:
-        _refuse_doubtful(met, options)
-        grade_of = _observed_grades(met)
+        _refuse_doubtful(number, options, refuse)
+        grade_of = _observed_grades(number, options.decimal)
         scale = _observed_scale(list(dict.fromkeys(grade_of.values())))
-        findings = _doubts(met, grade_of)
+        findings = _doubts(met, number, grade_of, where)
     code = {grade: k for k, grade in enumerate(scale.grades)}
     spellings: dict[str, list[str]] = {}
     for text, grade in grade_of.items():
         spellings.setdefault(grade, []).append(text)
     return Grades(
         scale=scale,
-        codes=np.array([code.get(grade_of.get(t, ""), -1) for t in texts], np.int64),
+        codes=np.array([code.get(grade_of.get(t, ""), -1) for t in freq], np.int64),
         merged={g: s for g, s in spellings.items() if len(s) > 1 or s != [g]},
-        n_missing={text: n for text, n in counted if text in absent},
+        n_missing={text: n for text, n in freq.items() if n and text in absent},
         findings=findings,
     )
+
+
+def _number(text: str, mark: str) -> Decimal | None:
+    # the number that a text is, by its decimal mark
+    if mark != ".":
+        text = "" if "." in text else text.replace(mark, ".")
+    return Decimal(text) if is_number(text) else None
 
 
 def _declared(options: ReadingOptions) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -176,38 +159,44 @@ def _declared(options: ReadingOptions) -> tuple[tuple[str, ...], tuple[str, ...]
     return declared, codes
 
 
-def _declared_grades(met: _Met, declared: Sequence[str]) -> dict[str, str]:
+def _declared_grades(
+    number: dict[str, Decimal | None], declared: Sequence[str], refuse: _Refuse
+) -> dict[str, str]:
     # text to the category it is: the same text, else the same number
-    is_numeric = all(map(is_number, declared))
-    numbers = {Decimal(c): c for c in declared} if is_numeric else {}
-    if len(numbers) < len(declared):  # 1 and 1.0 are two grades: 01 is neither
-        numbers = {}
+    categories = {_number(category, "."): category for category in declared}
+    if None in categories or len(categories) < len(declared):
+        categories = {}  # text, or 1 and 1.0 are two grades: 01 is neither
     grade_of: dict[str, str] = {}
-    for text in met.freq:
-        number = Decimal(met.number[text] or "nan")
+    for text, value in number.items():
         turned = f"{text[1:]}+" * text.startswith("+")  # clinicians write +1 for 1+
-        meant = [grade for grade in (text, turned) if grade in declared]
-        if meant or number in numbers:
-            grade_of[text] = [*meant, numbers.get(number, "")][0]
-    wrong = [text for text in met.freq if text not in grade_of]
-    if wrong:
+        same = [grade for grade in (text, turned) if grade in declared]
+        if same or value in categories:
+            grade_of[text] = same[0] if same else categories[value]
+    if wrong := [text for text in number if text not in grade_of]:
         likely = list(filter(_looks_missing, wrong))
         hint = f"; --missing {quoted(likely)} if it is missing" if likely else ""
-        raise met.refuse("other grade", wrong, scale=", ".join(declared), hint=hint)
+        raise refuse("other grade", wrong, scale=", ".join(declared), hint=hint)
     return grade_of
 
 
-def _refuse_doubtful(met: _Met, options: ReadingOptions) -> None:
-    likely = list(filter(_looks_missing, met.freq))
+def _refuse_doubtful(
+    number: dict[str, Decimal | None], options: ReadingOptions, refuse: _Refuse
+) -> None:
+    # what may be no grade, or one of two
+    likely = list(filter(_looks_missing, number))
+    commas = [text for text in number if _DECIMAL_COMMA.fullmatch(text)]
+    rest = [text for text in number if text not in commas and not is_number(text)]
+    plus = [t for t, value in number.items() if t[0] == "+" and value is not None]
+    others = [t for t, value in number.items() if t[0].isdigit() and value]
+    others += [t for t in number if t[-1] == "+" and f"+{t[:-1]}" in plus]
     if likely:
-        raise met.refuse("looks missing", likely, codes=quoted(likely))
-    broken = [text for text in met.freq if "\n" in text or "\r" in text]
-    if broken:
-        raise met.refuse("broken", broken[:1])
-    commas = [text for text in met.freq if _DECIMAL_COMMA.fullmatch(text)]
-    rest = [t for t in met.freq if t not in commas and not is_number(t)]
+        raise refuse("looks missing", likely, codes=quoted(likely))
+    if broken := [text for text in number if "\n" in text or "\r" in text]:
+        raise refuse("broken", broken[:1])
     if commas and not rest and options.decimal == ".":
-        raise met.refuse("decimal comma", commas)
+        raise refuse("decimal comma", commas)
+    if plus and others:
+        raise refuse("plus", plus, other=others[0], grade=f"{plus[0][1:]}+")
 
 
 @cache
@@ -220,20 +209,14 @@ def _looks_missing(text: str) -> bool:
     return normal_form(text) in _missing_forms()
 
 
-def _observed_grades(met: _Met) -> dict[str, str]:
-    # text to grade where nobody declared a scale
-    number = {text: met.number[text] for text in met.freq}
-    plus = [t for t, value in number.items() if t.startswith("+") and value is not None]
-    others = [t for t, value in number.items() if t[0].isdigit() and float(value or 0)]
-    others += [t for t in number if f"+{t[:-1]}" in plus and t.endswith("+")]
-    if plus and others:
-        raise met.refuse("plus", plus, other=others[0], grade=f"{plus[0][1:]}+")
+def _observed_grades(number: dict[str, Decimal | None], mark: str) -> dict[str, str]:
+    # text to grade where nobody declared a scale; of equal numbers, the shortest
     if None in number.values():
         return {text: text for text in number}
-    shortest: dict[Decimal, str] = {}
-    for text in sorted(number, key=lambda t: (len(t), t)):
-        shortest.setdefault(Decimal(str(number[text])), str(number[text]))
-    return {text: shortest[Decimal(str(number[text]))] for text in number}
+    shortest: dict[Decimal | None, str] = {}
+    for text in sorted(number, key=lambda text: (len(text), text)):
+        shortest.setdefault(number[text], text.replace(mark, "."))
+    return {text: shortest[value] for text, value in number.items()}
 
 
 def _observed_scale(grades: Sequence[str]) -> Scale:
@@ -251,23 +234,17 @@ def _observed_scale(grades: Sequence[str]) -> Scale:
 def normal_form(text: str) -> str:
     """Return what texts have in common that a reader takes for the same."""
     form = text.casefold()
-    if form.isalnum() and form.isascii():  # as most names of items are
-        if form.isdigit():
-            return form.lstrip("0") or "0"
-        if not form[0].isdigit():
-            return form
+    if form.isascii() and form.isdigit():
+        return form.lstrip("0") or "0"
     if not form.isascii():
         form = _INVISIBLE.sub("", unicodedata.normalize("NFKC", form))
         form = form.casefold().translate(_LOOK_ALIKE)
         form = "".join(str(unicodedata.decimal(c, c)) for c in form)
-    if _NEEDS_CARE.search(form):
-        form = "".join(form.split()).strip("'\"`=")
-        if _DECIMAL_COMMA.fullmatch(form):
-            form = form.replace(",", ".")
-        form = form.rstrip(".,:;!") or form[:1]
-    if form[:1] in _NUMBER_BEGINS and is_number(form):
-        return f"{Decimal(form).normalize():f}"
-    return form
+    form = "".join(form.split()).strip("'\"`=")
+    if _DECIMAL_COMMA.fullmatch(form):
+        form = form.replace(",", ".")
+    form = form.rstrip(".,:;!") or form[:1]
+    return f"{Decimal(form).normalize():f}" if is_number(form) else form
 
 
 def spelled_alike(texts: Sequence[str]) -> list[list[str]]:
@@ -286,17 +263,22 @@ def spelled_alike(texts: Sequence[str]) -> list[list[str]]:
     return [group for group in groups.values() if len(group) > 1]
 
 
-def _doubts(met: _Met, grade_of: dict[str, str]) -> list[Finding]:
+def _doubts(
+    met: dict[str, int],
+    number: dict[str, Decimal | None],
+    grade_of: dict[str, str],
+    where: Callable[[str], str],
+) -> list[Finding]:
     # what looks wrong in a scale that nobody declared
-    freq: dict[str, int] = {}
-    for text, n in met.freq.items():
-        freq[grade_of[text]] = freq.get(grade_of[text], 0) + n
+    freq: Counter[str] = Counter()
+    for text, n in met.items():
+        freq[grade_of[text]] += n
     findings = []
     for group in spelled_alike(list(freq)):
         grades = ", ".join(f"{text!r} ({freq[text]} times)" for text in group)
         findings.append(Finding("alike grades", grades=grades))
-    numbers = [text for text in met.freq if met.number[text] is not None]
-    others = [text for text in met.freq if met.number[text] is None]
+    numbers = [text for text in met if number[text] is not None]
+    others = [text for text in met if number[text] is None]
     n_ratings = sum(freq.values())
     if not others:
         # numbers that differ beyond the digits of a float
@@ -313,14 +295,14 @@ def _doubts(met: _Met, grade_of: dict[str, str]) -> list[Finding]:
         return findings + _far_codes([g for g in freq if is_number(g)], freq)
     # texts among numbers, or numbers among texts, whichever are fewer
     code, strays = "number", numbers
-    if sum(map(met.freq.__getitem__, others)) <= n_ratings / 2:
+    if sum(map(met.__getitem__, others)) <= n_ratings / 2:
         forms = set(map(normal_form, numbers))  # those are named already
         halves = {text for text in others if _HALF_GRADE.fullmatch(text)}
         strays = [t for t in others if t not in halves and normal_form(t) not in forms]
         code = "no number"
     if strays:
-        where = met.where(strays[0])
-        facts = {"got": listed(strays), "where": where, "codes": quoted(strays)}
+        facts = {"got": listed(strays), "codes": quoted(strays)}
+        facts["where"] = where(strays[0])
         findings.append(Finding(code, **facts))
     return findings
 
