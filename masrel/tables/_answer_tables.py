@@ -257,7 +257,10 @@ def _cells(
     cells: Row = {key: getattr(estimate, key) for key in _OF_ESTIMATE}
     cells |= dict.fromkeys(heads, row.group)
     cells |= {"title": row.title, "group": row.group, "interval_texts": None}
-    cells["standard_error"] = estimate.standard_error if _has_error(estimate) else None
+    # without observed agreement a statistic as a rule has no error either
+    numbers = (estimate.observed, estimate.standard_error)
+    has_none = all(map(math.isnan, numbers)) and estimate.reason is None
+    cells["standard_error"] = None if has_none else estimate.standard_error
     cells["words"] = None if bands is None else _word(row, bands)
     undefined = [] if estimate.reason is None else [f"undefined: {estimate.reason}"]
     cells["texts"] = [*undefined, *row.notes]
@@ -271,12 +274,6 @@ def _cells(
         brief = filter(None, (getattr(of, "brief", of) for of in interval.notes))
         cells["interval_texts"] = [*texts, *(interval.notes if explain else brief)]
     return cells
-
-
-def _has_error(estimate: Estimate) -> bool:
-    # without observed agreement a statistic as a rule has no error either
-    parts = (estimate.observed, estimate.standard_error)
-    return not all(map(math.isnan, parts)) or estimate.reason is not None
 
 
 def _word(row: AgreementRow, bands: BandScale) -> str | None:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from masrel.audit import ClaimAudit, Reading
-from masrel.tables._tables import Column, Table, in_thousands, table_of
+from masrel.tables._tables import Column, Table, table_of
 
 _CLAIM_COLUMNS = (
     Column(key="claim", heading="Claim", align="left"),
@@ -120,7 +120,7 @@ def _number(reading: Reading) -> str:
     if reading.n_tables is None:
         return "cannot tell"
     at_least = "at least " if reading.status == "at least" else ""
-    return at_least + in_thousands(reading.n_tables)
+    return at_least + f"{reading.n_tables:,}".replace(",", " ")
 
 
 def _examples_note(audit: ClaimAudit) -> tuple[str, ...]:

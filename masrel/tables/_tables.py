@@ -13,7 +13,7 @@ import textwrap
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from decimal import ROUND_HALF_UP, Decimal
+from decimal import Decimal
 from typing import Any, Literal
 
 from masrel._files import safe_cell
@@ -148,16 +148,6 @@ def number(value: Value, digits: int | None, *, in_units: bool = False) -> str:
     return text.replace("-", "−")
 
 
-def half_up(value: float, decimals: int) -> str:
-    """Return a number rounded as on paper: what lies in the middle goes up."""
-    # Means of a few whole numbers often lie there; a float's own format goes to even.
-    if math.isnan(value):
-        return UNDEFINED
-    unit = Decimal(1).scaleb(-decimals)
-    text = str(Decimal(repr(value)).quantize(unit, ROUND_HALF_UP))
-    return text.replace("-", "−")
-
-
 def significant(value: float, digits: int = 6) -> str:
     """Return a number with so many digits, whatever its size."""
     return f"{value:.{digits}g}"
@@ -203,11 +193,6 @@ def capital(text: str) -> str:
 def counted(count: int, noun: str) -> str:
     """Return a count with its noun, in the plural unless there is one."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
-def in_thousands(count: int) -> str:
-    """Return a whole number with a space every three digits."""
-    return f"{count:,}".replace(",", " ")
 
 
 def page_cells(table: Table) -> tuple[list[Column], list[list[str]]]:

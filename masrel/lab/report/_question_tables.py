@@ -1,6 +1,8 @@
 """Section `questionnaires`: what the raters answered, without saying who did."""
 
+import math
 from collections import Counter
+from decimal import ROUND_HALF_UP, Decimal
 
 from masrel.lab.analysis import QuestionSummary
 from masrel.lab.analysis._question_summaries import FEWEST_RATERS
@@ -13,7 +15,7 @@ from masrel.lab.report._material import (
     Section,
     absent_section,
 )
-from masrel.tables._tables import Column, Table, Value, half_up
+from masrel.tables._tables import Column, Table, Value
 
 _TITLE = "Questionnaires"
 
@@ -94,7 +96,7 @@ def _row(summary: QuestionSummary) -> tuple[Value, ...]:
     numbers: tuple[Value, ...] = (None,) * 6
     if has_numbers:
         ends = (summary.median, summary.least, summary.most)
-        both = f"{half_up(summary.mean, 2)} ± {half_up(summary.sd, 2)}"
+        both = f"{_half_up(summary.mean, 2)} ± {_half_up(summary.sd, 2)}"
         numbers = (both, summary.mean, summary.sd, *ends)
     choices = None
     if not has_numbers and summary.counts:
@@ -146,3 +148,13 @@ def _drawing(
         content=AnswerBars(panels=panels),
         stamp=_RECONSTRUCTED if is_made_up else material.stamp,
     )
+
+
+def _half_up(value: float, decimals: int) -> str:
+    # rounded as on paper: what lies in the middle goes up
+    # Means of a few whole numbers often lie there; a float's own format goes to even.
+    if math.isnan(value):
+        return "undefined"
+    unit = Decimal(1).scaleb(-decimals)
+    text = str(Decimal(repr(value)).quantize(unit, ROUND_HALF_UP))
+    return text.replace("-", "−")
