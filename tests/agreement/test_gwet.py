@@ -1,47 +1,20 @@
 """Gwet's AC1 and AC2: published tables, errors by hand, declared categories."""
 
 import math
-from collections.abc import Sequence
 from fractions import Fraction
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from masrel.agreement import (
-    brennan_prediger,
     cohen_kappa,
     count_items,
     count_table,
     gwet_ac,
 )
 from masrel.errors import UndefinedStatisticWarning
-from tests.agreement.slopes import delta_error
-from tests.agreement.undefined import assert_undefined
-from tests.strategies import LABELS, Table, tables
+from tests.strategies import Table
 
 SMALL: Table = [["a", "a"], ["a", "a"], ["a", "b"]]
-
-
-def plain(table: Table, w: Sequence[Fraction]) -> Fraction | None:
-    # (P-bar - p_e)/(1 - p_e), p_e = Σ p (1 - p)/(q - 1), items counted w times
-    above = below = whole = Fraction(0)
-    shares = dict.fromkeys(LABELS, Fraction(0))
-    for row, x in zip(table, w, strict=True):
-        grades = [grade for grade in row if grade is not None]
-        n = len(grades)
-        for grade in grades:
-            shares[grade] += x / n
-        whole += x
-        if n > 1:
-            alike = sum(grades.count(g) - 1 for g in grades)
-            above += x * Fraction(alike, n * (n - 1))
-            below += x
-    if not below:
-        return None
-    spread = sum(s / whole * (1 - s / whole) for s in shares.values())
-    chance = spread / Fraction(len(LABELS) - 1)
-    return (above / below - chance) / (1 - chance)
 
 
 def test_published_paradox_of_rare_positives() -> None:
@@ -100,43 +73,6 @@ def test_categories_that_nobody_used_still_count_by_hand() -> None:
     found = gwet_ac(SMALL, categories=["a", "b", "c"])
     assert found.value == pytest.approx(19 / 31, abs=1e-14)
     assert found.n_categories == 3
-
-
-@given(tables())
-def test_value_and_error_are_those_of_the_plain_formula(table: Table) -> None:
-    rated = [row for row in table if any(grade is not None for grade in row)]
-    expected = plain(rated, [Fraction(1)] * len(rated))
-    if expected is None:
-        assert_undefined(lambda: gwet_ac(table, categories=LABELS))
-        return
-    found = gwet_ac(table, categories=LABELS)
-    assert found.value == pytest.approx(float(expected), abs=1e-14)
-    if len(rated) > 1:
-        error = delta_error(lambda w: plain(rated, w) or Fraction(0), len(rated))
-        assert found.standard_error == pytest.approx(error, rel=1e-10, abs=1e-13)
-
-
-@given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=1))
-def test_chance_is_never_more_than_of_guessing(
-    pairs: list[tuple[int, int]],
-) -> None:
-    # Σp(1 - p) is at most (q - 1)/q, where it is Brennan and Prediger's 1/q
-    found = gwet_ac(pairs, categories=range(6))
-    guessing = brennan_prediger(pairs, categories=range(6))
-    assert found.chance <= guessing.chance + 1e-15
-    assert found.value >= guessing.value - 1e-15
-
-
-def test_of_even_shares_it_is_brennan_and_predigers() -> None:
-    table = [["a", "a"], ["b", "b"], ["a", "b"]]
-    for function in (gwet_ac, brennan_prediger):
-        assert function(table).value == pytest.approx(1 / 3, abs=1e-14)
-
-
-def test_all_in_one_category_of_several_is_perfect_agreement() -> None:
-    # p_e = 0: no item was hard
-    found = gwet_ac([["a", "a"], ["a", "a"]], categories=["a", "b"])
-    assert (found.value, found.chance, found.standard_error) == (1.0, 0.0, 0.0)
 
 
 def test_one_declared_category_leaves_no_room_for_chance() -> None:

@@ -13,18 +13,14 @@ from numpy.typing import NDArray
 from masrel.agreement import (
     COEFFICIENTS,
     cohen_kappa,
-    fleiss_kappa,
     krippendorff_alpha,
 )
 from masrel.errors import (
     ParameterError,
-    RatingsError,
     SmallSampleWarning,
-    UndefinedStatisticWarning,
 )
-from masrel.intervals import bootstrap, estimate, jackknife
+from masrel.intervals import bootstrap, jackknife
 
-Rows = list[list[float]]
 Distance = Callable[[Fraction, Fraction], Fraction]
 
 POOLED = ["percent_agreement", "fleiss_kappa", "gwet_ac", "brennan_prediger"]
@@ -51,14 +47,6 @@ def by_definition(ratings: NDArray[np.float64], distance: Distance) -> Fraction:
     return 1 - (n - 1) * Fraction(observed) / expected
 
 
-def rounded(distance: Callable[[float, float], float]) -> Distance:
-    """Return a distance that is no fraction, as the one of its float."""
-    return lambda x, y: Fraction(distance(float(x), float(y)))
-
-
-RANKED = {x: i for i, x in enumerate(sorted(set(continuous().ravel().tolist())))}
-
-
 @pytest.mark.parametrize(
     ("options", "distance"),
     [
@@ -75,20 +63,6 @@ def test_alpha_of_continuous_ratings_is_that_of_fractions(
     assert krippendorff_alpha(ratings, **options).value == pytest.approx(
         exact, rel=1e-13
     )
-
-
-def test_ratio_of_continuous_ratings_is_the_sum_over_pairs() -> None:
-    for power in (0.05, 1.0, 8.0):  # values of 1 to 1.3, of a few powers of e, of many
-        ratings = np.exp(power * continuous())
-        ratings[3, 1] = 0.0 if power == 1.0 else ratings[3, 1]
-        distance = rounded(lambda x, y: ((x - y) / (x + y or 1.0)) ** 2)
-        exact = float(by_definition(ratings, distance))
-        for signed in (ratings, -ratings):
-            value = krippendorff_alpha(signed, metric="ratio").value
-            assert value == pytest.approx(exact, rel=1e-12)
-        if power != 1.0:
-            value = krippendorff_alpha(ratings, weights="ratio").value
-            assert value == pytest.approx(exact, rel=1e-12)
 
 
 @pytest.mark.parametrize("name", [*POOLED, "conger_kappa", "light_kappa"])
@@ -118,19 +92,6 @@ def test_many_grades_have_the_value_of_a_matrix(name: str, weights: str) -> None
     )
 
 
-@pytest.mark.parametrize("weights", ["linear", "quadratic"])
-def test_many_ratings_round_no_more_than_few(weights: str) -> None:
-    # Where all rated everything, Fleiss' D_e is Krippendorff's times (n - 1)/n, and all
-    # counts of alpha are whole; where no two ratings are alike, Gwet's is Fleiss'.
-    ratings = continuous(200_000)[10:]
-    n = ratings.size
-    alpha = krippendorff_alpha(ratings, weights=weights).value  # type: ignore[arg-type]
-    expected = 1.0 - (1.0 - alpha) * n / (n - 1)
-    for name in ("fleiss_kappa", "gwet_ac", "brennan_prediger"):
-        value = COEFFICIENTS[name](ratings, weights=weights).value
-        assert value == pytest.approx(expected, rel=1e-13)
-
-
 def test_cohens_kappa_of_continuous_ratings_by_moments() -> None:
     # Quadratic: κ = 1 - Σ (x - y)² / Σ_ij (x_i - y_j)² n, so 2 s_xy over
     # s_x² + s_y² + (x̄ - ȳ)², Lin's concordance over n.
@@ -152,50 +113,6 @@ def test_the_ordinal_metric_goes_by_ranks() -> None:
     ordinal = krippendorff_alpha(ratings, metric="ordinal").value
     exact = by_definition(ranks, lambda x, y: (x - y) ** 2)
     assert ordinal == pytest.approx(float(exact), rel=1e-13)
-
-
-def test_categories_may_be_many() -> None:
-    # 400 codes, each item one of its own: a count of them is nearly all zeros.
-    rng = np.random.default_rng(2)
-    truth = rng.integers(0, 400, 1500)
-    codes = np.where(
-        rng.random((1500, 3)) < 0.7, truth[:, None], rng.integers(0, 400, (1500, 3))
-    )
-    same = [(codes[:, g] == codes[:, h]).mean() for g, h in ((0, 1), (0, 2), (1, 2))]
-    observed = np.mean(same)
-    shares = np.bincount(codes.ravel()) / codes.size
-    chance = (shares**2).sum()
-    as_text = np.char.add("icd", codes.astype(str))
-    for ratings in (codes, as_text, as_text.tolist()):
-        result = fleiss_kappa(ratings)
-        kappa = (observed - chance) / (1 - chance)
-        assert result.value == pytest.approx(kappa, rel=1e-13)
-    entry = estimate("fleiss_kappa", codes, target="items")
-    assert entry.interval is not None
-    assert entry.interval.low < entry.value < entry.interval.high
-
-
-@pytest.mark.parametrize(
-    "name", ["fleiss_kappa", "krippendorff_alpha", "light_kappa", "conger_kappa"]
-)
-def test_measurements_are_no_categories(name: str) -> None:
-    with pytest.raises(RatingsError) as refusal:
-        COEFFICIENTS[name](continuous())
-    said = str(refusal.value)
-    assert "206 different numbers among 20" in said
-    assert "ICC" in said
-    assert "metric" in said
-    # declared, or text, they are what they are
-    text = [[None if x != x else f"{x:.9f}" for x in row] for row in continuous()]
-    assert COEFFICIENTS[name](text).value <= 0.0
-
-
-def test_weights_that_need_a_matrix_say_so() -> None:
-    for weights in ("radical", "bipolar", "ratio", "circular"):
-        with pytest.raises(ParameterError, match=f"{weights} needs a matrix of every"):
-            fleiss_kappa(continuous(800), weights=weights)  # type: ignore[arg-type]
-    with pytest.raises(ParameterError, match="ratio needs a matrix of every"):
-        krippendorff_alpha(np.exp(continuous(800)), metric="ratio")
 
 
 @pytest.mark.parametrize("options", [{"metric": "interval"}, {"weights": "linear"}])
@@ -258,55 +175,6 @@ def test_continuous_ratings_have_a_bootstrap_by_moments() -> None:
     assert result.low < value < result.high
     with pytest.raises(ParameterError, match="raters of 2096 different grades are"):
         bootstrap("fleiss_kappa", ratings, target="raters", weights="quadratic", rng=1)
-
-
-def test_what_cannot_be_left_out_has_the_delta_method() -> None:
-    rng = np.random.default_rng(2)
-    codes = rng.integers(0, 3000, (6000, 1)).repeat(2, axis=1)
-    codes[::3, 1] = rng.integers(0, 3000, 2000)
-    result = estimate("fleiss_kappa", codes, target="items")
-    assert result.interval is not None
-    assert "delta method" in result.interval.method
-    assert "too many different grades" in result.interval.notes[0]
-    with pytest.raises(ParameterError, match='method="analytic"'):
-        jackknife("fleiss_kappa", codes, target="items")
-
-
-@pytest.mark.parametrize("name", [*POOLED, "cohen_kappa", "krippendorff_alpha"])
-@pytest.mark.parametrize("n_items", [60, 300])
-def test_names_that_never_agree_say_that_leaving_items_out_tells_nothing(
-    name: str, n_items: int
-) -> None:
-    ratings = [[f"a{i}", f"b{i}"] for i in range(n_items)]
-    with pytest.warns(UndefinedStatisticWarning):
-        result = estimate(name, ratings, target="items")
-    assert result.value == COEFFICIENTS[name](ratings).value <= 0.0
-    assert result.interval is not None
-    assert result.interval.reason is not None
-    assert "leaving out any of the items" in result.interval.reason
-
-
-def test_measurements_that_agree_now_and_then_have_the_jackknife() -> None:
-    # 1 000 items of two decimals: 1 350 different numbers, too few to be refused
-    rng = np.random.default_rng(4)
-    ratings = np.round(rng.normal(10.0, 2.0, (1000, 3)), 2)
-    chosen = estimate("fleiss_kappa", ratings, target="items").interval
-    left_out = jackknife("fleiss_kappa", ratings, target="items")
-    assert chosen is not None
-    assert (chosen.low, chosen.high) == (left_out.low, left_out.high)
-    assert chosen.low < chosen.high
-
-
-@pytest.mark.parametrize("name", ["fleiss_kappa", "cohen_kappa", "conger_kappa"])
-@pytest.mark.parametrize("n_grades", [100, 200])
-def test_weights_that_a_scale_lacks_give_no_interval(name: str, n_grades: int) -> None:
-    # ratio weights divide by sums, which of the grade 0 and itself is 0
-    ratings = [[i, 7 * i % n_grades] for i in range(n_grades)]
-    with pytest.warns(UndefinedStatisticWarning):
-        result = estimate(name, ratings, target="items", weights="ratio")
-    assert math.isnan(result.value)
-    assert result.interval is not None
-    assert result.interval.reason is not None
 
 
 def test_continuous_ratings_take_a_few_times_their_room() -> None:

@@ -1,19 +1,14 @@
 """Percent agreement and its standard errors: by hand, with and without lone ratings."""
 
 import math
-from collections.abc import Sequence
-from fractions import Fraction
 
 import pytest
-from hypothesis import given
 
 from masrel.agreement import (
     percent_agreement,
 )
-from masrel.errors import ParameterError, UndefinedStatisticWarning
-from tests.agreement.slopes import delta_error
-from tests.agreement.undefined import assert_undefined
-from tests.strategies import LABELS, Table, tables
+from masrel.errors import ParameterError
+from tests.strategies import Table
 
 # Krippendorff (2011), four observers of twelve units; the last has a single rating.
 UNITS: Table = [
@@ -54,39 +49,6 @@ def test_single_ratings_make_the_number_of_pairs_random_by_hand() -> None:
     assert error == pytest.approx(math.sqrt(1 / 12), rel=1e-14)
 
 
-@given(tables())
-def test_error_is_the_slope_of_the_plain_mean(table: Table) -> None:
-    agreement = []
-    for row in table:
-        grades = [g for g in row if g is not None]
-        pairs = len(grades) * (len(grades) - 1)
-        alike = sum(grades.count(g) - 1 for g in grades)
-        agreement.append(
-            (len(grades), Fraction(alike, pairs) if pairs else Fraction(0))
-        )
-    rated = [(n > 1, share) for n, share in agreement if n]
-    if not any(usable for usable, _ in rated):
-        assert_undefined(lambda: percent_agreement(table, categories=LABELS))
-        return
-    if len(rated) < 2:
-        single = percent_agreement(table, categories=LABELS)
-        assert single.value == pytest.approx(float(rated[0][1]), abs=1e-14)
-        assert math.isnan(single.standard_error)
-        return
-
-    def mean(w: Sequence[Fraction]) -> Fraction:
-        whole = sum(x for x, (usable, _) in zip(w, rated, strict=True) if usable)
-        return Fraction(
-            sum(x * share for x, (_, share) in zip(w, rated, strict=True)) / whole
-        )
-
-    found = percent_agreement(table, categories=LABELS)
-    exact = float(mean([Fraction(1)] * len(rated)))
-    assert found.value == pytest.approx(exact, abs=1e-14)
-    expected = delta_error(mean, len(rated))
-    assert found.standard_error == pytest.approx(expected, rel=1e-12, abs=1e-15)
-
-
 def test_of_a_finite_population_the_items_rated_are_known() -> None:
     # 1 - f with f = 3/12, and f = 1: all there is to know was seen
     plain, some, whole = (
@@ -107,10 +69,3 @@ def test_a_population_holds_the_items_rated() -> None:
 def test_is_not_corrected_for_chance_even_of_one_category() -> None:
     found = percent_agreement([["a", "a"], ["a", "a"]])
     assert (found.value, found.chance, found.reason) == (1.0, 0.0, None)
-
-
-def test_without_a_pair_there_is_none() -> None:
-    with pytest.warns(UndefinedStatisticWarning, match="no item has ratings of two"):
-        found = percent_agreement([["a", None], [None, "a"]])
-    assert math.isnan(found.value)
-    assert math.isnan(found.standard_error)

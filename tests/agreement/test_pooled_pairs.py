@@ -1,13 +1,9 @@
 """Pooled kappa of raters with themselves: one table of all pairs, items as clusters."""
 
-import itertools
 import math
 from fractions import Fraction
 
-import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from masrel.agreement import (
     cohen_kappa,
@@ -16,11 +12,9 @@ from masrel.agreement import (
     stratified_kappa,
 )
 from masrel.errors import UndefinedStatisticWarning
-from masrel.intervals import jackknife
 
 FIRST = [["a", "a"], ["b", "b"], ["a", "b"], ["b", "b"]]
 SECOND = [["a", "a"], ["a", "b"], ["a", "a"], ["b", "b"]]
-AB = ["a", "b"]
 
 
 def test_two_raters_by_hand() -> None:
@@ -54,55 +48,9 @@ def test_it_is_cohens_kappa_of_the_table_of_all_pairs() -> None:
     assert pooled_kappa([FIRST, SECOND]).value == cohen_kappa(count_table(table)).value
 
 
-@given(st.lists(st.tuples(st.sampled_from("abc"), st.sampled_from("abc")), min_size=2))
-@pytest.mark.filterwarnings("ignore::masrel.errors.UndefinedStatisticWarning")
-def test_one_rater_is_cohens_kappa(pairs: list[tuple[str, str]]) -> None:
-    for weights in ("identity", "linear"):
-        one = pooled_kappa([pairs], categories=list("abc"), weights=weights)
-        other = cohen_kappa(pairs, categories=list("abc"), weights=weights)
-        assert one.value == other.value or math.isnan(other.value)
-        assert one.standard_error == pytest.approx(
-            other.standard_error, rel=1e-14, nan_ok=True
-        )
-
-
 def test_margins_that_differ_between_raters_raise_it_above_the_stratified() -> None:
     # each rater knows one word: no agreement beyond chance for either, all of it pooled
     pairs = [[["a", "a"]] * 6, [["b", "b"]] * 6]
     assert pooled_kappa(pairs).value == 1.0
     with pytest.warns(UndefinedStatisticWarning, match="0/0"):
         assert math.isnan(stratified_kappa(pairs).value)
-
-
-def test_the_standard_error_is_that_of_items_left_out_when_there_are_many() -> None:
-    rng = np.random.default_rng(5)
-    truth, clear = rng.integers(0, 3, 400), rng.random(400) < 0.5  # the rest is hard
-    pairs = [
-        [
-            [
-                int(x) if sure or rng.random() < 0.1 else int(rng.integers(0, 3))
-                for _ in "12"
-            ]
-            for x, sure in zip(truth, clear, strict=True)
-        ]
-        for _ in range(3)
-    ]
-    found = pooled_kappa(pairs)
-    interval = jackknife("pooled_kappa", pairs, target="items")
-    t = 1.965927  # of 399 degrees
-    error = (interval.high - interval.low) / 2 / t
-    assert found.standard_error == pytest.approx(error, rel=0.01)
-    # pairs of an item go together: as if independent the error would be another
-    table = np.zeros((3, 3), dtype=int)
-    for x, y in itertools.chain.from_iterable(pairs):
-        table[x, y] += 1
-    alone = cohen_kappa(count_table(table))
-    assert alone.value == found.value
-    assert alone.standard_error < 0.9 * found.standard_error
-
-
-def test_undefined_says_why() -> None:
-    with pytest.warns(UndefinedStatisticWarning, match="0/0"):
-        assert pooled_kappa([[["a", "a"]], [["a", "a"]]], categories=AB).reason
-    with pytest.warns(UndefinedStatisticWarning, match="no item has"):
-        assert pooled_kappa([[["a", None]], [[None, "a"]]], categories=AB).reason

@@ -13,13 +13,11 @@ from masrel.agreement import (
     COEFFICIENTS,
     WeightName,
     cohen_kappa,
-    count_ratings,
     declared_weights,
     fleiss_kappa,
-    krippendorff_alpha,
     percent_agreement,
 )
-from masrel.errors import ParameterError, UndefinedStatisticWarning
+from masrel.errors import UndefinedStatisticWarning
 from masrel.intervals import jackknife
 
 NAMES = get_args(WeightName)
@@ -153,65 +151,6 @@ def test_a_matrix_of_the_caller_is_the_named_weights(
     assert given_.standard_error == pytest.approx(named.standard_error, rel=1e-12)
 
 
-def test_a_matrix_may_be_of_truth_values_and_weigh_below_zero() -> None:
-    ratings = [["a", "a"], ["b", "b"], ["a", "b"]]
-    scale = ["a", "b"]
-    as_truths = cohen_kappa(ratings, categories=scale, weights=np.eye(2, dtype=bool))
-    assert as_truths.value == cohen_kappa(ratings).value
-    # -1 for a disagreement doubles D_o and D_e: kappa does not move
-    below = cohen_kappa(ratings, categories=scale, weights=[[1, -1], [-1, 1]])
-    assert below.value == as_truths.value
-
-
-@pytest.mark.parametrize("weights", ["linear", "circular", [[1, 0], [0, 1]]])
-def test_text_that_was_not_declared_has_no_weights(weights: object) -> None:
-    # Sorted as text, 10 would come before 2.
-    ratings = [["2", "10"], ["10", "10"], ["2", "2"]]
-    for entry in COEFFICIENTS.values():
-        if entry.weighted and entry.shape == "ratings":
-            with pytest.raises(ParameterError, match=r"declared scale in order.*10, 2"):
-                entry(ratings, weights=weights)
-            assert entry(ratings, categories=["2", "10"], weights=weights).value
-    for metric in ("ordinal", "interval", "ratio"):
-        with pytest.raises(ParameterError, match=f"{metric} metric needs the declared"):
-            krippendorff_alpha(ratings, metric=metric)  # type: ignore[arg-type]
-    assert krippendorff_alpha(ratings, metric="nominal").value
-    # Ratings keep whether their scale was declared, counted, coded or complete.
-    counted = count_ratings(ratings)
-    assert not counted.declared
-    assert not counted.coded.declared
-    with pytest.raises(ParameterError, match="declared scale in order"):
-        fleiss_kappa(counted, weights=weights)
-
-
-@pytest.mark.parametrize(
-    ("weights", "scale", "said"),
-    [
-        ("square", UNEVEN, "weights: needs one of identity, linear, .* or a matrix"),
-        ("", UNEVEN, "got ''"),
-        ("Linear", UNEVEN, "got 'Linear'"),
-        ([[1, 0], [0, 1]], UNEVEN, r"needs 3 × 3 numbers.*shape \(2, 2\) of int"),
-        ([1, 0, 0], UNEVEN, r"got shape \(3,\)"),
-        ([["1", "0"], ["0", "1"]], [1, 2], "of <U1"),
-        ([[1, 0], [0.5, 1]], [1, 2], "needs a symmetric matrix with 1 on its diagonal"),
-        ([[1, 0], [0, 0.9]], [1, 2], "with 1 on its diagonal"),
-        ([[1, 1.5], [1.5, 1]], [1, 2], "finite numbers of at most 1"),
-        ([[1, math.nan], [math.nan, 1]], [1, 2], "finite numbers"),
-        ([[1, -math.inf], [-math.inf, 1]], [1, 2], "finite numbers"),
-        (
-            "linear",
-            [1, math.inf],
-            "categories: weights need numbers that floats tell apart",
-        ),
-    ],
-)
-def test_what_are_no_weights_is_refused(
-    weights: object, scale: list[float], said: str
-) -> None:
-    with pytest.raises(ParameterError, match=said):
-        declared_weights(weights, scale)  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize("scale", [[0, 1, 2], [-1, 0.5, 1]])
 def test_ratio_weights_of_values_that_sum_to_zero_are_undefined(
     scale: list[float],
@@ -223,11 +162,6 @@ def test_ratio_weights_of_values_that_sum_to_zero_are_undefined(
     assert math.isnan(found.value)
     assert found.reason is not None
     assert "ratio weights divide by sums of two values" in found.reason
-
-
-def test_values_of_both_signs_have_ratio_weights_if_no_two_sum_to_zero() -> None:
-    # (-1, 2): (3/1)² = 9; (-1, 4): (5/3)²; (2, 4): (1/3)²; over 9
-    assert disagreement("ratio", [-1, 2, 4])[0] == pytest.approx([0, 1, 25 / 81])
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "identity"])
@@ -261,31 +195,6 @@ def test_names_of_other_packages_are_taken(elsewhere: str | None, here: str) -> 
         assert known.weights == here
         of_other = jackknife(name, ratings, target="items", weights=elsewhere)
         assert of_other == jackknife(name, ratings, target="items", weights=here)
-
-
-def test_a_coefficient_without_weights_takes_none_by_any_name() -> None:
-    for weights in (None, "unweighted", "identity"):
-        assert COEFFICIENTS["icc_1"]([[1, 2], [2, 3]], weights=weights).reason is None
-    with pytest.raises(ParameterError, match=r"weights: ICC\(1\) takes none"):
-        COEFFICIENTS["icc_1"]([[1, 2], [2, 3]], weights="equal")
-
-
-def test_what_weights_make_is_taken_as_weights() -> None:
-    ratings, scale = [[1, 2], [2, 2], [4, 4], [4, 1], [2, 1], [1, 1]], [1, 2, 4]
-    named = fleiss_kappa(ratings, categories=scale, weights="quadratic")
-    made = declared_weights("quadratic", scale)
-    assert fleiss_kappa(ratings, categories=scale, weights=made) == named
-    # as_floats is rounded: 8/9 is no float
-    floats = fleiss_kappa(ratings, categories=scale, weights=made.as_floats())
-    assert floats.value == pytest.approx(named.value, rel=1e-15)
-    with pytest.raises(ParameterError, match='of 2 categories, got weights "quad'):
-        fleiss_kappa([[1, 2]], weights=made)
-    text = [["low", "high"], ["low", "low"]]
-    linear = declared_weights("linear", ["low", "high"])
-    with pytest.raises(ParameterError, match="need the declared scale in order"):
-        fleiss_kappa(text, weights=linear)
-    identity = declared_weights("identity", ["low", "high"])
-    assert fleiss_kappa(text, weights=identity) == fleiss_kappa(text)
 
 
 @pytest.mark.parametrize(

@@ -19,8 +19,6 @@ from masrel.agreement import (
     Coefficient,
     Property,
     WeightName,
-    coefficient,
-    declared_weights,
 )
 from masrel.errors import UndefinedStatisticWarning
 from masrel.estimates import Estimate
@@ -41,14 +39,6 @@ def having(name: Property) -> pytest.MarkDecorator:
 tested: set[str] = set()
 every = pytest.mark.parametrize(
     "entry", [pytest.param(entry, id=name) for name, entry in COEFFICIENTS.items()]
-)
-with_kernel = pytest.mark.parametrize(
-    "entry",
-    [
-        pytest.param(e, id=e.name)
-        for e in COEFFICIENTS.values()
-        if e.formula is not None
-    ],
 )
 
 
@@ -166,16 +156,6 @@ def test_an_unused_category_changes_nothing_but_their_number(
     assert same(found, wider)
 
 
-def test_an_unused_category_changes_those_that_say_so() -> None:
-    # Their chance agreement is 1/q, or spreads over q categories.
-    table: Table = [["0", "0"], ["1", "1"], ["0", "1"]]
-    for name in ("brennan_prediger", "gwet_ac"):
-        entry = COEFFICIENTS[name]
-        assert "unused category" not in entry.properties
-        found = [estimate(entry, table, LABELS[:q]).value for q in (2, 3)]
-        assert found[0] != found[1]
-
-
 @having("items twice")
 @given(data=st.data())
 def test_every_item_twice_gives_the_same_value(
@@ -194,15 +174,6 @@ def test_every_item_twice_gives_the_same_value(
     if n > 1 and not math.isnan(once.standard_error):
         expected = once.standard_error * math.sqrt((n - 1) / (2 * n - 1))
         assert math.isclose(twice.standard_error, expected, rel_tol=1e-9, abs_tol=1e-12)
-
-
-def test_every_item_twice_changes_those_that_say_so() -> None:
-    table: Table = [["0", "0"], ["1", "1"], ["0", "1"]]
-    alpha = COEFFICIENTS["krippendorff_alpha"]
-    assert "items twice" not in alpha.properties
-    # 1 - (n - 1) A / B: n = 6 and 12; A = 2, 4; B = 18, 72.
-    assert estimate(alpha, table).value == pytest.approx(1 - 5 * 2 / 18, abs=1e-15)
-    assert estimate(alpha, table * 2).value == pytest.approx(1 - 11 * 4 / 72, abs=1e-15)
 
 
 @having("two categories")
@@ -230,85 +201,6 @@ def test_perfect_agreement_on_two_categories_is_exactly_1(
         assert found.value == 1.0  # chance agreement is not 1: defined
     else:
         assert "0/0" in (found.reason or "")
-
-
-@every
-def test_1_is_perfect_agreement_only(entry: Coefficient) -> None:
-    table: Table = [["0", "0"]] * 30 + [["1", "1"]] * 30 + [["0", "1"]]
-    assert estimate(entry, table).value < 1.0
-
-
-@with_kernel
-@given(data=st.data())
-def test_kernel_and_function_are_the_same_coefficient(
-    entry: Coefficient, data: st.DataObject
-) -> None:
-    table, weights = data.draw(for_entry(entry)), data.draw(weights_for(entry))
-    coded = entry.code(shaped(entry, table), LABELS)
-    rate = (coded.codes >= 0).any(axis=0)
-    if entry.shape == "ratings" and rate.sum() >= 2:  # a kernel sees no other raters
-        coded = replace(coded, codes=coded.codes[:, rate])
-    v = declared_weights(weights, LABELS).v
-    assert entry.formula is not None
-    sums = entry.formula.features(coded.codes, v).rows().sum(axis=0)
-    value = float(entry.formula.value(sums, v))
-    found = estimate(entry, table, weights=weights).value
-    assert (math.isnan(value) and math.isnan(found)) or math.isclose(
-        value, found, rel_tol=1e-9, abs_tol=1e-11
-    )
-
-
-@given(table=tables(n_raters=(2, 2), missing=False))
-def test_two_raters_fleiss_is_scotts_pi(table: Table) -> None:
-    # Scott (1955): chance from the margins of both raters together.
-    n = len(table)
-    both = [grade for row in table for grade in row]
-    observed = sum(a == b for a, b in table) / n
-    chance = sum((both.count(k) / (2 * n)) ** 2 for k in LABELS)
-    fleiss = estimate(COEFFICIENTS["fleiss_kappa"], table)
-    scott = estimate(COEFFICIENTS["scott_pi"], table)
-    assert same(fleiss, scott)
-    if len(set(both)) == 1:
-        assert scott.reason
-    else:
-        assert math.isclose(
-            scott.value, (observed - chance) / (1 - chance), abs_tol=1e-12
-        )
-
-
-@given(table=tables(n_raters=(2, 2), missing=False), data=st.data())
-def test_two_raters_conger_and_light_are_cohens_kappa(
-    table: Table, data: st.DataObject
-) -> None:
-    weights = data.draw(st.sampled_from(get_args(WeightName)))
-    cohen = estimate(COEFFICIENTS["cohen_kappa"], table, weights=weights)
-    for name in ("conger_kappa", "light_kappa"):
-        assert same(cohen, estimate(COEFFICIENTS[name], table, weights=weights))
-
-
-def test_alpha_tends_to_scotts_pi() -> None:
-    # 1 - α = (1 - π) (2n - 1) / 2n exactly, of n items by two raters.
-    table: Table = [["0", "0"], ["1", "1"], ["0", "1"], ["1", "1"], ["2", "0"]]
-    for times in (1, 10, 1000):
-        alpha = estimate(COEFFICIENTS["krippendorff_alpha"], table * times).value
-        scott = estimate(COEFFICIENTS["scott_pi"], table * times).value
-        n = 2 * len(table) * times
-        assert math.isclose(1 - alpha, (1 - scott) * (n - 1) / n, rel_tol=1e-13)
-
-
-@given(table=tables(n_raters=(2, 5), missing=False))
-def test_two_categories_brennan_prediger_is_pabak(table: Table) -> None:
-    two = [["0" if g == "0" else "1" for g in row] for row in table]
-    found = estimate(COEFFICIENTS["brennan_prediger"], two, ("0", "1"))
-    assert math.isclose(found.value, 2 * found.observed - 1, abs_tol=1e-14)
-
-
-@every
-def test_a_warning_points_at_the_line_that_asked(entry: Coefficient) -> None:
-    # one item, and of no two ratings
-    with pytest.warns(UndefinedStatisticWarning) as warned:
-        entry.function(shaped(entry, [["0", None]]), categories=LABELS)
-    assert [warning.filename for warning in warned] == [__file__]
 
 
 @pytest.mark.parametrize(
@@ -351,32 +243,6 @@ def _public(names: Mapping[str, object]) -> set[str]:
         and inspect.signature(value).return_annotation is Estimate
         and name != "category_kappa"  # one of Fleiss' kappa, for a category
     }
-
-
-@pytest.mark.parametrize(
-    ("alias", "name"),
-    [(alias, e.name) for e in COEFFICIENTS.values() for alias in e.aliases],
-)
-def test_another_name_is_the_same_coefficient(alias: str, name: str) -> None:
-    assert alias not in COEFFICIENTS
-    assert coefficient(alias) is COEFFICIENTS[name]
-    assert coefficient(alias)([["a", "a"], ["a", "b"]]).coefficient == name
-
-
-def test_names_that_people_know_by_hand() -> None:
-    # 35 of 50 alike: PABAK and RE 2 · .7 - 1; of three categories S = (3 · .7 - 1)/2
-    pairs = [["a", "a"]] * 20 + [["b", "b"]] * 15 + [["a", "b"]] * 15
-    for alias in ("pabak", "maxwell_re", "bennett_s"):
-        assert coefficient(alias)(pairs).value == pytest.approx(0.4, rel=1e-15)
-    three = {"categories": ["a", "b", "c"]}
-    for alias in ("bennett_s", "randolph_kappa"):
-        found = coefficient(alias)(pairs, **three).value  # type: ignore[arg-type]
-        assert found == pytest.approx(0.55, rel=1e-15)
-        result = masrel.intervals.estimate(alias, pairs, target="items", **three)  # type: ignore[arg-type]
-        assert (result.coefficient, result.value) == ("brennan_prediger", found)
-        assert (
-            masrel.intervals.analytic(alias, pairs, target="items", **three).low < found
-        )  # type: ignore[arg-type]
 
 
 def test_every_public_coefficient_is_registered() -> None:

@@ -1,6 +1,5 @@
 """Odd input to every function of ratings: a value, a reason, or one sentence."""
 
-import contextlib
 import inspect
 import math
 import random
@@ -102,18 +101,6 @@ def check(result: Any) -> None:
         assert is_nothing or result.low <= result.high
     elif isinstance(result, Significance):
         assert math.isnan(result.p_value) == (result.reason is not None)
-
-
-@pytest.mark.parametrize("target", ["items", "raters", "both"])
-@pytest.mark.parametrize("row", [[1, 2, 1], [1, 1, 1], [1, 2, None], [1, None, None]])
-def test_one_item_has_an_interval_or_a_reason(target: str, row: list[Any]) -> None:
-    for entry in COEFFICIENTS.values():
-        if entry.shape != "ratings" or entry.n_raters[1] or entry.has_interval:
-            continue
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", MasrelWarning)
-            with contextlib.suppress(MasrelError):  # or it is refused
-                check(_I.estimate(entry.name, [row], target=target, categories=[1, 2]))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
