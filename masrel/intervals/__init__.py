@@ -23,8 +23,8 @@ from masrel.intervals.posterior import posterior
 from masrel.intervals.quantity import Quantity
 
 if TYPE_CHECKING:
-    from masrel.intervals.latent._density import LatentPrior
     from masrel.intervals.latent._implied import PredictiveCheck
+    from masrel.intervals.latent._model import LatentPrior
     from masrel.intervals.latent._trait import LatentChains, LatentTrait, latent_trait
     from masrel.intervals.self_agreement import RetestModel, retest_model
 
@@ -54,7 +54,7 @@ __all__ = [
 
 _HOMES = {
     "LatentChains": "latent._trait",
-    "LatentPrior": "latent._density",
+    "LatentPrior": "latent._model",
     "LatentTrait": "latent._trait",
     "PredictiveCheck": "latent._implied",
     "RetestModel": "self_agreement",

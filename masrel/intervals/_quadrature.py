@@ -1,34 +1,86 @@
-"""Distributions on the line by trapezoid sums, and the solving for their quantiles.
+"""Polynomials by logarithms, and distributions on the line by trapezoid sums.
 
 A density that is analytic beside the line and falls off both ways is known from equally
-spaced points: the error of the trapezoid sum falls as exp(-c / step), so that halving
-the step doubles the digits [1].
+spaced points: the error of the trapezoid sum falls as exp(-c / step) [1].
 
 [1] Trefethen, L. N., Weideman, J. A. C. (2014). The exponentially convergent
 trapezoidal rule. SIAM Review, 56(3), 385-458. https://doi.org/10.1137/130932132
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.special import betainc, expit, sici
+from scipy.special import betainc, betaincinv, expit, sici
 
 from masrel.agreement._engine import Floats
 from masrel.errors import ConvergenceError
 
-SETTLED = 1e-7
-"""Halving the step moves a quantile less: its own error is about the square."""
-TOLERANCE = 1e-12
-"""How far off a point is solved for, or relative to it where that is more."""
-NEGLIGIBLE = 1e-18
-"""Weight of a node that is dropped, relative to the largest."""
+_NATS = 37.0  # a density this far below its largest does not matter
+_FEWEST, _COARSE = 12, 65  # points where a density matters, of a grid this large
+_CLOSE = 1e-11  # how far off a quantile is solved for
+_REACHED = 1e-6  # how far its probability may be off the share, of itself
+_MAX_W = 3.1  # where nodes of a Beta end: 1e-15 of it is beyond
+_HELD = 1e-280  # share of the largest above which a sum lost nothing to underflow
 
-_REACHED = 1e-6  # how far the probability of a point may be off the share
-_MAX_TAIL = 1e-14  # mass that the outermost points may hold
-_FIRST_STEPS, _MAX_STEPS = 32, 1 << 15
-_MAX_W = 9.0  # sinh 9 = 4051 scales of the logit
-_MAX_SCALE = 2.0  # one end can fall off within a few units of the logit
+
+def log_convolve(left: Floats, right: Floats) -> Floats:
+    """Multiply two polynomials of which the logarithms of coefficients are known."""
+    # Floats hold some 1300 nats around the largest term. Times λ^t for several λ every
+    # term is near the largest once: coefficients are log-concave or nearly so, and
+    # the slope of a product's logarithm is among those of its factors'.
+    slopes = np.sort(np.concatenate([np.diff(left), np.diff(right)]))[::-1]
+    out = np.full(slopes.size + 1, np.nan)
+    at = 0
+    while at < out.size:
+        tilt = -float(slopes[min(at, slopes.size - 1)]) if slopes.size else 0.0
+        first, values, scale = _convolve_tilted(left, right, tilt)
+        held = np.flatnonzero(values > _HELD)
+        t = first + held
+        if not t[0] <= at <= t[-1]:
+            raise ConvergenceError("floats cannot hold the exact posterior")
+        out[t] = np.log(values[held]) + scale - tilt * t
+        at = int(t[-1]) + 1
+    return out
+
+
+def _convolve_tilted(
+    left: Floats, right: Floats, tilt: float
+) -> tuple[int, Floats, float]:
+    # -> lowest power, values of the product at e^tilt, and the logarithm of their scale
+    first, scale = 0, 0.0
+    parts: list[Floats] = []
+    for log in (left, right):
+        tilted = log + tilt * np.arange(log.size)
+        largest = float(tilted.max())
+        values = np.exp(tilted - largest)
+        low, high = np.flatnonzero(values)[[0, -1]].tolist()
+        parts.append(values[low : high + 1])
+        first, scale = first + low, scale + largest
+    return first, np.convolve(parts[0], parts[1]), scale
+
+
+def log_sum_exp(logs: Floats) -> Floats:
+    """Return the logarithm of each row's sum of exponentials."""
+    # (n, m) -> (n,)
+    top = logs.max(axis=1)
+    return np.asarray(top + np.log(np.exp(logs - top[:, None]).sum(axis=1)))
+
+
+def where_it_matters(
+    log_density: Callable[[Floats], Floats], low: float, high: float
+) -> tuple[float, float]:
+    """Return between which points a density is not next to nothing."""
+    for _ in range(30):
+        grid = np.linspace(low, high, _COARSE)
+        log = log_density(grid)
+        matters = np.flatnonzero(log > log.max() - _NATS)
+        low = float(grid[max(matters[0] - 1, 0)])
+        high = float(grid[min(matters[-1] + 1, _COARSE - 1)])
+        if matters.size >= _FEWEST:
+            break
+    return low, high
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,15 +90,34 @@ class LineDistribution:
     points: Floats = field(compare=False, repr=False)  # (n,): ascending
     # (n,): the density at each, times the step; they sum to 1
     masses: Floats = field(compare=False, repr=False)
-    step: float  # distance of two points
-    log_total: float  # logarithm of the integral that the density was divided by
 
-    def at(self, point: float) -> tuple[float, float]:
-        """Return the probability of at most a point, and the density there."""
-        away = point - self.points
-        probability = float(self.masses @ integrated_sinc(away, self.step))
-        density = float(self.masses @ np.sinc(away / self.step)) / self.step
-        return probability, max(density, 0.0)  # rounding can bring it below 0
+    @property
+    def step(self) -> float:
+        """The distance of two points."""
+        return float(self.points[1] - self.points[0])
+
+    def probability(self, at: Floats) -> Floats:
+        """Return the probabilities of at most some points, (n,)."""
+        return integrated_sinc(at[:, None] - self.points, self.step) @ self.masses
+
+    def density(self, at: Floats) -> Floats:
+        """Return the density at some points, (n,)."""
+        away = (at[:, None] - self.points) / self.step
+        return (np.sinc(away) @ self.masses / self.step).clip(0.0)  # but for rounding
+
+    def quantiles(self, shares: Sequence[float]) -> list[float]:
+        """Return the points below which shares lie."""
+        last = self.points.size - 1
+        near = self.masses.cumsum().searchsorted(shares)
+        return [
+            solve_quantile(
+                lambda at: float(self.probability(np.array([at]))[0]),
+                share,
+                float(self.points[max(i - 2, 0)]),
+                float(self.points[min(i + 2, last)]),
+            )
+            for share, i in zip(shares, near.tolist(), strict=True)
+        ]
 
 
 def integrated_sinc(away: Floats, step: float) -> Floats:
@@ -57,121 +128,49 @@ def integrated_sinc(away: Floats, step: float) -> Floats:
     return np.asarray(0.5 + sici(away * (np.pi / step))[0] / np.pi)
 
 
-def line_distribution(
-    log_density: Callable[[Floats], Floats],
-    low: float,
-    high: float,
-    shares: Sequence[float],
-) -> tuple[LineDistribution, list[float]]:
-    """Halve the step until the requested quantiles no longer move."""
-    points = np.linspace(low, high, _FIRST_STEPS + 1)
-    log = log_density(points)
-    before: list[float] = []
-    while points.size <= _MAX_STEPS + 1:
-        masses = np.exp(log - log.max())
-        total, step = float(masses.sum()), float(points[1] - points[0])
-        result = LineDistribution(
-            points=points,
-            masses=masses / total,
-            step=step,
-            log_total=float(log.max() + np.log(total * step)),
-        )
-        near = result.masses.cumsum().searchsorted(shares).clip(max=points.size - 1)
-        starts = before or points[near].tolist()
-        after = [
-            solve_quantile(result.at, share, start, (low, high), TOLERANCE)
-            for share, start in zip(shares, starts, strict=True)
-        ]
-        if before and np.allclose(after, before, rtol=0.0, atol=SETTLED):
-            if max(result.masses[0], result.masses[-1]) > _MAX_TAIL:
-                raise ConvergenceError("the posterior reaches beyond its quadrature")
-            return result, after
-        before = after
-        between = 0.5 * (points[:-1] + points[1:])
-        added = log_density(between)
-        points = np.insert(between, np.arange(points.size), points)
-        log = np.insert(added, np.arange(log.size), log)
-    raise ConvergenceError("the quadrature of the posterior has not settled")
-
-
 def solve_quantile(
-    at: Callable[[float], tuple[float, float]],
-    share: float,
-    start: float,
-    bounds: tuple[float, float],
-    tolerance: float,
+    probability: Callable[[float], float], share: float, low: float, high: float
 ) -> float:
-    """Return where a distribution function passes a share."""
-    # `at` gives the probability of at most a point and the density there. Newton's
-    # method, with a bisection where a step would leave the bracket, or is small only
-    # because the density is endless at one point, as that of kappa can be at 0.
-    low, high = bounds
-    point = start
+    """Return where a distribution function passes a share, between two points."""
+    # The Illinois method: a chord between both ends, where an end that stays counts
+    # half, so that both come near.
+    # Dowell, M., Jarratt, P. (1971). A modified regula falsi method for computing the
+    # root of an equation. BIT, 11, 168-174. https://doi.org/10.1007/BF01934364
+    below, above = probability(low) - share, probability(high) - share
+    at, stays = math.inf, ""
     for _ in range(200):
-        probability, density = at(point)
-        excess = probability - share
-        low, high = (low, point) if excess > 0.0 else (point, high)
-        ahead = point - excess / density if density > 0.0 else low
-        close = tolerance * max(1.0, abs(point))
-        is_close = density > 0.0 and abs(ahead - point) < close
-        if is_close and abs(excess) < _REACHED:
-            return min(max(ahead, low), high)  # rounding can put it outside
-        if is_close or not low < ahead < high:
-            ahead = 0.5 * (low + high)
-        if abs(ahead - point) < close:
-            return ahead
-        point = ahead
-    return point
+        before, at = at, low + below / (below - above) * (high - low)
+        excess = probability(at) - share
+        if excess > 0.0:
+            high, above = at, excess
+            below *= 0.5 if stays == "low" else 1.0
+            stays = "low"
+        else:
+            low, below = at, excess
+            above *= 0.5 if stays == "high" else 1.0
+            stays = "high"
+        close = _CLOSE * max(1.0, abs(at))
+        is_reached = abs(excess) < _REACHED * min(share, 1.0 - share)
+        if high - low < close or (is_reached and abs(at - before) < close):
+            break
+    return at
 
 
-def beta_nodes(
-    a: float, b: float, step: float, least: float = 0.0
-) -> tuple[Floats, Floats]:
+def beta_nodes(a: float, b: float, n: int, least: float = 0.0) -> tuple[Floats, Floats]:
     """Return nodes x, 1 - x and weights of a Beta(a, b) from least to 1 - least."""
     # -> (n, 2), (n,)
-    # The logit of the place in the range is its mode plus a scale times sinh w, with w
-    # equally spaced: a power of the distance to an end, as small parameters give, is
-    # smooth in w.
+    # Quantiles at tanh-sinh nodes of the probability, which come so close to both ends
+    # that powers of the distance to an end, as small parameters give, are smooth.
     # Takahasi, H., Mori, M. (1974). Double exponential formulas for numerical
     # integration. Publications of the RIMS, 9(3), 721-741.
     # https://doi.org/10.2977/prims/1195192451
-
-    def at(logit: Floats) -> tuple[Floats, Floats]:
-        place = np.column_stack([expit(logit), expit(-logit)])
-        x = least + (1.0 - 2.0 * least) * place
-        log_place = -np.logaddexp(0.0, np.column_stack([-logit, logit]))
-        log = np.log(x) if least > 0.0 else log_place
-        # the slope of x in the logit is place (1 - place), times a constant
-        return x, log @ np.array([a - 1.0, b - 1.0]) + log_place.sum(axis=1)
-
-    if least > 0.0:
-        middle, scale = _mode(lambda logit: at(logit)[1])
-        total = float(betainc(b, a, 1.0 - least) - betainc(b, a, least))
-    else:
-        middle, total = float(np.log(a / b)), 1.0
-        scale = min(float(np.sqrt(1.0 / a + 1.0 / b)), _MAX_SCALE)
-    w = np.arange(-_MAX_W, _MAX_W + 0.5 * step, step)
-    x, log = at(middle + scale * np.sinh(w))
-    weights = np.exp(log - log.max()) * np.cosh(w)
-    large = weights > NEGLIGIBLE * weights.max()
-    return x[large], weights[large] * (total / weights[large].sum())
-
-
-def _mode(log_density: Callable[[Floats], Floats]) -> tuple[float, float]:
-    # where it is highest, and the distance at which it has fallen by half a nat
-    low, high = -40.0, 40.0
-    for _ in range(6):
-        at = np.linspace(low, high, 41)
-        log = log_density(at)
-        near = np.flatnonzero(log > log.max() - 0.5)
-        if near.size > 8:
-            break
-        low, high = at[max(near[0] - 1, 0)], at[min(near[-1] + 1, 40)]
-    return float(at[log.argmax()]), float(0.5 * (at[near[-1]] - at[near[0]]))
-
-
-def log_sum_exp(logs: Floats) -> Floats:
-    """Return the logarithm of each row's sum of exponentials."""
-    # (n, m) -> (n,)
-    top = logs.max(axis=1)
-    return np.asarray(top + np.log(np.exp(logs - top[:, None]).sum(axis=1)))
+    w = np.linspace(-_MAX_W, _MAX_W, n)
+    logit = np.pi * np.sinh(w)
+    share, rest = expit(logit), expit(-logit)
+    weights = np.cosh(w) * share * rest
+    below, above = betainc(a, b, least), betainc(b, a, least)
+    inside = 1.0 - below - above
+    x = betaincinv(a, b, below + inside * share)
+    y = betaincinv(b, a, above + inside * rest)
+    nodes = np.column_stack([x, y]).clip(least, 1.0 - least)
+    return nodes, weights * (inside / weights.sum())

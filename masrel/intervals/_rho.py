@@ -1,24 +1,41 @@
-"""The credible interval of ρ in the Dirichlet-multinomial model."""
+"""The exact posterior of ρ in the Dirichlet-multinomial model, and its intervals.
 
-import dataclasses
+An item has category probabilities p ~ Dirichlet(A π); its ratings are multinomial. Then
+ρ = 1 / (1 + A) is the population value of Fleiss' kappa. The likelihood is
+Π_k Π_j (A π_k + j)^N_kj / Π_j (A + j)^n_j, with N_kj the items with more than j ratings
+in category k, and n_j those with more than j ratings at all [1].
+
+π is integrated out: each category's product Π_j (x + j)^N_kj at x = A π_k is a
+polynomial. Under π ~ Dirichlet(a) the power π_k^t has the moment Γ(a_k + t) / Γ(a_k);
+convolved over categories and divided by Γ(Σ a + t) the powers give a polynomial in A
+[2], and with it the density of ρ. All coefficients are positive, so that sums and
+products lose no digits.
+
+[1] Mosimann, J. E. (1962). On the compound multinomial distribution. Biometrika,
+49(1/2), 65-82. https://doi.org/10.2307/2333468
+[2] Antoniak, C. E. (1974). Mixtures of Dirichlet processes with applications to
+Bayesian nonparametric problems. Annals of Statistics, 2(6), 1152-1174.
+https://doi.org/10.1214/aos/1176342871
+"""
+
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import expit
+from scipy.special import expit, gammaln
 
 from masrel.agreement._engine import Floats
-from masrel.errors import ParameterError
+from masrel.agreement._weights import Distances
+from masrel.errors import ConvergenceError, ParameterError
 from masrel.estimates import Distribution, Interval, _LongNote
-from masrel.intervals._dirichlet_multinomial import DirichletMultinomial, RhoDensity
 from masrel.intervals._quadrature import (
-    TOLERANCE,
     LineDistribution,
-    integrated_sinc,
-    line_distribution,
-    solve_quantile,
+    log_convolve,
+    log_sum_exp,
+    where_it_matters,
 )
 from masrel.intervals._question import IntervalProblem
 
@@ -28,14 +45,19 @@ PriorName = Literal["uniform", "jeffreys"]
 PRIOR_SHAPES: dict[str, float] = {"uniform": 1.0, "jeffreys": 0.5}
 """The prior of ρ is Beta(shape, shape)."""
 
-_OF_RHO = {"uniform": "ρ ~ U(0, 1)", "jeffreys": "ρ ~ Beta(1/2, 1/2)"}
-_SHOWN = 201  # points of a distribution
-
 FEW_ITEMS = 10
 """Items below which the interval under another prior is noted."""
 
+METHOD = "Dirichlet-multinomial posterior"
+"""Of all intervals of raters who are alike."""
 
+_OF_RHO = {"uniform": "ρ ~ U(0, 1)", "jeffreys": "ρ ~ Beta(1/2, 1/2)"}
 _SUREST = 1e12  # concentration of a prior that leaves ratings no say
+_MAX_RATINGS = 1_000_000  # whose polynomials take some ten seconds
+_MAX_LOGIT = 160.0  # either way: beyond any posterior that floats can hold
+_N_POINTS = 769  # of the density: ends are within 1e-10
+_N_TERMS = 1 << 20  # at once
+_SHOWN = 201  # points of a distribution
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,120 +105,219 @@ DEFAULT_PRIOR = Prior(name="uniform", concentration=1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DirichletMultinomial:
+    """The posterior of ρ and π given counts, π in the used categories."""
+
+    # (n_parts,): parameters of the Dirichlet prior of π. Categories nobody used enter
+    # the likelihood nowhere, so they are one part, the last, whose parameter is the sum
+    # of theirs (the Dirichlet's aggregation property).
+    prior: Floats = field(compare=False, repr=False)
+    shape: float  # the prior of ρ is Beta(shape, shape): 1 is uniform
+    powers: Floats = field(compare=False, repr=False)  # (n_used, n_depths): N_kj
+    sizes: Floats = field(compare=False, repr=False)  # (n_depths,): n_j
+
+    @classmethod
+    def of_counts(
+        cls,
+        counts: NDArray[np.int64],
+        *,
+        concentration: float = 1.0,
+        shape: float = 1.0,
+    ) -> "DirichletMultinomial":
+        """Reduce counts to the powers of the likelihood's factors."""
+        # shape of counts: (n_items, n_categories)
+        used = counts.any(axis=0)
+        prior = np.full(int(used.sum()), concentration)
+        if not used.all():
+            prior = np.append(prior, concentration * float((~used).sum()))
+        n = counts.sum(axis=1)
+        met = [
+            np.bincount(column, minlength=int(n.max()) + 1)
+            for column in (*counts.T[used], n)
+        ]
+        # items with more than j ratings, j = 0, 1, ...
+        more = np.array(met, dtype=np.float64)[:, :0:-1].cumsum(axis=1)[:, ::-1]
+        return cls(prior=prior, shape=shape, powers=more[:-1], sizes=more[-1])
+
+    def polynomial(self) -> tuple[Floats, Floats]:
+        """Return powers of A, and the logarithms of their coefficients, both (n,)."""
+        if self.sizes.sum() > _MAX_RATINGS:
+            raise ConvergenceError(
+                f"the exact posterior of {self.sizes.sum():.0f} ratings takes long, "
+                f"from {_MAX_RATINGS} on; use the jackknife"
+            )
+        total = np.zeros(1)
+        for exponents, a in zip(self.powers, self.prior, strict=False):
+            log = _category_polynomial(tuple(exponents.tolist()))
+            t = exponents[0] + np.arange(log.size)
+            total = log_convolve(total, log + gammaln(a + t))
+        t = self.powers[:, 0].sum() + np.arange(total.size)
+        return t, total - gammaln(self.prior.sum() + t)
+
+    def log_cofactor(self, logit: Floats) -> Floats:
+        """Return what multiplies the polynomial in A = exp(-logit ρ), as logarithm."""
+        # -Σ n_j log(A + j), with the prior (ρ (1 - ρ))^(shape - 1) and the Jacobian
+        # ρ (1 - ρ) of the logit; logit (n,) -> (n,)
+        depth = np.arange(self.sizes.size)
+        with np.errstate(divide="ignore"):  # j = 0 is the logit itself
+            log = np.logaddexp(-logit[:, None], np.log(depth))
+        log_prior = np.logaddexp(0.0, logit) + np.logaddexp(0.0, -logit)
+        return np.asarray(-log @ self.sizes - self.shape * log_prior)
+
+    def of_logit(self) -> LineDistribution:
+        """Integrate the density of logit ρ."""
+        powers, terms = self.polynomial()
+        n_rows = max(1, _N_TERMS // powers.size)
+
+        def log_density(logit: Floats) -> Floats:
+            blocks = np.split(logit, range(n_rows, logit.size, n_rows))
+            sums = [log_sum_exp(terms - np.outer(rows, powers)) for rows in blocks]
+            return np.concatenate(sums) + self.log_cofactor(logit)
+
+        ends = where_it_matters(log_density, -_MAX_LOGIT, _MAX_LOGIT)
+        points = np.linspace(*ends, _N_POINTS)
+        log = log_density(points)
+        masses = np.exp(log - log.max())
+        return LineDistribution(points=points, masses=masses / masses.sum())
+
+
+@lru_cache(maxsize=64)
+def _category_polynomial(exponents: tuple[float, ...]) -> Floats:
+    """Return the logarithms of the coefficients of Π_j>0 (x + j)^N_j."""
+    log = np.zeros(1)
+    for j, n in enumerate(exponents):
+        if j:
+            k = np.arange(n + 1.0)
+            of_one = gammaln(n + 1.0) - gammaln(k + 1.0) - gammaln(n - k + 1.0)
+            log = log_convolve(of_one + (n - k) * math.log(j), log)
+    return log
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RhoPosterior:
     """The posterior of ρ = 1 / (1 + A), integrated."""
 
     prior: Prior
-    low: float  # ends of the central interval
-    median: float
-    high: float
     logit: LineDistribution = field(compare=False, repr=False)  # of logit ρ
-    log_density: RhoDensity = field(compare=False, repr=False)  # of logit ρ
 
     @classmethod
-    def of(
-        cls, counts: NDArray[np.int64], prior: Prior, level: float
-    ) -> "RhoPosterior":
+    def of(cls, counts: NDArray[np.int64], prior: Prior) -> "RhoPosterior":
         """Integrate the posterior of counts (n_items, n_categories)."""
-        density = RhoDensity(
-            DirichletMultinomial.of_counts(
-                counts,
-                concentration=prior.concentration,
-                shape=PRIOR_SHAPES[prior.name],
-            )
+        model = DirichletMultinomial.of_counts(
+            counts, concentration=prior.concentration, shape=PRIOR_SHAPES[prior.name]
         )
-        tail = 0.5 * (1.0 - level)
-        first, last = density.logits[[0, -1]].tolist()
-        shares = (tail, 0.5, 1.0 - tail)
-        logit, ends = line_distribution(density, first, last, shares)
-        low, median, high = expit(ends).tolist()
-        return cls(
-            prior=prior,
-            low=low,
-            median=median,
-            high=high,
-            logit=logit,
-            log_density=density,
-        )
+        return cls(prior=prior, logit=model.of_logit())
 
-    def quantile(self, share: float) -> float:
-        """Return a quantile of ρ."""
-        points = self.logit.points.tolist()
-        near = min(int(self.logit.masses.cumsum().searchsorted(share)), len(points) - 1)
-        ends = points[0], points[-1]
-        return float(
-            expit(solve_quantile(self.logit.at, share, points[near], ends, TOLERANCE))
-        )
+    def quantiles(self, *shares: float) -> list[float]:
+        """Return quantiles of ρ."""
+        ends: list[float] = expit(self.logit.quantiles(shares)).tolist()
+        return ends
+
+    def ends(self, level: float) -> list[float]:
+        """Return the ends of the central interval."""
+        return self.quantiles(0.5 - 0.5 * level, 0.5 + 0.5 * level)
 
     def draw(self, n_draws: int, generator: np.random.Generator) -> Floats:
         """Draw ρ from as many equal parts of its distribution, ascending."""
-        logits, logit = self._logits(), self.logit
-        below = integrated_sinc(logits[:, None] - logit.points, logit.step)
+        logits = self._logits()
         shares = (np.arange(n_draws) + generator.random(n_draws)) / n_draws
-        return np.asarray(expit(np.interp(shares, below @ logit.masses, logits)))
+        below = self.logit.probability(logits)
+        return np.asarray(expit(np.interp(shares, below, logits)))
 
     def _logits(self) -> Floats:
-        # equally spaced, from about the quantile at 1e-6 to that at 1 - 1e-6
-        cumulative = self.logit.masses.cumsum()
-        ends = np.searchsorted(cumulative, (1e-6, 1.0 - 1e-6)) + np.array([-1, 1])
-        low, high = self.logit.points[ends.clip(0, cumulative.size - 1)]
+        # equally spaced, between outermost quantiles
+        low, high = self.logit.quantiles((1e-6, 1.0 - 1e-6))
         return np.linspace(low, high, _SHOWN)
 
     def distribution(self) -> Distribution:
         """Return the density of ρ at points between its outermost quantiles."""
         logits = self._logits()
         rho, rest = expit(logits), expit(-logits)
-        density = np.exp(self.log_density(logits) - self.logit.log_total)
         return Distribution(
             values=rho,
-            weights=density / (rho * rest),
+            weights=self.logit.density(logits) / (rho * rest),
             continuous=True,
             words=f"posterior of ρ, prior {self.prior.description}",
         )
 
 
-def prior_notes(
-    counts: NDArray[np.int64], prior: Prior, level: float, low: float, high: float
-) -> tuple[str, ...]:
-    """Say where the prior weighs, by the interval under the one that moves it most."""
+def rho_interval(
+    problem: IntervalProblem, prior: Prior, *, one_sided: bool = False
+) -> Interval:
+    """Compute the central credible interval of ρ, or all above a lower quantile."""
+    reason = nothing_to_learn(problem)
+    if reason is not None:
+        return undefined(problem, reason, f"{METHOD}, exact")
+    counts, level = problem.item_counts(), problem.level
+    shares = (1.0 - level,) if one_sided else (0.5 - 0.5 * level, 0.5 + 0.5 * level)
+    posterior = RhoPosterior.of(counts, prior)
+    low, *high = posterior.quantiles(*shares)
+    what = "" if one_sided else _where_the_prior_weighs(counts)
+    notes: tuple[str, ...] = ()
+    if one_sided or what:
+        others = [
+            (RhoPosterior.of(counts, other).quantiles(*shares), other.description)
+            for other in prior.others(counts.shape[1])
+        ]
+        # the one that moves an end most
+        there, description = max(
+            others, key=lambda of: float(np.abs(np.subtract(of[0], [low, *high])).max())
+        )
+        here, there_ends = (
+            " to ".join(f"{end:.3f}" for end in ends) for ends in ([low, *high], there)
+        )
+        why = f"{what}, so the prior weighs"
+        why = "the bound rests on the prior, too" if one_sided else why
+        text = f"{here} with {prior.description}, but {there_ends} with {description}"
+        notes = (prior_note(why, text),)
+    return Interval(
+        low=low,
+        high=1.0 if one_sided else high[0],
+        median=posterior.quantiles(0.5)[0],
+        level=level,
+        kind="credible",
+        method=f"{METHOD}, {'one-sided' if one_sided else 'exact'}",
+        target=problem.target,
+        notes=notes,
+        distribution=posterior.distribution(),
+    )
+
+
+def nothing_to_learn(problem: IntervalProblem) -> str | None:
+    """Return why ratings say nothing of a coefficient, or None."""
+    if problem.n_paired_items == 0:
+        return "no item has ratings of two raters"
+    if problem.coded.n_categories < 2:
+        return "one category is declared"
+    # distances, which stand for the matrix of many categories, are all numbers
+    if not isinstance(problem.v, Distances):
+        if np.isnan(problem.v).any():
+            return "the scale has no such weights"
+        if not problem.v.any():
+            return "the weights count nothing as disagreement"
+    return None
+
+
+def undefined(problem: IntervalProblem, reason: str, method: str) -> Interval:
+    """Return a credible interval without ends."""
+    return replace(problem.undefined(reason, method=method, unit=None), kind="credible")
+
+
+def _where_the_prior_weighs(counts: NDArray[np.int64]) -> str:
     # shape of counts: (n_items, n_categories)
     n_items = int((counts.sum(axis=1) >= 2).sum())
-    if (counts.sum(axis=0) > 0).sum() == 1:
-        what = "all ratings are in one category"
-    elif ((counts > 0).sum(axis=1) <= 1).all():
-        what = "agreement is perfect in these data"
-    elif n_items < FEW_ITEMS:
-        what = "1 item is few" if n_items == 1 else f"{n_items} items are few"
-    else:
-        return ()
-    moved, other, ends = 0.0, prior, (low, high)
-    for candidate in prior.others(counts.shape[1]):
-        there = RhoPosterior.of(counts, candidate, level)
-        by = max(abs(there.low - low), abs(there.high - high))
-        if by > moved:
-            moved, other, ends = by, candidate, (there.low, there.high)
-    text = (
-        f"{low:.3f} to {high:.3f} with {prior.description}, but "
-        f"{ends[0]:.3f} to {ends[1]:.3f} with {other.description}"
-    )
-    return (prior_note(f"{what}, so the prior weighs", text),)
+    if counts.any(axis=0).sum() == 1:
+        return "all ratings are in one category"
+    if ((counts > 0).sum(axis=1) <= 1).all():
+        return "agreement is perfect in these data"
+    if n_items < FEW_ITEMS:
+        return "1 item is few" if n_items == 1 else f"{n_items} items are few"
+    return ""
 
 
 def prior_note(what: str, ends: str) -> str:
     """Return a note on the prior, which a table gives without its ends."""
     return _LongNote(f"{what}: {ends}", f"{what} (--explain says by how much)")
-
-
-def default_rho_interval(problem: IntervalProblem) -> Interval:
-    """Compute an interval that holds the estimate, one-sided where that is perfect."""
-    if not problem.value < 1.0:  # perfect, or undefined: one category
-        return _lower_bound_of_rho(problem)
-    counts, method = problem.item_counts(), "Dirichlet-multinomial posterior, exact"
-    posterior = RhoPosterior.of(counts, DEFAULT_PRIOR, problem.level)
-    interval = _central(problem, posterior, method)
-    low, high = interval.low, interval.high
-    notes = prior_notes(counts, DEFAULT_PRIOR, problem.level, low, high)
-    return extended(problem, dataclasses.replace(interval, notes=notes))
 
 
 def extended(problem: IntervalProblem, interval: Interval) -> Interval:
@@ -209,76 +330,9 @@ def extended(problem: IntervalProblem, interval: Interval) -> Interval:
         f"the {name} end is extended from {end:.3f}, that of the posterior, to the "
         f"estimate, {value:.3f}, which lies outside"
     )
-    return dataclasses.replace(
+    return replace(
         interval,
         low=min(low, value),
         high=max(high, value),
         notes=(note, *interval.notes),
     )
-
-
-def _central(
-    problem: IntervalProblem, posterior: RhoPosterior, method: str
-) -> Interval:
-    return Interval(
-        low=posterior.low,
-        high=posterior.high,
-        median=posterior.median,
-        level=problem.level,
-        kind="credible",
-        method=method,
-        target=problem.target,
-        distribution=posterior.distribution(),
-    )
-
-
-def _lower_bound_of_rho(problem: IntervalProblem) -> Interval:
-    """Compute the interval of all that is above a lower quantile."""
-    counts, prior, share = (
-        problem.item_counts(),
-        DEFAULT_PRIOR,
-        1.0 - problem.level,
-    )
-    posterior = RhoPosterior.of(counts, prior, problem.level)
-    low = posterior.quantile(share)
-    others = [
-        (RhoPosterior.of(counts, other, problem.level).quantile(share), other)
-        for other in prior.others(counts.shape[1])
-    ]
-    there, other = max(others, key=lambda bound: abs(bound[0] - low))
-    ends = f"{low:.3f} with {prior.description}, but {there:.3f} with "
-    note = prior_note("the bound rests on the prior, too", ends + other.description)
-    return Interval(
-        low=low,
-        high=1.0,
-        median=posterior.median,
-        level=problem.level,
-        kind="credible",
-        method="Dirichlet-multinomial posterior, one-sided",
-        target=problem.target,
-        notes=(note,),
-        distribution=posterior.distribution(),
-    )
-
-
-def rho_interval(problem: IntervalProblem, prior: Prior) -> Interval:
-    """Compute the central credible interval of ρ."""
-    method = "Dirichlet-multinomial posterior, exact"
-    counts = problem.item_counts()
-    reason = _nothing_to_learn(counts)
-    if reason is not None:
-        undefined = problem.undefined(reason, method=method, unit=None)
-        return dataclasses.replace(undefined, kind="credible")
-    level = problem.level
-    interval = _central(problem, RhoPosterior.of(counts, prior, level), method)
-    notes = prior_notes(counts, prior, level, interval.low, interval.high)
-    return dataclasses.replace(interval, notes=notes)
-
-
-def _nothing_to_learn(counts: NDArray[np.int64]) -> str | None:
-    # shape of counts: (n_items, n_categories)
-    if not (counts.sum(axis=1) >= 2).any():
-        return "no item has ratings of two raters"
-    if counts.shape[1] < 2:
-        return "one category is declared"
-    return None

@@ -1,88 +1,278 @@
-"""The interval of a coefficient of two raters from a Dirichlet on their table."""
+"""The posterior of a coefficient of two raters, given a Dirichlet on their table.
 
-import dataclasses
+With θ ~ Dirichlet the share t of pairs that disagree, the shares x of the categories
+among pairs that agree, and the shares y of the cells among pairs that do not, are
+independent: a Beta and two Dirichlets. Given x and y the disagreement is linear in t,
+and that by chance quadratic: the coefficient is at most a value where a quadratic in t
+is positive, which has a probability in closed form. That is summed over nodes of x and
+y: one where they do not matter, a grid for two categories, else draws.
+"""
+
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Self
+from functools import lru_cache, partial
+from typing import Literal
 
 import numpy as np
+from scipy.special import betainc
 
 from masrel.agreement._engine import Floats
 from masrel.agreement._weights import MANY
-from masrel.errors import ParameterError
-from masrel.estimates import Interval
+from masrel.errors import ConvergenceError, ParameterError
+from masrel.estimates import Distribution, Interval
+from masrel.intervals._quadrature import beta_nodes, solve_quantile
 from masrel.intervals._question import IntervalProblem, recorded_generator
-from masrel.intervals._rho import FEW_ITEMS, extended, prior_note
-from masrel.intervals._table_quadrature import (
-    CHANCE_AGREEMENT,
-    TablePosterior,
-    needs_draws,
-    table_quantiles,
+from masrel.intervals._rho import (
+    FEW_ITEMS,
+    nothing_to_learn,
+    prior_note,
+    undefined,
 )
 
-_MIN_DRAWS = 100
-_DEFAULT_DRAWS, _SEED = 4_000, 1  # always the same ones, so that they repeat
-_NOTED_DRAWS = 2_000  # for the interval under another prior: a note has three digits
+ChanceAgreement = Literal["none", "uniform", "pooled", "pooled, Gwet", "margins"]
+"""What disagreement by chance is made of."""
 
+CHANCE_AGREEMENT: dict[str, ChanceAgreement] = {
+    "percent_agreement": "none",
+    "brennan_prediger": "uniform",
+    "scott_pi": "pooled",
+    "fleiss_kappa": "pooled",
+    "krippendorff_alpha": "pooled",
+    "gwet_ac": "pooled, Gwet",
+    "cohen_kappa": "margins",
+    "conger_kappa": "margins",
+    "light_kappa": "margins",
+}
+"""Coefficients of two raters; those of one kind have one value in the population."""
+
+_NOTED_DRAWS = 2_000  # for the interval under another prior: a note has three digits
 _ITEMS = 1.5  # that the default prior is worth, by the study of coverage
+_NODES = (53, 97, 193)  # of the quadrature, until it settles
+_SETTLED = 1e-6  # with three quarters of them a share is off less
+_REACH = 0.01  # how far a quantile may be from where it is by fewer nodes
+_NEGLIGIBLE = 1e-16  # weight of a node
+_SLOPE = 1e-6  # step of a slope
+_SHOWN, _SHOWN_DRAWS = 101, 1_000  # of a density, looked at
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TablePrior:
-    """A Dirichlet over the pairs of categories."""
+class Nodes:
+    """Values of x and y with what the coefficient needs of them, all (n,)."""
 
-    cells: Floats = field(repr=False)  # (n_categories, n_categories): its parameters
-    description: str  # the prior in words
-    # the one parameter of all cells; None where pairs that agree have others
-    concentration: float | None
+    # The disagreement is t d, and by chance (1 - t)² e_0 + t (1 - t) e_1 + t² e_2.
+
+    weights: Floats = field(compare=False, repr=False)  # probabilities of the values
+    d: Floats = field(compare=False, repr=False)
+    # e_0, e_1, e_2: as if all pairs agreed, as if half of them did, as if none did
+    e_0: Floats = field(compare=False, repr=False)
+    e_1: Floats = field(compare=False, repr=False)
+    e_2: Floats = field(compare=False, repr=False)
 
     @classmethod
-    def by_default(cls, n_categories: int) -> Self:
-        """Return a prior worth 1.5 items, half of it on pairs that agree."""
-        # With the same parameter in every cell agreement would be expected to be the
-        # rarer, the more categories are declared.
-        q = n_categories
-        cells = np.full((q, q), 0.5 * _ITEMS / (q * (q - 1)))
-        np.fill_diagonal(cells, 0.5 * _ITEMS / q)
-        description = (
-            f"a Dirichlet worth {_ITEMS:g} items, half of it on pairs that agree"
+    def of(
+        cls, chance: ChanceAgreement, v: Floats, weights: Floats, x: Floats, y: Floats
+    ) -> "Nodes":
+        """Compute what the coefficient needs."""
+        # v (n_categories, n_categories), weights (n,), x (n, n_categories), y (n,
+        # n_categories (n_categories - 1))
+        q = len(v)
+        first, second = np.nonzero(~np.eye(q, dtype=bool))
+        rows, columns = y @ np.eye(q)[first], y @ np.eye(q)[second]
+        if chance in ("none", "uniform"):
+            level = np.full(len(weights), 1.0 if chance == "none" else v.mean())
+            e = [level, 2.0 * level, level]
+        else:
+            if chance != "margins":
+                rows = columns = 0.5 * (rows + columns)
+            u, rest = v, 0.0
+            if chance == "pooled, Gwet":
+                # 1 - g Σ p (1 - p) = 1 - g + g Σ p², g = T_w / (q (q - 1))
+                g = (q * q - v.sum()) / (q * (q - 1))
+                u, rest = g * np.eye(q), 1.0 - g
+            e = [
+                rest + ((x @ u) * x).sum(axis=1),
+                2.0 * rest + ((x @ u) * columns).sum(axis=1) + ((rows @ u) * x).sum(1),
+                rest + ((rows @ u) * columns).sum(axis=1),
+            ]
+        d = y @ v[first, second]
+        return cls(weights=weights, d=d, e_0=e[0], e_1=e[1], e_2=e[2])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TablePosterior:
+    """The distribution of a coefficient."""
+
+    # A value to nodes of x and y, for the coefficient to be at most that value
+    nodes: Callable[[float], Nodes]
+    # the same with fewer nodes, as many as a density that is looked at needs
+    shown: Callable[[float], Nodes]
+    # the share t of pairs that disagree is Beta(disagreeing, agreeing)
+    disagreeing: float
+    agreeing: float
+    n_draws: int | None = None  # how many nodes were drawn; None if none were
+
+    def conditional(self, nodes: Nodes, value: float) -> Floats:
+        """Return the probability of at most a value at each node, (n,)."""
+        # That is where t d - (1 - value) D_e(t) >= 0, or with s = t / (1 - t) where
+        # `high` s² + `h` s - `low` >= 0. It rises through 0 at t = `up`; with `high` <
+        # 0 it falls again at `down`, or is nowhere 0. Its roots are written so that
+        # nothing cancels at either end of t.
+        rest = 1.0 - value
+        low = rest * nodes.e_0
+        h, high = nodes.d - rest * nodes.e_1, nodes.d - rest * nodes.e_2
+        inside = h * h + 4.0 * low * high
+        near = np.sqrt(np.maximum(inside, 0.0)) + np.abs(h)
+        twice = (high < 0.0) & (inside > 0.0) & (h > 0.0)
+        never = (high < 0.0) & ~twice
+        part = np.where(h >= 0.0, 2.0 * low, near)
+        other = np.where(h >= 0.0, near, 2.0 * high)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            up, up_rest = part / (part + other), other / (part + other)
+            down_rest = 2.0 * high / (2.0 * high - near)
+        lost = np.isnan(up)  # both ends are 0 in floating point
+        up, up_rest = np.where(lost, 0.0, up), np.where(lost, 1.0, up_rest)
+        # from the nearer end of t, so that a small parameter there keeps its digits
+        from_0 = up < 0.5
+        a = np.where(from_0, self.disagreeing, self.agreeing)
+        b = np.where(from_0, self.agreeing, self.disagreeing)
+        part = betainc(a, b, np.where(from_0, up, up_rest))
+        beyond: Floats = np.where(from_0, 1.0 - part, part)
+        beyond[never] = 0.0
+        beyond[twice] -= betainc(self.agreeing, self.disagreeing, down_rest[twice])
+        return beyond
+
+    def probability(self, value: float, *, shown: bool = False) -> float:
+        """Return the probability that the coefficient is at most a value."""
+        nodes = self.shown(value) if shown else self.nodes(value)
+        return float(nodes.weights @ self.conditional(nodes, value))
+
+    def quantile(self, share: float) -> float:
+        """Return the value below which a share lies."""
+        low = -1.0
+        while self.probability(low) > share:
+            low = 2.0 * low - 1.0  # with weights it can be below -1
+        # first where it is by fewer nodes
+        by_shown = partial(self.probability, shown=True)
+        near, reach = solve_quantile(by_shown, share, low, 1.0), _REACH
+        while True:
+            ends = max(near - reach, low), min(near + reach, 1.0)
+            if self.probability(ends[0]) <= share <= self.probability(ends[1]):
+                return solve_quantile(self.probability, share, *ends)
+            reach *= 4.0
+
+    def quantile_error(self, at: float) -> float:
+        """Return the Monte Carlo standard error of the quantile at a value."""
+        probabilities = self.conditional(self.nodes(at), at)
+        ends = at - _SLOPE, min(at + _SLOPE, 1.0)
+        slope = np.diff([self.probability(end) for end in ends]) / np.diff(ends)
+        return float(probabilities.std() / np.sqrt(probabilities.size) / slope[0])
+
+    def distribution(self, low: float, high: float, words: str) -> Distribution:
+        """Return the density between two values, the mean of each small part."""
+        edges = np.linspace(low, high, _SHOWN + 1)
+        below = [self.probability(edge, shown=True) for edge in edges.tolist()]
+        return Distribution(
+            values=0.5 * (edges[1:] + edges[:-1]),
+            weights=(np.diff(below) / np.diff(edges)).clip(0.0),
+            continuous=True,
+            words=words,
         )
-        return cls(cells=cells, description=description, concentration=None)
 
-    @classmethod
-    def of(cls, concentration: float, n_categories: int) -> Self:
-        """Return a prior with one parameter for all cells."""
-        cells = np.full((n_categories, n_categories), concentration)
-        description = f"Dirichlet({concentration:.3g}, ...) over the cells of the table"
-        return cls(cells=cells, description=description, concentration=concentration)
 
-    def other(self) -> Self:
-        """Return another that is as reasonable."""
-        q = len(self.cells)
-        if self.concentration is not None and math.isclose(self.concentration, 1.0 / q):
-            return self.by_default(q)
-        return self.of(1.0 / q, q)
+def table_quantiles(
+    chance: ChanceAgreement,
+    v: Floats,
+    cells: Floats,
+    shares: Sequence[float],
+    *,
+    generator: np.random.Generator | None = None,
+    n_draws: int = 0,
+) -> tuple[TablePosterior, list[float]]:
+    """Integrate, or draw, the posterior of a coefficient of two raters."""
+    # v and the parameters of the Dirichlet, both (n_categories, n_categories)
+    agreeing = np.eye(len(v), dtype=bool)
+    of_nodes = partial(
+        TablePosterior,
+        disagreeing=float(cells[~agreeing].sum()),
+        agreeing=float(cells.trace()),
+    )
+    if generator is not None or only_agreement_matters(chance, v):
+        if generator is None:  # any x and y
+            x, y = (np.full((1, n), 1.0 / n) for n in (len(v), cells.size - len(v)))
+        else:
+            x = generator.dirichlet(cells[agreeing], size=n_draws)
+            y = generator.dirichlet(cells[~agreeing], size=n_draws)
+        nodes, shown = (
+            Nodes.of(chance, v, np.full(n, 1.0 / n), x[:n], y[:n])
+            for n in (len(x), min(len(x), _SHOWN_DRAWS))
+        )
+        posterior = of_nodes(
+            nodes=lambda _: nodes,
+            shown=lambda _: shown,
+            n_draws=None if generator is None else n_draws,
+        )
+        return posterior, [posterior.quantile(share) for share in shares]
+    grid = partial(grid_nodes, chance, v, cells)
+    for n in _NODES:
+        posterior = of_nodes(nodes=grid(n), shown=grid(3 * n // 4))
+        ends = [posterior.quantile(share) for share in shares]
+        again = [posterior.probability(end, shown=True) for end in ends]
+        if np.allclose(again, shares, rtol=_SETTLED, atol=0.0):
+            return posterior, ends
+    raise ConvergenceError("the quadrature of the posterior has not settled")
+
+
+def only_agreement_matters(chance: ChanceAgreement, v: Floats) -> bool:
+    """Return whether a coefficient depends on how often raters agree, alone."""
+    away = v[~np.eye(len(v), dtype=bool)]
+    return chance in ("none", "uniform") and float(np.ptp(away)) == 0.0
+
+
+def grid_nodes(
+    chance: ChanceAgreement, v: Floats, cells: Floats, n: int
+) -> Callable[[float], Nodes]:
+    """Return the nodes of two categories, for the coefficient at a value."""
+    # both v and cells are 2 by 2
+    x, of_x = beta_nodes(float(cells[0, 0]), float(cells[1, 1]), n)
+
+    @lru_cache(maxsize=1)
+    def nodes(least: float) -> Nodes:
+        y, of_y = np.full((1, 2), 0.5), np.ones(1)
+        if chance == "margins":  # else y does not matter
+            y, of_y = beta_nodes(float(cells[0, 1]), float(cells[1, 0]), n, least)
+        weights = np.outer(of_x, of_y).ravel()
+        large = weights > _NEGLIGIBLE
+        x_each, y_each = np.repeat(x, len(y), axis=0), np.tile(y, (len(x), 1))
+        return Nodes.of(chance, v, weights[large], x_each[large], y_each[large])
+
+    def at(value: float) -> Nodes:
+        # With margins and r = 1 - `value` the coefficient can be at most a negative
+        # value only where r 2 y (1 - y) is at least -`value`; beyond that the
+        # probability is 0, and a grid over all y would not see where it begins.
+        below = max(-value, 0.0)
+        product = below / (1.0 + below)  # least 2 y (1 - y)
+        return nodes(product / (1.0 + math.sqrt(max(1.0 - 2.0 * product, 0.0))))
+
+    return at
+
+
+def table_prior(concentration: float | None, q: int) -> tuple[Floats, str]:
+    """Return the parameters of a Dirichlet over pairs of categories, and its words."""
+    # -> (q, q)
+    if concentration is not None:
+        words = f"Dirichlet({concentration:.3g}, ...) over the cells of the table"
+        return np.full((q, q), concentration), words
+    # Worth 1.5 items, half of it on pairs that agree: with the same parameter in every
+    # cell agreement would be expected to be the rarer, the more categories there are.
+    cells = np.full((q, q), 0.5 * _ITEMS / (q * (q - 1)))
+    np.fill_diagonal(cells, 0.5 * _ITEMS / q)
+    return cells, f"a Dirichlet worth {_ITEMS:g} items, half of it on pairs that agree"
 
 
 def applies_to(problem: IntervalProblem) -> bool:
     """Return whether a table of two raters can answer a question."""
-    if problem.entry.name not in CHANCE_AGREEMENT or problem.n_raters != 2:
-        return False
-    if problem.coded.n_categories > MANY:
-        return False
-    if problem.entry.metric == "ordinal":  # not one of a table, but of its ratings
-        return False
-    table, _ = _table(problem)
-    return _nothing_to_learn(problem, table) is None
-
-
-def default_table_interval(problem: IntervalProblem) -> Interval:
-    """Compute an interval that holds the estimate, one-sided where that is perfect."""
-    perfect = not problem.value < 1.0
-    interval = table_interval(
-        problem, None, n_draws=_DEFAULT_DRAWS, rng=_SEED, one_sided=perfect
-    )
-    return interval if perfect else extended(problem, interval)
+    return _refusal(problem) is None and nothing_to_learn(problem) is None
 
 
 def table_interval(
@@ -94,117 +284,85 @@ def table_interval(
     one_sided: bool = False,
 ) -> Interval:
     """Compute the credible interval of a coefficient of two raters."""
-    _check(problem, n_draws)
-    table, n_single = _table(problem)
-    reason = _nothing_to_learn(problem, table)
+    refusal = _refusal(problem)
+    if refusal is not None:
+        raise ParameterError(refusal)
+    reason = nothing_to_learn(problem)
     if reason is not None:
-        undefined = problem.undefined(reason, method="table posterior", unit=None)
-        return dataclasses.replace(undefined, kind="credible")
+        return undefined(problem, reason, "table posterior")
+    table, n_single = _table(problem)
     q = len(table)
-    prior = (
-        TablePrior.by_default(q)
-        if concentration is None
-        else TablePrior.of(concentration, q)
-    )
+    prior, description = table_prior(concentration, q)
     generator, seed = None, None
-    if needs_draws(CHANCE_AGREEMENT[problem.entry.name], problem.v):
+    chance = CHANCE_AGREEMENT[problem.entry.name]
+    if q > 2 and not only_agreement_matters(chance, problem.v):
         generator, seed = recorded_generator(rng)
-    posterior, ends = _posterior(
-        problem, table + prior.cells, generator, n_draws, one_sided
-    )
-    what = _where_the_prior_weighs(table)
+    tail = (1.0 - problem.level) * (1.0 if one_sided else 0.5)
+    shares = (tail, 0.5) if one_sided else (tail, 0.5, 1.0 - tail)
+    of_cells = partial(table_quantiles, chance, problem.v, shares=shares)
+    posterior, ends = of_cells(table + prior, generator=generator, n_draws=n_draws)
+    low, high = ends[0], 1.0 if one_sided else ends[2]
     notes: tuple[str, ...] = ()
     if n_single:
         notes = (f"left out, items of a single rating: {n_single}",)
+    what = _where_the_prior_weighs(table)
     if what:
-        other = prior.other()
-        _, there = _posterior(
-            problem, table + other.cells, generator, _NOTED_DRAWS, one_sided
-        )
+        # another prior that is as reasonable
+        is_even = concentration is not None and math.isclose(concentration, 1.0 / q)
+        other, other_words = table_prior(None if is_even else 1.0 / q, q)
+        _, there = of_cells(table + other, generator=generator, n_draws=_NOTED_DRAWS)
+        other_high = 1.0 if one_sided else there[2]
         text = (
-            f"{ends[0]:.3f} to {ends[1]:.3f} with {prior.description}, but "
-            f"{there[0]:.3f} to {there[1]:.3f} with {other.description}"
+            f"{low:.3f} to {high:.3f} with {description}, but "
+            f"{there[0]:.3f} to {other_high:.3f} with {other_words}"
         )
         notes += (prior_note(f"{what}, so the prior weighs", text),)
-    interval = _interval(problem, posterior, ends, prior, one_sided)
-    return dataclasses.replace(interval, seed=seed, notes=notes)
-
-
-def _posterior(
-    problem: IntervalProblem,
-    cells: Floats,
-    generator: np.random.Generator | None,
-    n_draws: int,
-    one_sided: bool,
-) -> tuple[TablePosterior, tuple[float, float]]:
-    # of a Dirichlet with these parameters, and the ends of its interval
-    tail = 1.0 - problem.level
-    tail = tail if one_sided else 0.5 * tail
-    posterior, (low, high) = table_quantiles(
-        CHANCE_AGREEMENT[problem.entry.name],
-        problem.v,
-        cells,
-        (tail, 1.0 - tail),
-        start=0.5 if math.isnan(problem.value) else problem.value,
-        generator=generator,
-        n_draws=n_draws,
-    )
-    return posterior, (low, 1.0 if one_sided else high)
-
-
-def _interval(
-    problem: IntervalProblem,
-    posterior: TablePosterior,
-    ends: tuple[float, float],
-    prior: TablePrior,
-    one_sided: bool,
-) -> Interval:
-    low, high = ends
-    method = "Dirichlet posterior of the table of two raters, exact"
+    method = "Dirichlet posterior of the table of two raters"
     errors = None
     if posterior.n_draws is not None:
-        method = method.replace("exact", f"{posterior.n_draws} draws")
         of_high = 0.0 if one_sided else posterior.quantile_error(high)
         errors = (posterior.quantile_error(low), of_high)
+    way = "exact" if errors is None else f"{posterior.n_draws} draws"
     width = high - low  # the density is shown as far beyond the ends
-    lowest = min(problem.entry.lowest, low)
     return Interval(
         low=low,
         high=high,
-        median=posterior.quantile(0.5, 0.5 * (low + high)),
+        median=ends[1],
         level=problem.level,
         kind="credible",
-        method=f"{method}, one-sided" if one_sided else method,
+        method=f"{method}, {way}" + (", one-sided" if one_sided else ""),
         target=problem.target,
         n_resamples=posterior.n_draws,
         monte_carlo_error=errors,
+        seed=seed,
+        notes=notes,
         distribution=posterior.distribution(
-            max(low - width, lowest),
+            max(low - width, min(problem.entry.lowest, low)),
             min(high + width, 1.0),
-            f"posterior of {problem.entry.title}, prior {prior.description}",
+            f"posterior of {problem.entry.title}, prior {description}",
         ),
     )
 
 
-def _check(problem: IntervalProblem, n_draws: int) -> None:
+def _refusal(problem: IntervalProblem) -> str | None:
+    """Return why there is no table of two raters to ask, or None."""
     name, n_raters = problem.entry.name, problem.n_raters
     if name not in CHANCE_AGREEMENT or n_raters != 2:
-        raise ParameterError(
+        return (
             f'model: "table" applies to {", ".join(CHANCE_AGREEMENT)} of exactly two '
             f"raters; got {name} of {n_raters}"
         )
     if problem.coded.n_categories > MANY:
-        raise ParameterError(
+        return (
             f"ratings: a posterior of their table needs at most {MANY} different "
             f"grades, got {problem.coded.n_categories}; use the jackknife"
         )
     if problem.entry.metric == "ordinal":
-        raise ParameterError(
+        return (
             "metric: ordinal depends on the ratings, and so has no posterior; use the "
             "jackknife or the bootstrap"
         )
-    if n_draws < _MIN_DRAWS:
-        raise ParameterError(f"n_draws: needs at least {_MIN_DRAWS}, got {n_draws}")
+    return None
 
 
 def _table(problem: IntervalProblem) -> tuple[Floats, int]:
@@ -215,18 +373,6 @@ def _table(problem: IntervalProblem) -> tuple[Floats, int]:
     cells = np.zeros((problem.coded.n_categories,) * 2)
     cells[tuple(codes[paired].T)] = freq[paired]  # distinct rows: one a cell
     return cells, int(freq[~paired].sum())
-
-
-def _nothing_to_learn(problem: IntervalProblem, table: Floats) -> str | None:
-    if not table.any():
-        return "no item has ratings of two raters"
-    if len(table) < 2:
-        return "one category is declared"
-    if np.isnan(problem.v).any():
-        return "the scale has no such weights"
-    if not problem.v.any():
-        return "the weights count nothing as disagreement"
-    return None
 
 
 def _where_the_prior_weighs(table: Floats) -> str:

@@ -64,6 +64,7 @@ _FEW = 10  # items, and raters, below which a posterior covers best
 _SEVERAL = 30  # items, below which a jackknife alone ends too low
 _ACCIDENT = 0.003  # of (1 - κ) / ratings: a variance below it is no information
 _OUTSIDE = "items with a rating outside the commonest category"
+_DRAWS, _TABLE_DRAWS, _SEED = 2_000, 4_000, 1  # always the same, so that they repeat
 _MANY = 2_000  # items, above which the model's polynomials take long
 _MANY_RATERS = 10  # among whom careless ones are seldom missing
 _CARELESS = (
@@ -292,30 +293,39 @@ def _outside_commonest(problem: IntervalProblem) -> tuple[int, bool]:
 def _posterior(problem: IntervalProblem, alike: bool) -> Interval | None:
     """Compute the posterior, one-sided where the estimate is perfect or undefined."""
     # imported here: they load scipy
-    from masrel.intervals._drawn_posterior import (
-        DEFAULT_DRAWS,
-        SEED,
+    from masrel.intervals._dirichlet import (
         alike_interval,
-        nothing_to_learn,
+        no_posterior,
         patterns_interval,
     )
-    from masrel.intervals._rho import DEFAULT_PRIOR, default_rho_interval, extended
-    from masrel.intervals._table_quadrature import CHANCE_AGREEMENT
-    from masrel.intervals._two_raters import applies_to, default_table_interval
+    from masrel.intervals._rho import DEFAULT_PRIOR, extended, rho_interval
+    from masrel.intervals._two_raters import (
+        CHANCE_AGREEMENT,
+        applies_to,
+        table_interval,
+    )
 
-    if nothing_to_learn(problem):
+    if no_posterior(problem):
         return None
     name, unweighted = problem.entry.name, problem.unweighted
     chance, small = CHANCE_AGREEMENT.get(name), problem.n_paired_items <= _MANY
     alike = alike and unweighted and chance is not None and small
     is_rho = alike and chance in ("pooled", "margins")
-    if is_rho or (small and unweighted and name in _RHO_COEFFICIENTS):
-        return default_rho_interval(problem)
-    if not alike and small and applies_to(problem):
-        return default_table_interval(problem)
     one_sided = not problem.value < 1.0
-    drawn = partial(alike_interval, prior=DEFAULT_PRIOR) if alike else patterns_interval
-    interval = drawn(problem, n_draws=DEFAULT_DRAWS, rng=SEED, one_sided=one_sided)
+    if is_rho or (small and unweighted and name in _RHO_COEFFICIENTS):
+        interval = rho_interval(problem, DEFAULT_PRIOR, one_sided=one_sided)
+    elif alike:
+        interval = alike_interval(
+            problem, DEFAULT_PRIOR, n_draws=_DRAWS, rng=_SEED, one_sided=one_sided
+        )
+    elif small and applies_to(problem):
+        interval = table_interval(
+            problem, None, n_draws=_TABLE_DRAWS, rng=_SEED, one_sided=one_sided
+        )
+    else:
+        interval = patterns_interval(
+            problem, n_draws=_DRAWS, rng=_SEED, one_sided=one_sided
+        )
     return interval if one_sided else extended(problem, interval)
 
 
@@ -325,7 +335,7 @@ def _lift(problem: IntervalProblem, interval: Interval) -> Interval:
     from masrel.intervals._rho import DEFAULT_PRIOR, RhoPosterior
 
     counts = problem.item_counts()
-    high = RhoPosterior.of(counts, DEFAULT_PRIOR, problem.level).high
+    _, high = RhoPosterior.of(counts, DEFAULT_PRIOR).ends(problem.level)
     if not high > interval.high:
         return interval
     note = (

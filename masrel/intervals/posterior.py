@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 # whoever the raters; raters alike share it by other coefficients, too.
 _RHO_COEFFICIENTS = ("fleiss_kappa", "scott_pi", "krippendorff_alpha")
 
+_MIN_DRAWS = 100
+
 _Model = Literal["auto", "dirichlet-multinomial", "table", "patterns"]
 
 
@@ -129,15 +131,17 @@ def posterior(
         level=level,
     )
     # Imported here: the other intervals load no scipy.
+    from masrel.intervals._dirichlet import alike_interval, patterns_interval
     from masrel.intervals._rho import Prior, rho_interval
+    from masrel.intervals._two_raters import table_interval
 
     checked_prior = Prior.of(prior, 1.0 if concentration is None else concentration)
     model = _checked_model(problem, model)
-    if model == "dirichlet-multinomial" and _is_rho(problem, weights):
-        return rho_interval(problem, checked_prior)
-    from masrel.intervals._drawn_posterior import alike_interval, patterns_interval
-
+    if n_draws < _MIN_DRAWS:
+        raise ParameterError(f"n_draws: needs at least {_MIN_DRAWS}, got {n_draws}")
     if model == "dirichlet-multinomial":
+        if _is_rho(problem, weights):
+            return rho_interval(problem, checked_prior)
         return alike_interval(problem, checked_prior, n_draws=n_draws, rng=rng)
     options = "" if prior == "uniform" else f'prior="{prior}"'
     if model == "patterns" and concentration is not None:
@@ -146,8 +150,6 @@ def posterior(
         raise ParameterError(f'model: "{model}" has one prior; got {options}')
     if model == "patterns":
         return patterns_interval(problem, n_draws=n_draws, rng=rng)
-    from masrel.intervals._two_raters import table_interval
-
     return table_interval(problem, concentration, n_draws=n_draws, rng=rng)
 
 
@@ -174,7 +176,7 @@ def _checked_model(problem: IntervalProblem, model: _Model) -> _Model:
 
 def _is_rho(problem: IntervalProblem, weights: "WeightsLike") -> bool:
     """Return whether a coefficient is ρ where raters are alike, checked."""
-    from masrel.intervals._table_quadrature import CHANCE_AGREEMENT
+    from masrel.intervals._two_raters import CHANCE_AGREEMENT
 
     name = problem.entry.name
     if not problem.unweighted or name not in CHANCE_AGREEMENT:

@@ -11,23 +11,24 @@ import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.special import betainc, expit, gammaln, logit
+from scipy.special import betainc, expit, gammaln, log_expit, logit
 
 from masrel.agreement import Label
 from masrel.agreement._codes import code_pairs, pair_table
 from masrel.agreement._engine import Floats, check_level
 from masrel.errors import UndefinedStatisticWarning
 from masrel.estimates import Interval, Target
-from masrel.intervals._dirichlet_multinomial import log_convolve
 from masrel.intervals._quadrature import (
     LineDistribution,
     integrated_sinc,
-    line_distribution,
+    log_convolve,
     log_sum_exp,
+    solve_quantile,
+    where_it_matters,
 )
 from masrel.intervals._rho import PRIOR_SHAPES, Prior, PriorName
 from masrel.intervals.quantity import Quantity
@@ -35,7 +36,7 @@ from masrel.intervals.quantity import Quantity
 _METHOD = "hierarchical kappa model, exact"
 _GRID = np.linspace(-20.0, 20.0, 65)  # logit 3 g, for a trapezoid sum over all of it
 _MAX_LOGIT = 48.0  # logit m beyond which a uniform prior has no mass that matters
-_NEGLIGIBLE = 45.0  # log-density below its largest
+_N_MEANS = 257  # of the mean, whose ends are within 1e-11
 _LEFT_OUT = 1e-6  # probability of the smallest terms of a rater's mixture, together
 
 
@@ -149,10 +150,10 @@ def retest_model(
         return _undefined("one category is declared", checked_prior, level)
     used = list(tables.values())
     shares = (0.5, 0.5 - 0.5 * level, 0.5 + 0.5 * level)
-    posterior = _Posterior.of(used, shares, checked_prior)
-    kappa = _mean_kappa(posterior.quantiles, level)
+    posterior = _Posterior.of(used, checked_prior)
+    kappa = _mean_kappa(posterior.quantiles(shares), level)
     others = [
-        (_mean_kappa(_Posterior.of(used, shares, other).quantiles, level), other)
+        (_mean_kappa(_Posterior.of(used, other).quantiles(shares), level), other)
         for other in checked_prior.others(coded.n_categories)
     ]
     other_kappa, other = max(others, key=lambda by: _moved(by[0].interval, kappa))
@@ -238,84 +239,63 @@ class _Posterior:
     raters: "tuple[_RaterPairs, ...]" = field(compare=False, repr=False)  # the data
     # the distribution of logit m
     mean: LineDistribution = field(compare=False, repr=False)
-    quantiles: tuple[float, ...]  # of m, at the requested shares
     # (n_means, n_spreads): probabilities of the points (`mean.points`, `_GRID`)
     masses: Floats = field(compare=False, repr=False)
 
     @classmethod
-    def of(
-        cls,
-        tables: Sequence[NDArray[np.int64]],
-        shares: Sequence[float],
-        prior: Prior,
-    ) -> "_Posterior":
+    def of(cls, tables: Sequence[NDArray[np.int64]], prior: Prior) -> "_Posterior":
         """Integrate the posterior of tables (n_categories, n_categories)."""
         # m ~ Beta(shape, shape); g ~ U(0, 1/3)
         shape = PRIOR_SHAPES[prior.name]
         raters = tuple(_RaterPairs.of(table, prior.concentration) for table in tables)
-        known: dict[float, Floats] = {}  # log-density over _GRID, by logit m
-
-        def log_density(mean: Floats) -> Floats:
-            rows = _log_joint(raters, shape, mean, _GRID)
-            known.update(zip(mean.tolist(), rows, strict=True))
-            return log_sum_exp(rows)
-
-        low, high = _reach(raters, shape)
-        mean, ends = line_distribution(log_density, low, high, shares)
-        joint = np.array([known[point] for point in mean.points.tolist()])
+        coarse = partial(_log_joint, raters, shape, logit_g=_GRID[::4])
+        ends = -_MAX_LOGIT / shape, _MAX_LOGIT / shape
+        low, high = where_it_matters(lambda mean: log_sum_exp(coarse(mean)), *ends)
+        points = np.linspace(low, high, _N_MEANS)
+        joint = _log_joint(raters, shape, points, _GRID)
         masses = np.exp(joint - joint.max())
-        return cls(
-            raters=raters,
-            mean=mean,
-            quantiles=tuple(expit(ends).tolist()),
-            masses=masses / masses.sum(),
-        )
+        masses /= masses.sum()
+        mean = LineDistribution(points=points, masses=masses.sum(axis=1))
+        return cls(raters=raters, mean=mean, masses=masses)
+
+    def quantiles(self, shares: Sequence[float]) -> list[float]:
+        """Return quantiles of the mean."""
+        ends: list[float] = expit(self.mean.quantiles(shares)).tolist()
+        return ends
 
     def rater_quantiles(self, rater: int, shares: Sequence[float]) -> list[float]:
         """Return quantiles of one rater's kappa."""
         # Given m and g it is a mixture of Betas, one a term of the likelihood.
-        mass, up, down = self._mixture(self.raters[rater])
-
-        def excess(kappa: float, share: float) -> float:
-            return float(mass @ betainc(up, down, kappa)) - share
-
-        return [
-            float(brentq(excess, 0.0, 1.0, args=(share,), xtol=1e-9))
-            for share in shares
-        ]
-
-    def _mixture(self, pairs: "_RaterPairs") -> tuple[Floats, Floats, Floats]:
-        # -> probability and both parameters of every Beta that weighs, all (n,)
-        # every other mean: the lattice before the last halving, which moved nothing
+        pairs = self.raters[rater]
+        # every other mean, which is as good
         masses, points = self.masses[::2], self.mean.points[::2]
         at, of = np.nonzero(_weighs(masses))
-        mean, logit_g = points[at], _GRID[of]
-        terms = pairs.log_terms(_Moments.of(mean, logit_g, pairs.agree + pairs.differ))
-        terms -= log_sum_exp(terms)[:, None]
-        mass = masses[at, of, None] * np.exp(terms)  # (n, agree + 1)
+        up, down = _parameters(points[at], _GRID[of])
+        terms = pairs.log_terms(up, down)
+        mass = np.exp(terms - log_sum_exp(terms)[:, None]) * masses[at, of, None]
         node, j = np.nonzero(_weighs(mass))
-        size = 3.0 / expit(logit_g[node]) - 1.0  # 1 / g - 1, what the population weighs
-        up = expit(mean[node]) * size + pairs.agree - j
-        down = expit(-mean[node]) * size + pairs.differ + j
-        weight = mass[node, j]
-        return weight / weight.sum(), up, down
+        weights = mass[node, j] / mass[node, j].sum()
+        up, down = up[node] + pairs.agree - j, down[node] + pairs.differ + j
+
+        def probability(kappa: float) -> float:
+            return float(weights @ betainc(up, down, kappa))
+
+        return [solve_quantile(probability, share, 0.0, 1.0) for share in shares]
 
     def sd_quantiles(self, shares: Sequence[float]) -> list[float]:
         """Return quantiles of the standard deviation of kappa over raters."""
-        # of √(m (1 - m) g), to about 1e-9
+        # of √(m (1 - m) g), to about 1e-4: it has a kink in m
         variance = expit(self.mean.points) * expit(-self.mean.points)
-        step = _GRID[1] - _GRID[0]
+        step = float(_GRID[1] - _GRID[0])
 
-        def excess(deviation: float, share: float) -> float:
+        def probability(deviation: float) -> float:
             # 3 g may go so far at every m
             max_g = np.minimum(3.0 * deviation**2 / variance, 1.0)
             below = integrated_sinc(logit(max_g)[:, None] - _GRID, step)
-            return float((self.masses * below).sum()) - share
+            return float((self.masses * below).sum())
 
-        return [
-            float(brentq(excess, 1e-12, np.sqrt(1.0 / 12.0), args=(share,), xtol=1e-9))
-            for share in shares
-        ]
+        most = math.sqrt(1.0 / 12.0)
+        return [solve_quantile(probability, share, 1e-12, most) for share in shares]
 
 
 def _weighs(masses: Floats) -> NDArray[np.bool_]:
@@ -325,66 +305,24 @@ def _weighs(masses: Floats) -> NDArray[np.bool_]:
     return np.asarray(masses >= ascending[few])
 
 
-def _reach(raters: "Sequence[_RaterPairs]", shape: float) -> tuple[float, float]:
-    # logit m between which there is all that matters, from a coarse look
-    coarse = np.linspace(-_MAX_LOGIT / shape, _MAX_LOGIT / shape, 129)
-    log = _log_joint(raters, shape, coarse, _GRID[::8]).max(axis=1)
-    inside = coarse[log > log.max() - _NEGLIGIBLE]
-    step = coarse[1] - coarse[0]
-    return float(inside[0] - step), float(inside[-1] + step)
+def _parameters(mean: Floats, logit_g: Floats) -> tuple[Floats, Floats]:
+    # of the Beta of κ, of logit m and logit 3 g
+    size = 3.0 / expit(logit_g) - 1.0  # 1 / g - 1, what the population weighs
+    return expit(mean) * size, expit(-mean) * size
 
 
 def _log_joint(
     raters: "Sequence[_RaterPairs]", shape: float, mean: Floats, logit_g: Floats
 ) -> Floats:
     # mean (n,), logit_g (s,) -> log-density of (logit m, logit 3 g) but for a constant
-    max_pairs = max(pairs.agree + pairs.differ for pairs in raters)
-    means, logits_g = np.repeat(mean, logit_g.size), np.tile(logit_g, mean.size)
-    moments = _Moments.of(means, logits_g, max_pairs)
-    likelihood = np.zeros(mean.size * logit_g.size)
+    up, down = _parameters(np.repeat(mean, logit_g.size), np.tile(logit_g, mean.size))
+    likelihood = np.zeros(up.size)
     for pairs in raters:
-        likelihood += log_sum_exp(pairs.log_terms(moments))
+        likelihood += log_sum_exp(pairs.log_terms(up, down))
     # densities of m and 3 g times the Jacobians of their logits
-    of_mean = shape * (_log_expit(mean) + _log_expit(-mean))
-    of_g = _log_expit(logit_g) + _log_expit(-logit_g)
+    of_mean = shape * (log_expit(mean) + log_expit(-mean))
+    of_g = log_expit(logit_g) + log_expit(-logit_g)
     return likelihood.reshape(mean.size, -1) + of_mean[:, None] + of_g
-
-
-def _log_expit(x: Floats) -> Floats:
-    return -np.logaddexp(0.0, -x)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Moments:
-    """Moments E[κ^p (1 - κ)^q] of the Beta of mean m and spread g, as factors."""
-
-    # Times g in every factor they are Π_{i<p}(m (1 - g) + i g) Π_{i<q}((1 - m)(1 - g) +
-    # i g) / Π_{i<p+q}(1 - g + i g).
-
-    # (n, largest p + q + 1): logarithms of the three products, by their number of
-    # factors
-    up: Floats = field(compare=False, repr=False)
-    down: Floats = field(compare=False, repr=False)
-    denominator: Floats = field(compare=False, repr=False)
-
-    @classmethod
-    def of(cls, mean: Floats, logit_g: Floats, max_pairs: int) -> "_Moments":
-        """Compute them for logit m and logit 3 g, both (n,), up to p + q."""
-        g = (expit(logit_g) / 3.0)[:, None]
-        depth = np.arange(max_pairs) * g  # (n, max_pairs)
-        rest = 1.0 - g
-        return cls(
-            up=_log_products(expit(mean)[:, None] * rest + depth),
-            down=_log_products(expit(-mean)[:, None] * rest + depth),
-            denominator=_log_products(rest + depth),
-        )
-
-
-def _log_products(factors: Floats) -> Floats:
-    # (n, p) -> (n, p + 1): logarithms of the products of the first 0, 1, ..., p
-    logs = np.zeros((factors.shape[0], factors.shape[1] + 1))
-    np.cumsum(np.log(factors), axis=1, out=logs[:, 1:])
-    return logs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -400,40 +338,38 @@ class _RaterPairs:
     @classmethod
     def of(cls, table: NDArray[np.int64], concentration: float) -> "_RaterPairs":
         """Integrate the shares of the categories out of a rater's table."""
-        agree = int(np.diagonal(table).sum())
+        # With d_k pairs of k and k, and o_k unequal grades of k, the likelihood is
+        # (1 - κ)^differ times the mean of Π_k π_k^(d_k + o_k) (κ + (1 - κ) π_k)^d_k
+        # over the Dirichlet, whose moments are
+        # Π_k Γ(a + t_k) / Γ(a) · Γ(K a) / Γ(K a + Σ t_k).
+        equal = np.diagonal(table)
+        graded = table.sum(axis=0) + table.sum(axis=1) - equal  # d_k + o_k
+        total = np.zeros(1)
+        for d, t in zip(equal.tolist(), graded.tolist(), strict=True):
+            j = np.arange(d + 1)
+            binomial = gammaln(d + 1) - gammaln(j + 1) - gammaln(d - j + 1)
+            moment = gammaln(concentration + t + j) - gammaln(concentration)
+            total = log_convolve(total, binomial + moment)
+        mass = concentration * len(table)
+        power = graded.sum() + np.arange(total.size)
+        agree = int(equal.sum())
         return cls(
             agree=agree,
             differ=int(table.sum()) - agree,
-            log_weights=_log_weights(table, concentration),
+            log_weights=total + gammaln(mass) - gammaln(mass + power),
         )
 
-    def log_terms(self, moments: _Moments) -> Floats:
-        """Return the logarithms of the terms of the likelihood of (m, g)."""
+    def log_terms(self, up: Floats, down: Floats) -> Floats:
+        """Return the logarithms of the terms of the likelihood, κ ~ Beta(up, down)."""
         # κ is integrated out: in term j it has the powers agree - j and differ + j
         # -> (n, agree + 1)
-        n = self.agree + self.differ
-        return np.asarray(
-            self.log_weights
-            + moments.up[:, self.agree :: -1]
-            + moments.down[:, self.differ : n + 1]
-            - moments.denominator[:, [n]]
-        )
+        j = np.arange(self.agree + 1)
+        up, down = up[:, None], down[:, None]
+        moments = _log_rising(up, self.agree - j) + _log_rising(down, self.differ + j)
+        moments -= _log_rising(up + down, self.agree + self.differ)
+        return self.log_weights + moments
 
 
-def _log_weights(table: NDArray[np.int64], concentration: float) -> Floats:
-    # Expands the likelihood of κ: (n_categories, n_categories) -> (agree + 1,),
-    # logarithms of the weights of κ^(agree - j) (1 - κ)^(differ + j). With d_k pairs of
-    # k and k, and o_k unequal grades of k, it is (1 - κ)^differ times the mean of
-    # Π_k π_k^(d_k + o_k) (κ + (1 - κ) π_k)^d_k over the Dirichlet, whose moments are
-    # Π_k Γ(a + t_k) / Γ(a) · Γ(K a) / Γ(K a + Σ t_k).
-    equal = np.diagonal(table)
-    graded = table.sum(axis=0) + table.sum(axis=1) - equal  # d_k + o_k
-    total = np.zeros(1)
-    for d, t in zip(equal.tolist(), graded.tolist(), strict=True):
-        j = np.arange(d + 1)
-        binomial = gammaln(d + 1) - gammaln(j + 1) - gammaln(d - j + 1)
-        moment = gammaln(concentration + t + j) - gammaln(concentration)
-        total = log_convolve(total, binomial + moment)
-    mass = concentration * len(table)
-    power = graded.sum() + np.arange(total.size)
-    return np.asarray(total + gammaln(mass) - gammaln(mass + power))
+def _log_rising(x: Floats, n: NDArray[np.int64] | int) -> Floats:
+    # log x (x + 1) ... (x + n - 1)
+    return np.asarray(gammaln(x + n) - gammaln(x))

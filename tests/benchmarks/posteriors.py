@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import expit
 
 from masrel.intervals import posterior
-from masrel.intervals._dirichlet_multinomial import DirichletMultinomial
-from masrel.intervals._rho import DEFAULT_PRIOR, RhoPosterior
+from masrel.intervals._rho import DEFAULT_PRIOR, DirichletMultinomial, RhoPosterior
 from tests.benchmarks.bootstrap import Codes, Point, Race, counted, made, measured
 from tests.benchmarks.sidebyside import Timing, side_by_side
 from tests.intervals.gauss_legendre import ByPanels

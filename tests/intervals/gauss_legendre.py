@@ -1,8 +1,6 @@
-"""The same posterior by another way: integers or log-sums, and Gauss-Legendre panels.
+"""The same posterior by another way: sums of logarithms, and Gauss-Legendre panels.
 
-The polynomial is multiplied out in Python's integers, whole polynomials packed into
-one number each, so that no coefficient is rounded and no gamma function is asked; for
-many items, where those integers have millions of digits, in sums of logarithms. The
+The polynomial is multiplied out factor by factor, and no gamma function is asked. The
 density is integrated in panels over all that matters of logit ρ.
 """
 
@@ -30,9 +28,7 @@ class ByPanels:
         shape: float = 1.0,
         panels: int = 400,
     ) -> None:
-        few = sum(map(sum, counts)) <= 600
-        terms = _exact_terms if few else _log_sum_terms
-        self._terms, self._powers = terms(counts, a)
+        self._terms, self._powers = _log_terms(counts, a)
         sizes = [sum(row) for row in counts]
         self._below = [sum(n > j for n in sizes) for j in range(max(sizes))]
         self._shape = shape
@@ -98,22 +94,8 @@ class ByPanels:
         return float(low), float(high)
 
 
-def _exact_terms(counts: Counts, a: Fraction) -> tuple[Floats, Floats]:
+def _log_terms(counts: Counts, a: Fraction) -> tuple[Floats, Floats]:
     # log of each coefficient of A^t, and t
-    lowest, product = 0, [1]
-    for above in _above(counts):
-        moment, weighted = 1, []  # Γ(a + t) / Γ(a) (denominator of a)^t, an integer
-        for t, c in enumerate([0] * above[0] + _product(above)):
-            if t >= above[0]:
-                weighted.append(c * moment)
-            moment *= a.numerator + t * a.denominator
-        lowest, product = lowest + above[0], _times(product, weighted)
-    powers = lowest + np.arange(len(product), dtype=np.float64)
-    logs = np.array([math.log(c) for c in product]) - powers * math.log(a.denominator)
-    return logs - _log_moments(a * len(counts[0]), lowest, len(product)), powers
-
-
-def _log_sum_terms(counts: Counts, a: Fraction) -> tuple[Floats, Floats]:
     lowest, product = 0, np.zeros(1)  # of logarithms
     for above in _above(counts):
         category = np.zeros(1)
@@ -146,23 +128,3 @@ def _log_times(one: Floats, two: Floats) -> Floats:
         part = out[i : i + two.size]
         np.logaddexp(part, log + two, out=part)
     return out
-
-
-def _product(above: Sequence[int]) -> list[int]:
-    # coefficients of Π_{j>0} (x + j)^N_j: its value at a power of 2 above all of them
-    largest = math.prod((1 + j) ** n for j, n in enumerate(above) if j)
-    bits = largest.bit_length() + 1
-    x = 1 << bits
-    value = math.prod((x + j) ** n for j, n in enumerate(above) if j)
-    return _unpacked(value, bits, sum(above[1:]) + 1)
-
-
-def _times(one: list[int], two: list[int]) -> list[int]:
-    bits = (max(one) * max(two) * min(len(one), len(two))).bit_length() + 1
-    packed = [sum(c << (bits * i) for i, c in enumerate(of)) for of in (one, two)]
-    return _unpacked(packed[0] * packed[1], bits, len(one) + len(two) - 1)
-
-
-def _unpacked(value: int, bits: int, n: int) -> list[int]:
-    mask = (1 << bits) - 1
-    return [(value >> (bits * i)) & mask for i in range(n)]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.intervals.latent._coordinates import Traits
+from masrel.intervals.latent._model import Traits
 
 Floats = NDArray[np.float64]
 

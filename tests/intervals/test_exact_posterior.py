@@ -1,12 +1,7 @@
 """The exact posterior of ρ against values by hand, panels, and a published table."""
 
-import csv
-import json
 import math
-import subprocess
-import sys
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,8 +11,6 @@ from masrel.estimates import Interval
 from masrel.intervals import posterior
 from tests.intervals.data import SCALE, TABLE_V, dirichlet_multinomial
 from tests.intervals.gauss_legendre import ByPanels
-
-PUBLISHED = Path(__file__).parents[2] / "studies/hess2012/ratings/published.csv"
 
 Ratings = list[list[str | None]]
 
@@ -98,40 +91,14 @@ def test_single_ratings_inform_the_shares_only(m: int) -> None:
 def test_table_v(
     categories: tuple[str, ...], options: dict[str, object], expected: tuple[float, ...]
 ) -> None:
-    with PUBLISHED.open(encoding="utf-8", newline="") as file:
-        grades = {
-            (row["model"], row["rater"]): row["grade"]
-            for row in csv.DictReader(file)
-            if row["session"] == "test"
-        }
-    models = ("HM1", "HM2", "HM3", "HM4")
-    ratings = [
-        [grades[model, f"R{rater + 1}"] for rater in range(8)] for model in models
-    ]
     result = posterior(
         "fleiss_kappa",
-        ratings,
+        TABLE_V,
         target="items",
         categories=categories,
         **options,  # type: ignore[arg-type]
     )
     assert ends(result) == pytest.approx(expected, abs=6e-6)
-
-
-def test_the_bound_is_the_priors_where_one_category_was_used() -> None:
-    # lower 95 % bounds of four items by eight raters
-    bounds = [
-        posterior(
-            "fleiss_kappa",
-            [["1"] * 8] * 4,
-            target="items",
-            categories=SCALE,
-            concentration=a,
-            level=0.9,
-        ).low
-        for a in (1.0, 1 / 6)
-    ]
-    assert bounds == pytest.approx([0.554, 0.118], abs=5e-4)
 
 
 def labelled(counts: NDArray[np.int64] | list[list[int]]) -> Ratings:
@@ -204,54 +171,3 @@ def test_ends_are_right_at_every_level(level: float) -> None:
     )
     expected = [panels.quantile(0.5 - 0.5 * level), panels.quantile(0.5 + 0.5 * level)]
     assert ends(result) == pytest.approx(expected, abs=1e-8)
-
-
-def test_two_categories_agree_with_an_integral_over_rho_and_the_share() -> None:
-    # No polynomial: the beta-binomial likelihood, integrated over both by panels.
-    n_first, n = np.array([2, 0, 3, 2, 0, 1, 3]), 3
-    x, w = np.polynomial.legendre.leggauss(60)
-    rho, share = 0.5 * (x + 1.0), 0.5 * (x + 1.0)
-
-    def inner(rho: NDArray[np.float64]) -> NDArray[np.float64]:
-        a = ((1.0 - rho) / rho)[:, None] * share
-        b = ((1.0 - rho) / rho)[:, None] * (1.0 - share)
-        value = np.ones_like(a)
-        for first in n_first:
-            for j in range(first):
-                value *= a + j
-            for j in range(n - first):
-                value *= b + j
-            for j in range(n):
-                value /= a + b + j
-        return np.asarray(value @ w)
-
-    total = inner(rho) @ w
-    ratings = [["a"] * k + ["b"] * (n - k) for k in n_first.tolist()]
-    result = posterior("fleiss_kappa", ratings, target="items")
-    for end, below in zip(ends(result), (0.025, 0.975), strict=True):
-        assert inner(rho * end) @ w * end / total == pytest.approx(below, abs=1e-10)
-
-
-_COUNTED = """
-import json, sys
-import numpy as np
-from masrel.intervals.posterior import posterior
-
-def no(*arguments, **options):
-    raise RuntimeError("drew a random number")
-
-np.random.default_rng = np.random.SeedSequence = np.random.RandomState = no
-np.random.random = np.random.normal = np.random.rand = no
-ratings = [["a", "a", "b"], ["b", "b", "b"], ["a", "a", "a"]]
-result = posterior("fleiss_kappa", ratings, target="items", rng=1)
-heavy = ("emcee", "arviz_stats", "scipy.stats", "pandas")
-loaded = [name for name in heavy if name in sys.modules]
-print(json.dumps([result.n_resamples, result.monte_carlo_error, result.seed, loaded]))
-"""
-
-
-def test_exact_draws_nothing_and_loads_no_sampler() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", _COUNTED], check=True, capture_output=True, text=True
-    )
-    assert json.loads(done.stdout) == [None, None, None, []]

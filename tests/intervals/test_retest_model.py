@@ -106,13 +106,14 @@ def test_where_there_is_nothing_to_learn_it_is_undefined() -> None:
         retest_model([[["a", "a"], ["a", "a"]]])
 
 
-def test_what_is_no_question_is_refused() -> None:
-    pairs = [[["a", "a"], ["b", "b"]]]
-    with pytest.raises(ParameterError, match="level"):
-        retest_model(pairs, level=1.0)
-    with pytest.raises(ParameterError, match="prior"):
-        retest_model(pairs, prior="flat")  # type: ignore[arg-type]
-    with pytest.raises(ParameterError, match="concentration"):
-        retest_model(pairs, concentration=0.0)
+@pytest.mark.parametrize(
+    "options", [{"level": 1.0}, {"prior": "flat"}, {"concentration": 0.0}]
+)
+def test_what_is_no_question_is_refused(options: dict[str, object]) -> None:
+    with pytest.raises(ParameterError):
+        retest_model([[["a", "a"], ["b", "b"]]], **options)  # type: ignore[arg-type]
+
+
+def test_what_are_no_pairs_is_refused() -> None:
     with pytest.raises(RatingsError):
         retest_model("aabb")

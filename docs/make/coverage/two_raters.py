@@ -29,7 +29,7 @@ from docs.make.coverage.tables import (
     gwet,
     on_scale,
 )
-from masrel.intervals._two_raters import TablePrior
+from masrel.intervals._two_raters import table_prior
 
 DOCS = Path(__file__).parents[2]
 SEED, SIZE, QUICK = 20_261, 2_000, 100
@@ -76,7 +76,7 @@ def draw(question: Question, size: int) -> tuple[Tables, float]:
 def intervals(tables: Tables) -> dict[str, Bounds]:
     """Compute all candidates."""
     q = tables.counts.shape[-1]
-    posterior = tables.posterior(TablePrior.by_default(q).cells)
+    posterior = tables.posterior(table_prior(None, q)[0])
     held = Bounds(
         low=np.fmin(posterior.low, tables.value),
         high=np.fmax(posterior.high, tables.value),

@@ -18,7 +18,7 @@ from scipy.special import ndtr
 
 from masrel.agreement._engine import Floats
 from masrel.agreement._labels import Codes
-from masrel.intervals.latent._coordinates import Traits
+from masrel.intervals.latent._model import Traits
 
 Items = Literal["fixed", "random"]
 """Whether kappa is for these items, or for new ones of their population."""

@@ -4,31 +4,21 @@ Metric and step length are fitted in warm-up and then stay: a chain that goes on
 adapting has no distribution to converge to.
 """
 
-import itertools
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
+import emcee
 import numpy as np
+from arviz_stats.base import array_stats
 from scipy.optimize import minimize
 
 from masrel.agreement._engine import Floats
-from masrel.intervals._mcmc import (
-    MAX_R_HAT,
-    Walkers,
-    diagnose,
-    not_converged,
-    steps_needed,
-)
-from masrel.intervals.latent._coordinates import Information, Traits
-from masrel.intervals.latent._density import LatentDensity
-from masrel.intervals.latent._implied import (
-    Agreement,
-    Items,
-    agreement_on_items,
-    agreement_on_new_items,
-)
+from masrel.errors import ConvergenceError
+from masrel.intervals.latent._model import Information, LatentDensity
+
+MAX_R_HAT = 1.01
 
 JOURNEY = 2.0
 """How far a proposal of the fitted step length goes, in units of the metric; with the
@@ -46,11 +36,8 @@ EXPECTED_STEPS = 1_000
 """Steps of a chain that studies take, warm-up among them: from 400 to 2300."""
 
 # Gradients of all chains that studies take, about 3000 to 12 000 where ratings place
-# the items, 11 000 to 23 000 where they hardly do, 35 000 where raters disagree on one
-# item alone; and checks.
-_GRADIENTS = {"placed": 5_700, "loose": 15_000, "agreed": 30_000}
-_AGREED = 0.05  # share of items with dissent below which raters agree on nearly all
-_CHECKS = 4
+# the items, 11 000 to 23 000 where they hardly do; and checks
+_GRADIENTS = {"placed": 5_700, "loose": 15_000}
 _N_CURVED = 32  # chains at whose places the curvature is averaged
 _UNKNOWN = 0.3  # deviation in which chains begin around ρ', f' and η
 _WIDER = 2.0  # from where a variance of the draws is believed over the curvature
@@ -59,72 +46,12 @@ _N_CHAINS = 64
 _MANY = 1_000  # ratings from which half as many chains do: a step then costs by them
 _MIN_CURVATURE = 0.2  # least curvature that is believed
 _MAX_DROP = 0.75  # how far below the mode chains may begin, per dimension
-_MAX_KAPPAS = 8_192  # positions where an integral over new items is computed
 
 _Proposal = Callable[[Floats, np.random.RandomState], tuple[Floats, Floats]]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LatentFit:
-    """The model after the data."""
-
-    density: LatentDensity  # what was sampled
-    # draws of kappa and of all in `parts`, in that order
-    chains: "Chains" = field(repr=False)
-    # where "kappa", "severity", "bias", "noise", "thresholds", "shares" (of the items,
-    # the biases and the noises) and "noise_spread" are among the quantities
-    parts: dict[str, slice]
-    # of two new raters, at the positions where kappa was computed
-    agreement: Agreement = field(repr=False)
-
-    def draws(self, max_draws: int) -> Traits:
-        """Return the unknowns at no more than so many positions of all chains."""
-        return self.density.traits(_some(self.chains.positions, max_draws))
-
-
-def fit_latent(
-    density: LatentDensity,
-    items: Items,
-    *,
-    generator: np.random.Generator,
-    n_steps: int,
-    max_steps: int,
-    progress: Callable[[int], object] | None,
-    expect: Callable[[int], object] | None = None,
-) -> LatentFit:
-    """Sample the model until every reported quantity has converged."""
-    agreement: list[Agreement] = []
-
-    def quantities(positions: Floats) -> list[Floats]:
-        agreement[:] = [_agreement(density, positions, items)]
-        kappa = agreement[0].kappa
-        traits = density.traits(positions.reshape(-1, density.n_dimensions))
-        columns = np.column_stack([part for _, part in _reported(traits)]).T
-        rest = columns.reshape(len(columns), *positions.shape[:2])
-        return [kappa.reshape(len(positions), -1), *rest]
-
-    density, start, covariance = _begin(density, generator)
-    chains = sample_smooth(
-        density,
-        quantities,
-        start,
-        covariance,
-        generator=generator,
-        n_steps=n_steps,
-        max_steps=max_steps,
-        progress=progress,
-        expect=expect,
-    )
-    return LatentFit(
-        density=density,
-        chains=chains,
-        parts=_parts(density.traits(start)),
-        agreement=agreement[0],
-    )
-
-
 def _n_chains(density: LatentDensity) -> int:
-    return _N_CHAINS // 2 if density.cells.side.size > _MANY else _N_CHAINS
+    return _N_CHAINS // 2 if density.side.size > _MANY else _N_CHAINS
 
 
 def n_warm_up_steps() -> int:
@@ -132,82 +59,24 @@ def n_warm_up_steps() -> int:
     return sum(_WARM_UP)
 
 
-def expected_run_seconds(density: LatentDensity, items: Items) -> float:
-    """Return about how long the model takes to converge under one prior."""
-    # Costs are those of one gradient and of kappa and the diagnostics at a check,
-    # timed; how many there will be is what studies took.
-    n_chains = _n_chains(density)
-    position = np.tile(density.start(), (n_chains, 1))
-    gradient = _timed(lambda: density.gradient(position))
-    kappa = _timed(lambda: _agreement(density, position[:, None], items))
-    draws = np.random.default_rng(0).standard_normal((n_chains, _MAX_KEPT // 2))
-    check = _timed(lambda: diagnose(draws)) * (density.n_dimensions + 3)
-    n_kappas = _MAX_KAPPAS / n_chains if items == "random" else _MAX_KEPT
-    n_gradients = _GRADIENTS[_kind(density)]
-    return n_gradients * gradient + _CHECKS * (check + n_kappas * kappa)
-
-
-def _kind(density: LatentDensity) -> str:
-    # of a study, among those of `_GRADIENTS`
-    placed, beyond = density.coordinates.placed, density.coordinates.beyond
-    if not placed.any():
-        return "loose"
-    return "agreed" if (beyond == 0.0).mean() < _AGREED else "placed"
-
-
-def _timed(call: Callable[[], object]) -> float:
-    # seconds, of the second of two calls
+def gradient_seconds(density: LatentDensity) -> float:
+    """Return about how long all gradients take that a study needs, two timed."""
+    position = np.tile(density.start(), (_n_chains(density), 1))
     for _ in range(2):
         begin = time.perf_counter()
-        call()
-    return time.perf_counter() - begin
+        density.gradient(position)
+    seconds = time.perf_counter() - begin
+    return _GRADIENTS["placed" if density.placed.any() else "loose"] * seconds
 
 
-def _reported(traits: Traits) -> list[tuple[str, Floats]]:
-    # Severities and thresholds can all move together: from the mean of these items
-    # they are known better than from the mean of their population.
-    centre = traits.severity.mean(axis=1, keepdims=True)
-    shares = (traits.item_share, traits.bias_variance, traits.noise_variance)
-    return [
-        ("severity", traits.severity - centre),
-        ("bias", traits.bias),
-        ("noise", traits.noise),
-        ("thresholds", traits.thresholds - centre),
-        ("shares", np.column_stack(shares)),
-        ("noise_spread", traits.noise_spread[:, None]),
-    ]
-
-
-def _parts(traits: Traits) -> dict[str, slice]:
-    named = [("kappa", 1)] + [(n, part.shape[1]) for n, part in _reported(traits)]
-    ends = itertools.accumulate(size for _, size in named)
-    return {
-        name: slice(end - size, end)
-        for (name, size), end in zip(named, ends, strict=True)
-    }
-
-
-def _agreement(density: LatentDensity, positions: Floats, items: Items) -> Agreement:
-    if items == "fixed":
-        flat = positions.reshape(-1, density.n_dimensions)
-        return agreement_on_items(density.traits(flat))
-    return agreement_on_new_items(density.traits(_some(positions, _MAX_KAPPAS)))
-
-
-def _some(positions: Floats, max_draws: int) -> Floats:
-    # (n_chains, n_kept, d) -> (n, d): every so many of each chain, the last included
-    n_chains, n_kept, d = positions.shape
-    every = -(-n_chains * n_kept // max_draws)
-    return positions[:, (n_kept - 1) % every :: every].reshape(-1, d)
-
-
-def _begin(
+def begin(
     density: LatentDensity, generator: np.random.Generator
 ) -> tuple[LatentDensity, Floats, Floats]:
-    # -> starts (n_chains, d) spread as a normal, and its covariance. The joint density
+    """Return starts (n_chains, d) that are spread as a normal, and its covariance."""
+    # The density comes back with coordinates fitted to the ratings. The joint density
     # has its mode in a spike of next to no volume: the peak is looked for with ρ, f
     # and η held.
-    at = density.coordinates.share_start
+    at = density.share_start
     loose = np.delete(np.arange(density.n_dimensions), slice(at, at + 3))
     peak = density.start()
 
@@ -234,19 +103,19 @@ def _begin(
 def _informed(density: LatentDensity, peak: Floats) -> tuple[LatentDensity, Floats]:
     # -> with coordinates of biases and noises that know what ratings tell of each, as
     # seen at the peak; and the peak in them
-    coordinates, point = density.coordinates, density.coordinates.point(peak[None])
+    point, (first, n) = density.point(peak[None]), density.codes.shape
     curvature = np.diag(_curvature(density, peak[None])) - 1.0
-    n, first = coordinates.n_raters, coordinates.n_items
-    scales = np.sqrt(1.0 - point.fraction[0, 0]), point.noise_sd[0, 0]
-    parts = slice(first, first + n), slice(first + n, first + 2 * n)
-    known = [
-        Information.at_peak(peak[part], curvature[part], float(scale))
-        for part, scale in zip(parts, scales, strict=True)
-    ]
+    of_bias, of_noise = slice(first, first + n), slice(first + n, first + 2 * n)
+    bias_scale = float(np.sqrt(1.0 - point.fraction[0, 0]))
+    noise_scale = float(point.noise_sd[0, 0])
+    density = replace(
+        density,
+        of_bias=Information.at_peak(peak[of_bias], curvature[of_bias], bias_scale),
+        of_noise=Information.at_peak(peak[of_noise], curvature[of_noise], noise_scale),
+    )
     peak = np.array(peak)
     peak[first : first + 2 * n] = 0.0
-    informed = replace(coordinates, of_bias=known[0], of_noise=known[1])
-    return replace(density, coordinates=informed), peak
+    return density, peak
 
 
 def _curvature(density: "SmoothDensity", positions: Floats) -> Floats:
@@ -270,6 +139,28 @@ def _inverse(curvature: Floats) -> Floats:
     return np.asarray((axes / values.clip(_MIN_CURVATURE)) @ axes.T)
 
 
+def diagnose(chains: Floats) -> tuple[float, float]:
+    """Return rank-normalized split R-hat and the effective sample size of the tails."""
+    # shape of chains: (n_chains, n_steps)
+    # Vehtari, A. et al. (2021). Rank-normalization, folding, and localization: an
+    # improved R-hat. Bayesian Analysis, 16(2), 667-718.
+    # https://doi.org/10.1214/20-BA1221
+    r_hat = array_stats.rhat(chains, chain_axis=0, draw_axis=1)
+    ess = array_stats.ess(
+        chains, chain_axis=0, draw_axis=1, method="tail", prob=(0.025, 0.975)
+    )
+    return float(r_hat), float(ess)
+
+
+def quantile_error(chains: Floats, share: float) -> float:
+    """Return the Monte Carlo standard error of a quantile."""
+    # shape of chains: (n_chains, n_steps)
+    error = array_stats.mcse(
+        chains, chain_axis=0, draw_axis=1, method="quantile", prob=share
+    )
+    return float(error)
+
+
 class SmoothDensity(Protocol):
     """A log-density with its slopes, of many positions at once."""
 
@@ -286,19 +177,23 @@ class Chains:
 
     # (n_chains, n_kept, n_dimensions): where the chains were after warm-up
     positions: Floats = field(compare=False, repr=False)
-    # (n_chains, at most n_kept): the quantities there, or at some of them
-    values: list[Floats] = field(compare=False, repr=False)
-    # r_hat, ess: (n_quantities,): rank-normalized split R-hat; effective size of the
-    # tails
-    r_hat: Floats = field(compare=False, repr=False)
-    ess: Floats = field(compare=False, repr=False)
+    # by name: the quantities there, or at some of them, (n_chains, at most n_kept, n)
+    values: dict[str, Floats] = field(compare=False, repr=False)
+    # by name: rank-normalized split R-hat and effective size of the tails, (n, 2)
+    diagnostics: dict[str, Floats] = field(compare=False, repr=False)
     n_steps: int  # steps of every chain after warm-up, kept or not
     acceptance: float  # share of the proposals that were taken
+
+    @property
+    def worst(self) -> tuple[float, float]:
+        """The largest R-hat and the smallest effective size."""
+        r_hat, ess = np.concatenate(list(self.diagnostics.values())).T
+        return float(r_hat.max()), float(ess.min())
 
 
 def sample_smooth(
     density: SmoothDensity,
-    quantities: Callable[[Floats], list[Floats]],
+    quantities: Callable[[Floats], dict[str, Floats]],
     start: Floats,
     covariance: Floats,
     *,
@@ -320,22 +215,73 @@ def sample_smooth(
         n_made, positions, thin = _go_on(walkers, more, positions, thin, report)
         total += n_made
         values = quantities(positions)
-        r_hat, ess = np.array([diagnose(of_one) for of_one in values]).T
-        if (r_hat < MAX_R_HAT).all() and (ess >= MIN_ESS).all():
-            return Chains(
-                positions=positions,
-                values=values,
-                r_hat=r_hat,
-                ess=ess,
-                n_steps=total,
-                acceptance=walkers.acceptance,
-            )
-        needed = steps_needed(float(r_hat.max()), float(ess.min()), MIN_ESS)
+        chains = Chains(
+            positions=positions,
+            values=values,
+            diagnostics={
+                name: np.array([diagnose(one) for one in np.moveaxis(of, 2, 0)])
+                for name, of in values.items()
+            },
+            n_steps=total,
+            acceptance=walkers.acceptance,
+        )
+        r_hat, ess = chains.worst
+        if r_hat < MAX_R_HAT and ess >= MIN_ESS:
+            return chains
+        # how many times as many steps it takes in all
+        needed = max((r_hat - 1.0) / (MAX_R_HAT - 1.0), MIN_ESS / max(ess, 1.0))
         plan(sum(_WARM_UP) + int(total * max(needed, 1.0)))
         # no more than as many again: the first steps say little of how many it takes
         share = min(max(1.1 * needed - 1.0, 0.25), 1.0)
         more = min(int(share * total) + 1, max_steps - total)
-    raise not_converged(total, float(r_hat.max()), float(ess.min()), MIN_ESS)
+    further = int(total * needed) - total if np.isfinite(needed) else total
+    raise ConvergenceError(
+        f"the sampler has not converged after {total} steps: R-hat {r_hat:.4f} (needs "
+        f"below {MAX_R_HAT}), effective size {ess:.0f} (needs {MIN_ESS:.0f}); "
+        f"about {max(further, 1)} more steps are needed"
+    )
+
+
+class Walkers:
+    """Independent chains, moved by one proposal."""
+
+    # Foreman-Mackey, D. et al. (2013). emcee: The MCMC Hammer. PASP, 125, 306.
+    # https://doi.org/10.1086/670067
+    # shape of start: (n_chains, n_dimensions)
+
+    def __init__(
+        self,
+        log_density: Callable[[Floats], Floats],
+        proposal: Callable[[Floats, np.random.RandomState], tuple[Floats, Floats]],
+        start: Floats,
+        generator: np.random.Generator,
+    ) -> None:
+        self._state = emcee.State(start, random_state=_legacy_state(generator))
+        self._sampler = emcee.EnsembleSampler(
+            *start.shape,
+            log_density,
+            moves=emcee.moves.MHMove(proposal),
+            vectorize=True,
+        )
+
+    def run(self, n_steps: int, *, thin: int = 1) -> Floats:
+        """Go on, and return every `thin`-th position, (n_chains, kept, dimensions)."""
+        self._sampler.reset()
+        self._state = self._sampler.run_mcmc(
+            self._state, n_steps // thin, thin_by=thin, skip_initial_state_check=True
+        )
+        return np.ascontiguousarray(self._sampler.get_chain().swapaxes(0, 1))
+
+    @property
+    def acceptance(self) -> float:
+        """Share of the proposals of the last run that were taken."""
+        return float(self._sampler.acceptance_fraction.mean())
+
+
+def _legacy_state(generator: np.random.Generator) -> tuple[object, ...]:
+    # emcee passes over a numpy Generator without a word: it wants legacy state.
+    legacy = np.random.RandomState(generator.integers(2**32, dtype=np.uint64))
+    return tuple(legacy.get_state(legacy=True))
 
 
 def _warm_up(

@@ -12,26 +12,31 @@ from masrel.agreement._engine import Floats, check_level
 from masrel.agreement._labels import Codes
 from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Distribution, Estimate, Interval, Target
-from masrel.intervals._mcmc import quantile_error
 from masrel.intervals._question import recorded_generator
-from masrel.intervals.latent._density import LatentDensity, LatentPrior
 from masrel.intervals.latent._implied import (
+    Agreement,
     Items,
     PredictiveCheck,
+    agreement_on_items,
+    agreement_on_new_items,
     grade_probabilities,
     predictive_checks,
 )
+from masrel.intervals.latent._model import LatentDensity, LatentPrior
 from masrel.intervals.latent._sampler import (
-    LatentFit,
-    expected_run_seconds,
-    fit_latent,
+    Chains,
+    begin,
+    gradient_seconds,
     n_warm_up_steps,
+    quantile_error,
+    sample_smooth,
 )
 from masrel.intervals.quantity import Quantity
 
 _TARGETS: dict[str, Target] = {"fixed": "raters", "random": "both"}
 _REPLICATES = 4_000
 _SHOWN = 2_000
+_MAX_KAPPAS = 8_192  # positions where an integral over new items is computed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -221,7 +226,6 @@ def latent_trait(
     question = _Question(
         ratings=checked,
         items=items,
-        target=_TARGETS[items],
         level=level,
         n_steps=n_steps,
         max_steps=max_steps,
@@ -255,7 +259,7 @@ def expected_seconds(
     _check_kappa(items, level)
     checked = _Ratings.of(ratings, categories)
     density = LatentDensity.of(checked.codes, len(categories), LatentPrior())
-    return (1 + compare) * expected_run_seconds(density, items)
+    return (1 + compare) * gradient_seconds(density)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -325,7 +329,6 @@ class _Question:
 
     ratings: _Ratings  # the data
     items: Items  # which kappa
-    target: Target  # the population it generalises to
     level: float  # level of the intervals
     # n_steps, max_steps: steps of every chain at first, and where it gives up
     n_steps: int
@@ -337,6 +340,81 @@ class _Question:
     expect: Callable[[int], object] | None = field(compare=False, repr=False)
     n_runs: int
     seed: int | None  # the seed to be recorded
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LatentFit:
+    """The model after the data."""
+
+    density: LatentDensity  # what was sampled
+    chains: Chains = field(repr=False)  # draws of all that `LatentChains` has, by name
+    # of two new raters, at the positions where kappa was computed
+    agreement: Agreement = field(repr=False)
+
+    def draws(self, name: str, index: int = 0) -> Floats:
+        """Return the draws of one number, (n_chains, at most n_kept)."""
+        return self.chains.values[name][..., index]
+
+
+def fit_latent(
+    density: LatentDensity,
+    items: Items,
+    *,
+    generator: np.random.Generator,
+    n_steps: int,
+    max_steps: int,
+    progress: Callable[[int], object] | None = None,
+    expect: Callable[[int], object] | None = None,
+) -> LatentFit:
+    """Sample the model until every reported quantity has converged."""
+    agreement: list[Agreement] = []
+
+    def quantities(positions: Floats) -> dict[str, Floats]:
+        flat = positions.reshape(-1, density.n_dimensions)
+        traits = density.traits(flat)
+        if items == "fixed":
+            agreement[:] = [agreement_on_items(traits)]
+        else:
+            some = density.traits(_some(positions, _MAX_KAPPAS))
+            agreement[:] = [agreement_on_new_items(some)]
+        # Severities and thresholds can all move together: from the mean of these items
+        # they are known better than from the mean of their population.
+        centre = traits.severity.mean(axis=1, keepdims=True)
+        shares = (traits.item_share, traits.bias_variance, traits.noise_variance)
+        columns = {
+            "kappa": agreement[0].kappa[:, None],
+            "severity": traits.severity - centre,
+            "bias": traits.bias,
+            "noise": traits.noise,
+            "thresholds": traits.thresholds - centre,
+            "shares": np.column_stack(shares),
+            "noise_spread": traits.noise_spread[:, None],
+        }
+        n_chains = len(positions)
+        return {
+            name: of.reshape(n_chains, -1, of.shape[1]) for name, of in columns.items()
+        }
+
+    density, start, covariance = begin(density, generator)
+    chains = sample_smooth(
+        density,
+        quantities,
+        start,
+        covariance,
+        generator=generator,
+        n_steps=n_steps,
+        max_steps=max_steps,
+        progress=progress,
+        expect=expect,
+    )
+    return LatentFit(density=density, chains=chains, agreement=agreement[0])
+
+
+def _some(positions: Floats, max_draws: int) -> Floats:
+    # (n_chains, n_kept, d) -> (n, d): every so many of each chain, the last included
+    n_chains, n_kept, d = positions.shape
+    every = -(-n_chains * n_kept // max_draws)
+    return positions[:, (n_kept - 1) % every :: every].reshape(-1, d)
 
 
 def _summarize(
@@ -361,51 +439,44 @@ def _summarize(
         progress=question.progress,
         expect=expect,
     )
-    some = fit.draws(_REPLICATES)
+    some = fit.density.traits(_some(fit.chains.positions, _REPLICATES))
 
     def part(name: str, of: Sequence[str]) -> tuple[Quantity, ...]:
-        return _quantities(question, fit, name, of)
+        diagnostics = fit.chains.diagnostics[name].tolist()
+        return tuple(
+            Quantity(
+                name=whose,
+                value=float(np.median(fit.draws(name, k))),
+                interval=_interval(question, fit.draws(name, k)),
+                r_hat=r_hat,
+                ess=ess,
+            )
+            for k, (whose, (r_hat, ess)) in enumerate(zip(of, diagnostics, strict=True))
+        )
 
+    r_hat, ess = fit.chains.worst
+    thresholds = [
+        f"{low} | {high}" for low, high in itertools.pairwise(data.categories)
+    ]
+    chains = {**fit.chains.values, "kappa": fit.draws("kappa")}
     return LatentTrait(
         kappa=_kappa(question, fit, other),
         items=part("severity", data.items),
         raters=part("bias", data.raters),
         noises=part("noise", data.raters),
-        thresholds=part("thresholds", _threshold_names(data.categories)),
+        thresholds=part("thresholds", thresholds),
         shares=part("shares", ("items", "raters' biases", "raters' noise")),
         noise_spread=part("noise_spread", ("spread of raters' noises",))[0],
         grades=tuple(map(tuple, grade_probabilities(some).mean(axis=0).tolist())),
         checks=predictive_checks(data.codes, some, data.categories, generator),
         prior=prior,
         other=other,
-        r_hat=float(fit.chains.r_hat.max()),
-        ess=float(fit.chains.ess.min()),
+        r_hat=r_hat,
+        ess=ess,
         n_chains=len(fit.chains.positions),
         n_steps=fit.chains.n_steps,
         seed=question.seed,
-        chains=_chains(fit) if question.keep_chains else None,
-    )
-
-
-def _quantities(
-    question: _Question, fit: LatentFit, name: str, of: Sequence[str]
-) -> tuple[Quantity, ...]:
-    at = fit.parts[name]
-    return tuple(
-        Quantity(
-            name=whose,
-            value=float(np.median(draws)),
-            interval=_interval(question, draws),
-            r_hat=float(r_hat),
-            ess=float(ess),
-        )
-        for whose, draws, r_hat, ess in zip(
-            of,
-            fit.chains.values[at],
-            fit.chains.r_hat[at],
-            fit.chains.ess[at],
-            strict=True,
-        )
+        chains=LatentChains(**chains) if question.keep_chains else None,
     )
 
 
@@ -419,7 +490,7 @@ def _interval(question: _Question, draws: Floats) -> Interval:
         level=question.level,
         kind="credible",
         method="ordinal latent-trait model, emcee",
-        target=question.target,
+        target=_TARGETS[question.items],
         n_resamples=draws.size,
         monte_carlo_error=(
             quantile_error(draws, tail),
@@ -430,11 +501,16 @@ def _interval(question: _Question, draws: Floats) -> Interval:
 
 
 def _kappa(question: _Question, fit: LatentFit, other: LatentTrait | None) -> Estimate:
-    draws = fit.chains.values[0]
+    draws = fit.draws("kappa")
     shown = np.sort(draws.ravel()[:: -(-draws.size // _SHOWN)])
+    notes: tuple[str, ...] = ()
+    if other is not None and other.kappa.interval is not None:
+        low, high = other.kappa.interval.low, other.kappa.interval.high
+        words = other.prior.words
+        notes = (f"under another prior {low:.3f} to {high:.3f}: {words}",)
     interval = replace(
         _interval(question, draws),
-        notes=_notes(other),
+        notes=notes,
         distribution=Distribution(
             values=shown,
             weights=np.full(shown.size, 1.0 / shown.size),
@@ -456,32 +532,4 @@ def _kappa(question: _Question, fit: LatentFit, other: LatentTrait | None) -> Es
         n_items_paired=int(((codes >= 0).sum(axis=1) > 1).sum()),
         n_raters=n_raters,
         n_categories=len(question.ratings.categories),
-    )
-
-
-def _notes(other: LatentTrait | None) -> tuple[str, ...]:
-    if other is None or other.kappa.interval is None:
-        return ()
-    there = other.kappa.interval
-    return (
-        f"under another prior {there.low:.3f} to {there.high:.3f}: {other.prior.words}",
-    )
-
-
-def _threshold_names(categories: Sequence[object]) -> list[str]:
-    return [f"{low} | {high}" for low, high in itertools.pairwise(categories)]
-
-
-def _chains(fit: LatentFit) -> LatentChains:
-    def part(name: str) -> Floats:
-        return np.stack(fit.chains.values[fit.parts[name]], axis=-1)
-
-    return LatentChains(
-        kappa=fit.chains.values[0],
-        severity=part("severity"),
-        bias=part("bias"),
-        noise=part("noise"),
-        thresholds=part("thresholds"),
-        shares=part("shares"),
-        noise_spread=part("noise_spread"),
     )

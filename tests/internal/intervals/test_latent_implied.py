@@ -8,7 +8,6 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from masrel.intervals.latent._coordinates import Traits
 from masrel.intervals.latent._implied import (
     Agreement,
     agreement_on_items,
@@ -16,6 +15,7 @@ from masrel.intervals.latent._implied import (
     grade_probabilities,
     replicate,
 )
+from masrel.intervals.latent._model import Traits
 
 Floats = NDArray[np.float64]
 
@@ -124,16 +124,6 @@ def test_these_items_agree_with_simulated_raters(
         assert p[1, k] == pytest.approx(share, abs=4.5 * 0.5 / math.sqrt(2 * n))
 
 
-def test_kappa_is_fleiss_own_formula() -> None:
-    traits = one(0.6, 0.5, 0.5, [-0.7, 0.2, 1.0])
-    p = grade_probabilities(traits)[0]
-    observed, chance = (p**2).sum(axis=1).mean(), (p.mean(axis=0) ** 2).sum()
-    result = agreement_on_items(traits)
-    assert result.observed[0] == pytest.approx(observed)
-    assert result.chance[0] == pytest.approx(chance)
-    assert result.kappa[0] == pytest.approx((observed - chance) / (1 - chance))
-
-
 def test_alike_items_have_kappa_0_and_sure_raters_kappa_1() -> None:
     alike = agreement_on_items(one(0.5, 0.5, 0.3, [-1.0, 1.0], (0.2, 0.2)))
     assert alike.kappa[0] == pytest.approx(0.0, abs=1e-15)
@@ -145,9 +135,3 @@ def test_alike_items_have_kappa_0_and_sure_raters_kappa_1() -> None:
 def test_where_all_are_in_one_category_kappa_is_0_and_not_nan() -> None:
     result = Agreement.of(np.array([[1.0, 0.0, 0.0]]), np.array([0.0]))
     assert result.kappa.tolist() == [0.0]
-
-
-def test_probabilities_of_grades_sum_to_one() -> None:
-    p = grade_probabilities(one(0.5, 0.5, 0.5, [-1.0, 0.3]))
-    assert p.shape == (1, 3, 3)
-    assert p.sum(axis=2) == pytest.approx(np.ones((1, 3)))

@@ -5,9 +5,9 @@ import pytest
 from scipy import stats
 
 from masrel.intervals import LatentPrior, Quantity, latent_trait
-from masrel.intervals.latent._density import LatentDensity
 from masrel.intervals.latent._implied import agreement_on_items, agreement_on_new_items
-from masrel.intervals.latent._sampler import fit_latent
+from masrel.intervals.latent._model import LatentDensity
+from masrel.intervals.latent._trait import fit_latent
 from tests.intervals.latent_studies import drawn
 
 pytestmark = pytest.mark.slow
@@ -68,14 +68,13 @@ def places(rng: np.random.Generator, prior: LatentPrior) -> dict[str, float]:
             break
     fit = fit_latent(
         LatentDensity.of(study.codes, 3, prior), "random",
-        generator=rng, n_steps=60, max_steps=3_840, progress=None,
+        generator=rng, n_steps=60, max_steps=3_840,
     )  # fmt: skip
     truth = study.truth
-    draws = fit.chains.values
     centre = truth.severity.mean()
 
     def place(part: str, value: float, at: int = 0) -> float:
-        below = draws[fit.parts[part].start + at] < value
+        below = fit.draws(part, at) < value
         return float((below.sum() + 0.5) / (below.size + 1))  # neither 0 nor 1
 
     return {
@@ -102,7 +101,7 @@ def test_the_truth_is_anywhere_in_its_posterior(
     monkeypatch.setattr(f"{SAMPLER}.MAX_R_HAT", 1.15)
     monkeypatch.setattr(f"{SAMPLER}._WARM_UP", (20, 20, 20))
     monkeypatch.setattr("masrel.intervals.latent._sampler._N_CHAINS", 32)
-    monkeypatch.setattr("masrel.intervals.latent._sampler._MAX_KAPPAS", 500)
+    monkeypatch.setattr("masrel.intervals.latent._trait._MAX_KAPPAS", 500)
     prior = LatentPrior(item_share=(3.0, 1.5), noise_fraction=(2.0, 2.0))
     rng = np.random.default_rng(7)
     result = [places(rng, prior) for _ in range(50)]

@@ -1,73 +1,71 @@
-"""Quadrature on the line against distributions of known quantiles and moments."""
+"""Polynomials and quadrature against integers, and distributions that are known."""
+
+import math
 
 import numpy as np
 import pytest
-from scipy.special import betainc, logit
+from scipy.special import betainc
 
-from masrel.agreement import code_ratings
-from masrel.agreement._codes import item_counts
-from masrel.errors import ConvergenceError
-from masrel.intervals._quadrature import beta_nodes, line_distribution
-from masrel.intervals._rho import DEFAULT_PRIOR, RhoPosterior
-from tests.intervals.data import SCALE, TABLE_V
-
-
-def test_probabilities_rise_and_are_those_of_quantiles() -> None:
-    counts = item_counts(code_ratings(TABLE_V, SCALE).codes, len(SCALE))
-    posterior = RhoPosterior.of(counts, DEFAULT_PRIOR, 0.95)
-    shares = [1e-6, 0.025, 0.3, 0.5, 0.9, 1.0 - 1e-6]
-    points = [logit(posterior.quantile(share)) for share in shares]
-    again = [posterior.logit.at(point)[0] for point in points]
-    assert again == pytest.approx(shares, abs=1e-12)
-    grid = [posterior.logit.at(point)[0] for point in np.linspace(-20.0, 12.0, 400)]
-    assert (np.diff(grid) > -1e-14).all()
+from masrel.intervals._quadrature import (
+    LineDistribution,
+    beta_nodes,
+    log_convolve,
+    where_it_matters,
+)
 
 
-# The normal's tails are known to scipy; its quantiles are solved for here.
+def stirling(n: int) -> list[int]:
+    """Coefficients of x (x + 1) ... (x + n - 1), from power 0."""
+    row = [1]
+    for j in range(n):
+        row = [
+            j * same + below for same, below in zip([*row, 0], [0, *row], strict=True)
+        ]
+    return row
+
+
+@pytest.mark.parametrize(("n", "m"), [(5, 2), (40, 40), (700, 300)])
+def test_a_product_has_every_digit_of_its_integers(n: int, m: int) -> None:
+    # times t!, as moments are, which no float holds
+    of_n, of_m = (
+        [math.factorial(t) * c for t, c in enumerate(stirling(k)) if t] for k in (n, m)
+    )
+    packed = [sum(c << (1 << 15) * t for t, c in enumerate(of)) for of in (of_n, of_m)]
+    product, mask = packed[0] * packed[1], (1 << (1 << 15)) - 1
+    exact = [
+        math.log(product >> (1 << 15) * t & mask)
+        for t in range(len(of_n) + len(of_m) - 1)
+    ]
+    logs = (np.array([math.log(c) for c in of]) for of in (of_n, of_m))
+    assert log_convolve(*logs) == pytest.approx(exact, rel=1e-13, abs=1e-12)
+
+
+# The normal's quantiles are known; here they are found.
 @pytest.mark.parametrize("spread", [0.01, 1.0, 30.0])
 def test_the_quadrature_finds_the_quantiles_of_a_normal(spread: float) -> None:
-    _, result = line_distribution(
-        lambda x: -0.5 * ((x - 3.0) / spread) ** 2,
-        3.0 - 11.0 * spread,
-        3.0 + 13.0 * spread,
-        (0.025, 0.5, 0.999),
+    low, high = where_it_matters(
+        lambda x: -0.5 * ((x - 3.0) / spread) ** 2, -500.0, 600.0
     )
-    expected = np.array([-1.959963984540054, 0.0, 3.090232306167813])
-    assert (np.array(result) - 3.0) / spread == pytest.approx(expected, abs=1e-11)
+    points = np.linspace(low, high, 257)
+    masses = np.exp(-0.5 * ((points - 3.0) / spread) ** 2)
+    normal = LineDistribution(points=points, masses=masses / masses.sum())
+    found = np.array(normal.quantiles((0.025, 0.5, 0.999)))
+    expected = [-1.959963984540054, 0.0, 3.090232306167813]
+    assert (found - 3.0) / spread == pytest.approx(expected, abs=1e-9)
+    assert normal.density(np.array([3.0])) * spread == pytest.approx(0.3989422804)
 
 
-def test_a_density_that_is_cut_off_or_jumps_is_refused() -> None:
-    with pytest.raises(ConvergenceError, match="reaches beyond"):
-        line_distribution(lambda x: -0.5 * x**2, -6.0, 9.0, (0.5,))
-    with pytest.raises(ConvergenceError, match="not settled"):
-        line_distribution(
-            lambda x: np.where(x > 0.123, -np.abs(x), -50.0), -9.0, 50.0, (0.3,)
-        )
-
-
-@pytest.mark.parametrize("a", [0.01, 0.5, 3.0, 1e6])
-@pytest.mark.parametrize("b", [0.01, 1.0, 2e5])
-def test_nodes_of_a_beta_have_its_moments(a: float, b: float) -> None:
-    x, weights = beta_nodes(a, b, 0.0625)
-    total = a + b
-    assert weights.sum() == pytest.approx(1.0, abs=1e-14)
-    assert x.sum(axis=1) == pytest.approx(np.ones(len(x)))
-    mean = a / total
-    variance = a * b / (total**2 * (total + 1.0))
-    assert weights @ x[:, 0] == pytest.approx(mean, rel=1e-12)
-    assert weights @ (x[:, 0] - mean) ** 2 == pytest.approx(variance, rel=1e-10)
-
-
-@pytest.mark.parametrize(("a", "b"), [(0.25, 0.25), (5.0, 0.5), (400.0, 300.0)])
-@pytest.mark.parametrize("least", [1e-6, 0.2, 0.45])
-def test_nodes_of_a_part_of_a_beta_have_its_probability_and_mean(
+@pytest.mark.parametrize("a", [0.25, 3.0, 1e6])
+@pytest.mark.parametrize("b", [0.25, 1.0, 2e5])
+@pytest.mark.parametrize("least", [0.0, 1e-6, 0.1])
+def test_nodes_of_a_beta_have_its_probability_and_moments(
     a: float, b: float, least: float
 ) -> None:
-    x, weights = beta_nodes(a, b, 0.125, least)
+    x, weights = beta_nodes(a, b, 65, least)
     assert x.min() >= least
-    assert weights.sum() == pytest.approx(
-        betainc(a, b, 1.0 - least) - betainc(a, b, least), rel=1e-9
-    )
-    # x times its density is that of a Beta(a + 1, b), times a / (a + b)
-    upper = betainc(a + 1.0, b, 1.0 - least) - betainc(a + 1.0, b, least)
-    assert weights @ x[:, 0] == pytest.approx(a / (a + b) * upper, rel=1e-9)
+    # x^k times its density is that of a Beta(a + k, b), times its moment
+    moment = 1.0
+    for k in range(3):
+        inside = betainc(a + k, b, 1.0 - least) - betainc(a + k, b, least)
+        assert weights @ x[:, 0] ** k == pytest.approx(moment * inside, abs=1e-9)
+        moment *= (a + k) / (a + b + k)

@@ -8,12 +8,7 @@ from numpy.typing import NDArray
 from scipy import integrate, special, stats
 
 from masrel.intervals._rho import DEFAULT_PRIOR
-from masrel.intervals.self_agreement import (
-    _log_weights,
-    _Moments,
-    _Posterior,
-    _RaterPairs,
-)
+from masrel.intervals.self_agreement import _Posterior, _RaterPairs
 from tests.intervals.test_retest_model import drawn_pairs
 
 Floats = NDArray[np.float64]
@@ -57,23 +52,11 @@ def test_shares_integrate_out_as_by_brute_force(table: Table) -> None:
 def test_one_pair_by_hand() -> None:
     # Equal grades of two categories: Σ_k ∫ (κ π_k + (1 - κ) π_k²) over one k:
     # κ E[π] + (1 - κ) E[π²] = κ / 2 + (1 - κ) / 3.
-    equal = np.exp(_log_weights(np.array([[1, 0], [0, 0]]), 1.0))
+    equal = np.exp(_RaterPairs.of(np.array([[1, 0], [0, 0]]), 1.0).log_weights)
     assert equal == pytest.approx([1 / 2, 1 / 3])
     # Unequal: (1 - κ) E[π (1 - π)] = (1 - κ) / 6.
-    unequal = np.exp(_log_weights(np.array([[0, 1], [0, 0]]), 1.0))
+    unequal = np.exp(_RaterPairs.of(np.array([[0, 1], [0, 0]]), 1.0).log_weights)
     assert unequal == pytest.approx([1 / 6])
-
-
-def test_moments_are_those_of_the_beta() -> None:
-    m, g = 0.3, 0.1
-    law = stats.beta(m * (1 / g - 1), (1 - m) * (1 / g - 1))
-    assert law.mean() == pytest.approx(m)
-    assert law.var() == pytest.approx(g * m * (1 - m))
-    moments = _Moments.of(
-        np.array([special.logit(m)]), np.array([special.logit(3 * g)]), 5
-    )
-    log = moments.up[0, 2] + moments.down[0, 3] - moments.denominator[0, 5]
-    assert math.exp(log) == pytest.approx(law.expect(lambda k: k**2 * (1 - k) ** 3))
 
 
 def weighted_draws(
@@ -115,9 +98,9 @@ def test_quadrature_agrees_with_draws_of_every_unknown() -> None:
     # Of m, the spread and each κ, the weight of draws below each quantile is its
     # share, within 4 standard errors: 15 times, so that one of 1 000 other seeds
     # fails. A hundredth more of any median, or of m's low end, is 5 errors or more.
-    exact = _Posterior.of(SMALL, SHARES, DEFAULT_PRIOR)
+    exact = _Posterior.of(SMALL, DEFAULT_PRIOR)
     draws, weights = weighted_draws(SMALL, np.random.default_rng(5), 500_000)
-    quantiles = [exact.quantiles, exact.sd_quantiles(SHARES)]
+    quantiles = [exact.quantiles(SHARES), exact.sd_quantiles(SHARES)]
     quantiles += [exact.rater_quantiles(at, SHARES) for at in range(len(SMALL))]
     for column, of_one in zip(draws.T, quantiles, strict=True):
         for share, quantile in zip(SHARES, of_one, strict=True):
@@ -130,7 +113,7 @@ def test_quadrature_agrees_with_draws_of_every_unknown() -> None:
 def test_one_rater_is_a_mixture_that_integrates_by_brute_force() -> None:
     # κ of one rater: prior ∫∫ Beta(κ | m, g) dm dg on a grid of midpoints.
     table = SMALL[1]
-    result = _Posterior.of([table], SHARES, DEFAULT_PRIOR)
+    result = _Posterior.of([table], DEFAULT_PRIOR)
     points = (np.arange(60) + 0.5) / 60
     m, g = (a.ravel() for a in np.meshgrid(points, points / 3))
     size = 1 / g - 1
@@ -171,23 +154,6 @@ def test_ranks_of_what_made_the_data_are_uniform(n_raters: int, n_items: int) ->
             np.bincount(3 * a + b, minlength=9).reshape(3, 3)
             for a, b in np.moveaxis(study, 2, 1)
         ]
-        result = _Posterior.of(tables, (0.5,), DEFAULT_PRIOR)
-        below.append(result.mean.at(float(special.logit(m)))[0])
+        result = _Posterior.of(tables, DEFAULT_PRIOR)
+        below.append(result.mean.probability(special.logit([m]))[0])
     assert stats.kstest(below, "uniform").pvalue > 1e-4
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "table",
-    [
-        np.diag([200, 200]),
-        np.array([[0, 300], [300, 0]]),
-        np.array([[300, 0], [0, 0]]),
-    ],
-)
-def test_extreme_tables_have_finite_ends(table: Table) -> None:
-    result = _Posterior.of([table] * 3, SHARES, DEFAULT_PRIOR)
-    assert 0 < result.quantiles[0] < result.quantiles[1] < result.quantiles[2] <= 1
-    low, middle, high = result.rater_quantiles(0, SHARES)
-    assert 0 <= low < middle < high <= 1
-    assert list(result.sd_quantiles(SHARES)) == sorted(result.sd_quantiles(SHARES))

@@ -6,23 +6,24 @@ Patterns: what the raters give an item has a Dirichlet over the patterns that we
 and over a few that the prior adds. It knows raters by their columns and takes weights.
 """
 
-import dataclasses
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
 
 from masrel.agreement._engine import Floats
-from masrel.agreement._weights import Distances
-from masrel.errors import ParameterError
 from masrel.estimates import Distribution, Interval
-from masrel.intervals._dirichlet_multinomial import DirichletMultinomial
 from masrel.intervals._question import IntervalProblem, recorded_generator
-from masrel.intervals._rho import PRIOR_SHAPES, Prior, RhoPosterior
+from masrel.intervals._rho import (
+    METHOD,
+    PRIOR_SHAPES,
+    DirichletMultinomial,
+    Prior,
+    RhoPosterior,
+    nothing_to_learn,
+    undefined,
+)
 from masrel.intervals.bootstrap import _distinct_features, _Resamples
-
-MIN_DRAWS = 100
-DEFAULT_DRAWS, SEED = 2_000, 1
-"""Of the default: always the same, so that it repeats."""
 
 _WORTH = 1.5
 """Items that the prior is worth, as that of a table of two raters."""
@@ -44,12 +45,11 @@ def alike_interval(
     one_sided: bool = False,
 ) -> Interval:
     """Compute the credible interval of a coefficient, raters being alike."""
-    method = "Dirichlet-multinomial posterior"
-    reason = nothing_to_learn(problem)
+    reason = no_posterior(problem)
     if reason is not None:
-        return _undefined(problem, reason, method)
+        return undefined(problem, reason, METHOD)
     generator, seed = recorded_generator(rng)
-    rho, shares = _population(problem, prior, _checked(n_draws), generator)
+    rho, shares = _population(problem, prior, n_draws, generator)
     # two ratings of an item are one twice with probability ρ, else drawn anew
     q = problem.coded.n_categories
     pairs = np.indices((q, q)).reshape(2, -1)
@@ -57,8 +57,8 @@ def alike_interval(
     weights[:, pairs[0] == pairs[1]] += rho * shares
     rows = problem.features(pairs.T)
     values = problem.values(_WITHOUT_END * (weights @ rows))
-    interval = _interval(problem, values, method, prior.description, one_sided)
-    return dataclasses.replace(interval, seed=seed)
+    interval = _interval(problem, values, METHOD, prior.description, one_sided)
+    return replace(interval, seed=seed)
 
 
 def patterns_interval(
@@ -70,51 +70,30 @@ def patterns_interval(
 ) -> Interval:
     """Compute the credible interval of a coefficient from its patterns of ratings."""
     method = "Dirichlet posterior of the patterns of ratings"
-    reason = nothing_to_learn(problem)
+    reason = no_posterior(problem)
     if reason is not None:
-        return _undefined(problem, reason, method)
+        return undefined(problem, reason, method)
     generator, seed = recorded_generator(rng)
     rows, often = _distinct_features(problem.rows, problem.freq)
     added, worth = _prior_patterns(problem)
     rows, shapes = np.concatenate([rows, added]), np.concatenate([often, worth])
-    n_left, values, size = _checked(n_draws), [], max(1, _AT_ONCE // shapes.size)
+    n_left, values, size = n_draws, [], max(1, _AT_ONCE // shapes.size)
     while n_left > 0:
         freq = generator.standard_gamma(shapes, (min(size, n_left), shapes.size))
         freq *= _WITHOUT_END / problem.n_items
         values.append(problem.values(freq @ rows))
         n_left -= size
     interval = _interval(problem, np.concatenate(values), method, _PRIOR, one_sided)
-    return dataclasses.replace(interval, seed=seed)
+    return replace(interval, seed=seed)
 
 
-def nothing_to_learn(problem: IntervalProblem) -> str | None:
-    """Return why ratings say nothing of a coefficient, or None."""
-    if problem.n_paired_items == 0:
-        return "no item has ratings of two raters"
-    if problem.coded.n_categories < 2:
-        return "one category is declared"
-    # distances, which stand for the matrix of many categories, are all numbers
-    if not isinstance(problem.v, Distances):
-        if np.isnan(problem.v).any():
-            return "the scale has no such weights"
-        if not problem.v.any():
-            return "the weights count nothing as disagreement"
+def no_posterior(problem: IntervalProblem) -> str | None:
+    """Return why a coefficient has no posterior, or None."""
     if problem.entry.metric == "ordinal":
-        return "the ordinal metric depends on the ratings"
+        return nothing_to_learn(problem) or "the ordinal metric depends on the ratings"
     if problem.coded.n_categories > _MAX_CATEGORIES:
         return f"there are more than {_MAX_CATEGORIES} categories"
-    return None
-
-
-def _checked(n_draws: int) -> int:
-    if n_draws < MIN_DRAWS:
-        raise ParameterError(f"n_draws: needs at least {MIN_DRAWS}, got {n_draws}")
-    return n_draws
-
-
-def _undefined(problem: IntervalProblem, reason: str, method: str) -> Interval:
-    undefined = problem.undefined(reason, method=method, unit=None)
-    return dataclasses.replace(undefined, kind="credible")
+    return nothing_to_learn(problem)
 
 
 def _population(
@@ -132,7 +111,7 @@ def _population(
     # using mixtures. JASA, 90(430), 577-588.
     # https://doi.org/10.1080/01621459.1995.10476550
     counts = problem.item_counts()
-    rho = RhoPosterior.of(counts, prior, problem.level).draw(n_draws, generator)
+    rho = RhoPosterior.of(counts, prior).draw(n_draws, generator)
     model = DirichletMultinomial.of_counts(
         counts, concentration=prior.concentration, shape=PRIOR_SHAPES[prior.name]
     )
