@@ -1,4 +1,4 @@
-"""masrel audit: claims as options, as a file, or of a study; and what is refused."""
+"""masrel audit: claims as options, as a file, or of a study."""
 
 import hashlib
 import json
@@ -11,14 +11,6 @@ from tests.cli.process import Caller
 
 CLAIM = ("audit", "--items", 20, "--categories", 2, "--agreement", "85.0")
 STUDY = Path(__file__).parents[2] / "studies" / "hess2012"
-
-
-def test_a_claim_as_options_is_shown_with_all_its_tables(masrel: Caller) -> None:
-    done = masrel(*CLAIM, "--kappa", "0.58")
-    assert done.code == 0
-    assert "4 tables of 20 items in 2 categories give both" in done.out
-    assert "[3 0; 3 14], [3 3; 0 14], [14 0; 3 3], [14 3; 0 3]" in done.out
-    assert "Every reading that was tried" in done.out
 
 
 def test_json_has_every_reading_and_prints_nothing_else(masrel: Caller) -> None:
@@ -49,12 +41,6 @@ def test_the_published_study_audits_its_paper(masrel: Caller) -> None:
     lines = masrel("audit", STUDY, "--sentence").out.splitlines()
     assert lines[0].startswith("kappa-standard: 8 640 tables of 4 items")
     assert lines[2].endswith("in them the raters agree on 10 of 12.")
-
-
-def test_a_source_comes_without_options(masrel: Caller, tmp_path: Path) -> None:
-    assert "no option" in masrel("audit", STUDY, "--kappa", "0.5").err
-    assert "ratings/claims.csv" in masrel("audit", tmp_path).err
-    assert "--items: needed" in masrel("audit", "--kappa", "0.5").err
 
 
 def test_a_report_that_names_them_has_the_claims(

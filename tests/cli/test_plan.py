@@ -26,18 +26,6 @@ def test_the_number_of_items_is_solved_for(masrel: Caller) -> None:
     assert json.loads(less.out)["plans"][0]["expected_half_width"] > 0.2
 
 
-@pytest.mark.parametrize(
-    ("shares", "words"),
-    [
-        ("0.7,0.3", "(0.254 to 0.916), with coverage 0.923, if the coefficient is 0.6"),
-        ("0.5,0.5", "(mixture model with prevalences all 2 equal; summed over"),
-    ],
-)
-def test_a_sentence_for_a_protocol(masrel: Caller, shares: str, words: str) -> None:
-    size = ("--raters", "2", "--items", "30", "--prevalences", shares)
-    assert words in masrel(*KAPPA, *size, "--sentence").out
-
-
 def test_lines_for_a_protocol_are_toml(masrel: Caller) -> None:
     done = masrel(*KAPPA, "--raters", "2", "--items", "30", "--toml")
     analysis = tomllib.loads(done.out)["analysis"]
