@@ -134,10 +134,15 @@ def _new_part(path: Path, within: Path | None = None, mode: int | None = None) -
 @contextmanager
 def _on_disk(part: Path, path: Path) -> Iterator[BinaryIO]:
     """Open a part to write into; at the end it is on disk."""
-    with naming(path), open(part, "r+b") as out:
-        yield out
-        out.flush()
-        os.fsync(out.fileno())
+    descriptor = os.open(part, os.O_WRONLY | _BINARY)
+    try:
+        with naming(path):
+            # whoever writes may close the file, and it is synced all the same
+            with open(descriptor, "wb", closefd=False) as out:
+                yield out
+            os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def is_part(path: Path) -> bool:

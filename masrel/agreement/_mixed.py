@@ -21,8 +21,8 @@ from masrel.estimates import _LongNote
 _Floats = NDArray[np.float64]
 _Numbers = NDArray[Any]  # real, or complex for slopes
 
-_EXACT = 1e-24
-"""Residual sum of squares, as a share of all, that is the rounding of a perfect fit."""
+_EXACT = 1e-15
+"""Residual sum of squares, as a share of all, that is as good as a perfect fit."""
 
 _TINY = 1e-30
 """Imaginary step of which the square is nothing: slopes then have no rounding."""

@@ -600,7 +600,8 @@ def _without_each(values: _Floats) -> _Floats:
     variances = ((x**2).sum(axis=0) - x**2) / (n - 1) - means**2
     levels = means - means.mean(axis=1, keepdims=True)
     whole = (k - 1) * variances.sum(axis=1) + k * (levels**2).sum(axis=1)
-    return np.asarray(1.0 - (within.sum() - within) / (n - 1) / whole)
+    with np.errstate(invalid="ignore"):  # all ratings are the same without the item
+        return np.asarray(1.0 - (within.sum() - within) / (n - 1) / whole)
 
 
 def _interval(values: _Floats, value: float, error: float, level: float) -> Interval:
@@ -623,6 +624,8 @@ def _interval(values: _Floats, value: float, error: float, level: float) -> Inte
 
             limit = np.nextafter(1.0, 0.0)  # without an item all may be perfect
             each = np.arctanh(np.clip(_without_each(values), -limit, limit))
+            if np.isnan(each).any():
+                reason = "undefined with one item left out: all ratings are the same"
             squares = float(((each - each.mean()) ** 2).sum())
             quantile = float(stdtrit(n - 1, 0.5 + 0.5 * level))
             width = quantile * math.sqrt((n - 1) / n * squares)

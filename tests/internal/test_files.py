@@ -135,11 +135,19 @@ def test_a_file_that_was_not_finished_gets_no_name(tmp_path: Path) -> None:
     def stopped() -> None:
         with new_file(tmp_path / "a") as out:
             out.write(b"half")
+            out.close()
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         stopped()
     assert not list(tmp_path.iterdir())
+
+
+def test_whoever_writes_a_file_may_close_it(tmp_path: Path) -> None:
+    with new_file(tmp_path / "a") as out:
+        out.write(b"whole")
+        out.close()
+    assert (tmp_path / "a").read_bytes() == b"whole"
 
 
 KILLED = """
