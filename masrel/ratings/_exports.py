@@ -506,12 +506,9 @@ def _prodigy(ratings: _Ratings, records: _Records) -> str:
         for _, task in records
         if not is_choice and task.get("label") is not None
     )
-    if is_choice:
-        of = ratings.choose(["accept"], "fields")
-    elif labels:  # the answer is to a label: several labels are several questions
-        of = ratings.choose(labels, "labels")
-    else:
-        of = ratings.choose(["answer"], "fields")
+    # an answer is to a label: several labels are several questions
+    fields = ["accept"] if is_choice else labels or ["answer"]
+    of = ratings.choose(fields, "labels" if labels else "fields")
     for who, task in records:
         answer = task.get("answer")
         if answer == "ignore" or (is_choice and answer != "accept"):

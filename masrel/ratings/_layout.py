@@ -142,10 +142,8 @@ def _no_column(sheet: Sheet, option: str, name: str) -> RatingsError:
 
     near = get_close_matches(name, sheet.header, n=1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
-    columns = f"but {listed(sheet.header, 12)}"
-    return sheet.refuse(
-        "no column", option=option, column=name, columns=columns, hint=hint
-    )
+    facts = {"columns": f"but {listed(sheet.header, 12)}", "hint": hint}
+    return sheet.refuse("no column", option=option, column=name, **facts)
 
 
 def _refuse_two_roles(sheet: Sheet, named: dict[str, tuple[int, ...]]) -> None:

@@ -449,7 +449,7 @@ def _rated(
                 session=session,
                 items=tuple(items.texts),
                 raters=tuple(raters.texts),
-                ratings=_puttogether(items, raters, of_part[3], scale),
+                ratings=_put_together(items, raters, of_part[3], scale),
                 clusters=_clusters(sheet, layout, items, of_part[4]),
             )
         )
@@ -554,7 +554,7 @@ def _means(
     return codes[of_key], Scale(name="observed", grades=grades)
 
 
-def _puttogether(
+def _put_together(
     items: Column, raters: Column, grade: Codes, scale: Scale
 ) -> CodedRatings | CountedRatings:
     # item by rater, or counted where that were many empty places

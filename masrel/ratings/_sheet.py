@@ -96,7 +96,8 @@ class Column:
     def rows(self, chosen: Any) -> "Column":
         """Return some of the rows, with the texts of these alone."""
         codes = self.codes[chosen]
-        first = first_rows(codes, len(self.texts))
+        first = np.full(len(self.texts), len(codes))  # where each text is met first
+        first[codes[::-1]] = np.arange(len(codes) - 1, -1, -1)
         met = np.argsort(first, kind="stable")[: int((first < len(codes)).sum())]
         rank = np.zeros(len(first), dtype=np.int64)
         rank[met] = np.arange(len(met))
@@ -110,13 +111,6 @@ class Column:
     def cells(self) -> list[str]:
         """Return the text of every row."""
         return [self.texts[code] for code in self.codes.tolist()]
-
-
-def first_rows(codes: Codes, n_codes: int) -> Codes:
-    """Return where each code is met first."""
-    first = np.full(n_codes, len(codes))
-    first[codes[::-1]] = np.arange(len(codes) - 1, -1, -1)
-    return first
 
 
 def plain(text: str) -> str:
@@ -492,19 +486,13 @@ def checked_records(
             records = [record for record in records if not _is_blank(record)]
             is_closed = records[-1:] == [[_END]]
             records = records[: len(records) - is_closed]
-            _check_widths(sheet, records, width, n_rows)
+            wrong = (k for k, record in enumerate(records) if len(record) != width)
+            if (k := next(wrong, None)) is not None:
+                code = "open quote" if records[k][-1].endswith(_END) else "width"
+                facts = {"n": len(records[k]), "cells": ", ".join(records[k])[:60]}
+                where = sheet.at(n_rows + k)
+                raise sheet.refuse(code, where=where, width=width, **facts)
         yield records
         n_rows += len(records)
     if not is_closed:
         raise sheet.refuse("open quote", where=sheet.at(n_rows - 1))
-
-
-def _check_widths(
-    sheet: Sheet, records: Sequence[list[str]], width: int, n_rows: int
-) -> None:
-    for number, record in enumerate(records, n_rows):
-        if len(record) != width:
-            code = "open quote" if record[-1].endswith(_END) else "width"
-            facts = {"n": len(record), "cells": ", ".join(record)[:60]}
-            where = sheet.at(number)
-            raise sheet.refuse(code, where=where, width=width, **facts)
