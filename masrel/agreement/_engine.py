@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.agreement._codes import CountedRatings, refuse_measurements
-from masrel.agreement._labels import Codes, Label, shown, warn_caller
+from masrel.agreement._labels import Label, shown, warn_caller
 from masrel.agreement._weights import (
     NO_PAIR,
     Weights,
@@ -121,10 +121,11 @@ class Formula:
     # of which all but Light's kappa have one; where it is undefined they may divide by
     # 0, and the slope is anything.
     disagreements: Callable[[Floats, Any], tuple[Floats, Floats, Floats]]
-    # rows of codes and v to a callable: how often each row and each rater is taken,
-    # (b, n_rows) and (b, n_raters), to sums (b, m + n). A rater is never paired with a
-    # copy of itself. None where raters cannot be resampled.
-    resampled: Callable[[Codes, Any], Resampled] | None = None
+    # rows of codes, v, and `freq` where rows are always taken that often, to a call:
+    # how often each row and each rater is taken, (b, n_rows) and (b, n_raters),
+    # to sums (b, m + n). A rater is never paired with a copy of itself. None where
+    # raters cannot be resampled.
+    resampled: Callable[..., Resampled] | None = None
     # whether chance looks at each category by itself, not at sums of v of pairs alone
     needs_categories: bool = False
 

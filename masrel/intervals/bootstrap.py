@@ -311,29 +311,28 @@ def _rater_units(problem: IntervalProblem) -> _Units:
     is_item = problem.freq > 0
     codes, freq = problem.codes[is_item], problem.freq[is_item]
     few = warn_small(problem.n_paired_raters, 5, "raters", problem.n_raters)
-    sums_of = formula.resampled(codes, v)
+    of_raters = formula.resampled(codes, v, freq)
 
     def values(taken: Floats) -> Floats:
         items = np.broadcast_to(1.0 * freq, (len(taken), len(freq)))
-        return problem.values(sums_of(items, taken))
+        return problem.values(of_raters(items, taken))
 
-    width = freq.size * (3 * len(v) + 6) + codes.shape[1]
     raters = _Units(
         freqs=(np.ones(codes.shape[1], dtype=np.int64),),
         values=values,
         without=lambda: (values(1.0 - np.eye(codes.shape[1])),),
-        width=width,
+        width=freq.size + codes.shape[1] + problem.sums.size,
         notes=few,
     )
     if problem.target == "raters":
         return raters
     few_items = warn_small(problem.n_paired_items, 16, "items", problem.n_items)
-    rows = problem.rows[is_item]
+    rows, sums_of = problem.rows[is_item], formula.resampled(codes, v)
     return _Units(
         freqs=(freq, *raters.freqs),
         values=lambda items, taken: problem.values(sums_of(items, taken)),
         without=lambda: (problem.values(problem.sums - rows), *raters.without()),
-        width=width,
+        width=freq.size * (3 * len(v) + 6) + codes.shape[1],
         notes=(*few_items, *few),
         words=" of items and raters",
     )

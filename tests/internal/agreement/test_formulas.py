@@ -86,7 +86,8 @@ def test_of_resampled_raters_only_items_that_one_of_them_rated_count(
     assert formula is not None
     assert formula.resampled is not None
     v = declared_weights(weights, [1, 2, 4]).v
-    sums = formula.resampled(CODES, v)
+    once = np.ones(len(CODES), dtype=np.int64)
+    of_both, of_raters = formula.resampled(CODES, v), formula.resampled(CODES, v, once)
     chance = {
         "percent_agreement": lambda _: 1.0,
         "fleiss_kappa": lambda p: p @ v @ p,
@@ -96,7 +97,9 @@ def test_of_resampled_raters_only_items_that_one_of_them_rated_count(
     n_defined = 0
     for taken in product(range(3), repeat=3):
         raters = np.bincount(taken, minlength=3)[None].astype(np.float64)
-        value = float(formula.value(sums(np.ones((1, len(CODES))), raters), v)[0])
+        sums = of_both(once[None].astype(np.float64), raters)
+        assert of_raters(sums, raters) == pytest.approx(sums, rel=1e-12)
+        value = float(formula.value(sums, v)[0])
         parts = by_pairs(taken, v)
         if parts is None:
             assert np.isnan(value)
