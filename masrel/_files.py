@@ -1,31 +1,12 @@
-"""Every file that is written: whole, on disk and under its name, or not at all.
-
-It is made under another name beside the file that it replaces, synced, and gets its
-name in one step, which is synced too: a kill or a full disk leaves the old bytes or the
-new ones. No link is followed, and no output takes the place of a primary record.
-"""
+"""What goes out: files that replace no primary record, cells that are no formulas."""
 
 import errno
 import os
 import re
 import shutil
-import stat
-import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
 
-from masrel._input import regular
 from masrel.errors import ParameterError
-
-# What Windows alone has, and what it lacks
-_NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
-_NO_WAIT = getattr(os, "O_NONBLOCK", 0)
-_BINARY = getattr(os, "O_BINARY", 0)
-
-# Names of files that are not whole yet
-_PART_BEGINS, _PART_ENDS = ".masrel-", ".part"
 
 # A cell that begins a formula, and a number that merely begins like one
 _FORMULA = re.compile(r"'*[=+\-@\t\r]")
@@ -41,179 +22,24 @@ _SOURCES = (
 )
 
 
-def write_file(
-    path: Path,
-    data: bytes | str,
-    *,
-    within: Path | None = None,
-    mode: int | None = None,
-) -> None:
-    """Write an output: whole, on disk and under its name, or not at all."""
-    # within: a folder that it may not leave by a link; mode: as `write_files` has it
+def write_file(path: Path, data: bytes | str) -> None:
+    """Write what can be computed again: whole, through no link, or not at all."""
+    # what a study must not lose is written by `masrel.lab._durable_files`
     refuse_record(path)
-    write_files({path: data}, within=within, mode=mode)
-
-
-def write_files(
-    contents: Mapping[Path, bytes | str],
-    *,
-    within: Path | None = None,
-    mode: int | None = None,
-) -> None:
-    """Write files that belong together: all on disk before the first has its name."""
-    # They get their names in this order. Text is UTF-8 with lines as they are. mode:
-    # permissions; those of the file that is replaced, or the usual ones, unless given
-    parts: dict[Path, Path] = {}
+    if path.exists() and not path.is_file():  # such as /dev/stdout
+        raise OSError(errno.EINVAL, "needs to be a file, or nothing yet", str(path))
+    if path.is_file() and not os.access(path, os.W_OK):  # it is to stay as it is
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+    part = path.with_name(f".masrel-{os.urandom(8).hex()}.part")
     try:
-        for path, data in contents.items():
-            parts[path] = _new_part(path, within, mode)
-            with _on_disk(parts[path], path) as out:
-                out.write(data.encode() if isinstance(data, str) else data)
-        for path, part in parts.items():
-            with naming(path):
-                os.replace(part, path)
-    finally:
-        for part in parts.values():
-            part.unlink(missing_ok=True)
-    for folder in dict.fromkeys(path.parent for path in contents):
-        sync_folder(folder)
-
-
-@contextmanager
-def new_file(path: Path) -> Iterator[BinaryIO]:
-    """Give a file to write an output into bit by bit; at the end it gets its name."""
-    refuse_record(path)
-    part = _new_part(path)
-    try:
-        with _on_disk(part, path) as out:
-            yield out
-        with naming(path):
-            os.replace(part, path)
+        part.write_bytes(data.encode() if isinstance(data, str) else data)
+        if path.exists() and not path.is_symlink():
+            shutil.copymode(path, part)
+        os.replace(part, path)
+    except OSError as error:  # nobody knows the part
+        raise OSError(error.errno, error.strerror, str(path)) from error
     finally:
         part.unlink(missing_ok=True)
-    sync_folder(path.parent)
-
-
-@contextmanager
-def new_folder(folder: Path) -> Iterator[Path]:
-    """Give a folder to write into; at the end it gets its name, at a stop it goes."""
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise ParameterError(f"{folder}: needed a new or empty folder, got another")
-    make_folder(folder.parent)
-    part = _part_of(folder)
-    try:
-        part.mkdir()
-        yield part
-        os.replace(part, folder)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
-    sync_folder(folder.parent)
-
-
-def _part_of(path: Path) -> Path:
-    """Return a name that nobody knows beside a target."""
-    return path.with_name(f"{_PART_BEGINS}{os.urandom(8).hex()}{_PART_ENDS}")
-
-
-def _new_part(path: Path, within: Path | None = None, mode: int | None = None) -> Path:
-    """Make a new empty file beside a target."""
-    if within is not None:
-        check_inside(path.parent, within)
-    replaced = _mode(path)
-    mode = replaced if mode is None else mode
-    make_folder(path.parent)
-    part = _part_of(path)
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _NO_FOLLOW | _BINARY
-    with naming(path):
-        os.close(os.open(part, flags, 0o666 if mode is None else mode))
-    if mode is not None:
-        part.chmod(mode)  # as it was, whatever the umask is now
-    return part
-
-
-@contextmanager
-def _on_disk(part: Path, path: Path) -> Iterator[BinaryIO]:
-    """Open a part to write into; at the end it is on disk."""
-    descriptor = os.open(part, os.O_WRONLY | _BINARY)
-    try:
-        with naming(path):
-            # whoever writes may close the file, and it is synced all the same
-            with open(descriptor, "wb", closefd=False) as out:
-                yield out
-            os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
-def is_part(path: Path) -> bool:
-    """Return whether a file is one that is not whole yet, by its name."""
-    return path.name.startswith(_PART_BEGINS) and path.name.endswith(_PART_ENDS)
-
-
-@contextmanager
-def naming(path: Path) -> Iterator[None]:
-    """Within it, an error of the system that names no file names this one."""
-    try:
-        yield
-    except OSError as error:
-        # a full disk does not say which file it was, and nobody knows the part
-        if str(error.filename or _PART_ENDS).endswith(_PART_ENDS):
-            error.filename, error.filename2 = str(path), None
-        raise
-
-
-def _mode(path: Path) -> int | None:
-    """Return the permissions of what is replaced; refuse what is no file or kept so."""
-    try:
-        mode = path.stat().st_mode
-    except FileNotFoundError:  # nothing, or a link to nothing, which is replaced
-        return None
-    if not stat.S_ISREG(mode):  # such as /dev/stdout, which "-" stands for
-        raise OSError(errno.EINVAL, "needs to be a file, or nothing yet", str(path))
-    if path.is_symlink():
-        return None  # the permissions of another file
-    if not os.access(path, os.W_OK):
-        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
-    return stat.S_IMODE(mode)
-
-
-def make_folder(folder: Path, *, mode: int = 0o777) -> None:
-    """Make a folder, with this mode, and those above it that are missing, on disk."""
-    new: list[Path] = []
-    while not folder.is_dir() and folder != folder.parent:
-        new.append(folder)
-        folder = folder.parent
-    for path in reversed(new):
-        # Another process may be as fast.
-        path.mkdir(exist_ok=True, mode=mode if path is new[0] else 0o777)
-        sync_folder(path.parent)
-
-
-def sync_folder(folder: Path) -> None:
-    """Wait until the names in a folder are on disk."""
-    # A new file's name is on disk only when its folder is.
-    if sys.platform == "win32":
-        return
-    try:
-        descriptor = os.open(folder, os.O_RDONLY)
-    except PermissionError:  # a folder that one may write into, but not list
-        return
-    try:
-        with naming(folder):
-            os.fsync(descriptor)
-    except OSError as error:
-        if error.errno != errno.EINVAL:  # a file system that syncs no folders
-            raise
-    finally:
-        os.close(descriptor)
-
-
-def check_inside(folder: Path, root: Path) -> None:
-    """Refuse a folder of a study that a link leads out of it."""
-    if not folder.resolve().is_relative_to(root.resolve()):
-        raise ParameterError(
-            f"{folder}: needs to be in {root}, got a link to {folder.resolve()}"
-        )
 
 
 def refuse_record(path: Path) -> None:
@@ -227,19 +53,6 @@ def refuse_record(path: Path) -> None:
                 f"{path}: needs a file that is no primary record, got one of the "
                 f"study {root}"
             )
-
-
-def no_follow(path: str, flags: int, mode: int = 0o600) -> int:
-    """Open a file that is added to, an `opener` for ``open``; refuse a link or pipe."""
-    try:
-        descriptor = os.open(path, flags | _NO_FOLLOW | _NO_WAIT | _BINARY, mode)
-    except OSError as error:
-        if error.errno == errno.ELOOP:
-            raise OSError(
-                errno.ELOOP, "is a link, which is not followed", path
-            ) from None
-        raise
-    return regular(descriptor, Path(path))
 
 
 def safe_cell(text: str) -> str:

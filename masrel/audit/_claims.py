@@ -15,7 +15,7 @@ from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from masrel._input import MAX_TABLE, listed, not_utf8, read_regular, refuse
+from masrel._input import listed, not_utf8, refuse
 from masrel.errors import ParameterError, RatingsError
 
 Rule = Literal["half_even", "half_up"]
@@ -327,7 +327,7 @@ def read_claims(file: Path) -> tuple[Claim, ...]:
         If it cannot be read.
     """
     try:
-        return _claims_of(read_regular(file, most=MAX_TABLE).decode("utf-8-sig"))
+        return _claims_of(file.read_bytes().decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise RatingsError(f"{file}: {not_utf8(error)}") from error
     except (ParameterError, csv.Error) as error:

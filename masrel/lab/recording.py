@@ -18,15 +18,15 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel._files import write_files
-from masrel._input import (
+from masrel.errors import ParameterError, RecordingError
+from masrel.lab._bounded_files import (
     MAX_RECORDING,
     MAX_SMALL,
     format_problem,
     parse_json,
     read_regular,
 )
-from masrel.errors import ParameterError, RecordingError
+from masrel.lab._durable_files import write_files
 
 __all__ = [
     "MEASURED_TORQUE",

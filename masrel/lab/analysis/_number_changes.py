@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from masrel._input import MAX_TABLE, parse_json, read_regular
 from masrel.errors import ParameterError
+from masrel.lab._bounded_files import MAX_TABLE, parse_json, read_regular
 from masrel.lab.analysis._analysis_json import ANALYSIS_FORMAT
 
 # inputs are compared by themselves; notes say in words what numbers beside them say

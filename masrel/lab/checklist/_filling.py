@@ -4,8 +4,8 @@ import hashlib
 from collections.abc import Callable
 
 import masrel
-from masrel._input import MAX_TABLE, read_regular
 from masrel.errors import ParameterError
+from masrel.lab._bounded_files import MAX_TABLE, read_regular
 from masrel.lab.checklist._cosmin import cosmin_items
 from masrel.lab.checklist._facts import StudyFacts, gather_facts
 from masrel.lab.checklist._grras import grras_items

@@ -9,8 +9,9 @@ from typing import Any
 
 from tqdm import tqdm
 
-from masrel._files import new_file, safe_cell
+from masrel._files import safe_cell
 from masrel.errors import ParameterError
+from masrel.lab._durable_files import new_file
 from masrel.lab.report._traced_scenes import Scene
 
 _COLUMNS = ("time_s", "angle_deg", "velocity_deg_s", "torque_nm", "phase")

@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import masrel
-from masrel._input import format_problem, listed
+from masrel._input import listed
 from masrel.errors import ParameterError, SessionLogError
+from masrel.lab._bounded_files import format_problem
 from masrel.lab._event_log import Event, SessionLog, read_log, utc_now
 from masrel.lab.protocol import Protocol, StudyPaths
 

@@ -14,8 +14,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
 
-from masrel._input import MAX_SMALL, listed, parse_json, read_regular
+from masrel._input import listed
 from masrel.errors import ParameterError
+from masrel.lab._bounded_files import MAX_SMALL, parse_json, read_regular
 from masrel.lab.progress import rater_progress, raters_csv, session_progress
 from masrel.lab.protocol import Protocol, Question, StudyPaths
 from masrel.lab.ratings import (

@@ -9,7 +9,7 @@ from pathlib import PurePosixPath
 from urllib.parse import quote
 
 import masrel
-from masrel._input import MAX_RECORDING, read_regular
+from masrel.lab._bounded_files import MAX_RECORDING, read_regular
 from masrel.lab.export._dataset import Dataset, json_bytes
 
 _CONTEXT = "https://w3id.org/ro/crate/1.1"

@@ -8,8 +8,8 @@ from typing import Any
 
 import msgspec
 
-from masrel._input import MAX_SMALL, parse_toml, read_regular
 from masrel.errors import ProtocolError
+from masrel.lab._bounded_files import MAX_SMALL, parse_toml, read_regular
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
 
 _ABSENT = object()

@@ -8,8 +8,13 @@ from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
 
-from masrel._input import MAX_SMALL, csv_format, format_problem, read_regular
 from masrel.errors import RatingsError
+from masrel.lab._bounded_files import (
+    MAX_SMALL,
+    csv_format,
+    format_problem,
+    read_regular,
+)
 from masrel.lab.paper._form import FIRST_COLUMNS
 
 _SEPARATORS = (",", ";", "\t")

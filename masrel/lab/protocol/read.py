@@ -8,8 +8,14 @@ from typing import Any
 
 import msgspec
 
-from masrel._input import MAX_SMALL, format_problem, not_utf8, parse_toml, read_regular
+from masrel._input import not_utf8
 from masrel.errors import ProtocolError
+from masrel.lab._bounded_files import (
+    MAX_SMALL,
+    format_problem,
+    parse_toml,
+    read_regular,
+)
 from masrel.lab.elbow.identification._model_file import (
     CONSTANT_KEYS,
     FORMAT,

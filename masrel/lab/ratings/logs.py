@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from masrel._input import MAX_RECORDING, MAX_SMALL, read_regular
 from masrel.errors import RatingsError
+from masrel.lab._bounded_files import MAX_RECORDING, MAX_SMALL, read_regular
 from masrel.lab._event_log import Event
 from masrel.lab.protocol import Protocol, StudyPaths, scale_of
 from masrel.lab.ratings.table import _NEEDED_TIME, Ratings, _is_utc, ratings_from_rows

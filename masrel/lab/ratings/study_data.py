@@ -6,8 +6,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from masrel._input import MAX_TABLE, csv_format, format_problem, read_regular
 from masrel.errors import RatingsError
+from masrel.lab._bounded_files import (
+    MAX_TABLE,
+    csv_format,
+    format_problem,
+    read_regular,
+)
 from masrel.lab.conduct import excluded_raters
 from masrel.lab.protocol import Protocol, StudyPaths, scale_of
 from masrel.lab.ratings.answers import GivenAnswer, answers_of

@@ -10,15 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from masrel._files import from_safe_cell
-from masrel._input import (
+from masrel._input import listed, not_utf8
+from masrel.errors import RatingsError
+from masrel.lab._bounded_files import (
     MAX_TABLE,
     csv_format,
     format_problem,
-    listed,
-    not_utf8,
     read_regular,
 )
-from masrel.errors import RatingsError
 from masrel.lab.ratings.table import (
     _FORMAT,
     _NEEDED_TIME,

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from masrel._input import MAX_TABLE, parse_json, read_regular
+from masrel.lab._bounded_files import MAX_TABLE, parse_json, read_regular
 from masrel.lab._cache import (
     Cache,
     code_hash,

@@ -3,8 +3,8 @@
 import hashlib
 from dataclasses import dataclass
 
-from masrel._input import MAX_TABLE, read_regular
 from masrel.audit import Claim, audit_claim, read_claims
+from masrel.lab._bounded_files import MAX_TABLE, read_regular
 from masrel.lab.protocol import Protocol, StudyPaths, report_sections
 from masrel.lab.report._material import Material, Section, absent_section
 from masrel.tables._claims_table import claims_table, readings_table

@@ -7,8 +7,8 @@ from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, cast, get_args
 
-from masrel._input import format_problem
 from masrel.errors import SessionLogError
+from masrel.lab._bounded_files import format_problem
 from masrel.lab._event_log import Event
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import mmap
 from collections.abc import Sequence
 from pathlib import Path
 
-from masrel._input import parse_json
+from masrel.lab._bounded_files import parse_json
 from masrel.lab.hess._spool import _HEADER, _WORD
 from masrel.lab.recording import RECORDING_COLUMNS
 

@@ -11,7 +11,7 @@ from starlette.requests import cookie_parser
 from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from masrel._input import parse_json
+from masrel.lab._bounded_files import parse_json
 from masrel.lab.serve._access import ROLES, Access, AccessError, Role, Visitor
 from masrel.lab.serve._page_templates import page
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from masrel._input import format_problem
 from masrel.errors import SessionLogError
+from masrel.lab._bounded_files import format_problem
 from masrel.lab._event_log import Event, read_log
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
 from masrel.lab.training._criterion import Criterion, training_criterion

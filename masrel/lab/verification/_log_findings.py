@@ -7,14 +7,14 @@ from datetime import datetime
 from pathlib import Path
 from typing import TypeVar
 
-from masrel._input import (
+from masrel.errors import SessionLogError
+from masrel.lab._bounded_files import (
     MAX_RECORDING,
     MAX_SMALL,
     format_problem,
     parse_json,
     read_regular,
 )
-from masrel.errors import SessionLogError
 from masrel.lab._event_log import Event
 from masrel.lab.recording import _FORMAT
 from masrel.lab.schedule import Presentation

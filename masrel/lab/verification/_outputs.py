@@ -9,7 +9,8 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from masrel._input import (
+from masrel.errors import MasrelError, MasrelWarning
+from masrel.lab._bounded_files import (
     MAX_RECORDING,
     MAX_TABLE,
     csv_format,
@@ -17,7 +18,6 @@ from masrel._input import (
     parse_json,
     read_regular,
 )
-from masrel.errors import MasrelError, MasrelWarning
 from masrel.lab.conduct import excluded_raters
 from masrel.lab.conduct._study_log import conduct_hash
 from masrel.lab.protocol import Protocol, StudyPaths

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from masrel._input import MAX_SMALL, read_regular
 from masrel.errors import ParameterError
+from masrel.lab._bounded_files import MAX_SMALL, read_regular
 from masrel.lab._event_log import Event
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.protocol._questions import checked_answer

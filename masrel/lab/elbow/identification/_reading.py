@@ -17,8 +17,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel._input import MAX_RECORDING, not_utf8, read_regular
+from masrel._input import not_utf8
 from masrel.errors import ParameterError, RecordingError, RecordingWarning
+from masrel.lab._bounded_files import MAX_RECORDING, read_regular
 from masrel.lab.recording import (
     _FIRST_COLUMNS,
     MEASURED_TORQUE,

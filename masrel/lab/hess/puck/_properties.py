@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from masrel._input import MAX_SMALL, parse_toml, read_regular
 from masrel.errors import DeviceError, ParameterError
+from masrel.lab._bounded_files import MAX_SMALL, parse_toml, read_regular
 
 # The same for every type and firmware
 VERSION, ROLE, SERIAL_NUMBER, ID, ERROR, STATUS = 0, 1, 2, 3, 4, 5
