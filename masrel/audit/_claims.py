@@ -11,7 +11,7 @@ from fractions import Fraction
 from itertools import product
 from math import ceil, floor
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -55,13 +55,8 @@ UNCERTAINTY = ("standard_error", "low", "high", "p")
 """What may be printed beside the kappa of two raters."""
 
 
-class Bounds(NamedTuple):
-    """The values that are rounded to one text."""
-
-    low: Fraction
-    high: Fraction
-    has_low: bool  # whether the end itself is one of them
-    has_high: bool
+Bounds = tuple[Fraction, Fraction, bool, bool]
+"""The ends of the values rounded to one text, and whether each is one of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +74,7 @@ class PrintedNumber:
         else:  # away from 0: of 0 neither end, of others the end nearer to 0
             has_low, has_high = self.units > 0, self.units < 0
         half = self.half_unit
-        return Bounds(self.value - half, self.value + half, has_low, has_high)
+        return self.value - half, self.value + half, has_low, has_high
 
 
 def _parse_printed(
@@ -190,9 +185,8 @@ class Claim:
         for key, (least, most) in _COUNTS.items():
             count = getattr(self, key)
             most = min(most, self.n_items - 1) if key == "n_unrated" else most
-            is_whole = isinstance(count, int | np.integer) and count is not True
+            is_in = _is_whole(count) and least <= count <= most
             needed = f"needs a whole number from {least} to {most}"
-            is_in = is_whole and least <= count <= most
             refuse((not is_in, f"{key}: {needed}, got {count!r}"))
         refuse(
             (
@@ -209,25 +203,25 @@ class Claim:
                 f"rounding: needs half_even, half_up or either, got {self.rounding!r}",
             )
         )
-        self._check_margins("margins_1", self.margins_1)
-        self._check_margins("margins_2", self.margins_2)
+        for key in _MARGINS:
+            if getattr(self, key) is not None:
+                self._check_margins(key, getattr(self, key))
         self._check_uncertainty(printed)
 
-    def _check_margins(self, key: str, margins: tuple[int, ...] | None) -> None:
-        if margins is None:
-            return
-        shown = ";".join(map(str, margins))
+    def _check_margins(self, key: str, margins: tuple[int, ...]) -> None:
         sums = range(self.n_items - self.n_unrated, self.n_items + 1)
+        are_counts = all(_is_whole(count) and count >= 0 for count in margins)
         refuse(
             (self.n_raters != 2, f"{key}: needs two raters, got {self.n_raters}"),
             (
-                len(margins) != self.n_categories or min(margins) < 0,
-                f"{key}: needs {self.n_categories} counts, one a category, got {shown}",
+                not are_counts or len(margins) != self.n_categories,
+                f"{key}: needs {self.n_categories} counts, one a category, got "
+                f"{margins}",
             ),
             (
-                sum(margins) not in sums,
+                are_counts and sum(margins) not in sums,
                 f"{key}: needs counts that sum to n_items, {self.n_items}, got "
-                f"{shown}, which sum to {sum(margins)}",
+                f"{margins}",
             ),
         )
 
@@ -297,6 +291,10 @@ class Claim:
         return list(product(agreement, kappa))
 
 
+def _is_whole(count: object) -> bool:
+    return isinstance(count, int | np.integer) and count is not True
+
+
 def check_weights(name: str, weights: str, known: tuple[str, ...] = WEIGHTS) -> None:
     """Refuse weights that cannot be audited."""
     needed = f"{name}: needs one of {', '.join(known)}"
@@ -335,16 +333,22 @@ def read_claims(file: Path) -> tuple[Claim, ...]:
 
 
 def _claims_of(text: str) -> tuple[Claim, ...]:
-    lines = [
-        (number, line)
+    lines = {
+        number: line
         for number, line in enumerate(text.splitlines(), start=1)
         if line.strip(" ,;") and not line.startswith("#")
-    ]
+    }
     needed = f"needs a line of column names and a row a claim, got {len(lines)} lines"
     refuse((len(lines) < 2, needed))
-    separator = ";" if lines[0][1].count(";") > lines[0][1].count(",") else ","
-    rows = [next(csv.reader([line], delimiter=separator)) for _, line in lines]
-    head = [name.strip() for name in rows[0]]
+    first = next(iter(lines.values()))
+    separator = ";" if first.count(";") > first.count(",") else ","
+    (_, head), *rows = [
+        (
+            number,
+            [cell.strip() for cell in next(csv.reader([line], delimiter=separator))],
+        )
+        for number, line in lines.items()
+    ]
     known = [field.name for field in fields(Claim)]
     strays = [name for name in head if name not in known]
     are_there = set(head).issuperset(_NEEDED) and len(set(head)) == len(head)
@@ -355,46 +359,38 @@ def _claims_of(text: str) -> tuple[Claim, ...]:
             f"needs the columns {', '.join(_NEEDED)}, and each column once, got "
             f"{listed(head)}",
         ),
+        *(
+            (
+                len(row) != len(head),
+                f"row {number}: needs {len(head)} cells, as many as there are columns, "
+                f"got {len(row)}",
+            )
+            for number, row in rows
+        ),
     )
-    return tuple(
-        _claim_of_row(number, head, row)
-        for (number, _), row in zip(lines[1:], rows[1:], strict=True)
-    )
-
-
-def _claim_of_row(number: int, head: list[str], row: list[str]) -> Claim:
-    refuse(
-        (
-            len(row) != len(head),
-            f"row {number}: needs {len(head)} cells, as many as there are columns, got "
-            f"{len(row)}",
-        )
-    )
-    cells = dict(zip(head, map(str.strip, row), strict=True))
-    texts = {name: text for name, text in cells.items() if text}
-    try:
-        return claim_of({"name": f"row {number}"} | texts)
-    except ParameterError as error:  # its message begins with the parameter
-        raise ParameterError(f"row {number}, column {error}") from error
+    claims = []
+    for number, row in rows:
+        texts = {name: cell for name, cell in zip(head, row, strict=True) if cell}
+        try:
+            claims.append(claim_of({"name": f"row {number}"} | texts))
+        except ParameterError as error:  # its message begins with the parameter
+            raise ParameterError(f"row {number}, column {error}") from error
+    return tuple(claims)
 
 
 def claim_of(texts: dict[str, str]) -> Claim:
     """Return a claim from the texts of its parameters."""
-    values: dict[str, Any] = dict(texts)
-    for name in _NEEDED:
-        refuse((name not in texts, f"{name}: needed, got nothing"))
+    values: dict[str, Any] = {**dict.fromkeys(_NEEDED), **texts}
     for key, text in texts.items():
         if key in _COUNTS:
-            values[key] = _whole(key, text)
+            values[key] = _whole(text)
         elif key in _MARGINS:
-            parts = text.replace(";", " ").split()
-            values[key] = tuple(_whole(key, part) for part in parts)
+            values[key] = tuple(map(_whole, text.replace(";", " ").split()))
         elif key == "level":
             values[key] = float(_parse_printed(text, key, 0, 1, "0.95").value)
     return Claim(**values)
 
 
-def _whole(key: str, text: str) -> int:
-    is_whole = text.isascii() and text.isdecimal() and len(text) < 10
-    refuse((not is_whole, f"{key}: needs a whole number, got {text!r}"))
-    return int(text)
+def _whole(text: str) -> int | str:
+    # what is no whole number is left as it is, and refused by the claim
+    return int(text) if text.isdecimal() and len(text) < 10 else text

@@ -5,7 +5,7 @@ kappa plus and minus a normal quantile of it, and p that of kappa over it. All t
 floats: a printed number fits where it is nearer than half of its last decimal.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
 from statistics import NormalDist
@@ -383,9 +383,10 @@ def audit_claim(claim: Claim) -> ClaimAudit:
     examples: tuple[CellRows, ...] = ()
     read = _by_rounding if claim == _bare(claim) else _one_by_one
     for n_absent, weights in product(range(claim.n_unrated + 1), claim.weights()):
-        rows, tables = read(claim, _named(claim, weights, claim.n_items - n_absent))
-        readings += rows
-        examples = examples or tables
+        named = _named(claim, weights, claim.n_items - n_absent)
+        for reading, tables in read(claim, named):
+            readings.append(reading)
+            examples = examples or tables
     audit = ClaimAudit(claim=claim, readings=tuple(readings), examples=examples)
     return (
         audit if audit.is_possible is not False else replace(audit, alone=_alone(claim))
@@ -428,15 +429,16 @@ def _alone(claim: Claim) -> dict[str, ConsistentTables]:
     return {name: _answer(part) for name, part in parts.items()}
 
 
-_Read = tuple[list[Reading], tuple[CellRows, ...]]  # readings, examples of the first
+_Read = Iterator[tuple[Reading, tuple[CellRows, ...]]]  # each with its examples
 
 
 def _by_rounding(claim: Claim, named: Claim) -> _Read:
     # one reading where both rules lead to the same
     result = _answer(named)
-    if len({(r.n_tables, r.status) for r in result.readings}) == 1:
-        return [replace(result.readings[0], rounding=claim.rounding)], result.examples
-    return list(result.readings), result.examples
+    is_one = len({(r.n_tables, r.status) for r in result.readings}) == 1
+    rounding = {"rounding": claim.rounding} if is_one else {}
+    for reading in result.readings[: 1 if is_one else None]:
+        yield replace(reading, **rounding), result.examples
 
 
 def _one_by_one(claim: Claim, named: Claim) -> _Read:
@@ -450,8 +452,6 @@ def _one_by_one(claim: Claim, named: Claim) -> _Read:
     )
     errors = _ERRORS if printed.keys() & {"standard_error", "low"} else (None,)
     tests = _TESTS if "p" in printed else (None,)
-    readings: list[Reading] = []
-    examples: tuple[CellRows, ...] = ()
     for error, test in product(errors, tests):
         fits = np.ones(len(tables), dtype=bool)
         if error is not None:
@@ -466,9 +466,8 @@ def _one_by_one(claim: Claim, named: Claim) -> _Read:
             claim.rounding,
             tuple(agreed) if is_whole else (),
         )
-        readings.append(replace(reading, error=error, test=test))
-        examples = examples or _as_rows(tables[fits][:N_EXAMPLES])
-    return readings, examples
+        examples = _as_rows(tables[fits][:N_EXAMPLES])
+        yield replace(reading, error=error, test=test), examples
 
 
 def _errors(tables: Integers, weights: str) -> dict[str, _Floats]:
@@ -513,8 +512,7 @@ def _has_p(claim: Claim, values: dict[str, _Floats], test: str) -> _Flags:
     printed = claim.printed()["p"]
     error, sides = _TESTS[test]
     with np.errstate(divide="ignore", invalid="ignore"):
-        z = values["kappa"] / values[error]
-    above = np.array([1 - _NORMAL.cdf(value) for value in z])
+        above = np.array([1 - _NORMAL.cdf(z) for z in values["kappa"] / values[error]])
     p = above if sides == 1 else 2 * np.minimum(above, 1 - above)
     if str(claim.p).startswith("<"):
         return np.asarray(p < float(printed.value))

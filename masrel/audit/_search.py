@@ -7,18 +7,19 @@ A printed percentage allows a range of S, a printed kappa for every S a range of
 `SquareTables` has the tables of two raters, `ItemTables` those of more.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
 from fractions import Fraction
 from functools import cache, lru_cache, partial
 from itertools import combinations, islice
 from math import comb, prod
-from typing import NamedTuple
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.audit._claims import Bounds, Claim, Rule, Window, whole_numbers
+from masrel.audit._claims import Claim, Rule, Window, whole_numbers
 
 Integers = NDArray[np.int64]
 
@@ -44,77 +45,47 @@ class WorkLimitError(Exception):
     """The bound on work is met."""
 
 
-class Step(NamedTuple):
-    """Tables that were met at one step."""
-
-    numbers: Mapping[Rule | None, int]  # by rule, and by any of them (None)
-    n_agreed: set[int]  # on how many items two raters agree in them
-    tables: Callable[[], Iterator[Integers]]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SearchResult:
-    """What a search met until all was looked at, or enough was met, or work ended."""
-
-    numbers: Mapping[Rule | None, int]  # tables by rule, and by any of them (None)
-    tables: Sequence[Integers]  # the first of them
-    n_agreed: set[int]
-    is_whole: bool  # whether all was looked at
-    n_visited: int
+Step = tuple[
+    Mapping[Rule | None, int],  # tables by rule, and by any of them (None)
+    set[int],  # on how many items two raters agree in them
+    Callable[[], Iterator[Integers]],  # makes them
+]
+"""Tables that were met at one step."""
 
 
-def search_tables(claim: Claim, *, n_made: int = N_EXAMPLES) -> SearchResult:
+def search_tables(
+    claim: Claim, *, n_made: int = N_EXAMPLES
+) -> "SquareTables | ItemTables":
     """Search the tables of a claim with named weights, and make so many of them."""
     if claim.n_raters == 2:
-        return _searched(SquareTables(claim), n_made)
-    first = _searched(ItemTables(claim, _FIRST_VISITED_ITEMS), n_made)
+        return SquareTables(claim).run(n_made)
+    first = ItemTables(claim, _FIRST_VISITED_ITEMS).run(n_made)
     if first.is_whole or first.numbers[None] >= MAX_COUNTED:
         return first
-    return _searched(ItemTables(claim, _MAX_VISITED_ITEMS), n_made)
-
-
-def _searched(search: "SquareTables | ItemTables", n_made: int) -> SearchResult:
-    numbers: dict[Rule | None, int] = dict.fromkeys((None, *search.claim.rules), 0)
-    tables: list[Integers] = []
-    n_agreed: set[int] = set()
-    is_enough = False
-    try:
-        for step in search.steps():
-            for rule, n in step.numbers.items():
-                numbers[rule] += n
-            if step.numbers[None]:
-                n_agreed |= step.n_agreed
-                tables += islice(step.tables(), n_made - len(tables))
-            # margins are looked at only where tables are made
-            n = numbers[None] if n_made < MAX_COUNTED else len(tables)
-            if is_enough := n >= MAX_COUNTED:
-                break
-        is_whole = not is_enough
-    except WorkLimitError:
-        is_whole = False
-    return SearchResult(
-        numbers=numbers,
-        tables=tables,
-        n_agreed=n_agreed,
-        is_whole=is_whole,
-        n_visited=search.n_visited,
-    )
+    return ItemTables(claim, _MAX_VISITED_ITEMS).run(n_made)
 
 
 def disagreement(weights: str, n_categories: int) -> Integers:
     """Return v of any two categories in whole numbers, (n_categories, n_categories)."""
     codes = np.arange(n_categories)
     steps = abs(codes[:, None] - codes)
-    known: dict[str, Integers]
-    known = {"identity": np.minimum(steps, 1), "linear": steps, "quadratic": steps**2}
+    known: dict[str, Integers] = {
+        "identity": np.minimum(steps, 1),
+        "linear": steps,
+        "quadratic": steps**2,
+    }
     return known[weights]
 
 
-class _Search:
-    """A search for the tables of a claim with named weights, and its bound on work."""
+class _Search(ABC):
+    """The tables of a claim with named weights, as far as work bounds the search."""
 
     def __init__(self, claim: Claim, limit: int = _MAX_VISITED) -> None:
         self.claim, self.limit, self.n_visited = claim, limit, 0
+        self.numbers: dict[Rule | None, int] = dict.fromkeys((None, *claim.rules), 0)
+        self.tables: list[Integers] = []  # the first of them
+        self.n_agreed: set[int] = set()
+        self.is_whole = False  # whether all was looked at
         n, m, q = claim.n_items, claim.n_raters, claim.n_categories
         printed = claim.printed()
         self._kappa = printed.get("kappa")
@@ -130,10 +101,30 @@ class _Search:
             for rule in claim.rules:  # 100 (1 - S / most) lies in the bounds
                 low, high, has_low, has_high = printed["agreement"].bounds(rule)
                 ends = most * (1 - high / 100), most * (1 - low / 100)
-                first, last = whole_numbers(Bounds(*ends, has_high, has_low))
+                first, last = whole_numbers((*ends, has_high, has_low))
                 windows[rule] = max(first, 0), min(last, most)
         self.observed = _with_any(windows)
         self.chance = cache(self._chance)
+
+    @abstractmethod
+    def steps(self) -> Iterator[Step]:
+        """Yield the tables that there are, some at a time."""
+
+    def run(self, n_made: int) -> Self:
+        """Search until all was looked at, or enough was met, or work ended."""
+        with suppress(WorkLimitError):
+            for numbers, n_agreed, tables in self.steps():
+                for rule, n in numbers.items():
+                    self.numbers[rule] += n
+                if numbers[None]:
+                    self.n_agreed |= n_agreed
+                    self.tables += islice(tables(), n_made - len(self.tables))
+                # margins are looked at only where tables are made
+                is_made = n_made >= MAX_COUNTED
+                if (len(self.tables) if is_made else self.numbers[None]) >= MAX_COUNTED:
+                    return self
+            self.is_whole = True
+        return self
 
     def charge(self, n: int) -> None:
         """Count work before it is done."""
@@ -154,7 +145,7 @@ class _Search:
         # 1 - f S / C lies in the bounds
         total = self._factor * observed
         most = total / (1 - high) if high < 1 else Fraction(_UNBOUNDED)
-        return whole_numbers(Bounds(total / (1 - low), most, has_low, has_high))
+        return whole_numbers((total / (1 - low), most, has_low, has_high))
 
 
 def _with_any(windows: Mapping[Rule, Window]) -> dict[Rule | None, Window]:
@@ -324,7 +315,7 @@ class SquareTables(_Search):
                 ends[rule] = np.array([begin, end])
             numbers = {rule: int(np.diff(e, axis=0).sum()) for rule, e in ends.items()}
             made = partial(self._tables, diagonals, between, above[order], ends[None])
-            yield Step(numbers, n_agreed, made)
+            yield numbers, n_agreed, made
 
     def _tables(
         self, diagonals: Integers, between: Integers, above: Integers, ends: Integers
@@ -423,7 +414,7 @@ class ItemTables(_Search):
         numbers = {rule: int(counts @ fit.sum(axis=1)) for rule, fit in fits.items()}
         before, row = np.nonzero(fits[None])
         made = partial(self._tables, layers, begin + before, row)
-        return Step(numbers, set(), made)
+        return numbers, set(), made
 
     def _tables(
         self, layers: list[Integers], before: Integers, last: Integers

@@ -7,9 +7,13 @@ from typing import TYPE_CHECKING
 import click
 
 from masrel._input import refuse
-from masrel.cli._options import OutputOptions, output_options, write_output
+from masrel.cli._options import (
+    OutputOptions,
+    named_as_options,
+    output_options,
+    write_output,
+)
 from masrel.cli._paths import note_inputs
-from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
     from masrel.audit import Claim
@@ -124,18 +128,11 @@ def _claim(texts: _Texts) -> "Claim":
     values = {name: text for name, text in texts.items() if isinstance(text, str)}
     ends = texts.get("interval", ())
     values |= dict(zip(("low", "high"), ends, strict=False))
-    try:
+    with named_as_options(low="--interval", high="--interval"):
         for name, other in _BESIDE.items():
             alone = name in texts and other not in texts
             refuse((alone, f"{name}: needs --{other} beside it, got none"))
         return claim_of(values)
-    except ParameterError as error:  # its message begins with the parameter
-        names, _, rest = str(error).partition(":")
-        options = dict.fromkeys(("low", "high"), "--interval")
-        for param in click.get_current_context().command.params:
-            options[str(param.name)] = param.opts[0]
-        names = ", ".join(options[name] for name in names.split(", "))
-        raise ParameterError(f"{names}:{rest}") from None
 
 
 _BESIDE = {

@@ -8,7 +8,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from masrel._input import refuse
-from masrel.cli._options import OutputOptions, output_options, write_output
+from masrel.cli._options import (
+    OutputOptions,
+    named_as_options,
+    output_options,
+    write_output,
+)
 from masrel.cli._paths import InputFile
 from masrel.cli._progress import Progress, progress
 
@@ -39,13 +44,6 @@ def _floats(text: str, number: type = float) -> list[Any]:
 
 def _whole_numbers(text: str) -> list[int]:
     return _floats(text, int)
-
-
-def _prices(text: str) -> list[float]:
-    prices = _floats(text)
-    if len(prices) != 3:
-        raise click.BadParameter(f"needs 3 numbers, got {len(prices)}")
-    return prices
 
 
 def _prevalences(text: str) -> list[Any]:
@@ -115,7 +113,7 @@ _MODELS = ("mixture", "dirichlet-multinomial", "latent", "table")
 @click.option("--max-cost", type=float, help="What the study may cost.")
 @click.option(
     "--prices",
-    type=_prices,
+    type=_floats,
     metavar="NUMBERS",
     help="Of an item, a rater, a rating.  [default: 0,0,1]",
 )
@@ -192,7 +190,8 @@ def _plans(
     # with the lines of a study's plan that they are of
     with progress("planning", "steps", is_quiet=is_quiet) as bar:
         if folder is None:
-            return (), _of_options(_with_pilot(arguments), bar)
+            with named_as_options():
+                return (), _of_options(_with_pilot(arguments), bar)
         from masrel.lab.cli._study_plans import study_plans
 
         _refuse(arguments, _NOT_OF_STUDIES, "is not of a study, whose protocol says it")
@@ -205,12 +204,9 @@ def _of_options(arguments: dict[str, Any], bar: Progress) -> "tuple[Plan, ...]":
     ranges = {name: arguments.pop(name) for name in _RANGES if name in arguments}
     if _is_grid(arguments, ranges):
         _refuse(arguments, ("max_cost",), "is not of a grid, whose rows have costs")
-        is_other = arguments.pop("method", "auto") != "auto"
-        refuse((is_other, "--method: a grid is by auto, exact where it can be"))
         names = ("prevalences", "executor", "scheduler")
         ranges |= {name: arguments.pop(name) for name in names if name in arguments}
         return plan_grid(Study(**arguments), **ranges, progress=bar.reach)
-    _refuse(arguments, ("scheduler",), "is of grids")
     study = Study(**arguments, **{name: several[0] for name, several in ranges.items()})
     if study.n_items is None or study.n_raters is None:
         return (sample_size(study, progress=bar.reach),)
@@ -225,7 +221,8 @@ def _is_grid(arguments: dict[str, Any], ranges: dict[str, Any]) -> bool:
     has_chance = not arguments.keys().isdisjoint({"power", "assurance"})
     is_rows = isinstance(arguments.get("prevalences", [0.0])[0], list)
     is_rows = is_rows and arguments.get("model") != "table"
-    return several or is_rows or (is_known and has_chance) or "executor" in arguments
+    is_shared = not arguments.keys().isdisjoint({"executor", "scheduler"})
+    return several or is_rows or (is_known and has_chance) or is_shared
 
 
 def _refuse(arguments: dict[str, Any], names: Iterable[str], why: str) -> None:
@@ -236,9 +233,7 @@ def _refuse(arguments: dict[str, Any], names: Iterable[str], why: str) -> None:
 
 def _with_pilot(arguments: dict[str, Any]) -> dict[str, Any]:
     # what nobody gave is what a pilot had
-    needed = "--target: needs items, raters or both: what a new study draws anew"
-    refuse(("target" not in arguments, needed))
-    arguments = {"coefficient": "fleiss_kappa", **arguments}
+    arguments = {"coefficient": "fleiss_kappa", "target": None, **arguments}
     if (path := arguments.pop("pilot", None)) is None:
         return arguments
     from masrel.planning import pilot

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any, Literal
@@ -334,6 +334,7 @@ class _Search:
         if design.study.n_items is None:
             self._name, self.highest = "items", _MAX_ITEMS
             self.lowest = _FEWEST_ITEMS + design.is_icc
+        self.least_cost = self._cost(self.lowest)
 
     def _sizes(self, n: int) -> tuple[int, int]:
         known = (self.design.n_items, self.design.n_raters)
@@ -380,7 +381,7 @@ class _Search:
         low, high = self.lowest, min(max(guess, self.lowest), highest)
         if guess > _FAR * highest:
             low = highest + 1
-        while low <= highest and not self.at(high).reaches_aim:
+        while low <= highest and not self._is_met(high):
             low, high = high + 1, min(2 * high, highest)
         if low <= highest:
             sizes = range(low, high)
@@ -401,8 +402,8 @@ class _Search:
     def _stable(self, n: int) -> Plan:
         # An exact chance goes up and down with n: from where on it holds.
         plan, study = self.at(n), self.design.study
-        is_smooth = chance_of(study) is None or plan.method != "exact"
-        if is_smooth or self.design.is_icc or self._name == "raters":
+        is_exact = plan.method == "exact" and not self.design.is_icc
+        if chance_of(study) is None or not is_exact or self._name == "raters":
             return plan
         around = range(max(self.lowest, int(0.85 * n)), int(1.25 * n) + 2)
         designs = (self.design.of_size(*self._sizes(size)) for size in around)
@@ -418,22 +419,19 @@ class _Search:
         notes = () if first == stable else (note,)
         return replace(self.at(stable), notes=notes)
 
-    def affordable(self, limit: float) -> int | None:
-        """Return the largest size that costs no more than a limit, if any does."""
-        if self._cost(self.lowest) > limit:
-            return None
-        fixed, one_more = self._cost(0), self._cost(1) - self._cost(0)
-        if one_more == 0.0 or math.isinf(limit):
-            return self.highest
-        return min(int((limit - fixed) / one_more * (1.0 + 1e-12)), self.highest)
+    def affordable(self, limit: float) -> int:
+        """Return the largest size that costs no more than a limit; 0 if none does."""
+        sizes = range(self.lowest, self.highest + 1)
+        n_sizes = bisect_right(sizes, limit * (1.0 + 1e-12), key=self._cost)
+        return self.lowest + n_sizes - 1 if n_sizes else 0
 
     def _affordable_size(self) -> int:
         limit = self.design.study.max_cost or 0.0
-        n = self.affordable(limit) or 0
+        n = self.affordable(limit)
         refuse(
             (
-                n == 0 or self._cost(n + 1) <= limit,
-                f"max_cost: needs a limit between {self._cost(self.lowest):g}, of the "
+                n in (0, self.highest),
+                f"max_cost: needs a limit between {self.least_cost:g}, of the "
                 f"smallest study, and what some study costs; got {limit:g}",
             )
         )
@@ -448,33 +446,31 @@ def _cheapest(design: Design, progress: Progress | None) -> Plan:
     # Numbers of raters are tried from the fewest on. For each, the largest number of
     # items that is no dearer than the best study so far is looked at first: where that
     # does not reach the aim, nothing with as many raters can be cheaper.
-    study, best, n_worse = design.study, None, 0
+    study, n_worse = design.study, 0
     _check_prices(study)
     limit, is_counted = study.max_cost or math.inf, not has_aim(study)
     most = int(min(design.max_raters, _MAX_RATERS))
+    smallest = _Search(design.of_size(None, design.min_raters), progress)
+    needed = f"needs at least {smallest.least_cost:g}, of the smallest study"
+    refuse((limit < smallest.least_cost, f"max_cost: {needed}; got {limit:g}"))
+    best = smallest.at(smallest.lowest)
     if math.isinf(limit):
         best = _first_that_reaches(design, most, progress)
         limit = best.cost
     for n_raters in range(design.min_raters, most + 1):
         search = _Search(design.of_size(None, n_raters), progress)
         n = search.affordable(limit)
-        if n is None or n_worse >= _PATIENCE:
+        if n == 0 or n_worse >= _PATIENCE:
             break
         plan = search.at(n)
         if plan.reaches_aim:
             plan = search.up_to(n)
-        is_best = best is None or _merit(study, plan) >= _merit(study, best)
-        if plan.cost <= limit and is_best:
+        if _merit(study, plan) >= _merit(study, best):
             best, n_worse = plan, 0
             if plan.reaches_aim:  # too few raters may reach nothing: they do not count
                 limit, is_counted = plan.cost * _CHEAPER, True
         else:
             n_worse += is_counted
-    least = design.cost(_FEWEST_ITEMS + design.is_icc, design.min_raters)
-    if best is None:
-        raise ParameterError(
-            f"max_cost: needs at least {least:g}, of the smallest study; got {limit:g}"
-        )
     refuse(
         (
             best.reaches_aim is False,

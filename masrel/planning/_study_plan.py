@@ -5,13 +5,14 @@ import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from typing import Literal, get_args
+from numbers import Integral, Real
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from masrel._input import refuse
 from masrel.agreement import Label, WeightsLike, code_ratings
-from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
+from masrel.errors import RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Target
 from masrel.intervals import estimate
 
@@ -180,47 +181,45 @@ class Study:
 
     def __post_init__(self) -> None:
         """Check numbers and choices, and draw the seed where none was given."""
-        for name, (needed, holds) in _NUMBERS.items():
-            number = getattr(self, name)
-            if number is None and name not in _ALWAYS:
-                continue
-            if not isinstance(number, int | float | np.integer | np.floating):
-                raise ParameterError(f"{name}: needs a number, got {number!r}")
-            refuse((not holds(float(number)), f"{name}: needs {needed} got {number:g}"))
-        for name, least in (("n_items", 2), ("n_raters", 1), ("n_studies", 1)):
-            n = getattr(self, name)
-            is_size = isinstance(n, int | np.integer) and n >= least
-            needed = f"needs a whole number above {least - 1}"
-            refuse((n is not None and not is_size, f"{name}: {needed}, got {n!r}"))
-        for name, choices in _CHOICES.items():
-            chosen, known = getattr(self, name), ", ".join(map(str, choices))
-            refuse(
-                (chosen not in choices, f"{name}: needs one of {known}, got {chosen!r}")
-            )
+        for name, (needed, of_kind, holds) in _RULES.items():
+            value = getattr(self, name)
+            is_absent = value is None and name not in _ALWAYS
+            is_right = is_absent or (isinstance(value, of_kind) and holds(value))
+            refuse((not is_right, f"{name}: needs {needed}, got {value!r}"))
         _check_together(self)
         object.__setattr__(self, "rng", _seed(self.rng))
 
 
-_CHANCE = ("(0, 1),", lambda x: 0.0 < x < 1.0)
-_SHARE = ("[0, 1),", lambda x: 0.0 <= x < 1.0)
-_ON_SCALE = ("[-1, 1],", lambda x: -1.0 <= x <= 1.0)
-_NUMBERS: dict[str, tuple[str, Callable[[float], bool]]] = {
-    "half_width": (
-        "(0, 1], since the scale from -1 to 1 is no wider;",
-        lambda x: 0.0 < x <= 1.0,
-    ),
+# what is needed, of which kind it is, and whether it is right
+_Rule = tuple[str, type, Callable[[Any], bool]]
+
+
+def _whole(least: int) -> _Rule:
+    return f"a whole number above {least - 1}", Integral, lambda n: n >= least
+
+
+def _one_of(*choices: object) -> _Rule:
+    return f"one of {', '.join(map(str, choices))}", object, lambda x: x in choices
+
+
+_CHANCE: _Rule = ("a number in (0, 1)", Real, lambda x: 0.0 < x < 1.0)
+_SHARE: _Rule = ("a number in [0, 1)", Real, lambda x: 0.0 <= x < 1.0)
+_ON_SCALE: _Rule = ("a number in [-1, 1]", Real, lambda x: -1.0 <= x <= 1.0)
+_RULES: dict[str, _Rule] = {
+    "half_width": ("a number in (0, 1]", Real, lambda x: 0.0 < x <= 1.0),
     **dict.fromkeys(("power", "assurance", "level"), _CHANCE),
     **dict.fromkeys(("lower", "upper", "null", "value"), _ON_SCALE),
     **dict.fromkeys(("p_missing", "rater_share"), _SHARE),
-    "max_cost": ("a number above 0,", lambda x: x > 0.0),
+    "max_cost": ("a number above 0", Real, lambda x: x > 0.0),
+    "n_items": _whole(2),
+    **dict.fromkeys(("n_raters", "n_studies"), _whole(1)),
+    "sides": _one_of(1, 2),
+    "target": _one_of(*get_args(Target)),
+    "interval": _one_of(*get_args(Interval)),
+    "method": _one_of(*get_args(Method)),
 }
-_ALWAYS = ("level", "p_missing", "rater_share")  # numbers that are never None
-_CHOICES: dict[str, tuple[object, ...]] = {
-    "sides": (1, 2),
-    "target": get_args(Target),
-    "interval": get_args(Interval),
-    "method": get_args(Method),
-}
+# what is never None
+_ALWAYS = ("level", "p_missing", "rater_share", "sides", "target", "interval", "method")
 
 
 def _check_together(study: Study) -> None:
@@ -409,25 +408,22 @@ def is_met(study: Study, plan: Plan) -> bool:
 
 def aim_words(study: Study) -> tuple[str, str]:
     """Return the parameter that says the aim, and the aim for a reader."""
-    if study.power is not None:
-        return "power", f"power of {study.power:g}"
-    chance = "" if study.assurance is None else f" with assurance {study.assurance:g}"
-    if study.half_width is not None:
-        return "half_width", f"a half-width of {study.half_width:g}{chance}"
-    ends = ["…" if x is None else f"{x:g}" for x in (study.lower, study.upper)]
-    name = "upper" if study.lower is None else "lower"
-    return name, f"an interval inside [{', '.join(ends)}]{chance}"
+    names = ("power", "assurance", "half_width", "lower", "upper", "null")
+    aims = {name: getattr(study, name) for name in names}
+    there = {name: aim for name, aim in aims.items() if aim is not None}
+    words = [f"{name.replace('_', '-')} {aim:g}" for name, aim in there.items()]
+    named = next((name for name in there if name != "assurance"), "max_cost")
+    return named, " with ".join(words)
 
 
 def reached_words(study: Study, plan: Plan) -> str:
     """Say what a plan reaches of what a study aims at."""
-    name = number_of(study)
     if chance_of(study) is not None:
-        return f"{name} {getattr(plan, name):.3f}"
-    if study.half_width is None and limits_of(study) != (-math.inf, math.inf):
-        low, high = plan.expected_low, plan.expected_high
-        return f"an expected interval of {low:.3f} to {high:.3f}"
-    return f"an expected half-width of {plan.expected_half_width:.3f}"
+        return f"{number_of(study)} {getattr(plan, number_of(study)):.3f}"
+    return (
+        f"an expected half-width of {plan.expected_half_width:.3f} "
+        f"({plan.expected_low:.3f} to {plan.expected_high:.3f})"
+    )
 
 
 def check_one_aim(study: Study) -> None:
