@@ -436,9 +436,9 @@ def _by_rounding(claim: Claim, named: Claim) -> _Read:
     # one reading where both rules lead to the same
     result = _answer(named)
     is_one = len({(r.n_tables, r.status) for r in result.readings}) == 1
-    rounding = {"rounding": claim.rounding} if is_one else {}
     for reading in result.readings[: 1 if is_one else None]:
-        yield replace(reading, **rounding), result.examples
+        rounding = claim.rounding if is_one else reading.rounding
+        yield replace(reading, rounding=rounding), result.examples
 
 
 def _one_by_one(claim: Claim, named: Claim) -> _Read:

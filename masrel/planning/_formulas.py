@@ -55,8 +55,8 @@ def size_by_formula(design: Design) -> int:
             f"method: the formulas are of icc_1, got {study.coefficient}",
         ),
     )
-    of_kappa = _wald_items if study.method == "wald" else _fit_items
-    return math.ceil(_icc_items(design) if is_icc else of_kappa(design))
+    items = _wald_items if study.method == "wald" else _fit_items
+    return math.ceil((_icc_items if is_icc else items)(design))
 
 
 def items_nearby(design: Design) -> int:
@@ -190,11 +190,10 @@ def _fit_power(design: Design, null: float) -> float:
 
 def _icc_items(design: Design) -> float:
     study, chance = design.study, chance_of(design.study)
-    limit = study.lower if study.null is None else study.null
     if chance is None:
         return _n_icc_width(design)
     r, k, z, z_b = design.value, design.n_raters, _z(design), _NORMAL.inv_cdf(chance)
-    if limit is not None:
+    if (limit := study.lower if study.null is None else study.null) is not None:
         # n = 1 + 2k(z_a + z_b)²/((k - 1) ln(θ/θ_0)²) of [5]_; eq. 7 of [7]_
         ratio = math.log(icc_ratio(r, k) / icc_ratio(limit, k))
         return 1 + 2 * k * (z + z_b) ** 2 / ((k - 1) * ratio**2)
@@ -208,9 +207,8 @@ def _n_icc_width(design: Design) -> float:
     """Return n of an expected width of ICC(1), eq. 3 of [6]_."""
     r, k, width = design.value, design.n_raters, 2.0 * _half(design)
     error = (1 - r) * (1 + (k - 1) * r)
-    correction = 5 * r if k == 2 and r >= 0.7 else 0.0
     n = 8 * _z(design) ** 2 * error**2 / (k * (k - 1) * width**2)
-    return n + 1 + correction
+    return n + 1 + (5 * r if k == 2 and r >= 0.7 else 0.0)
 
 
 # -- at a given size ------------------------------------------------------------------

@@ -334,7 +334,7 @@ class _Search:
         if design.study.n_items is None:
             self._name, self.highest = "items", _MAX_ITEMS
             self.lowest = _FEWEST_ITEMS + design.is_icc
-        self.least_cost = self._cost(self.lowest)
+        self.min_cost = self._cost(self.lowest)
 
     def _sizes(self, n: int) -> tuple[int, int]:
         known = (self.design.n_items, self.design.n_raters)
@@ -431,7 +431,7 @@ class _Search:
         refuse(
             (
                 n in (0, self.highest),
-                f"max_cost: needs a limit between {self.least_cost:g}, of the "
+                f"max_cost: needs a limit between {self.min_cost:g}, of the "
                 f"smallest study, and what some study costs; got {limit:g}",
             )
         )
@@ -451,8 +451,8 @@ def _cheapest(design: Design, progress: Progress | None) -> Plan:
     limit, is_counted = study.max_cost or math.inf, not has_aim(study)
     most = int(min(design.max_raters, _MAX_RATERS))
     smallest = _Search(design.of_size(None, design.min_raters), progress)
-    needed = f"needs at least {smallest.least_cost:g}, of the smallest study"
-    refuse((limit < smallest.least_cost, f"max_cost: {needed}; got {limit:g}"))
+    needed = f"needs at least {smallest.min_cost:g}, of the smallest study"
+    refuse((limit < smallest.min_cost, f"max_cost: {needed}; got {limit:g}"))
     best = smallest.at(smallest.lowest)
     if math.isinf(limit):
         best = _first_that_reaches(design, most, progress)

@@ -58,16 +58,14 @@ class ItemModel:
         """Whether items of a study are independent draws of one distribution."""
         return self.latent.rater_sd == 0.0 and not self.latent.positions
 
-    def with_parameter(self, parameter: float) -> "ItemModel":
-        """Return the model with another kappa, or another noise of a latent trait."""
+    def with_parameter(self, x: float) -> "ItemModel":
+        """Return the model with kappa x, or noise exp(-x) of a latent trait."""
         if self.name != "latent":
-            return replace(self, kappa=parameter)
-        rater_sd = _RATER_SHARE * parameter
-        total = math.sqrt(1.0 + parameter**2 + rater_sd**2)
-        cuts = ndtri(np.cumsum(self.prevalences)[:-1]) * total
-        latent = LatentModel(
-            thresholds=tuple(cuts.tolist()), noise_sd=parameter, rater_sd=rater_sd
-        )
+            return replace(self, kappa=x)
+        noise, rater_sd = math.exp(-x), _RATER_SHARE * math.exp(-x)
+        total = math.sqrt(1.0 + noise**2 + rater_sd**2)
+        cuts = tuple((ndtri(np.cumsum(self.prevalences)[:-1]) * total).tolist())
+        latent = LatentModel(thresholds=cuts, noise_sd=noise, rater_sd=rater_sd)
         return replace(self, latent=latent)
 
 
@@ -77,9 +75,12 @@ class ItemModel:
 def declared_model(study: Study) -> ItemModel:
     """Return the model that a study declares, before its kappa is solved for."""
     if isinstance(study.model, LatentModel):
-        scale = _scale(study, len(study.model.thresholds) + 1)
-        model = ItemModel(name="latent", scale=scale, latent=study.model)
-        return replace(model, p_missing=study.p_missing)
+        return ItemModel(
+            name="latent",
+            scale=_scale(study, len(study.model.thresholds) + 1),
+            latent=study.model,
+            p_missing=study.p_missing,
+        )
     name, known = str(study.model), ", ".join(_MODELS)
     refuse(
         (
@@ -103,8 +104,7 @@ def declared_model(study: Study) -> ItemModel:
 def _shares(study: Study, *, is_table: bool) -> Floats:
     # prevalences (n_categories,), or a table (n_categories, n_categories), with sum 1
     categories, prevalences = study.categories, study.prevalences
-    scale = () if categories is None else categories
-    q = scale if isinstance(scale, int) else len(scale)
+    q = categories if isinstance(categories, int) else len(categories or ())
     refuse(
         (
             categories is None and prevalences is None,
@@ -115,18 +115,19 @@ def _shares(study: Study, *, is_table: bool) -> Floats:
             f"categories: needs at least 2, got {q}",
         ),
     )
-    if prevalences is None:
-        prevalences = np.full(q, 1.0 / q)
+    declared = np.full(q, 1.0 / q) if prevalences is None else prevalences
     try:
-        shares = np.atleast_1d(np.asarray(prevalences, dtype=np.float64))
+        shares = np.atleast_1d(np.asarray(declared, dtype=np.float64))
     except (TypeError, ValueError) as error:
         raise ParameterError(
             f"prevalences: needs numbers, got {prevalences!r}"
         ) from error
     q = q or len(shares)
-    needed = f"needs one of each of {q} categories, at least 2"
-    if is_table:
-        needed = f"a table needs the joint probabilities of two raters, {q} × {q}"
+    needed = (
+        f"a table needs the joint probabilities of two raters, {q} × {q}"
+        if is_table
+        else f"needs one of each of {q} categories, at least 2"
+    )
     is_shaped = q > 1 and shares.shape == ((q, q) if is_table else (q,))
     refuse(
         (not is_shaped, f"prevalences: {needed}; got shape {shares.shape}"),
@@ -194,7 +195,7 @@ def _dirichlet_multinomial(
     model: ItemModel, rows: Integers, counts: Integers
 ) -> Floats:
     # parameters π (1 - κ)/κ; both ends of κ are those of the mixture
-    if model.kappa <= 0.0 or model.kappa >= 1.0:
+    if not 0.0 < model.kappa < 1.0:
         return _mixture(model, rows, counts)
     scale = (1.0 - model.kappa) / model.kappa
     a = np.maximum(np.array(model.prevalences), 1e-300) * scale
@@ -248,7 +249,7 @@ def _draw_mixture(model: ItemModel, rng: np.random.Generator, size: Size) -> Int
 
 
 def _draw_dirichlet(model: ItemModel, rng: np.random.Generator, size: Size) -> Integers:
-    if model.kappa <= 0.0 or model.kappa >= 1.0:
+    if not 0.0 < model.kappa < 1.0:
         return _draw_mixture(model, rng, size)
     scale = (1.0 - model.kappa) / model.kappa
     parameters = np.maximum(np.array(model.prevalences), 1e-300) * scale
@@ -304,36 +305,26 @@ class Design:
 
     study: Study
     model: ItemModel
+    entry: Coefficient  # in the register
+    is_icc: bool  # an intraclass correlation, of normal ratings
+    n_items: int  # of a design that has a size
+    n_raters: int
+    value: float  # the true coefficient
+    level: float  # of the two-sided interval that is computed
 
-    @property
-    def entry(self) -> Coefficient:
-        """The coefficient's entry in the register."""
-        return coefficient(self.study.coefficient)
-
-    @property
-    def is_icc(self) -> bool:
-        """Whether it is an intraclass correlation, of normal ratings."""
-        return self.study.coefficient in FORMS
-
-    @property
-    def n_items(self) -> int:
-        """Items of a design that has a size."""
-        return int(self.study.n_items or 0)
-
-    @property
-    def n_raters(self) -> int:
-        """Raters of a design that has a size."""
-        return int(self.study.n_raters or 0)
-
-    @property
-    def value(self) -> float:
-        """The true coefficient."""
-        return float(self.study.value or 0.0)
-
-    @property
-    def level(self) -> float:
-        """The level of the two-sided interval that is computed."""
-        return 1.0 - (1.0 - self.study.level) * (2.0 / self.study.sides)
+    @classmethod
+    def of(cls, study: Study, model: ItemModel) -> "Design":
+        """Return the design of a study and its model."""
+        return cls(
+            study=study,
+            model=model,
+            entry=coefficient(study.coefficient),
+            is_icc=study.coefficient in FORMS,
+            n_items=int(study.n_items or 0),
+            n_raters=int(study.n_raters or 0),
+            value=float(study.value or 0.0),
+            level=1.0 - (1.0 - study.level) * (2.0 / study.sides),
+        )
 
     @property
     def ordered(self) -> bool:
@@ -399,14 +390,13 @@ class Design:
     def of_size(self, n_items: int | None, n_raters: int | None) -> "Design":
         """Return the design with other numbers of items and raters."""
         study = replace(self.study, n_items=n_items, n_raters=n_raters)
-        design = replace(self, study=study)
+        design = Design.of(study, self.model)
         _check_size(design)
         return design
 
     def at_value(self, value: float) -> "Design":
         """Return the design whose true coefficient is a value."""
-        model = _model_at(self, value)
-        return replace(self, study=replace(self.study, value=value), model=model)
+        return Design.of(replace(self.study, value=value), _model_at(self, value))
 
     def cost(self, n_items: int, n_raters: int) -> float:
         """Return what a study of a size costs."""
@@ -488,7 +478,7 @@ def design_of(study: Study) -> Design:
     study = replace(study, coefficient=entry.name)
     if entry.name in FORMS:
         _check_normal(study, entry)
-        design = Design(study=study, model=ItemModel(name="normal"))
+        design = Design.of(study, ItemModel(name="normal"))
     else:
         refuse(
             (
@@ -497,7 +487,7 @@ def design_of(study: Study) -> Design:
                 f"of sums over items; the others and {', '.join(FORMS)} can",
             )
         )
-        design = _with_value(Design(study=study, model=declared_model(study)))
+        design = _with_value(Design.of(study, declared_model(study)))
     value, null, lower, upper = design.value, study.null, study.lower, study.upper
     refuse(
         (
@@ -579,7 +569,7 @@ def _with_value(design: Design) -> Design:
                 f"value: the model has {implied:.4f}, got {value}; None takes it",
             )
         )
-        return replace(design, study=replace(study, value=implied))
+        return Design.of(replace(study, value=implied), design.model)
     refuse((value is None, "value: needs the true coefficient, got none"))
     return design.at_value(design.value)
 
@@ -588,8 +578,7 @@ def _true_value(design: Design) -> float:
     # of complete ratings by two raters, or by one who rates twice
     n_raters = 1 if design.entry.shape == "pairs" else 2
     model = replace(design.model, p_missing=0.0)
-    study = replace(design.study, n_raters=n_raters)
-    return replace(design, study=study, model=model).population()[0]
+    return Design.of(replace(design.study, n_raters=n_raters), model).population()[0]
 
 
 def _model_at(design: Design, value: float) -> ItemModel:
@@ -599,15 +588,11 @@ def _model_at(design: Design, value: float) -> ItemModel:
     model, title = design.model, design.entry.title
     if model.name == "table":
         return _table_at(design, value)
-    is_latent = model.name == "latent"
     # noise from much to little, or kappa from chance to agreement
-    ends = (-4.0, 4.0) if is_latent else (0.0, 1.0)
-
-    def at(x: float) -> ItemModel:
-        return model.with_parameter(math.exp(-x) if is_latent else x)
+    ends = (-4.0, 4.0) if model.name == "latent" else (0.0, 1.0)
 
     def short_of(x: float) -> float:
-        return _true_value(replace(design, model=at(x))) - value
+        return _true_value(replace(design, model=model.with_parameter(x))) - value
 
     refuse(
         (
@@ -616,8 +601,8 @@ def _model_at(design: Design, value: float) -> ItemModel:
         )
     )
     low, high = map(short_of, ends)
-    if not is_latent and min(abs(low), abs(high)) < 1e-12:
-        return at(ends[abs(high) < 1e-12])
+    if min(abs(low), abs(high)) < 1e-12:
+        return model.with_parameter(ends[abs(high) < 1e-12])
     refuse(
         (
             math.isnan(low) or math.isnan(high),
@@ -630,7 +615,8 @@ def _model_at(design: Design, value: float) -> ItemModel:
             f"{high + value:z.3f} with these prevalences, got {value:g}",
         ),
     )
-    return at(float(brentq(short_of, *ends, xtol=1e-15, rtol=1e-14)))
+    root = float(brentq(short_of, *ends, xtol=1e-15, rtol=1e-14))
+    return model.with_parameter(root)
 
 
 def _table_at(design: Design, value: float) -> ItemModel:

@@ -59,15 +59,15 @@ def planning_table(plans: Sequence[Plan], *, labels: Sequence[str] = ()) -> Tabl
     lines: Sequence[str | None] = labels or [None] * len(plans)
     rows = [_row(p) | {"line": line} for p, line in zip(plans, lines, strict=True)]
     # of one plan that reaches its aim that is not said, nor what all plans share
-    hidden = {"reaches"} if len(plans) == 1 and first.reaches_aim else set()
-    hidden |= set() if labels else {"interval", "target"}
-    hidden |= (
-        {"prevalences"} if len({plan.prevalences for plan in plans}) < 2 else set()
-    )
+    hidden = {
+        "reaches": len(plans) == 1 and first.reaches_aim,
+        "prevalences": len({plan.prevalences for plan in plans}) == 1,
+        **dict.fromkeys(("interval", "target"), not labels),
+    }
     columns = [
         column
         for column in _COLUMNS
-        if column.key not in hidden
+        if not hidden.get(column.key)
         and any(row.get(column.key) is not None for row in rows)
     ]
     notes = _notes(plans)
@@ -126,12 +126,12 @@ def planning_sentence(plan: Plan) -> str:
         "simulation": f"; {plan.n_studies} simulated studies",
         "": "",
     }.get(plan.method, f"; {plan.method} formula")
-    width = ""
-    if not math.isnan(plan.expected_half_width):
-        width = (
-            f" has an expected half-width of {number(plan.expected_half_width, 3)} "
-            f"({number(plan.expected_low, 3)} to {number(plan.expected_high, 3)})"
-        )
+    width = (
+        " reaches the aim"
+        if math.isnan(plan.expected_half_width)
+        else f" has an expected half-width of {number(plan.expected_half_width, 3)} "
+        f"({number(plan.expected_low, 3)} to {number(plan.expected_high, 3)})"
+    )
     chances_of = [
         f"{word} {number(value, 3)}{of}"
         for word, value, of in (
@@ -146,7 +146,7 @@ def planning_sentence(plan: Plan) -> str:
     return (
         f"With {plan.n_items} items and {plan.n_raters} raters, the {sides}"
         f"{percent(plan.level)} % interval of {title}{weights} for other "
-        f"{_TARGETS[plan.target]}{width or ' reaches the aim'}{rest}, if the "
+        f"{_TARGETS[plan.target]}{width}{rest}, if the "
         f"coefficient is {significant(plan.value, 3)} ({_model(plan)}{how})."
     )
 
@@ -166,9 +166,11 @@ def _model(plan: Plan) -> str:
     shares = plan.prevalences
     if not shares:
         return f"{plan.model} model{absent}"
-    listed = ", ".join(significant(share, 3) for share in shares)
-    if max(shares) - min(shares) < _EQUAL:
-        listed = f"all {len(shares)} equal"
+    listed = (
+        f"all {len(shares)} equal"
+        if max(shares) - min(shares) < _EQUAL
+        else ", ".join(significant(share, 3) for share in shares)
+    )
     return f"{plan.model} model with prevalences {listed}{absent}"
 
 
