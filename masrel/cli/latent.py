@@ -13,7 +13,7 @@ from masrel.cli._options import (
     write_output,
 )
 from masrel.cli._paths import InputFile
-from masrel.cli._progress import duration_words, progress
+from masrel.cli._progress import progress
 from masrel.cli._reading import (
     read_file,
     reading_options,
@@ -51,7 +51,7 @@ _DRAWER = "masrel.plots._latent_scale:latent_figure"
     json="Write the result here; - prints it, and nothing else, on stdout.",
     figure="Draw the scale into this .png, .svg or .pdf.",
     csv="Print every digit as CSV.",
-    quiet="No progress, and no word on how long it takes.",
+    quiet="No progress.",
 )
 def latent(
     file: Path,
@@ -135,30 +135,18 @@ def _sample(
     import pandas as pd
 
     from masrel.agreement import code_ratings
-    from masrel.intervals.latent._trait import expected_seconds, latent_trait
+    from masrel.intervals.latent._trait import latent_trait
 
     codes = code_ratings(part.ratings).codes
     grades = np.array([*ratings.scale.grades, None], dtype=object)[codes]
     table = pd.DataFrame(grades, index=part.items, columns=part.raters, dtype=object)
-    categories = list(ratings.scale.grades)
-    if not is_quiet:
-        seconds = expected_seconds(
-            table, items=items, categories=categories, level=level, compare=compare
-        )
-        halves = "; --one-prior halves it" if compare else ""
-        click.echo(
-            f"{duration_words(seconds)}: {len(part.items)} items, "
-            f"{len(part.raters)} raters, {len(categories)} grades{halves}",
-            err=True,
-        )
     with progress("sampling", " steps", is_quiet=is_quiet) as shown:
         return latent_trait(
             table,
             items=items,
-            categories=categories,
+            categories=list(ratings.scale.grades),
             level=level,
             compare=compare,
-            progress=shown.update,
-            expect=shown.expect,
+            progress=shown.reach,
             rng=seed,
         )

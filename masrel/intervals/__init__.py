@@ -19,8 +19,7 @@ from masrel.intervals.contrasts import (
 )
 from masrel.intervals.diagnosis import Diagnosis, diagnose
 from masrel.intervals.jackknife import jackknife
-from masrel.intervals.posterior import posterior
-from masrel.intervals.quantity import Quantity
+from masrel.intervals.posterior import Quantity, posterior
 
 if TYPE_CHECKING:
     from masrel.intervals.latent._implied import PredictiveCheck

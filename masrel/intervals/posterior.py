@@ -1,6 +1,7 @@
 """Bayesian intervals of any coefficient, by three models of how raters rate."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
@@ -21,6 +22,30 @@ _RHO_COEFFICIENTS = ("fleiss_kappa", "scott_pi", "krippendorff_alpha")
 _MIN_DRAWS = 100
 
 _Model = Literal["auto", "dirichlet-multinomial", "table", "patterns"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quantity:
+    """One unknown of a model after the data.
+
+    Attributes
+    ----------
+    name : str
+        What it is, or whose.
+    value : float
+        Posterior median; ``nan`` when undefined.
+    interval : Interval
+        Central credible interval.
+    r_hat, ess : float or None
+        Rank-normalized split R-hat, and the effective size of the tails; None when
+        nothing was drawn.
+    """
+
+    name: str
+    value: float
+    interval: Interval
+    r_hat: float | None = None
+    ess: float | None = None
 
 
 def posterior(

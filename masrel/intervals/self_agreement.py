@@ -31,7 +31,7 @@ from masrel.intervals._quadrature import (
     where_it_matters,
 )
 from masrel.intervals._rho import PRIOR_SHAPES, Prior, PriorName
-from masrel.intervals.quantity import Quantity
+from masrel.intervals.posterior import Quantity
 
 _METHOD = "hierarchical kappa model, exact"
 _GRID = np.linspace(-20.0, 20.0, 65)  # logit 3 g, for a trapezoid sum over all of it

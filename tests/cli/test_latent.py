@@ -85,18 +85,14 @@ def test_the_figure_shows_items_thresholds_and_raters(
         assert words in drawn
 
 
-def test_without_a_terminal_a_line_says_how_long_and_others_how_far(
+def test_without_a_terminal_lines_say_how_far_and_how_long(
     masrel: Caller, wide: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("masrel.cli._progress._PERIOD_S", 0.0)
     done = masrel("latent", wide, "--items", "fixed")
-    first, *others = done.err.splitlines()
-    assert re.fullmatch(
-        r"about \d+ (s|min): 4 items, 3 raters, \d+ grades; --one-prior halves it",
-        first,
-    )
-    assert others
-    for line in others:
+    lines = done.err.splitlines()
+    assert lines
+    for line in lines:
         assert re.fullmatch(r"sampling: \d+ %, about \d+ (s|min) left", line)
 
 

@@ -1,4 +1,4 @@
-"""What the latent-trait model costs, beside what it said beforehand.
+"""What the latent-trait model costs.
 
 ``python -m docs.make.benchmarks.latent`` writes its part of ``docs/latent_trait.md``.
 Ratings are drawn from the model itself; each study is sampled once, under one prior.
@@ -14,7 +14,6 @@ import numpy as np
 
 from docs.make.benchmarks.parts import write_part
 from masrel.intervals import latent_trait
-from masrel.intervals.latent._trait import expected_seconds
 
 DOCS = Path(__file__).parents[2]
 
@@ -64,13 +63,6 @@ STUDIES = (
 def measure(study: Study) -> str:
     """Return the line of a table."""
     ratings, n_grades = study.ratings(), len(study.shares)
-    expected = expected_seconds(
-        ratings,
-        items=study.items,
-        categories=range(n_grades),
-        level=0.95,
-        compare=False,
-    )
     began = time.process_time(), time.perf_counter()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -80,8 +72,7 @@ def measure(study: Study) -> str:
     processor, wall = time.process_time() - began[0], time.perf_counter() - began[1]
     line = (
         f"| {study.n_items} × {study.n_raters}{study.remark} | {n_grades} | "
-        f"{study.items} | {model.n_steps} | {processor:.0f} | {wall:.0f} | "
-        f"{expected:.0f} |"
+        f"{study.items} | {model.n_steps} | {processor:.0f} | {wall:.0f} |"
     )
     print(line, flush=True)
     return line
@@ -93,8 +84,8 @@ def main() -> None:
         "`python -m docs.make.benchmarks.latent`, under one prior, in seconds:",
         "",
         "| items × raters | grades | items | steps of a chain | processor | by the "
-        "clock | expected beforehand |",
-        "|---|---|---|---|---|---|---|",
+        "clock |",
+        "|---|---|---|---|---|---|",
         *map(measure, STUDIES),
     ]
     write_part(DOCS / "latent_trait.md", "costs", lines)

@@ -4,7 +4,6 @@ Metric and step length are fitted in warm-up and then stay: a chain that goes on
 adapting has no distribution to converge to.
 """
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Protocol
@@ -32,12 +31,7 @@ _STEPS = (0.02, 1.0)  # the least and the largest
 _BEST_ACCEPTANCE = 0.8
 LONGEST = 1.15  # the longest step length of a proposal, over the fitted one
 SHORTEST = 0.27  # the shortest, as a share of the longest
-EXPECTED_STEPS = 1_000
-"""Steps of a chain that studies take, warm-up among them: from 400 to 2300."""
-
-# Gradients of all chains that studies take, about 3000 to 12 000 where ratings place
-# the items, 11 000 to 23 000 where they hardly do; and checks
-_GRADIENTS = {"placed": 5_700, "loose": 15_000}
+_EXPECTED_STEPS = 1_000  # of a chain, before any is checked: studies take 400 to 2300
 _N_CURVED = 32  # chains at whose places the curvature is averaged
 _UNKNOWN = 0.3  # deviation in which chains begin around ρ', f' and η
 _WIDER = 2.0  # from where a variance of the draws is believed over the curvature
@@ -46,6 +40,9 @@ _N_CHAINS = 64
 _MANY = 1_000  # ratings from which half as many chains do: a step then costs by them
 _MIN_CURVATURE = 0.2  # least curvature that is believed
 _MAX_DROP = 0.75  # how far below the mode chains may begin, per dimension
+
+Progress = Callable[[int, int], object]
+"""Called with how many steps are made, and how many are expected in all."""
 
 _Proposal = Callable[[Floats, np.random.RandomState], tuple[Floats, Floats]]
 
@@ -57,16 +54,6 @@ def _n_chains(density: LatentDensity) -> int:
 def n_warm_up_steps() -> int:
     """Return how many steps of every chain are thrown away."""
     return sum(_WARM_UP)
-
-
-def gradient_seconds(density: LatentDensity) -> float:
-    """Return about how long all gradients take that a study needs, two timed."""
-    position = np.tile(density.start(), (_n_chains(density), 1))
-    for _ in range(2):
-        begin = time.perf_counter()
-        density.gradient(position)
-    seconds = time.perf_counter() - begin
-    return _GRADIENTS["placed" if density.placed.any() else "loose"] * seconds
 
 
 def begin(
@@ -200,20 +187,24 @@ def sample_smooth(
     generator: np.random.Generator,
     n_steps: int,
     max_steps: int,
-    progress: Callable[[int], object] | None = None,
-    expect: Callable[[int], object] | None = None,
+    progress: Progress | None = None,
 ) -> Chains:
     """Sample a density by Hamiltonian proposals until its quantities have converged."""
-    # shape of start: (n_chains, n_dimensions); of covariance: n_dimensions squared;
-    # expect is called with the steps there will be in all, as far as is known
-    report, plan = progress or _silent, expect or _silent
-    plan(EXPECTED_STEPS)
+    # shape of start: (n_chains, n_dimensions); of covariance: n_dimensions squared
+    n_made, n_expected = 0, _EXPECTED_STEPS
+
+    def report(n_steps: int) -> None:
+        nonlocal n_made
+        n_made += n_steps
+        if progress is not None:
+            progress(n_made, max(n_made, n_expected))
+
     walkers = _warm_up(density, start, covariance, generator, report)
     positions = np.empty((len(start), 0, start.shape[1]))
     total, thin, more = 0, 1, n_steps
     while total < max_steps:
-        n_made, positions, thin = _go_on(walkers, more, positions, thin, report)
-        total += n_made
+        n_more, positions, thin = _go_on(walkers, more, positions, thin, report)
+        total += n_more
         values = quantities(positions)
         chains = Chains(
             positions=positions,
@@ -230,7 +221,7 @@ def sample_smooth(
             return chains
         # how many times as many steps it takes in all
         needed = max((r_hat - 1.0) / (MAX_R_HAT - 1.0), MIN_ESS / max(ess, 1.0))
-        plan(sum(_WARM_UP) + int(total * max(needed, 1.0)))
+        n_expected = n_warm_up_steps() + int(total * max(needed, 1.0))
         # no more than as many again: the first steps say little of how many it takes
         share = min(max(1.1 * needed - 1.0, 0.25), 1.0)
         more = min(int(share * total) + 1, max_steps - total)
@@ -343,9 +334,6 @@ def _go_on(
     while positions.shape[1] > _MAX_KEPT:
         positions, thin = positions[:, 1::2], 2 * thin
     return n_made, positions, thin
-
-
-def _silent(_: int) -> None: ...
 
 
 def hamiltonian_proposal(

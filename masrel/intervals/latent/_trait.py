@@ -1,7 +1,7 @@
 """Ratings on an ordered scale as severities, biases, noises and thresholds."""
 
 import itertools
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -25,13 +25,13 @@ from masrel.intervals.latent._implied import (
 from masrel.intervals.latent._model import LatentDensity, LatentPrior
 from masrel.intervals.latent._sampler import (
     Chains,
+    Progress,
     begin,
-    gradient_seconds,
     n_warm_up_steps,
     quantile_error,
     sample_smooth,
 )
-from masrel.intervals.quantity import Quantity
+from masrel.intervals.posterior import Quantity
 
 _TARGETS: dict[str, Target] = {"fixed": "raters", "random": "both"}
 _REPLICATES = 4_000
@@ -140,8 +140,7 @@ def latent_trait(
     n_steps: int = 250,
     max_steps: int = 32_000,
     keep_chains: bool = False,
-    progress: Callable[[int], object] | None = None,
-    expect: Callable[[int], object] | None = None,
+    progress: Progress | None = None,
     rng: np.random.Generator | int | None = None,
 ) -> LatentTrait:
     """Place items, raters and thresholds on one scale, and read kappa off it.
@@ -169,11 +168,8 @@ def latent_trait(
     keep_chains : bool, optional
         Whether the result holds the draws.
     progress : callable, optional
-        Called with the number of steps just made, such as the ``update`` of a
-        progress bar.
-    expect : callable, optional
-        Called with the number of steps there will be in all, whenever that is known
-        better.
+        Called with how many steps are made, and how many there will be as far as is
+        known.
     rng : Generator or int, optional
         Where randomness comes from; an integer is recorded as the seed. Without it a
         fresh seed is drawn and recorded.
@@ -217,7 +213,9 @@ def latent_trait(
     ...     ratings, items="fixed", categories=[1, 2, 3, 4], rng=1
     ... )
     """
-    _check_kappa(items, level)
+    if items not in _TARGETS:
+        raise ParameterError(f'items: needs "fixed" or "random", got {items!r}')
+    check_level(level)
     if min(n_steps, max_steps) < 20:
         raise ParameterError("n_steps, max_steps: need at least 20")
     checked = _Ratings.of(ratings, categories)
@@ -231,7 +229,6 @@ def latent_trait(
         max_steps=max_steps,
         keep_chains=keep_chains,
         progress=progress,
-        expect=expect,
         n_runs=1 + compare,
         seed=seed,
     )
@@ -239,27 +236,6 @@ def latent_trait(
     if compare:
         other = _summarize(question, other_prior or LatentPrior.other(), seeds[1], None)
     return _summarize(question, prior or LatentPrior(), seeds[0], other)
-
-
-def _check_kappa(items: Items, level: float) -> None:
-    if items not in _TARGETS:
-        raise ParameterError(f'items: needs "fixed" or "random", got {items!r}')
-    check_level(level)
-
-
-def expected_seconds(
-    ratings: object,
-    *,
-    items: Items,
-    categories: Sequence[Label],
-    level: float,
-    compare: bool,
-) -> float:
-    """Return about how long `latent_trait` takes, after its checks."""
-    _check_kappa(items, level)
-    checked = _Ratings.of(ratings, categories)
-    density = LatentDensity.of(checked.codes, len(categories), LatentPrior())
-    return (1 + compare) * gradient_seconds(density)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -334,11 +310,8 @@ class _Question:
     n_steps: int
     max_steps: int
     keep_chains: bool  # whether the result holds the draws
-    # called with the number of steps just made
-    progress: Callable[[int], object] | None = field(compare=False, repr=False)
-    # called with the number of steps now expected of all runs, one for each prior
-    expect: Callable[[int], object] | None = field(compare=False, repr=False)
-    n_runs: int
+    progress: Progress | None = field(compare=False, repr=False)  # of all runs
+    n_runs: int  # one for each prior
     seed: int | None  # the seed to be recorded
 
 
@@ -363,8 +336,7 @@ def fit_latent(
     generator: np.random.Generator,
     n_steps: int,
     max_steps: int,
-    progress: Callable[[int], object] | None = None,
-    expect: Callable[[int], object] | None = None,
+    progress: Progress | None = None,
 ) -> LatentFit:
     """Sample the model until every reported quantity has converged."""
     agreement: list[Agreement] = []
@@ -405,7 +377,6 @@ def fit_latent(
         n_steps=n_steps,
         max_steps=max_steps,
         progress=progress,
-        expect=expect,
     )
     return LatentFit(density=density, chains=chains, agreement=agreement[0])
 
@@ -423,12 +394,12 @@ def _summarize(
     """Sample the model and put its result together."""
     data, generator = question.ratings, np.random.default_rng(seed)
 
-    def expect(n_steps: int) -> None:
-        # the runs before this one are in `other`, those after it take as long
-        if question.expect is not None:
-            made = other.n_steps + n_warm_up_steps() if other else 0
+    def progress(n_made: int, n_expected: int) -> None:
+        # the run before this one is `other`, one after it takes as long
+        if question.progress is not None:
+            before = other.n_steps + n_warm_up_steps() if other else 0
             left = question.n_runs - (other is not None)
-            question.expect(made + left * n_steps)
+            question.progress(before + n_made, before + left * n_expected)
 
     fit = fit_latent(
         LatentDensity.of(data.codes, len(data.categories), prior),
@@ -436,8 +407,7 @@ def _summarize(
         generator=generator,
         n_steps=question.n_steps,
         max_steps=question.max_steps,
-        progress=question.progress,
-        expect=expect,
+        progress=progress,
     )
     some = fit.density.traits(_some(fit.chains.positions, _REPLICATES))
 
