@@ -16,8 +16,6 @@ from masrel.estimates import Distribution, Interval
 from masrel.intervals._question import IntervalProblem, recorded_generator
 from masrel.intervals._rho import (
     METHOD,
-    PRIOR_SHAPES,
-    DirichletMultinomial,
     Prior,
     RhoPosterior,
     nothing_to_learn,
@@ -111,10 +109,8 @@ def _population(
     # using mixtures. JASA, 90(430), 577-588.
     # https://doi.org/10.1080/01621459.1995.10476550
     counts = problem.item_counts()
-    rho = RhoPosterior.of(counts, prior).draw(n_draws, generator)
-    model = DirichletMultinomial.of_counts(
-        counts, concentration=prior.concentration, shape=PRIOR_SHAPES[prior.name]
-    )
+    model = RhoPosterior.of(counts, prior)
+    rho = model.draw(n_draws, generator)
     powers = np.zeros((counts.shape[1], model.sizes.size), dtype=np.int64)
     powers[counts.any(axis=0)] = model.powers
     depth = np.arange(powers.shape[1])

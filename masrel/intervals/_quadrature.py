@@ -7,7 +7,6 @@ spaced points: the error of the trapezoid sum falls as exp(-c / step) [1].
 trapezoidal rule. SIAM Review, 56(3), 385-458. https://doi.org/10.1137/130932132
 """
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -22,6 +21,7 @@ _FEWEST, _COARSE = 12, 65  # points where a density matters, of a grid this larg
 _CLOSE = 1e-11  # how far off a quantile is solved for
 _REACHED = 1e-6  # how far its probability may be off the share, of itself
 _MAX_W = 3.1  # where nodes of a Beta end: 1e-15 of it is beyond
+_FAR = 700.0  # nats from the largest at which a term underflows
 _HELD = 1e-280  # share of the largest above which a sum lost nothing to underflow
 
 
@@ -35,30 +35,22 @@ def log_convolve(left: Floats, right: Floats) -> Floats:
     at = 0
     while at < out.size:
         tilt = -float(slopes[min(at, slopes.size - 1)]) if slopes.size else 0.0
-        first, values, scale = _convolve_tilted(left, right, tilt)
-        held = np.flatnonzero(values > _HELD)
+        first, scale = 0, 0.0
+        parts: list[Floats] = []
+        for log in (left, right):
+            tilted = log + tilt * np.arange(log.size)
+            largest = float(tilted.max())
+            low, high = np.flatnonzero(tilted > largest - _FAR)[[0, -1]].tolist()
+            parts.append(np.exp(tilted[low : high + 1] - largest))
+            first, scale = first + low, scale + largest
+        product = np.convolve(parts[0], parts[1])
+        held = np.flatnonzero(product > _HELD)
         t = first + held
         if not t[0] <= at <= t[-1]:
             raise ConvergenceError("floats cannot hold the exact posterior")
-        out[t] = np.log(values[held]) + scale - tilt * t
+        out[t] = np.log(product[held]) + scale - tilt * t
         at = int(t[-1]) + 1
     return out
-
-
-def _convolve_tilted(
-    left: Floats, right: Floats, tilt: float
-) -> tuple[int, Floats, float]:
-    # -> lowest power, values of the product at e^tilt, and the logarithm of their scale
-    first, scale = 0, 0.0
-    parts: list[Floats] = []
-    for log in (left, right):
-        tilted = log + tilt * np.arange(log.size)
-        largest = float(tilted.max())
-        values = np.exp(tilted - largest)
-        low, high = np.flatnonzero(values)[[0, -1]].tolist()
-        parts.append(values[low : high + 1])
-        first, scale = first + low, scale + largest
-    return first, np.convolve(parts[0], parts[1]), scale
 
 
 def log_sum_exp(logs: Floats) -> Floats:
@@ -91,19 +83,16 @@ class LineDistribution:
     # (n,): the density at each, times the step; they sum to 1
     masses: Floats = field(compare=False, repr=False)
 
-    @property
-    def step(self) -> float:
-        """The distance of two points."""
-        return float(self.points[1] - self.points[0])
-
     def probability(self, at: Floats) -> Floats:
         """Return the probabilities of at most some points, (n,)."""
-        return integrated_sinc(at[:, None] - self.points, self.step) @ self.masses
+        return np.asarray(integrated_sinc(at, self.points) @ self.masses)
 
     def density(self, at: Floats) -> Floats:
         """Return the density at some points, (n,)."""
-        away = (at[:, None] - self.points) / self.step
-        return (np.sinc(away) @ self.masses / self.step).clip(0.0)  # but for rounding
+        step = self.points[1] - self.points[0]
+        away = (at[:, None] - self.points) / step
+        density = np.sinc(away) @ self.masses / step
+        return np.asarray(density.clip(0.0))  # but for rounding
 
     def quantiles(self, shares: Sequence[float]) -> list[float]:
         """Return the points below which shares lie."""
@@ -120,38 +109,37 @@ class LineDistribution:
         ]
 
 
-def integrated_sinc(away: Floats, step: float) -> Floats:
-    """Return how much of the mass at points lies at most so far from them."""
+def integrated_sinc(at: Floats, points: Floats) -> Floats:
+    """Return how much of the mass at equally spaced points lies at most at some."""
+    # (n,), (n_points,) -> (n, n_points)
     # Haber, S. (1993). Two formulas for numerical indefinite integration. Mathematics
     # of Computation, 60(201), 279-296.
     # https://doi.org/10.1090/S0025-5718-1993-1149292-9
-    return np.asarray(0.5 + sici(away * (np.pi / step))[0] / np.pi)
+    away = (at[:, None] - points) * (np.pi / (points[1] - points[0]))
+    return np.asarray(0.5 + sici(away)[0] / np.pi)
 
 
 def solve_quantile(
     probability: Callable[[float], float], share: float, low: float, high: float
 ) -> float:
     """Return where a distribution function passes a share, between two points."""
-    # The Illinois method: a chord between both ends, where an end that stays counts
-    # half, so that both come near.
+    # The Illinois method: a chord from the last point to the one on the other side,
+    # which counts half when it stays, so that both come near.
     # Dowell, M., Jarratt, P. (1971). A modified regula falsi method for computing the
     # root of an equation. BIT, 11, 168-174. https://doi.org/10.1007/BF01934364
-    below, above = probability(low) - share, probability(high) - share
-    at, stays = math.inf, ""
+    other, at = low, high
+    there, here = probability(low) - share, probability(high) - share
     for _ in range(200):
-        before, at = at, low + below / (below - above) * (high - low)
+        before, at = at, at - here / (here - there) * (at - other)
         excess = probability(at) - share
-        if excess > 0.0:
-            high, above = at, excess
-            below *= 0.5 if stays == "low" else 1.0
-            stays = "low"
+        if excess * here < 0.0:
+            other, there = before, here
         else:
-            low, below = at, excess
-            above *= 0.5 if stays == "high" else 1.0
-            stays = "high"
+            there *= 0.5
+        here = excess
         close = _CLOSE * max(1.0, abs(at))
         is_reached = abs(excess) < _REACHED * min(share, 1.0 - share)
-        if high - low < close or (is_reached and abs(at - before) < close):
+        if abs(at - other) < close or (is_reached and abs(at - before) < close):
             break
     return at
 

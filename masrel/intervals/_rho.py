@@ -19,6 +19,7 @@ https://doi.org/10.1214/aos/1176342871
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Literal, get_args
@@ -45,13 +46,12 @@ PriorName = Literal["uniform", "jeffreys"]
 PRIOR_SHAPES: dict[str, float] = {"uniform": 1.0, "jeffreys": 0.5}
 """The prior of ρ is Beta(shape, shape)."""
 
-FEW_ITEMS = 10
-"""Items below which the interval under another prior is noted."""
 
 METHOD = "Dirichlet-multinomial posterior"
 """Of all intervals of raters who are alike."""
 
 _OF_RHO = {"uniform": "ρ ~ U(0, 1)", "jeffreys": "ρ ~ Beta(1/2, 1/2)"}
+_FEW_ITEMS = 10  # below which the interval under another prior is noted
 _SUREST = 1e12  # concentration of a prior that leaves ratings no say
 _MAX_RATINGS = 1_000_000  # whose polynomials take some ten seconds
 _MAX_LOGIT = 160.0  # either way: beyond any posterior that floats can hold
@@ -104,118 +104,88 @@ class Prior:
 DEFAULT_PRIOR = Prior(name="uniform", concentration=1.0)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DirichletMultinomial:
-    """The posterior of ρ and π given counts, π in the used categories."""
+@lru_cache(maxsize=64)
+def _category_polynomial(exponents: tuple[float, ...]) -> Floats:
+    """Return the logarithms of the coefficients of Π_j>0 (x + j)^N_j."""
+    log = np.zeros(1)
+    for j, n in enumerate(exponents[1:], start=1):
+        k = np.arange(n + 1.0)
+        of_one = gammaln(n + 1.0) - gammaln(k + 1.0) - gammaln(n - k + 1.0)
+        log = log_convolve(of_one + (n - k) * math.log(j), log)
+    return log
 
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RhoPosterior:
+    """The posterior of ρ = 1 / (1 + A), integrated over π."""
+
+    prior: Prior
     # (n_parts,): parameters of the Dirichlet prior of π. Categories nobody used enter
     # the likelihood nowhere, so they are one part, the last, whose parameter is the sum
     # of theirs (the Dirichlet's aggregation property).
-    prior: Floats = field(compare=False, repr=False)
-    shape: float  # the prior of ρ is Beta(shape, shape): 1 is uniform
+    of_shares: Floats = field(compare=False, repr=False)
     powers: Floats = field(compare=False, repr=False)  # (n_used, n_depths): N_kj
     sizes: Floats = field(compare=False, repr=False)  # (n_depths,): n_j
+    logit: LineDistribution = field(compare=False, repr=False)  # of logit ρ
 
     @classmethod
-    def of_counts(
-        cls,
-        counts: NDArray[np.int64],
-        *,
-        concentration: float = 1.0,
-        shape: float = 1.0,
-    ) -> "DirichletMultinomial":
-        """Reduce counts to the powers of the likelihood's factors."""
-        # shape of counts: (n_items, n_categories)
-        used = counts.any(axis=0)
-        prior = np.full(int(used.sum()), concentration)
+    def of(cls, counts: NDArray[np.int64], prior: Prior) -> "RhoPosterior":
+        """Integrate the posterior of counts (n_items, n_categories)."""
+        used, n = counts.any(axis=0), counts.sum(axis=1)
+        of_shares = np.full(int(used.sum()), prior.concentration)
         if not used.all():
-            prior = np.append(prior, concentration * float((~used).sum()))
-        n = counts.sum(axis=1)
+            n_unused = float((~used).sum())
+            of_shares = np.append(of_shares, prior.concentration * n_unused)
         met = [
             np.bincount(column, minlength=int(n.max()) + 1)
             for column in (*counts.T[used], n)
         ]
         # items with more than j ratings, j = 0, 1, ...
         more = np.array(met, dtype=np.float64)[:, :0:-1].cumsum(axis=1)[:, ::-1]
-        return cls(prior=prior, shape=shape, powers=more[:-1], sizes=more[-1])
-
-    def polynomial(self) -> tuple[Floats, Floats]:
-        """Return powers of A, and the logarithms of their coefficients, both (n,)."""
-        if self.sizes.sum() > _MAX_RATINGS:
+        powers, sizes = more[:-1], more[-1]
+        if sizes.sum() > _MAX_RATINGS:
             raise ConvergenceError(
-                f"the exact posterior of {self.sizes.sum():.0f} ratings takes long, "
+                f"the exact posterior of {sizes.sum():.0f} ratings takes long, "
                 f"from {_MAX_RATINGS} on; use the jackknife"
             )
-        total = np.zeros(1)
-        for exponents, a in zip(self.powers, self.prior, strict=False):
+        # the polynomial in A: its powers t, and the logarithms of their coefficients
+        terms = np.zeros(1)
+        for exponents, a in zip(powers, of_shares, strict=False):
             log = _category_polynomial(tuple(exponents.tolist()))
             t = exponents[0] + np.arange(log.size)
-            total = log_convolve(total, log + gammaln(a + t))
-        t = self.powers[:, 0].sum() + np.arange(total.size)
-        return t, total - gammaln(self.prior.sum() + t)
-
-    def log_cofactor(self, logit: Floats) -> Floats:
-        """Return what multiplies the polynomial in A = exp(-logit ρ), as logarithm."""
-        # -Σ n_j log(A + j), with the prior (ρ (1 - ρ))^(shape - 1) and the Jacobian
-        # ρ (1 - ρ) of the logit; logit (n,) -> (n,)
-        depth = np.arange(self.sizes.size)
-        with np.errstate(divide="ignore"):  # j = 0 is the logit itself
-            log = np.logaddexp(-logit[:, None], np.log(depth))
-        log_prior = np.logaddexp(0.0, logit) + np.logaddexp(0.0, -logit)
-        return np.asarray(-log @ self.sizes - self.shape * log_prior)
-
-    def of_logit(self) -> LineDistribution:
-        """Integrate the density of logit ρ."""
-        powers, terms = self.polynomial()
-        n_rows = max(1, _N_TERMS // powers.size)
+            terms = log_convolve(terms, log + gammaln(a + t))
+        t = powers[:, 0].sum() + np.arange(terms.size)
+        terms -= gammaln(of_shares.sum() + t)
+        n_rows = max(1, _N_TERMS // t.size)
+        with np.errstate(divide="ignore"):  # A + 0 is A itself
+            log_depth = np.log(np.arange(sizes.size))
 
         def log_density(logit: Floats) -> Floats:
+            # of A = exp(-logit ρ): the polynomial, divided by Π (A + j)^n_j, with the
+            # prior (ρ (1 - ρ))^(shape - 1) and the Jacobian ρ (1 - ρ) of the logit
             blocks = np.split(logit, range(n_rows, logit.size, n_rows))
-            sums = [log_sum_exp(terms - np.outer(rows, powers)) for rows in blocks]
-            return np.concatenate(sums) + self.log_cofactor(logit)
+            sums = [log_sum_exp(terms - np.outer(rows, t)) for rows in blocks]
+            log_divisor = np.logaddexp(-logit[:, None], log_depth) @ sizes
+            log_prior = np.logaddexp(0.0, logit) + np.logaddexp(0.0, -logit)
+            of_prior = PRIOR_SHAPES[prior.name] * log_prior
+            return np.asarray(np.concatenate(sums) - log_divisor - of_prior)
 
         ends = where_it_matters(log_density, -_MAX_LOGIT, _MAX_LOGIT)
         points = np.linspace(*ends, _N_POINTS)
         log = log_density(points)
         masses = np.exp(log - log.max())
-        return LineDistribution(points=points, masses=masses / masses.sum())
-
-
-@lru_cache(maxsize=64)
-def _category_polynomial(exponents: tuple[float, ...]) -> Floats:
-    """Return the logarithms of the coefficients of Π_j>0 (x + j)^N_j."""
-    log = np.zeros(1)
-    for j, n in enumerate(exponents):
-        if j:
-            k = np.arange(n + 1.0)
-            of_one = gammaln(n + 1.0) - gammaln(k + 1.0) - gammaln(n - k + 1.0)
-            log = log_convolve(of_one + (n - k) * math.log(j), log)
-    return log
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RhoPosterior:
-    """The posterior of ρ = 1 / (1 + A), integrated."""
-
-    prior: Prior
-    logit: LineDistribution = field(compare=False, repr=False)  # of logit ρ
-
-    @classmethod
-    def of(cls, counts: NDArray[np.int64], prior: Prior) -> "RhoPosterior":
-        """Integrate the posterior of counts (n_items, n_categories)."""
-        model = DirichletMultinomial.of_counts(
-            counts, concentration=prior.concentration, shape=PRIOR_SHAPES[prior.name]
+        return cls(
+            prior=prior,
+            of_shares=of_shares,
+            powers=powers,
+            sizes=sizes,
+            logit=LineDistribution(points=points, masses=masses / masses.sum()),
         )
-        return cls(prior=prior, logit=model.of_logit())
 
     def quantiles(self, *shares: float) -> list[float]:
         """Return quantiles of ρ."""
         ends: list[float] = expit(self.logit.quantiles(shares)).tolist()
         return ends
-
-    def ends(self, level: float) -> list[float]:
-        """Return the ends of the central interval."""
-        return self.quantiles(0.5 - 0.5 * level, 0.5 + 0.5 * level)
 
     def draw(self, n_draws: int, generator: np.random.Generator) -> Floats:
         """Draw ρ from as many equal parts of its distribution, ascending."""
@@ -252,7 +222,7 @@ def rho_interval(
     shares = (1.0 - level,) if one_sided else (0.5 - 0.5 * level, 0.5 + 0.5 * level)
     posterior = RhoPosterior.of(counts, prior)
     low, *high = posterior.quantiles(*shares)
-    what = "" if one_sided else _where_the_prior_weighs(counts)
+    what = "" if one_sided else where_the_prior_weighs(counts)
     notes: tuple[str, ...] = ()
     if one_sided or what:
         others = [
@@ -263,13 +233,10 @@ def rho_interval(
         there, description = max(
             others, key=lambda of: float(np.abs(np.subtract(of[0], [low, *high])).max())
         )
-        here, there_ends = (
-            " to ".join(f"{end:.3f}" for end in ends) for ends in ([low, *high], there)
-        )
         why = f"{what}, so the prior weighs"
         why = "the bound rests on the prior, too" if one_sided else why
-        text = f"{here} with {prior.description}, but {there_ends} with {description}"
-        notes = (prior_note(why, text),)
+        answers = ([low, *high], prior.description), (there, description)
+        notes = (prior_note(why, *answers),)
     return Interval(
         low=low,
         high=1.0 if one_sided else high[0],
@@ -303,21 +270,27 @@ def undefined(problem: IntervalProblem, reason: str, method: str) -> Interval:
     return replace(problem.undefined(reason, method=method, unit=None), kind="credible")
 
 
-def _where_the_prior_weighs(counts: NDArray[np.int64]) -> str:
-    # shape of counts: (n_items, n_categories)
+def where_the_prior_weighs(counts: NDArray[np.int64]) -> str:
+    """Return why counts (n_items, n_categories) leave the prior a say, or nothing."""
     n_items = int((counts.sum(axis=1) >= 2).sum())
     if counts.any(axis=0).sum() == 1:
         return "all ratings are in one category"
     if ((counts > 0).sum(axis=1) <= 1).all():
         return "agreement is perfect in these data"
-    if n_items < FEW_ITEMS:
+    if n_items < _FEW_ITEMS:
         return "1 item is few" if n_items == 1 else f"{n_items} items are few"
     return ""
 
 
-def prior_note(what: str, ends: str) -> str:
-    """Return a note on the prior, which a table gives without its ends."""
-    return _LongNote(f"{what}: {ends}", f"{what} (--explain says by how much)")
+def prior_note(why: str, *answers: tuple[Sequence[float], str]) -> str:
+    """Return a note on two priors' ends, which a table gives without them."""
+    here, there = (
+        f"{' to '.join(f'{end:.3f}' for end in ends)} with {words}"
+        for ends, words in answers
+    )
+    return _LongNote(
+        f"{why}: {here}, but {there}", f"{why} (--explain says by how much)"
+    )
 
 
 def extended(problem: IntervalProblem, interval: Interval) -> Interval:

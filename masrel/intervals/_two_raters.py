@@ -24,10 +24,10 @@ from masrel.estimates import Distribution, Interval
 from masrel.intervals._quadrature import beta_nodes, solve_quantile
 from masrel.intervals._question import IntervalProblem, recorded_generator
 from masrel.intervals._rho import (
-    FEW_ITEMS,
     nothing_to_learn,
     prior_note,
     undefined,
+    where_the_prior_weighs,
 )
 
 ChanceAgreement = Literal["none", "uniform", "pooled", "pooled, Gwet", "margins"]
@@ -50,7 +50,6 @@ _NOTED_DRAWS = 2_000  # for the interval under another prior: a note has three d
 _ITEMS = 1.5  # that the default prior is worth, by the study of coverage
 _NODES = (53, 97, 193)  # of the quadrature, until it settles
 _SETTLED = 1e-6  # with three quarters of them a share is off less
-_REACH = 0.01  # how far a quantile may be from where it is by fewer nodes
 _NEGLIGIBLE = 1e-16  # weight of a node
 _SLOPE = 1e-6  # step of a slope
 _SHOWN, _SHOWN_DRAWS = 101, 1_000  # of a density, looked at
@@ -103,14 +102,11 @@ class Nodes:
 class TablePosterior:
     """The distribution of a coefficient."""
 
-    # A value to nodes of x and y, for the coefficient to be at most that value
+    # a value to nodes of x and y, for the coefficient to be at most that value
     nodes: Callable[[float], Nodes]
-    # the same with fewer nodes, as many as a density that is looked at needs
-    shown: Callable[[float], Nodes]
     # the share t of pairs that disagree is Beta(disagreeing, agreeing)
     disagreeing: float
     agreeing: float
-    n_draws: int | None = None  # how many nodes were drawn; None if none were
 
     def conditional(self, nodes: Nodes, value: float) -> Floats:
         """Return the probability of at most a value at each node, (n,)."""
@@ -142,9 +138,9 @@ class TablePosterior:
         beyond[twice] -= betainc(self.agreeing, self.disagreeing, down_rest[twice])
         return beyond
 
-    def probability(self, value: float, *, shown: bool = False) -> float:
+    def probability(self, value: float) -> float:
         """Return the probability that the coefficient is at most a value."""
-        nodes = self.shown(value) if shown else self.nodes(value)
+        nodes = self.nodes(value)
         return float(nodes.weights @ self.conditional(nodes, value))
 
     def quantile(self, share: float) -> float:
@@ -152,14 +148,7 @@ class TablePosterior:
         low = -1.0
         while self.probability(low) > share:
             low = 2.0 * low - 1.0  # with weights it can be below -1
-        # first where it is by fewer nodes
-        by_shown = partial(self.probability, shown=True)
-        near, reach = solve_quantile(by_shown, share, low, 1.0), _REACH
-        while True:
-            ends = max(near - reach, low), min(near + reach, 1.0)
-            if self.probability(ends[0]) <= share <= self.probability(ends[1]):
-                return solve_quantile(self.probability, share, *ends)
-            reach *= 4.0
+        return solve_quantile(self.probability, share, low, 1.0)
 
     def quantile_error(self, at: float) -> float:
         """Return the Monte Carlo standard error of the quantile at a value."""
@@ -171,7 +160,7 @@ class TablePosterior:
     def distribution(self, low: float, high: float, words: str) -> Distribution:
         """Return the density between two values, the mean of each small part."""
         edges = np.linspace(low, high, _SHOWN + 1)
-        below = [self.probability(edge, shown=True) for edge in edges.tolist()]
+        below = [self.probability(edge) for edge in edges.tolist()]
         return Distribution(
             values=0.5 * (edges[1:] + edges[:-1]),
             weights=(np.diff(below) / np.diff(edges)).clip(0.0),
@@ -187,9 +176,10 @@ def table_quantiles(
     shares: Sequence[float],
     *,
     generator: np.random.Generator | None = None,
-    n_draws: int = 0,
-) -> tuple[TablePosterior, list[float]]:
+    n_draws: int = 1,
+) -> tuple[TablePosterior, list[float], TablePosterior]:
     """Integrate, or draw, the posterior of a coefficient of two raters."""
+    # -> the posterior, its quantiles, and one of fewer nodes for its density;
     # v and the parameters of the Dirichlet, both (n_categories, n_categories)
     agreeing = np.eye(len(v), dtype=bool)
     of_nodes = partial(
@@ -197,36 +187,28 @@ def table_quantiles(
         disagreeing=float(cells[~agreeing].sum()),
         agreeing=float(cells.trace()),
     )
-    if generator is not None or only_agreement_matters(chance, v):
-        if generator is None:  # any x and y
+    if len(v) > 2:
+        if generator is None:  # only how often they agree matters: any x and y
             x, y = (np.full((1, n), 1.0 / n) for n in (len(v), cells.size - len(v)))
         else:
             x = generator.dirichlet(cells[agreeing], size=n_draws)
             y = generator.dirichlet(cells[~agreeing], size=n_draws)
-        nodes, shown = (
+        every, some = (
             Nodes.of(chance, v, np.full(n, 1.0 / n), x[:n], y[:n])
             for n in (len(x), min(len(x), _SHOWN_DRAWS))
         )
-        posterior = of_nodes(
-            nodes=lambda _: nodes,
-            shown=lambda _: shown,
-            n_draws=None if generator is None else n_draws,
-        )
-        return posterior, [posterior.quantile(share) for share in shares]
-    grid = partial(grid_nodes, chance, v, cells)
-    for n in _NODES:
-        posterior = of_nodes(nodes=grid(n), shown=grid(3 * n // 4))
+        posterior = of_nodes(nodes=lambda _: every)
         ends = [posterior.quantile(share) for share in shares]
-        again = [posterior.probability(end, shown=True) for end in ends]
+        return posterior, ends, of_nodes(nodes=lambda _: some)
+    for n in _NODES:
+        posterior, fewer = (
+            of_nodes(nodes=grid_nodes(chance, v, cells, m)) for m in (n, 3 * n // 4)
+        )
+        ends = [posterior.quantile(share) for share in shares]
+        again = [fewer.probability(end) for end in ends]
         if np.allclose(again, shares, rtol=_SETTLED, atol=0.0):
-            return posterior, ends
+            return posterior, ends, fewer
     raise ConvergenceError("the quadrature of the posterior has not settled")
-
-
-def only_agreement_matters(chance: ChanceAgreement, v: Floats) -> bool:
-    """Return whether a coefficient depends on how often raters agree, alone."""
-    away = v[~np.eye(len(v), dtype=bool)]
-    return chance in ("none", "uniform") and float(np.ptp(away)) == 0.0
 
 
 def grid_nodes(
@@ -293,36 +275,38 @@ def table_interval(
     table, n_single = _table(problem)
     q = len(table)
     prior, description = table_prior(concentration, q)
-    generator, seed = None, None
+    generator, seed, n_drawn = None, None, None
     chance = CHANCE_AGREEMENT[problem.entry.name]
-    if q > 2 and not only_agreement_matters(chance, problem.v):
-        generator, seed = recorded_generator(rng)
+    away = problem.v[~np.eye(q, dtype=bool)]
+    only_agreement_matters = chance in ("none", "uniform") and not np.ptp(away)
+    if q > 2 and not only_agreement_matters:
+        (generator, seed), n_drawn = recorded_generator(rng), n_draws
     tail = (1.0 - problem.level) * (1.0 if one_sided else 0.5)
     shares = (tail, 0.5) if one_sided else (tail, 0.5, 1.0 - tail)
     of_cells = partial(table_quantiles, chance, problem.v, shares=shares)
-    posterior, ends = of_cells(table + prior, generator=generator, n_draws=n_draws)
+    posterior, ends, fewer = of_cells(
+        table + prior, generator=generator, n_draws=n_draws
+    )
     low, high = ends[0], 1.0 if one_sided else ends[2]
     notes: tuple[str, ...] = ()
     if n_single:
         notes = (f"left out, items of a single rating: {n_single}",)
-    what = _where_the_prior_weighs(table)
+    counts = problem.item_counts()
+    what = where_the_prior_weighs(counts[counts.sum(axis=1) > 1])
     if what:
         # another prior that is as reasonable
         is_even = concentration is not None and math.isclose(concentration, 1.0 / q)
         other, other_words = table_prior(None if is_even else 1.0 / q, q)
-        _, there = of_cells(table + other, generator=generator, n_draws=_NOTED_DRAWS)
-        other_high = 1.0 if one_sided else there[2]
-        text = (
-            f"{low:.3f} to {high:.3f} with {description}, but "
-            f"{there[0]:.3f} to {other_high:.3f} with {other_words}"
-        )
-        notes += (prior_note(f"{what}, so the prior weighs", text),)
+        _, there, _ = of_cells(table + other, generator=generator, n_draws=_NOTED_DRAWS)
+        there_ends = [there[0], 1.0 if one_sided else there[2]]
+        answers = ([low, high], description), (there_ends, other_words)
+        notes += (prior_note(f"{what}, so the prior weighs", *answers),)
     method = "Dirichlet posterior of the table of two raters"
     errors = None
-    if posterior.n_draws is not None:
+    if n_drawn is not None:
         of_high = 0.0 if one_sided else posterior.quantile_error(high)
         errors = (posterior.quantile_error(low), of_high)
-    way = "exact" if errors is None else f"{posterior.n_draws} draws"
+    way = "exact" if errors is None else f"{n_drawn} draws"
     width = high - low  # the density is shown as far beyond the ends
     return Interval(
         low=low,
@@ -332,11 +316,11 @@ def table_interval(
         kind="credible",
         method=f"{method}, {way}" + (", one-sided" if one_sided else ""),
         target=problem.target,
-        n_resamples=posterior.n_draws,
+        n_resamples=n_drawn,
         monte_carlo_error=errors,
         seed=seed,
         notes=notes,
-        distribution=posterior.distribution(
+        distribution=fewer.distribution(
             max(low - width, min(problem.entry.lowest, low)),
             min(high + width, 1.0),
             f"posterior of {problem.entry.title}, prior {description}",
@@ -373,13 +357,3 @@ def _table(problem: IntervalProblem) -> tuple[Floats, int]:
     cells = np.zeros((problem.coded.n_categories,) * 2)
     cells[tuple(codes[paired].T)] = freq[paired]  # distinct rows: one a cell
     return cells, int(freq[~paired].sum())
-
-
-def _where_the_prior_weighs(table: Floats) -> str:
-    if (table > 0.0).sum() == 1 and table.trace():
-        return "all ratings are in one category"
-    if table.trace() == table.sum():
-        return "agreement is perfect in these data"
-    if table.sum() < FEW_ITEMS:
-        return f"{table.sum():.0f} items are few"
-    return ""

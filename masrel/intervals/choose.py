@@ -335,7 +335,8 @@ def _lift(problem: IntervalProblem, interval: Interval) -> Interval:
     from masrel.intervals._rho import DEFAULT_PRIOR, RhoPosterior
 
     counts = problem.item_counts()
-    _, high = RhoPosterior.of(counts, DEFAULT_PRIOR).ends(problem.level)
+    posterior = RhoPosterior.of(counts, DEFAULT_PRIOR)
+    (high,) = posterior.quantiles(0.5 + 0.5 * problem.level)
     if not high > interval.high:
         return interval
     note = (

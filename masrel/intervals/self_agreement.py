@@ -286,12 +286,11 @@ class _Posterior:
         """Return quantiles of the standard deviation of kappa over raters."""
         # of √(m (1 - m) g), to about 1e-4: it has a kink in m
         variance = expit(self.mean.points) * expit(-self.mean.points)
-        step = float(_GRID[1] - _GRID[0])
 
         def probability(deviation: float) -> float:
             # 3 g may go so far at every m
             max_g = np.minimum(3.0 * deviation**2 / variance, 1.0)
-            below = integrated_sinc(logit(max_g)[:, None] - _GRID, step)
+            below = integrated_sinc(logit(max_g), _GRID)
             return float((self.masses * below).sum())
 
         most = math.sqrt(1.0 / 12.0)

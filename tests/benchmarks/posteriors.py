@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import expit
 
 from masrel.intervals import posterior
-from masrel.intervals._rho import DEFAULT_PRIOR, DirichletMultinomial, RhoPosterior
+from masrel.intervals._rho import DEFAULT_PRIOR, RhoPosterior
 from tests.benchmarks.bootstrap import Codes, Point, Race, counted, made, measured
 from tests.benchmarks.sidebyside import Timing, side_by_side
 from tests.intervals.gauss_legendre import ByPanels
@@ -41,7 +41,7 @@ def parts(position: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def log_likelihood(
-    model: DirichletMultinomial, rho: Floats, rest: Floats, pi: Floats
+    model: RhoPosterior, rho: Floats, rest: Floats, pi: Floats
 ) -> Floats:
     """Return the log-likelihood, constants left out."""
     # With A = (1 - ρ)/ρ every factor A π_k + j and A + j, times ρ, is (1 - ρ) π_k +
@@ -54,27 +54,27 @@ def log_likelihood(
     return np.asarray(log - np.log(denominator) @ model.sizes)
 
 
-def log_density(model: DirichletMultinomial, position: Floats) -> Floats:
+def log_density(model: RhoPosterior, position: Floats) -> Floats:
     """Return the log posterior density of unbounded positions."""
     # position (n, n_dimensions) -> (n,)
     rho, rest, pi = parts(position)
     with np.errstate(divide="ignore", invalid="ignore"):  # far out a part is 0
-        # Beta density (ρ (1 - ρ))^(shape - 1), times the logit's Jacobian ρ (1 - ρ)
-        of_rho = model.shape * (np.log(rho) + np.log(rest))
+        # uniform, times the logit's Jacobian ρ (1 - ρ)
+        of_rho = np.log(rho) + np.log(rest)
         # Dirichlet density Π π_k^(a_k - 1), times the log-ratios' Jacobian Π π_k
-        of_pi = np.log(pi) @ model.prior
+        of_pi = np.log(pi) @ model.of_shares
         density = log_likelihood(model, rho, rest, pi) + of_rho + of_pi
     return np.where(np.isfinite(density), density, -np.inf)
 
 
 def chains(
-    way: str, model: DirichletMultinomial, n_steps: int, seed: int
+    way: str, model: RhoPosterior, n_steps: int, seed: int
 ) -> NDArray[np.float64]:
     """ρ by emcee, (n_steps, walkers): vectorized, on collapsed counts."""
     import emcee
 
     rng = np.random.default_rng(seed)
-    start = rng.normal(scale=1.5, size=(WALKERS[way], model.prior.size))
+    start = rng.normal(scale=1.5, size=(WALKERS[way], model.of_shares.size))
     legacy = np.random.RandomState(seed).get_state()
     moves = None
     if way == EVOLUTION:
@@ -88,14 +88,14 @@ def chains(
 
 
 def emcee_ends(
-    way: str, model: DirichletMultinomial, n_steps: int, seed: int
+    way: str, model: RhoPosterior, n_steps: int, seed: int
 ) -> tuple[float, ...]:
     """The ends, the first third of the chains left out."""
     kept = chains(way, model, n_steps, seed)[n_steps // 3 :]
     return tuple(np.quantile(kept, TAILS).tolist())
 
 
-def steps_for(way: str, model: DirichletMultinomial) -> int:
+def steps_for(way: str, model: RhoPosterior) -> int:
     """How many steps ESS takes by the autocorrelation time, and half of it first."""
     from emcee.autocorr import integrated_time
 
@@ -104,15 +104,13 @@ def steps_for(way: str, model: DirichletMultinomial) -> int:
     return math.ceil(1.5 * ESS * float(tau) / WALKERS[way])
 
 
-def importance_ends(
-    model: DirichletMultinomial, size: int, seed: int
-) -> tuple[float, ...]:
+def importance_ends(model: RhoPosterior, size: int, seed: int) -> tuple[float, ...]:
     """The ends, by scrambled Sobol points of a multivariate t with five degrees."""
     from scipy.optimize import minimize
     from scipy.special import gammaincinv, ndtri
     from scipy.stats import qmc
 
-    d, df = model.prior.size, 5.0
+    d, df = model.of_shares.size, 5.0
 
     def minus(position: NDArray[np.float64]) -> float:
         return -float(log_density(model, position[None])[0])
@@ -137,7 +135,7 @@ def importance_ends(
 
 
 def _inverse_hessian(
-    model: DirichletMultinomial, mode: NDArray[np.float64], step: float = 1e-3
+    model: RhoPosterior, mode: NDArray[np.float64], step: float = 1e-3
 ) -> NDArray[np.float64]:
     # central differences of the log-density, all at once
     d = mode.size
@@ -168,7 +166,7 @@ def posteriors(quick: bool) -> list[Posterior]:
 def _study(n: int, r: int, q: int, *, quick: bool) -> Posterior:
     codes = made(n, r, q)
     counts = counted(codes, q)
-    model = DirichletMultinomial.of_counts(counts)
+    model = RhoPosterior.of(counts, DEFAULT_PRIOR)
     panels = ByPanels(counts.tolist())
     truth = (panels.quantile(TAILS[0]), panels.quantile(TAILS[1]))
     points = _points(codes, q, model, truth, quick)
@@ -177,7 +175,7 @@ def _study(n: int, r: int, q: int, *, quick: bool) -> Posterior:
         INTERVAL: partial(
             posterior, "fleiss_kappa", codes, target="items", categories=range(q)
         ),
-        QUADRATURE: lambda: RhoPosterior.of(counts, DEFAULT_PRIOR, 0.95),
+        QUADRATURE: lambda: RhoPosterior.of(counts, DEFAULT_PRIOR),
     }
     errors = {INTERVAL: points[0].error}
     for way, size in n_steps.items():
@@ -198,7 +196,7 @@ def _study(n: int, r: int, q: int, *, quick: bool) -> Posterior:
 def _points(
     codes: Codes,
     q: int,
-    model: DirichletMultinomial,
+    model: RhoPosterior,
     truth: tuple[float, float],
     quick: bool,
 ) -> list[Point]:

@@ -41,7 +41,6 @@ def test_the_probability_of_no_agreement_beyond_chance(
     nodes = grid_nodes("margins", IDENTITY, prior, 81)
     result = TablePosterior(
         nodes=nodes,
-        shown=nodes,
         disagreeing=prior[0, 1] + prior[1, 0],
         agreeing=prior.trace(),
     )
@@ -69,9 +68,7 @@ def test_given_the_rest_the_probability_is_that_of_a_grid_of_shares(
     y = rng.dirichlet(np.full(q * (q - 1), 0.3), size=n)
     v = np.array([[0.0, 0.25, 1.0], [0.25, 0.0, 0.25], [1.0, 0.25, 0.0]])
     nodes = Nodes.of("margins", v, np.full(n, 1.0 / n), x, y)
-    result = TablePosterior(
-        nodes=lambda _: nodes, shown=lambda _: nodes, disagreeing=2.5, agreeing=1.5
-    )
+    result = TablePosterior(nodes=lambda _: nodes, disagreeing=2.5, agreeing=1.5)
     edges = np.linspace(0.0, 1.0, 4001)
     t = 0.5 * (edges[1:] + edges[:-1])
     masses = np.diff(betainc(2.5, 1.5, edges))
