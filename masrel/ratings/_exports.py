@@ -1,7 +1,7 @@
 """Files of other programs as sheets: workbooks, Parquet, JSON, SPSS, annotation tools.
 
-An annotation tool has a function from its records to `_Ratings`: who gave which item
-which category. Only categories of whole documents are read; several of them at once,
+An annotation tool has a function from a record to what was `_Given`: who gave which
+item which category. Only categories of whole documents are read; several of them at once,
 spans and relations are refused.
 """
 
@@ -13,16 +13,16 @@ import tempfile
 import zipfile
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from masrel.errors import ParameterError, RatingsError
+from masrel.errors import ParameterError
 from masrel.ratings._findings import ReadingOptions, library, refusal
 from masrel.ratings._sheet import MAX_UNPACKED, Column, Sheet, value_text
 
@@ -243,30 +243,27 @@ def _statistical(
 
 def _json_values(name: str, suffix: str, data: bytes) -> list[Any]:
     # values of JSON, of JSON lines whatever the name ends with, or rows of a CSV file
-    try:
-        text = data.decode("utf-8-sig").rstrip()
+    def read() -> list[Any]:
+        text, place = data.decode("utf-8-sig").rstrip(), 0
         if suffix == ".csv":
             return list(csv.DictReader(io.StringIO(text, newline="")))
-    except UnicodeDecodeError as error:
-        raise refusal(name, "no utf-8", error=error) from error
-    except csv.Error as error:
-        raise refusal(name, "no table", error=error) from error
-    values, place = [], 0
-    parse = json.JSONDecoder(object_pairs_hook=partial(_object, name)).raw_decode
-    try:
+        values = []
         while begun := _SOLID.search(text, place):
             value, place = parse(text, begun.start())
             values.append(value)
-    except json.JSONDecodeError as error:
-        raise refusal(name, "no JSON", line=error.lineno, error=error.msg) from error
+        return values
+
+    parse = json.JSONDecoder(object_pairs_hook=_object).raw_decode
+    kind = suffix if suffix == ".csv" else ".json"
+    values: list[Any] = read_foreign(name, kind, read, csv.Error)
     return values[0] if len(values) == 1 and isinstance(values[0], list) else values
 
 
-def _object(name: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     value = dict(pairs)
     if len(value) < len(pairs):  # the json module would keep the last in silence
-        keys = Counter(key for key, _ in pairs)
-        raise refusal(name, "same key", key=keys.most_common(1)[0][0])
+        key = Counter(key for key, _ in pairs).most_common(1)[0][0]
+        raise ValueError(f"an object has the key {key!r} twice")
     return value
 
 
@@ -289,7 +286,15 @@ def _objects(name: str, values: list[Any]) -> pd.DataFrame:
 
 # ---- annotation tools ----
 
-_Records = list[tuple[str, dict[str, Any]]]  # name of the file, or "", and a record
+
+class _Given(NamedTuple):
+    """What an annotator gave an item."""
+
+    item: Any
+    rater: Any
+    grades: dict[str, Any]  # by field; several in a list
+    text: Any = None  # what was annotated
+    why: str = ""  # it is left out
 
 
 def _records(name: str, suffix: str, data: bytes) -> list[tuple[str, Any]]:
@@ -309,249 +314,138 @@ def _records(name: str, suffix: str, data: bytes) -> list[tuple[str, Any]]:
     ]
 
 
-@dataclass(slots=True)
-class _Ratings:
-    """What is collected from the records of an export."""
-
-    name: str  # of the file, for messages
-    chosen: str | None  # the field that the caller takes for the grade
-    rows: list[tuple[Any, Any, Any, Any]] = field(default_factory=list)
-    dropped: Counter[str] = field(default_factory=Counter)
-
-    def error(self, message: str) -> RatingsError:
-        return RatingsError(f"{self.name}: {message}")
-
-    def add(self, item: Any, rater: Any, grade: Any, text: Any) -> None:
-        where = f"annotation {len(self.rows) + 1}" if item is None else f"item {item}"
-        for role, value in (("item", item), ("annotator", rater)):
-            if value is None or value == "":
-                raise self.error(f"{where}: needed its {role}, got none")
-        labels = grade if isinstance(grade, list) else [grade]
-        if any(isinstance(label, dict | list) for label in labels):
-            raise self.error(
-                f"{where}: needed a category of the whole, got {str(grade)[:60]}; "
-                "spans, regions and relations are not read"
-            )
-        if len(labels) > 1:
-            raise self.error(
-                f"{where}: needed one category of each annotator, {rater} gave "
-                f"{len(labels)}: {', '.join(map(str, labels))[:60]}; annotations with "
-                "several labels are not read"
-            )
-        grade = labels[0] if labels else None
-        self.rows.append((item, rater, grade, text))
-
-    def choose(self, fields: Iterable[str], what: str) -> str:
-        """Return the field that is the grade: the one there is, or that is named."""
-        names = list(dict.fromkeys(fields))
-        listed = ", ".join(names) or "none"
-        if self.chosen is None and len(names) == 1:
-            return names[0]
-        if self.chosen is None and not names:
-            raise self.error(
-                f"needed {what}, got none; spans, regions and relations are not read"
-            )
-        if self.chosen is None:
-            raise self.error(f"needs --grade with one of its {what}, {listed}")
-        if self.chosen not in names:
-            raise self.error(
-                f"--grade: needed one of its {what}, {listed}, got {self.chosen!r}"
-            )
-        return self.chosen
-
-
 def _export(
-    name: str, source: str, records: list[tuple[str, Any]], grade: str | None
+    name: str, source: str, records: list[tuple[str, Any]], chosen: str | None
 ) -> tuple[pd.DataFrame, dict[str, Any], dict[str, int]]:
     # columns item, rater, the grade, and text where it has any; its facts, and why
     # annotations are left out
     if source not in _TOOLS:
         raise ParameterError(f"--from: needed {', '.join(_TOOLS)}, got {source!r}")
-    ratings = _Ratings(name, grade)
-    if not records or not all(isinstance(value, dict) for _, value in records):
-        raise ratings.error(f"needed the records of {source}, got no list of objects")
     try:
-        of = _TOOLS[source](ratings, records)
-    except (TypeError, AttributeError, KeyError, StopIteration) as error:
-        raise ratings.error(
-            f"is no export of {source}, or damaged: a record after "
-            f"{len(ratings.rows)} annotations has another shape ({error})"
-        ) from error
-    if not ratings.rows:
-        raise ratings.error(f"needed ratings of {of}, got none")
-    if grade in ("item", "rater"):
-        raise ratings.error(f"--grade: a field cannot be called {grade!r} here")
-    names = ["item", "rater", grade or "grade", "text"]
-    frame = pd.DataFrame(ratings.rows, columns=names, dtype=object)
-    if frame.iloc[:, 3].isna().all() or grade == "text":
-        frame = frame.iloc[:, :3]
-    return frame, {"format": f"{source} export", "field": of}, dict(ratings.dropped)
-
-
-# Label Studio's results that are categories of a whole task, and the key of the value.
-_CATEGORIES = {
-    "choices": "choices",
-    "rating": "rating",
-    "number": "number",
-    "taxonomy": "taxonomy",
-    "pairwise": "selected",
-}
-# What its JSON-MIN has beside the task's data and the results.
-_ABOUT = ("id", "annotator", "annotation_id", "created_at", "updated_at", "lead_time")
-
-
-def _label_studio(ratings: _Ratings, records: _Records) -> str:
-    if all("annotator" in task and "annotations" not in task for _, task in records):
-        return _label_studio_min(ratings, records)
-    annotations = [  # task, annotation
-        (task, annotation)
-        for _, task in records
-        for annotation in task.get("annotations") or task.get("completions") or ()
-        if isinstance(annotation, dict)
-    ]
-    if not annotations:
-        raise ratings.error("needed tasks with annotations: the JSON export, got none")
-    of = ratings.choose(
-        (field for _, annotation in annotations for field in _categories(annotation)),
-        "fields of categories",
-    )
-    for task, annotation in annotations:
-        if annotation.get("was_cancelled") or annotation.get("skipped"):
-            ratings.dropped["skipped"] += 1
+        given = [g for who, record in records for g in _TOOLS[source](who, record)]
+    except (TypeError, AttributeError, KeyError) as error:
+        raise refusal(name, "shape", source=source, error=error) from error
+    fields = list(dict.fromkeys(field for g in given for field in g.grades))
+    if not fields:
+        raise refusal(name, "no fields")
+    of = fields[0] if chosen is None else chosen
+    if of not in fields or (chosen is None and len(fields) > 1):
+        got = "none" if chosen is None else repr(chosen)
+        raise refusal(name, "fields", fields=", ".join(fields), got=got)
+    if chosen in ("item", "rater"):
+        raise refusal(name, "field's name", chosen=chosen)
+    rows, dropped = [], Counter[str]()
+    for who in given:
+        # an answer of Prodigy is to one label; others ask for all fields at once
+        if who.why or (source == "prodigy" and of not in who.grades):
+            dropped[who.why or "of other labels"] += 1
             continue
+        grade = who.grades.get(of)
+        labels = grade if isinstance(grade, list) else [grade]
+        wrong = {
+            "no item": who.item in (None, ""),
+            "no annotator": who.rater in (None, ""),
+            "spans": any(isinstance(label, dict | list) for label in labels),
+            "several labels": len(labels) > 1,
+        }
+        for code, is_so in wrong.items():
+            if is_so:
+                got = ", ".join(map(str, labels))[:60]
+                raise refusal(name, code, item=who.item, rater=who.rater, got=got)
+        text = who.text if isinstance(who.text, str) else None
+        rows.append((who.item, who.rater, labels[0] if labels else None, text))
+    if not rows:
+        raise refusal(name, "no rating", field=of)
+    frame = pd.DataFrame(
+        rows, columns=["item", "rater", chosen or "grade", "text"], dtype=object
+    )
+    if frame.iloc[:, 3].isna().all() or chosen == "text":
+        frame = frame.iloc[:, :3]
+    return frame, {"format": f"{source} export", "field": of}, dict(dropped)
+
+
+def _label_studio(_: str, task: dict[str, Any]) -> Iterator[_Given]:
+    if "annotator" in task and "annotations" not in task:
+        # its JSON-MIN has one object an annotation, data and results side by side
+        grades = {key: _labels(v) for key, v in task.items() if key not in _ABOUT}
+        yield _Given(task.get("id"), task["annotator"], grades, task.get("text"))
+        return
+    data = task.get("data") or {}
+    only = next(iter(data.values())) if len(data) == 1 else None
+    for annotation in task.get("annotations") or task.get("completions") or ():
         who = annotation.get("completed_by")
         if isinstance(who, dict):
             who = who.get("email") or who.get("id")
-        grades = _categories(annotation).get(of)
-        ratings.add(task.get("id"), who, grades, _text_of(task.get("data")))
-    return of
+        grades = {}
+        for result in annotation.get("result") or ():
+            value = result.get("value")
+            if _is_category(value):
+                of = grades.setdefault(str(result.get("from_name")), [])
+                of += _labels(value)
+        is_skipped = annotation.get("was_cancelled") or annotation.get("skipped")
+        why = "skipped" if is_skipped else ""
+        yield _Given(task.get("id"), who, grades, data.get("text", only), why)
 
 
-def _categories(annotation: dict[str, Any]) -> dict[str, list[Any]]:
-    # of the whole task by field; beside those of a region stands its place
-    grades: dict[str, list[Any]] = {}
-    for result in annotation.get("result") or ():
-        value, key = result.get("value"), _CATEGORIES.get(str(result.get("type")))
-        if isinstance(value, dict) and key is not None and set(value) == {key}:
-            of = grades.setdefault(str(result.get("from_name")), [])
-            of += _grades_of(key, value[key])
-    return grades
+# The keys of Label Studio's results that are categories, and what its JSON-MIN has
+# beside the task's data and the results.
+_CATEGORIES = {"choices", "rating", "number", "taxonomy", "selected"}
+_ABOUT = ("id", "annotator", "annotation_id", "created_at", "updated_at", "lead_time")
 
 
-def _grades_of(key: str, value: Any) -> list[Any]:
-    if key == "taxonomy":  # paths from the root
-        return ["/".join(map(str, p)) if isinstance(p, list) else p for p in value]
-    return value if isinstance(value, list) else [value]
+def _is_category(value: Any) -> bool:
+    # of the whole task: beside that of a region stands its place
+    return isinstance(value, dict) and len(value) == 1 and value.keys() <= _CATEGORIES
 
 
-def _text_of(data: object) -> Any:
-    # what was annotated, where there is no doubt which of the data that is
-    if not isinstance(data, dict):
-        return None
-    text = data.get("text", next(iter(data.values())) if len(data) == 1 else None)
-    return None if isinstance(text, dict | list) else text
+def _labels(value: Any) -> Any:
+    # the categories of a result, of a taxonomy by their path from the root
+    if isinstance(value, list) and len(value) == 1:
+        value = value[0]
+    if not _is_category(value):
+        return value
+    ((_, labels),) = value.items()
+    several = labels if isinstance(labels, list) else [labels]
+    return ["/".join(map(str, x)) if isinstance(x, list) else x for x in several]
 
 
-def _label_studio_min(ratings: _Ratings, records: _Records) -> str:
-    # one object an annotation, its data and its results side by side
-    fields = (key for _, task in records for key in task if key not in _ABOUT)
-    of = ratings.choose(fields, "fields")
-    for _, task in records:
-        grade = task.get(of)
-        if isinstance(grade, list) and len(grade) == 1:
-            grade = grade[0]
-        for key in _CATEGORIES.values():
-            if isinstance(grade, dict) and set(grade) == {key}:
-                grade = _grades_of(key, grade[key])
-        ratings.add(task.get("id"), task.get("annotator"), grade, task.get("text"))
-    return of
+def _doccano(who: str, example: dict[str, Any]) -> Iterator[_Given]:
+    rater = example.get("username", example.get("user", who))
+    text = example.get("text", example.get("filename"))
+    keys = {"label", "labels", "cats"} & example.keys()
+    if keys:
+        grades = {key: example[key] for key in sorted(keys)}
+        yield _Given(example.get("id"), rater, grades, text)
+    for label in example.get("annotations") or ():  # old: labels, users by number
+        grade = label if "start_offset" in label else label.get("label")
+        yield _Given(example.get("id"), label.get("user"), {"annotations": grade}, text)
 
 
-def _doccano(ratings: _Ratings, records: _Records) -> str:
-    of = ratings.choose(
-        (
-            key
-            for _, example in records
-            for key in ("label", "labels", "cats", "annotations")
-            if key in example
-        ),
-        "labels of whole examples",
-    )
-    for who, example in records:
-        grades: dict[Any, list[Any]] = {}
-        labels = example.get(of)
-        if of == "annotations":  # old exports: labels and users by their numbers
-            for label in labels or ():
-                grade = label if "start_offset" in label else label.get("label")
-                grades.setdefault(label.get("user"), []).append(grade)
-        else:
-            rater = example.get("username", example.get("user", who or None))
-            if rater is None:
-                raise ratings.error(
-                    "needed to know who gave the labels, got one file without it: "
-                    "doccano writes one for each annotator, in a zip, unless a "
-                    "project's annotations are shared"
-                )
-            grades[rater] = labels if isinstance(labels, list) else [labels]
-        for rater, labels in grades.items():
-            text = example.get("text", example.get("filename"))
-            ratings.add(example.get("id"), rater, labels, text)
-    return of
+def _prodigy(who: str, task: dict[str, Any]) -> Iterator[_Given]:
+    answer, why = task.get("answer"), ""
+    is_choice = "accept" in task or "options" in task
+    if answer == "ignore" or (is_choice and answer != "accept"):
+        why = f"answered {answer or 'nothing'}"
+    regions = task.get("spans") or task.get("relations")
+    if is_choice:
+        grades = {"accept": task.get("accept", [])}
+    elif task.get("label") is not None:
+        grades = {str(task["label"]): answer}
+    else:
+        grades = {"answer": regions or answer}
+    rater = task.get("_annotator_id") or task.get("_session_id") or who
+    yield _Given(task.get("_input_hash"), rater, grades, task.get("text"), why)
 
 
-def _prodigy(ratings: _Ratings, records: _Records) -> str:
-    is_choice = any("accept" in task for _, task in records)
-    labels = dict.fromkeys(
-        str(task["label"])
-        for _, task in records
-        if not is_choice and task.get("label") is not None
-    )
-    # an answer is to a label: several labels are several questions
-    fields = ["accept"] if is_choice else labels or ["answer"]
-    of = ratings.choose(fields, "labels" if labels else "fields")
-    for who, task in records:
-        answer = task.get("answer")
-        if answer == "ignore" or (is_choice and answer != "accept"):
-            ratings.dropped[f"answered {answer or 'nothing'}"] += 1
-            continue
-        if labels and task.get("label") != of:
-            ratings.dropped["of other labels"] += 1
-            continue
-        regions = task.get("spans") or task.get("relations")
-        grade = task.get("accept", []) if is_choice else answer
-        if regions and not is_choice and not labels:
-            grade = regions[0]
-        rater = task.get("_annotator_id") or task.get("_session_id") or who
-        ratings.add(task.get("_input_hash"), rater, grade, task.get("text"))
-    return of
+def _inception(_: str, row: dict[str, Any]) -> Iterator[_Given]:
+    if other := row.keys() - {"doc", "user", "label"}:
+        raise KeyError(f"columns of spans or chains, {', '.join(map(str, other))}")
+    is_other = row["user"] in ("CURATION_USER", "INITIAL_CAS")
+    why = "of the curator or the source" if is_other else ""
+    yield _Given(row["doc"], row["user"], {"label": row["label"]}, why=why)
 
 
-def _inception(ratings: _Ratings, records: _Records) -> str:
-    columns = {key for _, row in records for key in row}
-    if not {"doc", "user"} <= columns:
-        raise ratings.error(
-            "needed doc, user and label: the CSV or JSON export of the agreement page, "
-            f"got {', '.join(sorted(map(str, columns)))[:60]}"
-        )
-    if columns - {"doc", "user", "label"}:
-        raise ratings.error(
-            "needed labels of documents, got those of a layer of spans, relations or "
-            f"chains ({', '.join(sorted(map(str, columns - {'doc', 'user'})))})"
-        )
-    of = ratings.choose(["label"] if "label" in columns else [], "labels of a feature")
-    grades: dict[tuple[Any, Any], list[Any]] = {}
-    for _, row in records:
-        document, rater = row.get("doc"), row.get("user")
-        if rater in ("CURATION_USER", "INITIAL_CAS"):
-            ratings.dropped["of the curator or the source"] += 1
-        else:
-            grades.setdefault((document, rater), []).append(row.get("label"))
-    for (document, rater), labels in grades.items():
-        ratings.add(document, rater, labels, None)
-    return of
-
-
-_TOOLS: dict[str, Callable[[_Ratings, _Records], str]] = {
+_TOOLS: dict[str, Callable[[str, Any], Iterator[_Given]]] = {
     "label-studio": _label_studio,
     "doccano": _doccano,
     "prodigy": _prodigy,

@@ -220,14 +220,23 @@ _TEXTS = {
     "sheets": "needs --sheet with one of its sheets, {sheets}",
     "nested cell": "{where}needed text or numbers, got a {kind}",
     "no export": "needed {suffixes} in it, got none",
-    "no table": "needed cells of a table ({error})",
-    "no utf-8": "needed text in UTF-8 ({error})",
-    "no JSON": "line {line}: is no JSON: {error}",
-    "same key": "needed different keys in an object, {key!r} is there twice",
     "no objects": "needed a JSON list of objects, one a row; --from reads exports of "
     "annotation tools",
     "nested": "object {number}: needed text or a number for {key!r}, got what is "
     "nested; --from reads exports of annotation tools",
+    "shape": "is no export of {source}, or damaged: a record has another shape "
+    "({error})",
+    "no fields": "needed labels of whole items, got none; spans, regions and relations "
+    "are not read",
+    "fields": "--grade: needed one of its fields, {fields}, got {got}",
+    "field's name": "--grade: a field cannot be called {chosen!r} here",
+    "no item": "needed an item of every annotation, {rater} gave {got} to none",
+    "no annotator": "item {item}: needed its annotator, got none",
+    "spans": "item {item}: needed a category of the whole, got {got}; spans, regions "
+    "and relations are not read",
+    "several labels": "item {item}: needed one category of each annotator, {rater} "
+    "gave several, {got}, which are not read",
+    "no rating": "needed ratings of {field}, got none",
     "xpt": "is damaged, or no .xpt file (needed lines of 80 bytes)",
     # columns
     "no column": "{option}: there is no column {column!r}, {columns}{hint}",

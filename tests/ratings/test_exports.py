@@ -242,15 +242,15 @@ READ: dict[str, tuple[str, str, Any, dict[str, Any], Any, dict[str, int]]] = {
 SPAN = field("labels", start=0, end=3, text="Kim", labels=["PER"])
 DOCCANO = {"id": 1, "text": "a", "username": "ann"}
 REFUSED: list[tuple[str, Any, dict[str, Any], str]] = [
-    ("label-studio", SEVERAL, {}, "needs --grade .*, mood, stars"),
+    ("label-studio", SEVERAL, {}, "--grade: .*, mood, stars, got none"),
     ("label-studio", SEVERAL, {"grade": "box"}, "--grade: .* got 'box'"),
-    ("label-studio", MIN, {}, "needs --grade .*text, mood, stars"),
-    ("label-studio", MIN, {"grade": "mood"}, "several labels are not read"),
+    ("label-studio", MIN, {}, "--grade: .*text, mood, stars"),
+    ("label-studio", MIN, {"grade": "mood"}, "several, good, bad"),
     (
         "label-studio",
         [task(3, annotation(KIM, choice("topic", "war", "sport")))],
         {},
-        "item 3: needed one category .*kim@x.org gave 2: war, sport",
+        "item 3: needed one category .*kim@x.org gave several, war, sport",
     ),
     (
         "label-studio",
@@ -261,14 +261,14 @@ REFUSED: list[tuple[str, Any, dict[str, Any], str]] = [
     ("label-studio", [task(1, annotation(None, GOOD))], {}, "needed its annotator"),
     ("label-studio", [task(1, annotation(KIM, "x"))], {}, "another shape"),
     ("label-studio", [{"id": 1, "annotations": 3}], {}, "another shape"),
-    ("doccano", [{**DOCCANO, "label": ["good", "bad"]}], {}, "several labels"),
+    ("doccano", [{**DOCCANO, "label": ["good", "bad"]}], {}, "several"),
     ("doccano", [{**DOCCANO, "label": [[0, 3, "PER"], [5, 8, "LOC"]]}], {}, "spans"),
     ("doccano", [{**DOCCANO, "entities": [{"label": "PER"}]}], {}, "spans"),
-    ("doccano", [{"id": 1, "label": ["good"]}], {}, "to know who gave the labels"),
-    ("doccano", [{"label": ["good"], "username": "ann"}], {}, "needed its item"),
+    ("doccano", [{"id": 1, "label": ["good"]}], {}, "needed its annotator"),
+    ("doccano", [{"label": ["good"], "username": "ann"}], {}, "needed an item"),
     ("doccano", [{"id": 1, "annotations": ["x"]}], {}, "another shape"),
     ("doccano", [{"id": [1], "label": ["a"], "user": ["ann"]}], {}, ""),
-    ("prodigy", TWO_LABELS, {}, "needs --grade .* labels, ECO, POL"),
+    ("prodigy", TWO_LABELS, {}, "--grade: .*, ECO, POL"),
     ("prodigy", [answer(5, "kim", "A", "B")], {}, "item 5: needed one category"),
     (
         "prodigy",
@@ -278,12 +278,12 @@ REFUSED: list[tuple[str, Any, dict[str, Any], str]] = [
     ),
     ("prodigy", [answer(1, "", "A")], {}, "needed its annotator"),
     ("prodigy", [answer(5, "kim", accept={"A": 1})], {}, ""),
-    ("inception", [{"doc": None, "user": "a", "label": "b"}], {}, "needed its item"),
+    ("inception", [{"doc": None, "user": "a", "label": "b"}], {}, "needed an item"),
     ("inception", [{"doc": "a", "user": ["x"], "label": "l"}], {}, ""),
-    ("inception", "doc,user,begin,text,label\na,x,0,Kim,P\n", {}, "layer of spans"),
-    ("inception", "doc,user,label\na,x,good\na,x,bad\n", {}, "several labels"),
-    ("inception", "doc,user\na,x\n", {}, "labels of a feature"),
-    ("inception", "Type,Document\nDocumentPosition,a\n", {}, "CSV"),
+    ("inception", "doc,user,begin,text,label\na,x,0,Kim,P\n", {}, "columns of spans"),
+    ("inception", "doc,user,label\na,x,good\na,x,bad\n", {}, "more than once"),
+    ("inception", "doc,user\na,x\n", {}, "another shape"),
+    ("inception", "Type,Document\nDocumentPosition,a\n", {}, "another shape"),
     ("brat", [{"a": 1}], {}, "--from: needed label-studio, doccano"),
     *(
         (source, content, {}, r"e\.(json|csv): ")

@@ -306,17 +306,17 @@ REFUSED: list[tuple[str, Write, dict[str, Any], str]] = [
     *(
         ("json", partial(text, content=content), {}, words)
         for content, words in (
-            ('[{"item": "A", "Kim": 1, "Kim": 2}]', "'Kim' is there twice"),
+            ('[{"item": "A", "Kim": 1, "Kim": 2}]', "key 'Kim' twice"),
             ('[{"item": "A", "Kim": [1]}]', "object 1: .*'Kim', got what is nested"),
-            ('[{"item": "A"\n,]', "line 2: is no JSON"),
+            ('[{"item": "A"\n,]', r"is damaged, or no .json file .*line 2"),
             ("[]", "needed a JSON list of objects"),
             ("{}", "needed rows of ratings below the names"),
             ("null", "needed a JSON list of objects"),
             ('{"data": [{"a": 1}]}', "'data': needed text or numbers, got a dict"),
             ("[1, 2]", "needed a JSON list of objects"),
             ('{"item": ["A"], "Kim": []}', "object 1: .* nested"),
-            ("nonsense", "line 1: is no JSON"),
-            ('{"a": 1}\n{"a": \n', "line 2: is no JSON"),
+            ("nonsense", r"is damaged, or no .json file .*line 1"),
+            ('{"a": 1}\n{"a": \n', r"is damaged, or no .json file .*line 2"),
         )
     ),
 ]
