@@ -1,8 +1,8 @@
 """Files of other programs as sheets: workbooks, Parquet, JSON, SPSS, annotation tools.
 
 An annotation tool has a function from a record to what was `_Given`: who gave which
-item which category. Only categories of whole documents are read; several of them at once,
-spans and relations are refused.
+item which category. Only categories of whole documents are read; several of them at
+once, spans and relations are refused.
 """
 
 import csv
@@ -339,21 +339,8 @@ def _export(
         # an answer of Prodigy is to one label; others ask for all fields at once
         if who.why or (source == "prodigy" and of not in who.grades):
             dropped[who.why or "of other labels"] += 1
-            continue
-        grade = who.grades.get(of)
-        labels = grade if isinstance(grade, list) else [grade]
-        wrong = {
-            "no item": who.item in (None, ""),
-            "no annotator": who.rater in (None, ""),
-            "spans": any(isinstance(label, dict | list) for label in labels),
-            "several labels": len(labels) > 1,
-        }
-        for code, is_so in wrong.items():
-            if is_so:
-                got = ", ".join(map(str, labels))[:60]
-                raise refusal(name, code, item=who.item, rater=who.rater, got=got)
-        text = who.text if isinstance(who.text, str) else None
-        rows.append((who.item, who.rater, labels[0] if labels else None, text))
+        else:
+            rows.append(_row(name, who, of))
     if not rows:
         raise refusal(name, "no rating", field=of)
     frame = pd.DataFrame(
@@ -362,6 +349,24 @@ def _export(
     if frame.iloc[:, 3].isna().all() or chosen == "text":
         frame = frame.iloc[:, :3]
     return frame, {"format": f"{source} export", "field": of}, dict(dropped)
+
+
+def _row(name: str, who: _Given, field: str) -> tuple[Any, Any, Any, str | None]:
+    # item, rater, the one grade, and the text
+    grade = who.grades.get(field)
+    labels = grade if isinstance(grade, list) else [grade]
+    wrong = {
+        "no item": who.item in (None, ""),
+        "no annotator": who.rater in (None, ""),
+        "spans": any(isinstance(label, dict | list) for label in labels),
+        "several labels": len(labels) > 1,
+    }
+    for code, is_so in wrong.items():
+        if is_so:
+            got = ", ".join(map(str, labels))[:60]
+            raise refusal(name, code, item=who.item, rater=who.rater, got=got)
+    text = who.text if isinstance(who.text, str) else None
+    return who.item, who.rater, labels[0] if labels else None, text
 
 
 def _label_studio(_: str, task: dict[str, Any]) -> Iterator[_Given]:

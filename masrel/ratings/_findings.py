@@ -37,7 +37,7 @@ class ReadingOptions:
     categories: Sequence[str] | None = None  # every grade of the scale in order
     missing_codes: tuple[str, ...] = ()  # beside the usual ones
     decimal: str = "."
-    delimiter: str = "auto"
+    delimiter: str | None = "auto"  # None or auto is for the file to tell
     encoding: str | None = None
     sheet: str | None = None  # of a workbook
     transpose: bool = False  # whether raters are rows
@@ -63,14 +63,9 @@ class ReadingOptions:
         is_kept = self.repeated == "error"
         return options + ([] if is_kept else [f"--repeated {self.repeated}"])
 
-    def mark(self) -> str | None:
-        """Return the separator of cells, None for the file to tell."""
-        names = {"auto": None, "tab": "\t", "\\t": "\t", "space": " ", "blanks": " "}
-        return names.get(self.delimiter, self.delimiter)
-
     def check(self) -> None:
         """Refuse what is wrong whatever the file is."""
-        mark, is_counted = self.mark(), self.counts or self.table
+        mark, is_counted = self.delimiter, self.counts or self.table
         is_long = bool(self.rater or self.grade)
         for is_wrong, text in (
             (
@@ -327,7 +322,7 @@ _TEXTS = {
     "missing, --missing {codes}",
     # ratings
     "twice": "{rows}: {rater!r} graded {item!r} more than once: --by or --session "
-    "names a column that tells such ratings apart{hint}, --repeated first, last or "
+    "names a column that tells such ratings apart, --repeated first, last or "
     "mean keeps one{guess}",
     "means": "--repeated mean: needs grades that are numbers without a declared scale, "
     "got {grades}",

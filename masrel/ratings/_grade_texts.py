@@ -11,7 +11,6 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
-from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -61,11 +60,6 @@ class Grades:
     n_missing: dict[str, int] = field(default_factory=dict)  # code to number of cells
     findings: list[Finding] = field(default_factory=list)
 
-    @property
-    def is_ordered(self) -> bool:
-        """Whether the order of the scale is more than that of the alphabet."""
-        return self.scale.name != "observed" or all(map(is_number, self.scale.grades))
-
 
 def is_number(text: str) -> bool:
     """Return whether a text is a finite decimal number in ASCII."""
@@ -82,7 +76,7 @@ def graded(
         of_text = [number.setdefault(text, len(number)) for text in column.texts]
         codes[:, k] = np.array(of_text, dtype=np.int64)[column.codes]
     cells = Column(codes.ravel(), list(number)).rows(slice(None))
-    weights = np.repeat(sheet.n_rows, len(places))
+    weights = np.repeat(sheet.freq, len(places))
     n_cells = np.bincount(cells.codes, weights, len(cells.texts)).astype(np.int64)
     freq = dict(zip(cells.texts, n_cells.tolist(), strict=True))
 
@@ -112,15 +106,17 @@ def _grades(
     def refuse(code: str, texts: Sequence[str], **facts: str) -> RatingsError:
         return sheet.refuse(code, where(texts[0]), None, got=listed(texts), **facts)
 
-    number = {text: _number(text, options.decimal) for text in met}
+    written = dict(zip(met, met, strict=True))
+    if options.decimal != ".":
+        written = {t: "" if "." in t else t.replace(options.decimal, ".") for t in met}
+    number = {t: Decimal(w) if is_number(w) else None for t, w in written.items()}
     findings: list[Finding] = []
     if declared:
         scale = Scale(name="declared", grades=declared)
         grade_of = _declared_grades(number, declared, refuse)
     else:
         _refuse_doubtful(number, options, refuse)
-        grade_of = _observed_grades(number, options.decimal)
-        scale = _observed_scale(list(dict.fromkeys(grade_of.values())))
+        grade_of, scale = _observed(number, options.decimal)
         findings = _doubts(met, number, grade_of, where)
     code = {grade: k for k, grade in enumerate(scale.grades)}
     spellings: dict[str, list[str]] = {}
@@ -133,13 +129,6 @@ def _grades(
         n_missing={text: n for text, n in freq.items() if n and text in absent},
         findings=findings,
     )
-
-
-def _number(text: str, mark: str) -> Decimal | None:
-    # the number that a text is, by its decimal mark
-    if mark != ".":
-        text = "" if "." in text else text.replace(mark, ".")
-    return Decimal(text) if is_number(text) else None
 
 
 def _declared(options: ReadingOptions) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -163,8 +152,10 @@ def _declared_grades(
     number: dict[str, Decimal | None], declared: Sequence[str], refuse: _Refuse
 ) -> dict[str, str]:
     # text to the category it is: the same text, else the same number
-    categories = {_number(category, "."): category for category in declared}
-    if None in categories or len(categories) < len(declared):
+    categories: dict[Decimal | None, str] = {}
+    if all(map(is_number, declared)):
+        categories = {Decimal(category): category for category in declared}
+    if len(categories) < len(declared):
         categories = {}  # text, or 1 and 1.0 are two grades: 01 is neither
     grade_of: dict[str, str] = {}
     for text, value in number.items():
@@ -173,7 +164,7 @@ def _declared_grades(
         if same or value in categories:
             grade_of[text] = same[0] if same else categories[value]
     if wrong := [text for text in number if text not in grade_of]:
-        likely = list(filter(_looks_missing, wrong))
+        likely = [text for text in wrong if normal_form(text) in _MISSING_FORMS]
         hint = f"; --missing {quoted(likely)} if it is missing" if likely else ""
         raise refuse("other grade", wrong, scale=", ".join(declared), hint=hint)
     return grade_of
@@ -183,7 +174,7 @@ def _refuse_doubtful(
     number: dict[str, Decimal | None], options: ReadingOptions, refuse: _Refuse
 ) -> None:
     # what may be no grade, or one of two
-    likely = list(filter(_looks_missing, number))
+    likely = [text for text in number if normal_form(text) in _MISSING_FORMS]
     commas = [text for text in number if _DECIMAL_COMMA.fullmatch(text)]
     rest = [text for text in number if text not in commas and not is_number(text)]
     plus = [t for t, value in number.items() if t[0] == "+" and value is not None]
@@ -199,33 +190,22 @@ def _refuse_doubtful(
         raise refuse("plus", plus, other=others[0], grade=f"{plus[0][1:]}+")
 
 
-@cache
-def _missing_forms() -> frozenset[str]:
-    # normal forms of what is a missing grade unless somebody says otherwise
-    return frozenset(["", *map(normal_form, _LOOKS_MISSING.split())])
-
-
-def _looks_missing(text: str) -> bool:
-    return normal_form(text) in _missing_forms()
-
-
-def _observed_grades(number: dict[str, Decimal | None], mark: str) -> dict[str, str]:
-    # text to grade where nobody declared a scale; of equal numbers, the shortest
-    if None in number.values():
-        return {text: text for text in number}
-    shortest: dict[Decimal | None, str] = {}
-    for text in sorted(number, key=lambda text: (len(text), text)):
-        shortest.setdefault(number[text], text.replace(mark, "."))
-    return {text: shortest[value] for text, value in number.items()}
-
-
-def _observed_scale(grades: Sequence[str]) -> Scale:
-    if all(map(is_number, grades)):
-        return Scale(name="observed", grades=tuple(sorted(grades, key=Decimal)))
+def _observed(
+    number: dict[str, Decimal | None], mark: str
+) -> tuple[dict[str, str], Scale]:
+    # text to grade where nobody declared a scale, and the scale
+    if None not in number.values():
+        shortest: dict[Decimal | None, str] = {}  # of equal numbers
+        for text in sorted(number, key=lambda text: (len(text), text)):
+            shortest.setdefault(number[text], text.replace(mark, "."))
+        grades = tuple(sorted(shortest.values(), key=Decimal))
+        grade_of = {text: shortest[value] for text, value in number.items()}
+        return grade_of, Scale(name="observed", grades=grades)
+    scale = Scale(name="observed", grades=tuple(sorted(number)))
     # No other scale has a grade 1+: its order is known, and its other grades.
-    if "1+" in grades and set(grades) <= set(MODIFIED_ASHWORTH.grades):
-        return MODIFIED_ASHWORTH
-    return Scale(name="observed", grades=tuple(sorted(grades)))
+    if "1+" in number and number.keys() <= set(MODIFIED_ASHWORTH.grades):
+        scale = MODIFIED_ASHWORTH
+    return {text: text for text in number}, scale
 
 
 # ---- what looks alike, or wrong ----
@@ -245,6 +225,10 @@ def normal_form(text: str) -> str:
         form = form.replace(",", ".")
     form = form.rstrip(".,:;!") or form[:1]
     return f"{Decimal(form).normalize():f}" if is_number(form) else form
+
+
+# of what is a missing grade unless somebody says otherwise
+_MISSING_FORMS = frozenset(["", *map(normal_form, _LOOKS_MISSING.split())])
 
 
 def spelled_alike(texts: Sequence[str]) -> list[list[str]]:

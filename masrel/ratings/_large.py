@@ -10,7 +10,7 @@ import atexit
 import gc
 import hashlib
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
+from collections.abc import Callable, Iterator, Sized
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ from masrel.ratings._findings import (
     ReadingOptions,
     library,
 )
-from masrel.ratings._layout import Layout, named, rated_twice
+from masrel.ratings._layout import Layout, rated_twice
 from masrel.ratings._sheet import (
     DELIMITERS,
     TEXT_FORMATS,
@@ -254,9 +254,14 @@ def groups_of(answer: Answer, sheet: Sheet, layout: Layout) -> Sheet:
     )
     frame = answer("SELECT * FROM cells_met ORDER BY first")
     _refuse_many(frame, _MAX_ROWS, "rows that differ")
-    groups = _rows(sheet, frame, places)
+    nothing = Column(np.zeros(len(frame), dtype=np.int64), [""])
+    cells = [nothing] * len(sheet.header)
+    for place in places:
+        cells[place] = column_of(sheet.name, sheet.header[place], frame[str(place)])
     groups = replace(
-        groups,
+        sheet,
+        columns=tuple(cells),
+        numbers=frame["first"].to_numpy(np.int64) + sheet.has_header,
         freq=frame["freq"].to_numpy(np.int64),
         is_simulated=sheet.is_simulated or bool(frame["is_simulated"].any()),
     )
@@ -269,26 +274,12 @@ def groups_of(answer: Answer, sheet: Sheet, layout: Layout) -> Sheet:
     is_unnamed = frame["is_unnamed"].to_numpy(bool)
     is_blank = is_unnamed & groups.hold([""] * len(sheet.header))
     if layout.item and (is_unnamed & ~is_blank).any():
-        first = frame["first"][is_unnamed & ~is_blank].iloc[0]
-        named(_rows_of(answer, sheet, [first]), "item", layout.item)
+        row = int(np.argmax(is_unnamed & ~is_blank))
+        item = answer(f"SELECT item FROM cells WHERE n = {frame['first'][row]}")
+        got = " ".join(item["item"][0].split(chr(31)))
+        only = layout.item[0] if len(layout.item) == 1 else None
+        raise groups.refuse("unnamed", groups.where(row), only, role="item", got=got)
     return groups.without(is_blank, "blank")
-
-
-def _rows(sheet: Sheet, frame: pd.DataFrame, places: Sequence[int]) -> Sheet:
-    # rows of the file, with the cells of some columns
-    nothing = Column(np.zeros(len(frame), dtype=np.int64), [""])
-    columns = [nothing] * len(sheet.header)
-    for place in places:
-        columns[place] = column_of(sheet.name, sheet.header[place], frame[str(place)])
-    numbers = frame["first"].to_numpy(np.int64) + sheet.has_header
-    return replace(sheet, columns=tuple(columns), numbers=numbers)
-
-
-def _rows_of(answer: Answer, sheet: Sheet, numbers: Iterable[int]) -> Sheet:
-    # some rows of the file, to be refused
-    chosen = ", ".join(map(str, numbers))
-    frame = answer(f"SELECT *, n AS first FROM cells WHERE n IN ({chosen}) ORDER BY n")
-    return _rows(sheet, frame, range(len(sheet.header)))
 
 
 def patterns(
@@ -332,15 +323,12 @@ def refuse_repeated(answer: Answer, sheet: Sheet, layout: Layout) -> None:
         return
     by_rater = ", rater" if layout.kind == "long" else ""
     twice = answer(
-        "SELECT min(n) AS one, max(n) AS other FROM cells WHERE NOT is_unnamed "
+        "SELECT min(n) AS one, max(n) AS other, min(item) AS item, min(rater) AS rater "
+        "FROM cells WHERE NOT is_unnamed "
         f"GROUP BY {_ITEM}{by_rater} HAVING count(*) > 1 ORDER BY one LIMIT 1"
     )
-    if len(twice):
-        two = replace(_rows_of(answer, sheet, twice.iloc[0]), freq=None)
-        item, rater = (
-            named(two, "item", layout.item).texts[0],
-            sheet.header[layout.raters[0]],
-        )
-        if layout.kind == "long":
-            rater = named(two, "rater", layout.raters).texts[0]
-        raise rated_twice(two, layout, np.arange(2), item, rater)
+    for one, other, item, rater in twice.to_numpy().tolist():
+        two = replace(sheet, numbers=np.array([one, other]) + sheet.has_header)
+        name = rater if by_rater else sheet.header[layout.raters[0]]
+        item = " ".join(item.split(chr(31)))
+        raise rated_twice(two, layout, np.arange(2), item, name)

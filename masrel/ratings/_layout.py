@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any, Literal
 
 import numpy as np
@@ -99,7 +100,14 @@ def find_layout(sheet: Sheet, options: ReadingOptions) -> Layout:
         for option in _NAMED
         if getattr(options, option)
     }
-    _refuse_two_roles(sheet, named)
+    for one, other in combinations(named, 2):
+        both = set(named[one]) & set(named[other])
+        if both and {one, other} not in _MAY_BE_BOTH:
+            raise sheet.refuse(
+                "two roles",
+                options=f"--{one}, --{other}",
+                column=sheet.header[min(both)],
+            )
     taken = set(named.get("ignore", ()))
     session = named.get("session") or _usual(sheet, "session", taken)
     by, clusters = named.get("by", ()), named.get("clusters", ())
@@ -131,31 +139,22 @@ def _columns_of(
             joined = [",".join(parts[:n]).strip() for n in range(len(parts), 0, -1)]
             name = next((name for name in joined if name in sheet.header), None)
             if name is None:
-                raise _no_column(sheet, f"--{option}", joined[-1])
-            places.append(sheet.header.index(name))
+                from difflib import get_close_matches  # loaded only for an error
+
+                near = get_close_matches(joined[-1], sheet.header, n=1)
+                raise sheet.refuse(
+                    "no column",
+                    option=f"--{option}",
+                    column=joined[-1],
+                    columns=f"but {listed(sheet.header, 12)}",
+                    hint=f"; did you mean {near[0]!r}?" if near else "",
+                )
+            place = sheet.header.index(name)
+            if place in places:
+                raise sheet.refuse("two roles", options=f"--{option}", column=name)
+            places.append(place)
             parts = parts[len(parts) - joined.index(name) :]
     return tuple(places)
-
-
-def _no_column(sheet: Sheet, option: str, name: str) -> RatingsError:
-    from difflib import get_close_matches  # loaded only for an error
-
-    near = get_close_matches(name, sheet.header, n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
-    facts = {"columns": f"but {listed(sheet.header, 12)}", "hint": hint}
-    return sheet.refuse("no column", option=option, column=name, **facts)
-
-
-def _refuse_two_roles(sheet: Sheet, named: dict[str, tuple[int, ...]]) -> None:
-    options_of: dict[int, list[str]] = {}
-    for option, places in named.items():
-        for place in places:
-            for other in options_of.setdefault(place, []):
-                if {other, option} not in _MAY_BE_BOTH:
-                    both = ", ".join(f"--{o}" for o in dict.fromkeys([other, option]))
-                    name = sheet.header[place]
-                    raise sheet.refuse("two roles", options=both, column=name)
-            options_of[place].append(option)
 
 
 def _usual(sheet: Sheet, role: str, taken: set[int]) -> tuple[int, ...]:
@@ -252,7 +251,7 @@ def together(columns: Sequence[Column]) -> tuple[Codes, list[tuple[str, ...]]]:
 
 
 def rated_twice(
-    sheet: Sheet, layout: Layout, rows: Codes, item: str, rater: str, hint: str = ""
+    sheet: Sheet, layout: Layout, rows: Codes, item: str, rater: str
 ) -> RatingsError:
     """Return the error of a rating that is there twice."""
     guess = ""
@@ -260,7 +259,7 @@ def rated_twice(
         guess = ", --rater and --grade name the columns of one row a rating"
     guess += ", --no-item says that no column names items" * layout.is_item_guessed
     where = " and ".join(sheet.where(row) for row in rows.tolist())
-    facts = {"item": item, "rater": rater, "hint": hint, "guess": guess}
+    facts = {"item": item, "rater": rater, "guess": guess}
     return sheet.refuse("twice", rows=where, **facts)
 
 
@@ -279,11 +278,10 @@ def without_second_header(sheet: Sheet) -> tuple[Sheet, list[Finding]]:
 
 
 def doubt_columns(
-    sheet: Sheet, layout: Layout, codes: Codes, scale: Scale, freq: Codes | None = None
+    sheet: Sheet, layout: Layout, codes: Codes, scale: Scale, freq: Codes
 ) -> list[Finding]:
     """Refuse or warn of columns of a wide table that are no raters."""
-    # codes (n_items, n_raters): places in the scale, -1 where missing; freq: how often
-    # each row is there, if not once
+    # codes (n_items, n_raters): places in the scale, -1 where missing; freq (n_items,)
     names = [sheet.header[place] for place in layout.raters]
     if len(layout.item) == 1 and len(names) == len(sheet.numbers) > 1:
         if set(sheet.columns[layout.item[0]].texts) == set(names):
@@ -379,7 +377,7 @@ def _unlike(codes: Codes, scale: Scale) -> set[int]:
 
 
 def _looks_counted(
-    names: Sequence[str], codes: Codes, scale: Scale, freq: Codes | None
+    names: Sequence[str], codes: Codes, scale: Scale, freq: Codes
 ) -> list[Finding]:
     # Whole numbers whose sum is the same in every row, or in most and nowhere above
     # what one of them is alone, as where all raters agree.

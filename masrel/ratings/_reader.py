@@ -56,6 +56,7 @@ from masrel.scales import Scale
 if TYPE_CHECKING:
     from masrel.ratings._large import Answer
 
+_SEPARATORS = {"tab": "\t", "\\t": "\t", "space": " ", "blanks": " ", "auto": None}
 _LARGE_TEXT = 256 << 20  # bytes of text from which it is read as a stream
 _MAX_DENSE = 20_000_000  # places, items by raters, that are always kept one by one
 _MAX_SPARSE = 8  # places a rating beyond which only counts are kept
@@ -230,7 +231,7 @@ def read_ratings(
         categories=None if categories is None else tuple(categories),
         missing_codes=tuple(missing_codes),
         decimal=decimal,
-        delimiter=delimiter or "auto",
+        delimiter=_SEPARATORS.get(delimiter or "auto", delimiter),
         encoding=encoding,
         sheet=sheet,
         transpose=transpose,
@@ -310,7 +311,7 @@ def _grouped(
 
     groups = _large.groups_of(answer, sheet, layout)
     cells, grades = graded(groups, layout.grades, options)
-    codes, freq = grades.codes[cells.codes], groups.n_rows
+    codes, freq = grades.codes[cells.codes], groups.freq
     n_cells = np.repeat(freq, len(layout.grades))
     n_missing, *counts = np.bincount(codes + 1, n_cells, len(grades.scale.grades) + 1)
     names, findings = [sheet.header[place] for place in layout.raters], []
@@ -397,7 +398,8 @@ def _file_of(
     return RatingsFile(
         parts=tuple(parts),
         scale=scale,
-        is_ordered=grades.is_ordered,
+        # more than by the alphabet
+        is_ordered=scale.name != "observed" or all(map(is_number, scale.grades)),
         read=record,
         sha256=sheet.sha256,
         warnings=findings,
@@ -424,7 +426,9 @@ def _rated(
         rater = Column(np.tile(np.arange(n_raters), n_rows), names)
         cells, grades = graded(sheet, layout.grades, options)
         table = grades.codes[cells.codes].reshape(n_rows, n_raters)
-        findings = findings + doubt_columns(sheet, layout, table, grades.scale)
+        findings = findings + doubt_columns(
+            sheet, layout, table, grades.scale, sheet.freq
+        )
         item = Column(row, [str(n) for n in range(1, n_rows + 1)])
         if layout.item:
             item = named(sheet, "item", layout.item)
@@ -450,7 +454,9 @@ def _rated(
                 items=tuple(items.texts),
                 raters=tuple(raters.texts),
                 ratings=_put_together(items, raters, of_part[3], scale),
-                clusters=_clusters(sheet, layout, items, of_part[4]),
+                clusters=()
+                if layout.clusters is None
+                else _clusters(sheet, layout.clusters, items, of_part[4]),
             )
         )
     n_repeated = len(row) - len(once[0])
@@ -516,9 +522,8 @@ def _one_each(
     if options.repeated == "error":
         first = int(np.argmax((np.bincount(of_key) > 1)[of_key]))
         second = first + 1 + int(np.argmax(of_key[first + 1 :] == of_key[first]))
-        hint = _what_tells_apart(sheet, layout, of_key, row)
         names = item.texts[items[first]], rater.texts[raters[first]]
-        raise rated_twice(sheet, layout, row[[first, second]], *names, hint)
+        raise rated_twice(sheet, layout, row[[first, second]], *names)
     if options.repeated == "mean":
         grade, scale = _means(sheet, grade, of_key, scale)
     # grades before missing ones, so that none is lost to an empty cell
@@ -526,16 +531,6 @@ def _one_each(
     order = np.lexsort((place, grade < 0, of_key))
     chosen = np.sort(order[np.unique(of_key[order], return_index=True)[1]])
     return [values[chosen] for values in (part, items, raters, grade, row)], scale
-
-
-def _what_tells_apart(sheet: Sheet, layout: Layout, of_key: Codes, row: Codes) -> str:
-    # the column whose cells differ wherever a rating is there twice
-    for place, column in enumerate(sheet.columns):
-        n = len(column.texts)
-        if place not in layout.used and 1 < n < len(sheet.numbers):
-            if len(np.unique(of_key * n + column.codes[row])) == len(of_key):
-                return f" (--by {sheet.header[place]!r} would)"
-    return ""
 
 
 def _means(
@@ -582,13 +577,9 @@ def _put_together(
     )
 
 
-def _clusters(
-    sheet: Sheet, layout: Layout, items: Column, row: Codes
-) -> tuple[str, ...]:
-    # the cluster of every item
-    if layout.clusters is None:
-        return ()
-    cluster = named(sheet, "cluster", (layout.clusters,))
+def _clusters(sheet: Sheet, place: int, items: Column, row: Codes) -> tuple[str, ...]:
+    # the cluster of every item, by the column at this place
+    cluster = named(sheet, "cluster", (place,))
     of_rating = cluster.codes[row]
     of_item = np.zeros(len(items.texts), dtype=np.int64)
     of_item[items.codes] = of_rating
@@ -600,7 +591,7 @@ def _clusters(
             "two clusters",
             rows=" and ".join(sheet.where(int(row[k])) for k in two),
             item=items.texts[item],
-            column=sheet.header[layout.clusters],
+            column=sheet.header[place],
             both=" and ".join(repr(cluster.texts[of_rating[k]]) for k in two),
         )
     return tuple(cluster.texts[code] for code in of_item.tolist())

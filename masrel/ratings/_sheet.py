@@ -78,19 +78,12 @@ class Column:
 
     @classmethod
     def of(cls, codes: Codes, cells: Iterable[str]) -> "Column":
-        """Take cells that differ, some of them by blanks or Unicode forms alone."""
-        if not _UNPLAIN.search("".join(cells)):  # as names and grades are, as a rule
-            return cls(codes, list(cells))
+        """Take cells that may differ by blanks or Unicode forms alone."""
         number: dict[str, int] = {}
-        places = [number.setdefault(plain(cell), len(number)) for cell in cells]
+        if _UNPLAIN.search("".join(cells)):  # names and grades have none, as a rule
+            cells = map(plain, cells)
+        places = [number.setdefault(cell, len(number)) for cell in cells]
         return cls(np.array(places, dtype=np.int64)[codes], list(number))
-
-    @classmethod
-    def of_cells(cls, cells: Iterable[str]) -> "Column":
-        """Take cells row by row."""
-        number: dict[str, int] = {}
-        codes = [number.setdefault(cell, len(number)) for cell in cells]
-        return cls.of(np.array(codes, dtype=np.int64), number)
 
     def rows(self, chosen: Any) -> "Column":
         """Return some of the rows, with the texts of these alone."""
@@ -145,7 +138,8 @@ class Sheet:
     columns: tuple[Column, ...] = field(repr=False)
     # (n_rows,): number of the record of every row in the file; the names are 0
     numbers: Codes = field(default_factory=lambda: np.arange(0), repr=False)
-    freq: Codes | None = field(default=None, repr=False)  # of every row, if not once
+    # (n_rows,): how many rows of the file each stands for
+    freq: Codes = field(default_factory=lambda: np.arange(0), repr=False)
     # format; delimiter, encoding or sheet; what codes are called
     facts: dict[str, Any] = field(default_factory=dict)
     dropped: dict[str, int] = field(default_factory=dict)  # why rows are left out
@@ -154,11 +148,6 @@ class Sheet:
     is_simulated: bool = False  # whether a comment at its head says so
     unit: str = "line"  # in which a record is
     line_of: Callable[[int], int]  # number of a record to the line that it is in
-
-    @property
-    def n_rows(self) -> Codes:
-        """How many rows of the file each row stands for."""
-        return np.ones_like(self.numbers) if self.freq is None else self.freq
 
     def at(self, number: int) -> str:
         """Return where a record, the names from 0, stands in the file."""
@@ -190,8 +179,8 @@ class Sheet:
             self,
             columns=tuple(column.rows(~rows) for column in self.columns),
             numbers=self.numbers[~rows],
-            freq=None if self.freq is None else self.freq[~rows],
-            dropped={**self.dropped, why: int(self.n_rows[rows].sum())},
+            freq=self.freq[~rows],
+            dropped={**self.dropped, why: int(self.freq[rows].sum())},
         )
 
 
@@ -202,13 +191,14 @@ def finished(sheet: Sheet, options: ReadingOptions) -> Sheet:
         cells = [[n, *c.cells()] for n, c in zip(header, columns, strict=True)]
         if options.transpose:
             cells = list(map(list, zip(*cells, strict=True)))
-            sheet = replace(sheet, is_transposed=True, unit="column", line_of=_next)
+            sheet = replace(sheet, is_transposed=True, unit="column")
+            sheet = replace(sheet, line_of=lambda number: number + 1)
         if options.no_header:
             header = [str(n) for n in range(1, len(cells) + 1)]
         else:
             header = [name for name, *_ in cells]
             cells = [rest for _, *rest in cells]
-        columns = list(map(Column.of_cells, cells))
+        columns = [Column.of(np.arange(len(rows)), rows) for rows in cells]
     header = [name.strip() for name in header]
     # a separator at the end of every line makes a column without name and cells
     if header and not header[-1] and set(columns[-1].texts) <= {""}:
@@ -225,6 +215,7 @@ def finished(sheet: Sheet, options: ReadingOptions) -> Sheet:
         header=tuple(header),
         columns=tuple(columns),
         numbers=np.arange(n_rows) + (not options.no_header),
+        freq=np.ones(n_rows, dtype=np.int64),
         has_header=not options.no_header,
     )
     if header:
@@ -233,10 +224,6 @@ def finished(sheet: Sheet, options: ReadingOptions) -> Sheet:
         if sheet.has_header and again.any():
             raise sheet.refuse("names again", sheet.where(int(np.argmax(again))))
     return sheet
-
-
-def _next(number: int) -> int:
-    return number + 1
 
 
 # ---- bytes ----
@@ -331,7 +318,7 @@ def read_text(
 ) -> Sheet:
     """Take a text apart: its comments, its separator, its records."""
     declared = re.match(r'"?sep=(.)"?(\r\n|\n|\r)', text, re.IGNORECASE)
-    delimiter = options.mark() or (declared.group(1) if declared else None)
+    delimiter = options.delimiter or (declared.group(1) if declared else None)
     start = declared.end() if declared else 0
     comments, start = _comments(name, text, start, delimiter)
     text, n_before = text[start:], text.count("\n", 0, start)

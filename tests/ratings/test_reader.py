@@ -232,7 +232,7 @@ def test_groups_and_sessions_are_parts(
         (
             "day,item,rater,grade\n1,A,K,1\n1,A,L,1\n2,A,K,2\n",
             {},
-            "--by 'day' would",
+            "line 2 and line 4: 'K' graded 'A'",
         ),
         (TWICE.replace("1", "a"), {"repeated": "mean"}, "--repeated mean"),
         (TWICE, {"repeated": "mean", "categories": ["1", "2", "3"]}, "declared scale"),
