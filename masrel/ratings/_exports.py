@@ -1,6 +1,6 @@
 """Files of other programs as sheets: workbooks, Parquet, JSON, SPSS, annotation tools.
 
-An annotation tool has a function from a record to what was `_Given`: who gave which
+An annotation tool has a function from a record to its `_Annotation`s: who gave which
 item which category. Only categories of whole documents are read; several of them at
 once, spans and relations are refused.
 """
@@ -287,7 +287,7 @@ def _objects(name: str, values: list[Any]) -> pd.DataFrame:
 # ---- annotation tools ----
 
 
-class _Given(NamedTuple):
+class _Annotation(NamedTuple):
     """What an annotator gave an item."""
 
     item: Any
@@ -322,10 +322,12 @@ def _export(
     if source not in _TOOLS:
         raise ParameterError(f"--from: needed {', '.join(_TOOLS)}, got {source!r}")
     try:
-        given = [g for who, record in records for g in _TOOLS[source](who, record)]
+        annotations = [
+            g for who, record in records for g in _TOOLS[source](who, record)
+        ]
     except (TypeError, AttributeError, KeyError) as error:
         raise refusal(name, "shape", source=source, error=error) from error
-    fields = list(dict.fromkeys(field for g in given for field in g.grades))
+    fields = list(dict.fromkeys(field for g in annotations for field in g.grades))
     if not fields:
         raise refusal(name, "no fields")
     of = fields[0] if chosen is None else chosen
@@ -335,7 +337,7 @@ def _export(
     if chosen in ("item", "rater"):
         raise refusal(name, "field's name", chosen=chosen)
     rows, dropped = [], Counter[str]()
-    for who in given:
+    for who in annotations:
         # an answer of Prodigy is to one label; others ask for all fields at once
         if who.why or (source == "prodigy" and of not in who.grades):
             dropped[who.why or "of other labels"] += 1
@@ -351,7 +353,7 @@ def _export(
     return frame, {"format": f"{source} export", "field": of}, dict(dropped)
 
 
-def _row(name: str, who: _Given, field: str) -> tuple[Any, Any, Any, str | None]:
+def _row(name: str, who: _Annotation, field: str) -> tuple[Any, Any, Any, str | None]:
     # item, rater, the one grade, and the text
     grade = who.grades.get(field)
     labels = grade if isinstance(grade, list) else [grade]
@@ -369,11 +371,11 @@ def _row(name: str, who: _Given, field: str) -> tuple[Any, Any, Any, str | None]
     return who.item, who.rater, labels[0] if labels else None, text
 
 
-def _label_studio(_: str, task: dict[str, Any]) -> Iterator[_Given]:
+def _label_studio(_: str, task: dict[str, Any]) -> Iterator[_Annotation]:
     if "annotator" in task and "annotations" not in task:
         # its JSON-MIN has one object an annotation, data and results side by side
         grades = {key: _labels(v) for key, v in task.items() if key not in _ABOUT}
-        yield _Given(task.get("id"), task["annotator"], grades, task.get("text"))
+        yield _Annotation(task.get("id"), task["annotator"], grades, task.get("text"))
         return
     data = task.get("data") or {}
     only = next(iter(data.values())) if len(data) == 1 else None
@@ -389,7 +391,7 @@ def _label_studio(_: str, task: dict[str, Any]) -> Iterator[_Given]:
                 of += _labels(value)
         is_skipped = annotation.get("was_cancelled") or annotation.get("skipped")
         why = "skipped" if is_skipped else ""
-        yield _Given(task.get("id"), who, grades, data.get("text", only), why)
+        yield _Annotation(task.get("id"), who, grades, data.get("text", only), why)
 
 
 # The keys of Label Studio's results that are categories, and what its JSON-MIN has
@@ -414,19 +416,21 @@ def _labels(value: Any) -> Any:
     return ["/".join(map(str, x)) if isinstance(x, list) else x for x in several]
 
 
-def _doccano(who: str, example: dict[str, Any]) -> Iterator[_Given]:
+def _doccano(who: str, example: dict[str, Any]) -> Iterator[_Annotation]:
     rater = example.get("username", example.get("user", who))
     text = example.get("text", example.get("filename"))
     keys = {"label", "labels", "cats"} & example.keys()
     if keys:
         grades = {key: example[key] for key in sorted(keys)}
-        yield _Given(example.get("id"), rater, grades, text)
+        yield _Annotation(example.get("id"), rater, grades, text)
     for label in example.get("annotations") or ():  # old: labels, users by number
         grade = label if "start_offset" in label else label.get("label")
-        yield _Given(example.get("id"), label.get("user"), {"annotations": grade}, text)
+        yield _Annotation(
+            example.get("id"), label.get("user"), {"annotations": grade}, text
+        )
 
 
-def _prodigy(who: str, task: dict[str, Any]) -> Iterator[_Given]:
+def _prodigy(who: str, task: dict[str, Any]) -> Iterator[_Annotation]:
     answer, why = task.get("answer"), ""
     is_choice = "accept" in task or "options" in task
     if answer == "ignore" or (is_choice and answer != "accept"):
@@ -439,18 +443,18 @@ def _prodigy(who: str, task: dict[str, Any]) -> Iterator[_Given]:
     else:
         grades = {"answer": regions or answer}
     rater = task.get("_annotator_id") or task.get("_session_id") or who
-    yield _Given(task.get("_input_hash"), rater, grades, task.get("text"), why)
+    yield _Annotation(task.get("_input_hash"), rater, grades, task.get("text"), why)
 
 
-def _inception(_: str, row: dict[str, Any]) -> Iterator[_Given]:
+def _inception(_: str, row: dict[str, Any]) -> Iterator[_Annotation]:
     if other := row.keys() - {"doc", "user", "label"}:
         raise KeyError(f"columns of spans or chains, {', '.join(map(str, other))}")
     is_other = row["user"] in ("CURATION_USER", "INITIAL_CAS")
     why = "of the curator or the source" if is_other else ""
-    yield _Given(row["doc"], row["user"], {"label": row["label"]}, why=why)
+    yield _Annotation(row["doc"], row["user"], {"label": row["label"]}, why=why)
 
 
-_TOOLS: dict[str, Callable[[str, Any], Iterator[_Given]]] = {
+_TOOLS: dict[str, Callable[[str, Any], Iterator[_Annotation]]] = {
     "label-studio": _label_studio,
     "doccano": _doccano,
     "prodigy": _prodigy,
