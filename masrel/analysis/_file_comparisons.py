@@ -12,17 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from masrel.agreement import CodedRatings, Coefficient, Significance, holm
+from masrel.agreement import CodedRatings, Coefficient, Significance, code_ratings, holm
 from masrel.analysis._file_estimates import (
     Answer,
     EstimateOptions,
     Row,
-    coded_part,
     note,
     on_grades,
     parts_of,
+    placed,
 )
-from masrel.errors import MasrelError, ParameterError, RatingsError
+from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Estimate, as_document
 from masrel.ratings import RatingsFile, RatingsPart
 
@@ -51,7 +51,8 @@ class _Groups:
 
 def _groups_of(parts: Sequence[RatingsPart]) -> _Groups:
     """Return groups with the same items in the same rows; others have their own."""
-    coded = [coded_part(part, "--compare") for part in parts]
+    with placed("--compare"):
+        coded = [code_ratings(part.ratings) for part in parts]
     rated = [_rated_rows(*both) for both in zip(parts, coded, strict=True)]
     items = [frozenset(rows) for rows in rated]
     n_shared = len(frozenset.intersection(*items))
@@ -150,11 +151,9 @@ def _differences(
             "weights": options.weights_of(entry),
             "clusters": groups.clusters,
         }
-        try:
+        with placed("--compare", f"{first} and {second}"):
             estimate = difference(entry, *ratings, level=options.level, **of_pair)
             test = difference_test(entry, *ratings, **of_pair)
-        except MasrelError as error:
-            raise type(error)(f"--compare: {first} and {second}: {error}") from error
         row: Row = {
             "first": first,
             "second": second,
@@ -216,7 +215,7 @@ def equality_rows(
 ) -> Answer:
     """Return the tests that all groups have the same coefficient, for each of them."""
     groups = _groups_of(file.parts)
-    rows, shown, notes, undefined = [], [], [], []
+    rows, shown, notes = [], [], []
     for entry in entries:
         if entry.formula is None:  # the differences say it
             continue
@@ -238,14 +237,11 @@ def equality_rows(
             )
             shown.append({**rows[-1], "title": options.title(entry), "test": test})
             notes.append(note(test))
-            if result.reason is not None:
-                why = note("undefined", of=entry.title, reason=result.reason)
-                undefined.append(why)
     return Answer(
         name="equality",
         rows=rows,
         shown=shown,
-        notes=(*dict.fromkeys(notes), *undefined),
+        notes=tuple(dict.fromkeys(notes)),
     )
 
 

@@ -3,11 +3,13 @@
 In: a `RatingsFile` and how estimates are made. Out: a row for every coefficient.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
-from masrel.errors import MasrelError, ParameterError, RatingsError
+from masrel._input import refuse
+from masrel.errors import MasrelError, ParameterError
 from masrel.estimates import Estimate, Interval, Target
 
 if TYPE_CHECKING:
@@ -133,7 +135,7 @@ class Questions:
         other = f"--{by_items[0].replace('_', '-')}" if by_items else None
         target = f"--target {options.target}"
         of_raters = options.target in ("raters", "both")
-        refusals = (
+        refuse(
             (
                 self.reference is not None and not self.diagnose,
                 "--reference: belongs to --diagnose, got it alone",
@@ -172,9 +174,6 @@ class Questions:
                 f"--target items, got {target}",
             ),
         )
-        for is_wrong, message in refusals:
-            if is_wrong:
-                raise ParameterError(message)
         if self.compare or clusters is not None:
             return replace(options, target="items")
         if self.limits_of_agreement and options.weights == "identity":
@@ -237,8 +236,6 @@ class Answer:
 
 
 _TEXTS = {
-    "note": "{of}: {reason}.",
-    "undefined": "{of}: undefined: {reason}.",
     # test and retest
     "sessions": "{group}Each rater's grades of {first} and of {second}.",
     "left_out": "{group}Left out: {names}.",
@@ -336,14 +333,14 @@ def parts_of(file: "RatingsFile") -> "Iterator[tuple[RatingsPart, str, Row]]":
         yield part, ": ".join(names.values()), keys
 
 
-def coded_part(part: "RatingsPart", option: str) -> "CodedRatings":
-    """Return the ratings of a part, of which it must be known who rated what."""
-    from masrel.agreement import code_ratings
-
+@contextmanager
+def placed(option: str, place: str | None = "") -> Iterator[None]:
+    """Say of a refusal which option it is of, and which part of the file."""
     try:
-        return code_ratings(part.ratings)
-    except RatingsError as error:
-        raise RatingsError(f"{option}: {error}") from error
+        yield
+    except MasrelError as error:
+        where = f"{option}: {place}" if place else option
+        raise type(error)(f"{where}: {error}") from error
 
 
 def heads_of(file: "RatingsFile", *others: str) -> dict[str, str]:
@@ -362,8 +359,7 @@ def agreement(file: "RatingsFile", options: EstimateOptions) -> Answer:
     for part, group, _ in parts_of(file):
         rows, refusals = [], []
         of_part = replace(options, clusters=part.clusters)
-        n_raters = len(part.raters) or file.read["n_raters"]
-        for entry in entries(options, n_raters, file):
+        for entry in entries(options, file, [part]):
             ratings = part.ratings if entry.formula is None else part.counted
             ratings = on_grades(ratings, entry, file)
             row, refusal = estimate_row(
@@ -383,7 +379,7 @@ def agreement(file: "RatingsFile", options: EstimateOptions) -> Answer:
 
 
 def entries(
-    options: EstimateOptions, n_raters: int, file: "RatingsFile"
+    options: EstimateOptions, file: "RatingsFile", parts: "Sequence[RatingsPart]"
 ) -> list["Coefficient"]:
     """Return the coefficients that are estimated, or refuse those that do not fit."""
     from masrel.agreement import COEFFICIENTS, coefficient
@@ -394,6 +390,7 @@ def entries(
             f"--coefficients {','.join(options.names)}"
         )
     every = options.takes_all
+    n_raters = max(len(part.raters) for part in parts) or file.read["n_raters"]
     chosen = COEFFICIENTS.values() if every else map(coefficient, options.names)
     fitting = [
         of.by_metric(options.metric) if of.name == _OF_METRIC else of for of in chosen

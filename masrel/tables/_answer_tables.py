@@ -191,11 +191,18 @@ def answer_table(
         in_units=tuple(at for at, row in enumerate(estimates) if _is_in_units(row)),
         notes=(
             *notes,
-            *row_notes([row for row in shown if "texts" in row], by),
+            *row_notes([_with_texts(row) for row in shown if "title" in row], by),
             *after,
         ),
         data=data,
     )
+
+
+def _with_texts(row: Row) -> Row:
+    # as notes on rows are made of
+    reason = row.get("reason")
+    texts = [] if reason is None else [f"undefined: {reason}"]
+    return {"group": "", "texts": texts, **row}
 
 
 def _columns(

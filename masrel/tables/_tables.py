@@ -112,7 +112,9 @@ def table_of(
         for column in columns
     ]
     cells = [[row.get(column.key) for column in shown] for row in rows]
-    cells = [[_joined(c) if isinstance(c, list) else c for c in row] for row in cells]
+    cells = [
+        [_joined(c) if isinstance(c, list | tuple) else c for c in row] for row in cells
+    ]
     return Table(
         name=name,
         caption=caption,
