@@ -193,11 +193,10 @@ class ClaimAudit:
 
 def _agreed_text(claim: Claim, readings: list[Reading]) -> str:
     # on how many items raters agree, where all readings say it
-    agreed = [reading.n_agreed for reading in readings]
-    if not all(agreed):
+    if not all(reading.n_agreed for reading in readings):
         return ""
-    ends = sorted({min(map(min, agreed)), max(map(max, agreed))})
-    shown = " to ".join(map(str, ends))
+    agreed = [n for reading in readings for n in reading.n_agreed]
+    shown = " to ".join(map(str, sorted({min(agreed), max(agreed)})))
     return f"; in them the raters agree on {shown} of {claim.n_items}"
 
 

@@ -219,8 +219,8 @@ def _is_grid(arguments: dict[str, Any], ranges: dict[str, Any]) -> bool:
     several = any(len(values) > 1 for values in ranges.values())
     is_known = {"n_items", "n_raters"} <= ranges.keys()
     has_chance = not arguments.keys().isdisjoint({"power", "assurance"})
-    is_rows = isinstance(arguments.get("prevalences", [0.0])[0], list)
-    is_rows = is_rows and arguments.get("model") != "table"
+    is_table = arguments.get("model") == "table"
+    is_rows = isinstance(arguments.get("prevalences", [0.0])[0], list) and not is_table
     is_shared = not arguments.keys().isdisjoint({"executor", "scheduler"})
     return several or is_rows or (is_known and has_chance) or is_shared
 
@@ -248,6 +248,9 @@ def _with_pilot(arguments: dict[str, Any]) -> dict[str, Any]:
     click.echo(f"pilot {path}: {made.estimate}", err=True)
     had: dict[str, Any] = {"value": [made.estimate.value]}
     if not arguments["coefficient"].startswith("icc"):
-        had |= {"categories": made.categories, "prevalences": [*made.prevalences]}
-        had["p_missing"] = made.p_missing
+        had |= {
+            "categories": made.categories,
+            "prevalences": [*made.prevalences],
+            "p_missing": made.p_missing,
+        }
     return {**had, **arguments}

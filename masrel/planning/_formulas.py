@@ -76,10 +76,9 @@ def _z(design: Design) -> float:
 def _half(design: Design) -> float:
     """Return the half-width that is needed, or the distance of the nearest limit."""
     study = design.study
-    if study.half_width is not None:
-        return study.half_width
     limits = [x for x in (study.null, study.lower, study.upper) if x is not None]
-    return max(min(abs(design.value - x) for x in limits), 1e-6)
+    nearest = min((abs(design.value - x) for x in limits), default=1.0)
+    return study.half_width or max(nearest, 1e-6)
 
 
 # -- Wald intervals -------------------------------------------------------------------
@@ -151,16 +150,15 @@ def _fit_items(design: Design) -> float:
 
 def _fit_numbers(design: Design) -> dict[str, float]:
     """Return the exact power, or its mean over a prior of the true value."""
-    study = design.study
-    if study.null is None or (design.n_raters, len(design.model.scale)) != (2, 2):
+    null, prior = design.study.null, design.study.prior
+    if null is None or (design.n_raters, len(design.model.scale)) != (2, 2):
         return {}
-    if study.prior is None:
-        return {"power": _fit_power(design, study.null)}
+    if prior is None:
+        return {"power": _fit_power(design, null)}
     from scipy.stats import beta  # slow to load
 
-    null = study.null
     # O'Hagan, Stevens and Campbell (2005)
-    power = beta(*study.prior).expect(
+    power = beta(*prior).expect(
         lambda value: _fit_power(design.at_value(value), null), epsrel=1e-9
     )
     return {"power": float(power)}

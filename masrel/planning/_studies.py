@@ -61,12 +61,11 @@ def shown(design: Design, progress: Progress | None = None) -> Shown:
         return _drawn(design, progress)
     if design.is_icc and design.study.coefficient != AGREEMENT:
         return _exact_icc(design), {}, 0
-    listed = f"{design.n_tables:g}" if design.n_tables < math.inf else "no list"
     refuse(
         (
             design.n_tables > 20 * MAX_TABLES,
-            'method: "exact" sums over all studies that differ, and there is '
-            f'{listed} of them; "simulation" needs no list',
+            'method: "exact" sums over all studies that differ, of which there are '
+            f'{design.n_tables:g}; "simulation" draws some of them',
         )
     )
     total = np.zeros((3, len(NUMBERS)))
@@ -77,11 +76,8 @@ def shown(design: Design, progress: Progress | None = None) -> Shown:
 
 def _drawn(design: Design, progress: Progress | None) -> Shown:
     # until the Monte Carlo errors are small, or as many as were asked for
-    is_resampled, n_studies = (
-        design.study.interval == "bootstrap",
-        design.study.n_studies,
-    )
-    of_chosen = _RESAMPLED_TASK if is_resampled else _CHOSEN_TASK
+    n_studies, interval = design.study.n_studies, design.study.interval
+    of_chosen = _RESAMPLED_TASK if interval == "bootstrap" else _CHOSEN_TASK
     size, factor = (of_chosen, 2.0) if design.is_chosen else (_TASK, 1.0)
     total, task, n_tasks = np.zeros((3, len(NUMBERS))), 0, 1
     while task < n_tasks:  # each has its own seed
@@ -138,11 +134,8 @@ def outcomes_of(
     if not design.is_chosen:
         weight = np.ones(codes.shape[:2]) if freq is None else freq.astype(np.float64)
         return _wald(design, weight, codes)
-    if freq is None:
-        return np.array([_chosen(design, study) for study in codes])
-    distinct, place = np.unique(freq, axis=0, return_inverse=True)
-    chosen = [_chosen(design, codes.repeat(row, axis=0)) for row in distinct]
-    return np.array(chosen)[place.ravel()]
+    studies = codes if freq is None else [codes.repeat(row, axis=0) for row in freq]
+    return np.array([_chosen(design, study) for study in studies])
 
 
 @np.errstate(invalid="ignore")  # 0/0 where a study has no coefficient

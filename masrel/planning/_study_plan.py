@@ -211,6 +211,16 @@ _RULES: dict[str, _Rule] = {
     **dict.fromkeys(("lower", "upper", "null", "value"), _ON_SCALE),
     **dict.fromkeys(("p_missing", "rater_share"), _SHARE),
     "max_cost": ("a number above 0", Real, lambda x: x > 0.0),
+    "prices": (
+        "three numbers of at least 0",
+        Sequence,
+        lambda x: len(x) == 3 and all(0.0 <= price < math.inf for price in x),
+    ),
+    "prior": (
+        "two numbers above 0",
+        Sequence,
+        lambda x: len(x) == 2 and all(0.0 < part < math.inf for part in x),
+    ),
     "n_items": _whole(2),
     **dict.fromkeys(("n_raters", "n_studies"), _whole(1)),
     "sides": _one_of(1, 2),
@@ -224,11 +234,8 @@ _ALWAYS = ("level", "p_missing", "rater_share", "sides", "target", "interval", "
 
 def _check_together(study: Study) -> None:
     # what is in range by itself, and does not fit the rest
-    target, interval, prior = study.target, study.interval, study.prior or (1.0, 1.0)
+    target, interval = study.target, study.interval
     is_of_items = interval in _OF_ITEMS_ALONE and target != "items"
-    prices = (0.0, 0.0, 1.0) if study.prices is None else study.prices
-    are_prices = len(prices) == 3 and all(0.0 <= price < math.inf for price in prices)
-    are_two = len(prior) == 2 and all(0.0 < part < math.inf for part in prior)
     refuse(
         (
             study.sides == 1 and study.level <= 0.5,
@@ -239,8 +246,6 @@ def _check_together(study: Study) -> None:
             f'interval: "{interval}" is not of target "{target}", where "auto" and '
             '"jackknife" are',
         ),
-        (not are_prices, f"prices: needs three of at least 0, got {prices}"),
-        (not are_two, f"prior: needs two numbers above 0, got {prior}"),
         (
             study.prior is not None and study.method != "goodness-of-fit",
             f'prior: is of method "goodness-of-fit" alone, got "{study.method}"',
