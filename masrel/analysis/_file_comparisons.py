@@ -31,8 +31,8 @@ FLEISS = "Fleiss' weighted χ²"
 DONNER = "Donner's goodness of fit"
 HOTELLING = "Hotelling's T² as F"
 
+# coefficients that are the intraclass kappa of two raters and two categories
 _INTRACLASS = ("fleiss_kappa", "scott_pi")
-"""Coefficients that are the intraclass kappa of two raters and two categories."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -31,11 +31,9 @@ USUAL = ("percent_agreement", "fleiss_kappa")
 OF_MEASUREMENTS = ("icc_a1", "lin_ccc")
 """The same where limits of agreement show that grades are measurements."""
 
+# The coefficient that has metrics, and those of each rater's grades of two sessions
 _OF_METRIC = "krippendorff_alpha"
-"""The coefficient that has metrics."""
-
 _OF_SESSIONS = ("stratified_kappa", "pooled_kappa")
-"""Coefficients of each rater's grades of two sessions."""
 
 _SURE = 0.95  # probability with which the true value reaches the word for it
 _SURE_TWO_SIDED = 0.90  # the level of which the lower end alone is as sure

@@ -70,8 +70,8 @@ GROUPS = {
 VERBS = {verb: text for verbs in GROUPS.values() for verb, text in verbs.items()}
 """Verb to summary. The verb ``x`` is the command ``x`` of the module ``x``."""
 
+# verbs that need no study; the modules of the others are in the laboratory
 _STATISTICS = ("agree", "audit", "latent", "plan")
-"""Verbs that need no study; the modules of the others are in the laboratory."""
 
 
 class _Verbs(click.Group):

@@ -210,20 +210,14 @@ def write_json(document: dict[str, object], file: Path) -> None:
     if "format" not in document:
         document = {"format": f"masrel {_verb()} {_FORMAT}", **document}
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
-    if file == STDOUT:
-        # escapes of JSON where the screen cannot show the letters
-        click.echo(text if _is_encodable(text) else json.dumps(document, indent=1))
+    if file != STDOUT:
+        write_file(file, text + "\n")
         return
-    write_file(file, text + "\n")
-
-
-def _is_encodable(text: str) -> bool:
-    # whether stdout can write a text as it is
     try:
         text.encode(sys.stdout.encoding or "utf-8")
-    except UnicodeEncodeError:
-        return False
-    return True
+    except UnicodeEncodeError:  # escapes of JSON for letters that it cannot show
+        text = json.dumps(document, indent=1)
+    click.echo(text)
 
 
 def _verb() -> str:

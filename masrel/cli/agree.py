@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from masrel.plots._drawn_values import Content, Drawn
     from masrel.ratings import RatingsFile
 
+# of notes where there is no terminal, and the largest in one
 _WIDTHS = (88, 100)
-"""Width of notes where there is no terminal, and the largest in one."""
 
 _DRAWERS = {
     "diagnosis_pairs": "masrel.plots._rater_pairs:rater_figure",

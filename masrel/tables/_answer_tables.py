@@ -122,9 +122,8 @@ _COLUMNS: dict[str, tuple[Column, ...]] = {
     ),
 }
 
+# columns of diagnoses that a note explains, which has their name
 _EXPLAINED = ("change", "standard_error", "agreement")
-"""Columns of diagnoses that a note explains, which has their name."""
-
 
 _OF_ESTIMATES = (
     *_COEFFICIENT,

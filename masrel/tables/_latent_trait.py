@@ -19,8 +19,8 @@ _COLUMNS = (
     Column(key="other_high", heading="High, other prior", digits=3),
 )
 
+# A p-value of the predictive check below this, or above 1 less this, is noted.
 _UNLIKELY = 0.01
-"""A p-value of the predictive check below this, or above 1 less this, is noted."""
 
 
 def latent_table(

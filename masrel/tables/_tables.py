@@ -27,6 +27,7 @@ ABSENT = "–"
 UNDEFINED = "undefined"
 """What is shown for ``nan``."""
 
+# What tables and figures of simulated data carry
 SIMULATED = "SIMULATED DATA"
 SIMULATED_DEVICE = "SIMULATED DEVICE"
 
@@ -38,8 +39,6 @@ def tag_of(data: str) -> str:
     label = SIMULATED_DEVICE if "simulated device" in data else SIMULATED
     return f"{label.capitalize()}."
 
-
-"""What tables and figures of simulated data carry."""
 
 Value = str | int | float | None
 """What a cell holds: text, a number, or nothing."""
