@@ -174,20 +174,22 @@ def _refuse_doubtful(
     number: dict[str, Decimal | None], options: ReadingOptions, refuse: _Refuse
 ) -> None:
     # what may be no grade, or one of two
-    likely = [text for text in number if normal_form(text) in _MISSING_FORMS]
     commas = [text for text in number if _DECIMAL_COMMA.fullmatch(text)]
     rest = [text for text in number if text not in commas and not is_number(text)]
     plus = [t for t, value in number.items() if t[0] == "+" and value is not None]
     others = [t for t, value in number.items() if t[0].isdigit() and value]
     others += [t for t in number if t[-1] == "+" and f"+{t[:-1]}" in plus]
-    if likely:
-        raise refuse("looks missing", likely, codes=quoted(likely))
-    if broken := [text for text in number if "\n" in text or "\r" in text]:
-        raise refuse("broken", broken[:1])
-    if commas and not rest and options.decimal == ".":
-        raise refuse("decimal comma", commas)
-    if plus and others:
-        raise refuse("plus", plus, other=others[0], grade=f"{plus[0][1:]}+")
+    is_comma = not rest and options.decimal == "."
+    doubts = {
+        "looks missing": [t for t in number if normal_form(t) in _MISSING_FORMS],
+        "broken": [t for t in number if "\n" in t or "\r" in t][:1],
+        "decimal comma": commas if is_comma else [],
+        "plus": plus if others else [],
+    }
+    for code, texts in doubts.items():
+        if texts:
+            facts = {"codes": quoted(texts), "grade": f"{texts[0][1:]}+"}
+            raise refuse(code, texts, other="".join(others[:1]), **facts)
 
 
 def _observed(
@@ -214,8 +216,11 @@ def _observed(
 def normal_form(text: str) -> str:
     """Return what texts have in common that a reader takes for the same."""
     form = text.casefold()
-    if form.isascii() and form.isdigit():
-        return form.lstrip("0") or "0"
+    if form.isascii() and form.isalnum():  # as names of items are
+        if form.isdigit():
+            return form.lstrip("0") or "0"
+        if form[0].isalpha():
+            return form
     if not form.isascii():
         form = _INVISIBLE.sub("", unicodedata.normalize("NFKC", form))
         form = form.casefold().translate(_LOOK_ALIKE)
@@ -233,12 +238,7 @@ _MISSING_FORMS = frozenset(["", *map(normal_form, _LOOKS_MISSING.split())])
 
 def spelled_alike(texts: Sequence[str]) -> list[list[str]]:
     """Return the texts, all different, that differ by spelling alone, together."""
-    joined = "".join(texts)
-    is_plain = joined.isascii() and joined.isalnum()
-    if is_plain and (joined.isdigit() or not any(text[0].isdigit() for text in texts)):
-        forms = [text.lower().lstrip("0") for text in texts]  # as names of items are
-    else:
-        forms = list(map(normal_form, texts))
+    forms = list(map(normal_form, texts))
     if len(set(forms)) == len(forms):
         return []
     groups: dict[str, list[str]] = {}

@@ -286,24 +286,29 @@ def doubt_columns(
     if len(layout.item) == 1 and len(names) == len(sheet.numbers) > 1:
         if set(sheet.columns[layout.item[0]].texts) == set(names):
             raise sheet.refuse("contingency")
-    findings = _first_line(sheet, layout, names, scale)
-    findings += _first_column(sheet, layout, scale)
-    odd = _unlike(codes, scale) if len(names) <= _MAX_COMPARED else set()
+    findings = []
+    if sheet.has_header and not sheet.is_transposed:
+        findings = _first_line(sheet, layout, names, scale)
+    if layout.is_item_guessed:  # it may be a rater
+        findings += _first_column(sheet, layout.item[0], scale)
+    odd = _unlike(codes, scale) if 1 < len(names) <= _MAX_COMPARED else set()
     named = {k for k, name in enumerate(names) if _NO_RATER.fullmatch(name)}
-    if odd & named and len(names) > 1:
+    if odd & named:
         doubtful = odd | named if len(odd) < len(names) else odd & named
         wrong = [names[k] for k in sorted(doubtful)]
         columns = ", ".join(map(repr, wrong))
         raise sheet.refuse("no raters", columns=columns, names=quoted(wrong))
-    for k in sorted(named):
-        findings.append(
-            Finding("named rater", column=names[k], name=quoted([names[k]]))
-        )
+    findings += [
+        Finding("named rater", column=names[k], name=quoted([names[k]]))
+        for k in sorted(named)
+    ]
     alone = [names[k] for k in sorted(odd - named)][:_SHOWN]
-    if alone and len(names) > 1:
+    if alone:
         findings.append(Finding("apart", columns=listed(alone), names=quoted(alone)))
-    findings += _looks_counted(names, codes, scale, freq)
-    findings += _second_header(sheet, codes, scale)
+    if all(map(is_number, scale.grades)):
+        findings += _looks_counted(names, codes, scale, freq)
+    elif sheet.has_header and len(codes) > 3:
+        findings += _second_header(sheet, codes, scale)
     unrated = np.flatnonzero((codes < 0).all(axis=0))[:_SHOWN]
     return findings + [Finding("no grade of", rater=names[k]) for k in unrated]
 
@@ -312,8 +317,6 @@ def _first_line(
     sheet: Sheet, layout: Layout, names: Sequence[str], scale: Scale
 ) -> list[Finding]:
     # names that are grades, and more names than rows
-    if not sheet.has_header or sheet.is_transposed:
-        return []
     grades = set(map(normal_form, scale.grades))
     are_numbers = all(map(is_number, scale.grades))
     n_grades = sum(
@@ -338,11 +341,8 @@ def _first_line(
     return findings
 
 
-def _first_column(sheet: Sheet, layout: Layout, scale: Scale) -> list[Finding]:
-    # The first column is the item because nothing else was: it may be a rater.
-    if not layout.is_item_guessed:
-        return []
-    place = layout.item[0]
+def _first_column(sheet: Sheet, place: int, scale: Scale) -> list[Finding]:
+    # a column that is the item because nothing else was
     name, texts = sheet.header[place], sheet.columns[place].texts
     numbers = {float(grade) for grade in scale.grades if is_number(grade)}
     low, high = min(numbers, default=0.0), max(numbers, default=0.0) + 1
@@ -381,10 +381,8 @@ def _looks_counted(
 ) -> list[Finding]:
     # Whole numbers whose sum is the same in every row, or in most and nowhere above
     # what one of them is alone, as where all raters agree.
-    if not all(map(is_number, scale.grades)) or len(codes) < 2 or codes.shape[1] < 2:
-        return []
     values = np.array([*scale.values, 0.0])  # a missing count, at -1, is 0
-    if (values < 0).any() or (values % 1 != 0).any():
+    if min(codes.shape) < 2 or (values < 0).any() or (values % 1 != 0).any():
         return []
     sums = values[codes].sum(axis=1)
     total = sums.max()
@@ -400,14 +398,10 @@ def _looks_counted(
 
 def _second_header(sheet: Sheet, codes: Codes, scale: Scale) -> list[Finding]:
     # a first row whose grades occur nowhere else, while those of the others do
-    if len(codes) < 4 or not sheet.has_header or (codes[0] < 0).all():
-        return []
-    if all(map(is_number, scale.grades)):
-        return []
     rest = np.bincount(codes[1:].ravel() + 1, minlength=len(scale.grades) + 1)[1:]
     n_met = np.count_nonzero(rest) + bool((codes[1:] < 0).any())
     is_known = (rest[codes[0][codes[0] >= 0]] > 0).any()
-    if is_known or n_met > codes[1:].size / 2:
+    if is_known or (codes[0] < 0).all() or n_met > codes[1:].size / 2:
         return []
     return [Finding("second header", where=sheet.where(0))]
 

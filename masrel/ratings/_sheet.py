@@ -49,6 +49,7 @@ _BOMS = (
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
 _PACKED = {b"\x1f\x8b": ".gz", b"\xfd7zXZ\0": ".xz"}  # how packed files begin
+_OPENED: dict[str, Callable[..., Any]] = {".gz": gzip.open, ".xz": lzma.open}
 _MARKS = {  # how files begin that are no text, and what their names end in
     b"PK\x03\x04": ".xlsx, .ods or .zip",
     b"\xd0\xcf\x11\xe0": ".xls",
@@ -252,10 +253,8 @@ def unpacked(name: str, data: bytes, *, is_export: bool) -> tuple[str, bytes]:
     inner = name[: -len(suffix)] if name.lower().endswith(suffix) else name
     stored = io.BytesIO(data)
     try:
-        if suffix == ".gz":
-            data = gzip.open(stored).read(MAX_UNPACKED + 1)
-        elif suffix == ".xz":
-            data = lzma.open(stored).read(MAX_UNPACKED + 1)
+        if suffix in _OPENED:
+            data = _OPENED[suffix](stored).read(MAX_UNPACKED + 1)
         elif suffix == ".zip":
             archive = zipfile.ZipFile(stored)
             members = [m for m in archive.namelist() if not m.endswith("/")]
