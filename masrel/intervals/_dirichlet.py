@@ -156,6 +156,9 @@ def _interval(
     if one_sided:
         high = (1.0, 0.0)
     method = f"{method}, {drawn.size} draws"
+    # a density from how far apart quantiles are, between which equally many draws lie
+    ends = np.quantile(drawn, np.linspace(0.0, 1.0, _SHOWN + 1))
+    widths = np.maximum(np.diff(ends), np.finfo(float).tiny)
     return Interval(
         low=low[0],
         high=high[0],
@@ -167,19 +170,10 @@ def _interval(
         n_resamples=drawn.size,
         n_undefined=values.size - drawn.size,
         monte_carlo_error=(low[1], high[1]),
-        distribution=_density(
-            drawn, f"posterior of {problem.entry.title}, prior {prior}"
+        distribution=Distribution(
+            values=0.5 * (ends[:-1] + ends[1:]),
+            weights=1.0 / (_SHOWN * widths),
+            continuous=True,
+            words=f"posterior of {problem.entry.title}, prior {prior}",
         ),
-    )
-
-
-def _density(values: Floats, words: str) -> Distribution:
-    # from how far apart quantiles are between which equally many draws lie
-    ends = np.quantile(values, np.linspace(0.0, 1.0, _SHOWN + 1))
-    widths = np.maximum(np.diff(ends), np.finfo(float).tiny)
-    return Distribution(
-        values=0.5 * (ends[:-1] + ends[1:]),
-        weights=1.0 / (_SHOWN * widths),
-        continuous=True,
-        words=words,
     )

@@ -34,6 +34,7 @@ from masrel.intervals._rho import PRIOR_SHAPES, Prior, PriorName
 from masrel.intervals.posterior import Quantity
 
 _METHOD = "hierarchical kappa model, exact"
+_MEAN = "kappa, mean of raters"
 _GRID = np.linspace(-20.0, 20.0, 65)  # logit 3 g, for a trapezoid sum over all of it
 _MAX_LOGIT = 48.0  # logit m beyond which a uniform prior has no mass that matters
 _N_MEANS = 257  # of the mean, whose ends are within 1e-11
@@ -151,14 +152,17 @@ def retest_model(
     used = list(tables.values())
     shares = (0.5, 0.5 - 0.5 * level, 0.5 + 0.5 * level)
     posterior = _Posterior.of(used, checked_prior)
-    kappa = _mean_kappa(posterior.quantiles(shares), level)
+    here = posterior.quantiles(shares)
     others = [
-        (_mean_kappa(_Posterior.of(used, other).quantiles(shares), level), other)
+        (_Posterior.of(used, other).quantiles(shares), other)
         for other in checked_prior.others(coded.n_categories)
     ]
-    other_kappa, other = max(others, key=lambda by: _moved(by[0].interval, kappa))
+    # the one that moves an end most
+    there, other = max(
+        others, key=lambda of: float(np.abs(np.subtract(of[0], here))[1:].max())
+    )
     return RetestModel(
-        kappa=kappa,
+        kappa=_quantity(_MEAN, here, level, "raters"),
         standard_deviation=_quantity(
             "kappa, standard deviation over raters",
             posterior.sd_quantiles(shares),
@@ -176,13 +180,9 @@ def retest_model(
         ),
         n_pairs=tuple(int(table.sum()) for table in used),
         prior=_describe(checked_prior),
-        other_kappa=other_kappa,
+        other_kappa=_quantity(_MEAN, there, level, "raters"),
         other_prior=_describe(other),
     )
-
-
-def _mean_kappa(quantiles: Sequence[float], level: float) -> Quantity:
-    return _quantity("kappa, mean of raters", quantiles, level, "raters")
 
 
 def _quantity(
@@ -204,12 +204,6 @@ def _quantity(
     )
 
 
-def _moved(there: Interval, kappa: Quantity) -> float:
-    # how far one end moves at most
-    here = kappa.interval
-    return max(abs(there.low - here.low), abs(there.high - here.high))
-
-
 def _describe(prior: Prior) -> str:
     of_mean, of_shares = prior.description.split(", ", 1)
     return f"{of_mean.replace('ρ', 'mean kappa')}, {of_shares}, g ~ U(0, 1/3)"
@@ -219,7 +213,7 @@ def _undefined(reason: str, prior: Prior, level: float) -> RetestModel:
     warnings.warn(
         f"{_METHOD}: undefined: {reason}", UndefinedStatisticWarning, stacklevel=3
     )
-    nothing = _mean_kappa((math.nan,) * 3, level)
+    nothing = _quantity(_MEAN, (math.nan,) * 3, level, "raters")
     nothing = replace(nothing, interval=replace(nothing.interval, reason=reason))
     return RetestModel(
         kappa=nothing,

@@ -52,7 +52,6 @@ def drawn(
             noise=noise[None],
             thresholds=np.array([thresholds]),
             item_share=np.array([share]),
-            noise_fraction=np.array([fraction]),
             noise_spread=np.array([spread]),
             bias_variance=np.array([rest * (1.0 - fraction)]),
             noise_variance=np.array([rest * fraction]),

@@ -79,28 +79,6 @@ def test_single_ratings_inform_the_shares_only(m: int) -> None:
     assert ends(result) == pytest.approx(by_hand, abs=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("categories", "options", "expected"),
-    [
-        (SCALE, {}, (0.36964, 0.87373)),
-        (("1", "1+", "2", "3"), {}, (0.34777, 0.86627)),
-        (SCALE, {"concentration": 1 / 6}, (0.35421, 0.86818)),
-        (SCALE, {"prior": "jeffreys"}, (0.37107, 0.89087)),
-    ],
-)
-def test_table_v(
-    categories: tuple[str, ...], options: dict[str, object], expected: tuple[float, ...]
-) -> None:
-    result = posterior(
-        "fleiss_kappa",
-        TABLE_V,
-        target="items",
-        categories=categories,
-        **options,  # type: ignore[arg-type]
-    )
-    assert ends(result) == pytest.approx(expected, abs=6e-6)
-
-
 def labelled(counts: NDArray[np.int64] | list[list[int]]) -> Ratings:
     """Ratings that have these counts, padded with missing ones."""
     rows = [[str(k) for k, n in enumerate(row) for _ in range(n)] for row in counts]

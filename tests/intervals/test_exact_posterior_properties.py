@@ -56,13 +56,6 @@ def test_more_agreement_moves_it_up(table: Table, grades: list[str]) -> None:
 
 @settings(max_examples=25)
 @given(WITH_PAIRS)
-def test_levels_are_nested(table: Table) -> None:
-    inner, outer = exact(table, level=0.5), exact(table, level=0.9)
-    assert 0.0 < outer.low < inner.low < inner.high < outer.high < 1.0
-
-
-@settings(max_examples=25)
-@given(WITH_PAIRS)
 def test_the_density_integrates_to_one(table: Table) -> None:
     of = exact(table).distribution
     assert of is not None
@@ -109,17 +102,6 @@ def test_where_the_prior_weighs_another_stands_beside(
     ]
     other = others[int(np.argmax(moves))]
     assert f"but {other.low:.3f} to {other.high:.3f} with " in note
-
-
-def test_enough_items_need_no_note() -> None:
-    assert exact([["a", "a"], ["a", "b"], ["b", "b"]] * 4, ["a", "b"]).notes == ()
-
-
-@pytest.mark.parametrize("name", ["scott_pi", "krippendorff_alpha"])
-def test_coefficients_of_the_same_value_in_the_population_have_it(name: str) -> None:
-    ratings = [["a", "a"], ["a", "b"], ["b", "b"]] * 4
-    result = posterior(name, ratings, target="items")
-    assert result == posterior("fleiss_kappa", ratings, target="items")
 
 
 @pytest.mark.parametrize(

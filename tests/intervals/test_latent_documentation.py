@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from masrel.intervals import LatentPrior, LatentTrait, latent_trait
+from masrel.intervals import LatentTrait, latent_trait
 from tests.intervals.data import SCALE, TABLE_V
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -22,16 +22,6 @@ def test_there_is_something_to_check() -> None:
     assert {(study, items) for study, items, *_ in ROWS} == {
         (study, items) for study in RATERS for items in ("fixed", "random")
     }
-
-
-def test_the_page_names_the_command_and_the_prior_there_is() -> None:
-    from masrel.cli import VERBS
-
-    assert "masrel latent" in PAGE
-    assert "latent" in VERBS
-    assert LatentPrior().item_share == (1, 1 / 3)
-    assert (LatentPrior().noise_fraction, LatentPrior().noise_spread) == ((2, 2), 0.5)
-    assert LatentPrior.other().concentration == 0.5
 
 
 def ends(result: LatentTrait) -> list[float]:

@@ -122,18 +122,6 @@ def test_a_generator_is_taken_and_a_fresh_seed_recorded(result: LatentTrait) -> 
     assert fitted(rng=fresh.seed) == fresh
 
 
-def test_random_items_speak_of_both_populations(result: LatentTrait) -> None:
-    fixed, new = result, fitted(items="random")
-    assert fixed.kappa.interval is not None
-    assert new.kappa.interval is not None
-    assert (fixed.kappa.interval.target, new.kappa.interval.target) == (
-        "raters",
-        "both",
-    )
-    assert new.raters[0].value == fixed.raters[0].value  # the same posterior
-    assert new.kappa.value != fixed.kappa.value
-
-
 def test_labels_give_the_names_and_what_has_no_rating_is_left_out() -> None:
     table = pd.DataFrame(
         [
@@ -229,28 +217,6 @@ def test_progress_counts_warm_up_and_both_priors() -> None:
     assert all(n_made <= n_expected for n_made, n_expected in seen)
 
 
-@pytest.mark.slow
-def test_a_rater_who_grades_high_and_one_who_is_careless_are_found() -> None:
-    rng = np.random.default_rng(3)
-    severity = np.repeat([-2.0, -1.0, 0.0, 1.0, 2.0], 4)
-    perceived = severity[:, None] + 0.2 * rng.normal(size=(20, 5))
-    perceived[:, 1] += 1.0
-    perceived[:, 3] += 1.2 * rng.normal(size=20)
-    codes = np.digitize(perceived, [-2.5, -1.5, -0.5, 0.5, 1.5, 2.5])
-    result = fitted(codes, categories=list(range(7)))
-    bias = [one.value for one in result.raters]
-    noise = [one.value for one in result.noises]
-    assert (int(np.argmax(bias)), int(np.argmax(noise))) == (1, 3)
-    assert result.raters[1].interval.low > 0.0
-    others = max(noise[r] for r in (0, 2, 4))
-    assert result.noises[3].interval.low > others
-    # thresholds are about one apart, so that the bias is about one grade
-    apart = result.thresholds[3].value - result.thresholds[2].value
-    assert bias[1] - bias[0] == pytest.approx(apart, rel=0.35)
-    order = np.argsort([one.value for one in result.items])
-    assert (np.diff(severity[order]) >= -1.0).all()
-
-
 def extreme(result: LatentTrait) -> dict[str, float]:
     return {
         check.name: check.p_value
@@ -267,15 +233,6 @@ def test_the_predictive_check_is_calm_about_the_model_s_own_ratings() -> None:
         share=0.8, fraction=0.6, spread=0.3,
     )  # fmt: skip
     assert extreme(fitted(study.codes, categories=[0, 1, 2, 3])) == {}
-
-
-def test_raters_who_answer_at_random_agree_not_at_all_and_fit() -> None:
-    # That raters do not look at the items is one of the things the model can say.
-    codes = np.random.default_rng(5).integers(0, 4, (12, 6))
-    result = fitted(codes, categories=[0, 1, 2, 3])
-    assert extreme(result) == {}
-    assert result.kappa.interval is not None
-    assert result.kappa.interval.high < 0.2
 
 
 def test_the_predictive_check_sees_a_rater_who_turns_the_scale_round() -> None:

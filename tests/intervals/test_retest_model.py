@@ -43,23 +43,6 @@ def test_on_many_pairs_of_alike_raters_it_is_stratified_kappa() -> None:
     assert result.standard_deviation.value < 0.1
 
 
-@pytest.mark.slow
-def test_raters_who_differ_are_told_apart_and_pulled_together() -> None:
-    rng = np.random.default_rng(12)
-    kappas = np.array([0.3, 0.5, 0.7, 0.9] * 2)
-    study = drawn_pairs(rng, kappas, np.full((8, 3), 1 / 3), 100)
-    result = retest_model(study, categories=[0, 1, 2])
-    truth = np.mean(kappas)
-    assert result.kappa.interval.low < truth < result.kappa.interval.high
-    assert result.standard_deviation.value == pytest.approx(np.std(kappas), abs=0.06)
-    for of_rater, kappa in zip(result.raters, kappas, strict=True):
-        assert of_rater.value == pytest.approx(kappa, abs=0.2)
-    few = retest_model([pairs[:6] for pairs in study], categories=[0, 1, 2])
-    assert np.ptp([q.value for q in few.raters]) < np.ptp(
-        [q.value for q in result.raters]
-    )
-
-
 def test_three_raters_and_four_models_say_how_little_is_known() -> None:
     perfect = [[["1", "1"], ["1+", "1+"], ["2", "2"], ["3", "3"]]] * 2
     study = [*perfect, [["1", "1"], ["1+", "1"], ["2", "2"], ["3", "2"]]]

@@ -1,22 +1,21 @@
 """The posterior of two raters' table: by hand, by other integrals, by drawing it."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from scipy.special import betainc, betaincinv, betaln, roots_jacobi
+from scipy.special import betainc, betaincinv, roots_jacobi
 
+from masrel.agreement import COEFFICIENTS
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Interval
 from masrel.intervals import posterior
 
 Floats = NDArray[np.float64]
 
-IDENTITY = 1.0 - np.eye(2)
 TAILS = (0.025, 0.975)
 COEFFICIENTS_OF_PAIRS = [
     "brennan_prediger",
@@ -73,6 +72,15 @@ def test_raters_who_never_agree_are_as_uncertain_as_draws_say(n: int, row: int) 
         assert (kappas <= end).mean() == pytest.approx(share, abs=1.75e-3)
 
 
+def test_every_coefficient_of_two_raters_has_a_table() -> None:
+    of_pairs = {
+        name
+        for name, entry in COEFFICIENTS.items()
+        if entry.formula is not None and entry.shape == "ratings"
+    }
+    assert set(COEFFICIENTS_OF_PAIRS) == of_pairs
+
+
 def ends(result: Interval) -> tuple[float, float]:
     return result.low, result.high
 
@@ -126,25 +134,6 @@ def cohen_probability(prior: Floats, value: float) -> float:
     return float(of_p @ given_both @ of_w)
 
 
-def scott_probability(prior: Floats, value: float) -> float:
-    """By another way round: given the share t of pairs apart, with m = t/2 + (1 - t) x
-    of category 1, π <= value where m (1 - m) <= t / (2 (1 - value)): x beyond either
-    of two bounds, which meet at t = top.
-    """
-    apart, agreed = prior[0, 1] + prior[1, 0], prior.trace()
-    top = 0.5 * (1.0 - value)
-    x, weights = np.polynomial.legendre.leggauss(200)
-    root = 0.5 * (x + 1.0)  # t = top (1 - root²), so that the bounds are smooth in it
-    t = top * (1.0 - root**2)
-    log = (apart - 1.0) * np.log(t) + (agreed - 1.0) * np.log1p(-t)
-    of_t = np.exp(log - betaln(apart, agreed)) * top * root * weights
-    reach = np.sqrt(0.25 * root**2) / (1.0 - t)
-    a, b = prior[0, 0], prior[1, 1]
-    beyond = betainc(a, b, (0.5 - reach).clip(0.0, 1.0))
-    beyond += betainc(b, a, (0.5 - reach).clip(0.0, 1.0))
-    return float(of_t @ beyond + betainc(agreed, apart, 1.0 - top))
-
-
 @pytest.mark.parametrize(
     "table",
     [
@@ -155,19 +144,11 @@ def scott_probability(prior: Floats, value: float) -> float:
         [[90, 4], [5, 12]],
     ],
 )
-@pytest.mark.parametrize(
-    ("coefficient", "probability"),
-    [("cohen_kappa", cohen_probability), ("scott_pi", scott_probability)],
-)
-def test_two_categories_by_another_integral(
-    table: list[list[int]],
-    coefficient: str,
-    probability: Callable[[Floats, float], float],
-) -> None:
+def test_two_categories_by_another_integral(table: list[list[int]]) -> None:
     prior = np.array(table) + 2.0
-    result = table_posterior(coefficient, table, concentration=2.0)
-    again = [probability(prior, end) for end in ends(result)]
-    # the other integrals have kinks where a share reaches 0 or 1
+    result = table_posterior("cohen_kappa", table, concentration=2.0)
+    again = [cohen_probability(prior, end) for end in ends(result)]
+    # the other integral has kinks where a share reaches 0 or 1
     assert again == pytest.approx(TAILS, abs=1e-8)
     assert result.n_resamples is None
 
@@ -243,16 +224,6 @@ def test_seeds_repeat_and_are_recorded() -> None:
     assert one.low != two.low
 
 
-def test_coefficients_of_one_value_in_the_population_have_one_posterior() -> None:
-    for names in (
-        ("cohen_kappa", "conger_kappa", "light_kappa"),
-        ("scott_pi", "fleiss_kappa", "krippendorff_alpha"),
-    ):
-        first, *others = (ends(table_posterior(name, TABLE)) for name in names)
-        for other in others:
-            assert other == pytest.approx(first, abs=1e-10)
-
-
 counts = st.integers(0, 12)
 tables_of_two = st.lists(counts, min_size=4, max_size=4).filter(any)
 
@@ -270,15 +241,6 @@ def test_renaming_raters_or_categories_changes_nothing(
         )
 
 
-@settings(max_examples=15)
-@given(tables_of_two, st.sampled_from(COEFFICIENTS_OF_PAIRS))
-def test_levels_are_nested(cells: list[int], coefficient: str) -> None:
-    table = [cells[:2], cells[2:]]
-    inner = table_posterior(coefficient, table, level=0.5)
-    outer = table_posterior(coefficient, table, level=0.9)
-    assert -1.0 <= outer.low < inner.low < inner.high < outer.high <= 1.0
-
-
 def test_the_place_of_a_probability_is_its_quantile_at_every_level() -> None:
     for level in (0.01, 0.9, 1.0 - 1e-9):
         prior = np.array([[20, 5], [10, 15]]) + 2.0
@@ -288,28 +250,6 @@ def test_the_place_of_a_probability_is_its_quantile_at_every_level() -> None:
         shares = [0.5 - 0.5 * level, 0.5 + 0.5 * level]
         again = [cohen_probability(prior, end) for end in ends(result)]
         assert again == pytest.approx(shares, abs=1e-10)
-
-
-@pytest.mark.parametrize(
-    ("table", "what"),
-    [
-        ([[12, 0], [0, 0]], "all ratings are in one category"),
-        ([[6, 0], [0, 6]], "agreement is perfect in these data"),
-        ([[3, 1], [2, 3]], "9 items are few"),
-    ],
-)
-def test_where_the_prior_weighs_another_stands_beside(
-    table: list[list[int]], what: str
-) -> None:
-    result = table_posterior("cohen_kappa", table)
-    other = table_posterior("cohen_kappa", table, concentration=0.5)
-    assert result.notes == (
-        f"{what}, so the prior weighs: {result.low:.3f} to {result.high:.3f} with "
-        "a Dirichlet worth 1.5 items, half of it on pairs that agree, but "
-        f"{other.low:.3f} to {other.high:.3f} with Dirichlet(0.5, ...) over the cells "
-        "of the table",
-    )
-    assert f"{result.low:.3f} to {result.high:.3f} with a Dirichlet" in other.notes[0]
 
 
 def test_items_of_a_single_rating_are_left_out() -> None:

@@ -115,9 +115,8 @@ class Traits:
     noise: Floats = field(compare=False, repr=False)
     # (n, n_categories - 1): τ_k, ascending
     thresholds: Floats = field(compare=False, repr=False)
-    # item_share, noise_fraction, noise_spread: (n,): ρ, f and η
+    # item_share, noise_spread: (n,): ρ and η
     item_share: Floats = field(compare=False, repr=False)
-    noise_fraction: Floats = field(compare=False, repr=False)
     noise_spread: Floats = field(compare=False, repr=False)
     # bias_variance, noise_variance: (n,): ω² and σ²
     bias_variance: Floats = field(compare=False, repr=False)
@@ -355,17 +354,15 @@ class LatentDensity:
         """Turn positions (n, n_dimensions) into the unknowns."""
         point = self.point(position)
         rest = (point.root**2)[:, 0]
-        fraction = point.fraction[:, 0]
         return Traits(
             severity=point.severity,
             bias=point.root * point.bias,
             noise=point.root * point.noise,
             thresholds=point.tau,
             item_share=point.share[:, 0],
-            noise_fraction=fraction,
             noise_spread=point.noise_sd[:, 0],
             bias_variance=rest * expit(-point.raw_fraction[:, 0]),
-            noise_variance=rest * fraction,
+            noise_variance=rest * point.fraction[:, 0],
         )
 
     def log_density(self, position: Floats) -> Floats:

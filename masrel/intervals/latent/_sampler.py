@@ -169,7 +169,6 @@ class Chains:
     # by name: rank-normalized split R-hat and effective size of the tails, (n, 2)
     diagnostics: dict[str, Floats] = field(compare=False, repr=False)
     n_steps: int  # steps of every chain after warm-up, kept or not
-    acceptance: float  # share of the proposals that were taken
 
     @property
     def worst(self) -> tuple[float, float]:
@@ -214,7 +213,6 @@ def sample_smooth(
                 for name, of in values.items()
             },
             n_steps=total,
-            acceptance=walkers.acceptance,
         )
         r_hat, ess = chains.worst
         if r_hat < MAX_R_HAT and ess >= MIN_ESS:
@@ -247,7 +245,10 @@ class Walkers:
         start: Floats,
         generator: np.random.Generator,
     ) -> None:
-        self._state = emcee.State(start, random_state=_legacy_state(generator))
+        # emcee passes over a numpy Generator without a word: it wants legacy state.
+        legacy = np.random.RandomState(generator.integers(2**32, dtype=np.uint64))
+        random = tuple(legacy.get_state(legacy=True))
+        self._state = emcee.State(start, random_state=random)
         self._sampler = emcee.EnsembleSampler(
             *start.shape,
             log_density,
@@ -267,12 +268,6 @@ class Walkers:
     def acceptance(self) -> float:
         """Share of the proposals of the last run that were taken."""
         return float(self._sampler.acceptance_fraction.mean())
-
-
-def _legacy_state(generator: np.random.Generator) -> tuple[object, ...]:
-    # emcee passes over a numpy Generator without a word: it wants legacy state.
-    legacy = np.random.RandomState(generator.integers(2**32, dtype=np.uint64))
-    return tuple(legacy.get_state(legacy=True))
 
 
 def _warm_up(

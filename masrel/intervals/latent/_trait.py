@@ -5,7 +5,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from masrel.agreement import Label, code_ratings
 from masrel.agreement._engine import Floats, check_level
@@ -265,29 +264,25 @@ class _Ratings:
         if not (rated.sum(axis=1) >= 2).any():
             raise RatingsError("ratings: the model needs an item rated by two raters")
         rows = np.flatnonzero(rated.any(axis=1))
-        _check_spread(coded.codes, rated)
+        if rows.size < 2:
+            raise RatingsError(
+                "ratings: the model needs two items to say how far apart they are, got "
+                f"{rows.size}"
+            )
+        highest = coded.codes.max(axis=1)
+        lowest = np.where(rated, coded.codes, highest[:, None]).min(axis=1)
+        if (highest <= lowest).all():
+            raise RatingsError(
+                "ratings: no two raters disagree on any item, so that nothing tells "
+                "how small biases and noises are; masrel.intervals.posterior bounds "
+                "kappa here"
+            )
         columns = np.flatnonzero(rated.any(axis=0))
         return cls(
             codes=coded.codes[rows][:, columns],
             categories=coded.categories,
             items=_names(getattr(ratings, "index", None), "item", rows.tolist()),
             raters=_names(getattr(ratings, "columns", None), "rater", columns.tolist()),
-        )
-
-
-def _check_spread(codes: Codes, rated: NDArray[np.bool_]) -> None:
-    n_items = int(rated.any(axis=1).sum())
-    if n_items < 2:
-        raise RatingsError(
-            "ratings: the model needs two items to say how far apart they are, got "
-            f"{n_items}"
-        )
-    highest = np.where(rated, codes, -1).max(axis=1)
-    lowest = np.where(rated, codes, codes.max()).min(axis=1)
-    if (highest <= lowest).all():
-        raise RatingsError(
-            "ratings: no two raters disagree on any item, so that nothing tells how "
-            "small biases and noises are; masrel.intervals.posterior bounds kappa here"
         )
 
 

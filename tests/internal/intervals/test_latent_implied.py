@@ -1,6 +1,5 @@
 """Kappa implied by the latent-trait model against closed forms and brute force."""
 
-import itertools
 import math
 
 import numpy as np
@@ -35,7 +34,6 @@ def one(
         noise=np.ones((1, 1)),
         thresholds=np.array([tau]),
         item_share=np.array([rho]),
-        noise_fraction=np.array([f]),
         noise_spread=np.array([eta]),
         bias_variance=np.array([rest * (1 - f)]),
         noise_variance=np.array([rest * f]),
@@ -59,17 +57,6 @@ def test_two_halves_have_the_arcsine_of_the_correlation(rho: float) -> None:
     assert result.observed[0] == pytest.approx(0.5 + math.asin(rho) / math.pi, abs=1e-7)
     assert result.chance[0] == pytest.approx(0.5)
     assert result.kappa[0] == pytest.approx(2 * math.asin(rho) / math.pi, abs=2e-7)
-
-
-def test_alike_noises_have_the_rectangles_of_a_bivariate_normal() -> None:
-    rho, tau = 0.8, [-1.2, -0.1, 0.9]
-    law = stats.multivariate_normal([0, 0], [[1, rho], [rho, 1]])
-    ends = [-9.0, *tau, 9.0]
-    observed = sum(
-        law.cdf([b, b], lower_limit=[a, a]) for a, b in itertools.pairwise(ends)
-    )
-    result = agreement_on_new_items(one(rho, 0.5, 1e-9, tau))
-    assert result.observed[0] == pytest.approx(observed, abs=1e-6)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -107,7 +94,6 @@ def test_these_items_agree_with_simulated_raters(
         noise=math.sqrt(rest * f) * np.exp(eta * rng.normal(size=(n, 2))),
         thresholds=np.tile(tau, (n, 1)),
         item_share=np.full(n, rho),
-        noise_fraction=np.full(n, f),
         noise_spread=np.full(n, eta),
         bias_variance=np.full(n, rest * (1 - f)),
         noise_variance=np.full(n, rest * f),

@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy import integrate, special, stats
+from scipy import integrate, special
 
 from masrel.intervals._rho import DEFAULT_PRIOR
 from masrel.intervals.self_agreement import _Posterior, _RaterPairs
-from tests.intervals.test_retest_model import drawn_pairs
 
 Floats = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -108,52 +107,3 @@ def test_quadrature_agrees_with_draws_of_every_unknown() -> None:
             error = np.sqrt(((weights * beyond) ** 2).sum())
             assert abs(weights @ beyond) < 4 * error
             assert error < 0.06 * min(share, 1 - share)
-
-
-def test_one_rater_is_a_mixture_that_integrates_by_brute_force() -> None:
-    # κ of one rater: prior ∫∫ Beta(κ | m, g) dm dg on a grid of midpoints.
-    table = SMALL[1]
-    result = _Posterior.of([table], DEFAULT_PRIOR)
-    points = (np.arange(60) + 0.5) / 60
-    m, g = (a.ravel() for a in np.meshgrid(points, points / 3))
-    size = 1 / g - 1
-    kappa = (np.arange(400) + 0.5) / 400
-    edges = np.arange(401)[:, None] / 400
-    cumulative = special.betainc(m * size, (1 - m) * size, edges).mean(axis=1)
-    prior = np.diff(cumulative)
-    density = prior * [textbook_log(table, k) for k in kappa]
-    below = np.cumsum(density) / density.sum()
-    ours = result.rater_quantiles(0, SHARES)
-    theirs = np.interp(SHARES, below, kappa + 0.5 / 400)
-    assert ours == pytest.approx(theirs, abs=2e-3)
-
-
-def textbook_log(table: Table, kappa: float) -> float:
-    pairs = _RaterPairs.of(table, 1.0)
-    j = np.arange(pairs.agree + 1)
-    weights = np.exp(pairs.log_weights - pairs.log_weights.max())
-    return float(
-        weights @ (kappa ** (pairs.agree - j) * (1 - kappa) ** (pairs.differ + j))
-    )
-
-
-@pytest.mark.parametrize(
-    ("n_raters", "n_items"), [(3, 4), pytest.param(5, 12, marks=pytest.mark.slow)]
-)
-def test_ranks_of_what_made_the_data_are_uniform(n_raters: int, n_items: int) -> None:
-    # Simulation-based calibration with exact posteriors: the share of the posterior
-    # below the true mean is U(0, 1). 100 studies; p < 1e-4 by chance once in 10 000.
-    rng = np.random.default_rng([n_raters, n_items])
-    below = []
-    for _ in range(100):
-        m, g = rng.random(), rng.random() / 3
-        kappas = rng.beta(m * (1 / g - 1), (1 - m) * (1 / g - 1), n_raters)
-        shares = rng.dirichlet(np.ones(3), n_raters)
-        study = np.array(drawn_pairs(rng, kappas, shares, n_items))
-        tables = [
-            np.bincount(3 * a + b, minlength=9).reshape(3, 3)
-            for a, b in np.moveaxis(study, 2, 1)
-        ]
-        result = _Posterior.of(tables, DEFAULT_PRIOR)
-        below.append(result.mean.probability(special.logit([m]))[0])
-    assert stats.kstest(below, "uniform").pvalue > 1e-4
