@@ -72,7 +72,7 @@ def patterns_interval(
     if reason is not None:
         return undefined(problem, reason, method)
     generator, seed = recorded_generator(rng)
-    rows, often = _distinct_features(problem.rows, problem.freq)
+    rows, often = _distinct_features(problem.features(problem.codes), problem.freq)
     added, worth = _prior_patterns(problem)
     rows, shapes = np.concatenate([rows, added]), np.concatenate([often, worth])
     n_left, values, size = n_draws, [], max(1, _AT_ONCE // shapes.size)

@@ -5,11 +5,8 @@ In: a coefficient, ratings, and the population asked about. Out: an `IntervalPro
 
 import math
 import re
-import sys
-import warnings
-from collections.abc import Callable, Collection, Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any, get_args
 
 import numpy as np
@@ -28,17 +25,22 @@ from masrel.agreement import (
     count_ratings,
 )
 from masrel.agreement._codes import distinct_rows, item_counts
-from masrel.agreement._engine import Features, Floats, Formula, check_level
-from masrel.agreement._labels import Codes, is_missing, is_row
+from masrel.agreement._engine import (
+    Features,
+    Floats,
+    Formula,
+    Integers,
+    check_level,
+    check_option,
+    undefined,
+)
+from masrel.agreement._labels import Codes, is_missing, is_row, warn_caller
 from masrel.agreement._weights import Line, declared_weights
 from masrel.errors import (
     ParameterError,
     SmallSampleWarning,
-    UndefinedStatisticWarning,
 )
 from masrel.estimates import Estimate, Interval, Target, Unit
-
-Integers = NDArray[np.int64]
 
 Statistic = str | Callable[..., Estimate] | Coefficient
 """A coefficient: its name, its public function, or its entry in the register."""
@@ -86,11 +88,6 @@ class IntervalProblem:
     is_too_large: bool  # to hold the features of all items
     notes: tuple[str, ...] = ()  # of every interval
     max_df: float = math.inf  # degrees of freedom, where other parts have as few
-
-    @cached_property
-    def rows(self) -> Floats:
-        """The features of each row, (n_rows, n_features)."""
-        return self.features(self.codes)
 
     @property
     def n_raters(self) -> int:
@@ -188,8 +185,7 @@ class IntervalProblem:
 
     def undefined(self, reason: str, *, method: str, unit: Unit | None) -> Interval:
         """Return an interval of ``nan`` that says why, with a warning."""
-        message = f"{method} interval of {self.entry.title} is undefined: {reason}"
-        warn_user(message, UndefinedStatisticWarning)
+        undefined(f"{method} interval of {self.entry.title}", reason)
         return Interval(
             low=math.nan,
             high=math.nan,
@@ -222,9 +218,25 @@ def pose_problem(
 ) -> IntervalProblem:
     """Check a question and prepare its data."""
     entry = find_entry(statistic, metric)
-    check_one_of("target", target, get_args(Target))
+    check_option("target", target, get_args(Target))
     check_level(level)
-    coded = _coded(entry, ratings, target, categories)
+    if isinstance(ratings, CountedRatings) and not (
+        ratings.knows_raters or entry.tells_raters_apart
+    ):
+        if target != "items":
+            raise ParameterError(
+                "target: counts do not say who rated what, so that an interval "
+                f'generalises to other "items"; got "{target}"'
+            )
+        ratings = count_ratings(ratings, categories).coded
+    coded = entry.code(ratings, categories)
+    fewest, most = entry.n_raters
+    n_raters = coded.codes.shape[1]
+    if most is not None and n_raters > most:
+        n_raters = coded.n_raters  # those without any rating are none
+    if entry.shape == "ratings" and not fewest <= n_raters <= (most or n_raters):
+        needed = f"{fewest}" if most == fewest else f"at least {fewest}"
+        raise ParameterError(f"{entry.title} needs {needed} raters, got {n_raters}")
     formula = entry.formula
     notes: tuple[str, ...] = ()
     if formula is None:
@@ -264,34 +276,6 @@ def pose_problem(
     )
 
 
-def _coded(
-    entry: Coefficient,
-    ratings: object,
-    target: Target,
-    categories: Sequence[Label] | None,
-) -> CodedRatings:
-    """Code the ratings of as many raters as the coefficient takes."""
-    if isinstance(ratings, CountedRatings) and not (
-        ratings.knows_raters or entry.tells_raters_apart
-    ):
-        if target != "items":
-            raise ParameterError(
-                "target: counts do not say who rated what, so that an interval "
-                f'generalises to other "items"; got "{target}"'
-            )
-        coded = count_ratings(ratings, categories).coded
-    else:
-        coded = entry.code(ratings, categories)
-    fewest, most = entry.n_raters
-    n_raters = coded.codes.shape[1]
-    if most is not None and n_raters > most:
-        n_raters = coded.n_raters  # those without any rating are none
-    if entry.shape == "ratings" and not fewest <= n_raters <= (most or n_raters):
-        needed = f"{fewest}" if most == fewest else f"at least {fewest}"
-        raise ParameterError(f"{entry.title} needs {needed} raters, got {n_raters}")
-    return coded
-
-
 def _who_matters(
     entry: Coefficient, formula: Formula, v: Any, coded: CodedRatings
 ) -> tuple[Codes, Codes, Integers]:
@@ -303,7 +287,7 @@ def _who_matters(
     if width == 1 and fewest <= rated.sum() < rated.size:
         item_codes = item_codes[:, rated]
     while True:
-        codes, often = distinct_rows(item_codes, coded.n_categories)
+        codes, often = distinct_rows(item_codes, len(coded.categories))
         matter = formula.features(codes, v).summed(often)[1] > 0
         there = codes[matter] >= 0
         shape = (len(there), codes.shape[1] // width, width)
@@ -373,14 +357,6 @@ def _by_nodes(formula: Formula, line: Line) -> Formula | None:
         disagreements=disagreements,
         resampled=None,
     )
-
-
-def check_one_of(option: str, value: object, known: Collection[str]) -> None:
-    """Check an option that is one of some words."""
-    if value not in known:
-        raise ParameterError(
-            f"{option}: needs one of {', '.join(known)}, got {value!r}"
-        )
 
 
 def find_entry(statistic: Statistic, metric: Metric | None = None) -> Coefficient:
@@ -463,16 +439,8 @@ def warn_small(
     if count == 1:
         what = singular(what)
     note = f"{count} {what}: below {minimum} the interval may cover less than it says"
-    warn_user(note, SmallSampleWarning)
+    warn_caller(note, SmallSampleWarning)
     return (note,)
-
-
-def warn_user(message: str, category: type[Warning]) -> None:
-    """Warn whoever called this package."""
-    frame, level = sys._getframe(1), 2
-    while frame.f_back and frame.f_globals.get("__package__") == __package__:
-        frame, level = frame.f_back, level + 1
-    warnings.warn(message, category, stacklevel=level)
 
 
 def singular(what: str) -> str:

@@ -10,17 +10,22 @@ import numpy as np
 
 from masrel._input import refuse
 from masrel.agreement import COEFFICIENTS, Label, Metric, WeightsLike
-from masrel.agreement._engine import NO_SPREAD, ONE_PAIR, WHOLE, Features
+from masrel.agreement._engine import (
+    NO_SPREAD,
+    ONE_PAIR,
+    WHOLE,
+    Features,
+    Integers,
+    check_option,
+)
 from masrel.agreement.category import _null_error
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval, Target, Unit
 from masrel.intervals._question import (
     HELD,
     ClusterSums,
-    Integers,
     IntervalProblem,
     Statistic,
-    check_one_of,
     cluster_codes,
     pose_problem,
     warn_small,
@@ -143,8 +148,8 @@ def analytic(
     >>> round(interval.low, 3), round(interval.high, 3)
     (0.171, 0.829)
     """
-    check_one_of("distribution", distribution, _METHODS)
-    check_one_of("convention", convention or "over_n", _NAMES)
+    check_option("distribution", distribution, _METHODS)
+    check_option("convention", convention or "over_n", _NAMES)
     problem = pose_problem(
         coefficient,
         ratings,

@@ -12,7 +12,7 @@ import numpy as np
 
 from masrel._input import refuse
 from masrel.agreement import Label, Metric, WeightsLike
-from masrel.agreement._engine import Floats
+from masrel.agreement._engine import Floats, Integers, check_option
 from masrel.agreement._labels import shown
 from masrel.agreement._weights import Distances
 from masrel.errors import ParameterError
@@ -20,10 +20,8 @@ from masrel.estimates import Distribution, Interval, Target
 from masrel.intervals._question import (
     ROUNDING,
     ClusterSums,
-    Integers,
     IntervalProblem,
     Statistic,
-    check_one_of,
     cluster_codes,
     pose_problem,
     recorded_generator,
@@ -158,7 +156,7 @@ def bootstrap(
     >>> interval.seed, interval.n_resamples, interval.low < 0.5 < interval.high
     (1, 10000, True)
     """
-    check_one_of("kind", kind, get_args(_Kind))
+    check_option("kind", kind, get_args(_Kind))
     is_whole = isinstance(n_resamples, int | np.integer)
     refuse(
         (
@@ -239,19 +237,42 @@ def _resampled(
     """Return values of resamples, how many distinct ones there are, and the seed."""
     if rng is not None:
         recorded_generator(rng)  # or an error, even where nothing is drawn
-    n_distinct = math.prod(
-        _count_compositions(int(of.sum()), of.size) for of in units.freqs
-    )
-    if exact is not False and n_distinct <= _MAX_ALL:
-        return _all_resamples(units.freqs, values, units.width), n_distinct, None
-    if exact is True:
+    n_distinct = 1
+    for freq in units.freqs:
+        n, others = int(freq.sum()), freq.size - 1
+        # of more than 30 they are more than anybody takes, and not counted any further
+        n_distinct *= math.comb(n + others, min(n, others, 30))
+    if exact is True and n_distinct > _MAX_ALL:
         raise ParameterError(
             f"exact: there are more than {_MAX_ALL} distinct resamples, too many; draw "
             "some of them instead"
         )
-    generator, seed = recorded_generator(rng)
-    drawn = _draw_resamples(units.freqs, values, units.width, n_resamples, generator)
-    return drawn, n_distinct, seed
+    if exact is False or n_distinct > _MAX_ALL:
+        generator, seed = recorded_generator(rng)
+        size = max(1, _AT_ONCE // units.width)
+        of_blocks = [
+            values(
+                *(
+                    generator.multinomial(
+                        of.sum(), of / of.sum(), size=min(size, n_resamples - start)
+                    ).astype(np.float64)
+                    for of in units.freqs
+                )
+            )
+            for start in range(0, n_resamples, size)
+        ]
+        return _Resamples.of(np.concatenate(of_blocks)), n_distinct, seed
+    # every distinct resample once, of each sample by itself
+    counts, weights = zip(*map(_compositions, units.freqs), strict=True)
+    places = np.indices([len(of) for of in counts]).reshape(len(counts), -1)
+    n_blocks = 1 + n_distinct * units.width // _AT_ONCE
+    of_blocks = [
+        values(*(of[at] * 1.0 for of, at in zip(counts, block, strict=True)))
+        for block in np.array_split(places, n_blocks, axis=1)
+    ]
+    probabilities = [of[at] for of, at in zip(weights, places, strict=True)]
+    taken = _Resamples.of(np.concatenate(of_blocks), np.prod(probabilities, axis=0))
+    return taken, n_distinct, None
 
 
 # -- what is drawn ---------------------------------------------------------------------
@@ -275,7 +296,7 @@ class _Units:
 
 def _item_units(problem: IntervalProblem, clusters: object) -> _Units:
     """Return items, or clusters of them, with a warning where there are few."""
-    rows, freq, words = problem.rows, problem.freq, ""
+    rows, freq, words = problem.features(problem.codes), problem.freq, ""
     if clusters is None:
         few = warn_small(problem.n_paired_items, 16, "items", problem.n_items)
     else:
@@ -327,7 +348,7 @@ def _rater_units(problem: IntervalProblem) -> _Units:
     if problem.target == "raters":
         return raters
     few_items = warn_small(problem.n_paired_items, 16, "items", problem.n_items)
-    rows, sums_of = problem.rows[is_item], formula.resampled(codes, v)
+    rows, sums_of = problem.features(codes), formula.resampled(codes, v)
     return _Units(
         freqs=(freq, *raters.freqs),
         values=lambda items, taken: problem.values(sums_of(items, taken)),
@@ -340,12 +361,9 @@ def _rater_units(problem: IntervalProblem) -> _Units:
 
 def _distinct_features(rows: Floats, freq: Integers) -> tuple[Floats, Integers]:
     """Put items, or clusters, with equal features together; those of none go."""
-    rows, freq = rows[freq > 0], freq[freq > 0]
-    order = np.lexsort(rows.T[::-1])
-    is_first = np.ones(len(rows), dtype=bool)
-    is_first[1:] = (rows[order[1:]] != rows[order[:-1]]).any(axis=1)
-    first = np.flatnonzero(is_first)
-    return rows[order[first]], np.add.reduceat(freq[order], first)
+    distinct, places = np.unique(rows[freq > 0], axis=0, return_inverse=True)
+    often = np.bincount(places.ravel(), freq[freq > 0])
+    return distinct, often.astype(np.int64)
 
 
 def _standard_errors(problem: IntervalProblem, units: _Units, counts: Floats) -> Floats:
@@ -531,13 +549,6 @@ class _Resamples:
         return off * (high - low) / (ends[1] - ends[0]) if low < high else 0.0
 
 
-def _count_compositions(n: int, n_units: int) -> int:
-    """Return how many distinct resamples of n there are of some distinct units."""
-    fewer = min(n, n_units - 1)
-    # of so many they are more than anybody counts
-    return math.comb(n + n_units - 1, fewer) if fewer < 30 else 10**15
-
-
 def _compositions(freq: Integers) -> tuple[Integers, Floats]:
     """Return how often each unit is in every resample, and its probability."""
     # freq (n_units,) -> (n_resamples, n_units), (n_resamples,)
@@ -552,42 +563,3 @@ def _compositions(freq: Integers) -> tuple[Integers, Floats]:
     factorials = np.cumsum(steps, dtype=np.longdouble).astype(np.float64)
     logs = counts * np.log(freq / n) - factorials[counts]
     return counts, np.exp(factorials[n] + logs.sum(axis=1))
-
-
-def _all_resamples(
-    freqs: Sequence[Integers], values: Callable[..., Floats], width: int
-) -> _Resamples:
-    """Take every distinct resample once, of each sample by itself."""
-    counts, weights = zip(*map(_compositions, freqs), strict=True)
-    places = np.indices([len(of) for of in counts]).reshape(len(counts), -1)
-    of_blocks = [
-        values(*(of[at] * 1.0 for of, at in zip(counts, block, strict=True)))
-        for block in np.array_split(
-            places, 1 + places.shape[1] * width // _AT_ONCE, axis=1
-        )
-    ]
-    probabilities = [of[at] for of, at in zip(weights, places, strict=True)]
-    return _Resamples.of(np.concatenate(of_blocks), np.prod(probabilities, axis=0))
-
-
-def _draw_resamples(
-    freqs: Sequence[Integers],
-    values: Callable[..., Floats],
-    width: int,
-    n_resamples: int,
-    generator: np.random.Generator,
-) -> _Resamples:
-    """Draw as many of each sample as there are, with replacement."""
-    size = max(1, _AT_ONCE // width)
-    of_blocks = [
-        values(
-            *(
-                generator.multinomial(
-                    of.sum(), of / of.sum(), size=min(size, n_resamples - start)
-                ).astype(np.float64)
-                for of in freqs
-            )
-        )
-        for start in range(0, n_resamples, size)
-    ]
-    return _Resamples.of(np.concatenate(of_blocks))

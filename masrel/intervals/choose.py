@@ -35,13 +35,12 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from masrel.agreement import CountedRatings, Label
+from masrel.agreement._engine import Integers, check_option
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, Target, _LongNote
 from masrel.intervals._question import (
-    Integers,
     IntervalProblem,
     Statistic,
-    check_one_of,
     cluster_codes,
     find_entry,
     pose_problem,
@@ -146,9 +145,9 @@ def estimate(
     >>> result.interval.method
     'item jackknife, t(11) on the logit'
     """
-    check_one_of("method", method, get_args(_Method))
+    check_option("method", method, get_args(_Method))
     entry = find_entry(coefficient, metric)
-    check_one_of("target", target, get_args(Target))
+    check_option("target", target, get_args(Target))
     there_is = entry.interval_target
     if method == "auto" and there_is not in (None, target):
         raise ParameterError(
@@ -184,7 +183,7 @@ def estimate(
             error, _ = _clustered_error(problem, clusters)
             result = replace(result, standard_error=error)
     if method == "auto":
-        interval, why = _chosen(ask(entry, ratings), clusters)
+        interval, why = _choose_interval(ask(entry, ratings), clusters)
         others = _OTHERS[target] if clusters is None else "clusters of items"
         notes = (_LongNote(f"chosen for other {others}: {why}"), *interval.notes)
         interval = replace(interval, target=target, notes=notes)
@@ -201,29 +200,24 @@ def estimate(
     return replace(result, interval=interval)
 
 
-def _chosen(
-    problem: IntervalProblem, clusters: Integers | None
+def _choose_interval(
+    problem: IntervalProblem, clusters: Integers | None = None
 ) -> tuple[Interval, str]:
-    """Compute the interval that covers best, where clusters may be what is sampled."""
+    """Compute the interval that covers best, and say what it is and why."""
     if clusters is not None:
         # no posterior knows of them
-        interval = _leave_out(problem, clusters).interval(lowest=problem.entry.lowest)
+        left_out = _leave_out(problem, clusters).interval(lowest=problem.entry.lowest)
         outside, rare = _outside_commonest(problem)
-        if interval.reason is None and rare:
+        if left_out.reason is None and rare:
             notes = warn_small(outside, _SEVERAL, _OUTSIDE)
-            interval = replace(interval, notes=(*notes, *interval.notes))
-        return interval, "left out, on a scale without ends"
+            left_out = replace(left_out, notes=(*notes, *left_out.notes))
+        return left_out, "left out, on a scale without ends"
     if problem.is_too_large and problem.target == "items":
         slope = problem.slopes(problem.sums)
         error = problem.item_features.error(slope, problem.freq)
         df, method = problem.n_paired_items - 1, "delta method, t(n-1)"
         why = "too many different grades to leave items out one by one"
         return problem.by_t(error, df, method=method, unit=None), why
-    return _choose_interval(problem)
-
-
-def _choose_interval(problem: IntervalProblem) -> tuple[Interval, str]:
-    """Compute the interval that covers best, and say what it is and why."""
     if problem.entry.shape == "pairs":
         why = "items leave with the pairs of all their raters"
         return _leave_out(problem).interval(), why
@@ -334,8 +328,7 @@ def _lift(problem: IntervalProblem, interval: Interval) -> Interval:
     # knows, but trusts many raters too much where κ is low; halfway covers with either.
     from masrel.intervals._rho import DEFAULT_PRIOR, RhoPosterior
 
-    counts = problem.item_counts()
-    posterior = RhoPosterior.of(counts, DEFAULT_PRIOR)
+    posterior = RhoPosterior.of(problem.item_counts(), DEFAULT_PRIOR)
     (high,) = posterior.quantiles(0.5 + 0.5 * problem.level)
     if not high > interval.high:
         return interval

@@ -18,20 +18,18 @@ import numpy as np
 
 from masrel.agreement import Label, Metric, Significance, WeightsLike, count_ratings
 from masrel.agreement._codes import item_counts
-from masrel.agreement._engine import Floats
-from masrel.agreement._labels import is_row
+from masrel.agreement._engine import Floats, check_option
+from masrel.agreement._labels import is_row, warn_caller
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval
 from masrel.intervals._question import (
     ClusterSums,
     IntervalProblem,
     Statistic,
-    check_one_of,
     cluster_codes,
     pose_problem,
     student_t,
     warn_small,
-    warn_user,
 )
 from masrel.intervals.jackknife import _variance_of
 
@@ -277,7 +275,7 @@ def _compare(
     clusters: object,
 ) -> _Compared:
     """Check both sets of ratings, and estimate their difference and its variance."""
-    check_one_of("design", design, get_args(_Design))
+    check_option("design", design, get_args(_Design))
     problems = [
         pose_problem(
             coefficient,
@@ -457,11 +455,11 @@ class Differences:
         first = self.estimates[0].coefficient
         lines = [f"{first}: {self.n_units} {self.unit}, {self.method}"]
         for one, other in itertools.combinations(range(len(self.names)), 2):
-            place = one, other
             lines.append(
-                f"{self.names[one]} - {self.names[other]}: {self.values[place]:.3f} "
-                f"[{self.low[place]:.3f}, {self.high[place]:.3f}], "
-                f"p = {self.p_values[place]:.3g}"
+                f"{self.names[one]} - {self.names[other]}: "
+                f"{self.values[one, other]:.3f} "
+                f"[{self.low[one, other]:.3f}, {self.high[one, other]:.3f}], "
+                f"p = {self.p_values[one, other]:.3g}"
             )
         return "\n".join([*lines, str(self.equality)])
 
@@ -553,7 +551,7 @@ def differences(
     first - second: 0.600 [0.300, 0.900], p = 0.000237
     differences: 16.39, F(1, 39), p = 0.000237
     """
-    check_one_of("simultaneous", simultaneous, _METHODS)
+    check_option("simultaneous", simultaneous, _METHODS)
     if isinstance(sets, str) or not isinstance(sets, Iterable):
         raise ParameterError(f"sets: needs ratings of two sets or more, got {sets!r}")
     named = dict(sets) if isinstance(sets, Mapping) else dict(enumerate(sets))
@@ -873,8 +871,7 @@ def donner_test(
     test = partial(_tested, "donner_test", _SAME, "chi-squared", df, n)
     for place, (both, one, neither) in enumerate(tables):
         if one == 0 and 0 in (both, neither):
-            reason = f"group {place}: its ratings are of one category"
-            return test(reason=reason)
+            return test(reason=f"group {place}: its ratings are of one category")
     p = (2.0 * observed[:, 0] + observed[:, 1]) / (2.0 * n_items)
     between = p * (1.0 - p)
     kappa = 1.0 - observed[:, 1] / (2.0 * n_items * between)
@@ -888,8 +885,7 @@ def donner_test(
     )
     expected = n_items[:, None] * shares
     if not (expected > 0.0).all():
-        reason = "both raters of all groups agree on every item, or never"
-        return test(reason=reason)
+        return test(reason="both raters of all groups agree on every item, or never")
     return test(statistic=float(((observed - expected) ** 2 / expected).sum()))
 
 
@@ -929,7 +925,7 @@ def _tested(
     from scipy.special import chdtrc, fdtrc, stdtr  # loaded only for a p-value
 
     if reason is not None:
-        warn_user(f"undefined {name}: {reason}", UndefinedStatisticWarning)
+        warn_caller(f"undefined {name}: {reason}", UndefinedStatisticWarning)
         statistic = p = math.nan
     elif distribution == "t":
         p = min(1.0, 2.0 * float(stdtr(df[0], -abs(statistic))))

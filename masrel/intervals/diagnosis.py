@@ -356,7 +356,7 @@ def _changes(
     without, errors, half = (np.full(codes.shape[1], math.nan) for _ in range(3))
     active = np.flatnonzero((codes >= 0).any(axis=0))
     everyone = of_rows(problem, codes[:, active], freq)
-    moved = everyone.values(everyone.sums - everyone.rows)
+    moved = everyone.values(everyone.sums - everyone.features(everyone.codes))
     rated = everyone.codes >= 0
     left_out = _without_raters(everyone) if len(active) > 2 else ()
     for rater, is_rated, (sums, rows) in zip(active, rated.T, left_out, strict=False):

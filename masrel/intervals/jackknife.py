@@ -7,14 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from masrel.agreement import Label, Metric, WeightsLike
-from masrel.agreement._engine import Floats
+from masrel.agreement._engine import Floats, Integers
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target, Unit
 from masrel.intervals._question import (
     COLUMNS,
     ROUNDING,
     ClusterSums,
-    Integers,
     IntervalProblem,
     Statistic,
     cluster_codes,
@@ -156,8 +155,9 @@ def _leave_out(problem: IntervalProblem, clusters: Integers | None = None) -> _L
         variance, units, reason = math.nan, (), "the estimate itself is undefined"
     for unit in units:
         if unit == "items":
-            values, freq = problem.values(problem.sums - problem.rows), problem.freq
-            n = problem.n_paired_items
+            rows = problem.features(problem.codes)
+            values = problem.values(problem.sums - rows)
+            freq, n = problem.freq, problem.n_paired_items
         elif clusters is not None:
             left = ClusterSums.of(problem, clusters)
             values = problem.values(problem.sums - left.sums[left.known])
@@ -222,7 +222,7 @@ def _without_raters(problem: IntervalProblem) -> Iterator[tuple[Floats, Floats]]
 def _variance_of_cells(problem: IntervalProblem) -> float:
     """Return the variance that leaving out items and leaving out raters both hold."""
     # that of a rater on an item, (n - 1)(r - 1)/(n r) Σ_ij (κ_-i-j - κ_-i - κ_-j + κ)²
-    without_item = problem.values(problem.sums - problem.rows)
+    without_item = problem.values(problem.sums - problem.features(problem.codes))
     cells = 0.0
     for sums, rows in _without_raters(problem):
         without_both = problem.values(sums - rows)
