@@ -1,6 +1,6 @@
 """What comes in: the rules that it breaks, as a sentence."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from masrel.errors import ParameterError
 
@@ -12,6 +12,13 @@ def refuse(*rules: tuple[object, str]) -> None:
     for is_broken, sentence in rules:
         if is_broken:
             raise ParameterError(sentence)
+
+
+def check_option(name: str, value: object, options: Collection[object]) -> None:
+    """Check that an argument is one of its options."""
+    if value not in options:
+        known = ", ".join(map(str, options))
+        raise ParameterError(f"{name}: needs one of {known}, got {value!r}")
 
 
 def not_utf8(error: UnicodeDecodeError) -> str:

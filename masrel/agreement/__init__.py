@@ -31,7 +31,6 @@ from masrel.agreement.benchmarks import (
     p_value,
     strength,
 )
-from masrel.agreement.category import category_kappa, fleiss_null
 from masrel.agreement.change import (
     McnemarKind,
     bhapkar,
@@ -44,16 +43,24 @@ from masrel.agreement.change import (
     specific_agreement,
     stuart_maxwell,
 )
-from masrel.agreement.icc import IccForm, icc, icc_f_test, robinson_a
+from masrel.agreement.icc import (
+    IccForm,
+    icc,
+    icc_f_test,
+    kendall_w,
+    kendall_w_test,
+    robinson_a,
+)
 from masrel.agreement.kappas import (
     brennan_prediger,
+    category_kappa,
     conger_kappa,
     fleiss_kappa,
+    fleiss_null,
     gwet_ac,
     percent_agreement,
     scott_pi,
 )
-from masrel.agreement.kendall import kendall_w, kendall_w_test
 from masrel.agreement.krippendorff import Metric, krippendorff_alpha
 from masrel.agreement.measurement import (
     ErrorKind,

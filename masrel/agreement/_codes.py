@@ -11,6 +11,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from masrel._input import check_option
 from masrel.agreement._labels import (
     MISSING,
     Codes,
@@ -302,10 +303,7 @@ def code_long(
     >>> code_long(frame, categories=["1", "1+", "2"]).codes.tolist()
     [[0, 1], [2, -1]]
     """
-    if repeated not in get_args(Repeated):
-        raise ParameterError(
-            f"repeated: needs one of {', '.join(get_args(Repeated))}, got {repeated!r}"
-        )
+    check_option("repeated", repeated, get_args(Repeated))
     if not hasattr(frame, "columns") or not hasattr(frame, "iloc"):
         raise RatingsError(f"frame: needs a DataFrame, got {type(frame).__name__}")
     for name in (item, rater, grade):

@@ -7,7 +7,7 @@ jackknife, the bootstrap and clusters follow from these two.
 """
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -217,13 +217,6 @@ def check_level(level: float) -> None:
     # a level so near to 1 that its upper quantile is that of 1 has no ends
     if not (is_number and 0.0 < level < 1.0 and 0.5 + 0.5 * level < 1.0):
         raise ParameterError(f"level: needs (0, 1), got {shown(level)}")
-
-
-def check_option(name: str, value: object, options: Collection[object]) -> None:
-    """Check that an argument is one of its options."""
-    if value not in options:
-        known = ", ".join(map(str, options))
-        raise ParameterError(f"{name}: needs one of {known}, got {value!r}")
 
 
 def check_population(population: int, n_items: int) -> None:

@@ -94,7 +94,7 @@ class _Likelihood:
         """Return the ratios (2,) of highest likelihood."""
         # from the best of a grid, the first of those that differ by rounding; ratios
         # are about as large as 1 / residual at most
-        axis = _u_of(np.geomspace(1e-4, 30.0 * max(1.0, precision), 8))
+        axis = np.arcsinh(np.sqrt(np.geomspace(1e-4, 30.0 * max(1.0, precision), 8)))
         starts = np.array(list(product(axis, repeat=1 + self.has_raters)))
         start = starts[np.argmin(self.at(starts).round(9))]
         near = minimize(self._height, start, jac=self.slopes, method="BFGS").x
@@ -135,17 +135,15 @@ class _Likelihood:
             return float(at(0.0)[0])
         # there may be more than one valley
         around = last * np.geomspace(1e-2, 1e2, 9)
-        grid = _u_of(np.sort([0.0, *np.geomspace(1e-4, 1e4, 24), *around]))
+        grid = np.arcsinh(
+            np.sqrt(np.sort([0.0, *np.geomspace(1e-4, 1e4, 24), *around]))
+        )
         best = int(np.argmin(at(grid)))
         ends = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
         valley = minimize_scalar(
             lambda u: at(u)[0], bounds=ends, method="bounded", options={"xatol": 1e-8}
         )
         return float(min(valley.fun, at(0.0)[0]))
-
-
-def _u_of(ratios: _Floats) -> _Floats:
-    return np.asarray(np.arcsinh(np.sqrt(ratios)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -174,15 +172,7 @@ class Components:
             + " (the least it can be)" * (value == 0.0)
             for name, value in parts.items()
         ]
-        text = f"ratings are missing; variances by REML: {', '.join(listed)}"
-        return _LongNote(text)
-
-    def covariance(self) -> _Floats:
-        """Return that of the three estimates, (3, 3), from the expected information."""
-        if self.likelihood is None:
-            return np.full((3, 3), math.nan)
-        information = self.likelihood.information(self.ratios)
-        return np.asarray(2.0 * self.residual**2 * np.linalg.inv(information))
+        return _LongNote(f"ratings are missing; variances by REML: {', '.join(listed)}")
 
     def icc_ends(self, *, absolute: bool, level: float) -> tuple[float, float]:
         """Return the ends of the interval of a single rating's correlation."""

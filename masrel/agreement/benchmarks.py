@@ -7,11 +7,11 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from masrel._input import check_option
 from masrel.agreement._engine import (
     NO_SPREAD,
     ONE_PAIR,
     check_level,
-    check_option,
     undefined,
 )
 from masrel.agreement._labels import is_row, shown

@@ -7,13 +7,14 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from masrel._input import check_option
 from masrel.agreement._codes import (
     check_table,
     check_two_by_two,
     pair_table,
     two_raters,
 )
-from masrel.agreement._engine import check_option, undefined
+from masrel.agreement._engine import undefined
 from masrel.agreement._labels import Label
 from masrel.agreement._weights import NO_CHANCE, NO_PAIR
 from masrel.errors import CountsError

@@ -1,4 +1,4 @@
-"""What mean squares say: six intraclass correlations, and Robinson's A.
+"""What mean squares say: intraclass correlations, Robinson's A, and W, of ranks.
 
 A table with gaps has no mean squares: variances are then estimated by restricted
 maximum likelihood, and the interval is read from its profile.
@@ -12,10 +12,10 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel._input import check_option
 from masrel.agreement._codes import complete_values, rated_part, rating_values
 from masrel.agreement._engine import (
     check_level,
-    check_option,
     deviations,
     measured,
     undefined,
@@ -262,6 +262,118 @@ def robinson_a(
     )
 
 
+def kendall_w(
+    ratings: object,
+    *,
+    categories: Sequence[Label] | None = None,
+    ties: bool = True,
+) -> Estimate:
+    """Estimate how far raters put the items into the same order.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Numbers, or labels of a declared scale; None and ``nan`` are missing.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; needed for text.
+    ties : bool, optional
+        Whether to correct for ties; without it W cannot reach 1 when there are any.
+
+    Returns
+    -------
+    Estimate
+        W within [0, 1]. It has no delta-method error, observed or chance agreement.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table, or text without categories.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If there are fewer than two complete items or two raters, or every rater ties
+        all items; the value is then ``nan``.
+
+    Notes
+    -----
+    Items with a missing rating are left out.
+
+    References
+    ----------
+    .. [1] Kendall, M. G., Babington Smith, B. (1939). The problem of m rankings.
+       Annals of Mathematical Statistics, 10(3), 275-287.
+       https://doi.org/10.1214/aoms/1177732186
+    .. [2] Kendall, M. G. (1948). Rank Correlation Methods, ch. 6.
+
+    Examples
+    --------
+    >>> kendall_w([[1, 1, 2], [2, 3, 1], [3, 2, 3]]).value
+    0.4444444444444444
+    """
+    values = complete_values(ratings, categories)
+    value, reason = _w(values, ties=ties)
+    weights = "tie-corrected" if ties else "uncorrected"
+    return measured(
+        "kendall_w", values, categories, value, weights=weights, reason=reason
+    )
+
+
+def kendall_w_test(
+    ratings: object,
+    *,
+    categories: Sequence[Label] | None = None,
+    ties: bool = True,
+) -> Significance:
+    """Test whether the raters' orders are unrelated, by Friedman's chi-squared.
+
+    Parameters
+    ----------
+    ratings, categories, ties : optional
+        As of `kendall_w`.
+
+    Returns
+    -------
+    Significance
+        Friedman's m (n - 1) W with n - 1 degrees of freedom; approximate below some
+        8 items.
+
+    Raises
+    ------
+    RatingsError
+        As `kendall_w`.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        As `kendall_w`.
+
+    Examples
+    --------
+    >>> print(kendall_w_test([[1, 1, 2], [2, 3, 1], [3, 2, 3]]))
+    kendall_w_test: 2.667, chi-squared(2), p = 0.264
+    """
+    values = complete_values(ratings, categories)
+    n, m = values.shape
+    w, reason = _w(values, ties=ties)
+    statistic = p = math.nan
+    if reason is None:
+        from scipy.special import chdtrc
+
+        statistic = m * (n - 1) * w
+        p = float(chdtrc(n - 1, statistic))
+    return Significance(
+        name="kendall_w_test",
+        hypothesis="the raters' orders are unrelated",
+        statistic=statistic,
+        distribution="chi-squared",
+        df=(float(max(n - 1, 0)),),
+        p_value=p,
+        n_items=n,
+        reason=reason,
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class _Anova:
     # mean squares of [1], of items, raters, residual, and within items, in unit²
@@ -314,13 +426,17 @@ class _Anova:
         return (self.items - self.error(form)) / self.denominator(form)
 
 
+def _too_few(values: NDArray[np.float64]) -> str | None:
+    if values.shape[0] < 2:
+        return "fewer than two items are rated by every rater"
+    return "fewer than two raters" if values.shape[1] < 2 else None
+
+
 def _reason(
     values: NDArray[np.float64], anova: _Anova, form: str = "ICC(1)"
 ) -> str | None:
-    if values.shape[0] < 2:
-        return undefined(form, "fewer than two items are rated by every rater")
-    if values.shape[1] < 2:
-        return undefined(form, "fewer than two raters")
+    if why := _too_few(values):
+        return undefined(form, why)
     if anova.items == 0.0 and anova.error(form) == 0.0:
         return undefined(form, "0/0: neither items nor ratings of an item differ")
     if anova.denominator(form) == 0.0:
@@ -448,3 +564,25 @@ def _stepped_up(rho: float, k: int) -> float:
     # an end of the interval that lies beyond is no bound
     denominator = 1.0 + (k - 1) * rho
     return -math.inf if denominator <= 0.0 else k * rho / denominator
+
+
+def _w(values: NDArray[np.float64], *, ties: bool) -> tuple[float, str | None]:
+    """Return W, or why there is none."""
+    n, m = values.shape
+    if why := _too_few(values):
+        return math.nan, undefined("Kendall's W", why)
+    # ranks are doubled, so that those of ties are whole, and S four times as large
+    sums, tied = np.zeros(n, dtype=np.int64), 0
+    for column in values.T:
+        _, place, freq = np.unique(column, return_inverse=True, return_counts=True)
+        # the mean rank of a tie, doubled: those below twice, then t + 1
+        sums += (2 * (np.cumsum(freq) - freq) + freq + 1)[place]
+        tied += sum(t**3 - t for t in freq.tolist())
+    # 12 S / (m² (n³ - n) - m ΣT), as in Kendall (1948), in whole numbers of any size
+    numerator = 3 * sum((s - m * (n + 1)) ** 2 for s in sums.tolist())
+    whole = m**2 * (n**3 - n)
+    denominator = whole - m * tied if ties else whole
+    if denominator == 0:
+        why = "0/0: every rater gives all items one rating"
+        return math.nan, undefined("Kendall's W", why)
+    return numerator / denominator, None

@@ -12,6 +12,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from masrel._input import check_option
 from masrel.agreement._codes import CountedRatings, count_ratings, item_counts
 from masrel.agreement._engine import (
     WHOLE,
@@ -206,17 +207,10 @@ def krippendorff_alpha(
     )
 
 
-def _check_metric(metric: str) -> None:
-    if metric not in get_args(Metric):
-        raise ParameterError(
-            f"metric: needs one of {', '.join(get_args(Metric))}, got {metric!r}"
-        )
-
-
 def _metric_weights(metric: Metric, counted: CountedRatings) -> Weights:
     # the δ² of a metric, which grow without bound
     # Krippendorff (2004), Content Analysis, 2nd ed., pp. 232-236
-    _check_metric(metric)
+    check_option("metric", metric, get_args(Metric))
     categories = counted.categories
     n = len(categories)
     if metric == "nominal" or n == 0:  # nobody rated anything

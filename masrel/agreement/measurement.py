@@ -9,21 +9,22 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel._input import check_option
 from masrel.agreement._codes import complete_values, rated_part, rating_values
 from masrel.agreement._engine import (
     NO_SPREAD,
     check_level,
-    check_option,
     deviations,
     measured,
     undefined,
 )
 from masrel.agreement._labels import Label
-from masrel.agreement.icc import _Anova
+from masrel.agreement.icc import _Anova, _too_few
 from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Estimate, Interval
 
 _Floats = NDArray[np.float64]
+_Parts = list[tuple[float, float]]  # of a variance, each with its degrees of freedom
 
 ErrorKind = Literal["agreement", "consistency"]
 """Whether what raters differ by on average is error, or not."""
@@ -33,6 +34,9 @@ _CHANGE = 1.96 * math.sqrt(2.0)
 
 _FEW = 3
 """Items from which on Lin's concordance has an error."""
+
+_ROUNDING = 1e-13
+"""Share of the variance of all ratings that is none."""
 
 _NODES, _FARTHEST = 96, 8.5
 """Of Gauss and Legendre's rule over what the mean can be: nodes, and standard errors
@@ -160,14 +164,14 @@ def _error(
     check_option("kind", kind, get_args(ErrorKind))
     check_level(level)
     values = rated_part(rating_values(ratings, categories))
-    squares = _squares(values)
+    variance_parts = _variance_parts(values, kind)
     value, interval, reason = math.nan, None, None
-    if isinstance(squares, str):
+    if isinstance(variance_parts, str):
         title = {"sem": "the standard error of measurement", "mdc": "MDC95"}[name]
-        reason = undefined(title, squares)
+        reason = undefined(title, variance_parts)
     else:
-        scale, parts = factor * squares.unit, squares.parts(kind)
-        variance = sum(square for square, _ in parts)
+        parts, unit, notes = variance_parts
+        scale, variance = factor * unit, sum(square for square, _ in parts)
         value = scale * math.sqrt(variance)
         low, high, why = _variance_ends(parts, variance, level)
         method = "χ²" if kind == "consistency" else "modified large sample, χ²"
@@ -176,53 +180,25 @@ def _error(
             high=scale * math.sqrt(high),
             level=level,
             kind="confidence",
-            method=f"REML, {method}" if squares.notes else method,
+            method=f"REML, {method}" if notes else method,
             target="items" if kind == "consistency" else "both",
-            notes=squares.notes,
+            notes=notes,
             reason=why,
         )
     name = name if kind == "agreement" else f"{name}_{kind}"
     return measured(name, values, categories, value, interval=interval, reason=reason)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Squares:
-    """Mean squares of raters and residual, in unit², with degrees of freedom."""
-
-    raters: float
-    residual: float
-    df_raters: float
-    df_residual: float
-    n: float  # items of a rater: the first is residual + n times that of raters
-    unit: float
-    notes: tuple[str, ...] = ()
-
-    def parts(self, kind: ErrorKind) -> list[tuple[float, float]]:
-        """Return what adds up to the variance of the error, and how free each is."""
-        if kind == "consistency":
-            return [(self.residual, self.df_residual)]
-        share = 1.0 / self.n
-        return [
-            (share * self.raters, self.df_raters),
-            ((1.0 - share) * self.residual, self.df_residual),
-        ]
-
-
-def _squares(values: _Floats) -> _Squares | str:
-    """Return the squares, or why there are none."""
+def _variance_parts(
+    values: _Floats, kind: ErrorKind
+) -> tuple[_Parts, float, tuple[str, ...]] | str:
+    """Return what adds up to the error's variance, its unit and notes, or why not."""
     n, k = values.shape
     if n < 2 or k < 2:
         return "fewer than two items" if n < 2 else "fewer than two raters"
     if not np.isnan(values).any():
-        anova = _Anova.of(values)
-        return _Squares(
-            raters=anova.raters,
-            residual=anova.residual,
-            df_raters=k - 1.0,
-            df_residual=(n - 1.0) * (k - 1.0),
-            n=float(n),
-            unit=anova.unit,
-        )
+        anova, df = _Anova.of(values), (k - 1.0, (n - 1.0) * (k - 1.0))
+        return _parts(kind, anova.raters, anova.residual, df, n), anova.unit, ()
     from masrel.agreement._mixed import components
 
     fit = components(values, has_raters=True)
@@ -231,27 +207,30 @@ def _squares(values: _Floats) -> _Squares | str:
     # Of the complete table that would say as much. With covariance V of the variances,
     # m = -V_ee / V_re makes σ²_e + m σ²_r and σ²_e uncorrelated; of a complete table it
     # is its number of items.
-    m, df_raters, df_residual = 1.0, k - 1.0, math.inf
-    if fit.residual > 0.0:
-        v = fit.covariance()
+    m, df = 1.0, (k - 1.0, math.inf)
+    of_raters = fit.residual + fit.raters
+    if fit.likelihood is not None:
+        information = fit.likelihood.information(fit.ratios)
+        v = 2.0 * fit.residual**2 * np.linalg.inv(information)
         # no more than all items, whatever rounding leaves of a tiny V_re
         m = float(v[2, 2] / max(-v[1, 2], v[2, 2] / n))
-        df_residual = float(2.0 * fit.residual**2 / v[2, 2])
+        of_raters = fit.residual + m * fit.raters
         noise = float(m**2 * v[1, 1] - v[2, 2])
-        df_raters = 2.0 * (fit.residual + m * fit.raters) ** 2 / noise
-    return _Squares(
-        raters=fit.residual + m * fit.raters,
-        residual=fit.residual,
-        df_raters=df_raters,
-        df_residual=df_residual,
-        n=m,
-        unit=fit.unit,
-        notes=(fit.words,),
-    )
+        df = 2.0 * of_raters**2 / noise, float(2.0 * fit.residual**2 / v[2, 2])
+    return _parts(kind, of_raters, fit.residual, df, m), fit.unit, (fit.words,)
+
+
+def _parts(
+    kind: ErrorKind, raters: float, residual: float, df: tuple[float, float], m: float
+) -> _Parts:
+    # of mean squares, that of raters being the residual's and m times their variance
+    if kind == "consistency":
+        return [(residual, df[1])]
+    return [(raters / m, df[0]), ((1.0 - 1.0 / m) * residual, df[1])]
 
 
 def _variance_ends(
-    parts: list[tuple[float, float]], variance: float, level: float
+    parts: _Parts, variance: float, level: float
 ) -> tuple[float, float, str | None]:
     # Equations (1.3) and (1.4) of [2]; of a single part they are those of χ².
     from scipy.special import chdtri
@@ -521,13 +500,15 @@ def lin_ccc(
     check_level(level)
     values = complete_values(ratings, categories)
     value, error, interval = math.nan, math.nan, None
-    reason = _reason(values)
+    reason = _too_few(values)
+    if reason is None and np.ptp(values) == 0.0:
+        reason = "0/0: all ratings are the same"
     if reason is not None:
         undefined("Lin's concordance", reason)
     else:
         scaled, _ = deviations(values)
-        value, error = _concordance(scaled)
-        interval = _interval(scaled, value, error, level)
+        value, error, without = _concordance(scaled)
+        interval = _interval(scaled, value, error, without, level)
     return measured(
         "lin_ccc",
         values,
@@ -539,32 +520,32 @@ def lin_ccc(
     )
 
 
-def _reason(values: _Floats) -> str | None:
-    if values.shape[0] < 2:
-        return "fewer than two items are rated by every rater"
-    if values.shape[1] < 2:
-        return "fewer than two raters"
-    return "0/0: all ratings are the same" if np.ptp(values) == 0.0 else None
-
-
-def _concordance(values: _Floats) -> tuple[float, float]:
-    """Return the coefficient and its error."""
+def _concordance(values: _Floats) -> tuple[float, float, _Floats]:
+    """Return the coefficient, its error, and the coefficient without each item."""
     # 1 - Σ (x_j - x_l)² within items over that between them, and its delta method
     n, k = values.shape
     means = values.mean(axis=0)
     x, levels = values - means, means - means.mean()
-    within = _within(values)
+    # Σ_{j<l} (x_j - x_l)² = k Σ_j (x_j - x̄)² of each item
+    within = k * ((values - values.mean(axis=1, keepdims=True)) ** 2).sum(axis=1)
     # (k - 1) Σ_j σ_j² + Σ_{j<l} (μ_j - μ_l)², and what each item adds to it
     between = k * float((levels**2).sum())
-    pull = (k - 1) * (x**2).sum(axis=1) + 2.0 * k * x @ levels
+    squares = (x**2).sum(axis=1)
+    pull = (k - 1) * squares + 2.0 * k * x @ levels
     whole = float(pull.mean()) + between
     ratio = float(within.mean()) / whole
-    if n < _FEW:
-        return 1.0 - ratio, math.nan
-    if k == 2:
-        return 1.0 - ratio, _error_of_two(values, 1.0 - ratio)
-    influence = (within - ratio * (pull + between)) / whole
-    return 1.0 - ratio, math.sqrt(float((influence**2).sum()) / (n * (n - 1)))
+    # without an item the raters' means move, too
+    moved = (squares - x.sum(axis=1) ** 2) / (n - 1) ** 2
+    wholes = (pull.sum() - pull) / (n - 1) + between + moved
+    wholes[wholes < _ROUNDING * whole] = math.nan  # all ratings are the same then
+    without = 1.0 - (within.sum() - within) / (n - 1) / wholes
+    error = math.nan
+    if n >= _FEW and k == 2:
+        error = _error_of_two(values, 1.0 - ratio)
+    elif n >= _FEW:
+        influence = (within - ratio * (pull + between)) / whole
+        error = math.sqrt(float((influence**2).sum()) / (n * (n - 1)))
+    return 1.0 - ratio, error, without
 
 
 def _error_of_two(values: _Floats, rho: float) -> float:
@@ -584,27 +565,9 @@ def _error_of_two(values: _Floats, rho: float) -> float:
     return math.sqrt(max(variance, 0.0) / (len(values) - 2))
 
 
-def _within(values: _Floats) -> _Floats:
-    """Return the squared differences of all pairs of raters, added up, of each item."""
-    # Σ_{j<l} (x_j - x_l)² = k Σ_j (x_j - x̄)²
-    means = values.mean(axis=1, keepdims=True)
-    return np.asarray(values.shape[1] * ((values - means) ** 2).sum(axis=1))
-
-
-def _without_each(values: _Floats) -> _Floats:
-    """Return the overall coefficient without each item."""
-    n, k = values.shape
-    x = values - values.mean()
-    within = _within(x)
-    means = (x.sum(axis=0) - x) / (n - 1)  # (n, k)
-    variances = ((x**2).sum(axis=0) - x**2) / (n - 1) - means**2
-    levels = means - means.mean(axis=1, keepdims=True)
-    whole = (k - 1) * variances.sum(axis=1) + k * (levels**2).sum(axis=1)
-    with np.errstate(invalid="ignore"):  # all ratings are the same without the item
-        return np.asarray(1.0 - (within.sum() - within) / (n - 1) / whole)
-
-
-def _interval(values: _Floats, value: float, error: float, level: float) -> Interval:
+def _interval(
+    values: _Floats, value: float, error: float, without: _Floats, level: float
+) -> Interval:
     """Return the interval, on Fisher's z."""
     n, k = values.shape
     low = high = value
@@ -623,12 +586,11 @@ def _interval(values: _Floats, value: float, error: float, level: float) -> Inte
             from scipy.special import stdtrit
 
             limit = np.nextafter(1.0, 0.0)  # without an item all may be perfect
-            each = np.arctanh(np.clip(_without_each(values), -limit, limit))
+            each = np.arctanh(np.clip(without, -limit, limit))
             if np.isnan(each).any():
                 reason = "undefined with one item left out: all ratings are the same"
-            squares = float(((each - each.mean()) ** 2).sum())
             quantile = float(stdtrit(n - 1, 0.5 + 0.5 * level))
-            width = quantile * math.sqrt((n - 1) / n * squares)
+            width = quantile * math.sqrt((n - 1) * float(each.var()))
         low, high = math.tanh(z - width), math.tanh(z + width)
     return Interval(
         low=low,

@@ -13,6 +13,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from masrel._input import check_option
 from masrel.agreement._codes import (
     CountedRatings,
     code_pairs,
@@ -31,7 +32,7 @@ from masrel.agreement._engine import (
 )
 from masrel.agreement._labels import Codes, Label
 from masrel.agreement._weights import NO_CHANCE, Weights, WeightsLike
-from masrel.errors import ParameterError, RatingsError
+from masrel.errors import RatingsError
 from masrel.estimates import Estimate
 
 Deletion = Literal["listwise", "pairwise"]
@@ -258,10 +259,7 @@ def light_kappa(
     >>> light_kappa([["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"]]).value
     0.5
     """
-    if deletion not in get_args(Deletion):
-        raise ParameterError(
-            f"deletion: needs one of {', '.join(get_args(Deletion))}, got {deletion!r}"
-        )
+    check_option("deletion", deletion, get_args(Deletion))
     everybody = count_ratings(ratings, categories)
     counted = raters_told_apart(everybody)
     n_raters = counted.codes.shape[1]

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, get_args
 
+from masrel._input import check_option
 from masrel.agreement._codes import (
     CodedRatings,
     code_pairs,
@@ -17,7 +18,7 @@ from masrel.agreement._labels import Label, shown
 from masrel.agreement._weights import Weights, WeightsLike, is_identity
 from masrel.agreement.icc import _NAMES as ICC_NAMES
 from masrel.agreement.icc import _target_of as icc_target
-from masrel.agreement.icc import icc, robinson_a
+from masrel.agreement.icc import icc, kendall_w, robinson_a
 from masrel.agreement.kappas import (
     _BRENNAN_PREDIGER,
     _CONGER,
@@ -32,12 +33,10 @@ from masrel.agreement.kappas import (
     percent_agreement,
     scott_pi,
 )
-from masrel.agreement.kendall import kendall_w
 from masrel.agreement.krippendorff import (
     _ALPHA,
     _ORDINAL_ALPHA,
     Metric,
-    _check_metric,
     _metric_weights,
     krippendorff_alpha,
 )
@@ -178,7 +177,7 @@ class Coefficient:
                 f"metric: is of krippendorff_alpha alone, got {metric!r} for "
                 f"{self.name}; other coefficients take weights"
             )
-        _check_metric(metric)
+        check_option("metric", metric, get_args(Metric))
         is_ordered = metric in ("ordinal", "interval", "ratio")
         order: frozenset[Property] = frozenset({"categories in any order"})
         return replace(

@@ -15,7 +15,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from masrel._input import listed, not_utf8, refuse
+from masrel._input import check_option, listed, not_utf8, refuse
 from masrel.errors import ParameterError, RatingsError
 
 Rule = Literal["half_even", "half_up"]
@@ -297,8 +297,7 @@ def _is_whole(count: object) -> bool:
 
 def check_weights(name: str, weights: str, known: tuple[str, ...] = WEIGHTS) -> None:
     """Refuse weights that cannot be audited."""
-    needed = f"{name}: needs one of {', '.join(known)}"
-    refuse((weights not in known, f"{needed}, got {weights!r}"))
+    check_option(name, weights, known)
 
 
 def read_claims(file: Path) -> tuple[Claim, ...]:

@@ -12,7 +12,7 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel._input import refuse
+from masrel._input import check_option, refuse
 from masrel.agreement import (
     COEFFICIENTS,
     CodedRatings,
@@ -31,7 +31,6 @@ from masrel.agreement._engine import (
     Formula,
     Integers,
     check_level,
-    check_option,
     undefined,
 )
 from masrel.agreement._labels import Codes, is_missing, is_row, warn_caller

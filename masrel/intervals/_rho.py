@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit, gammaln
 
+from masrel._input import check_option
 from masrel.agreement._engine import Floats
 from masrel.agreement._weights import Distances
 from masrel.errors import ConvergenceError, ParameterError
@@ -71,10 +72,7 @@ class Prior:
     @classmethod
     def of(cls, name: PriorName, concentration: float) -> "Prior":
         """Return a prior, checked."""
-        if name not in PRIOR_SHAPES:
-            raise ParameterError(
-                f"prior: needs one of {', '.join(get_args(PriorName))}, got {name!r}"
-            )
+        check_option("prior", name, get_args(PriorName))
         is_number = isinstance(concentration, int | float | np.number)
         if not (is_number and 0.0 < concentration <= _SUREST):
             raise ParameterError(

@@ -8,17 +8,10 @@ from typing import Literal
 
 import numpy as np
 
-from masrel._input import refuse
+from masrel._input import check_option, refuse
 from masrel.agreement import COEFFICIENTS, Label, Metric, WeightsLike
-from masrel.agreement._engine import (
-    NO_SPREAD,
-    ONE_PAIR,
-    WHOLE,
-    Features,
-    Integers,
-    check_option,
-)
-from masrel.agreement.category import _null_error
+from masrel.agreement._engine import NO_SPREAD, ONE_PAIR, WHOLE, Features, Integers
+from masrel.agreement.kappas import _null_error
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval, Target, Unit
 from masrel.intervals._question import (

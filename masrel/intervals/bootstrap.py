@@ -10,9 +10,9 @@ from typing import Literal, cast, get_args
 
 import numpy as np
 
-from masrel._input import refuse
+from masrel._input import check_option, refuse
 from masrel.agreement import Label, Metric, WeightsLike
-from masrel.agreement._engine import Floats, Integers, check_option
+from masrel.agreement._engine import Floats, Integers
 from masrel.agreement._labels import shown
 from masrel.agreement._weights import Distances
 from masrel.errors import ParameterError

@@ -34,8 +34,9 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
+from masrel._input import check_option
 from masrel.agreement import CountedRatings, Label
-from masrel.agreement._engine import Integers, check_option
+from masrel.agreement._engine import Integers
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, Target, _LongNote
 from masrel.intervals._question import (

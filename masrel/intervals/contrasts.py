@@ -16,9 +16,10 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from masrel._input import check_option
 from masrel.agreement import Label, Metric, Significance, WeightsLike, count_ratings
 from masrel.agreement._codes import item_counts
-from masrel.agreement._engine import Floats, check_option
+from masrel.agreement._engine import Floats
 from masrel.agreement._labels import is_row, warn_caller
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
+from masrel._input import check_option
 from masrel.agreement import Label
 from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
@@ -180,9 +181,7 @@ def posterior(
 
 def _checked_model(problem: IntervalProblem, model: _Model) -> _Model:
     """Check what was chosen, and return the model, which may be left to the data."""
-    if model not in get_args(_Model):
-        known = ", ".join(get_args(_Model))
-        raise ParameterError(f"model: needs one of {known}, got {model!r}")
+    check_option("model", model, get_args(_Model))
     if problem.target != "items":
         raise ParameterError(
             "target: a posterior generalises to other items, so "
