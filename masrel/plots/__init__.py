@@ -4,7 +4,10 @@ In: what to draw, as plain frozen values. Out: PNG, SVG or PDF, the same bytes f
 same values.
 """
 
+import contextlib
 import importlib
+import os
+import sys
 from collections.abc import Sequence
 
 from masrel.plots._drawn_values import Content, Drawn, Form
@@ -34,7 +37,7 @@ def draw(
     dict of str to bytes
         Each form's file.
     """
-    # matplotlib is loaded when something is drawn
+    _load_matplotlib()
     from masrel.plots._style import finished, house_style
 
     with house_style():
@@ -42,3 +45,17 @@ def draw(
         # one figure loads what no other needs
         drawer = getattr(importlib.import_module(module), function)
         return finished(drawer(*content.arguments), stamp=stamp, forms=forms)
+
+
+def _load_matplotlib() -> None:
+    """Load it whatever backend the environment names: none is needed here."""
+    # It cannot be loaded where MPLBACKEND names a backend that is not there.
+    if "matplotlib" in sys.modules:
+        return
+    backend = os.environ.pop("MPLBACKEND", None)
+    import matplotlib as mpl
+
+    if backend is not None:
+        os.environ["MPLBACKEND"] = backend
+        with contextlib.suppress(ValueError):
+            mpl.rcParams["backend"] = backend

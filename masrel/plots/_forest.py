@@ -248,7 +248,11 @@ def _ridge(distribution: Distribution) -> _Ridge:
         places, heights = distribution.values, distribution.weights
         parts["density"] = places, heights
     else:
-        values, shares = _distinct(distribution)
+        # every value once, with its share of the finite ones: both (n_distinct,)
+        finite = np.isfinite(distribution.values)
+        values, weights = distribution.values[finite], distribution.weights[finite]
+        starts = np.flatnonzero(np.diff(values, prepend=-np.inf) > _SAME)
+        values, shares = values[starts], np.add.reduceat(weights, starts)
         single = (shares.size <= _MAX_STEMS) | (shares >= _STEM_SHARE)
         if single.any():
             parts["stems"] = values[single], shares[single]
@@ -260,29 +264,15 @@ def _ridge(distribution: Distribution) -> _Ridge:
     return _Ridge(parts=parts, lowest=float(visible.min()))
 
 
-def _distinct(
-    distribution: Distribution,
-) -> tuple[_Floats, _Floats]:
-    # every value once, with its share of the finite ones: both (n_distinct,)
-    finite = np.isfinite(distribution.values)
-    values, weights = distribution.values[finite], distribution.weights[finite]
-    starts = np.flatnonzero(np.diff(values, prepend=-np.inf) > _SAME)
-    return values[starts], np.add.reduceat(weights, starts)
-
-
 def _bars(values: _Floats, shares: _Floats) -> tuple[_Floats, _Floats]:
     # (n_bars + 1,), (n_bars,); a value on an edge belongs to the bar below, as 1 does
-    width = _width(values, shares)
+    cumulative = shares.cumsum() / shares.sum()
+    low, high = values[np.searchsorted(cumulative, _MIDDLE).clip(0, values.size - 1)]
+    # the widest that shows the shape of what is narrow, too
+    enough = (width for width in _WIDTHS if _MIN_BARS * width <= high - low)
+    width = next(enough, _WIDTHS[-1])
     at = np.ceil(values / width - _SAME).astype(np.int64)
     first = at[0]
     heights = np.bincount(at - first, weights=shares).astype(np.float64)
     edges = width * np.arange(first - 1, first + heights.size)
     return edges, heights
-
-
-def _width(values: _Floats, shares: _Floats) -> float:
-    # the widest that shows the shape of what is narrow, too
-    cumulative = shares.cumsum() / shares.sum()
-    low, high = values[np.searchsorted(cumulative, _MIDDLE).clip(0, values.size - 1)]
-    enough = (width for width in _WIDTHS if _MIN_BARS * width <= high - low)
-    return next(enough, _WIDTHS[-1])

@@ -10,13 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from masrel.plots._style import (
-    BLACK,
-    BLUE,
-    DASHES,
-    GREY,
-    ORANGE,
-)
+from masrel.plots._style import BLACK, BLUE, DASHES, GREY, ORANGE
 from masrel.tables._tables import percent
 
 if TYPE_CHECKING:

@@ -14,12 +14,9 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogFormatter
-from numpy.typing import NDArray
 
-from masrel.plots._style import BLACK, BLUE, DASHES, GREY, ORANGE
+from masrel.plots._style import BLACK, BLUE, DASHES, GREY, ORANGE, short_name
 from masrel.tables._tables import counted, fixed_or_significant, percent
-
-_Floats = NDArray[np.float64]
 
 if TYPE_CHECKING:
     from masrel.agreement import LimitsOfAgreement
@@ -29,6 +26,7 @@ if TYPE_CHECKING:
 
 _MAX_DOTS = 2000
 _MAX_IN_A_ROW = 2
+_MAX_IN_A_LINE = 24  # letters of both raters
 _DOT: dict[str, Any] = {"color": BLUE, "alpha": 0.6}
 _SMALLEST, _LARGEST = 14.0, 160.0  # areas of dots, points²
 _NAMES = ("upper limit", "mean", "lower limit")
@@ -48,7 +46,9 @@ def limits_figure(panels: "Sequence[Panel]", unit: str) -> Figure:
     rows = -(-n // columns)
     figure = Figure(figsize=(5.2 if n == 1 else 3.9 * columns, 3.5 * rows + 0.3))
     places = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
-    dots = [_dots(panel) for _, (_, panel) in panels]
+    points = (np.column_stack([p.averages, p.differences]) for _, (_, p) in panels)
+    # where items are, (n, 2), and how many at each place
+    dots = [np.unique(at, axis=0, return_counts=True) for at in points]
     shown = [freq for _, freq in dots if len(freq) <= _MAX_DOTS]
     most = max((int(freq.max(initial=1)) for freq in shown), default=1)
     area = min(_SMALLEST, _LARGEST / most)  # of one item: points² on paper
@@ -61,13 +61,14 @@ def limits_figure(panels: "Sequence[Panel]", unit: str) -> Figure:
         else:
             axes.scatter(*at.T, s=area * freq, **_DOT, linewidths=0.0, zorder=3.0)
         of_unit = f" ({unit})" if unit else ""
-        axes.set_xlabel(f"mean of {raters[0]} and {raters[1]}{of_unit}")
-        axes.set_ylabel(f"{raters[0]} − {raters[1]}{of_unit}")
+        first, second = map(short_name, raters)
+        space = "\n" if len(first) + len(second) > _MAX_IN_A_LINE else " "
+        axes.set_xlabel(f"mean of {first}{space}and {second}{of_unit}")
+        axes.set_ylabel(f"{first} −{space}{second}{of_unit}")
         axes.set_title(title, loc="left")
         axes.margins(x=0.06, y=0.08)
     for axes in places[n:]:
         axes.set_visible(False)
-    sizes = [1, most] if most > 1 else []
     mark: dict[str, Any] = {"linestyle": "none", "marker": "o", "markeredgewidth": 0.0}
     marks = [
         Line2D(
@@ -78,7 +79,7 @@ def limits_figure(panels: "Sequence[Panel]", unit: str) -> Figure:
             **mark,
             **_DOT,
         )
-        for of in sizes
+        for of in ([1, most] if most > 1 else [])
     ]
     name = f"{percent(level)} % confidence interval, exact"
     band = Line2D([], [], color=GREY, alpha=0.3, linewidth=6.0, label=name)
@@ -86,12 +87,6 @@ def limits_figure(panels: "Sequence[Panel]", unit: str) -> Figure:
         handles=[*marks, band], loc="outside lower center", ncols=3, fontsize=8
     )
     return figure
-
-
-def _dots(panel: "LimitsOfAgreement") -> tuple[_Floats, NDArray[np.int64]]:
-    # where items are, (n, 2), and how many at each place
-    points = np.column_stack([panel.averages, panel.differences])
-    return np.unique(points, axis=0, return_counts=True)
 
 
 def _draw_hexagons(axes: Axes, panel: "LimitsOfAgreement") -> None:

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
+from matplotlib.transforms import ScaledTranslation, blended_transform_factory
 from numpy.typing import NDArray
 
 from masrel.plots._style import BLACK, BLUE, DASHES, GREY, short_name
@@ -61,9 +62,10 @@ def rater_figure(parts: "Sequence[tuple[str, Diagnosis]]", title: str) -> Figure
         axes.set_ylabel(name)
         for panel in panels:
             _influence(panel, result, order, cell)
-    bar = axes.inset_axes(
-        (0.0, -0.27 / (cell * sizes[-1]), 1.0, 0.11 / cell / sizes[-1])
-    )
+    # as wide as the last map, and below it by inches
+    below = figure.dpi_scale_trans + ScaledTranslation(0.0, 0.0, axes.transAxes)
+    place = blended_transform_factory(axes.transAxes, below)
+    bar = axes.inset_axes((0.0, -0.27, 1.0, 0.11), transform=place)
     figure.colorbar(image, cax=bar, orientation="horizontal", label=f"{title} of pairs")
     for panel in panels:
         panel.set_xlabel(

@@ -4,19 +4,17 @@ Colours are Okabe and Ito's, which colour-blind readers tell apart; shapes, line
 styles and text repeat what the colours say, so that a grey print loses nothing.
 """
 
+import io
 import textwrap
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from masrel.plots._matplotlib import mpl
-
-# isort: split
+import matplotlib as mpl
 from matplotlib.figure import Figure
-from matplotlib.text import Text
 
 from masrel.plots._drawn_values import Form
-from masrel.plots._picture import arrange, files_of
 
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
@@ -37,6 +35,8 @@ _NO_STYLE = ("backend", "backend_fallback")
 SHADES = {"pre-catch": "#FFFFFF", "catch": "#D9D9D9", "post-catch": "#F0F0F0"}
 """Background of each phase of a stretch."""
 
+_POINTS = 72  # to the inch
+
 STYLE: "dict[RcKeyType, object]" = {
     "font.family": "DejaVu Sans",  # ships with matplotlib: the same everywhere
     "font.size": 9,
@@ -53,10 +53,19 @@ STYLE: "dict[RcKeyType, object]" = {
     "svg.fonttype": "path",
     "pdf.fonttype": 42,  # letters stay letters, as journals ask
     "text.hinting": "none",  # as in vectors, where texts are measured
-    "figure.dpi": 72,  # a point is a pixel where labels are measured
+    "figure.dpi": _POINTS,  # a point is a pixel where labels are measured
     "axes.titley": 1.0,  # titles stand where they are placed, and are not moved about
+    "figure.constrained_layout.use": True,  # no label is cut off
 }
 
+_DPI = 200  # of pixels, also of those inside vectors
+_LEAST_ACROSS, _LEAST_DOWN = 100.0, 72.0  # points of an axes
+_ABOVE = 20.0  # points of a stamp
+_NO_TIME: dict[Form, dict[str, None]] = {  # what no file is to hold
+    "png": {"Software": None},
+    "svg": {"Date": None},
+    "pdf": {"CreationDate": None},
+}
 
 _MAX_LETTERS = 22  # of a name
 
@@ -91,21 +100,50 @@ def finished(
     figure: Figure, *, stamp: str, forms: Sequence[Form] = ("png", "svg")
 ) -> dict[Form, bytes]:
     """Return the files of a figure of the house style, under its stamp."""
-    arrange(figure, _stamp(figure, stamp) if stamp else None)
-    return files_of(figure, forms)
+    lay_out(figure, stamp)
+    files: dict[Form, bytes] = {}
+    for form in forms:
+        file = io.BytesIO()
+        figure.canvas.print_figure(file, format=form, dpi=_DPI, metadata=_NO_TIME[form])
+        files[form] = file.getvalue()
+    return files
 
 
-def _stamp(figure: Figure, text: str) -> Text:
-    is_loud = text.isupper()
-    # 7 pt letters are about 0.054 in wide; a long source goes on two lines
-    n_letters = int(figure.get_figwidth() / 0.054) - 2
-    return figure.text(
-        0.995,
-        1.0,
-        textwrap.fill(text, n_letters),
-        ha="right",
-        va="top",
-        fontsize=9.5 if is_loud else 7,
-        color=ALARM if is_loud else GREY,
-        weight="bold" if is_loud else "normal",
-    )
+def lay_out(figure: Figure, stamp: str) -> None:
+    """Place the axes of a figure between its stamp above and its legends below."""
+    for axes in figure.axes:
+        axes.xaxis.label.set_wrap(True)
+    _enlarge(figure)
+    if stamp:
+        is_loud = stamp.isupper()
+        # 7 pt letters are about 0.054 in wide; a long source goes on two lines
+        n_letters = int(figure.get_figwidth() / 0.054) - 2
+        figure.suptitle(
+            textwrap.fill(stamp, n_letters),
+            x=0.995,
+            ha="right",
+            va="top",
+            fontsize=9.5 if is_loud else 7,
+            color=ALARM if is_loud else GREY,
+            weight="bold" if is_loud else "normal",
+        )
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # the same for every form
+
+
+def _enlarge(figure: Figure) -> None:
+    # as far as long names, or a wide legend, leave too little room for the axes
+    across: dict[int, float] = defaultdict(float)  # points each row of axes needs
+    down: dict[int, float] = defaultdict(float)  # and each column
+    for axes in figure.axes:
+        place, inner = axes.get_subplotspec(), axes.bbox
+        outer = axes.get_tightbbox(for_layout_only=True)
+        if place is not None and outer is not None:
+            across[place.rowspan.start] += outer.width - inner.width + _LEAST_ACROSS
+            down[place.colspan.start] += outer.height - inner.height + _LEAST_DOWN
+    legends = [legend.get_window_extent() for legend in figure.legends]
+    beyond = _ABOVE + sum(legend.height for legend in legends)
+    width, height = figure.get_size_inches() * _POINTS
+    width = max([width, *across.values(), *(legend.width + 8.0 for legend in legends)])
+    height = max([height, *(points + beyond for points in down.values())])
+    figure.set_size_inches(width / _POINTS, height / _POINTS)

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from masrel.plots._picture import arrange, files_of
 from masrel.plots._style import (
     BLACK,
     BLUE,
     DASHES,
     GREY,
     ORANGE,
+    finished,
     house_style,
 )
 
@@ -55,8 +55,7 @@ def draw_work(points: Sequence["Point"]) -> None:
         axes.grid(which="major")
         axes.set_xlim(right=axes.get_xlim()[1] * 4)
         axes.legend(fontsize=7.5, loc="lower right")
-        arrange(figure, None)
-        picture = files_of(figure, ["png"])["png"]
+        picture = finished(figure, stamp="", forms=["png"])["png"]
         (FIGURES / "elbow_work.png").write_bytes(picture)
 
 
@@ -80,6 +79,5 @@ def draw_approach(rates: Sequence[float], late: dict[str, np.ndarray]) -> None:
             axes.set_xlabel("samples a second (Hz)")
             axes.legend(fontsize=7.5, loc="upper right")
         panels[0].set_ylabel("sampled − exact (ms)")
-        arrange(figure, None)
-        picture = files_of(figure, ["png"])["png"]
+        picture = finished(figure, stamp="", forms=["png"])["png"]
         (FIGURES / "elbow_sampled.png").write_bytes(picture)

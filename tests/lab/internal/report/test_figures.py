@@ -26,9 +26,8 @@ from masrel.lab.report.figures._trace_figures import trace_figure
 from masrel.plots import draw
 from masrel.plots._drawn_values import Drawn, Forest, ForestRow
 from masrel.plots._forest import forest_figure
-from masrel.plots._picture import arrange
 from masrel.plots._rater_pairs import rater_figure
-from masrel.plots._style import STYLE, house_style
+from masrel.plots._style import STYLE, house_style, lay_out
 
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -306,9 +305,9 @@ def test_every_group_has_its_map_and_what_raters_change_beside_it(
     parts = [("A", diagnosis(n_raters, reference)), ("B", diagnosis(n_raters))]
     with house_style():
         figure = rater_figure(parts[:1] if reference else parts, "Fleiss' κ")
+        lay_out(figure, "")
     maps = [axes for axes in figure.axes if axes.images]
     assert len(figure.axes) == len(maps) * n_panels
-    arrange(figure, None)
     cells = [axes.get_position() for axes in maps]
     assert [of.y1 for of in cells] == sorted((of.y1 for of in cells), reverse=True)
     across, down = figure.get_size_inches() / maps[0].images[0].get_array().shape[::-1]

@@ -88,8 +88,7 @@ def test_a_png_says_its_size_and_resolution_as_its_svg_does() -> None:
         image.verify()
     with Image.open(io.BytesIO(picture["png"])) as image:
         inches = np.array(image.size) / np.array(image.info["dpi"])
-        assert image.mode == "RGB"
-        assert image.getpixel((0, 0)) == (255, 255, 255)
+        assert image.getpixel((0, 0)) == (255, 255, 255, 255)
     words = picture["svg"].decode().partition("<svg ")[2].partition(">")[0]
     points = [
         float(words.partition(f'{side}="')[2].partition("pt")[0])
