@@ -620,10 +620,14 @@ def _model_at(design: Design, value: float) -> ItemModel:
 
 
 def _table_at(design: Design, value: float) -> ItemModel:
-    # With its margins, a table's kappa is proportional to how far it is from chance.
+    # With its margins held, a table's coefficient is a straight line in how far it is
+    # from chance, where Cohen's kappa is 0 and others need not be.
     table = np.array(design.model.table)
     chance = np.outer(table.sum(axis=1), table.sum(axis=0))
-    other = chance + value / _true_value(design) * (table - chance)
+    rows = tuple(map(tuple, chance.tolist()))
+    at_chance = _true_value(replace(design, model=replace(design.model, table=rows)))
+    share = (value - at_chance) / (_true_value(design) - at_chance)
+    other = chance + share * (table - chance)
     none = f"value: no table with these margins is as far from chance as {value:g}"
     refuse((other.min() < -1e-12, none))
     rows = tuple(map(tuple, np.maximum(other, 0.0).tolist()))

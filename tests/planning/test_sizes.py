@@ -173,3 +173,18 @@ def test_every_rating_costs_its_price(coefficient: str, n_ratings: int) -> None:
         Study(**options, n_items=20, n_raters=2, method="wald", prices=(1, 2, 3))
     )
     assert found.cost == 20 + 2 * 2 + 3 * n_ratings
+
+
+def test_the_size_of_an_agreement_of_a_table_is_that_of_a_share() -> None:
+    # ((1.960 √(.6 · .4) + .842 √(.7 · .3)) / (.7 - .6))² = 181.1
+    study = Study(
+        "percent_agreement",
+        target="items",
+        model="table",
+        prevalences=((0.4, 0.1), (0.2, 0.3)),
+        n_raters=2,
+        null=0.6,
+        power=0.8,
+        method="wald",
+    )
+    assert sample_size(study).n_items == 182
