@@ -315,6 +315,8 @@ def _plain(value: object) -> object:
         return as_document(value)
     if isinstance(value, float) and not math.isfinite(value):
         return None
+    if isinstance(value, str):
+        return str(value)  # also of a note that has a brief form
     if isinstance(value, dict):
         return {key: _plain(part) for key, part in value.items()}
     if isinstance(value, tuple | list):

@@ -73,13 +73,16 @@ def _hard_items(p: Floats, v: Any) -> tuple[Floats, Floats]:
 
 def _item_features(codes: Codes, v: Any, repeats: Integers | None = None) -> Features:
     # d, s, and the shares of categories of each row
+    if repeats is None:
+        codes = np.sort(codes, axis=1)  # so that rows of the same ratings are equal
     chosen = np.asarray(codes >= 0 if repeats is None else repeats, dtype=np.float64)
     size, within = chosen.sum(axis=1), np.empty(len(codes))
     step = max(1, _MAX_PAIRS // codes.shape[1] ** 2)
     for start in range(0, len(codes), step):
         rows = slice(start, start + step)
         pairs, often = v[codes[rows, :, None], codes[rows, None, :]], chosen[rows]
-        within[rows] = np.einsum("ig,igh,ih->i", often, pairs, often)
+        # summed in two steps, as one over all pairs of many raters would be rounded
+        within[rows] = ((pairs @ often[:, :, None])[..., 0] * often).sum(axis=1)
     d = within * (WHOLE / np.maximum(size * (size - 1.0), 1.0))
     d[size < 2] = 0.0  # also where v is nan
     shares = chosen * (WHOLE / np.maximum(size, 1.0))[:, None]

@@ -167,7 +167,7 @@ class IntervalProblem:
         notes: Sequence[str] = (),
     ) -> Interval:
         """Return a confidence interval, cut at the ends of the parameter space."""
-        if low < self.min_value or high > 1.0:
+        if low < self.min_value - ROUNDING or high > 1.0 + ROUNDING:
             space = f"[{self.min_value:g}, 1]"
             notes = (*notes, f"cut at the end of the parameter space {space}")
         return Interval(

@@ -5,11 +5,13 @@ name in one step, which is synced too: a kill or a full disk leaves the old byte
 new ones. No link is followed, and no output takes the place of a primary record.
 """
 
+import contextlib
 import errno
 import os
 import shutil
 import stat
 import sys
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -26,6 +28,7 @@ _BINARY = getattr(os, "O_BINARY", 0)
 
 # Names of files that are not whole yet
 _PART_BEGINS, _PART_ENDS = ".masrel-", ".part"
+_LONGEST_S = 86_400.0
 
 
 def write_file(
@@ -53,16 +56,16 @@ def write_files(
     parts: dict[Path, Path] = {}
     try:
         for path, data in contents.items():
-            parts[path] = _new_part(path, within, mode)
-            with _on_disk(parts[path], path) as out:
-                out.write(data.encode() if isinstance(data, str) else data)
-        for path, part in parts.items():
+            parts[path] = _write_part(path, data, within, mode)
+        for path in contents:
             with naming(path):
-                os.replace(part, path)
+                os.replace(parts[path], path)
+            del parts[path]
     finally:
         for part in parts.values():
             part.unlink(missing_ok=True)
     for folder in dict.fromkeys(path.parent for path in contents):
+        _remove_left_over(folder)
         sync_folder(folder)
 
 
@@ -70,14 +73,19 @@ def write_files(
 def new_file(path: Path) -> Iterator[BinaryIO]:
     """Give a file to write an output into bit by bit; at the end it gets its name."""
     refuse_record(path)
-    part = _new_part(path)
+    part, descriptor = _new_part(path)
     try:
-        with _on_disk(part, path) as out:
-            yield out
         with naming(path):
+            try:
+                with os.fdopen(descriptor, "wb", closefd=False) as out:
+                    yield out
+                os.fsync(descriptor)
+            finally:
+                os.close(descriptor)
             os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)
+    _remove_left_over(path.parent)
     sync_folder(path.parent)
 
 
@@ -87,54 +95,73 @@ def new_folder(folder: Path) -> Iterator[Path]:
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise ParameterError(f"{folder}: needed a new or empty folder, got another")
     make_folder(folder.parent)
-    part = _part_of(folder)
+    part = folder.with_name(f"{_PART_BEGINS}{os.urandom(8).hex()}{_PART_ENDS}")
     try:
         part.mkdir()
         yield part
         os.replace(part, folder)
+    except OSError as error:
+        place = Path(str(error.filename))
+        if place.is_relative_to(part):  # nobody knows it
+            error.filename = str(folder / place.relative_to(part))
+            error.filename2 = None
+        raise
     finally:
         shutil.rmtree(part, ignore_errors=True)
     sync_folder(folder.parent)
 
 
-def _part_of(path: Path) -> Path:
-    """Return a name that nobody knows beside a target."""
-    return path.with_name(f"{_PART_BEGINS}{os.urandom(8).hex()}{_PART_ENDS}")
+def _write_part(
+    path: Path, data: bytes | str, within: Path | None, mode: int | None
+) -> Path:
+    """Write what a file is to hold into a new one beside it, which is returned."""
+    part, descriptor = _new_part(path, within, mode)
+    try:
+        with naming(path):
+            remaining = memoryview(data.encode() if isinstance(data, str) else data)
+            while remaining:
+                remaining = remaining[os.write(descriptor, remaining) :]
+            os.fsync(descriptor)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+    finally:
+        os.close(descriptor)
+    return part
 
 
-def _new_part(path: Path, within: Path | None = None, mode: int | None = None) -> Path:
-    """Make a new empty file beside a target."""
+def _new_part(
+    path: Path, within: Path | None = None, mode: int | None = None
+) -> tuple[Path, int]:
+    """Make a new file of a name that nobody knows beside a target."""
     if within is not None:
         check_inside(path.parent, within)
     replaced = _mode(path)
     mode = replaced if mode is None else mode
     make_folder(path.parent)
-    part = _part_of(path)
+    part = path.with_name(f"{_PART_BEGINS}{os.urandom(8).hex()}{_PART_ENDS}")
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _NO_FOLLOW | _BINARY
     with naming(path):
-        os.close(os.open(part, flags, 0o666 if mode is None else mode))
+        descriptor = os.open(part, flags, 0o666 if mode is None else mode)
     if mode is not None:
         part.chmod(mode)  # as it was, whatever the umask is now
-    return part
-
-
-@contextmanager
-def _on_disk(part: Path, path: Path) -> Iterator[BinaryIO]:
-    """Open a part to write into; at the end it is on disk."""
-    descriptor = os.open(part, os.O_WRONLY | _BINARY)
-    try:
-        with naming(path):
-            # whoever writes may close the file, and it is synced all the same
-            with open(descriptor, "wb", closefd=False) as out:
-                yield out
-            os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+    return part, descriptor
 
 
 def is_part(path: Path) -> bool:
     """Return whether a file is one that is not whole yet, by its name."""
     return path.name.startswith(_PART_BEGINS) and path.name.endswith(_PART_ENDS)
+
+
+def _remove_left_over(folder: Path) -> None:
+    """Take away parts of processes that died: no file takes a day to write."""
+    with contextlib.suppress(OSError):  # of what another process took away
+        for path in folder.iterdir():
+            if is_part(path) and path.lstat().st_mtime < time.time() - _LONGEST_S:
+                if path.is_dir() and not path.is_symlink():
+                    shutil.rmtree(path)
+                else:
+                    path.unlink()
 
 
 @contextmanager
@@ -186,9 +213,9 @@ def sync_folder(folder: Path) -> None:
     except PermissionError:  # a folder that one may write into, but not list
         return
     try:
-        with naming(folder):
-            os.fsync(descriptor)
+        os.fsync(descriptor)
     except OSError as error:
+        error.filename = str(folder)
         if error.errno != errno.EINVAL:  # a file system that syncs no folders
             raise
     finally:

@@ -48,6 +48,7 @@ from masrel.ratings._sheet import (
     bytes_of,
     decoded,
     finished,
+    long_cells,
     read_text,
     unpacked,
 )
@@ -126,6 +127,7 @@ class RatingsFile:
     simulated: bool
 
 
+@long_cells()
 def read_ratings(
     path: Path | str,
     *,

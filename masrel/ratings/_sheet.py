@@ -17,6 +17,7 @@ import zipfile
 import zlib
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import date, datetime
 from decimal import Decimal
@@ -386,9 +387,18 @@ def _comments(
     return comments, start
 
 
+@contextmanager
+def long_cells() -> Iterator[None]:
+    """Let the csv module read cells of any length; the limit is that of all readers."""
+    limit = csv.field_size_limit(2**31 - 1)
+    try:
+        yield
+    finally:
+        csv.field_size_limit(limit)
+
+
 def reader_of(lines: Iterable[str], delimiter: str) -> Any:
     """Return a reader of records, by the csv module."""
-    csv.field_size_limit(2**31 - 1)  # cells may be of any length
     if delimiter == " ":  # any number of blanks or tabs, as R's write.table writes
         lines = (line.rstrip(" \t\r\n").replace("\t", " ") for line in lines)
     is_skipped = delimiter != "\t"

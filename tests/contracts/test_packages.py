@@ -31,7 +31,7 @@ USES = {
         "0.368",
     ),
     "scipy": (
-        "intervals/_problem.py",
+        "intervals/_question.py",
         IN_PYTHON
         + "from masrel.intervals import jackknife\n"
         + "print(jackknife('fleiss_kappa', ratings, target='raters',\n"
@@ -50,7 +50,7 @@ USES = {
         "forest.svg",
     ),
     "emcee": (
-        "intervals/_mcmc.py",
+        "intervals/latent/_sampler.py",
         "from masrel.intervals import latent_trait\n"
         + "ratings = [['0', '0', '0'], ['0', '1', '0'], ['1', '1', '1'],\n"
         + "           ['1', '0', '1'], ['0', '0', '1'], ['1', '1', '1']]\n"

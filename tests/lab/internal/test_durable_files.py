@@ -5,12 +5,19 @@ import os
 import stat
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
 from masrel.errors import ParameterError
-from masrel.lab._durable_files import new_file, no_follow, write_file, write_files
+from masrel.lab._durable_files import (
+    make_folder,
+    new_file,
+    no_follow,
+    write_file,
+    write_files,
+)
 
 
 def study(root: Path) -> Path:
@@ -56,11 +63,15 @@ def test_no_output_is_written_over_or_among_primary_records(
     record: str, tmp_path: Path
 ) -> None:
     root = study(tmp_path / "study")
+    before = sorted(root.rglob("*"))
     with pytest.raises(ParameterError, match="no primary record"):
         write_file(root / record, "x")
-    with pytest.raises(ParameterError), new_file(root / record):
+    with (
+        pytest.raises(ParameterError, match="no primary record"),
+        new_file(root / record),
+    ):
         pass
-    assert not (root / record).is_file() or not (root / record).read_text()
+    assert sorted(root.rglob("*")) == before
     write_file(root / "ratings" / "ratings.csv", "x")
 
 
@@ -83,7 +94,7 @@ def test_permissions_stay(mode: int, tmp_path: Path) -> None:
     assert stat.S_IMODE(secret.stat().st_mode) == mode
 
 
-@pytest.mark.parametrize("call", ["fsync", "replace"])
+@pytest.mark.parametrize("call", ["write", "fsync", "replace"])
 def test_a_full_disk_leaves_all_as_it_was_and_names_the_file(
     call: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -131,23 +142,12 @@ def test_files_that_belong_together_are_all_on_disk_before_one_has_its_name(
     assert events == [tmp_path.name, *new]
 
 
-def test_a_file_that_was_not_finished_gets_no_name(tmp_path: Path) -> None:
-    def stopped() -> None:
-        with new_file(tmp_path / "a") as out:
-            out.write(b"half")
-            out.close()
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        stopped()
-    assert not list(tmp_path.iterdir())
-
-
-def test_whoever_writes_a_file_may_close_it(tmp_path: Path) -> None:
+def test_a_file_that_is_written_bit_by_bit_is_on_disk_before_it_has_its_name(
+    tmp_path: Path, events: list[str]
+) -> None:
     with new_file(tmp_path / "a") as out:
-        out.write(b"whole")
-        out.close()
-    assert (tmp_path / "a").read_bytes() == b"whole"
+        out.write(b"x")
+    assert events == ["part", "= a", tmp_path.name]
 
 
 KILLED = """
@@ -159,12 +159,25 @@ write_file(Path(sys.argv[1]), "new")
 """
 
 
-def test_a_kill_leaves_what_there_was(tmp_path: Path) -> None:
+def test_what_a_kill_leaves_is_taken_away_after_a_day(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("old")
     died = subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False)
     assert died.returncode < 0
+    (left,) = tmp_path.glob(".masrel-*.part")
     assert path.read_text() == "old"
+    with new_file(tmp_path / "b.csv") as out:  # whose own part is not taken away
+        write_file(path, "new")
+        assert left.exists()  # it may be of a process that lives
+        yesterday = time.time() - 90_000
+        os.utime(left, (yesterday, yesterday))
+        write_file(path, "new")
+        assert not left.exists()
+        out.write(b"whole")
+    assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {
+        "a.csv": "new",
+        "b.csv": "whole",
+    }
 
 
 def test_a_file_that_is_added_to_is_not_opened_through_a_link(tmp_path: Path) -> None:
@@ -172,3 +185,9 @@ def test_a_file_that_is_added_to_is_not_opened_through_a_link(tmp_path: Path) ->
     (tmp_path / "log").symlink_to(tmp_path / "target")
     with pytest.raises(OSError, match="is a link, which is not followed"):
         open(tmp_path / "log", "ab", opener=no_follow)
+
+
+def test_folders_are_made_one_in_the_other(tmp_path: Path) -> None:
+    make_folder(tmp_path / "a" / "b")
+    make_folder(tmp_path / "a" / "b")
+    assert (tmp_path / "a" / "b").is_dir()
