@@ -16,7 +16,7 @@ def refuse(*rules: tuple[object, str]) -> None:
 
 def check_option(name: str, value: object, options: Collection[object]) -> None:
     """Check that an argument is one of its options."""
-    if value not in options:
+    if not isinstance(value, str) or value not in options:
         known = ", ".join(map(str, options))
         raise ParameterError(f"{name}: needs one of {known}, got {value!r}")
 

@@ -81,8 +81,9 @@ def _item_features(codes: Codes, v: Any, repeats: Integers | None = None) -> Fea
     for start in range(0, len(codes), step):
         rows = slice(start, start + step)
         pairs, often = v[codes[rows, :, None], codes[rows, None, :]], chosen[rows]
-        # summed in two steps, as one over all pairs of many raters would be rounded
-        within[rows] = ((pairs @ often[:, :, None])[..., 0] * often).sum(axis=1)
+        # in two steps: one sum over all pairs of many raters is rounded too often
+        of_first = np.einsum("igh,ih->ig", pairs, often)
+        within[rows] = np.einsum("ig,ig->i", of_first, often)
     d = within * (WHOLE / np.maximum(size * (size - 1.0), 1.0))
     d[size < 2] = 0.0  # also where v is nan
     shares = chosen * (WHOLE / np.maximum(size, 1.0))[:, None]
