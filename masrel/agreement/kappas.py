@@ -74,7 +74,8 @@ def _hard_items(p: Floats, v: Any) -> tuple[Floats, Floats]:
 def _item_features(codes: Codes, v: Any, repeats: Integers | None = None) -> Features:
     # d, s, and the shares of categories of each row
     if repeats is None:
-        codes = np.sort(codes, axis=1)  # so that rows of the same ratings are equal
+        # so that rows of the same ratings are equal, with what is missing behind
+        codes = -np.sort(-codes, axis=1)
     chosen = np.asarray(codes >= 0 if repeats is None else repeats, dtype=np.float64)
     size, within = chosen.sum(axis=1), np.empty(len(codes))
     step = max(1, _MAX_PAIRS // codes.shape[1] ** 2)
