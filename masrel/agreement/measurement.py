@@ -501,7 +501,7 @@ def lin_ccc(
     values = complete_values(ratings, categories)
     value, error, interval = math.nan, math.nan, None
     reason = _too_few(values)
-    if reason is None and np.ptp(values) == 0.0:
+    if reason is None and values.min() == values.max():
         reason = "0/0: all ratings are the same"
     if reason is not None:
         undefined("Lin's concordance", reason)
