@@ -18,7 +18,8 @@ def check_option(name: str, value: object, options: Collection[object]) -> None:
     """Check that an argument is one of its options."""
     if not isinstance(value, str) or value not in options:
         known = ", ".join(map(str, options))
-        raise ParameterError(f"{name}: needs one of {known}, got {value!r}")
+        got = "nothing" if value is None else repr(value)
+        raise ParameterError(f"{name}: needs one of {known}, got {got}")
 
 
 def not_utf8(error: UnicodeDecodeError) -> str:

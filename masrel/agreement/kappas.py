@@ -76,7 +76,7 @@ def _item_features(codes: Codes, v: Any, repeats: Integers | None = None) -> Fea
     if repeats is None:
         # so that rows of the same ratings are equal, with what is missing behind
         codes = -np.sort(-codes, axis=1)
-    chosen = np.asarray(codes >= 0 if repeats is None else repeats, dtype=np.float64)
+    chosen = np.array(codes >= 0 if repeats is None else repeats, dtype=np.float64)
     size, within = chosen.sum(axis=1), np.empty(len(codes))
     step = max(1, _MAX_PAIRS // codes.shape[1] ** 2)
     for start in range(0, len(codes), step):
@@ -87,9 +87,9 @@ def _item_features(codes: Codes, v: Any, repeats: Integers | None = None) -> Fea
         within[rows] = np.einsum("ig,ig->i", of_first, often)
     d = within * (WHOLE / np.maximum(size * (size - 1.0), 1.0))
     d[size < 2] = 0.0  # also where v is nan
-    shares = chosen * (WHOLE / np.maximum(size, 1.0))[:, None]
+    chosen *= (WHOLE / np.maximum(size, 1.0))[:, None]
     dense = np.array([d, (size > 1) * float(WHOLE)])
-    return Features(dense, np.maximum(codes, 0), shares, len(v))
+    return Features(dense, np.maximum(codes, 0), chosen, len(v))
 
 
 def _complete_features(

@@ -361,9 +361,11 @@ def _rater_units(problem: IntervalProblem) -> _Units:
 
 def _distinct_features(rows: Floats, freq: Integers) -> tuple[Floats, Integers]:
     """Put items, or clusters, with equal features together; those of none go."""
-    distinct, places = np.unique(rows[freq > 0], axis=0, return_inverse=True)
-    often = np.bincount(places.ravel(), freq[freq > 0])
-    return distinct, often.astype(np.int64)
+    rows, freq = rows[freq > 0], freq[freq > 0]
+    _, first, places = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    often = np.bincount(places.ravel(), freq).astype(np.int64)
+    order = np.argsort(first)  # as they come: features, which are rounded, decide none
+    return rows[first[order]], often[order]
 
 
 def _standard_errors(problem: IntervalProblem, units: _Units, counts: Floats) -> Floats:

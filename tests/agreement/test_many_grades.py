@@ -184,4 +184,4 @@ def test_continuous_ratings_take_a_few_times_their_room() -> None:
     krippendorff_alpha(ratings, metric="interval")
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert peak < 24 * ratings.nbytes
+    assert peak < 20 * ratings.nbytes
