@@ -1,12 +1,31 @@
-"""What goes out: files that replace no primary record, cells that are no formulas."""
+"""What goes out: files that are whole or not there, cells that are no formulas.
 
+A file is made under another name beside the one that it replaces, synced, and gets its
+name in one step, which is synced too: a kill or a full disk leaves the old bytes or the
+new ones. No link is followed, and no output takes the place of a primary record.
+"""
+
+import contextlib
 import errno
 import os
 import re
 import shutil
+import stat
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 from masrel.errors import ParameterError
+
+# What Windows alone has, and what it lacks
+NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
+BINARY = getattr(os, "OBINARY", 0)
+
+# Names of files that are not whole yet, and seconds that no file takes to write
+PART_BEGINS, PART_ENDS = ".masrel-", ".part"
+_LONGEST_S = 86_400.0
 
 # A cell that begins a formula, and a number that merely begins like one
 _FORMULA = re.compile(r"'*[=+\-@\t\r]")
@@ -22,24 +41,161 @@ _SOURCES = (
 )
 
 
-def write_file(path: Path, data: bytes | str) -> None:
-    """Write what can be computed again: whole, through no link, or not at all."""
-    # what a study must not lose is written by `masrel.lab._durable_files`
+def write_file(
+    path: Path,
+    data: bytes | str,
+    *,
+    within: Path | None = None,
+    mode: int | None = None,
+) -> None:
+    """Write an output: whole, on disk and under its name, or not at all."""
+    # within: a folder that it may not leave by a link; mode: as `write_files` has it
     refuse_record(path)
-    if path.exists() and not path.is_file():  # such as /dev/stdout
-        raise OSError(errno.EINVAL, "needs to be a file, or nothing yet", str(path))
-    if path.is_file() and not os.access(path, os.W_OK):  # it is to stay as it is
-        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
-    part = path.with_name(f".masrel-{os.urandom(8).hex()}.part")
+    write_files({path: data}, within=within, mode=mode)
+
+
+def write_files(
+    contents: Mapping[Path, bytes | str],
+    *,
+    within: Path | None = None,
+    mode: int | None = None,
+) -> None:
+    """Write files that belong together: all on disk before the first has its name."""
+    # They get their names in this order. Text is UTF-8 with lines as they are. mode:
+    # permissions; those of the file that is replaced, or the usual ones, unless given
+    parts: dict[Path, Path] = {}
     try:
-        part.write_bytes(data.encode() if isinstance(data, str) else data)
-        if path.exists() and not path.is_symlink():
-            shutil.copymode(path, part)
-        os.replace(part, path)
-    except OSError as error:  # nobody knows the part
-        raise OSError(error.errno, error.strerror, str(path)) from error
+        for path, data in contents.items():
+            parts[path] = _write_part(path, data, within, mode)
+        for path in contents:
+            with naming(path):
+                os.replace(parts[path], path)
+            del parts[path]
     finally:
+        for part in parts.values():
+            part.unlink(missing_ok=True)
+    for folder in dict.fromkeys(path.parent for path in contents):
+        remove_left_over(folder)
+        sync_folder(folder)
+
+
+def _write_part(
+    path: Path, data: bytes | str, within: Path | None, mode: int | None
+) -> Path:
+    """Write what a file is to hold into a new one beside it, which is returned."""
+    part, descriptor = new_part(path, within, mode)
+    try:
+        with naming(path):
+            remaining = memoryview(data.encode() if isinstance(data, str) else data)
+            while remaining:
+                remaining = remaining[os.write(descriptor, remaining) :]
+            os.fsync(descriptor)
+    except BaseException:
         part.unlink(missing_ok=True)
+        raise
+    finally:
+        os.close(descriptor)
+    return part
+
+
+def new_part(
+    path: Path, within: Path | None = None, mode: int | None = None
+) -> tuple[Path, int]:
+    """Make a new file of a name that nobody knows beside a target."""
+    if within is not None:
+        check_inside(path.parent, within)
+    replaced = _mode(path)
+    mode = replaced if mode is None else mode
+    make_folder(path.parent)
+    part = path.with_name(f"{PART_BEGINS}{os.urandom(8).hex()}{PART_ENDS}")
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | NO_FOLLOW | BINARY
+    with naming(path):
+        descriptor = os.open(part, flags, 0o666 if mode is None else mode)
+    if mode is not None:
+        part.chmod(mode)  # as it was, whatever the umask is now
+    return part, descriptor
+
+
+def is_part(path: Path) -> bool:
+    """Return whether a file is one that is not whole yet, by its name."""
+    return path.name.startswith(PART_BEGINS) and path.name.endswith(PART_ENDS)
+
+
+def remove_left_over(folder: Path) -> None:
+    """Take away parts of processes that died: no file takes a day to write."""
+    with contextlib.suppress(OSError):  # of what another process took away
+        for path in folder.iterdir():
+            if is_part(path) and path.lstat().st_mtime < time.time() - _LONGEST_S:
+                if path.is_dir() and not path.is_symlink():
+                    shutil.rmtree(path)
+                else:
+                    path.unlink()
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Within it, an error of the system that names no file names this one."""
+    try:
+        yield
+    except OSError as error:
+        # a full disk does not say which file it was, and nobody knows the part
+        if str(error.filename or PART_ENDS).endswith(PART_ENDS):
+            error.filename, error.filename2 = str(path), None
+        raise
+
+
+def _mode(path: Path) -> int | None:
+    """Return the permissions of what is replaced; refuse what is no file or kept so."""
+    try:
+        mode = path.stat().st_mode
+    except FileNotFoundError:  # nothing, or a link to nothing, which is replaced
+        return None
+    if not stat.S_ISREG(mode):  # such as /dev/stdout, which "-" stands for
+        raise OSError(errno.EINVAL, "needs to be a file, or nothing yet", str(path))
+    if path.is_symlink():
+        return None  # the permissions of another file
+    if not os.access(path, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+    return stat.S_IMODE(mode)
+
+
+def make_folder(folder: Path, *, mode: int = 0o777) -> None:
+    """Make a folder, with this mode, and those above it that are missing, on disk."""
+    new: list[Path] = []
+    while not folder.is_dir() and folder != folder.parent:
+        new.append(folder)
+        folder = folder.parent
+    for path in reversed(new):
+        # Another process may be as fast.
+        path.mkdir(exist_ok=True, mode=mode if path is new[0] else 0o777)
+        sync_folder(path.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Wait until the names in a folder are on disk."""
+    # A new file's name is on disk only when its folder is.
+    if sys.platform == "win32":
+        return
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except PermissionError:  # a folder that one may write into, but not list
+        return
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        error.filename = str(folder)
+        if error.errno != errno.EINVAL:  # a file system that syncs no folders
+            raise
+    finally:
+        os.close(descriptor)
+
+
+def check_inside(folder: Path, root: Path) -> None:
+    """Refuse a folder of a study that a link leads out of it."""
+    if not folder.resolve().is_relative_to(root.resolve()):
+        raise ParameterError(
+            f"{folder}: needs to be in {root}, got a link to {folder.resolve()}"
+        )
 
 
 def refuse_record(path: Path) -> None:

@@ -18,9 +18,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from masrel._files import write_file
 from masrel.errors import ParameterError
 from masrel.lab._bounded_files import MAX_RECORDING, read_regular, regular
-from masrel.lab._durable_files import write_file
 
 FOLDER = ".masrel_cache"
 """What the folder is called in a study."""

@@ -16,9 +16,10 @@ from pathlib import Path
 from types import MappingProxyType, TracebackType
 from typing import TYPE_CHECKING, Self
 
+from masrel._files import make_folder, naming, sync_folder
 from masrel.errors import SessionLogError, SessionLogInUseError
 from masrel.lab._bounded_files import MAX_TABLE, parse_json, read_regular
-from masrel.lab._durable_files import make_folder, naming, no_follow, sync_folder
+from masrel.lab._durable_files import no_follow
 from masrel.lab._once import once
 
 if TYPE_CHECKING:

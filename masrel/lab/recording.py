@@ -18,6 +18,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel._files import write_files
 from masrel.errors import ParameterError, RecordingError
 from masrel.lab._bounded_files import (
     MAX_RECORDING,
@@ -26,7 +27,6 @@ from masrel.lab._bounded_files import (
     parse_json,
     read_regular,
 )
-from masrel.lab._durable_files import write_files
 
 __all__ = [
     "MEASURED_TORQUE",

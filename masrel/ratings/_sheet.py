@@ -5,7 +5,6 @@ In: a path, "-" or a pipe, and what the caller says of it. Out: a `Sheet`.
 
 import codecs
 import csv
-import gc
 import gzip
 import io
 import lzma
@@ -29,6 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel._collector import collector_off
 from masrel.errors import ParameterError, RatingsError
 from masrel.ratings._findings import ReadingOptions, refusal
 
@@ -461,17 +461,11 @@ def _columns(sheet: Sheet, reader: Any, width: int) -> tuple[Column, ...]:
     numbers: list[dict[str, int]]
     numbers = [defaultdict(count().__next__) for _ in range(width)]  # the next is new
     codes: list[list[Codes]] = [[np.zeros(0, dtype=np.int64)] for _ in range(width)]
-    # lists of text are no cycles, and to look for some in them takes as long as to read
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
+    with collector_off():  # lists of text are no cycles, and are looked at in vain
         for records in checked_records(sheet, reader, width):
             for k, cells in enumerate(zip(*records, strict=True)):
                 part = map(numbers[k].__getitem__, cells)
                 codes[k].append(np.fromiter(part, np.int64, len(records)))
-    finally:
-        if was_on:
-            gc.enable()
     parts = zip(codes, numbers, strict=True)
     return tuple(Column.of(np.concatenate(codes), number) for codes, number in parts)
 

@@ -9,8 +9,8 @@ import masrel
 PACKAGE = Path(masrel.__file__).parent
 
 WRITERS = {
-    "_files.py",  # what can be computed again
-    "lab/_durable_files.py",
+    "_files.py",
+    "lab/_durable_files.py",  # bit by bit
     "lab/_event_log.py",  # lines are added to a log
     "lab/cli/_gating.py",  # a summary that a CI system gives is added to
     "lab/hess/_spool.py",  # samples while they are taken

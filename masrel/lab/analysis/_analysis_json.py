@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from masrel._files import write_file
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, as_document
-from masrel.lab._durable_files import write_file
 from masrel.lab.analysis._results import Analysis
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 from importlib.resources import files
 from pathlib import Path
 
+from masrel._files import write_file
 from masrel.errors import ParameterError
-from masrel.lab._durable_files import write_file
 from masrel.lab.checklist._items import Checklist, ChecklistItem, State
 from masrel.lab.report._docx import Heading, as_docx
 from masrel.lab.report._material import Paragraph

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 
 import click
 
+from masrel._files import write_file
 from masrel.cli._options import Decorator, grouped
 from masrel.cli._paths import OutputFile
 from masrel.errors import ParameterError
 from masrel.lab._bounded_files import read_regular
-from masrel.lab._durable_files import no_follow, write_file
+from masrel.lab._durable_files import no_follow
 
 if TYPE_CHECKING:
     from masrel.lab.analysis import Analysis, GateResult

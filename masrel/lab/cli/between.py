@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import click
 
 import masrel
+from masrel._files import write_file
 from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.cli._paths import InputFile, refuse_inputs
 from masrel.errors import ParameterError
 from masrel.lab._bounded_files import MAX_SMALL, parse_toml, read_regular
-from masrel.lab._durable_files import write_file
 
 if TYPE_CHECKING:
     from masrel.lab.elbow import ElbowParameters

@@ -7,9 +7,9 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
+from masrel._files import write_file
 from masrel.cli._options import OutputOptions, output_options
 from masrel.errors import MasrelWarning, ParameterError
-from masrel.lab._durable_files import write_file
 from masrel.lab.cli._study_options import read_study
 from masrel.lab.protocol import Protocol, StudyPaths, copy_template, read_protocol
 

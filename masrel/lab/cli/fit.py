@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from masrel._files import write_file
 from masrel.cli._options import Decorator, OutputOptions, output_options, write_output
 from masrel.cli._paths import InputFile, OutputFile
 from masrel.errors import ParameterError
-from masrel.lab._durable_files import write_file
 from masrel.lab.cli._study_options import warnings_as_notes
 
 if TYPE_CHECKING:

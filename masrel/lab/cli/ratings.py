@@ -4,8 +4,8 @@ from pathlib import Path
 
 import click
 
+from masrel._files import write_file
 from masrel.cli._paths import OutputFile, note_inputs
-from masrel.lab._durable_files import write_file
 from masrel.lab._once import read_once
 from masrel.lab.cli._study_options import echo_remarks
 from masrel.lab.protocol import StudyPaths, read_protocol

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from masrel._files import refuse_record
+from masrel._collector import collector_off
+from masrel._files import check_inside, refuse_record
 from masrel.cli._options import (
     STDOUT,
     OutputOptions,
@@ -20,8 +21,6 @@ from masrel.cli._options import (
 from masrel.errors import ParameterError
 from masrel.lab._bounded_files import MAX_TABLE, parse_json, read_regular
 from masrel.lab._cache import FOLDER, Cache
-from masrel.lab._collector import collector_off
-from masrel.lab._durable_files import check_inside
 from masrel.lab._once import read_once
 from masrel.lab.cli._comparing import CompareOptions, compare_options
 from masrel.lab.cli._gating import GateOptions, Verdict, gate_options, verdict_of

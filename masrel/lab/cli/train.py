@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from masrel._files import write_file
 from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.cli._paths import OutputFile
-from masrel.lab._durable_files import write_file
 from masrel.lab.cli._study_options import warnings_as_notes
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol, scale_of
 

@@ -4,8 +4,9 @@ from collections.abc import Callable, Collection, Iterator
 from datetime import date
 from pathlib import Path
 
+from masrel._files import write_files
 from masrel.errors import ParameterError
-from masrel.lab._durable_files import new_folder, write_files
+from masrel.lab._durable_files import new_folder
 from masrel.lab.export._bids import bids_files
 from masrel.lab.export._data_package import data_package_files
 from masrel.lab.export._dataset import Dataset, gather_dataset

@@ -17,9 +17,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel._files import make_folder
 from masrel.errors import ParameterError, RecordingError
 from masrel.lab._bounded_files import MAX_RECORDING, parse_json, read_regular
-from masrel.lab._durable_files import make_folder, no_follow
+from masrel.lab._durable_files import no_follow
 from masrel.lab.hess.limits import DeviceLimits
 from masrel.lab.recording import RECORDING_COLUMNS, Channel, _channels_of, _Fact
 

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from masrel._collector import collector_off
 from masrel.errors import (
     DeviceError,
     OverrunWarning,
     ParameterError,
     RecordingWarning,
 )
-from masrel.lab._collector import collector_off
 from masrel.lab.hess._course import Course
 from masrel.lab.hess._presented import Presented, as_presented
 from masrel.lab.hess._realtime import scheduled

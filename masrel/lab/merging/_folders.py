@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
+from masrel._files import make_folder, write_files
 from masrel.errors import ParameterError, ScheduleError
 from masrel.lab._bounded_files import MAX_RECORDING, read_regular
-from masrel.lab._durable_files import make_folder, new_folder, write_files
+from masrel.lab._durable_files import new_folder
 from masrel.lab._event_log import line_hashes, utc_now
 from masrel.lab.conduct._study_log import append_event
 from masrel.lab.merging._site_protocols import check_protocols, merged_protocol

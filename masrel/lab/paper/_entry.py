@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import msgspec
 
 import masrel
+from masrel._files import check_inside
 from masrel.errors import ParameterError, RatingsError, SessionLogError
-from masrel.lab._durable_files import check_inside
 from masrel.lab._event_log import SessionLog, utc_now
 from masrel.lab.conduct._study_answers import study_answers
 from masrel.lab.conduct._study_log import append_event, stated

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import masrel
+from masrel._files import write_files
 from masrel.errors import ParameterError, RatingsError
-from masrel.lab._durable_files import write_files
 from masrel.lab.paper._form import (
     Form,
     QuestionColumn,

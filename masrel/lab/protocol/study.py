@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import masrel
+from masrel._files import is_part, write_files
 from masrel.errors import ParameterError
-from masrel.lab._durable_files import is_part, write_files
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,10 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from masrel._files import from_safe_cell, safe_cell
+from masrel._files import from_safe_cell, safe_cell, write_file
 from masrel._input import listed
 from masrel.errors import ParameterError
-from masrel.lab._durable_files import write_file
 from masrel.lab.conduct._study_answers import study_answers
 from masrel.lab.protocol import Protocol, Question, StudyPaths
 from masrel.lab.protocol._questions import Answer, checked_answer, questions_of

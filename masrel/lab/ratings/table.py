@@ -9,9 +9,8 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from masrel._files import safe_cell
+from masrel._files import safe_cell, write_file
 from masrel.errors import RatingsError
-from masrel.lab._durable_files import write_file
 from masrel.lab.run._state import FELT, FROM_PERSONS
 from masrel.scales import Scale
 

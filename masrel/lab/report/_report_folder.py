@@ -17,10 +17,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from masrel._files import refuse_record
+from masrel._files import make_folder, refuse_record, sync_folder, write_files
 from masrel.lab._bounded_files import MAX_TABLE, read_regular
 from masrel.lab._cache import file_hash
-from masrel.lab._durable_files import make_folder, sync_folder, write_files
 
 if sys.platform != "win32":
     import fcntl

@@ -9,12 +9,12 @@ from collections.abc import Callable, Container, Sequence
 from datetime import datetime
 from pathlib import Path
 
+from masrel._files import check_inside
 from masrel.errors import (
     ParameterError,
     ProtocolError,
     SessionLogError,
 )
-from masrel.lab._durable_files import check_inside
 from masrel.lab._event_log import Event, SessionLog, utc_now
 from masrel.lab.conduct._standing import refuse_withdrawn
 from masrel.lab.conduct._study_answers import study_answers

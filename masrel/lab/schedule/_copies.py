@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
+from masrel._files import make_folder, write_files
 from masrel.errors import ScheduleError
 from masrel.lab._bounded_files import MAX_SMALL, read_regular
-from masrel.lab._durable_files import make_folder, write_files
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.protocol.study import _check_new_folder
 from masrel.lab.schedule._secret import find_secret, new_secret, site_secret_text

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
+from masrel._files import make_folder, write_files
 from masrel.errors import ScheduleError
 from masrel.lab._bounded_files import MAX_SMALL, read_regular
-from masrel.lab._durable_files import make_folder, write_files
 from masrel.lab.protocol import StudyPaths
 
 N_BYTES = 16

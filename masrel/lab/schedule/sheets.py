@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from masrel._files import make_folder, write_files
 from masrel._input import listed, not_utf8
 from masrel.errors import ScheduleError
 from masrel.lab._bounded_files import (
@@ -15,7 +16,6 @@ from masrel.lab._bounded_files import (
     format_problem,
     read_regular,
 )
-from masrel.lab._durable_files import make_folder, write_files
 from masrel.lab._once import once
 from masrel.lab.protocol import (
     Protocol,

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from masrel._files import make_folder, write_files
 from masrel.errors import MasrelError, ParameterError
 from masrel.lab._bounded_files import MAX_SMALL, parse_json, read_regular
-from masrel.lab._durable_files import make_folder, write_files
 from masrel.lab.protocol import StudyPaths
 
 Role = Literal["rater", "coordinator"]

@@ -18,8 +18,8 @@ from pathlib import Path
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from masrel._files import make_folder
 from masrel.errors import ParameterError
-from masrel.lab._durable_files import make_folder
 from masrel.lab.hess._realtime import off_the_loop
 from masrel.lab.protocol import StudyPaths
 from masrel.lab.serve._access import Access

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from masrel._files import write_file
 from masrel.errors import ParameterError, SessionLogError
 from masrel.lab._bounded_files import (
     MAX_TABLE,
@@ -12,7 +13,6 @@ from masrel.lab._bounded_files import (
     format_problem,
     read_regular,
 )
-from masrel.lab._durable_files import write_file
 from masrel.lab._event_log import line_hashes, read_log
 from masrel.lab.protocol import StudyPaths
 from masrel.lab.verification._finding import Finding, broken
