@@ -21,7 +21,7 @@ from masrel.errors import ParameterError
 
 # What Windows alone has, and what it lacks
 NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
-BINARY = getattr(os, "OBINARY", 0)
+BINARY = getattr(os, "O_BINARY", 0)
 
 # Names of files that are not whole yet, and seconds that no file takes to write
 PART_BEGINS, PART_ENDS = ".masrel-", ".part"

@@ -812,7 +812,7 @@ def rating_values(ratings: Any, categories: Sequence[Label] | None) -> Floats:
     known = coded.categories
     if not known:
         return np.empty((0, coded.codes.shape[1]))
-    if categories is None and isinstance(known[0], str):
+    if not coded.declared and isinstance(known[0], str):
         raise RatingsError(
             "categories: needs the declared scale in order, because the ratings are "
             f"text, such as {known[0]!r}"

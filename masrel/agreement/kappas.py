@@ -75,10 +75,10 @@ def _item_features(codes: Codes, v: Any, repeats: Integers | None = None) -> Fea
     # d, s, and the shares of categories of each row
     if repeats is None:
         # so that rows of the same ratings are equal, with what is missing behind
-        codes = -np.sort(-codes, axis=1)
+        codes = np.sort(codes, axis=1)[:, ::-1]
     chosen = np.array(codes >= 0 if repeats is None else repeats, dtype=np.float64)
     size, within = chosen.sum(axis=1), np.empty(len(codes))
-    step = max(1, _MAX_PAIRS // codes.shape[1] ** 2)
+    step = max(1, _MAX_PAIRS // max(codes.shape[1], 1) ** 2)
     for start in range(0, len(codes), step):
         rows = slice(start, start + step)
         pairs, often = v[codes[rows, :, None], codes[rows, None, :]], chosen[rows]

@@ -92,7 +92,9 @@ def _ordinal_features(
     pairs /= np.maximum(size - 1.0, 1.0)[:, None, None]
     pairs[size < 2] = 0.0
     none = np.empty((len(counts), 0))
-    return Features(pairs.reshape(len(counts), -1).T, none.astype(np.int64), none, 0)
+    return Features(
+        pairs.reshape(len(counts), k.size**2).T, none.astype(np.int64), none, 0
+    )
 
 
 def _ordinal_disagreements(sums: Floats, v: Any) -> tuple[Floats, Floats, Floats]:

@@ -351,8 +351,9 @@ def limits_of_agreement(
     0.00, -2.77 to 2.77
     """
     for name, value in (("share", share), ("level", level)):
-        if not 0.0 < value < 1.0:
-            raise ParameterError(f"{name}: needs (0, 1), got {value}")
+        is_number = isinstance(value, int | float | np.number)
+        if not (is_number and 0.0 < value < 1.0):
+            raise ParameterError(f"{name}: needs (0, 1), got {value!r}")
     values = complete_values(ratings, categories)
     if values.shape[1] != 2:
         raise RatingsError(

@@ -412,10 +412,11 @@ def coefficient(name: str) -> Coefficient:
     >>> coefficient("randolph_kappa").name
     'brennan_prediger'
     """
-    if name in _BY_ALIAS:
+    is_text = isinstance(name, str)
+    if is_text and name in _BY_ALIAS:
         return _BY_ALIAS[name]
-    if name not in COEFFICIENTS:
-        meant = _meant_by(name)
+    if not is_text or name not in COEFFICIENTS:
+        meant = _meant_by(name) if is_text else None
         raise ParameterError(
             f"coefficient: needs one of {', '.join(COEFFICIENTS)}, got {name!r}"
             + ("" if meant is None else f"; did you mean {meant}?")

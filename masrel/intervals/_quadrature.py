@@ -61,13 +61,16 @@ def log_sum_exp(logs: Floats) -> Floats:
 
 
 def where_it_matters(
-    log_density: Callable[[Floats], Floats], low: float, high: float
+    log_density: Callable[[Floats], Floats],
+    low: float,
+    high: float,
+    nats: float = _NATS,
 ) -> tuple[float, float]:
-    """Return between which points a density is not next to nothing."""
+    """Return between which points a density is less than so far below its largest."""
     for _ in range(30):
         grid = np.linspace(low, high, _COARSE)
         log = log_density(grid)
-        matters = np.flatnonzero(log > log.max() - _NATS)
+        matters = np.flatnonzero(log > log.max() - nats)
         low = float(grid[max(matters[0] - 1, 0)])
         high = float(grid[min(matters[-1] + 1, _COARSE - 1)])
         if matters.size >= _FEWEST:

@@ -56,7 +56,8 @@ _FEW_ITEMS = 10  # below which the interval under another prior is noted
 _SUREST = 1e12  # concentration of a prior that leaves ratings no say
 _MAX_RATINGS = 1_000_000  # whose polynomials take some ten seconds
 _MAX_LOGIT = 160.0  # either way: beyond any posterior that floats can hold
-_N_POINTS = 769  # of the density: ends are within 1e-10
+_N_POINTS = 769  # of the density at least: ends are within 1e-10
+_OF_PEAK, _PEAK_POINTS = 8.0, 48  # nats down to which its peak goes, and points of that
 _N_TERMS = 1 << 20  # at once
 _SHOWN = 201  # points of a distribution
 
@@ -76,8 +77,8 @@ class Prior:
         is_number = isinstance(concentration, int | float | np.number)
         if not (is_number and 0.0 < concentration <= _SUREST):
             raise ParameterError(
-                f"concentration: needs a positive number, got {concentration!r}"
-                f" (and at most {_SUREST:g})"
+                f"concentration: needs more than 0 and at most {_SUREST:g}, got "
+                f"{concentration!r}"
             )
         return cls(name=name, concentration=float(concentration))
 
@@ -143,8 +144,8 @@ class RhoPosterior:
         powers, sizes = more[:-1], more[-1]
         if sizes.sum() > _MAX_RATINGS:
             raise ConvergenceError(
-                f"the exact posterior of {sizes.sum():.0f} ratings takes long, "
-                f"from {_MAX_RATINGS} on; use the jackknife"
+                f"the exact posterior is of at most {_MAX_RATINGS} ratings, got "
+                f"{sizes.sum():.0f}; use the jackknife"
             )
         # the polynomial in A: its powers t, and the logarithms of their coefficients
         terms = np.zeros(1)
@@ -169,7 +170,10 @@ class RhoPosterior:
             return np.asarray(np.concatenate(sums) - log_divisor - of_prior)
 
         ends = where_it_matters(log_density, -_MAX_LOGIT, _MAX_LOGIT)
-        points = np.linspace(*ends, _N_POINTS)
+        # a tail may be a hundred times as long as the peak, of which the steps are
+        low, high = where_it_matters(log_density, *ends, nats=_OF_PEAK)
+        n_points = int((ends[1] - ends[0]) / (high - low) * _PEAK_POINTS)
+        points = np.linspace(*ends, max(_N_POINTS, n_points))
         log = log_density(points)
         masses = np.exp(log - log.max())
         return cls(

@@ -142,7 +142,8 @@ def analytic(
     (0.171, 0.829)
     """
     check_option("distribution", distribution, _METHODS)
-    check_option("convention", convention or "over_n", _NAMES)
+    if convention is not None:
+        check_option("convention", convention, _NAMES)
     problem = pose_problem(
         coefficient,
         ratings,

@@ -16,7 +16,7 @@ from masrel.agreement._engine import Floats, Integers
 from masrel.agreement._labels import shown
 from masrel.agreement._weights import Distances
 from masrel.errors import ParameterError
-from masrel.estimates import Distribution, Interval, Target
+from masrel.estimates import Distribution, Interval, Target, Unit
 from masrel.intervals._question import (
     ROUNDING,
     ClusterSums,
@@ -75,7 +75,7 @@ def bootstrap(
     level : float, optional
         Nominal level.
     n_resamples : int, optional
-        _Resamples where they are drawn, at least 100.
+        Resamples where they are drawn, at least 100.
     kind : {"percentile", "basic", "bca", "studentized"}
         How endpoints come from the resamples.
     exact : {"auto", True, False}, optional
@@ -115,7 +115,7 @@ def bootstrap(
 
     Notes
     -----
-    _Resamples on which the coefficient is undefined, such as one item drawn n times,
+    Resamples on which the coefficient is undefined, such as one item drawn n times,
     are left out and counted in `n_undefined`; the probabilities of the others are
     scaled up to 1. An exact interval counts distinct resamples there, and a note says
     how probable they are. When raters are resampled, a rater is never paired with a
@@ -187,6 +187,7 @@ def bootstrap(
     units = _item_units(problem, clusters) if of_items else _rater_units(problem)
     method = f"{kind} bootstrap{units.words}"
     values, error = units.values, math.nan
+    unit: Unit = target if clusters is None else "clusters"
     reason = "the estimate itself is undefined" if math.isnan(problem.value) else None
     if reason is None and kind == "studentized":
         error = _standard_errors(
@@ -196,7 +197,7 @@ def bootstrap(
         if not error > ROUNDING:
             reason = "the estimate has no standard error to studentize by"
     if reason is not None:
-        return problem.undefined(reason, method=method, unit=target)
+        return problem.undefined(reason, method=method, unit=unit)
     resamples, n_distinct, seed = _resampled(units, values, exact, n_resamples, rng)
     words = f"bootstrap distribution, {n_resamples - resamples.n_undefined} resamples"
     if resamples.n_drawn is None:
@@ -204,11 +205,11 @@ def bootstrap(
         words = f"exact bootstrap distribution, {n_distinct} resamples"
     ends = _ends(kind, problem, units, resamples, error)
     if isinstance(ends, str):
-        return problem.undefined(ends, method=method, unit=target)
+        return problem.undefined(ends, method=method, unit=unit)
     (low, high), errors = ends
     notes = (*units.notes, *_notes(resamples, n_distinct, low == high))
     interval = replace(
-        problem.confidence(low, high, method=method, unit=target, notes=notes),
+        problem.confidence(low, high, method=method, unit=unit, notes=notes),
         n_resamples=resamples.n_drawn,
         n_undefined=resamples.n_undefined,
         monte_carlo_error=None if resamples.n_drawn is None else errors,

@@ -36,7 +36,7 @@ import numpy as np
 
 from masrel._input import check_option
 from masrel.agreement import CountedRatings, Label
-from masrel.agreement._engine import Integers
+from masrel.agreement._engine import NO_SPREAD, ONE_PAIR, Integers
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, Target, _LongNote
 from masrel.intervals._question import (
@@ -111,7 +111,7 @@ def estimate(
     level : float, optional
         Nominal level.
     n_resamples : int, optional
-        _Resamples of a bootstrap, where they are drawn.
+        Resamples of a bootstrap, where they are drawn.
     rng : Generator or int, optional
         Where randomness comes from, for methods that draw.
     clusters : sequence of labels, length n_items, optional
@@ -201,6 +201,18 @@ def estimate(
     return replace(result, interval=interval)
 
 
+def _by_error(problem: IntervalProblem) -> Interval:
+    """Compute the interval by the standard error, which needs no item left out."""
+    error = problem.item_features.error(problem.slopes(problem.sums), problem.freq)
+    df, method = problem.n_paired_items - 1, "delta method, t(n-1)"
+    reason = None if error > 0.0 else ONE_PAIR if df < 1 else NO_SPREAD
+    if np.isnan(problem.value):
+        reason = "the estimate itself is undefined"
+    if reason is not None:
+        return problem.undefined(reason, method=method, unit=None)
+    return problem.by_t(error, df, method=method, unit=None)
+
+
 def _choose_interval(
     problem: IntervalProblem, clusters: Integers | None = None
 ) -> tuple[Interval, str]:
@@ -214,11 +226,8 @@ def _choose_interval(
             left_out = replace(left_out, notes=(*notes, *left_out.notes))
         return left_out, "left out, on a scale without ends"
     if problem.is_too_large and problem.target == "items":
-        slope = problem.slopes(problem.sums)
-        error = problem.item_features.error(slope, problem.freq)
-        df, method = problem.n_paired_items - 1, "delta method, t(n-1)"
         why = "too many different grades to leave items out one by one"
-        return problem.by_t(error, df, method=method, unit=None), why
+        return _by_error(problem), why
     if problem.entry.shape == "pairs":
         why = "items leave with the pairs of all their raters"
         return _leave_out(problem).interval(), why

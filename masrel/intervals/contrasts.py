@@ -19,8 +19,8 @@ import numpy as np
 from masrel._input import check_option
 from masrel.agreement import Label, Metric, Significance, WeightsLike, count_ratings
 from masrel.agreement._codes import item_counts
-from masrel.agreement._engine import Floats
-from masrel.agreement._labels import is_row, warn_caller
+from masrel.agreement._engine import Floats, undefined
+from masrel.agreement._labels import is_row
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval
 from masrel.intervals._question import (
@@ -591,8 +591,13 @@ def differences(
     values, errors = each[:, None] - each, np.zeros((len(each),) * 2)
     for i, j in itertools.combinations(range(len(each)), 2):
         errors[i, j] = errors[j, i] = math.sqrt(joint.variance(i, j))
+    if reason is None and not errors.any():
+        left_out = unit.removesuffix("s")
+        reason = f"leaving out any {left_out} leaves all differences as they are"
+    elif reason is None and simultaneous == "scheffe":
+        reason = _too_few(len(each), joint.n)
     quantile, p_values = math.nan, np.full_like(errors, math.nan)
-    if reason is None and errors.any():
+    if reason is None:
         quantile, p_values = _adjusted(joint, values, errors, level, simultaneous)
     half = np.where(errors > 0.0, quantile * errors, math.nan)
     alone = np.sqrt(np.diag(joint.covariance))
@@ -639,6 +644,12 @@ def _why_undefined(
     return None
 
 
+def _too_few(g: int, n: int) -> str | None:
+    if n >= g:
+        return None
+    return f"{g} coefficients need at least {g} items or clusters, got {n}"
+
+
 def _adjusted(
     joint: _Joint,
     values: Floats,
@@ -659,8 +670,6 @@ def _adjusted(
         return quantile, np.minimum(1.0, 2.0 * m * stdtr(df, -t))
     if simultaneous == "scheffe":
         rest = df + 2.0 - g  # K - g + 1
-        if rest <= 0.0:
-            return math.nan, np.full_like(t, math.nan)
         factor = (g - 1.0) * df / rest
         quantile = math.sqrt(factor * float(fdtri(g - 1.0, rest, level)))
         return quantile, fdtrc(g - 1.0, rest, t**2 / factor)
@@ -718,8 +727,7 @@ def _hotelling(values: Floats, joint: _Joint, reason: str | None) -> Significanc
     """Test that all coefficients are the same: T² = (Cκ)ᵀ (C V Cᵀ)⁻¹ Cκ."""
     g, n, v, statistic = len(values), joint.n, joint.covariance, math.nan
     df = (g - 1.0, n - g + 1.0)
-    if reason is None and n < g:
-        reason = f"{g} coefficients need at least {g} items or clusters, got {n}"
+    reason = reason or _too_few(g, n)
     if reason is None:
         # C takes each from the first
         sizes, axes = np.linalg.eigh(v[1:, 1:] - v[1:, :1] - v[:1, 1:] + v[0, 0])
@@ -913,6 +921,14 @@ def _concordance(
     return both, one, neither
 
 
+_TITLES = {
+    "difference_test": "the test of a difference",
+    "differences": "the test of equality",
+    "equality_test": "the test of equality",
+    "donner_test": "Donner's test",
+}
+
+
 def _tested(
     name: str,
     hypothesis: str,
@@ -926,7 +942,7 @@ def _tested(
     from scipy.special import chdtrc, fdtrc, stdtr  # loaded only for a p-value
 
     if reason is not None:
-        warn_caller(f"undefined {name}: {reason}", UndefinedStatisticWarning)
+        undefined(_TITLES[name], reason)
         statistic = p = math.nan
     elif distribution == "t":
         p = min(1.0, 2.0 * float(stdtr(df[0], -abs(statistic))))

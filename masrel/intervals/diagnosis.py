@@ -105,7 +105,7 @@ n_categories)
 
     def __str__(self) -> str:
         lines = [str(self.estimate), "rater: mean of pairs, all without, change"]
-        width = max(map(len, self.raters))
+        width = max(map(len, self.raters), default=0)
         for place, rater in enumerate(self.raters):
             lines.append(
                 f"{rater:<{width}}  {self.mean_values[place]:6.3f}  "
@@ -113,7 +113,7 @@ n_categories)
                 + _ends(self.change_low[place], self.change_high[place])
             )
         lines.append("category: ratings, agreement on it")
-        width = max(len(str(category)) for category in self.categories)
+        width = max((len(str(category)) for category in self.categories), default=0)
         for place, category in enumerate(self.categories):
             lines.append(
                 f"{category!s:<{width}}  {self.category_counts[place]:6d}  "

@@ -112,7 +112,8 @@ def posterior(
     RatingsError
         If the ratings do not fit.
     ConvergenceError
-        If floats cannot hold the exact posterior of so many ratings.
+        If there are more than a million ratings, floats cannot hold their exact
+        posterior, or a quadrature does not settle.
 
     Warns
     -----
@@ -163,8 +164,11 @@ def posterior(
 
     checked_prior = Prior.of(prior, 1.0 if concentration is None else concentration)
     model = _checked_model(problem, model)
-    if n_draws < _MIN_DRAWS:
-        raise ParameterError(f"n_draws: needs at least {_MIN_DRAWS}, got {n_draws}")
+    is_whole = isinstance(n_draws, int | np.integer) and not isinstance(n_draws, bool)
+    if not is_whole or n_draws < _MIN_DRAWS:
+        raise ParameterError(
+            f"n_draws: needs a whole number of at least {_MIN_DRAWS}, got {n_draws!r}"
+        )
     if model == "dirichlet-multinomial":
         if _is_rho(problem, weights):
             return rho_interval(problem, checked_prior)
