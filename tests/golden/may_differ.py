@@ -12,23 +12,15 @@ from dataclasses import dataclass
 from tests.golden.compare import NUMBER, Change, Kind
 
 IN_FORCE: tuple[str, ...] = ()
-"""Names of `EXCEPTIONS`: none, since what differed by moves 1 to 3 is stored anew."""
+"""Names of `EXCEPTIONS`: none, as all that differed is stored anew."""
 
 EXCEPTIONS = {
-    "error of alpha": "the influence of an item on alpha is centred: its delta-method "
-    "errors, what is made of them, and whether they are 0",
-    "bootstrap hayes": "the bootstrap of pairs is dropped",
-    "bootstrap krippendorff": "the bootstrap that holds chance is dropped",
-    "bootstrap studentized raters": "raters have no standard errors to studentize by",
-    "analytic cohen": "error= by name is dropped",
-    "analytic unconditional": "error= by name is dropped",
-    "irrcac": 'variance= is dropped; "analytic irrcac" has the same errors',
     "order of notes": "notes come in another order",
     "wording": "notes, reasons and methods are worded otherwise: their `KINDS` stay",
     "seeded draws": "the same seed draws other numbers, and fewer or more resamples "
     "are taken one by one: ends are within their Monte Carlo errors",
 }
-"""What may differ and why. The name of a method: it is left out."""
+"""What may differ and why."""
 
 VALUE = 1e-14
 """Of 1 + |κ|: κ is 1 less a ratio, and has the rounding of both."""
@@ -137,8 +129,6 @@ def differences(
     question: Question, stored: dict, new: dict, in_force: Collection[str] = IN_FORCE
 ) -> list[Change]:
     """Every number and text that is not what is stored; `within` where it may be."""
-    if question.method in in_force:
-        return []
     return list(_walk(question, stored, new, in_force))
 
 
@@ -155,10 +145,6 @@ def _walk(
 ) -> Iterator[Change]:
     compared = (stored.keys() | new.keys()) - {"steps", "near_1"}
     is_drawn = "seeded draws" in in_force and "mce" in compared
-    if "error of alpha" in in_force and question.coefficient == "krippendorff_alpha":
-        compared -= {"error", "errors"}
-        if re.match("analytic|differences|bootstrap studentized", question.method):
-            compared &= {"value", "values", "n", "refused"}
     if is_drawn:
         if "low" in compared:
             yield from _drawn_ends(question, stored, new)

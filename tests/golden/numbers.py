@@ -271,22 +271,18 @@ def freeze(stored: dict[str, dict]) -> dict[str, dict]:
         return {f"{seed:04}": of for seed, of in enumerate(made)}
 
 
-def replayed(
-    stored: dict[str, dict], in_force: Collection[str] = (), rng: int = 0
-) -> Iterator[tuple[Question, dict, dict]]:
+def replayed(stored: dict[str, dict]) -> Iterator[tuple[Question, dict, dict]]:
     """Every stored answer of some tables, with the result of today."""
     for seed, frozen_table in stored.items():
         of = table(int(seed))
         if checksum(of) != frozen_table["crc"]:
             raise ValueError(f"table {seed} is drawn otherwise than the stored one")
         for method, answers in frozen_table["answers"].items():
-            if method in in_force:  # and gone
-                continue
             for name, answer in answers.items():
                 question = Question(
                     f"{seed}/{method}/{name}", method, name, of.has_gaps
                 )
-                yield question, answer, rounded(result_of(method, name, of, rng))
+                yield question, answer, rounded(result_of(method, name, of))
 
 
 def compared(
@@ -294,7 +290,7 @@ def compared(
 ) -> tuple[list[Change], int]:
     """What differs of some tables, and how many of their ends were drawn."""
     changes, n_drawn = [], 0
-    for question, answer, new in replayed(stored, in_force):
+    for question, answer, new in replayed(stored):
         changes += differences(question, answer, new, in_force)
         n_drawn += len(answer.get("mce", ()))
     return changes, n_drawn
