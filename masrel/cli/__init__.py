@@ -11,7 +11,7 @@ import importlib
 import io
 import sys
 import unicodedata
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import click
 
@@ -20,6 +20,7 @@ from masrel.errors import (
     ConvergenceError,
     DeviceError,
     MasrelError,
+    ParameterError,
     SessionStoppedError,
 )
 
@@ -73,6 +74,15 @@ VERBS = {verb: text for verbs in GROUPS.values() for verb, text in verbs.items()
 # verbs that need no study; the modules of the others are in the laboratory
 _STATISTICS = ("agree", "audit", "latent", "plan")
 
+# parameters whose options are called otherwise
+_CALLED = {
+    "coefficient": "coefficients",
+    "high": "interval",
+    "low": "interval",
+    "method": "interval",
+    "rng": "seed",
+}
+
 
 class _Verbs(click.Group):
     """A group that imports a verb only when it is called."""
@@ -90,6 +100,13 @@ class _Verbs(click.Group):
         command: click.Command = getattr(module, cmd_name)
         return command
 
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except ParameterError as error:
+            command = self.get_command(ctx, str(ctx.invoked_subcommand))
+            raise ParameterError(_with_options(str(error), command)) from error
+
     def format_commands(
         self,
         ctx: click.Context,  # noqa: ARG002 - click's signature
@@ -99,6 +116,21 @@ class _Verbs(click.Group):
         for title, verbs in GROUPS.items():
             with formatter.section(title):
                 formatter.write_dl(list(verbs.items()))
+
+
+def _with_options(sentence: str, command: click.Command | None) -> str:
+    # the places that a refusal begins with, where they are parameters, as options
+    params = [] if command is None else command.params
+    options = {param.name: max(param.opts, key=len) for param in params}
+    for name, other in _CALLED.items():
+        if other in options:
+            options.setdefault(name, options[other])
+    *places, rest = sentence.split(": ")
+    for at, place in enumerate(places):
+        names = place.split(", ")
+        if options.keys() >= set(names):
+            places[at] = ", ".join(options[name] for name in names)
+    return ": ".join([*places, rest])
 
 
 def _refuse_verb(ctx: click.Context, name: str) -> NoReturn:

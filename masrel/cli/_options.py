@@ -2,8 +2,7 @@
 
 import json
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import wraps
 from pathlib import Path
@@ -40,20 +39,6 @@ class _FigureFile(FileInFolder):
                 f"--figure: needs a name that ends in .png, .svg or .pdf, got {file}"
             )
         return file
-
-
-@contextmanager
-def named_as_options(**others: str) -> Iterator[None]:
-    """Name options in an error whose sentence begins with parameters."""
-    try:
-        yield
-    except ParameterError as error:
-        names, _, rest = str(error).partition(":")
-        options = {**others}
-        for param in click.get_current_context().command.params:
-            options[str(param.name)] = param.opts[0]
-        named = ", ".join(options.get(name, name) for name in names.split(", "))
-        raise ParameterError(f"{named}:{rest}") from None
 
 
 def grouped(name: str, group: type, *options: Callable[..., Any]) -> Decorator:

@@ -9,7 +9,6 @@ import click
 from masrel._input import refuse
 from masrel.cli._options import (
     OutputOptions,
-    named_as_options,
     output_options,
     write_output,
 )
@@ -128,11 +127,12 @@ def _claim(texts: _Texts) -> "Claim":
     values = {name: text for name, text in texts.items() if isinstance(text, str)}
     ends = texts.get("interval", ())
     values |= dict(zip(("low", "high"), ends, strict=False))
-    with named_as_options(low="--interval", high="--interval"):
-        for name, other in _BESIDE.items():
-            alone = name in texts and other not in texts
-            refuse((alone, f"{name}: needs --{other} beside it, got none"))
-        return claim_of(values)
+    for name in ("n_items", "n_categories"):
+        refuse((name not in texts, f"{name}: needed without a SOURCE, got none"))
+    for name, other in _BESIDE.items():
+        alone = name in texts and other not in texts
+        refuse((alone, f"{name}: needs --{other} beside it, got none"))
+    return claim_of(values)
 
 
 _BESIDE = {

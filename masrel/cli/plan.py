@@ -10,7 +10,6 @@ import click
 from masrel._input import refuse
 from masrel.cli._options import (
     OutputOptions,
-    named_as_options,
     output_options,
     write_output,
 )
@@ -190,8 +189,7 @@ def _plans(
     # with the lines of a study's plan that they are of
     with progress("planning", "steps", is_quiet=is_quiet) as bar:
         if folder is None:
-            with named_as_options():
-                return (), _of_options(_with_pilot(arguments), bar)
+            return (), _of_options(_with_pilot(arguments), bar)
         from masrel.lab.cli._study_plans import study_plans
 
         _refuse(arguments, _NOT_OF_STUDIES, "is not of a study, whose protocol says it")
