@@ -24,13 +24,9 @@ def read_file(file: Path, options: ReadingOptions) -> "RatingsFile":
     codes = map(split_commas, options.missing_codes)
     arguments["missing_codes"] = [code for listed in codes for code in listed]
     with progress("reading", "MB", is_quiet=False) as shown:
-        n_shown = 0
 
         def show(n_bytes: int, n_expected: int) -> None:
-            nonlocal n_shown
-            shown.expect(n_expected >> 20)
-            shown.update((n_bytes >> 20) - n_shown)
-            n_shown = n_bytes >> 20
+            shown.reach(n_bytes >> 20, n_expected >> 20)
 
         return read_ratings(file, progress=show, **arguments)
 

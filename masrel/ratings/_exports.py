@@ -24,9 +24,8 @@ import pandas as pd
 
 from masrel.errors import ParameterError
 from masrel.ratings._findings import ReadingOptions, library, refusal
-from masrel.ratings._sheet import MAX_UNPACKED, Column, Sheet, value_text
+from masrel.ratings._sheet import MAX_UNPACKED, WORKBOOKS, Column, Sheet, value_text
 
-_WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
 _ARROW = {".parquet": "pyarrow.parquet", ".feather": "pyarrow.feather"}
 _PYREADSTAT = {
     ".sav": "read_sav",
@@ -38,7 +37,7 @@ _PYREADSTAT = {
 }
 
 _MAX_WORKBOOK = MAX_UNPACKED // 4  # bytes of XML: its cells take several times the room
-_OLD_WORKBOOK = b"\xd0\xcf\x11\xe0"  # how an .xls begins, in which archives may lie
+_ZIP = b"PK\3\4"  # how an archive begins
 # a cell of type error: its formula, if any, and its value
 _ERROR_CELL = re.compile(
     rb'<c\s[^>]*?\bt="e"[^>]*>(?:<f[^>]*?(?:/>|>[^<]*</f>))?<v>([^<]*)</v>'
@@ -48,7 +47,6 @@ _ANY: tuple[type[Exception], ...] = (
     *(ValueError, TypeError, KeyError, OSError, RuntimeError, EOFError),
     *(zipfile.BadZipFile, zlib.error),
 )
-_EXPORTED = (".json", ".jsonl", ".csv")
 _SOLID = re.compile(r"[^ \t\n\r]")
 _ENCODED = (".sav", ".zsav", ".dta", ".sas7bdat", ".xpt")  # pyreadstat takes theirs
 
@@ -69,13 +67,11 @@ def read_typed(
         raise ParameterError(
             f"--encoding: needed a file of text, got {facts['format']}, whose is known"
         )
-    if options.sheet is not None and suffix not in _WORKBOOKS:
-        raise ParameterError(f"--sheet: needed a workbook, got {facts['format']}")
     n_above, dropped = 0, dict[str, int]()
     if options.source is not None:
         records = _records(name, suffix, data)
         frame, facts, dropped = _export(name, options.source, records, options.grade)
-    elif suffix in _WORKBOOKS:
+    elif suffix in WORKBOOKS:
         frame, n_above = _workbook(name, suffix, data, options.sheet, facts)
     elif suffix in _ARROW:
         arrow = library(name, _ARROW[suffix])
@@ -113,11 +109,12 @@ def sheet_of(
 
 def column_of(name: str, title: str, values: "pd.Series[Any]") -> Column:
     """Return the cells of a column as texts, empty where a value is missing."""
-    kinds = set(map(type, values)) if values.dtype == object else set()
-    if nested := {list, dict, set, np.ndarray} & kinds:
-        where, kind = f"column {title!r}: ", nested.pop().__name__
-        raise refusal(name, "nested cell", where=where, kind=kind)
-    if {bool, np.bool_} & kinds:  # True equals 1 in Python, and is another grade
+    kinds = list(map(type, values)) if values.dtype == object else []
+    for number, kind in enumerate(kinds, start=1):
+        if kind in (list, dict, set, np.ndarray):
+            facts = {"column": title, "number": number, "kind": kind.__name__}
+            raise refusal(name, "nested cell", **facts)
+    if {bool, np.bool_} & set(kinds):  # True equals 1 in Python, and is another grade
         values = values.map(value_text, na_action="ignore")
     codes, known = pd.factorize(values, use_na_sentinel=True)
     # numpy's floats know their precision
@@ -147,20 +144,13 @@ def _unzipped(
     chosen: re.Pattern[str],
 ) -> dict[str, bytes]:
     # the files of an archive that are chosen, if all is not more than fits the memory
-    def read() -> dict[str, bytes] | None:
-        with zipfile.ZipFile(io.BytesIO(data)) as packed:
-            if sum(member.file_size for member in packed.infolist()) > most:
-                return None
-            return {
-                file: packed.read(file)
-                for file in packed.namelist()
-                if chosen.fullmatch(file)
-            }
-
-    files = read_foreign(name, suffix, read)
-    if files is None:
+    packed = read_foreign(name, suffix, lambda: zipfile.ZipFile(io.BytesIO(data)))
+    if sum(member.file_size for member in packed.infolist()) > most:
         raise refusal(name, "unpacked", most=most, it="", do=do)
-    return dict(files)
+    meant = list(filter(chosen.fullmatch, packed.namelist()))
+    return {
+        file: read_foreign(name, suffix, partial(packed.read, file)) for file in meant
+    }
 
 
 def _workbook(
@@ -168,7 +158,7 @@ def _workbook(
 ) -> tuple[pd.DataFrame, int]:
     # -> the cells below their names, and how many blank rows are above
     calamine = library(name, "python_calamine")
-    if zipfile.is_zipfile(io.BytesIO(data)) and not data.startswith(_OLD_WORKBOOK):
+    if data.startswith(_ZIP):  # not an .xls
         do = "save its sheet as CSV, since a large table of text is read piece by piece"
         sheets = re.compile(r"xl/worksheets/.*\.xml")  # not of .ods
         files = _unzipped(name, suffix, data, _MAX_WORKBOOK, do, sheets)
@@ -179,21 +169,21 @@ def _workbook(
                 e.decode("utf-8", "replace"): n for e, n in errors.items()
             }
 
-    def stored() -> dict[str, Any]:
-        book = calamine.CalamineWorkbook.from_filelike(io.BytesIO(data))
-        names = list(map(str, book.sheet_names))
-        meant = [n for n in names if chosen in (None, n)]
-        return dict.fromkeys(names) | {n: book.get_sheet_by_name(n) for n in meant}
-
-    sheets_of = read_foreign(name, suffix, stored, calamine.CalamineError)
-    if chosen is not None and chosen not in sheets_of:
-        raise refusal(name, "no sheet", sheet=chosen, sheets=", ".join(sheets_of))
-    meant = {n: cells for n, cells in sheets_of.items() if cells is not None}
-    filled = {n: cells for n, cells in meant.items() if cells.start is not None}
+    open_book = partial(calamine.CalamineWorkbook.from_filelike, io.BytesIO(data))
+    book = read_foreign(name, suffix, open_book, calamine.CalamineError)
+    if chosen is not None and chosen not in book.sheet_names:
+        known = ", ".join(book.sheet_names)
+        raise refusal(name, "no sheet", sheet=chosen, sheets=known)
+    filled = {}
+    for title in book.sheet_names if chosen is None else [chosen]:
+        read = partial(book.get_sheet_by_name, title)
+        cells = read_foreign(name, suffix, read, calamine.CalamineError)
+        if cells.start is not None:
+            filled[title] = cells
     if len(filled) > 1:
         raise refusal(name, "sheets", sheets=", ".join(filled))
     if not filled:
-        raise refusal(name, "no cells", sheet=", ".join(meant))
+        raise refusal(name, "no cells", sheet=chosen or ", ".join(book.sheet_names))
     ((facts["sheet"], cells),) = filled.items()
     frame = pd.DataFrame(cells.to_python(skip_empty_area=True), dtype=object)
     # a column without name and cells is a space between others
@@ -254,8 +244,7 @@ def _json_values(name: str, suffix: str, data: bytes) -> list[Any]:
         return values
 
     parse = json.JSONDecoder(object_pairs_hook=_object).raw_decode
-    kind = suffix if suffix == ".csv" else ".json"
-    values: list[Any] = read_foreign(name, kind, read, csv.Error)
+    values: list[Any] = read_foreign(name, suffix, read, csv.Error)
     return values[0] if len(values) == 1 and isinstance(values[0], list) else values
 
 
@@ -269,18 +258,12 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 def _objects(name: str, values: list[Any]) -> pd.DataFrame:
     # a list of objects, one a row; or one object of columns, as pandas and R write
-    if len(values) == 1 and isinstance(values[0], dict):
-        columns = list(values[0].values())
-        if all(isinstance(c, dict) and c.keys() == columns[0].keys() for c in columns):
-            return pd.DataFrame(values[0], dtype=object).reset_index(drop=True)
-        if all(isinstance(c, list) and len(c) == len(columns[0]) for c in columns):
-            return pd.DataFrame(values[0], dtype=object)
     if not values or not all(isinstance(value, dict) for value in values):
         raise refusal(name, "no objects")
-    for number, value in enumerate(values, start=1):
-        for key, cell in value.items():
-            if isinstance(cell, dict | list):
-                raise refusal(name, "nested", number=number, key=key)
+    columns = values[0].values()
+    are_columns = len(values) == 1 and set(map(type, columns)) in ({dict}, {list})
+    if are_columns and len(set(map(len, columns))) == 1:
+        return pd.DataFrame(values[0], dtype=object).reset_index(drop=True)
     return pd.DataFrame(values, dtype=object)
 
 
@@ -299,14 +282,14 @@ class _Annotation(NamedTuple):
 
 def _records(name: str, suffix: str, data: bytes) -> list[tuple[str, Any]]:
     # the values of an export, each with the name of its file in an archive
-    if not data.startswith(b"PK\3\4"):  # a pipe has no name that says .zip
+    if not data.startswith(_ZIP):  # a pipe has no name that says .zip
         return [("", value) for value in _json_values(name, suffix, data)]
     do = "unpack it and leave files out"
     # a Mac adds a folder to every archive
     chosen = re.compile(r"(?!__MACOSX/).*\.(jsonl?|csv)", re.IGNORECASE)
     files = _unzipped(name, ".zip", data, MAX_UNPACKED, do, chosen)
     if not files:
-        raise refusal(name, "no export", suffixes=", ".join(_EXPORTED))
+        raise refusal(name, "no export")
     return [
         (Path(file).stem, value)
         for file, content in files.items()

@@ -60,8 +60,7 @@ class ReadingOptions:
         """The options that need the whole file in memory."""
         names = ("by", "session", "clusters", "counts", "table")
         options = [f"--{name}" for name in names if getattr(self, name)]
-        is_kept = self.repeated == "error"
-        return options + ([] if is_kept else [f"--repeated {self.repeated}"])
+        return options + [f"--repeated {self.repeated}"] * (self.repeated != "error")
 
     def check(self) -> None:
         """Refuse what is wrong whatever the file is."""
@@ -177,7 +176,6 @@ _TEXTS = {
     # the file
     "folder": "needed a file, got a folder",
     "absent": "no such file",
-    "device": "needed a file or a pipe, got a device",
     "empty": "needed a header and rows, the file is empty",
     "no records": "needed a header and rows, the file has none",
     "no rows": "needed rows of ratings below the names, got none",
@@ -211,14 +209,14 @@ _TEXTS = {
     "twice; " + _ROW_LIKE_OTHERS,
     # workbooks, JSON, exports
     "no cells": "sheet {sheet}: needed a header and rows, got none",
+    "no workbook": "--sheet {sheet}: needed a workbook",
     "no sheet": "--sheet: there is no sheet {sheet!r}, but {sheets}",
     "sheets": "needs --sheet with one of its sheets, {sheets}",
-    "nested cell": "{where}needed text or numbers, got a {kind}",
-    "no export": "needed {suffixes} in it, got none",
+    "nested cell": "column {column!r}, value {number}: needed text or numbers, got a "
+    "{kind}; --from reads exports of annotation tools",
+    "no export": "needed .json, .jsonl or .csv in it, got none",
     "no objects": "needed a JSON list of objects, one a row; --from reads exports of "
     "annotation tools",
-    "nested": "object {number}: needed text or a number for {key!r}, got what is "
-    "nested; --from reads exports of annotation tools",
     "shape": "is no export of {source}, or damaged: a record has another shape "
     "({error})",
     "no fields": "needed labels of whole items, got none; spans, regions and relations "
@@ -241,7 +239,7 @@ _TEXTS = {
     "unknown role": "{where}: looks like one row a rating ({known}): needs {needed}, "
     "{columns}; if its columns are raters, --raters names them, if they are items, "
     "--transpose",
-    "no rater": "{where}: needed a column for {what}, got none",
+    "no rater": "{where}: needed columns of raters, or of categories, got none",
     "unnamed": "needed the {role}, got {got!r}",
     "no value": "needed a value",
     "contingency": "rows and columns have the same names, so that this looks like a "
@@ -263,12 +261,10 @@ _TEXTS = {
     "row is a rater",
     "item or rater": "the first column, {column!r}, is taken for the names of items: "
     "--no-item if it is a rater, --item {name} if it names the items",
-    "counts": "{rows} to {total:g}, so that this may be a table of counts, items by "
+    "counts": "rows sum to {total:g}, so that this may be a table of counts, items by "
     "categories: --counts reads it as one",
     "second header": "{where} holds grades that occur nowhere else: if it is a second "
     "line of names, delete it",
-    "second names": "{where} names a rater and an item that occur nowhere else: if it "
-    "is a second line of names, delete it",
     "numbered": "no item was rated twice: {columns} may number the rows, --item names "
     "the column of the items",
     "alike": "{kind} that differ by spelling alone are counted as different: {names}",

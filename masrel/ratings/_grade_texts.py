@@ -152,9 +152,8 @@ def _declared_grades(
     number: dict[str, Decimal | None], declared: Sequence[str], refuse: _Refuse
 ) -> dict[str, str]:
     # text to the category it is: the same text, else the same number
-    categories: dict[Decimal | None, str] = {}
-    if all(map(is_number, declared)):
-        categories = {Decimal(category): category for category in declared}
+    categories: dict[Decimal | None, str]
+    categories = {Decimal(grade): grade for grade in declared if is_number(grade)}
     if len(categories) < len(declared):
         categories = {}  # text, or 1 and 1.0 are two grades: 01 is neither
     grade_of: dict[str, str] = {}
@@ -266,12 +265,10 @@ def _doubts(
     n_ratings = sum(freq.values())
     if not others:
         # numbers that differ beyond the digits of a float
-        by_value: dict[float, str] = {}
-        for grade in freq:
-            other = by_value.setdefault(float(grade), grade)
-            if other != grade:
-                findings.append(Finding("too near", one=other, other=grade))
-                break
+        pairs = pairwise(sorted(freq, key=Decimal))
+        near = [(one, other) for one, other in pairs if float(one) == float(other)]
+        for one, other in near[:1]:
+            findings.append(Finding("too near", one=one, other=other))
         # more numbers than a scale has grades, most of which hardly ever come again
         if len(freq) > _MANY_GRADES and 2 * len(freq) > n_ratings:
             findings.append(Finding("measurements", n=len(freq), n_ratings=n_ratings))

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -27,6 +27,7 @@ from masrel.errors import RatingsError
 from masrel.ratings._exports import column_of, read_foreign, sheet_of, table_frame
 from masrel.ratings._findings import (
     USUAL_MISSING,
+    Finding,
     ReadingOptions,
     library,
 )
@@ -72,30 +73,27 @@ class Source:
     recheck: Callable[[], None]  # refuses the first record that is none of the table
 
 
-def source_of(path: Path, options: ReadingOptions) -> Source | None:
-    """Open a file for DuckDB; None if it is to be read as a whole."""
+def source_of(path: Path, options: ReadingOptions) -> Source:
+    """Open a file for DuckDB."""
     is_other = options.transpose or options.source or options.sheet
-    if is_other or not path.is_file() or not (options.stream or find_spec("duckdb")):
-        return None
-    kind = path.suffix.lower()
-    if kind == ".parquet" and options.encoding is None and not options.no_header:
-        return _parquet(path, options)
-    if kind in TEXT_FORMATS and options.encoding in (None, "utf-8"):
-        return _text(path, options)
-    return None
+    kind, has_duckdb = path.suffix.lower(), options.stream or find_spec("duckdb")
+    if path.is_file() and has_duckdb and not is_other:
+        if kind == ".parquet" and options.encoding is None and not options.no_header:
+            return _parquet(path, options)
+        if kind in TEXT_FORMATS and options.encoding in (None, "utf-8"):
+            return _text(path, options)
+    raise NoStreamError(Finding("no stream"))
 
 
-def _parquet(path: Path, options: ReadingOptions) -> Source | None:
+def _parquet(path: Path, options: ReadingOptions) -> Source:
     name = str(path)
     parquet = library(name, "pyarrow.parquet")
     file = read_foreign(name, ".parquet", lambda: parquet.ParquetFile(path))
     about = file.metadata
     if not options.stream and about.num_rows * about.num_columns < _LARGE_TABLE:
-        return None
-    head = file.schema_arrow.empty_table()
-    for batch in file.iter_batches(_HEAD_ROWS):
-        head = head.from_batches([batch])
-        break
+        raise NoStreamError("it fits the memory")
+    first = islice(file.iter_batches(_HEAD_ROWS), 1)
+    head = library(name, "pyarrow").Table.from_batches(first, file.schema_arrow)
     facts = {"format": "parquet"}
     sheet = sheet_of(name, partial(_sha256, path), table_frame(head), facts)
     # names of rows that pandas keeps come first
@@ -115,7 +113,7 @@ def _parquet(path: Path, options: ReadingOptions) -> Source | None:
     )
 
 
-def _text(path: Path, options: ReadingOptions) -> Source | None:
+def _text(path: Path, options: ReadingOptions) -> Source:
     name, kind = str(path), TEXT_FORMATS[path.suffix.lower()]
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)
@@ -124,13 +122,13 @@ def _text(path: Path, options: ReadingOptions) -> Source | None:
         while head.count(b'"') % 2:
             head = head[: head.rfind(b"\n", 0, -1) + 1]
     if b"\n" not in head or head.startswith((b"\0", b"\xff\xfe", b"\xfe\xff")):
-        return None
+        raise NoStreamError(Finding("no stream"))
     text = decoded(name, head, options.encoding)
     sheet = read_text(name, partial(_sha256, path), text, kind, options)
     marks = {title: mark for mark, title in DELIMITERS.items()}
     delimiter = marks.get(sheet.facts["delimiter"], sheet.facts["delimiter"])
     if delimiter == " ":
-        return None
+        raise NoStreamError(Finding("no stream"))
     width, first = len(sheet.columns), int(not options.no_header)
     n_above, n_before = sheet.line_of(0) - 1, sheet.line_of(first) - 1
     lines = partial(_lines, path, n_above)

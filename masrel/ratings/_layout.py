@@ -86,12 +86,6 @@ class Layout:
     # whether the item is the first column because nothing else was said of it
     is_item_guessed: bool = False
 
-    @property
-    def used(self) -> set[int | None]:
-        """The columns that are something."""
-        named = {self.session, self.by, self.clusters}
-        return {*self.item, *self.raters, *self.grades, *named}
-
 
 def find_layout(sheet: Sheet, options: ReadingOptions) -> Layout:
     """Decide which column is what, or say which option would."""
@@ -218,8 +212,7 @@ def _wide(
             is_guessed = bool(item)
     raters = raters or tuple(k for k in places if k not in taken.union(item))
     if not raters:
-        what = "a rater" if kind == "wide" else "a category"
-        raise sheet.refuse("no rater", where=sheet.at(0), what=what)
+        raise sheet.refuse("no rater", where=sheet.at(0))
     return Layout(
         kind=kind, item=item, raters=raters, grades=raters, is_item_guessed=is_guessed
     )
@@ -392,8 +385,7 @@ def _looks_counted(
     is_most &= np.average(sums == total, weights=freq) >= 1 / 2
     if total < 2 or not has_zeros or not ((sums == total).all() or is_most):
         return []
-    rows = "every row sums" if sums.min() == total else "most rows sum"
-    return [Finding("counts", rows=rows, total=total)]
+    return [Finding("counts", total=total)]
 
 
 def _second_header(sheet: Sheet, codes: Codes, scale: Scale) -> list[Finding]:
@@ -406,25 +398,12 @@ def _second_header(sheet: Sheet, codes: Codes, scale: Scale) -> list[Finding]:
     return [Finding("second header", where=sheet.where(0))]
 
 
-def doubt_long(
-    sheet: Sheet, layout: Layout, items: Codes, raters: Codes
+def doubt_items(
+    sheet: Sheet, layout: Layout, n_items: int, n_rows: int
 ) -> list[Finding]:
-    """Warn of a long table whose items are numbers of rows, or of a second header."""
-    findings = []
-    if items.max(initial=0) + 1 == len(items) > 2:
-        findings.append(numbered(sheet, layout))
-    is_first_alone = len(items) > 4 and not (
-        (items[1:] == items[0]).any() or (raters[1:] == raters[0]).any()
-    )
-    if is_first_alone and sheet.has_header:
-        findings.append(Finding("second names", where=sheet.where(0)))
-    return findings
-
-
-def numbered(sheet: Sheet, layout: Layout) -> Finding:
-    """Return the warning of a long table none of whose items was rated twice."""
+    """Warn of a long table none of whose items was rated twice."""
     columns = ", ".join(repr(sheet.header[place]) for place in layout.item)
-    return Finding("numbered", columns=columns)
+    return [Finding("numbered", columns=columns)] if n_items == n_rows > 2 else []
 
 
 def doubt_names(kind: str, names: Sequence[str]) -> list[Finding]:

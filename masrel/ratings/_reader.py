@@ -30,11 +30,10 @@ from masrel.ratings._layout import (
     Layout,
     doubt_columns,
     doubt_counts,
-    doubt_long,
+    doubt_items,
     doubt_names,
     find_layout,
     named,
-    numbered,
     rated_twice,
     together,
     without_second_header,
@@ -42,6 +41,7 @@ from masrel.ratings._layout import (
 from masrel.ratings._sheet import (
     TEXT_FORMATS,
     TYPED_FORMATS,
+    WORKBOOKS,
     Codes,
     Column,
     Sheet,
@@ -269,6 +269,8 @@ def _read_sheet(path: Path | str, options: ReadingOptions) -> Sheet:
     sha256 = partial(str, hashlib.sha256(data).hexdigest())  # which pickle takes
     inner, data = unpacked(name, data, is_export=options.source is not None)
     suffix = Path(inner).suffix.lower()
+    if options.sheet is not None and suffix not in WORKBOOKS:
+        raise refusal(name, "no workbook", sheet=options.sheet)
     if options.source is not None or suffix in TYPED_FORMATS:
         from masrel.ratings._exports import read_typed  # with pandas
 
@@ -284,22 +286,18 @@ def _streamed(
     # by DuckDB; None if the file is to be read as a whole
     from masrel.ratings import _large  # with pandas
 
-    source = _large.source_of(path, options)
-    if source is None:
-        if options.stream:
-            raise refusal(str(path), "no stream" if path.exists() else "absent")
-        return None
-    sheet, findings = without_second_header(source.head)
-    if findings or not len(sheet.numbers):
-        return None
-    layout = find_layout(sheet, options)
-    if layout.session is not None:
-        return None
     try:
+        source = _large.source_of(path, options)
+        sheet, findings = without_second_header(source.head)
+        if findings or not len(sheet.numbers):
+            return None
+        layout = find_layout(sheet, options)
+        if layout.session is not None:
+            return None
         with _large.database_of(source, layout, progress) as answer:
             return _grouped(answer, sheet, layout, options)
     except _large.NoStreamError as error:
-        if options.stream:
+        if options.stream and (path.exists() or str(path) == "-"):
             text = f"{path}: {error}; --no-stream reads it as a whole"
             raise RatingsError(text) from error
         return None
@@ -321,7 +319,7 @@ def _grouped(
         rater, n_rows = named(groups, "rater", layout.raters), int(freq.sum())
         names = rater.texts
         rows, freq = _large.patterns(answer, groups, layout, rater, codes)
-        findings = [numbered(sheet, layout)] * bool(freq.sum() == n_rows > 2)
+        findings = doubt_items(sheet, layout, int(freq.sum()), n_rows)
     else:
         _large.refuse_repeated(answer, sheet, layout)
         rows = codes.reshape(len(freq), -1)
@@ -363,6 +361,7 @@ def _file_of(
     of_long = (*layout.raters, *layout.grades) if layout.kind == "long" else (None,) * 2
     roles = ("rater", "grade", "session", "by")
     places = (*of_long, layout.session, layout.by)
+    used = {*layout.item, *layout.raters, *layout.grades, *places, layout.clusters}
     findings = (*findings, *grades.findings)
     record = {
         "file": sheet.name,
@@ -373,7 +372,7 @@ def _file_of(
             role: None if place is None else header[place]
             for role, place in zip(roles, places, strict=True)
         },
-        "ignored": [name for k, name in enumerate(header) if k not in layout.used],
+        "ignored": [name for k, name in enumerate(header) if k not in used],
         "grades": {
             g: n for g, n in zip(scale.grades, counts.tolist(), strict=True) if n
         },
@@ -422,7 +421,7 @@ def _rated(
         item = named(sheet, "item", layout.item)
         rater = named(sheet, "rater", layout.raters)
         cells, grades = graded(sheet, layout.grades, options)
-        findings = findings + doubt_long(sheet, layout, item.codes, rater.codes)
+        findings = findings + doubt_items(sheet, layout, len(item.texts), n_rows)
     else:
         names = [sheet.header[place] for place in layout.raters]
         rater = Column(np.tile(np.arange(n_raters), n_rows), names)
@@ -437,13 +436,14 @@ def _rated(
         row = np.repeat(row, n_raters)
     findings += doubt_names("raters", rater.texts) + doubt_names("items", item.texts)
     part, names_of_parts = _parts(sheet, layout)
-    findings += doubt_names("groups", sorted({g or "" for g, _ in names_of_parts}))
+    groups = sorted({names.get("group", "") for names in names_of_parts})
+    findings += doubt_names("groups", groups)
     codes = grades.codes[cells.codes]
     # part, item, rater, grade and row of each rating
     ratings = [part[row], item.codes[row], rater.codes, codes, row]
     once, scale = _one_each(sheet, layout, options, ratings, item, rater, grades.scale)
     parts = []
-    for k, (group, session) in enumerate(names_of_parts):
+    for k, of in enumerate(names_of_parts):
         of_part = once
         if len(names_of_parts) > 1:
             of_part = [values[once[0] == k] for values in once]
@@ -451,8 +451,8 @@ def _rated(
         raters = Column(of_part[2], rater.texts).rows(slice(None))
         parts.append(
             RatingsPart(
-                group=group,
-                session=session,
+                group=of.get("group"),
+                session=of.get("session"),
                 items=tuple(items.texts),
                 raters=tuple(raters.texts),
                 ratings=_put_together(items, raters, of_part[3], scale),
@@ -484,26 +484,19 @@ def _rated(
     )
 
 
-def _parts(
-    sheet: Sheet, layout: Layout
-) -> tuple[Codes, list[tuple[str | None, str | None]]]:
+def _parts(sheet: Sheet, layout: Layout) -> tuple[Codes, list[dict[str, str]]]:
     # the part of every row, and the group and session of every part
     session = None if layout.session == layout.by else layout.session
-    places = [place for place in (layout.by, session) if place is not None]
-    for place in places:
+    roles = {"group": layout.by, "session": session}
+    places = {role: place for role, place in roles.items() if place is not None}
+    for place in places.values():
         is_empty = sheet.columns[place].is_text("")
         if is_empty.any():
             raise sheet.refuse("no value", sheet.where(int(np.argmax(is_empty))), place)
     if not places:
-        return np.zeros(len(sheet.numbers), dtype=np.int64), [(None, None)]
-    codes, names = together([sheet.columns[place] for place in places])
-    group, visit = (
-        places.index(p) if p in places else None for p in (layout.by, session)
-    )
-    return codes, [
-        (None if group is None else of[group], None if visit is None else of[visit])
-        for of in names
-    ]
+        return np.zeros(len(sheet.numbers), dtype=np.int64), [{}]
+    codes, names = together([sheet.columns[place] for place in places.values()])
+    return codes, [dict(zip(places, texts, strict=True)) for texts in names]
 
 
 def _one_each(
@@ -612,14 +605,18 @@ def _counted(
     name, order = "observed", list(range(len(names)))
     if options.categories is not None:
         if set(options.categories) != set(names):
-            declared, known = ", ".join(options.categories), ", ".join(names)
-            raise sheet.refuse("other categories", names=known, categories=declared)
+            raise sheet.refuse(
+                "other categories",
+                names=", ".join(names),
+                categories=", ".join(options.categories),
+            )
         name, order = "declared", [names.index(name) for name in options.categories]
     elif all(map(is_number, names)):
         order.sort(key=lambda k: float(names[k]))
     scale = Scale(name=name, grades=tuple(names[k] for k in order))
-    part, groups = _parts(sheet, layout)
-    findings += doubt_names("groups", sorted(group or "" for group, _ in groups))
+    part, names_of_parts = _parts(sheet, layout)
+    groups = sorted(names.get("group", "") for names in names_of_parts)
+    findings += doubt_names("groups", groups)
     if layout.kind == "table":
         rows = _names_of_rows(sheet, layout, names)
         table = table[np.ix_([rows.index(names[k]) for k in order], order)]
@@ -633,11 +630,11 @@ def _counted(
         n_items, n_raters = int((of_item > 0).sum()), int(of_item.max())
         parts = [
             RatingsPart(
-                group=group,
-                session=session,
+                group=of.get("group"),
+                session=of.get("session"),
                 ratings=count_items(table[part == k], categories=scale.values),
             )
-            for k, (group, session) in enumerate(groups)
+            for k, of in enumerate(names_of_parts)
         ]
     grades = Grades(scale=scale, codes=np.arange(len(names)))
     return _file_of(

@@ -35,8 +35,9 @@ from masrel.ratings._findings import ReadingOptions, refusal
 Codes = NDArray[np.int64]
 
 TEXT_FORMATS = {".csv": "CSV", ".tsv": "TSV", ".txt": "text", ".dat": "text"}
+WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
 TYPED_FORMATS = (
-    *(".xlsx", ".xlsm", ".xls", ".ods", ".parquet", ".feather", ".json", ".jsonl"),
+    *(*WORKBOOKS, ".parquet", ".feather", ".json", ".jsonl"),
     *(".sav", ".zsav", ".por", ".dta", ".sas7bdat", ".xpt"),
 )
 DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "blanks"}
@@ -63,7 +64,6 @@ _MARKS = {  # how files begin that are no text, and what their names end in
     b"(\xb5/\xfd": ".zst, which is not read",
     b"%PDF": ".pdf, which is not read",
 }
-_UNPLAIN = re.compile(r"[^\x21-\x7e]")  # blanks, and letters that may have two forms
 _SNIFFED = 20  # lines that the separator is found in
 _CHUNK = 1 << 14  # records that are taken apart at once
 _END = "\0"  # a record behind the last, which a quote that stays open swallows
@@ -83,9 +83,7 @@ class Column:
     def of(cls, codes: Codes, cells: Iterable[str]) -> "Column":
         """Take cells that may differ by blanks or Unicode forms alone."""
         number: dict[str, int] = {}
-        if _UNPLAIN.search("".join(cells)):  # names and grades have none, as a rule
-            cells = map(plain, cells)
-        places = [number.setdefault(cell, len(number)) for cell in cells]
+        places = [number.setdefault(plain(cell), len(number)) for cell in cells]
         return cls(np.array(places, dtype=np.int64)[codes], list(number))
 
     def rows(self, chosen: Any) -> "Column":
@@ -194,8 +192,12 @@ def finished(sheet: Sheet, options: ReadingOptions) -> Sheet:
         cells = [[n, *c.cells()] for n, c in zip(header, columns, strict=True)]
         if options.transpose:
             cells = list(map(list, zip(*cells, strict=True)))
-            sheet = replace(sheet, is_transposed=True, unit="column")
-            sheet = replace(sheet, line_of=lambda number: number + 1)
+            sheet = replace(
+                sheet,
+                is_transposed=True,
+                unit="column",
+                line_of=lambda number: number + 1,
+            )
         if options.no_header:
             header = [str(n) for n in range(1, len(cells) + 1)]
         else:
@@ -236,16 +238,11 @@ def bytes_of(path: Path | str) -> bytes:
     """Return the bytes of a file, or of standard input for "-"."""
     if str(path) == "-":
         return sys.stdin.buffer.read()
-    path = Path(path)
-    wrong = {
-        "folder": path.is_dir(),
-        "absent": not path.exists(),
-        "device": path.is_char_device() or path.is_block_device(),
-    }
-    for code, is_so in wrong.items():
-        if is_so:
-            raise refusal(str(path), code)
-    return path.read_bytes()
+    if not Path(path).exists():
+        raise refusal(str(path), "absent")
+    if Path(path).is_dir():
+        raise refusal(str(path), "folder")
+    return Path(path).read_bytes()
 
 
 def unpacked(name: str, data: bytes, *, is_export: bool) -> tuple[str, bytes]:

@@ -357,9 +357,6 @@ def test_scales(
     assert file.read["scale"]["declared"] is bool(options)
 
 
-SECOND_NAMES = (
-    "item,rater,grade\nPatient,Observer,1\nA,Kim,1\nA,Lee,1\nB,Kim,2\nB,Lee,2\n"
-)
 UNITS = "patient,Kim,Lee\nid,level,level\nA,mild,mild\nB,mild,severe\nC,severe,severe\n"
 NUMBERED = "P1,mild,severe\nP2,no,no\nP3,no,some\nP4,some,some\n"
 ANGLES = "".join(f"i{k},{k + 0.25},{k + 0.5}\n" for k in range(40))
@@ -377,8 +374,6 @@ BORG = "".join(f"i{k},{k},{k + 1}\n" for k in range(6, 20))
             "second header",
             False,
         ),
-        (SECOND_NAMES, "second names", True),
-        (SECOND_NAMES.replace("Patient,Observer,1\n", ""), "second names", False),
         ("item,A,B\n" + ANGLES, "measurements", True),
         # 15 grades of Borg's scale once or twice each
         ("item,A,B\n" + BORG, "measurements", False),

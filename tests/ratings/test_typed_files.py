@@ -299,22 +299,35 @@ REFUSED: list[tuple[str, Write, dict[str, Any], str]] = [
     ),
     ("xlsx", partial(workbook, R=[]), {}, "needed a header and rows, got none"),
     ("parquet", partial(arrow, columns=NO_ROWS), {}, "needed rows of ratings"),
-    ("parquet", partial(arrow, columns=LONG), {"sheet": "R"}, "--sheet: .* a workbook"),
+    (
+        "parquet",
+        partial(arrow, columns=LONG),
+        {"sheet": "R"},
+        "--sheet R: needed a workbook",
+    ),
     ("parquet", partial(arrow, columns=LONG), {"encoding": "latin-1"}, "--encoding: "),
-    ("parquet", partial(arrow, columns=LISTS), {}, "column 'Kim': needed text or"),
+    (
+        "parquet",
+        partial(arrow, columns=LISTS),
+        {},
+        "column 'Kim', value 1: needed text or",
+    ),
     ("sav", statistical, {"encoding": "no such encoding"}, r"r\.sav"),
     *(
         ("json", partial(text, content=content), {}, words)
         for content, words in (
             ('[{"item": "A", "Kim": 1, "Kim": 2}]', "key 'Kim' twice"),
-            ('[{"item": "A", "Kim": [1]}]', "object 1: .*'Kim', got what is nested"),
+            ('[{"item": "A", "Kim": [1]}]', "column 'Kim', value 1: .* a list; --from"),
             ('[{"item": "A"\n,]', r"is damaged, or no .json file .*line 2"),
             ("[]", "needed a JSON list of objects"),
             ("{}", "needed rows of ratings below the names"),
             ("null", "needed a JSON list of objects"),
-            ('{"data": [{"a": 1}]}', "'data': needed text or numbers, got a dict"),
+            (
+                '{"data": [{"a": 1}]}',
+                "'data', value 1: needed text or numbers, got a dict",
+            ),
             ("[1, 2]", "needed a JSON list of objects"),
-            ('{"item": ["A"], "Kim": []}', "object 1: .* nested"),
+            ('{"item": ["A"], "Kim": []}', "value 1: .* a list"),
             ("nonsense", r"is damaged, or no .json file .*line 1"),
             ('{"a": 1}\n{"a": \n', r"is damaged, or no .json file .*line 2"),
         )
