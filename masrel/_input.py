@@ -18,8 +18,12 @@ def check_option(name: str, value: object, options: Collection[object]) -> None:
     """Check that an argument is one of its options."""
     if not isinstance(value, str) or value not in options:
         known = ", ".join(map(str, options))
-        got = "nothing" if value is None else repr(value)
-        raise ParameterError(f"{name}: needs one of {known}, got {got}")
+        raise ParameterError(f"{name}: needs one of {known}, got {said(value)}")
+
+
+def said(value: object) -> str:
+    """Return a value as a message has it."""
+    return "nothing" if value is None else repr(value)
 
 
 def not_utf8(error: UnicodeDecodeError) -> str:

@@ -15,31 +15,26 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from masrel._input import check_option, listed, not_utf8, refuse
+from masrel._input import check_option, listed, not_utf8, refuse, said
 from masrel.errors import ParameterError, RatingsError
 
+# what becomes of a tie: the even neighbour, or the one further from 0
 Rule = Literal["half_even", "half_up"]
-"""What becomes of a tie: the even neighbour, or the one further from 0."""
+RULES: tuple[Rule, ...] = get_args(Rule)
+WEIGHTS = ("identity", "linear", "quadratic")
 
-RULES: tuple[Rule, ...] = ("half_even", "half_up")
-
+# the least and the greatest whole number that is allowed; none where it is less
 Window = tuple[int, int]
-"""The least and the greatest whole number that is allowed; none where it is less."""
+# the ends of the values rounded to one text, and whether each is one of them
+Bounds = tuple[Fraction, Fraction, bool, bool]
 
 _NUMBER = re.compile(r"-?(\d+\.?\d*|\.\d+)", re.ASCII)
 _MAX_DECIMALS = 12
-
-AuditWeights = Literal["identity", "linear", "quadratic"]
-"""Weights of printed coefficients."""
-
-WEIGHTS: tuple[AuditWeights, ...] = get_args(AuditWeights)
-
-_MAX_UNRATED = 20  # items of which it is tried that not both ratings are there
 _COUNTS = {  # the least and the greatest
     "n_items": (1, 10_000),
     "n_categories": (2, 20),
     "n_raters": (2, 1_000),
-    "n_unrated": (0, _MAX_UNRATED),
+    "n_unrated": (0, 20),
 }
 _PRINTED = {  # the least, the greatest, an example
     "agreement": (0, 100, "97.4"),
@@ -49,14 +44,9 @@ _PRINTED = {  # the least, the greatest, an example
     "high": (-2, 2, "0.12"),
     "p": (0, 1, "0.003"),
 }
-_MARGINS = ("margins_1", "margins_2")
+MARGINS = ("margins_1", "margins_2")
+UNCERTAINTY = ("standard_error", "low", "high", "p")  # of the kappa of two raters
 _NEEDED = ("n_items", "n_categories")
-UNCERTAINTY = ("standard_error", "low", "high", "p")
-"""What may be printed beside the kappa of two raters."""
-
-
-Bounds = tuple[Fraction, Fraction, bool, bool]
-"""The ends of the values rounded to one text, and whether each is one of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +72,8 @@ def _parse_printed(
 ) -> PrintedNumber:
     """Return a printed number between two limits; `where` begins the message."""
     plain = text.strip().replace("−", "-") if isinstance(text, str) else ""
+    if where == "p":  # of which a bound may be printed
+        plain = plain.removeprefix("<")
     decimals = len(plain.partition(".")[2])
     is_number = _NUMBER.fullmatch(plain) is not None
     value = Fraction(plain if is_number else 0)
@@ -187,51 +179,44 @@ class Claim:
             most = min(most, self.n_items - 1) if key == "n_unrated" else most
             is_in = _is_whole(count) and least <= count <= most
             needed = f"needs a whole number from {least} to {most}"
-            refuse((not is_in, f"{key}: {needed}, got {count!r}"))
+            refuse((not is_in, f"{key}: {needed}, got {said(count)}"))
         refuse(
             (
                 self.agreement is None and self.kappa is None,
                 "agreement, kappa: needs at least one of them, got neither",
             )
         )
-        printed = self.printed()
-        check_weights("agreement_weights", self.agreement_weights, (*WEIGHTS, "any"))
-        check_weights("kappa_weights", self.kappa_weights, (*WEIGHTS, "any"))
-        refuse(
-            (
-                self.rounding not in (*RULES, "either"),
-                f"rounding: needs half_even, half_up or either, got {self.rounding!r}",
-            )
-        )
-        for key in _MARGINS:
+        check_option("agreement_weights", self.agreement_weights, (*WEIGHTS, "any"))
+        check_option("kappa_weights", self.kappa_weights, (*WEIGHTS, "any"))
+        check_option("rounding", self.rounding, (*RULES, "either"))
+        for key in MARGINS:
             if getattr(self, key) is not None:
                 self._check_margins(key, getattr(self, key))
-        self._check_uncertainty(printed)
+        self._check_uncertainty()
 
     def _check_margins(self, key: str, margins: tuple[int, ...]) -> None:
         sums = range(self.n_items - self.n_unrated, self.n_items + 1)
         are_counts = all(_is_whole(count) and count >= 0 for count in margins)
+        got = f"got {' '.join(map(str, margins))}"
         refuse(
             (self.n_raters != 2, f"{key}: needs two raters, got {self.n_raters}"),
             (
                 not are_counts or len(margins) != self.n_categories,
-                f"{key}: needs {self.n_categories} counts, one a category, got "
-                f"{margins}",
+                f"{key}: needs {self.n_categories} counts, one a category, {got}",
             ),
             (
                 are_counts and sum(margins) not in sums,
-                f"{key}: needs counts that sum to n_items, {self.n_items}, got "
-                f"{margins}",
+                f"{key}: needs counts that sum to n_items, {self.n_items}, {got}",
             ),
         )
 
-    def _check_uncertainty(self, printed: dict[str, PrintedNumber]) -> None:
-        is_kappa_of_two = self.n_raters == 2 and self.kappa is not None
+    def _check_uncertainty(self) -> None:
+        printed, is_of_two = self.printed(), self.n_raters == 2
         low, high = printed.get("low"), printed.get("high")
         refuse(
             *(
                 (
-                    key in printed and not is_kappa_of_two,
+                    key in printed and not (is_of_two and "kappa" in printed),
                     f"{key}: needs the kappa of two raters beside it",
                 )
                 for key in UNCERTAINTY
@@ -240,7 +225,7 @@ class Claim:
             (low and not high, "high: needed beside low, got none"),
             (
                 not 0.5 <= self.level < 1,
-                f"level: needs a number from 0.5 to below 1, got {self.level!r}",
+                f"level: needs a number from 0.5 to below 1, got {self.level:g}",
             ),
             (
                 low and high and low.value > high.value,
@@ -250,14 +235,12 @@ class Claim:
 
     def printed(self) -> dict[str, PrintedNumber]:
         """Return the numbers that are printed, by their names here."""
-        numbers = {}
-        for key, (low, high, example) in _PRINTED.items():
-            text = getattr(self, key)
-            if key == "p" and isinstance(text, str):
-                text = text.removeprefix("<")
-            if text is not None:
-                numbers[key] = _parse_printed(text, key, low, high, example)
-        return numbers
+        texts = {key: getattr(self, key) for key in _PRINTED}
+        return {
+            key: _parse_printed(text, key, *_PRINTED[key])
+            for key, text in texts.items()
+            if text is not None
+        }
 
     @property
     def rules(self) -> tuple[Rule, ...]:
@@ -276,28 +259,23 @@ class Claim:
             or high.value + high.half_unit < kappa.value - kappa.half_unit
         )
 
-    def weights(self) -> list[tuple[AuditWeights, AuditWeights]]:
+    def weights(self) -> list[tuple[str, str]]:
         """Return the weights of agreement and of kappa that it may be read with."""
-        known = []
-        for number, name in (
-            (self.agreement, self.agreement_weights),
-            (self.kappa, self.kappa_weights),
-        ):
+        of_agreement, of_kappa = (
             # of two categories all weights are alike
-            is_one = number is None or (name == "any" and self.n_categories == 2)
-            chosen = "identity" if is_one else name
-            known.append([w for w in WEIGHTS if chosen in (w, "any")])
-        agreement, kappa = known
-        return list(product(agreement, kappa))
+            WEIGHTS[: 1 if number is None or self.n_categories == 2 else None]
+            if name == "any"
+            else (name,)
+            for number, name in (
+                (self.agreement, self.agreement_weights),
+                (self.kappa, self.kappa_weights),
+            )
+        )
+        return list(product(of_agreement, of_kappa))
 
 
 def _is_whole(count: object) -> bool:
     return isinstance(count, int | np.integer) and count is not True
-
-
-def check_weights(name: str, weights: str, known: tuple[str, ...] = WEIGHTS) -> None:
-    """Refuse weights that cannot be audited."""
-    check_option(name, weights, known)
 
 
 def read_claims(file: Path) -> tuple[Claim, ...]:
@@ -383,10 +361,10 @@ def claim_of(texts: dict[str, str]) -> Claim:
     for key, text in texts.items():
         if key in _COUNTS:
             values[key] = _whole(text)
-        elif key in _MARGINS:
+        elif key in MARGINS:
             values[key] = tuple(map(_whole, text.replace(";", " ").split()))
         elif key == "level":
-            values[key] = float(_parse_printed(text, key, 0, 1, "0.95").value)
+            values[key] = float(_parse_printed(text, key, 0, 100, "0.95").value)
     return Claim(**values)
 
 

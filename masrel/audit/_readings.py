@@ -5,7 +5,7 @@ kappa plus and minus a normal quantile of it, and p that of kappa over it. All t
 floats: a printed number fits where it is nearer than half of its last decimal.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from statistics import NormalDist
@@ -14,14 +14,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel._input import check_option
 from masrel.agreement import cohen_kappa, count_table
-from masrel.audit._claims import (
-    UNCERTAINTY,
-    AuditWeights,
-    Claim,
-    PrintedNumber,
-    check_weights,
-)
+from masrel.audit._claims import MARGINS, UNCERTAINTY, WEIGHTS, Claim, PrintedNumber
 from masrel.audit._search import (
     MAX_COUNTED,
     N_EXAMPLES,
@@ -36,8 +31,8 @@ CountStatus = Literal["exact", "at least", "cannot tell"]
 
 _Floats = NDArray[np.float64]
 _Flags = NDArray[np.bool_]
-_Weights = tuple[AuditWeights, AuditWeights]  # of agreement and of kappa
 
+_BESIDE = (*MARGINS, *UNCERTAINTY)  # what needs tables that are made
 _ERRORS = ("delta", "delta n-1", "null", "simple")
 _TESTS = {
     "null, two-sided": ("null", 2),
@@ -185,19 +180,16 @@ class ClaimAudit:
         count = _range_text(some)
         verb = "gives" if count == "one table" else "give"
         read = "" if len(some) == n else f", by {len(some)} of {n} readings"
-        return (
-            f"{count}{table.removeprefix('table')} {verb} {what}{read}"
-            f"{_agreed_text(claim, some)}"
-        )
+        if all(reading.n_agreed for reading in some):
+            agreed = [number for reading in some for number in reading.n_agreed]
+            on = f"{ends_text(agreed)} of {claim.n_items}"
+            read += f"; in them the raters agree on {on}"
+        return f"{count}{table.removeprefix('table')} {verb} {what}{read}"
 
 
-def _agreed_text(claim: Claim, readings: list[Reading]) -> str:
-    # on how many items raters agree, where all readings say it
-    if not all(reading.n_agreed for reading in readings):
-        return ""
-    agreed = [n for reading in readings for n in reading.n_agreed]
-    shown = " to ".join(map(str, sorted({min(agreed), max(agreed)})))
-    return f"; in them the raters agree on {shown} of {claim.n_items}"
+def ends_text(numbers: Sequence[int]) -> str:
+    """Return the ends of some numbers in words."""
+    return " to ".join(map(str, sorted({min(numbers), max(numbers)})))
 
 
 def _numbers(claim: Claim) -> str:
@@ -287,8 +279,8 @@ def consistent_tables(
     ...     n_items=20, n_categories=2, agreement="65.0", kappa="0.244"))
     no table
     """
-    check_weights("agreement_weights", agreement_weights)
-    check_weights("kappa_weights", kappa_weights)
+    check_option("agreement_weights", agreement_weights, WEIGHTS)
+    check_option("kappa_weights", kappa_weights, WEIGHTS)
     return _answer(
         Claim(
             n_items=n_items,
@@ -380,10 +372,9 @@ def audit_claim(claim: Claim) -> ClaimAudit:
     """
     readings: list[Reading] = []
     examples: tuple[CellRows, ...] = ()
-    read = _by_rounding if claim == _bare(claim) else _one_by_one
+    read = _one_by_one if _has_more(claim) else _by_rounding
     for n_absent, weights in product(range(claim.n_unrated + 1), claim.weights()):
-        named = _named(claim, weights, claim.n_items - n_absent)
-        for reading, tables in read(claim, named):
+        for reading, tables in read(_named(claim, weights, claim.n_items - n_absent)):
             readings.append(reading)
             examples = examples or tables
     audit = ClaimAudit(claim=claim, readings=tuple(readings), examples=examples)
@@ -392,13 +383,12 @@ def audit_claim(claim: Claim) -> ClaimAudit:
     )
 
 
-def _bare(claim: Claim) -> Claim:
-    # by its percentage and kappa alone
-    absent = dict.fromkeys(("margins_1", "margins_2", *UNCERTAINTY))
-    return replace(claim, **absent)  # type: ignore[arg-type]
+def _has_more(claim: Claim) -> bool:
+    # whether something is printed beside its percentage and kappa
+    return any(getattr(claim, key) is not None for key in _BESIDE)
 
 
-def _named(claim: Claim, weights: _Weights, n_items: int) -> Claim:
+def _named(claim: Claim, weights: tuple[str, str], n_items: int) -> Claim:
     # a claim read by named weights, of so many items that have both ratings
     # margins of more items than are left say nothing of those that are
     first, second = (
@@ -418,12 +408,13 @@ def _named(claim: Claim, weights: _Weights, n_items: int) -> Claim:
 
 def _alone(claim: Claim) -> dict[str, ConsistentTables]:
     # by the first weights: which of the numbers it is that no table gives
-    bare = _named(_bare(claim), claim.weights()[0], claim.n_items)
+    absent: dict[str, None] = dict.fromkeys(_BESIDE)
+    bare = _named(replace(claim, **absent), claim.weights()[0], claim.n_items)  # type: ignore[arg-type]
     parts = {}
     if claim.agreement is not None and claim.kappa is not None:
         parts[f"{claim.agreement} % agreement"] = replace(bare, kappa=None)
         parts[f"κ {claim.kappa}"] = replace(bare, agreement=None)
-    if claim != _bare(claim):
+    if _has_more(claim):
         parts[_numbers(claim)] = bare
     return {name: _answer(part) for name, part in parts.items()}
 
@@ -431,24 +422,23 @@ def _alone(claim: Claim) -> dict[str, ConsistentTables]:
 _Read = Iterator[tuple[Reading, tuple[CellRows, ...]]]  # each with its examples
 
 
-def _by_rounding(claim: Claim, named: Claim) -> _Read:
+def _by_rounding(claim: Claim) -> _Read:
     # one reading where both rules lead to the same
-    result = _answer(named)
+    result = _answer(claim)
     is_one = len({(r.n_tables, r.status) for r in result.readings}) == 1
     for reading in result.readings[: 1 if is_one else None]:
         rounding = claim.rounding if is_one else reading.rounding
         yield replace(reading, rounding=rounding), result.examples
 
 
-def _one_by_one(claim: Claim, named: Claim) -> _Read:
+def _one_by_one(claim: Claim) -> _Read:
     # readings of margins, errors and p, from tables made one by one
-    result = search_tables(named, n_made=MAX_COUNTED)
+    result = search_tables(claim, n_made=MAX_COUNTED)
     is_whole = result.is_whole or claim.excludes_kappa
     q, printed = claim.n_categories, claim.printed()
     tables = np.array(result.tables, dtype=np.int64).reshape(-1, q, q)
-    values = (
-        _errors(tables, named.kappa_weights) if printed.keys() & UNCERTAINTY else {}
-    )
+    has_errors = not printed.keys().isdisjoint(UNCERTAINTY)
+    values = _errors(tables, claim.kappa_weights) if has_errors else {}
     errors = _ERRORS if printed.keys() & {"standard_error", "low"} else (None,)
     tests = _TESTS if "p" in printed else (None,)
     for error, test in product(errors, tests):
@@ -459,7 +449,7 @@ def _one_by_one(claim: Claim, named: Claim) -> _Read:
             fits &= _has_p(claim, values, test)
         agreed = np.unique(np.trace(tables[fits], axis1=1, axis2=2)).tolist()
         reading = _reading(
-            named,
+            claim,
             int(fits.sum()),
             is_whole,
             claim.rounding,

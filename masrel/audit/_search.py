@@ -8,10 +8,10 @@ A printed percentage allows a range of S, a printed kappa for every S a range of
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from fractions import Fraction
-from functools import cache, lru_cache, partial
+from functools import cache, lru_cache
 from itertools import combinations, islice
 from math import comb, prod
 from typing import Self
@@ -23,12 +23,8 @@ from masrel.audit._claims import Claim, Rule, Window, whole_numbers
 
 Integers = NDArray[np.int64]
 
-MAX_COUNTED = 10_000
-"""Tables that are counted; of more it is said that there are at least as many."""
-
-N_EXAMPLES = 10
-"""Tables that are shown."""
-
+MAX_COUNTED = 10_000  # of more tables it is said that there are at least as many
+N_EXAMPLES = 10  # tables that are shown
 _MAX_VISITED = 100_000_000  # partial tables of two raters, until a search is given up
 _MAX_VISITED_ITEMS = 20_000_000  # states of items of more raters
 _FIRST_VISITED_ITEMS = 1_000_000  # of a first search, enough where tables are many
@@ -45,12 +41,12 @@ class WorkLimitError(Exception):
     """The bound on work is met."""
 
 
+# tables that were met at one step
 Step = tuple[
-    Mapping[Rule | None, int],  # tables by rule, and by any of them (None)
+    Mapping[Rule | None, int],  # how many by rule, and by any of them (None)
     set[int],  # on how many items two raters agree in them
-    Callable[[], Iterator[Integers]],  # makes them
+    Iterator[Integers],  # the tables, made one by one
 ]
-"""Tables that were met at one step."""
 
 
 def search_tables(
@@ -118,7 +114,7 @@ class _Search(ABC):
                     self.numbers[rule] += n
                 if numbers[None]:
                     self.n_agreed |= n_agreed
-                    self.tables += islice(tables(), n_made - len(self.tables))
+                    self.tables += islice(tables, n_made - len(self.tables))
                 # margins are looked at only where tables are made
                 is_made = n_made >= MAX_COUNTED
                 if (len(self.tables) if is_made else self.numbers[None]) >= MAX_COUNTED:
@@ -314,8 +310,8 @@ class SquareTables(_Search):
                 end = np.searchsorted(g[order], high - symmetric, "right")
                 ends[rule] = np.array([begin, end])
             numbers = {rule: int(np.diff(e, axis=0).sum()) for rule, e in ends.items()}
-            made = partial(self._tables, diagonals, between, above[order], ends[None])
-            yield numbers, n_agreed, made
+            tables = self._tables(diagonals, between, above[order], ends[None])
+            yield numbers, n_agreed, tables
 
     def _tables(
         self, diagonals: Integers, between: Integers, above: Integers, ends: Integers
@@ -413,8 +409,7 @@ class ItemTables(_Search):
         fits = self._fits(keys)
         numbers = {rule: int(counts @ fit.sum(axis=1)) for rule, fit in fits.items()}
         before, row = np.nonzero(fits[None])
-        made = partial(self._tables, layers, begin + before, row)
-        return numbers, set(), made
+        return numbers, set(), self._tables(layers, begin + before, row)
 
     def _tables(
         self, layers: list[Integers], before: Integers, last: Integers

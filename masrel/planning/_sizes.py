@@ -253,7 +253,7 @@ def _check_grid(
         ),
         (
             scheduler is not None and executor is None,
-            'scheduler: is of executor "dask" alone, got None',
+            'scheduler: is of executor "dask" alone, got none',
         ),
     )
 

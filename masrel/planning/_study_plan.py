@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from masrel._input import refuse
+from masrel._input import refuse, said
 from masrel.agreement import Label, WeightsLike, code_ratings
 from masrel.errors import RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Target
@@ -185,7 +185,7 @@ class Study:
             value = getattr(self, name)
             is_absent = value is None and name not in _ALWAYS
             is_right = is_absent or (isinstance(value, of_kind) and holds(value))
-            refuse((not is_right, f"{name}: needs {needed}, got {value!r}"))
+            refuse((not is_right, f"{name}: needs {needed}, got {said(value)}"))
         _check_together(self)
         object.__setattr__(self, "rng", _seed(self.rng))
 
@@ -224,7 +224,11 @@ _RULES: dict[str, _Rule] = {
     "n_items": _whole(2),
     **dict.fromkeys(("n_raters", "n_studies"), _whole(1)),
     "sides": _one_of(1, 2),
-    "target": _one_of(*get_args(Target)),
+    "target": (
+        "items, raters or both: what a new study draws anew",
+        object,
+        lambda x: x in get_args(Target),
+    ),
     "interval": _one_of(*get_args(Interval)),
     "method": _one_of(*get_args(Method)),
 }

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln, ndtr, ndtri
 
-from masrel._input import refuse
+from masrel._input import refuse, said
 from masrel.agreement import CodedRatings, Coefficient, Label, coefficient
 from masrel.errors import MasrelWarning, ParameterError
 from masrel.intervals._question import IntervalProblem, pose_problem
@@ -86,7 +86,7 @@ def declared_model(study: Study) -> ItemModel:
         (
             name not in _MODELS,
             f"model: needs one of {known}, or a LatentModel, since models of one kappa "
-            f"differ in precision; got {study.model!r}",
+            f"differ in precision; got {said(study.model)}",
         )
     )
     shares = _shares(study, is_table=name == "table")
@@ -524,7 +524,7 @@ def _check_normal(study: Study, entry: Coefficient) -> None:
         (study.model is not None, f"model: {absent}; got {study.model!r}"),
         (
             value is None or not 0.0 < value < 1.0,
-            f"value: {entry.title} needs (0, 1), got {value}",
+            f"value: {entry.title} needs a number in (0, 1), got {said(value)}",
         ),
         (
             study.target != target,
@@ -566,7 +566,7 @@ def _with_value(design: Design) -> Design:
         refuse(
             (
                 is_other,
-                f"value: the model has {implied:.4f}, got {value}; None takes it",
+                f"value: the model has {implied:.4f}, so it needs none, got {value}",
             )
         )
         return Design.of(replace(study, value=implied), design.model)

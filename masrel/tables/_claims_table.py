@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from masrel.audit import ClaimAudit, Reading
+from masrel.audit._readings import ends_text
 from masrel.tables._tables import Column, Table, table_of
 
 _CLAIM_COLUMNS = (
@@ -70,7 +71,7 @@ def readings_table(audits: Sequence[ClaimAudit]) -> Table:
             "claim": audit.claim.name,
             "rounding": reading.rounding.replace("_", " "),
             "n_tables": _number(reading),
-            "n_agreed": _ends(reading.n_agreed),
+            "n_agreed": ends_text(reading.n_agreed) if reading.n_agreed else None,
         }
         for audit in audits
         for reading in audit.readings
@@ -110,10 +111,6 @@ def _result(audit: ClaimAudit) -> str:
     if audit.is_possible and n_some < len(audit.readings):
         return f"some, by {n_some} of {len(audit.readings)} readings"
     return {True: "some", False: "none", None: "cannot tell"}[audit.is_possible]
-
-
-def _ends(numbers: tuple[int, ...]) -> str | None:
-    return " to ".join(map(str, sorted({*numbers[:1], *numbers[-1:]}))) or None
 
 
 def _number(reading: Reading) -> str:
