@@ -18,10 +18,10 @@ def check_option(name: str, value: object, options: Collection[object]) -> None:
     """Check that an argument is one of its options."""
     if not isinstance(value, str) or value not in options:
         known = ", ".join(map(str, options))
-        raise ParameterError(f"{name}: needs one of {known}, got {said(value)}")
+        raise ParameterError(f"{name}: needs one of {known}, got {value_text(value)}")
 
 
-def said(value: object) -> str:
+def value_text(value: object) -> str:
     """Return a value as a message has it."""
     return "nothing" if value is None else repr(value)
 

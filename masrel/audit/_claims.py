@@ -15,7 +15,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from masrel._input import check_option, listed, not_utf8, refuse, said
+from masrel._input import check_option, listed, not_utf8, refuse, value_text
 from masrel.errors import ParameterError, RatingsError
 
 # what becomes of a tie: the even neighbour, or the one further from 0
@@ -179,7 +179,7 @@ class Claim:
             most = min(most, self.n_items - 1) if key == "n_unrated" else most
             is_in = _is_whole(count) and least <= count <= most
             needed = f"needs a whole number from {least} to {most}"
-            refuse((not is_in, f"{key}: {needed}, got {said(count)}"))
+            refuse((not is_in, f"{key}: {needed}, got {value_text(count)}"))
         refuse(
             (
                 self.agreement is None and self.kappa is None,

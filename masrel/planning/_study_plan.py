@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from masrel._input import refuse, said
+from masrel._input import refuse, value_text
 from masrel.agreement import Label, WeightsLike, code_ratings
 from masrel.errors import RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Target
@@ -185,7 +185,7 @@ class Study:
             value = getattr(self, name)
             is_absent = value is None and name not in _ALWAYS
             is_right = is_absent or (isinstance(value, of_kind) and holds(value))
-            refuse((not is_right, f"{name}: needs {needed}, got {said(value)}"))
+            refuse((not is_right, f"{name}: needs {needed}, got {value_text(value)}"))
         _check_together(self)
         object.__setattr__(self, "rng", _seed(self.rng))
 

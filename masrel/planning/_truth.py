@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln, ndtr, ndtri
 
-from masrel._input import refuse, said
+from masrel._input import refuse, value_text
 from masrel.agreement import CodedRatings, Coefficient, Label, coefficient
 from masrel.errors import MasrelWarning, ParameterError
 from masrel.intervals._question import IntervalProblem, pose_problem
@@ -86,7 +86,7 @@ def declared_model(study: Study) -> ItemModel:
         (
             name not in _MODELS,
             f"model: needs one of {known}, or a LatentModel, since models of one kappa "
-            f"differ in precision; got {said(study.model)}",
+            f"differ in precision; got {value_text(study.model)}",
         )
     )
     shares = _shares(study, is_table=name == "table")
@@ -524,7 +524,7 @@ def _check_normal(study: Study, entry: Coefficient) -> None:
         (study.model is not None, f"model: {absent}; got {study.model!r}"),
         (
             value is None or not 0.0 < value < 1.0,
-            f"value: {entry.title} needs a number in (0, 1), got {said(value)}",
+            f"value: {entry.title} needs a number in (0, 1), got {value_text(value)}",
         ),
         (
             study.target != target,
