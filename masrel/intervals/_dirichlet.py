@@ -6,7 +6,6 @@ Patterns: what the raters give an item has a Dirichlet over the patterns that we
 and over a few that the prior adds. It knows raters by their columns and takes weights.
 """
 
-from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
@@ -19,9 +18,11 @@ from masrel.intervals._rho import (
     Prior,
     RhoPosterior,
     nothing_to_learn,
-    undefined,
 )
 from masrel.intervals.bootstrap import _distinct_features, _Resamples
+
+OF_PATTERNS = "Dirichlet posterior of the patterns of ratings"
+"""Of all intervals of patterns."""
 
 _WORTH = 1.5
 """Items that the prior is worth, as that of a table of two raters."""
@@ -43,9 +44,6 @@ def alike_interval(
     one_sided: bool = False,
 ) -> Interval:
     """Compute the credible interval of a coefficient, raters being alike."""
-    reason = no_posterior(problem)
-    if reason is not None:
-        return undefined(problem, reason, METHOD)
     generator, seed = recorded_generator(rng)
     rho, shares = _population(problem, prior, n_draws, generator)
     # two ratings of an item are one twice with probability ρ, else drawn anew
@@ -55,8 +53,7 @@ def alike_interval(
     weights[:, pairs[0] == pairs[1]] += rho * shares
     rows = problem.features(pairs.T)
     values = problem.values(_WITHOUT_END * (weights @ rows))
-    interval = _interval(problem, values, METHOD, prior.description, one_sided)
-    return replace(interval, seed=seed)
+    return _interval(problem, values, METHOD, prior.description, one_sided, seed)
 
 
 def patterns_interval(
@@ -67,10 +64,6 @@ def patterns_interval(
     one_sided: bool = False,
 ) -> Interval:
     """Compute the credible interval of a coefficient from its patterns of ratings."""
-    method = "Dirichlet posterior of the patterns of ratings"
-    reason = no_posterior(problem)
-    if reason is not None:
-        return undefined(problem, reason, method)
     generator, seed = recorded_generator(rng)
     rows, often = _distinct_features(problem.features(problem.codes), problem.freq)
     added, worth = _prior_patterns(problem)
@@ -81,8 +74,8 @@ def patterns_interval(
         freq *= _WITHOUT_END / problem.n_items
         values.append(problem.values(freq @ rows))
         n_left -= size
-    interval = _interval(problem, np.concatenate(values), method, _PRIOR, one_sided)
-    return replace(interval, seed=seed)
+    drawn = np.concatenate(values)
+    return _interval(problem, drawn, OF_PATTERNS, _PRIOR, one_sided, seed)
 
 
 def no_posterior(problem: IntervalProblem) -> str | None:
@@ -146,6 +139,7 @@ def _interval(
     method: str,
     prior: str,
     one_sided: bool,
+    seed: int | None,
 ) -> Interval:
     drawn = values[np.isfinite(values)]
     tail = (1.0 - problem.level) * (1.0 if one_sided else 0.5)
@@ -170,6 +164,7 @@ def _interval(
         n_resamples=drawn.size,
         n_undefined=values.size - drawn.size,
         monte_carlo_error=(low[1], high[1]),
+        seed=seed,
         distribution=Distribution(
             values=0.5 * (ends[:-1] + ends[1:]),
             weights=1.0 / (_SHOWN * widths),

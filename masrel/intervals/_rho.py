@@ -217,31 +217,25 @@ def rho_interval(
     problem: IntervalProblem, prior: Prior, *, one_sided: bool = False
 ) -> Interval:
     """Compute the central credible interval of ρ, or all above a lower quantile."""
-    reason = nothing_to_learn(problem)
-    if reason is not None:
-        return undefined(problem, reason, f"{METHOD}, exact")
     counts, level = problem.item_counts(), problem.level
     shares = (1.0 - level,) if one_sided else (0.5 - 0.5 * level, 0.5 + 0.5 * level)
     posterior = RhoPosterior.of(counts, prior)
-    low, *high = posterior.quantiles(*shares)
-    what = "" if one_sided else where_the_prior_weighs(counts)
+    ends = posterior.quantiles(*shares)
+    why = where_the_prior_weighs(counts)
+    if one_sided:
+        why = "the bound rests on the prior, too"
     notes: tuple[str, ...] = ()
-    if one_sided or what:
+    if why:
         others = [
             (RhoPosterior.of(counts, other).quantiles(*shares), other.description)
             for other in prior.others(counts.shape[1])
         ]
         # the one that moves an end most
-        there, description = max(
-            others, key=lambda of: float(np.abs(np.subtract(of[0], [low, *high])).max())
-        )
-        why = f"{what}, so the prior weighs"
-        why = "the bound rests on the prior, too" if one_sided else why
-        answers = ([low, *high], prior.description), (there, description)
-        notes = (prior_note(why, *answers),)
+        there = max(others, key=lambda of: np.abs(np.subtract(of[0], ends)).max())
+        notes = (prior_note(why, (ends, prior.description), there),)
     return Interval(
-        low=low,
-        high=1.0 if one_sided else high[0],
+        low=ends[0],
+        high=1.0 if one_sided else ends[1],
         median=posterior.quantiles(0.5)[0],
         level=level,
         kind="credible",
@@ -267,21 +261,18 @@ def nothing_to_learn(problem: IntervalProblem) -> str | None:
     return None
 
 
-def undefined(problem: IntervalProblem, reason: str, method: str) -> Interval:
-    """Return a credible interval without ends."""
-    return replace(problem.undefined(reason, method=method, unit=None), kind="credible")
-
-
 def where_the_prior_weighs(counts: NDArray[np.int64]) -> str:
     """Return why counts (n_items, n_categories) leave the prior a say, or nothing."""
     n_items = int((counts.sum(axis=1) >= 2).sum())
     if counts.any(axis=0).sum() == 1:
-        return "all ratings are in one category"
-    if ((counts > 0).sum(axis=1) <= 1).all():
-        return "agreement is perfect in these data"
-    if n_items < _FEW_ITEMS:
-        return "1 item is few" if n_items == 1 else f"{n_items} items are few"
-    return ""
+        what = "all ratings are in one category"
+    elif ((counts > 0).sum(axis=1) <= 1).all():
+        what = "agreement is perfect in these data"
+    elif n_items < _FEW_ITEMS:
+        what = "1 item is few" if n_items == 1 else f"{n_items} items are few"
+    else:
+        return ""
+    return f"{what}, so the prior weighs"
 
 
 def prior_note(why: str, *answers: tuple[Sequence[float], str]) -> str:

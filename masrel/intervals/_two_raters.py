@@ -17,18 +17,14 @@ from typing import Literal
 import numpy as np
 from scipy.special import betainc
 
+from masrel.agreement._codes import pair_table
 from masrel.agreement._engine import Floats
 from masrel.agreement._weights import MANY
-from masrel.errors import ConvergenceError, ParameterError
+from masrel.errors import ConvergenceError
 from masrel.estimates import Distribution, Interval
 from masrel.intervals._quadrature import beta_nodes, solve_quantile
 from masrel.intervals._question import IntervalProblem, recorded_generator
-from masrel.intervals._rho import (
-    nothing_to_learn,
-    prior_note,
-    undefined,
-    where_the_prior_weighs,
-)
+from masrel.intervals._rho import prior_note, where_the_prior_weighs
 
 ChanceAgreement = Literal["none", "uniform", "pooled", "pooled, Gwet", "margins"]
 """What disagreement by chance is made of."""
@@ -252,11 +248,6 @@ def table_prior(concentration: float | None, q: int) -> tuple[Floats, str]:
     return cells, f"a Dirichlet worth {_ITEMS:g} items, half of it on pairs that agree"
 
 
-def applies_to(problem: IntervalProblem) -> bool:
-    """Return whether a table of two raters can answer a question."""
-    return _refusal(problem) is None and nothing_to_learn(problem) is None
-
-
 def table_interval(
     problem: IntervalProblem,
     concentration: float | None,
@@ -266,57 +257,51 @@ def table_interval(
     one_sided: bool = False,
 ) -> Interval:
     """Compute the credible interval of a coefficient of two raters."""
-    refusal = _refusal(problem)
-    if refusal is not None:
-        raise ParameterError(refusal)
-    reason = nothing_to_learn(problem)
-    if reason is not None:
-        return undefined(problem, reason, "table posterior")
-    table, n_single = _table(problem)
-    q = len(table)
+    q = problem.coded.n_categories
+    table = pair_table(problem.codes, q, problem.freq)
     prior, description = table_prior(concentration, q)
-    generator, seed, n_drawn = None, None, None
+    generator, seed, errors = None, None, None
     chance = CHANCE_AGREEMENT[problem.entry.name]
     away = problem.v[~np.eye(q, dtype=bool)]
     only_agreement_matters = chance in ("none", "uniform") and not np.ptp(away)
-    if q > 2 and not only_agreement_matters:
-        (generator, seed), n_drawn = recorded_generator(rng), n_draws
+    is_drawn = q > 2 and not only_agreement_matters
+    if is_drawn:
+        generator, seed = recorded_generator(rng)
     tail = (1.0 - problem.level) * (1.0 if one_sided else 0.5)
     shares = (tail, 0.5) if one_sided else (tail, 0.5, 1.0 - tail)
     of_cells = partial(table_quantiles, chance, problem.v, shares=shares)
     posterior, ends, fewer = of_cells(
         table + prior, generator=generator, n_draws=n_draws
     )
-    low, high = ends[0], 1.0 if one_sided else ends[2]
+    low, median, high = [*ends, 1.0][:3]  # 1 is the upper end of a one-sided one
+    if is_drawn:
+        of_high = 0.0 if one_sided else posterior.quantile_error(high)
+        errors = (posterior.quantile_error(low), of_high)
     notes: tuple[str, ...] = ()
+    n_single = problem.n_items - problem.n_paired_items
     if n_single:
         notes = (f"left out, items of a single rating: {n_single}",)
     counts = problem.item_counts()
-    what = where_the_prior_weighs(counts[counts.sum(axis=1) > 1])
-    if what:
+    why = where_the_prior_weighs(counts[counts.sum(axis=1) > 1])
+    if why:
         # another prior that is as reasonable
         is_even = concentration is not None and math.isclose(concentration, 1.0 / q)
         other, other_words = table_prior(None if is_even else 1.0 / q, q)
         _, there, _ = of_cells(table + other, generator=generator, n_draws=_NOTED_DRAWS)
-        there_ends = [there[0], 1.0 if one_sided else there[2]]
-        answers = ([low, high], description), (there_ends, other_words)
-        notes += (prior_note(f"{what}, so the prior weighs", *answers),)
-    method = "Dirichlet posterior of the table of two raters"
-    errors = None
-    if n_drawn is not None:
-        of_high = 0.0 if one_sided else posterior.quantile_error(high)
-        errors = (posterior.quantile_error(low), of_high)
-    way = "exact" if errors is None else f"{n_drawn} draws"
+        answers = ([low, high], description), ([*there, 1.0][:3:2], other_words)
+        notes += (prior_note(why, *answers),)
+    way = f"{n_draws} draws" if is_drawn else "exact"
+    method = f"Dirichlet posterior of the table of two raters, {way}"
     width = high - low  # the density is shown as far beyond the ends
     return Interval(
         low=low,
         high=high,
-        median=ends[1],
+        median=median,
         level=problem.level,
         kind="credible",
-        method=f"{method}, {way}" + (", one-sided" if one_sided else ""),
+        method=f"{method}, one-sided" if one_sided else method,
         target=problem.target,
-        n_resamples=n_drawn,
+        n_resamples=n_draws if is_drawn else None,
         monte_carlo_error=errors,
         seed=seed,
         notes=notes,
@@ -328,8 +313,8 @@ def table_interval(
     )
 
 
-def _refusal(problem: IntervalProblem) -> str | None:
-    """Return why there is no table of two raters to ask, or None."""
+def table_refusal(problem: IntervalProblem) -> str:
+    """Return why there is no table of two raters to ask, or nothing."""
     name, n_raters = problem.entry.name, problem.n_raters
     if name not in CHANCE_AGREEMENT or n_raters != 2:
         return (
@@ -346,14 +331,4 @@ def _refusal(problem: IntervalProblem) -> str | None:
             "metric: ordinal depends on the ratings, and so has no posterior; use the "
             "jackknife or the bootstrap"
         )
-    return None
-
-
-def _table(problem: IntervalProblem) -> tuple[Floats, int]:
-    # -> items per pair of categories, (n_categories, n_categories), and those of one
-    # rating that matter otherwise
-    codes, freq = problem.codes, problem.freq
-    paired = (codes >= 0).all(axis=1)
-    cells = np.zeros((problem.coded.n_categories,) * 2)
-    cells[tuple(codes[paired].T)] = freq[paired]  # distinct rows: one a cell
-    return cells, int(freq[~paired].sum())
+    return ""

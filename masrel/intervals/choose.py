@@ -305,8 +305,8 @@ def _posterior(problem: IntervalProblem, alike: bool) -> Interval | None:
     from masrel.intervals._rho import DEFAULT_PRIOR, extended, rho_interval
     from masrel.intervals._two_raters import (
         CHANCE_AGREEMENT,
-        applies_to,
         table_interval,
+        table_refusal,
     )
 
     if no_posterior(problem):
@@ -322,7 +322,7 @@ def _posterior(problem: IntervalProblem, alike: bool) -> Interval | None:
         interval = alike_interval(
             problem, DEFAULT_PRIOR, n_draws=_DRAWS, rng=_SEED, one_sided=one_sided
         )
-    elif small and applies_to(problem):
+    elif small and not table_refusal(problem):
         interval = table_interval(
             problem, None, n_draws=_TABLE_DRAWS, rng=_SEED, one_sided=one_sided
         )

@@ -1,14 +1,13 @@
 """Bayesian intervals of any coefficient, by three models of how raters rate."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from masrel._input import check_option
+from masrel._input import check_option, refuse
 from masrel.agreement import Label
-from masrel.errors import ParameterError
 from masrel.estimates import Interval, Target
 from masrel.intervals._question import IntervalProblem, Statistic, pose_problem
 
@@ -158,58 +157,81 @@ def posterior(
         level=level,
     )
     # Imported here: the other intervals load no scipy.
-    from masrel.intervals._dirichlet import alike_interval, patterns_interval
-    from masrel.intervals._rho import Prior, rho_interval
-    from masrel.intervals._two_raters import table_interval
+    from masrel.intervals._dirichlet import (
+        OF_PATTERNS,
+        alike_interval,
+        no_posterior,
+        patterns_interval,
+    )
+    from masrel.intervals._rho import METHOD, Prior, nothing_to_learn, rho_interval
+    from masrel.intervals._two_raters import CHANCE_AGREEMENT, table_interval
 
     checked_prior = Prior.of(prior, 1.0 if concentration is None else concentration)
-    model = _checked_model(problem, model)
+    model = _checked_model(problem, model, weights)
     is_whole = isinstance(n_draws, int | np.integer) and not isinstance(n_draws, bool)
-    if not is_whole or n_draws < _MIN_DRAWS:
-        raise ParameterError(
-            f"n_draws: needs a whole number of at least {_MIN_DRAWS}, got {n_draws!r}"
-        )
-    if model == "dirichlet-multinomial":
-        if _is_rho(problem, weights):
-            return rho_interval(problem, checked_prior)
+    is_alike = model == "dirichlet-multinomial"
+    refuse(
+        (
+            not is_whole or n_draws < _MIN_DRAWS,
+            f"n_draws: needs a whole number of at least {_MIN_DRAWS}, got {n_draws!r}",
+        ),
+        (
+            model == "patterns" and concentration is not None,
+            f'model: "patterns" has one prior; got concentration={concentration!r}',
+        ),
+        (
+            prior != "uniform" and not is_alike,
+            f'model: "{model}" has one prior; got prior="{prior}"',
+        ),
+    )
+    # the value of some in the population is ρ where raters are alike
+    kind = CHANCE_AGREEMENT.get(problem.entry.name)
+    is_rho = is_alike and kind in ("pooled", "margins")
+    is_exact = is_rho or model == "table"
+    reason = nothing_to_learn(problem) if is_exact else no_posterior(problem)
+    if reason is not None:
+        methods = {"table": "table posterior", "patterns": OF_PATTERNS}
+        method = methods.get(model, f"{METHOD}, exact" if is_rho else METHOD)
+        nothing = problem.undefined(reason, method=method, unit=None)
+        return replace(nothing, kind="credible")
+    if is_rho:
+        return rho_interval(problem, checked_prior)
+    if is_alike:
         return alike_interval(problem, checked_prior, n_draws=n_draws, rng=rng)
-    options = "" if prior == "uniform" else f'prior="{prior}"'
-    if model == "patterns" and concentration is not None:
-        options = f"concentration={concentration!r}"
-    if options:
-        raise ParameterError(f'model: "{model}" has one prior; got {options}')
     if model == "patterns":
         return patterns_interval(problem, n_draws=n_draws, rng=rng)
     return table_interval(problem, concentration, n_draws=n_draws, rng=rng)
 
 
-def _checked_model(problem: IntervalProblem, model: _Model) -> _Model:
+def _checked_model(
+    problem: IntervalProblem, model: _Model, weights: "WeightsLike"
+) -> _Model:
     """Check what was chosen, and return the model, which may be left to the data."""
-    check_option("model", model, get_args(_Model))
-    if problem.target != "items":
-        raise ParameterError(
-            "target: a posterior generalises to other items, so "
-            f'"items"; for other raters use the jackknife; got "{problem.target}"'
-        )
-    if problem.entry.shape == "pairs":
-        raise ParameterError(
-            f"coefficient: there is no posterior of {problem.entry.title}"
-        )
-    if model != "auto":
-        return model
-    if problem.unweighted and problem.entry.name in _RHO_COEFFICIENTS:
-        return "dirichlet-multinomial"
-    return "table" if problem.n_raters == 2 else "patterns"
-
-
-def _is_rho(problem: IntervalProblem, weights: "WeightsLike") -> bool:
-    """Return whether a coefficient is ρ where raters are alike, checked."""
-    from masrel.intervals._two_raters import CHANCE_AGREEMENT
+    from masrel.intervals._two_raters import CHANCE_AGREEMENT, table_refusal
 
     name = problem.entry.name
-    if not problem.unweighted or name not in CHANCE_AGREEMENT:
-        raise ParameterError(
+    check_option("model", model, get_args(_Model))
+    if model == "auto" and problem.unweighted and name in _RHO_COEFFICIENTS:
+        model = "dirichlet-multinomial"
+    elif model == "auto":
+        model = "table" if problem.n_raters == 2 else "patterns"
+    has_alike = problem.unweighted and name in CHANCE_AGREEMENT
+    of_table = table_refusal(problem)
+    refuse(
+        (
+            problem.target != "items",
+            "target: a posterior generalises to other items, so "
+            f'"items"; for other raters use the jackknife; got "{problem.target}"',
+        ),
+        (
+            problem.entry.shape == "pairs",
+            f"coefficient: there is no posterior of {problem.entry.title}",
+        ),
+        (
+            model == "dirichlet-multinomial" and not has_alike,
             "model: the Dirichlet-multinomial model applies to unweighted "
-            f"{', '.join(CHANCE_AGREEMENT)}; got {name} with weights={weights!r}"
-        )
-    return CHANCE_AGREEMENT[name] in ("pooled", "margins")
+            f"{', '.join(CHANCE_AGREEMENT)}; got {name} with weights={weights!r}",
+        ),
+        (model == "table" and of_table, of_table),
+    )
+    return model
