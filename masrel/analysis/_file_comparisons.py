@@ -12,24 +12,21 @@ from typing import Any
 
 import numpy as np
 
+from masrel._input import refuse
 from masrel.agreement import CodedRatings, Coefficient, Significance, code_ratings, holm
 from masrel.analysis._file_estimates import (
     Answer,
-    EstimateOptions,
+    Questions,
     Row,
+    entries,
     note,
     on_grades,
     parts_of,
     placed,
 )
-from masrel.errors import ParameterError, RatingsError
-from masrel.estimates import Estimate, as_document
+from masrel.errors import RatingsError
+from masrel.estimates import as_document
 from masrel.ratings import RatingsFile, RatingsPart
-
-# Tests that all groups agree as well.
-FLEISS = "Fleiss' weighted χ²"
-DONNER = "Donner's goodness of fit"
-HOTELLING = "Hotelling's T² as F"
 
 # coefficients that are the intraclass kappa of two raters and two categories
 _INTRACLASS = ("fleiss_kappa", "scott_pi")
@@ -67,33 +64,29 @@ def _groups_of(parts: Sequence[RatingsPart]) -> _Groups:
             same_items=False,
             clusters=tuple(part.clusters for part in parts) if has_clusters else None,
         )
-    # a row for each item of each set of items that groups have
-    rows_of: dict[tuple[frozenset[str], str], int] = {}
-    for names, rows in zip(items, rated, strict=True):
-        for item in rows:
-            rows_of.setdefault((names, item), len(rows_of))
-    sets = []
-    clusters: dict[int, str] = {}
-    for part, ratings, names, rows in zip(parts, coded, items, rated, strict=True):
-        at = [rows_of[names, item] for item in rows]
-        codes = np.full((len(rows_of), ratings.codes.shape[1]), -1, ratings.codes.dtype)
-        codes[at] = ratings.codes[list(rows.values())]
-        sets.append(replace(ratings, codes=codes))
-        for row, (item, place) in zip(at, rows.items(), strict=True):
-            cluster = part.clusters[place] if part.clusters else ""
-            if clusters.setdefault(row, cluster) != cluster:
+    # a row for each item of each set of items that groups have, and its cluster
+    clusters: dict[tuple[frozenset[str], str], str] = {}
+    for part, names, rows in zip(parts, items, rated, strict=True):
+        for item, row in rows.items():
+            cluster = part.clusters[row] if part.clusters else ""
+            if (known := clusters.setdefault((names, item), cluster)) != cluster:
                 raise RatingsError(
                     f"--compare: item {item!r} needs one cluster in all groups, got "
-                    f"{clusters[row]!r} and {cluster!r}"
+                    f"{known!r} and {cluster!r}"
                 )
+    row_of = {item: row for row, item in enumerate(clusters)}
+    sets = []
+    for ratings, names, rows in zip(coded, items, rated, strict=True):
+        codes = np.full((len(row_of), ratings.codes.shape[1]), -1, ratings.codes.dtype)
+        to = [row_of[names, item] for item in rows]
+        codes[to] = ratings.codes[list(rows.values())]
+        sets.append(replace(ratings, codes=codes))
     return _Groups(
         sets=tuple(sets),
         is_dependent=True,
         n_shared=n_shared,
         same_items=len(set(items)) == 1,
-        clusters=tuple(map(clusters.__getitem__, range(len(rows_of))))
-        if has_clusters
-        else None,
+        clusters=tuple(clusters.values()) if has_clusters else None,
     )
 
 
@@ -103,15 +96,24 @@ def _rated_rows(part: RatingsPart, coded: CodedRatings) -> dict[str, int]:
     return {item: row for row, item in enumerate(part.items) if rated[row]}
 
 
-def difference_rows(
-    file: RatingsFile, entries: Sequence[Coefficient], options: EstimateOptions
+def comparisons(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
+    """Return the differences of every two groups, and whether all groups are equal."""
+    of_all = entries(questions, file, file.parts)
+    yield _difference_rows(file, of_all, questions)
+    if len(file.parts) > 2:  # of two the difference says it
+        yield _equality_rows(file, of_all, questions)
+
+
+def _difference_rows(
+    file: RatingsFile, coefficients: Sequence[Coefficient], questions: Questions
 ) -> Answer:
-    """Return the difference of every two groups in every coefficient."""
-    if len(file.parts) < 2:
-        raise ParameterError(
+    refuse(
+        (
+            len(file.parts) < 2,
             "--compare: needs two groups or more, so --by with the column that tells "
-            "them apart"
+            "them apart",
         )
+    )
     pairs = {
         (first, second): _groups_of((one, other))
         for (one, first, _), (other, second, _) in itertools.combinations(
@@ -119,17 +121,29 @@ def difference_rows(
         )
     }
     # one that was named is refused rather than left out
-    can = [of for of in entries if of.formula is not None or not options.takes_all]
-    rows = [row for of in can for row in _differences(of, file, pairs, options)]
-    notes = list(_difference_notes(pairs, options.level))
-    if without := ", ".join(entry.title for entry in entries if entry not in can):
+    can = [
+        of for of in coefficients if of.formula is not None or not questions.takes_all
+    ]
+    rows = [row for of in can for row in _differences(of, file, pairs, questions)]
+    is_clustered = any(of.clusters is not None for of in pairs.values())
+    unit = "clusters" if is_clustered else "items"
+    notes = [note(f"difference_of_{unit}", level=questions.level)]
+    if len(pairs) > 1:
+        notes.append(note("holm", n=len(pairs)))
+    if any(of.is_dependent for of in pairs.values()):
+        notes.append(note(f"shared_{unit}"))
+    notes += [
+        note("same_names", first=first, second=second, n=of.n_shared)
+        for (first, second), of in pairs.items()
+        if not of.same_items and of.n_shared
+    ]
+    if without := ", ".join(entry.title for entry in coefficients if entry not in can):
         notes.append(note("without", titles=without))
     return Answer(
         name="differences",
         rows=[row for row, _ in rows],
-        shown=[shown for _, shown in rows],
+        shown=[{**row, **cells} for row, cells in rows],
         notes=tuple(notes),
-        is_single=len(pairs) == 1,
     )
 
 
@@ -137,9 +151,9 @@ def _differences(
     entry: Coefficient,
     file: RatingsFile,
     pairs: Mapping[tuple[str, str], _Groups],
-    options: EstimateOptions,
+    questions: Questions,
 ) -> Iterator[tuple[Row, Row]]:
-    # the row of every pair, and what a table shows of it
+    # the row of every pair, and what a table shows of it otherwise
     from masrel.intervals.contrasts import difference, difference_test
 
     rows: list[tuple[Row, Row]] = []
@@ -148,11 +162,11 @@ def _differences(
         ratings = [on_grades(of, entry, file) for of in groups.sets]
         of_pair: Any = {
             "design": design,
-            "weights": options.weights_of(entry),
+            "weights": questions.weights_of(entry),
             "clusters": groups.clusters,
         }
         with placed("--compare", f"{first} and {second}"):
-            estimate = difference(entry, *ratings, level=options.level, **of_pair)
+            estimate = difference(entry, *ratings, level=questions.level, **of_pair)
             test = difference_test(entry, *ratings, **of_pair)
         row: Row = {
             "first": first,
@@ -166,107 +180,80 @@ def _differences(
             "p_holm": math.nan,
             "test_reason": test.reason,
         }
-        shown = {
-            "title": options.title(entry),
+        interval = estimate.interval
+        why = () if test.reason is None else (f"undefined: {test.reason}",)
+        cells = {
+            "title": questions.title(entry),
             "group": f"{first} and {second}",
             "items": "the same" if groups.same_items else "others",
-            **_shown(estimate, test),
+            "texts": (*(() if interval is None else interval.notes), *why),
+            # ``nan`` where they are undefined
+            "difference": estimate.value,
+            "standard_error": estimate.standard_error,
+            "low": getattr(interval, "low", math.nan),
+            "high": getattr(interval, "high", math.nan),
+            "level": getattr(interval, "level", None),
         }
-        rows.append((row, shown))
+        rows.append((row, cells))
     adjusted = holm([row["p_value"] for row, _ in rows])
-    for (row, shown), p in zip(rows, adjusted, strict=True):
-        yield row | {"p_holm": p}, row | {"p_holm": p} | shown
+    for (row, cells), p in zip(rows, adjusted, strict=True):
+        yield row | {"p_holm": p}, cells
 
 
-def _shown(estimate: Estimate, test: Significance) -> Row:
-    # what a table has of a difference: ``nan`` where it is undefined
-    interval = estimate.interval
-    texts = () if interval is None else interval.notes
-    if test.reason is not None:
-        texts = (*texts, f"undefined: {test.reason}")
-    return {
-        "texts": texts,
-        "difference": estimate.value,
-        "standard_error": estimate.standard_error,
-        "low": math.nan if interval is None else interval.low,
-        "high": math.nan if interval is None else interval.high,
-        "level": None if interval is None else interval.level,
-    }
-
-
-def _difference_notes(
-    pairs: Mapping[tuple[str, str], _Groups], level: float
-) -> Iterator[str]:
-    groups = pairs.values()
-    is_clustered = any(of.clusters is not None for of in groups)
-    unit = "clusters" if is_clustered else "items"
-    yield note(f"difference_of_{unit}", level=level)
-    if len(pairs) > 1:
-        yield note("holm", n=len(pairs))
-    if any(of.is_dependent for of in groups):
-        yield note(f"shared_{unit}")
-    for (first, second), of in pairs.items():
-        if not of.same_items and of.n_shared:
-            yield note("same_names", first=first, second=second, n=of.n_shared)
-
-
-def equality_rows(
-    file: RatingsFile, entries: Sequence[Coefficient], options: EstimateOptions
+def _equality_rows(
+    file: RatingsFile, coefficients: Sequence[Coefficient], questions: Questions
 ) -> Answer:
-    """Return the tests that all groups have the same coefficient, for each of them."""
     groups = _groups_of(file.parts)
-    rows, shown, notes = [], [], []
-    for entry in entries:
-        if entry.formula is None:  # the differences say it
-            continue
-        of_entry = tuple(on_grades(of, entry, file) for of in groups.sets)
-        of_groups = replace(groups, sets=of_entry)
-        for test, result in _equality_tests(entry, of_groups, options):
-            rows.append(
-                {
-                    "coefficient": entry.name,
-                    "weights": options.weights_of(entry),
-                    "test": result.name,
-                    "statistic": result.statistic,
-                    "distribution": result.distribution,
-                    "df": list(result.df),
-                    "p_value": result.p_value,
-                    "n_items": result.n_items,
-                    "reason": result.reason,
-                }
-            )
-            shown.append({**rows[-1], "title": options.title(entry), "test": test})
-            notes.append(note(test))
-    return Answer(
-        name="equality",
-        rows=rows,
-        shown=shown,
-        notes=tuple(dict.fromkeys(notes)),
-    )
+    results = [
+        (entry, test, result)
+        for entry in coefficients
+        if entry.formula is not None  # else the differences say it
+        for test, result in _equality_tests(entry, file, groups, questions)
+    ]
+    rows: list[Row] = [
+        {
+            "coefficient": entry.name,
+            "weights": questions.weights_of(entry),
+            "test": result.name,
+            "statistic": result.statistic,
+            "distribution": result.distribution,
+            "df": list(result.df),
+            "p_value": result.p_value,
+            "n_items": result.n_items,
+            "reason": result.reason,
+        }
+        for entry, _, result in results
+    ]
+    shown = [
+        {**row, "title": questions.title(entry), "test": test}
+        for row, (entry, test, _) in zip(rows, results, strict=True)
+    ]
+    notes = dict.fromkeys(note(test) for _, test, _ in results)
+    return Answer(name="equality", rows=rows, shown=shown, notes=tuple(notes))
 
 
 def _equality_tests(
-    entry: Coefficient, groups: _Groups, options: EstimateOptions
+    entry: Coefficient, file: RatingsFile, groups: _Groups, questions: Questions
 ) -> Iterator[tuple[str, Significance]]:
     from masrel.intervals.choose import estimate
     from masrel.intervals.contrasts import differences, donner_test, equality_test
 
-    weights, clusters = options.weights_of(entry), groups.clusters
+    weights, clusters = questions.weights_of(entry), groups.clusters
+    sets = [on_grades(ratings, entry, file) for ratings in groups.sets]
     if groups.is_dependent:
-        result = differences(entry, groups.sets, weights=weights, clusters=clusters)
-        yield HOTELLING, result.equality
+        result = differences(entry, sets, weights=weights, clusters=clusters)
+        yield "Hotelling's T² as F", result.equality
         return
     if clusters is None:
-        estimates = [entry(ratings, weights=weights) for ratings in groups.sets]
+        estimates = [entry(ratings, weights=weights) for ratings in sets]
     else:
         estimates = [
             estimate(entry, ratings, target="items", weights=weights, clusters=of)
-            for ratings, of in zip(groups.sets, clusters, strict=True)
+            for ratings, of in zip(sets, clusters, strict=True)
         ]
-    yield FLEISS, equality_test(estimates)
+    yield "Fleiss' weighted χ²", equality_test(estimates)
     of_two = all(
-        ratings.codes.shape[1] == 2 and len(ratings.categories) == 2
-        for ratings in groups.sets
+        ratings.codes.shape[1] == 2 and len(ratings.categories) == 2 for ratings in sets
     )
     if of_two and clusters is None and entry.name in _INTRACLASS:
-        yield DONNER, donner_test(groups.sets)
+        yield "Donner's goodness of fit", donner_test(sets)

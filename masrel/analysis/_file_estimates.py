@@ -38,19 +38,29 @@ _OF_SESSIONS = ("stratified_kappa", "pooled_kappa")
 _SURE = 0.95  # probability with which the true value reaches the word for it
 _SURE_TWO_SIDED = 0.90  # the level of which the lower end alone is as sure
 
-# What is asked for as a coefficient and is a table of its own
+# What is named as a coefficient and is a table of its own
 _TABLES = {
     **dict.fromkeys(("mcnemar", "bowker", "stuart_maxwell", "bhapkar"), "--symmetry"),
     "bland_altman": "--limits-of-agreement",
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EstimateOptions:
-    """What is estimated of every part of the ratings."""
+_BY_ITEM = (
+    "retest",
+    "each_category",
+    "symmetry",
+    "indices",
+    "diagnose",
+    "limits_of_agreement",
+)
 
-    coefficients: list[str] | None  # names, or "all" alone; None for `usual`
-    weights: "WeightName"  # for coefficients that take any; checked where they are made
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Questions:
+    """What is to be told of a file: estimates, and a table for each question."""
+
+    coefficients: list[str] | None  # names, or "all" alone; None for the usual ones
+    weights: "WeightName"  # for coefficients that take any; checked with the rest
     target: Target | None  # what a new study would draw anew; no interval when None
     interval: Literal["auto", "analytic", "jackknife", "bootstrap", "posterior"]
     level: float
@@ -58,9 +68,17 @@ class EstimateOptions:
     n_resamples: int
     seed: int
     words: "BandScale | None"  # whose words for values
-    metric: "Metric | None" = None  # of Krippendorff's alpha
+    metric: "Metric | None"  # of Krippendorff's alpha
+    retest: bool
+    each_category: bool
+    symmetry: bool
+    indices: bool
+    compare: bool
+    diagnose: bool
+    reference: str | None
+    limits_of_agreement: bool
+    unit: str | None
     clusters: tuple[str, ...] = ()  # that of every item of the part, if items have any
-    usual: tuple[str, ...] = USUAL  # estimated where none are named
 
     @property
     def takes_all(self) -> bool:
@@ -68,16 +86,15 @@ class EstimateOptions:
         return self.coefficients == ["all"]
 
     @property
-    def are_named(self) -> bool:
-        """Whether the coefficients were named one by one."""
-        return self.coefficients is not None and not self.takes_all
-
-    @property
     def names(self) -> list[str]:
         """The coefficients that are named, or the usual ones."""
         if self.coefficients is not None:
             return self.coefficients
-        return list(self.usual) if self.metric is None else [_OF_METRIC]
+        if self.metric is not None:
+            return [_OF_METRIC]
+        # weights are those of a kappa
+        is_measured = self.limits_of_agreement and self.weights == "identity"
+        return list(OF_MEASUREMENTS if is_measured else USUAL)
 
     def weights_of(self, entry: "Coefficient") -> "WeightName":
         """Return the weights, of a coefficient that takes any."""
@@ -103,36 +120,22 @@ class EstimateOptions:
             **by_metric,
         }
 
+    def checked(self, by: str | None, clusters: str | None) -> "Questions":
+        """Return the same with defaults, or refuse what excludes each other."""
+        from masrel.agreement._engine import check_level
+        from masrel.agreement._weights import plain_name
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Questions:
-    """What is asked beside the agreement between raters: a table each."""
-
-    retest: bool
-    each_category: bool
-    symmetry: bool
-    indices: bool
-    compare: bool
-    diagnose: bool
-    reference: str | None
-    limits_of_agreement: bool
-    unit: str | None
-
-    def checked(
-        self, options: EstimateOptions, by: str | None, clusters: str | None
-    ) -> EstimateOptions:
-        """Return what is estimated between raters, with the defaults of the tables."""
-        for name in options.names:
+        check_level(self.level)  # nothing else looks at it where there is no interval
+        for name in self.names:
             if option := _TABLES.get(name.lower().replace("-", "_")):
                 raise ParameterError(
                     f"--coefficients: needed coefficients, got {name!r}: {option} has "
                     "that table"
                 )
-        names = [of.name for of in fields(self) if getattr(self, of.name)]
-        by_items = [name for name in names if name != "compare"]
-        other = f"--{by_items[0].replace('_', '-')}" if by_items else None
-        target = f"--target {options.target}"
-        of_raters = options.target in ("raters", "both")
+        by_item = [name for name in _BY_ITEM if getattr(self, name)]
+        other = f"--{by_item[0].replace('_', '-')}" if by_item else None
+        got = f"--target {self.target}"
+        of_raters = self.target in ("raters", "both")
         refuse(
             (
                 self.reference is not None and not self.diagnose,
@@ -150,7 +153,7 @@ class Questions:
             (
                 self.diagnose and of_raters,
                 "--diagnose: is of these raters, so its intervals generalise to other "
-                f"items: --target items or none, got {target}",
+                f"items: --target items or none, got {got}",
             ),
             (
                 clusters is not None and other is not None,
@@ -160,7 +163,7 @@ class Questions:
             (
                 clusters is not None and of_raters,
                 "--clusters: what is left out is a cluster of items, so it takes "
-                f"--target items, got {target}",
+                f"--target items, got {got}",
             ),
             (
                 self.compare and by is None,
@@ -169,26 +172,22 @@ class Questions:
             (
                 self.compare and of_raters,
                 "--compare: a difference generalises to other items, so it takes "
-                f"--target items, got {target}",
+                f"--target items, got {got}",
             ),
         )
-        if self.compare or clusters is not None:
-            return replace(options, target="items")
-        if self.limits_of_agreement and options.weights == "identity":
-            # weights are those of a kappa
-            return replace(options, usual=OF_MEASUREMENTS)
-        return options
+        of_items = self.compare or clusters is not None
+        target = "items" if of_items else self.target
+        weights: Any = plain_name(self.weights)
+        return replace(self, weights=weights, target=target)
 
-    def between_raters(
-        self, file: "RatingsFile", options: EstimateOptions
-    ) -> EstimateOptions | None:
+    def between_raters(self, file: "RatingsFile") -> "Questions | None":
         """Return what is estimated between raters; None where that is nothing."""
         if self.retest and all(len(part.raters) == 1 for part in file.parts):
             return None
-        if not self.retest or options.coefficients is None:
-            return options
-        rest = [name for name in options.coefficients if name not in _OF_SESSIONS]
-        return replace(options, coefficients=rest) if rest else None
+        if not self.retest or self.coefficients is None:
+            return self
+        rest = [name for name in self.coefficients if name not in _OF_SESSIONS]
+        return replace(self, coefficients=rest) if rest else None
 
 
 Row = dict[str, Any]
@@ -226,8 +225,6 @@ class Answer:
     notes: tuple[str, ...] = ()  # below the table
     of: str = ""  # what the caption says it is of
     grades: tuple[str, ...] = ()  # that have a column each
-    has_reference: bool = False  # whether a rater is held against another
-    is_single: bool = False  # whether there is nothing that p is adjusted for
     estimates: tuple[AgreementRow, ...] = ()
     # what a figure shows of each part: its name, and its result
     figure: tuple[tuple[str, Any], ...] = ()
@@ -317,17 +314,18 @@ def part_names(file: "RatingsFile", part: "RatingsPart") -> dict[str, str]:
     return names
 
 
-def group_key(by: str) -> str:
-    """Return what groups are called in a CSV and a record, unlike all else there."""
-    names = {of.name for of in (*fields(Estimate), *fields(Interval))}
-    return f"group_{by}" if by in names | {"title", "word", "words", "data"} else by
+def heads_of(*names: str) -> dict[str, str]:
+    """Return columns with names of a file, by keys unlike all else in a CSV."""
+    taken = {of.name for of in (*fields(Estimate), *fields(Interval))}
+    taken |= {"title", "word", "words", "data"}
+    return {f"group_{name}" if name in taken else name: name for name in names}
 
 
 def parts_of(file: "RatingsFile") -> "Iterator[tuple[RatingsPart, str, Row]]":
     """Return every part, what it is called, and the same by keys."""
     for part in file.parts:
         names = part_names(file, part)
-        keys = {group_key(name): value for name, value in names.items()}
+        keys = dict(zip(heads_of(*names), names.values(), strict=True))
         yield part, ": ".join(names.values()), keys
 
 
@@ -341,33 +339,21 @@ def placed(option: str, place: str | None = "") -> Iterator[None]:
         raise type(error)(f"{where}: {error}") from error
 
 
-def heads_of(file: "RatingsFile", *others: str) -> dict[str, str]:
-    """Return the head of one column for all that tells parts, and others, apart."""
-    by = ", ".join([*part_names(file, file.parts[0]), *others])
-    return {group_key(by): by} if by else {}
-
-
 # ---- estimates ----
 
 
-def agreement(file: "RatingsFile", options: EstimateOptions) -> Answer:
+def agreement(file: "RatingsFile", questions: Questions) -> Answer:
     """Return how well the raters of every part agree, every coefficient as a row."""
-    heads = heads_of(file)
-    estimates: list[AgreementRow] = []
+    by = ", ".join(part_names(file, file.parts[0]))
+    heads = heads_of(by) if by else {}
+    estimates = []
     for part, group, _ in parts_of(file):
-        rows, refusals = [], []
-        of_part = replace(options, clusters=part.clusters)
-        for entry in entries(options, file, [part]):
+        keys = dict.fromkeys(heads, group)
+        of_part = replace(questions, clusters=part.clusters)
+        for entry in entries(questions, file, [part]):
             ratings = part.ratings if entry.formula is None else part.counted
             ratings = on_grades(ratings, entry, file)
-            row, refusal = estimate_row(
-                entry, ratings, dict.fromkeys(heads, group), of_part
-            )
-            rows.append(row)
-            refusals += [] if refusal is None else [refusal]
-        if not options.takes_all and refusals and len(refusals) == len(rows):
-            raise refusals[0]
-        estimates += rows
+            estimates.append(estimate_row(entry, ratings, keys, of_part))
     return Answer(
         name="agreement",
         heads=heads,
@@ -377,23 +363,29 @@ def agreement(file: "RatingsFile", options: EstimateOptions) -> Answer:
 
 
 def entries(
-    options: EstimateOptions, file: "RatingsFile", parts: "Sequence[RatingsPart]"
+    questions: Questions, file: "RatingsFile", parts: "Sequence[RatingsPart]"
 ) -> list["Coefficient"]:
     """Return the coefficients that are estimated, or refuse those that do not fit."""
     from masrel.agreement import COEFFICIENTS, coefficient
 
-    if not options.takes_all and _OF_METRIC not in options.names and options.metric:
-        raise ParameterError(
-            f"--metric {options.metric}: is of {_OF_METRIC}, which is not among "
-            f"--coefficients {','.join(options.names)}"
+    is_of_others = not questions.takes_all and _OF_METRIC not in questions.names
+    needed = f"--metric {questions.metric}: is of {_OF_METRIC}, which is not among "
+    refuse(
+        (
+            questions.metric and is_of_others,
+            f"{needed}--coefficients {','.join(questions.names)}",
         )
-    every = options.takes_all
+    )
     n_raters = max(len(part.raters) for part in parts) or file.read["n_raters"]
-    chosen = COEFFICIENTS.values() if every else map(coefficient, options.names)
+    chosen = (
+        COEFFICIENTS.values()
+        if questions.takes_all
+        else map(coefficient, questions.names)
+    )
     fitting = [
-        of.by_metric(options.metric) if of.name == _OF_METRIC else of for of in chosen
+        of.by_metric(questions.metric) if of.name == _OF_METRIC else of for of in chosen
     ]
-    if every:
+    if questions.takes_all:
         return [
             entry
             for entry in fitting
@@ -403,11 +395,13 @@ def entries(
             and (file.is_ordered or not entry.needs_order)
         ]
     for entry in fitting:
-        if entry.shape == "pairs":
-            raise ParameterError(
+        refuse(
+            (
+                entry.shape == "pairs",
                 f"--coefficients: {entry.name} takes each rater's grades of two "
-                "sessions: --session COL --retest computes it"
+                "sessions: --session COL --retest computes it",
             )
+        )
         if entry.needs_order:
             check_order(file, entry.name)
     return fitting
@@ -415,11 +409,13 @@ def entries(
 
 def check_order(file: "RatingsFile", what: str) -> None:
     """Refuse what needs the order of grades, where it is the alphabet's alone."""
-    if not file.is_ordered:
-        raise ParameterError(
+    refuse(
+        (
+            not file.is_ordered,
             f"{what}: needs grades that are numbers or --categories with every grade "
-            f"in order, the grades met are text: {', '.join(file.scale.grades)}"
+            f"in order, the grades met are text: {', '.join(file.scale.grades)}",
         )
+    )
 
 
 def on_grades(ratings: _Ratings, entry: "Coefficient", file: "RatingsFile") -> _Ratings:
@@ -439,69 +435,69 @@ def estimate_row(
     entry: "Coefficient",
     ratings: "CodedRatings | CountedRatings",
     keys: Mapping[str, str | None],
-    options: EstimateOptions,
-) -> "tuple[AgreementRow, MasrelError | None]":
-    """Return the row of a coefficient, and why it has no interval if it should."""
-    notes, refusal = [], None
-    is_unweighted = options.weights != options.weights_of(entry)
-    if is_unweighted and not options.takes_all:
-        by_metric = f"by its metric, without {options.weights} weights"
+    questions: Questions,
+) -> AgreementRow:
+    """Return the row of a coefficient; of all that fit, some without an interval."""
+    notes = []
+    is_unweighted = questions.weights != questions.weights_of(entry)
+    if is_unweighted and not questions.takes_all:
+        by_metric = f"by its metric, without {questions.weights} weights"
         unweighted = "unweighted, there are no weights for it"
         notes.append(by_metric if entry.metric else unweighted)
     try:
-        estimate = _estimate(entry, ratings, options, options.level)
+        estimate = _estimate(entry, ratings, questions, questions.level)
     except MasrelError as error:
-        if options.target is None or options.are_named:
-            raise  # each of them must have the interval
+        if questions.target is None or not questions.takes_all:
+            raise
         no_sums = entry.formula is None
         why = "it is no function of sums over items" if no_sums else error
         notes.append(f"no interval: {why}")
-        refusal, options = error, replace(options, target=None)
-        estimate = _estimate(entry, ratings, options, options.level)
+        questions = replace(questions, target=None)
+        estimate = _estimate(entry, ratings, questions, questions.level)
     interval, bound = estimate.interval, None
-    if interval is not None and options.words and entry.chance_corrected:
+    if interval is not None and questions.words and entry.chance_corrected:
         # the lower end of an interval leaves out half of what is outside, a bound all
         level = _SURE if interval.is_one_sided else _SURE_TWO_SIDED
         if interval.reason is None and interval.level != level:
-            interval = _estimate(entry, ratings, options, level).interval or interval
+            interval = _estimate(entry, ratings, questions, level).interval or interval
         bound = interval.low
-    row = AgreementRow(
+    return AgreementRow(
         keys=keys,
-        title=options.title(entry),
+        title=questions.title(entry),
         estimate=estimate,
         notes=tuple(notes),
         lower_bound=bound,
     )
-    return row, refusal
 
 
 def _estimate(
     entry: "Coefficient",
     ratings: "CodedRatings | CountedRatings",
-    options: EstimateOptions,
+    questions: Questions,
     level: float,
 ) -> Estimate:
     """Return the coefficient, with the interval that answers for the target."""
-    weights = options.weights_of(entry)
+    weights = questions.weights_of(entry)
     # Unless it was named, one that comes with an interval has it, whatever its target.
-    is_done = entry.has_interval and not (options.are_named or options.clusters)
-    if options.target is None or is_done:
+    is_named = questions.coefficients is not None and not questions.takes_all
+    is_done = entry.has_interval and not (is_named or questions.clusters)
+    if questions.target is None or is_done:
         result = entry(
             ratings, categories=ratings.categories, weights=weights, level=level
         )
         # one that comes with the coefficient knows of no clusters
-        return replace(result, interval=None) if options.clusters else result
+        return replace(result, interval=None) if questions.clusters else result
     from masrel.intervals.choose import estimate
 
     return estimate(
         entry,
         ratings,
-        target=options.target,
-        method=options.interval,
+        target=questions.target,
+        method=questions.interval,
         categories=ratings.categories,
         weights=weights,
         level=level,
-        n_resamples=options.n_resamples,
-        rng=options.seed,
-        clusters=options.clusters or None,
+        n_resamples=questions.n_resamples,
+        rng=questions.seed,
+        clusters=questions.clusters or None,
     )

@@ -4,21 +4,21 @@ In: a `RatingsFile` and how estimates are made. Out: an `Answer`, whose rows are
 JSON has them; what tables show otherwise stands beside them.
 """
 
-import itertools
 import math
 import warnings
-from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel._input import refuse
+from masrel._input import listed, refuse
 from masrel.agreement import (
     CodedRatings,
+    Label,
     Significance,
     bhapkar,
     bias_index,
@@ -35,18 +35,16 @@ from masrel.agreement import (
     specific_agreement,
     stuart_maxwell,
 )
-from masrel.analysis._file_comparisons import difference_rows, equality_rows
+from masrel.analysis._file_comparisons import comparisons
 from masrel.analysis._file_estimates import (
     AgreementRow,
     Answer,
-    EstimateOptions,
     Questions,
     Row,
     agreement,
     check_order,
     entries,
     estimate_row,
-    group_key,
     heads_of,
     note,
     on_grades,
@@ -56,11 +54,9 @@ from masrel.analysis._file_estimates import (
 )
 from masrel.errors import (
     MasrelWarning,
-    ParameterError,
     RatingsError,
     UndefinedStatisticWarning,
 )
-from masrel.estimates import Interval
 from masrel.ratings import RatingsFile, RatingsPart
 
 if TYPE_CHECKING:
@@ -68,13 +64,12 @@ if TYPE_CHECKING:
 
 _T = TypeVar("_T")
 
-_SHOWN = 6  # names that a note lists
 _MANY = 8  # raters beyond which only the pairs that agree least are shown
 _SHOWN_PAIRS = 20  # of these pairs
 
 
 def answers(
-    file: RatingsFile, options: EstimateOptions, questions: Questions
+    file: RatingsFile, questions: Questions
 ) -> tuple[RatingsFile, list[Answer]]:
     """Return the ratings without a reference, and the answers, agreement first."""
     sessions = list(dict.fromkeys(str(part.session) for part in file.parts))
@@ -84,56 +79,34 @@ def answers(
             f"({', '.join(sessions)}), so that raters graded the same item more than "
             f"once; --by {file.read['session']} estimates each"
         )
-    if options.weights != "identity" and not file.is_ordered:
-        raise ParameterError(
-            f"--weights {options.weights}: needs --categories with every grade of the "
-            f"scale in order, the grades met are text: {', '.join(file.scale.grades)}"
+    refuse(
+        (
+            questions.weights != "identity" and not file.is_ordered,
+            f"--weights {questions.weights}: needs --categories with every grade of "
+            f"the scale in order, the grades met are text: "
+            f"{', '.join(file.scale.grades)}",
         )
+    )
     others = file
     if questions.reference is not None:
         others = _without_reference(file, questions.reference)
-    between = questions.between_raters(others, options)
+    between = questions.between_raters(others)
     with warnings.catch_warnings():
         # Every note is in a result, and so below its table or in the JSON.
         warnings.simplefilter("ignore", MasrelWarning)
         # what does not fit these tables is said first: it says most
-        further = list(_further_answers(file, others, options, between, questions))
+        further = [
+            answer
+            for name, question in _QUESTIONS.items()
+            if getattr(questions, name)
+            for answer in question(
+                file if name in _WITH_REFERENCE else others, questions
+            )
+        ]
+        if between is not None and questions.compare:
+            further += comparisons(others, between)
         first = [] if between is None else [agreement(others, between)]
     return others, first + further
-
-
-def _further_answers(
-    file: RatingsFile,
-    others: RatingsFile,
-    options: EstimateOptions,
-    between: EstimateOptions | None,
-    questions: Questions,
-) -> Iterator[Answer]:
-    # others: the ratings without a reference; between: what is estimated of raters
-    if questions.retest:
-        yield _retest(file, options)
-    if questions.each_category:
-        yield _categories(others, options)
-    if questions.diagnose:
-        yield from _diagnosis(file, options, questions.reference)
-    if questions.symmetry:
-        yield _symmetry(others)
-    if questions.indices:
-        yield _indices(others)
-    if questions.limits_of_agreement:
-        yield _limits(others, options, questions.unit)
-    if questions.compare and between is not None:
-        of_all = entries(between, others, others.parts)
-        yield difference_rows(others, of_all, between)
-        if len(others.parts) > 2:  # of two the difference says it
-            yield equality_rows(others, of_all, between)
-
-
-def _named(names: Collection[str]) -> str:
-    # as a note lists them
-    more = len(names) - _SHOWN
-    listed = ", ".join(itertools.islice(names, _SHOWN))
-    return f"{listed} and {more} more" if more > 0 else listed
 
 
 def _without_reference(file: RatingsFile, reference: str) -> RatingsFile:
@@ -143,10 +116,13 @@ def _without_reference(file: RatingsFile, reference: str) -> RatingsFile:
         with placed("--diagnose"):
             coded = code_ratings(part.ratings)
         others = [place for place, name in enumerate(part.raters) if name != reference]
-        if len(others) == len(part.raters):
-            raise ParameterError(
-                f"--reference: needs one of {', '.join(part.raters)}, got {reference!r}"
+        refuse(
+            (
+                len(others) == len(part.raters),
+                f"--reference: needs one of {', '.join(part.raters)}, got "
+                f"{reference!r}",
             )
+        )
         raters = tuple(part.raters[place] for place in others)
         ratings = replace(coded, codes=coded.codes[:, others])
         parts.append(replace(part, raters=raters, ratings=ratings))
@@ -161,40 +137,38 @@ def _without_reference(file: RatingsFile, reference: str) -> RatingsFile:
 # ---- each category ----
 
 
-def _categories(file: RatingsFile, options: EstimateOptions) -> Answer:
-    """Return how well raters tell each category from all others."""
+def _categories(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
+    """Give how well raters tell each category from all others."""
     rows = []
-    plain = replace(options, coefficients=None, weights="identity")
+    folded = replace(questions, coefficients=["all"], weights="identity")
     for part, _, names in parts_of(file):
         for place, grade in enumerate(file.scale.grades):
-            estimate = category_kappa(part.counted, file.scale.values[place])
+            of_grade = category_kappa(part.counted, file.scale.values[place])
             row = AgreementRow(
                 keys={**names, "category": grade},
                 title="Fleiss' κ, category",
-                estimate=replace(estimate, weights=grade),
+                estimate=replace(of_grade, weights=grade),
             )
-            if options.target is not None and estimate.reason is None:
+            if questions.target is not None and of_grade.reason is None:
                 # of the two categories that the scale is folded to
                 counted = part.counted
                 ratings = counted.coded if counted.knows_raters else counted
                 codes = np.where(ratings.codes < 0, -1, ratings.codes != place)
-                folded = replace(ratings, codes=codes, categories=("this", "other"))
-                of, _ = estimate_row(
-                    coefficient("fleiss_kappa"), folded, row.keys, plain
-                )
-                interval = of.estimate.interval
-                estimate = replace(row.estimate, interval=interval)
+                ratings = replace(ratings, codes=codes, categories=("this", "other"))
+                fleiss = coefficient("fleiss_kappa")
+                of = estimate_row(fleiss, ratings, row.keys, folded)
+                estimate = replace(row.estimate, interval=of.estimate.interval)
                 row = replace(of, title=row.title, estimate=estimate)
             rows.append(row)
-    heads = heads_of(file, "category")
-    return Answer(name="categories", estimates=tuple(rows), heads=heads)
+    heads = heads_of(", ".join([*part_names(file, file.parts[0]), "category"]))
+    yield Answer(name="categories", estimates=tuple(rows), heads=heads)
 
 
 # ---- two sessions ----
 
 
-def _retest(file: RatingsFile, options: EstimateOptions) -> Answer:
-    """Return how well raters agree with themselves, each and all together."""
+def _retest(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
+    """Give how well raters agree with themselves, each and all together."""
     by, column = file.read["by"], file.read["session"]
     refuse(
         (
@@ -216,17 +190,14 @@ def _retest(file: RatingsFile, options: EstimateOptions) -> Answer:
             if len(parts) != 2:
                 raise RatingsError(
                     f"needs two sessions in column {column!r}, got {len(names)} "
-                    f"({_named(names)})"
+                    f"({listed(names)})"
                 )
-            raters, lone_raters = _of_both(parts, "rater")
-            items, lone_items = _of_both(parts, "item")
-            codes = _side_by_side(parts, items, raters)
-        pairs = CodedRatings(codes=codes, categories=file.scale.values)
-        keys = {} if by is None else {group_key(by): group}
-        estimates += _retest_rows(keys, raters, pairs, options)
+            pairs, raters, lone = _both_sessions(parts, file.scale.values)
+        keys = {} if by is None else dict.fromkeys(heads_of(by), group)
+        estimates += _retest_rows(keys, raters, pairs, questions)
         of_group = "" if group is None else f"{group}: "
         sessions[of_group] = names
-        if lone := [*lone_raters, *lone_items]:
+        if lone:
             left_out.append(note("left_out", group=of_group, names="; ".join(lone)))
     # groups that have sessions of the same names share the note
     if all(names == other for other in sessions.values()):
@@ -235,74 +206,66 @@ def _retest(file: RatingsFile, options: EstimateOptions) -> Answer:
         note("sessions", group=of, first=first, second=second)
         for of, (first, second) in sessions.items()
     ]
-    heads = "rater" if by is None else f"{by}, rater"
-    return Answer(
+    yield Answer(
         name="retest",
         estimates=tuple(estimates),
-        heads={group_key(heads): heads},
+        heads=heads_of("rater" if by is None else f"{by}, rater"),
         notes=(*notes, *left_out),
     )
 
 
-def _of_both(
-    parts: Sequence[RatingsPart], noun: Literal["rater", "item"]
-) -> tuple[list[str], list[str]]:
-    # names that both sessions have, as they come in the first; those of one, in words
-    first, second = (dict.fromkeys(getattr(part, f"{noun}s")) for part in parts)
-    both = [name for name in first if name in second]
-    if not both:
-        article = "an" if noun == "item" else "a"
-        raise RatingsError(
-            f"needs {article} {noun} of both sessions, got {_named(first)} in "
-            f"{parts[0].session!r} and {_named(second)} in "
-            f"{parts[1].session!r}"
-        )
-    words = []
-    for part, names, others in zip(
-        parts, (first, second), (second, first), strict=True
-    ):
-        if lone := [name for name in names if name not in others]:
-            words.append(f"{noun} {_named(lone)} ({part.session} only)")
-    return both, words
-
-
-def _side_by_side(
-    parts: Sequence[RatingsPart], items: list[str], raters: list[str]
-) -> NDArray[np.signedinteger]:
-    # codes (n_items, 2 n_raters), both sessions of a rater beside each other
+def _both_sessions(
+    parts: Sequence[RatingsPart], grades: tuple[Label, ...]
+) -> tuple[CodedRatings, list[str], list[str]]:
+    """Return ratings of both sessions, their raters, and what only one of them has."""
     import pandas as pd  # of all questions this one alone needs it
 
+    both, lone = {}, []
+    for noun in ("rater", "item"):
+        names = [dict.fromkeys(getattr(part, f"{noun}s")) for part in parts]
+        both[noun] = [name for name in names[0] if name in names[1]]
+        if not both[noun]:
+            article = "an" if noun == "item" else "a"
+            raise RatingsError(
+                f"needs {article} {noun} of both sessions, got {listed(names[0])} in "
+                f"{parts[0].session!r} and {listed(names[1])} in {parts[1].session!r}"
+            )
+        for part, mine, others in zip(parts, names, names[::-1], strict=True):
+            if left := [name for name in mine if name not in others]:
+                lone.append(f"{noun} {listed(left)} ({part.session} only)")
     tables = [
         pd.DataFrame(code_ratings(part.ratings).codes, part.items, part.raters)
         for part in parts
     ]
-    codes = [table.loc[items, raters].to_numpy() for table in tables]
-    return np.stack(codes, axis=2).reshape(len(items), -1)
+    codes = [of.loc[both["item"], both["rater"]].to_numpy() for of in tables]
+    # (n_items, 2 n_raters), both sessions of a rater beside each other
+    pairs = np.stack(codes, axis=2).reshape(len(both["item"]), -1)
+    return CodedRatings(codes=pairs, categories=grades), both["rater"], lone
 
 
 def _retest_rows(
-    names: dict[str, str | None],
+    names: Mapping[str, str | None],
     raters: Sequence[str],
     pairs: CodedRatings,
-    options: EstimateOptions,
+    questions: Questions,
 ) -> list[AgreementRow]:
     # of both sessions of each rater in pairs, (n_items, 2 n_raters)
-    every = replace(options, coefficients=None)
+    every = replace(questions, coefficients=["all"])
     # a single rater says nothing of other raters
-    alone = replace(every, target=None if options.target != "items" else "items")
+    alone = replace(every, target=None if questions.target != "items" else "items")
     rows = []
     for place, rater in enumerate(raters):
         ratings = replace(pairs, codes=pairs.codes[:, 2 * place : 2 * place + 2])
         keys = {**names, "rater": rater}
-        row, _ = estimate_row(coefficient("cohen_kappa"), ratings, keys, alone)
+        row = estimate_row(coefficient("cohen_kappa"), ratings, keys, alone)
         estimate = replace(row.estimate, n_raters=min(row.estimate.n_raters, 1))
         rows.append(replace(row, estimate=estimate))
     of_all = ["stratified_kappa"]
-    if options.takes_all or "pooled_kappa" in options.names:
+    if questions.takes_all or "pooled_kappa" in questions.names:
         of_all.append("pooled_kappa")
     everybody = {**names, "rater": None}
     return rows + [
-        estimate_row(coefficient(name), pairs, everybody, every)[0] for name in of_all
+        estimate_row(coefficient(name), pairs, everybody, every) for name in of_all
     ]
 
 
@@ -314,72 +277,79 @@ def _two_raters(part: RatingsPart) -> CodedRatings:
     if coded.codes.shape[1] != 2:
         raise RatingsError(
             f"needs two raters, got {coded.codes.shape[1]} "
-            f"({_named(part.raters)}); --raters chooses two"
+            f"({listed(part.raters)}); --raters chooses two"
         )
     return coded
 
 
-def _heads(file: RatingsFile) -> dict[str, str]:
-    # a column for each of what tells parts apart
-    return {group_key(name): name for name in part_names(file, file.parts[0])}
-
-
-def _of_two(
+def _table(
     name: str,
     file: RatingsFile,
-    rows_of: Callable[[RatingsPart], Iterator[tuple[Row, Row]]],
+    rows_of: Callable[[RatingsPart], Iterable[tuple[Row, ...]]],
 ) -> Answer:
-    """Return rows of two raters of each part, and what a table shows otherwise."""
+    """Return rows of two raters of each part, and what a table shows of each."""
+    # rows_of: a row for JSON, and the cells of each row of a table that it becomes
     rows, shown = [], []
     for part, group, keys in parts_of(file):
-        with placed(f"--{name}", group):
-            for row, cells in rows_of(part):
+        with placed(f"--{name.replace('_', '-')}", group):
+            for row, *cells in rows_of(part):
                 rows.append({**keys, **row})
-                shown.append({**rows[-1], "group": group, **cells})
-    return Answer(name=name, rows=rows, shown=shown, heads=_heads(file))
+                shown += [{**rows[-1], "group": group, **of} for of in cells]
+    return Answer(
+        name=name,
+        rows=rows,
+        shown=shown,
+        heads=heads_of(*part_names(file, file.parts[0])),
+    )
 
 
-def _symmetry(file: RatingsFile) -> Answer:
-    """Return whether changes between categories go both ways alike often."""
-    answer = _of_two("symmetry", file, _symmetry_rows)
+def _symmetry(file: RatingsFile, _: Questions) -> Iterator[Answer]:
+    """Give whether changes between categories go both ways alike often."""
+    answer = _table("symmetry", file, _symmetry_rows)
     texts = {"binomial": "exact_test", "chi-squared": "test"}
     notes = [
         note(texts[row["distribution"]], test=row["test"], hypothesis=row["hypothesis"])
         for row in answer.shown or ()
     ]
-    return replace(answer, notes=tuple(dict.fromkeys(notes)))
+    yield replace(answer, notes=tuple(dict.fromkeys(notes)))
+
+
+_OF_TEST = ("hypothesis", "statistic", "distribution", "p_value", "n_items")
 
 
 def _symmetry_rows(part: RatingsPart) -> Iterator[tuple[Row, Row]]:
     table = contingency_table(_two_raters(part))
-    of_two = {}
-    if len(table) == 2:
-        corrected = mcnemar(table, kind="corrected")
-        of_two = {"McNemar, exact": mcnemar(table), "McNemar, corrected": corrected}
     tests: dict[str, Significance] = {
-        **of_two,
         "Bowker": bowker(table),
         "Stuart-Maxwell": stuart_maxwell(table),
         "Bhapkar": bhapkar(table),
     }
+    if len(table) == 2:
+        corrected = mcnemar(table, kind="corrected")
+        of_two = {"McNemar, exact": mcnemar(table), "McNemar, corrected": corrected}
+        tests = {**of_two, **tests}
     for title, result in tests.items():
         name, _, kind = title.partition(", ")
         key = name.lower().replace("-", "_")
-        row = {"test": key, "kind": kind or None, **asdict(result)}
-        del row["name"]
-        row["df"] = row.pop("df")  # last, as in the first records
-        cells: Row = {"test": title, "title": title}
-        if result.reason is None and math.isinf(result.statistic):
-            row["reason"] = "infinite: all items changed, and one way"
-            cells["texts"] = [row["reason"]]
-        yield row, cells
+        why = result.reason
+        if why is None and math.isinf(result.statistic):
+            why = "infinite: all items changed, and one way"
+        row = {
+            "test": key,
+            "kind": kind or None,
+            **{of: getattr(result, of) for of in _OF_TEST},
+            "reason": why,
+            "df": result.df,
+        }
+        texts = {"texts": [why]} if why != result.reason else {}
+        yield row, {"test": title, "title": title, **texts}
 
 
-def _indices(file: RatingsFile) -> Answer:
-    """Return what the margins of two raters and two categories do to kappa."""
-    answer = _of_two("indices", file, partial(_of_margins, file.scale.grades))
+def _indices(file: RatingsFile, _: Questions) -> Iterator[Answer]:
+    """Give what the margins of two raters and two categories do to kappa."""
+    answer = _table("indices", file, partial(_of_margins, file.scale.grades))
     notes = tuple(map(note, ("pabak", "on_category", "largest")))
-    return replace(answer, notes=notes)
+    yield replace(answer, notes=notes)
 
 
 _OF_TABLE = {
@@ -393,32 +363,35 @@ def _of_margins(grades: Sequence[str], part: RatingsPart) -> Iterator[tuple[Row,
     table = contingency_table(_two_raters(part))
     if len(grades) != 2:
         raise RatingsError(
-            f"needs a scale of two categories, got {len(grades)} ({_named(grades)})"
+            f"needs a scale of two categories, got {len(grades)} ({listed(grades)})"
         )
 
-    def row(index: str, title: str, value: float, why: str | None, **more: Any) -> Any:
-        cells = {
+    of_all, why = _with_reason(lambda: brennan_prediger(part.counted))
+    error = of_all.standard_error
+    indices: list[tuple[str, str, float, str | None, Row]] = [
+        ("pabak", "PABAK", of_all.value, why, {"standard_error": error})
+    ]
+    indices += [
+        (name, title, *_with_reason(partial(function, table)), {})
+        for name, (title, function) in _OF_TABLE.items()
+    ]
+    shares, why = _with_reason(lambda: specific_agreement(table))
+    indices += [
+        ("specific_agreement", f"Agreement on {grade}", share, why, {"category": grade})
+        for grade, share in zip(grades, shares, strict=True)
+    ]
+    for index, title, value, why, more in indices:
+        row: Row = {
             "index": index,
             "title": title,
             "category": None,
             "value": value,
             "standard_error": None,
             "n_items": int(table.sum()),
-            "reason": why,
+            "reason": why if math.isnan(value) else None,
             **more,
         }
-        return cells, {"index": title, "texts": [] if why is None else [why]}
-
-    estimate, why = _with_reason(lambda: brennan_prediger(part.counted))
-    error = estimate.standard_error
-    yield row("pabak", "PABAK", estimate.value, why, standard_error=error)
-    for name, (title, function) in _OF_TABLE.items():
-        yield row(name, title, *_with_reason(partial(function, table)))
-    shares, why = _with_reason(lambda: specific_agreement(table))
-    for grade, share in zip(grades, shares, strict=True):
-        reason = why if math.isnan(share) else None
-        title = f"Agreement on {grade}"
-        yield row("specific_agreement", title, share, reason, category=grade)
+        yield row, {"index": title, "texts": [why] if row["reason"] else []}
 
 
 def _with_reason(call: Callable[[], _T]) -> tuple[_T, str | None]:
@@ -429,89 +402,85 @@ def _with_reason(call: Callable[[], _T]) -> tuple[_T, str | None]:
     return value, str(caught[0].message) if caught else None
 
 
-def _ends(interval: Interval) -> dict[str, float]:
-    return {"low": interval.low, "high": interval.high}
+_QUANTITIES = {"mean": "Mean", "lower": "Lower limit", "upper": "Upper limit"}
 
 
-def _limits(file: RatingsFile, options: EstimateOptions, unit: str | None) -> Answer:
-    """Return between which bounds the differences of two raters lie."""
+def _limits(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
+    """Give between which bounds the differences of two raters lie."""
     check_order(file, "--limits-of-agreement")
-    rows, shown, notes, figure = [], [], [], []
-    for part, group, keys in parts_of(file):
-        with placed("--limits-of-agreement", group):
-            result = limits_of_agreement(_two_raters(part), level=options.level)
+    panels = []
+
+    def rows_of(part: RatingsPart) -> Iterator[tuple[Row, ...]]:
+        result = limits_of_agreement(_two_raters(part), level=questions.level)
+        panels.append((part.raters, result))
         first, second = part.raters
         of_result = ("n_items", "mean", "sd", "lower", "upper", "share")
+        intervals = {key: getattr(result, f"{key}_interval") for key in _QUANTITIES}
+        ends = {key: {"low": of.low, "high": of.high} for key, of in intervals.items()}
         row: Row = {
-            **keys,
             "first": first,
             "second": second,
             **{key: getattr(result, key) for key in of_result},
             "level": result.mean_interval.level,
-            "mean_interval": _ends(result.mean_interval),
-            "lower_interval": _ends(result.lower_interval),
-            "upper_interval": _ends(result.upper_interval),
+            **{f"{key}_interval": of for key, of in ends.items()},
             **{key: getattr(result, key) for key in ("inner", "outer", "reason")},
         }
         low, high = zip(result.outer, result.inner, strict=True)
-        for quantity, key, pair in (
-            ("Mean", "mean", (None, None)),
-            ("Lower limit", "lower", low),
-            ("Upper limit", "upper", high[::-1]),
-        ):
-            of_both = {"pair_low": pair[0], "pair_high": pair[1]}
-            cells = {"quantity": quantity, "value": row[key], **row[f"{key}_interval"]}
-            shown.append({**row, **cells, **of_both, "title": quantity, "group": group})
-        rows.append(row)
-        notes.append(note("pair", pair=f"{first} less {second}"))
-        figure.append((group, (part.raters, result)))
-    notes += [note("limits"), note("exact_ends", level=options.level)]
-    return Answer(
-        name="limits_of_agreement",
-        rows=rows,
-        shown=shown,
-        heads=_heads(file),
-        notes=tuple(dict.fromkeys(notes)),
-        of=unit or "",
-        figure=tuple(figure),
+        of_both = {"lower": low, "upper": high[::-1]}
+        cells = [
+            {"title": title, "quantity": title, "value": row[key], **ends[key]}
+            | dict(zip(("pair_low", "pair_high"), of_both.get(key, ()), strict=False))
+            for key, title in _QUANTITIES.items()
+        ]
+        yield row, *cells
+
+    answer = _table("limits_of_agreement", file, rows_of)
+    pairs = [f"{row['first']} less {row['second']}" for row in answer.rows]
+    notes = [note("pair", pair=pair) for pair in dict.fromkeys(pairs)]
+    groups = (group for _, group, _ in parts_of(file))
+    yield replace(
+        answer,
+        notes=(*notes, note("limits"), note("exact_ends", level=questions.level)),
+        of=questions.unit or "",
+        figure=tuple(zip(groups, panels, strict=True)),
     )
 
 
 # ---- raters, pairs and categories ----
 
 
-def _diagnosis(
-    file: RatingsFile, options: EstimateOptions, reference: str | None
-) -> Iterator[Answer]:
-    """Return raters, pairs, categories and confusions of every part of the ratings."""
+def _diagnosis(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
+    """Give raters, pairs, categories and confusions of every part of the ratings."""
     from masrel.intervals.diagnosis import diagnose
 
-    if options.takes_all or (options.coefficients is None and options.metric is None):
-        options = replace(options, coefficients=["fleiss_kappa"])
-    several = f"--coefficients {','.join(options.names)}"
+    if questions.takes_all or (
+        questions.coefficients is None and questions.metric is None
+    ):
+        questions = replace(questions, coefficients=["fleiss_kappa"])
+    several = f"--coefficients {','.join(questions.names)}"
     needed = f"--diagnose: needs one coefficient, got {several}"
-    refuse((len(options.names) > 1, needed))
-    (entry,) = entries(options, file, file.parts)
-    title, grades = options.title(entry), file.scale.grades
+    refuse((len(questions.names) > 1, needed))
+    (entry,) = entries(questions, file, file.parts)
+    title, grades = questions.title(entry), file.scale.grades
     parts = []
     for part, group, keys in parts_of(file):
         with placed("--diagnose", group):
             result = diagnose(
                 on_grades(code_ratings(part.ratings), entry, file),
                 coefficient=entry,
-                target=None if options.target is None else "items",
+                target=None if questions.target is None else "items",
                 raters=part.raters,
-                reference=reference,
-                weights=options.weights_of(entry),
-                level=options.level,
+                reference=questions.reference,
+                weights=questions.weights_of(entry),
+                level=questions.level,
             )
         parts.append((group, keys, result, _diagnosis_rows(grades, result)))
-    notes = _diagnosis_notes([result for *_, result, _ in parts], title, options)
-    by = ", ".join(_heads(file).values())
-    of = {"raters": title, "pairs": title, "confusion": reference or "another rater"}
-    of_kind: dict[str, Row] = {
-        "pairs": {"figure": tuple((group, result) for group, _, result, _ in parts)},
-        "confusion": {"grades": grades},
+    notes = _diagnosis_notes([result for *_, result, _ in parts], title, questions)
+    by = ", ".join(part_names(file, file.parts[0]))
+    of = {
+        "raters": title,
+        "pairs": title,
+        "confusion": questions.reference or "another rater",
     }
     for kind, texts in notes.items():
         shown = [
@@ -524,6 +493,7 @@ def _diagnosis(
             least = sorted(known, key=itemgetter("value"))[:_SHOWN_PAIRS]
             texts.insert(0, note("least", n=len(least), n_all=len(shown)))
             shown = least
+        panels = [(group, result) for group, _, result, _ in parts]
         yield Answer(
             name=f"diagnosis_{kind}",
             rows=[{**keys, **row} for _, keys, _, rows in parts for row in rows[kind]],
@@ -531,8 +501,8 @@ def _diagnosis(
             heads={"group": by} if by else {},
             notes=tuple(texts),
             of=of.get(kind, ""),
-            has_reference=reference is not None,
-            **of_kind.get(kind, {}),
+            grades=grades if kind == "confusion" else (),
+            figure=tuple(panels) if kind == "pairs" else (),
         )
 
 
@@ -601,12 +571,12 @@ def _rows(**columns: NDArray[Any]) -> list[Row]:
 
 
 def _diagnosis_notes(
-    results: "Sequence[Diagnosis]", title: str, options: EstimateOptions
+    results: "Sequence[Diagnosis]", title: str, questions: Questions
 ) -> dict[str, list[str]]:
     # of each table
-    reference, has_ends = results[0].reference, options.target is not None
+    reference, has_ends = results[0].reference, questions.target is not None
     ends = {
-        kind: [note(f"{kind}_ends", level=options.level, title=title)] * has_ends
+        kind: [note(f"{kind}_ends", level=questions.level, title=title)] * has_ends
         for kind in ("raters", "pairs", "categories", "confusion")
     }
     right = [] if reference is None else [note("reference", rater=reference)]
@@ -614,3 +584,16 @@ def _diagnosis_notes(
     of_raters = [*right, *(ends["raters"] or [note("no_ends")]), *texts]
     confusion = [note("confusion"), *ends["confusion"]]
     return {**ends, "raters": of_raters, "confusion": confusion}
+
+
+_QUESTIONS = {
+    "retest": _retest,
+    "each_category": _categories,
+    "diagnose": _diagnosis,
+    "symmetry": _symmetry,
+    "indices": _indices,
+    "limits_of_agreement": _limits,
+}
+"""Options to what answers them, in the order in which it is shown."""
+
+_WITH_REFERENCE = ("retest", "diagnose")

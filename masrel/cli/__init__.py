@@ -92,9 +92,13 @@ class _Verbs(click.Group):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in VERBS:
-            if not ctx.resilient_parsing:  # as it is where a shell completes names
-                _refuse_verb(ctx, cmd_name)
-            return None
+            if ctx.resilient_parsing:  # as it is where a shell completes names
+                return None
+            from difflib import get_close_matches  # loaded only for an error
+
+            near = get_close_matches(cmd_name, VERBS, n=1)
+            hint = f" Did you mean '{near[0]}'?" if near else ""
+            ctx.fail(f"No such command '{cmd_name}'.{hint}")
         package = "masrel.cli" if cmd_name in _STATISTICS else "masrel.lab.cli"
         module = importlib.import_module(f"{package}.{cmd_name}")
         command: click.Command = getattr(module, cmd_name)
@@ -105,7 +109,19 @@ class _Verbs(click.Group):
             return super().invoke(ctx)
         except ParameterError as error:
             command = self.get_command(ctx, str(ctx.invoked_subcommand))
-            raise ParameterError(_with_options(str(error), command)) from error
+            params = [] if command is None else command.params
+            options = {param.name: max(param.opts, key=len) for param in params}
+            for name, other in _CALLED.items():
+                if other in options:
+                    options.setdefault(name, options[other])
+            # the places that a refusal begins with are parameters: here they are
+            # options
+            *places, rest = str(error).split(": ")
+            for at, place in enumerate(places):
+                names = place.split(", ")
+                if options.keys() >= set(names):
+                    places[at] = ", ".join(options[name] for name in names)
+            raise ParameterError(": ".join([*places, rest])) from error
 
     def format_commands(
         self,
@@ -116,29 +132,6 @@ class _Verbs(click.Group):
         for title, verbs in GROUPS.items():
             with formatter.section(title):
                 formatter.write_dl(list(verbs.items()))
-
-
-def _with_options(sentence: str, command: click.Command | None) -> str:
-    # the places that a refusal begins with, where they are parameters, as options
-    params = [] if command is None else command.params
-    options = {param.name: max(param.opts, key=len) for param in params}
-    for name, other in _CALLED.items():
-        if other in options:
-            options.setdefault(name, options[other])
-    *places, rest = sentence.split(": ")
-    for at, place in enumerate(places):
-        names = place.split(", ")
-        if options.keys() >= set(names):
-            places[at] = ", ".join(options[name] for name in names)
-    return ": ".join([*places, rest])
-
-
-def _refuse_verb(ctx: click.Context, name: str) -> NoReturn:
-    from difflib import get_close_matches  # loaded only for an error
-
-    near = get_close_matches(name, VERBS, n=1)
-    hint = f" Did you mean '{near[0]}'?" if near else ""
-    ctx.fail(f"No such command '{name}'.{hint}")
 
 
 cli = click.version_option(masrel.__version__, prog_name="masrel")(

@@ -2,7 +2,9 @@
 
 import json
 import sys
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from functools import wraps
 from pathlib import Path
@@ -11,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from masrel._files import write_file
+from masrel._input import refuse
 from masrel.cli._paths import FileInFolder, OutputFile
-from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
     from masrel.plots._drawn_values import Content, Drawn, Form
@@ -25,20 +27,6 @@ STDOUT = Path("-")
 """What a file is called that is printed."""
 
 _FORMS: dict[str, "Form"] = {".png": "png", ".svg": "svg", ".pdf": "pdf"}
-
-
-class _FigureFile(FileInFolder):
-    """A figure's file, whose name says its form."""
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> Path:
-        file: Path = super().convert(value, param, ctx)
-        if file.suffix.lower() not in _FORMS:
-            raise ParameterError(
-                f"--figure: needs a name that ends in .png, .svg or .pdf, got {file}"
-            )
-        return file
 
 
 def grouped(name: str, group: type, *options: Callable[..., Any]) -> Decorator:
@@ -72,7 +60,7 @@ class OutputOptions:
     json_file: Path | None = None  # where JSON goes; "-" is the screen
     figure: Path | None = None  # where a figure goes
     # csv, latex: in which form the table is printed; as text when neither
-    csv: bool = False
+    csv: bool | None = None  # None where a command has no such table
     raw_csv: bool = False  # whether cells of CSV are as they are
     latex: bool = False
     sentence: bool = False  # whether sentences are printed instead of a table
@@ -86,10 +74,22 @@ class OutputOptions:
             "--sentence": self.sentence,
         }
         printed = [option for option, is_printed in forms.items() if is_printed]
-        if len(printed) > 1:
-            raise ParameterError(
-                f"{' and '.join(printed)} want the same stdout: choose one"
-            )
+        suffix = ".svg" if self.figure is None else self.figure.suffix.lower()
+        refuse(
+            (
+                suffix not in _FORMS,
+                f"--figure: needs a name that ends in .png, .svg or .pdf, got "
+                f"{self.figure}",
+            ),
+            (
+                self.raw_csv and self.csv is False,
+                "--raw-csv: needs --csv, whose table it is about",
+            ),
+            (
+                len(printed) > 1,
+                f"{' and '.join(printed)} want the same stdout: choose one",
+            ),
+        )
 
 
 _FORMAT = 1  # of what verbs write as JSON
@@ -111,30 +111,19 @@ def output_options(
     # makes_folder: whether the command makes a folder that JSON may go to
     kind = OutputFile if makes_folder else FileInFolder
     json_path = kind(path_type=Path, allow_dash=True)
-    # of verbs that print no table unless asked, it is nothing by itself
-    needs_csv = _needs_csv if raw_csv is None else None
     raw_csv = raw_csv or (_RAW if csv is not None else None)
-    figures = _FigureFile(path_type=Path, dir_okay=False)
+    figures = FileInFolder(path_type=Path, dir_okay=False)
     options = [
         (json, click.option("--json", "json_file", type=json_path, help=json)),
         (figure, click.option("--figure", type=figures, help=figure)),
-        (csv, click.option("--csv", is_flag=True, is_eager=True, help=csv)),
-        (
-            raw_csv,
-            click.option("--raw-csv", is_flag=True, help=raw_csv, callback=needs_csv),
-        ),
+        (csv, click.option("--csv", is_flag=True, help=csv)),
+        (raw_csv, click.option("--raw-csv", is_flag=True, help=raw_csv)),
         (latex, click.option("--latex", is_flag=True, help=latex)),
         (sentence, click.option("--sentence", is_flag=True, help=sentence)),
         (quiet, click.option("--quiet", is_flag=True, help=quiet)),
     ]
     offered = [option for text, option in options if text is not None]
     return grouped("output", OutputOptions, *offered)
-
-
-def _needs_csv(context: click.Context, _: click.Parameter, raw_csv: bool) -> bool:
-    if raw_csv and not context.params["csv"]:
-        raise click.UsageError("--raw-csv: needs --csv, whose table it is about")
-    return raw_csv
 
 
 def write_output(
@@ -155,14 +144,11 @@ def write_output(
     if output.json_file == STDOUT:
         echo_notes(notes)
     else:  # first: a disk that is full then loses no result
-        first = text()
-        if isinstance(first, str):
-            click.echo(first)
-        else:
-            _print_table(first, output, width)
-        for table in more:
-            click.echo()
-            _print_table(table, output, width)
+        parts = (text(), *more)
+        click.echo("\n\n".join(_shown(part, output, width) for part in parts))
+        for table in parts:
+            if output.csv and not isinstance(table, str):
+                echo_notes((*table.read, *table.notes))
     if output.json_file is not None:
         write_json(document(), output.json_file)
     if figure is not None and output.figure is not None:
@@ -175,25 +161,26 @@ def write_output(
         click.echo(f"figure: {output.figure}", err=True)
 
 
-def _print_table(table: "Table", output: OutputOptions, width: int | None) -> None:
+def _shown(part: "Table | str", output: OutputOptions, width: int | None) -> str:
     from masrel.tables._latex import as_latex
     from masrel.tables._tables import as_csv, as_text
 
+    if isinstance(part, str):
+        return part
     if output.csv:
-        shown = as_csv(table, raw=output.raw_csv)
-    elif output.latex:
-        shown = as_latex(table)
-    else:
-        shown = as_text(table, width=width)
-    click.echo(shown.rstrip("\n"))
-    if output.csv:
-        echo_notes((*table.read, *table.notes))
+        return as_csv(part, raw=output.raw_csv).rstrip("\n")
+    if output.latex:
+        return as_latex(part).rstrip("\n")
+    return as_text(part, width=width)
 
 
 def write_json(document: dict[str, object], file: Path) -> None:
     """Write a document, or print it where the file is "-"; it names its format."""
     if "format" not in document:
-        document = {"format": f"masrel {_verb()} {_FORMAT}", **document}
+        context = click.get_current_context()
+        # the first word is as the user called it
+        words = context.command_path.removeprefix(context.find_root().command_path)
+        document = {"format": f"masrel{words} {_FORMAT}", **document}
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     if file != STDOUT:
         write_file(file, text + "\n")
@@ -203,14 +190,6 @@ def write_json(document: dict[str, object], file: Path) -> None:
     except UnicodeEncodeError:  # escapes of JSON for letters that it cannot show
         text = json.dumps(document, indent=1)
     click.echo(text)
-
-
-def _verb() -> str:
-    names, context = [], click.get_current_context()
-    while context.parent is not None:  # the first is called as the user called it
-        names.append(str(context.info_name))
-        context = context.parent
-    return " ".join(reversed(names))
 
 
 _NOTES = "masrel.notes"
@@ -227,3 +206,48 @@ def echo_notes(notes: Sequence[str]) -> None:
     """Print notes on stderr, one a line."""
     notes_of_call().extend(notes)
     click.echo("".join(f"{note}\n" for note in notes), err=True, nl=False)
+
+
+_PERIOD_S = 10.0  # between lines that say how far a command has come
+
+Report = Callable[[int, int], None]
+"""Is told how many steps are made, and how many there will be."""
+
+
+@contextmanager
+def progress(description: str, unit: str, *, is_quiet: bool) -> Iterator[Report]:
+    """Show a bar on stderr, or a line every ten seconds where that is no terminal."""
+    start = last = time.monotonic()
+
+    def line(n_made: int, n_expected: int) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if is_quiet or n_made == 0 or now - last < _PERIOD_S:
+            return
+        last = now
+        share = n_made / max(n_expected, n_made)
+        left = _duration((now - start) * (1.0 / share - 1.0))
+        click.echo(f"{description}: {100.0 * share:.0f} %, {left} left", err=True)
+
+    if is_quiet or not sys.stderr.isatty():
+        yield line
+        return
+    from tqdm import tqdm
+
+    # nothing is shown of a call that is refused at once
+    with tqdm(desc=description, unit=unit, delay=0.01) as bar:
+
+        def move(n_made: int, n_expected: int) -> None:
+            bar.total = n_expected
+            bar.update(n_made - bar.n)
+
+        yield move
+
+
+def _duration(seconds: float) -> str:
+    # no more exact than an estimate is
+    if seconds >= 90.0:
+        return f"about {seconds / 60.0:.0f} min"
+    if seconds >= 10.0:
+        return f"about {round(seconds, -1):.0f} s"
+    return f"about {max(seconds, 1.0):.0f} s"

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli._options import split_commas
-from masrel.cli._progress import progress
+from masrel.cli._options import progress, split_commas
 from masrel.ratings._findings import ReadingOptions
 
 if TYPE_CHECKING:
@@ -23,10 +22,10 @@ def read_file(file: Path, options: ReadingOptions) -> "RatingsFile":
     arguments = asdict(options)
     codes = map(split_commas, options.missing_codes)
     arguments["missing_codes"] = [code for listed in codes for code in listed]
-    with progress("reading", "MB", is_quiet=False) as shown:
+    with progress("reading", "MB", is_quiet=False) as report:
 
         def show(n_bytes: int, n_expected: int) -> None:
-            shown.reach(n_bytes >> 20, n_expected >> 20)
+            report(n_bytes >> 20, n_expected >> 20)
 
         return read_ratings(file, progress=show, **arguments)
 

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+from masrel._input import refuse
 from masrel.analysis._file_estimates import (
     OF_MEASUREMENTS,
     USUAL,
     Answer,
-    EstimateOptions,
     Questions,
 )
 from masrel.cli._options import (
@@ -32,7 +32,6 @@ from masrel.cli._reading import (
     table_options,
     what_was_read,
 )
-from masrel.errors import ParameterError
 from masrel.ratings._findings import ReadingOptions
 
 if TYPE_CHECKING:
@@ -52,29 +51,27 @@ def _list_register(
     context: click.Context, _: click.Parameter, value: list[str] | None
 ) -> list[str] | None:
     # "list" needs no file: it is seen before the file is missed
-    if value == ["list"] and not context.resilient_parsing:
-        click.echo(_register())
-        context.exit()
-    return value
+    if value != ["list"] or context.resilient_parsing:
+        return value
+    from masrel.agreement import COEFFICIENTS
+    from masrel.tables._tables import aligned
+
+    lines = [("name", "title", "raters", "weights", "also called")]
+    for entry in COEFFICIENTS.values():
+        fewest, most = entry.n_raters
+        raters = str(fewest) if most == fewest else f"{fewest} or more"
+        if entry.shape == "pairs":
+            raters += ", each twice (--retest)"
+        weights = "any" if entry.weighted else "none"
+        aliases = ", ".join(entry.aliases)
+        lines.append((entry.name, entry.title, raters, weights, aliases))
+    click.echo("\n".join(aligned(lines, ["left"] * 5, rule=True)))
+    context.exit()
 
 
-def _plain_weights(name: str) -> str:
-    from masrel.agreement._weights import plain_name
-
-    return plain_name(name)
-
-
-def _level(_: click.Context, __: click.Parameter, value: float) -> float:
-    # checked here, since nothing else looks at it where there is no interval
-    from masrel.agreement._engine import check_level
-
-    check_level(value)
-    return value
-
-
-_estimate_options = grouped(
-    "options",
-    EstimateOptions,
+_question_options = grouped(
+    "questions",
+    Questions,
     click.option(
         "--coefficients",
         metavar="NAMES",
@@ -89,7 +86,6 @@ _estimate_options = grouped(
     click.option(
         "--weights",
         default="identity",
-        type=_plain_weights,
         metavar="NAME",
         show_default=True,
         help="identity, linear, quadratic, ordinal, radical, ratio, circular or "
@@ -119,7 +115,6 @@ _estimate_options = grouped(
         "--level",
         default=0.95,
         show_default=True,
-        callback=_level,
         help="Level of intervals.",
     ),
     click.option("--resamples", "n_resamples", default=10_000, show_default=True),
@@ -129,28 +124,6 @@ _estimate_options = grouped(
         type=click.Choice(["landis_koch", "altman", "fleiss", "cicchetti"]),
         help="Name the best band that the true value reaches with 95 % probability.",
     ),
-)
-
-
-def _register() -> str:
-    from masrel.agreement import COEFFICIENTS
-    from masrel.tables._tables import aligned
-
-    lines = [("name", "title", "raters", "weights", "also called")]
-    for entry in COEFFICIENTS.values():
-        fewest, most = entry.n_raters
-        raters = str(fewest) if most == fewest else f"{fewest} or more"
-        if entry.shape == "pairs":
-            raters += ", each twice (--retest)"
-        weights = "any" if entry.weighted else "none"
-        aliases = ", ".join(entry.aliases)
-        lines.append((entry.name, entry.title, raters, weights, aliases))
-    return "\n".join(aligned(lines, ["left"] * 5, rule=True))
-
-
-_question_options = grouped(
-    "questions",
-    Questions,
     click.option(
         "--retest",
         is_flag=True,
@@ -226,7 +199,6 @@ _question_options = grouped(
         "sites: they are left out as a whole.",
     ),
 )
-@_estimate_options
 @_question_options
 @click.option(
     "--explain", is_flag=True, help="Say in notes what every interval promises."
@@ -242,7 +214,6 @@ _question_options = grouped(
 def agree(
     file: Path,
     reading: ReadingOptions,
-    options: EstimateOptions,
     questions: Questions,
     explain: bool,
     output: OutputOptions,
@@ -254,44 +225,46 @@ def agree(
     one row a rating. "-" reads standard input. What was read is shown; what could be
     read in two ways is refused with the option that decides.
     """
-    options = questions.checked(options, reading.by, reading.clusters)
-    has_figure = options.target or questions.diagnose or questions.limits_of_agreement
-    if output.figure is not None and not has_figure:
-        raise ParameterError(
-            "--figure: shows intervals, so it needs --target raters, items or both"
+    questions = questions.checked(reading.by, reading.clusters)
+    has_figure = questions.target or questions.diagnose or questions.limits_of_agreement
+    refuse(
+        (
+            output.figure is not None and not has_figure,
+            "--figure: shows intervals, so it needs --target raters, items or both",
         )
+    )
     ratings = read_file(file, reading)
     from masrel.analysis._file_questions import answers
     from masrel.tables._answer_tables import agreement_sentences, answer_table
     from masrel.tables._tables import SIMULATED
 
-    others, answered = answers(ratings, options, questions)
+    others, answered = answers(ratings, questions)
     data = "simulated" if others.simulated else "foreign"
     first, *more = [
         answer_table(
             answer,
-            bands=options.words,
+            bands=questions.words,
             explain=explain,
             in_sentences=output.sentence and answer.name == "agreement",
             data=data,
         )
         for answer in answered
     ]
-    notes = _notes(others, options, answered[0])
+    notes = _notes(others, questions, answered[0])
     read = tuple(what_was_read(others))
     table = replace(first, read=read, notes=(*notes, *first.notes))
     is_sentence = output.sentence and answered[0].name == "agreement"
     sentences = ""
     if is_sentence:
-        sentences = agreement_sentences(answered[0], bands=options.words, data=data)
+        sentences = agreement_sentences(answered[0], bands=questions.words, data=data)
     width, widest = _WIDTHS
     if sys.stdout.isatty():
         width = min(shutil.get_terminal_size((width, 24)).columns, widest)
     write_output(
         output,
-        document=lambda: _record(others, reading, options, answered, notes),
+        document=lambda: _record(others, reading, questions, answered, notes),
         text=lambda: sentences if is_sentence else table,
-        figure=lambda: _figure(answered, options),
+        figure=lambda: _figure(answered, questions),
         stamp=SIMULATED if others.simulated else "",
         notes=(*read, *notes),
         more=more,
@@ -300,13 +273,11 @@ def agree(
     if is_sentence:
         echo_notes((*read, *table.notes))
     # what came through a pipe is gone
-    if options.target is None and Path(others.read["file"]).is_file():
-        _offer_interval(answered[0], options)
+    if questions.target is None and Path(others.read["file"]).is_file():
+        _offer_interval(answered[0], questions)
 
 
-def _notes(
-    ratings: "RatingsFile", options: EstimateOptions, first: Answer
-) -> list[str]:
+def _notes(ratings: "RatingsFile", questions: Questions, first: Answer) -> list[str]:
     """Return what may have been read wrongly, and what is left out of it."""
     from masrel.agreement import COEFFICIENTS
 
@@ -323,7 +294,7 @@ def _notes(
         for text in ratings.warnings
         if is_warned or text.code != "measurements"
     ]
-    if options.takes_all and not ratings.is_ordered:
+    if questions.takes_all and not ratings.is_ordered:
         notes.append(
             "Left out: the six forms of ICC, Kendall's W and Robinson's A, which need "
             "grades that are numbers or --categories with every grade in order."
@@ -334,7 +305,7 @@ def _notes(
 def _record(
     ratings: "RatingsFile",
     reading: ReadingOptions,
-    options: EstimateOptions,
+    questions: Questions,
     answers: Sequence[Answer],
     notes: list[str],
 ) -> dict[str, object]:
@@ -343,12 +314,12 @@ def _record(
     from masrel.tables._answer_tables import answer_documents
 
     read, scale = dict(ratings.read), ratings.scale
-    documents = {of.name: answer_documents(of, options.words) for of in answers}
+    documents = {of.name: answer_documents(of, questions.words) for of in answers}
     return {
         "masrel": __version__,
         "file": read.pop("file"),
         "sha256": ratings.sha256(),
-        "options": {**options.record(), "by": read["by"]},
+        "options": {**questions.record(), "by": read["by"]},
         "scale": {
             "name": scale.name,
             "grades": list(scale.grades),
@@ -361,7 +332,7 @@ def _record(
     }
 
 
-def _figure(answers: Sequence[Answer], options: EstimateOptions) -> "Content | Drawn":
+def _figure(answers: Sequence[Answer], questions: Questions) -> "Content | Drawn":
     """Return what is drawn: the figure of an answer, else of the estimates."""
     from masrel.plots._drawn_values import Drawn
     from masrel.tables._answer_tables import agreement_forest
@@ -373,10 +344,10 @@ def _figure(answers: Sequence[Answer], options: EstimateOptions) -> "Content | D
     rows = first.estimates
     if first.name != "agreement":
         rows += tuple(row for of in others for row in of.estimates)
-    return agreement_forest(rows, options.target or "items")
+    return agreement_forest(rows, questions.target or "items")
 
 
-def _offer_interval(answer: Answer, options: EstimateOptions) -> None:
+def _offer_interval(answer: Answer, questions: Questions) -> None:
     """Print the command that gives an interval, where there is none."""
     from masrel.agreement import COEFFICIENTS
 
@@ -389,7 +360,7 @@ def _offer_interval(answer: Answer, options: EstimateOptions) -> None:
         return
     more, but = ["--target", "items"], ""
     without = [e for e in entries if e.formula is None and e.interval_target != "items"]
-    if without and not options.takes_all:  # named, they would be refused
+    if without and not questions.takes_all:  # named, they would be refused
         others = (entry.name for entry in entries if entry not in without)
         more = ["--coefficients", ",".join(dict.fromkeys(others)), *more]
         but = f" (without {', '.join(dict.fromkeys(e.title for e in without))})"

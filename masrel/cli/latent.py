@@ -10,10 +10,10 @@ from masrel.cli._options import (
     OutputOptions,
     grouped,
     output_options,
+    progress,
     write_output,
 )
 from masrel.cli._paths import InputFile
-from masrel.cli._progress import progress
 from masrel.cli._reading import (
     read_file,
     reading_options,
@@ -140,13 +140,13 @@ def _sample(
     codes = code_ratings(part.ratings).codes
     grades = np.array([*ratings.scale.grades, None], dtype=object)[codes]
     table = pd.DataFrame(grades, index=part.items, columns=part.raters, dtype=object)
-    with progress("sampling", " steps", is_quiet=is_quiet) as shown:
+    with progress("sampling", " steps", is_quiet=is_quiet) as report:
         return latent_trait(
             table,
             items=items,
             categories=list(ratings.scale.grades),
             level=level,
             compare=compare,
-            progress=shown.reach,
+            progress=report,
             rng=seed,
         )

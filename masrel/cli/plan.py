@@ -10,11 +10,12 @@ import click
 from masrel._input import refuse
 from masrel.cli._options import (
     OutputOptions,
+    Report,
     output_options,
+    progress,
     write_output,
 )
 from masrel.cli._paths import InputFile
-from masrel.cli._progress import Progress, progress
 
 if TYPE_CHECKING:
     from masrel.planning import Plan
@@ -187,16 +188,16 @@ def _plans(
     folder: Path | None, arguments: dict[str, Any], *, is_quiet: bool
 ) -> "tuple[tuple[str, ...], tuple[Plan, ...]]":
     # with the lines of a study's plan that they are of
-    with progress("planning", "steps", is_quiet=is_quiet) as bar:
+    with progress("planning", "steps", is_quiet=is_quiet) as report:
         if folder is None:
-            return (), _of_options(_with_pilot(arguments), bar)
+            return (), _of_options(_with_pilot(arguments), report)
         from masrel.lab.cli._study_plans import study_plans
 
         _refuse(arguments, _NOT_OF_STUDIES, "is not of a study, whose protocol says it")
-        return study_plans(folder, arguments, bar.reach)
+        return study_plans(folder, arguments, report)
 
 
-def _of_options(arguments: dict[str, Any], bar: Progress) -> "tuple[Plan, ...]":
+def _of_options(arguments: dict[str, Any], report: Report) -> "tuple[Plan, ...]":
     from masrel.planning import Study, plan_grid, precision, sample_size
 
     ranges = {name: arguments.pop(name) for name in _RANGES if name in arguments}
@@ -204,12 +205,12 @@ def _of_options(arguments: dict[str, Any], bar: Progress) -> "tuple[Plan, ...]":
         _refuse(arguments, ("max_cost",), "is not of a grid, whose rows have costs")
         names = ("prevalences", "executor", "scheduler")
         ranges |= {name: arguments.pop(name) for name in names if name in arguments}
-        return plan_grid(Study(**arguments), **ranges, progress=bar.reach)
+        return plan_grid(Study(**arguments), **ranges, progress=report)
     study = Study(**arguments, **{name: several[0] for name, several in ranges.items()})
     if study.n_items is None or study.n_raters is None:
-        return (sample_size(study, progress=bar.reach),)
+        return (sample_size(study, progress=report),)
     _refuse(arguments, ("max_cost",), "needs --items or --raters to be left out")
-    return (precision(study, progress=bar.reach),)
+    return (precision(study, progress=report),)
 
 
 def _is_grid(arguments: dict[str, Any], ranges: dict[str, Any]) -> bool:

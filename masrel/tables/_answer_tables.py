@@ -211,15 +211,14 @@ def _columns(
         Column(key=key, heading=capital(name), align="left")
         for key, name in answer.heads.items()
     ]
-    hidden = {"p_holm"} if answer.is_single else set()
-    if not any(row.get("median") is not None for row in shown):
-        hidden.add("median")
+    known = {key for row in shown for key, value in row.items() if value is not None}
+    hidden = {"median"} - known
+    if len({row.get("group") for row in shown}) == 1:  # nothing to adjust p for
+        hidden.add("p_holm")
     for column in _COLUMNS.get(answer.name, _OF_ESTIMATES):
-        if "reference" in column.key and not answer.has_reference:
+        if "reference" in column.key and "with_reference" not in known:
             continue
-        heading = column.heading
-        if "{of}" in heading:
-            heading = heading.format(of=answer.of).capitalize()
+        heading = column.heading.format(of=capital(answer.of))
         where = "csv" if column.key in hidden else column.where
         columns.append(replace(column, heading=heading, where=where))
     columns += [Column(key=f"said_{g}", heading=g, digits=2) for g in answer.grades]

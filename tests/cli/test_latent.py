@@ -88,7 +88,7 @@ def test_the_figure_shows_items_thresholds_and_raters(
 def test_without_a_terminal_lines_say_how_far_and_how_long(
     masrel: Caller, wide: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("masrel.cli._progress._PERIOD_S", 0.0)
+    monkeypatch.setattr("masrel.cli._options._PERIOD_S", 0.0)
     done = masrel("latent", wide, "--items", "fixed")
     lines = done.err.splitlines()
     assert lines

@@ -54,7 +54,7 @@ def analyze(
     library.write_analysis(
         analysis, destination, within=None if output.json_file else study
     )
-    _show(data, analysis, csv=output.csv, raw=output.raw_csv)
+    _show(data, analysis, csv=bool(output.csv), raw=output.raw_csv)
     click.echo(f"read: {data.read}\nanalysis: {destination}", err=True)
     verdict_of(analysis, gates).conclude(gating)
 

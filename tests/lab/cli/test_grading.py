@@ -50,7 +50,7 @@ def test_only_the_ratings_asked_for_are_regressed(masrel: Caller) -> None:
     assert "needs two grades and two raters or more, got 0 and 0" in done.err
     done = masrel("grading", STUDY, "--session", "third")
     assert done.code == 2
-    assert done.err.startswith("masrel: session: needs one of ")
+    assert done.err.startswith("masrel: --session: needs one of ")
 
 
 def test_a_folder_that_is_not_there_is_named_before_anything_is_read(

@@ -247,7 +247,7 @@ def test_lines_of_a_figure_have_as_many_points_as_pixels(tmp_path: Path) -> None
         (["--view", "time"], "--view: goes with --figure"),
         (["--rate-hz", "nan"], "--rate-hz: needs a finite rate, got nan"),
         (["--rate-hz", 1e12], "--csv: needs at most 5000000 samples, got 1.261e+12"),
-        (["--at-deg", "nan"], "angles: need ones that the motion reaches, got nan"),
+        (["--at-deg", "nan"], "--at-deg: need ones that the motion reaches, got nan"),
         (["--json", "no/such.json"], "--json: needs a folder that exists, got no/such"),
         (["--figure", "no/such.png"], "--figure: needs a folder that exists, got no/"),
         (
@@ -263,13 +263,13 @@ def test_lines_of_a_figure_have_as_many_points_as_pixels(tmp_path: Path) -> None
         (["--repeat", 0], "--repeat: needs 1 to 1000, got 0"),
         (["--repeat", 1001], "--repeat: needs 1 to 1000, got 1001"),
         (["--catch-rise-s", 1], "catch_rise: needs 0 to peak_duration"),
-        (["--inertia-kg-m2", -1], "inertia: needs 0 or more"),
+        (["--inertia-kg-m2", -1], "--inertia-kg-m2: needs 0 or more"),
         (
             ["--speed-deg-s", 120, "--at-s", 1],
-            "HM3, constant 120 deg/s: times: need 0 to 0.966667 s, the end of the "
+            "HM3, constant 120 deg/s: --at-s: need 0 to 0.966667 s, the end of the "
             "stretch, got 1 s",
         ),
-        (["--at-deg", 170], "angles: need ones that the motion reaches, got 170"),
+        (["--at-deg", 170], "--at-deg: need ones that the motion reaches, got 170"),
         (["--figure", "x.gif"], "--figure: needs a name that ends in .png"),
         (["--figure", "x.png", "--view", "catch"], "needs two or more speeds, got 1"),
         (
