@@ -1,5 +1,7 @@
-"""What comes in: the rules that it breaks, as a sentence."""
+"""What comes in: the rules that it breaks, as a sentence, and what is warned of."""
 
+import sys
+import warnings
 from collections.abc import Collection, Iterable
 
 from masrel.errors import ParameterError
@@ -24,6 +26,20 @@ def check_option(name: str, value: object, options: Collection[object]) -> None:
 def value_text(value: object) -> str:
     """Return a value as a message has it."""
     return "nothing" if value is None else repr(value)
+
+
+def shown(value: object) -> str:
+    """Return what a message shows of a value: one line, and not a long one."""
+    text = " ".join(f"{value!r}".split())
+    return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+def warn_caller(message: str, category: type[Warning]) -> None:
+    """Warn whoever called this package."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back and str(frame.f_globals.get("__name__")).startswith("masrel."):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, category, stacklevel=level)
 
 
 def not_utf8(error: UnicodeDecodeError) -> str:

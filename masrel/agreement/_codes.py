@@ -11,18 +11,15 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel._input import check_option
+from masrel._input import check_option, shown
 from masrel.agreement._labels import (
     MISSING,
     Codes,
     Label,
     check_categories,
-    doubt_texts,
     is_row,
     label_codes,
-    labels_met,
-    no_category,
-    shown,
+    warn_of_texts,
 )
 from masrel.agreement._weights import category_values
 from masrel.errors import CountsError, ParameterError, RatingsError
@@ -30,7 +27,7 @@ from masrel.errors import CountsError, ParameterError, RatingsError
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-_NOTHING = "ratings: needs at least one item and one rater, got none"
+_NOTHING = "ratings: needs a table (items, raters) of at least one of each"
 
 _MAX_SPAN = 1 << 14  # of whole numbers that are codes but for a shift
 _MAX_KEYS = 1 << 22  # different rows that are counted in a table rather than sorted
@@ -38,7 +35,6 @@ _BLOCK = 1 << 14  # items at once: they stay in the cache, and BLAS starts no th
 _MAX_PLACES = 100_000_000  # that are made of counts, where ratings are gone through
 _MAX_SIDE = 4000  # categories of a table of pairs
 _MEASURED = 0.8  # of the ratings are different numbers where those are measurements
-_UNKNOWN = -2
 
 # -- item by item ---------------------------------------------------------------------
 
@@ -65,11 +61,6 @@ class CodedRatings:
     def n_items(self) -> int:
         """Items with at least one rating."""
         return int((self.codes >= 0).any(axis=1).sum())
-
-    @property
-    def n_items_paired(self) -> int:
-        """Items with ratings of at least two raters."""
-        return int(((self.codes >= 0).sum(axis=1) > 1).sum())
 
     @property
     def n_raters(self) -> int:
@@ -132,11 +123,12 @@ def code_ratings(
         check_scale(ratings.categories, categories)
         return ratings
     scale = None if categories is None else check_categories(categories)
+    shape = getattr(ratings, "shape", None)  # of an array or a frame
+    if shape is not None and (len(shape) != 2 or 0 in shape):
+        raise RatingsError(f"{_NOTHING}, got shape {shape}")
     if type(ratings) is not np.ndarray and type(ratings) is not list:
         ratings, scale = _plain_table(ratings, scale)
     if isinstance(ratings, np.ndarray) and ratings.dtype.kind in "iuf":
-        if ratings.ndim != 2 or 0 in ratings.shape:
-            raise _no_table(ratings.shape)
         lowest, highest = ratings.min(), ratings.max()
         has_whole = ratings.dtype.kind in "iu" and int(highest) < 2**63
         span = int(highest) - int(lowest) + 1 if has_whole else _MAX_SPAN
@@ -154,27 +146,28 @@ def code_ratings(
             codes[codes == len(labels)] = MISSING
         known: tuple[Label, ...] = tuple(labels.tolist())
         if scale is not None:
-            codes, known = _on_scale(ratings, codes, known, scale), scale
+            codes, known = _on_scale(known, codes, scale)
     else:
         codes, known = label_codes(_rows_of(ratings), scale)
+        warn_of_texts(known, codes, declared=scale is not None)
     codes.setflags(write=False)
     return CodedRatings(codes=codes, categories=known, declared=scale is not None)
 
 
 def _on_scale(
-    values: NDArray[Any],
-    codes: Codes,
-    known: tuple[Label, ...],
-    scale: tuple[Label, ...],
-) -> Codes:
-    # codes of numbers met -> those of a declared scale
-    position = {label: code for code, label in enumerate(scale)}
-    table = [*(position.get(label, _UNKNOWN) for label in known), MISSING]
-    codes = np.array(table, dtype=np.min_scalar_type(-len(scale) - 1))[codes]
-    if codes.min() == _UNKNOWN:
-        i, j = np.argwhere(codes == _UNKNOWN)[0].tolist()
-        raise no_category(values[i, j].item(), scale, i, j)
-    return codes
+    labels: Sequence[Any],
+    codes: NDArray[np.signedinteger[Any]],
+    scale: tuple[Label, ...] | None,
+    column: str | None = None,
+) -> tuple[Codes, tuple[Label, ...]]:
+    # from codes of labels as they were met, of a table or of a column of this name, to
+    # those on a scale
+    def where(label: int, _: int) -> str:
+        row, *rest = np.argwhere(codes == label)[0].tolist()
+        return f"ratings: row {row}, column {rest[0] if rest else repr(column)}"
+
+    coded, known = label_codes([[label] for label in labels], scale, where)
+    return np.append(coded[:, 0], coded.dtype.type(MISSING))[codes], known
 
 
 def check_scale(known: tuple[Label, ...], categories: Sequence[Label] | None) -> None:
@@ -185,39 +178,32 @@ def check_scale(known: tuple[Label, ...], categories: Sequence[Label] | None) ->
         )
 
 
-def _no_table(shape: tuple[int, ...]) -> RatingsError:
-    if len(shape) != 2:
-        return RatingsError(
-            "ratings: needs two dimensions (items, raters), got "
-            f"{len(shape)} with shape {shape}"
-        )
-    return RatingsError(f"{_NOTHING}: shape {shape}")
-
-
-def _rows_of(ratings: Any) -> list[list[Any]]:
-    # an array or nested sequences -> n_items lists of labels
-    if isinstance(ratings, np.ndarray):
-        if ratings.ndim != 2 or 0 in ratings.shape:
-            raise _no_table(ratings.shape)
-        return list(ratings.tolist())
-    if not is_row(ratings):
+def _rows_of(
+    table: Any,
+    name: str = "ratings",
+    row_name: str = "ratings: row",
+    width: int | None = None,
+) -> list[list[Any]]:
+    # an array or nested sequences -> n_items lists of labels, of such a width or as
+    # the first
+    if isinstance(table, np.ndarray):
+        return list(table.tolist())
+    if not is_row(table):
         raise RatingsError(
-            f"ratings: needs an item × rater table, got {type(ratings).__name__}"
+            f"{name}: needs a table, with a row of labels an item, got {shown(table)}"
         )
     rows: list[list[Any]] = []
-    for row in ratings:
-        if not is_row(row):
+    for row in table:
+        labels = list(row) if is_row(row) else []
+        width = width or len(labels)
+        if not labels or len(labels) != width:
             raise RatingsError(
-                f"ratings: row {len(rows)} needs one rating per rater, got {row!r}"
+                f"{row_name} {len(rows)}: needs {width or 'a row of'} labels, got "
+                f"{shown(row)}"
             )
-        rows.append(list(row))
-        if len(rows[-1]) != len(rows[0]):
-            raise RatingsError(
-                f"ratings: row {len(rows) - 1} needs {len(rows[0])} ratings as row 0 "
-                f"has, got {len(rows[-1])}"
-            )
-    if not rows or not rows[0]:
-        raise RatingsError(_NOTHING)
+        rows.append(labels)
+    if not rows:
+        raise RatingsError(f"{_NOTHING}, got none")
     return rows
 
 
@@ -226,10 +212,12 @@ def _plain_table(
 ) -> tuple[Any, tuple[Label, ...] | None]:
     # a frame, without importing its library, or an array of another kind, as a plain
     # array; and the scale, which ordered categories of a frame declare
+    if isinstance(ratings, np.ma.MaskedArray):
+        return np.ma.filled(ratings.astype(object), np.nan), scale
+    if isinstance(ratings, np.ndarray):  # a matrix
+        return np.asarray(ratings), scale
     if not hasattr(ratings, "to_numpy"):
-        return plain_array(ratings), scale
-    if len(ratings.shape) != 2 or 0 in ratings.shape:
-        raise _no_table(ratings.shape)
+        return ratings, scale
     if not hasattr(ratings, "iloc"):  # not pandas, whose own types are told apart here
         return np.asarray(ratings.to_numpy()), scale
     types = list(ratings.dtypes)
@@ -238,15 +226,6 @@ def _plain_table(
         scale = scales[0] if len(set(scales)) == 1 else None
     are_numbers = all(isinstance(of, np.dtype) and of.kind in "iuf" for of in types)
     return ratings.to_numpy(None if are_numbers else object), scale
-
-
-def plain_array(ratings: Any) -> Any:
-    """Return a matrix or a masked array as a plain one, and all else as it is."""
-    if isinstance(ratings, np.ma.MaskedArray):
-        mask, kind = np.ma.getmaskarray(ratings), ratings.dtype.kind
-        ratings = ratings.data.astype(float if kind == "f" else object)
-        ratings[mask] = None  # nan among floats
-    return np.asarray(ratings) if isinstance(ratings, np.ndarray) else ratings
 
 
 Repeated = Literal["error", "first", "last"]
@@ -313,10 +292,16 @@ def code_long(
                 f"{', '.join(map(repr, frame.columns))}"
             )
     if not len(frame):
-        raise RatingsError(_NOTHING)
+        raise RatingsError(f"{_NOTHING}, got no row")
     items, item_names = _named(frame[item], item)
     raters, rater_names = _named(frame[rater], rater)
-    grades, known = _grades(frame[grade], grade, categories)
+    scale = None if categories is None else check_categories(categories)
+    try:
+        met, labels = frame[grade].factorize()
+    except TypeError:  # sets have no hash
+        met, labels = np.arange(len(frame)), frame[grade]
+    grades, known = _on_scale(labels.tolist(), met, scale, grade)
+    warn_of_texts(known, grades, declared=scale is not None)
     places = items * len(rater_names) + raters
     if repeated == "error" and np.bincount(places).max() > 1:
         raise _repeats(frame[[item, rater]])
@@ -324,7 +309,7 @@ def code_long(
     order = slice(None, None, -1 if repeated == "first" else 1)  # the last one stays
     codes.reshape(-1)[places[order]] = grades[order]
     codes.setflags(write=False)
-    return CodedRatings(codes=codes, categories=known, declared=categories is not None)
+    return CodedRatings(codes=codes, categories=known, declared=scale is not None)
 
 
 def _named(column: Any, name: str) -> tuple[NDArray[np.intp], Any]:
@@ -334,23 +319,6 @@ def _named(column: Any, name: str) -> tuple[NDArray[np.intp], Any]:
             f"ratings: row {np.argmin(places)}, column {name!r}: needs a name, got none"
         )
     return places, names
-
-
-def _grades(
-    column: Any, name: str, categories: Sequence[Label] | None
-) -> tuple[Codes, tuple[Label, ...]]:
-    places, labels = column.factorize()
-    names = labels.tolist()
-    known = labels_met(names) if categories is None else check_categories(categories)
-    position = {label: code for code, label in enumerate(known)}
-    for place, label in enumerate(names):
-        if label not in position:
-            raise no_category(label, known, int(np.argmax(places == place)), name)
-    table = [*(position[label] for label in names), MISSING]
-    grades = np.array(table, dtype=np.min_scalar_type(-len(known) - 1))[places]
-    if categories is None and known and isinstance(known[0], str):
-        doubt_texts(known, grades, name)
-    return grades, known
 
 
 def _repeats(names: Any) -> RatingsError:
@@ -376,7 +344,10 @@ def code_pairs(
         raise RatingsError(
             f"pairs: needs one table (items, 2) per rater, got {type(pairs).__name__}"
         )
-    tables = [_pairs_of(table, rater) for rater, table in enumerate(pairs)]
+    tables = [
+        _rows_of(table, f"pairs: rater {rater}", f"pairs: rater {rater}, item", 2)
+        for rater, table in enumerate(pairs)
+    ]
     if len({len(table) for table in tables}) != 1:
         raise RatingsError(
             "pairs: needs at least one rater, and the same items of every rater, got "
@@ -387,21 +358,6 @@ def code_pairs(
         for of_item in zip(*tables, strict=True)
     ]
     return code_ratings(rows, categories)
-
-
-def _pairs_of(table: object, rater: int) -> list[list[object]]:
-    # one rater's table -> n_items lists of 2 labels
-    if not is_row(table):
-        raise RatingsError(f"pairs: rater {rater} needs a table, got {shown(table)}")
-    rows = []
-    for item, pair in enumerate(table):
-        rows.append(list(pair) if is_row(pair) else [])
-        if len(rows[-1]) != 2:
-            raise RatingsError(
-                f"pairs: rater {rater}, item {item}: needs two grades, got "
-                f"{shown(pair)}"
-            )
-    return rows
 
 
 # -- distinct rows ---------------------------------------------------------------------
@@ -552,7 +508,7 @@ def count_ratings(
         codes=codes,
         freq=freq,
         categories=coded.categories,
-        n_raters=int((codes >= 0).any(axis=0).sum()),
+        n_raters=coded.n_raters,
         declared=coded.declared,
         source=coded,
     )

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel._input import shown, warn_caller
 from masrel.agreement._codes import CountedRatings, refuse_measurements
-from masrel.agreement._labels import Label, shown, warn_caller
+from masrel.agreement._labels import Label
 from masrel.agreement._weights import (
     NO_PAIR,
     Weights,
@@ -162,15 +163,14 @@ def estimate(
     `why` takes weights, D_o and D_e, and returns the reason why they make no value.
     """
     made = declared_weights(weights, counted.categories, declared=counted.declared)
-    v, codes, freq, repeats = made.v, counted.codes, counted.freq, counted.repeats
+    v, freq, size = made.v, counted.freq, counted.size
     are_many = len(counted.categories) > _MANY_GRADES and not counted.declared
     if are_many and made.counts_misses:
         refuse_measurements(counted)
-    size = (codes >= 0 if repeats is None else repeats).sum(axis=1)
     n_items = int(freq @ (size > 0))
     if population is not None:
         check_population(population, n_items)
-    features = formula.features(codes, v, repeats)
+    features = formula.features(counted.codes, v, counted.repeats)
     sums, freq = features.summed(freq)
     n_paired = int(freq @ (size > 1))
     with np.errstate(divide="ignore", invalid="ignore"):

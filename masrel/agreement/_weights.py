@@ -12,7 +12,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel.agreement._labels import Codes, Label, is_row, shown
+from masrel._input import shown
+from masrel.agreement._labels import Codes, Label, check_kinds, is_row
 from masrel.errors import ParameterError, RatingsError
 
 Floats = NDArray[np.float64]
@@ -164,11 +165,15 @@ class Weights:
     line: Line | None = None
 
     @property
+    def tells_apart(self) -> bool:
+        """Whether every two categories disagree, if only in part."""
+        is_operator = isinstance(self.v, Distances)
+        return is_operator or int((self.v == 0.0).sum()) <= self.n_categories
+
+    @property
     def no_chance(self) -> str:
         """Why chance agreement is 1, if it is."""
-        if isinstance(self.v, Distances) or (self.v == 0.0).sum() <= self.n_categories:
-            return NO_CHANCE
-        return NO_CHANCE_BY_WEIGHTS
+        return NO_CHANCE if self.tells_apart else NO_CHANCE_BY_WEIGHTS
 
     def as_floats(self) -> Floats:
         """Return w, a matrix as `weights=` takes it; ``nan`` for a reason."""
@@ -290,6 +295,7 @@ def declared_weights(
 
 
 def _check_order(categories: Sequence[Label], declared: bool) -> None:
+    check_kinds(categories, "categories")
     if not declared and len(categories) > 1 and isinstance(categories[0], str):
         raise ParameterError(
             "categories: weights need the declared scale in order, the ratings are "
@@ -359,7 +365,7 @@ def category_values(categories: Sequence[Label]) -> Floats:
         return np.arange(1.0, len(categories) + 1.0)
     try:
         values = np.array(categories, dtype=np.float64)
-    except OverflowError as error:
+    except (OverflowError, TypeError, ValueError) as error:
         raise ParameterError(
             f"categories: needs numbers that floats hold, got {shown(categories)}"
         ) from error

@@ -7,14 +7,14 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from masrel._input import check_option
+from masrel._input import check_option, shown
 from masrel.agreement._engine import (
     NO_SPREAD,
     ONE_PAIR,
     check_level,
     undefined,
 )
-from masrel.agreement._labels import is_row, shown
+from masrel.agreement._labels import is_row
 from masrel.agreement.registry import COEFFICIENTS
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate
@@ -347,7 +347,7 @@ def bands(estimate: Estimate, *, scale: BandScale = "landis_koch") -> tuple[Band
     least = -math.inf if estimate.value < -1.0 else -1.0
     whole = math.nan if reason else _between(estimate, least, 1.0)
     for low, _, word in _SCALES[scale]:
-        end = max(low, least) if low > -1.0 else least
+        end = low if low > -1.0 else least
         inside = math.nan if reason else _between(estimate, end, high) / whole
         better = min(better + inside, 1.0) if not reason else math.nan
         every.append(

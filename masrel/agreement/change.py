@@ -17,7 +17,6 @@ from masrel.agreement._codes import (
 from masrel.agreement._engine import undefined
 from masrel.agreement._labels import Label
 from masrel.agreement._weights import NO_CHANCE, NO_PAIR
-from masrel.errors import CountsError
 from masrel.estimates import Significance
 
 McnemarKind = Literal["exact", "uncorrected", "corrected"]
@@ -95,14 +94,9 @@ def mcnemar(table: ArrayLike, *, kind: McnemarKind = "exact") -> Significance:
     >>> round(mcnemar([[10, 5], [1, 10]]).p_value, 5)
     0.21875
     """
-    cells = check_table(table)
-    if cells.shape != (2, 2):
-        raise CountsError(
-            f"table: mcnemar needs 2 × 2, got {len(cells)} × {len(cells)}"
-        )
+    (a, b), (c, d) = check_two_by_two(table)
     check_option("kind", kind, get_args(McnemarKind))
-    b, c = int(cells[0, 1]), int(cells[1, 0])
-    hypothesis, n_items = "changes go both ways alike often", int(cells.sum())
+    hypothesis, n_items = "changes go both ways alike often", a + b + c + d
     if kind != "exact":
         shift = max(abs(b - c) - 1, 0) if kind == "corrected" else abs(b - c)
         statistic = shift**2 / (b + c) if b + c else math.nan

@@ -36,6 +36,8 @@ _NAMES: dict[IccForm, str] = {
 }
 """Form to its name in the register."""
 
+_ALL_ALIKE = "0/0: neither items nor ratings of an item differ"
+
 _Answer = tuple[float, Interval | None, str | None]
 """Value, interval and why there is none."""
 
@@ -184,7 +186,7 @@ def icc_f_test(
     check_option("form", form, get_args(IccForm))
     values = complete_values(ratings, categories)
     anova = _Anova.of(values)
-    reason = _reason(values, anova, form.replace(",k)", ",1)"))
+    reason = _no_variance(values, anova, form)
     statistic = p = math.nan
     if reason is None:
         from scipy.special import fdtrc
@@ -432,22 +434,24 @@ def _too_few(values: NDArray[np.float64]) -> str | None:
     return "fewer than two raters" if values.shape[1] < 2 else None
 
 
-def _reason(
-    values: NDArray[np.float64], anova: _Anova, form: str = "ICC(1)"
+def _no_variance(
+    values: NDArray[np.float64], anova: _Anova, form: IccForm
 ) -> str | None:
-    if why := _too_few(values):
-        return undefined(form, why)
-    if anova.items == 0.0 and anova.error(form) == 0.0:
-        return undefined(form, "0/0: neither items nor ratings of an item differ")
-    if anova.denominator(form) == 0.0:
-        return undefined(form, "division by 0: the total variance is estimated as 0")
-    return None
+    # why there is neither a correlation nor an F, with a warning
+    why = _too_few(values)
+    if why is None and anova.items == 0.0 and anova.error(form) == 0.0:
+        why = _ALL_ALIKE
+    return None if why is None else undefined(form, why)
 
 
 def _without_gaps(values: NDArray[np.float64], form: IccForm, level: float) -> _Answer:
     """Return value, interval and reason by mean squares."""
     anova = _Anova.of(values)
-    if reason := _reason(values, anova, form):
+    reason = _no_variance(values, anova, form)
+    if reason is None and anova.denominator(form) == 0.0:
+        why = "division by 0: the total variance is estimated as 0"
+        reason = undefined(form, why)
+    if reason is not None:
         return math.nan, None, reason
     low, high, reason = _ends(anova, form, level)
     interval = Interval(
@@ -530,8 +534,7 @@ def _with_gaps(values: NDArray[np.float64], form: IccForm, level: float) -> _Ans
     absolute = form.startswith("ICC(A")
     error = fit.residual + (fit.raters if absolute else 0.0)
     if fit.items == 0.0 and error == 0.0:
-        why = "0/0: neither items nor ratings of an item differ"
-        return math.nan, None, undefined(form, why)
+        return math.nan, None, undefined(form, _ALL_ALIKE)
     k, notes = 1, [fit.words]
     if form.endswith("k)"):
         k = fit.n_raters

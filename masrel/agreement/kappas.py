@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from masrel._input import shown
 from masrel.agreement._codes import (
     complete_rows,
     count_items,
@@ -34,7 +35,7 @@ from masrel.agreement._engine import (
     estimate,
     undefined,
 )
-from masrel.agreement._labels import Codes, Label, shown
+from masrel.agreement._labels import Codes, Label
 from masrel.agreement._weights import WeightsLike
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Significance

@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from masrel._input import check_option
+from masrel._input import check_option, shown
 from masrel.agreement._codes import CountedRatings, count_ratings, item_counts
 from masrel.agreement._engine import (
     WHOLE,
@@ -22,7 +22,7 @@ from masrel.agreement._engine import (
     Integers,
     estimate,
 )
-from masrel.agreement._labels import EMPTY_SET, Codes, Label, SetText, shown
+from masrel.agreement._labels import EMPTY_SET, Codes, Label, SetText
 from masrel.agreement._weights import (
     MANY,
     Line,

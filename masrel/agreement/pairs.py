@@ -31,7 +31,7 @@ from masrel.agreement._engine import (
     estimate,
 )
 from masrel.agreement._labels import Codes, Label
-from masrel.agreement._weights import NO_CHANCE, Weights, WeightsLike
+from masrel.agreement._weights import Weights, WeightsLike
 from masrel.errors import RatingsError
 from masrel.estimates import Estimate
 
@@ -290,8 +290,9 @@ def _why_no_mean(
         if np.isnan(d_o):
             return f"no item has both ratings {of_pair}"
         if d_e == 0.0:
-            alike = weights.no_chance != NO_CHANCE
-            return weights.no_chance if alike else f"0/0: one category is all {of_pair}"
+            if weights.tells_apart:
+                return f"0/0: one category is all {of_pair}"
+            return weights.no_chance
     return None
 
 

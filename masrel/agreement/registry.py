@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, get_args
 
-from masrel._input import check_option
+from masrel._input import check_option, shown
 from masrel.agreement._codes import (
     CodedRatings,
     code_pairs,
@@ -14,7 +14,7 @@ from masrel.agreement._codes import (
     count_ratings,
 )
 from masrel.agreement._engine import Formula
-from masrel.agreement._labels import Label, shown
+from masrel.agreement._labels import Label
 from masrel.agreement._weights import Weights, WeightsLike, is_identity
 from masrel.agreement.icc import _NAMES as ICC_NAMES
 from masrel.agreement.icc import _target_of as icc_target

@@ -12,7 +12,7 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel._input import check_option, refuse
+from masrel._input import check_option, refuse, warn_caller
 from masrel.agreement import (
     COEFFICIENTS,
     CodedRatings,
@@ -33,7 +33,7 @@ from masrel.agreement._engine import (
     check_level,
     undefined,
 )
-from masrel.agreement._labels import Codes, is_missing, is_row, warn_caller
+from masrel.agreement._labels import Codes, is_missing, is_row
 from masrel.agreement._weights import Line, declared_weights
 from masrel.errors import (
     ParameterError,

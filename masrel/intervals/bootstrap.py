@@ -10,10 +10,9 @@ from typing import Literal, cast, get_args
 
 import numpy as np
 
-from masrel._input import check_option, refuse
+from masrel._input import check_option, refuse, shown
 from masrel.agreement import Label, Metric, WeightsLike
 from masrel.agreement._engine import Floats, Integers
-from masrel.agreement._labels import shown
 from masrel.agreement._weights import Distances
 from masrel.errors import ParameterError
 from masrel.estimates import Distribution, Interval, Target, Unit

@@ -5,7 +5,6 @@ import pandas as pd
 import pytest
 
 from masrel.agreement import code_ratings, fleiss_kappa
-from masrel.errors import RatingsError
 
 GRADES = ["0", "1", "1+", "2", "3", "4"]
 
@@ -42,35 +41,6 @@ def test_list_array_and_frame_are_the_same_ratings() -> None:
 def test_items_and_raters_without_any_rating_do_not_count() -> None:
     coded = code_ratings([["a", None, "b"], [None, None, None], ["a", None, "a"]])
     assert (coded.n_items, coded.n_raters) == (2, 2)
-
-
-@pytest.mark.parametrize(
-    ("ratings", "categories", "said"),
-    [
-        ([], None, "at least one item"),
-        ([[]], None, "at least one item and one rater"),
-        ("1,2", None, "item × rater table, got str"),
-        (5, None, "item × rater table, got int"),
-        (["12", "21"], None, "row 0 needs one rating per rater, got '12'"),
-        ([["1", "2"], ["1"]], None, "row 1 needs 2 ratings as row 0 has, got 1"),
-        (np.zeros((2, 2, 2)), None, "two dimensions"),
-        (np.zeros(3), None, "two dimensions"),
-        ([["1", 2]], None, "text and numbers cannot be mixed"),
-        ([["1", "5"]], ["1", "2"], "row 0, column 1: needs one of '1', '2'"),
-        ([["1", ["2"]]], ["1", "2"], r"row 0, column 1: labels need"),
-        ([[1, 2]], ["1", "2"], "row 0, column 0"),
-        ([["1", "2"]], [], "at least one label"),
-        ([["1", "2"]], "12", "at least one label"),
-        ([["1", "2"]], ["1", "2", "1"], r"repeated: \['1'\]"),
-        ([["1", "2"]], ["1", 2], "text and numbers"),
-        ([["1", "2"]], ["1", None, "2"], "missing value cannot be a category"),
-    ],
-)
-def test_what_is_no_table_of_ratings_is_refused_with_its_place(
-    ratings: object, categories: list[str] | None, said: str
-) -> None:
-    with pytest.raises(RatingsError, match=said):
-        code_ratings(ratings, categories)
 
 
 def test_codes_cannot_be_written_to() -> None:

@@ -149,9 +149,10 @@ def test_mean_of_raters_on_items_that_do_not_differ_is_a_division_by_zero() -> N
     # items' means are equal, ratings within are not: (0 - W)/0
     with pytest.warns(UndefinedStatisticWarning, match="division by 0"):
         assert math.isnan(icc([[1, 2], [2, 1]], form="ICC(1,k)").value)
-    # F is 0 and says: no difference
-    found = icc_f_test([[1, 2], [2, 1]], form="ICC(1,k)")
-    assert (found.statistic, found.p_value) == (0.0, 1.0)
+    # F is 0 and says: no difference, whatever the total variance is
+    for form in FORMS:
+        found = icc_f_test([[1, 2], [2, 1]], form=form)
+        assert (found.statistic, found.p_value, found.reason) == (0.0, 1.0, None)
 
 
 def test_wrong_options_are_one_sentence() -> None:

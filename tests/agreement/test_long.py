@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from masrel.agreement import code_long
+from masrel.agreement import code_long, code_ratings
 from masrel.agreement._codes import Repeated
 from masrel.errors import RatingsError
 
@@ -59,3 +59,13 @@ def test_a_repeated_rating_is_refused_by_name() -> None:
 def test_a_named_policy_keeps_one_of_them(policy: Repeated, kept: int) -> None:
     coded = code_long(TWICE, categories=SCALE, repeated=policy)
     assert coded.codes.tolist() == [[kept, 2], [2, -1]]
+
+
+def test_sets_of_labels_are_categories_as_of_a_wide_table() -> None:
+    frame = long(("x", "A", {"b", "a"}), ("x", "B", {"a"}), ("y", "A", set()))
+    wide = code_ratings([[{"a", "b"}, {"a"}], [set(), None]])
+    coded = code_long(frame)
+    assert coded == wide
+    assert coded.codes.tolist() == wide.codes.tolist()
+    with pytest.raises(RatingsError, match="row 1, column 'grade'"):
+        code_long(long(("x", "A", {"a"}), ("x", "B", ["a"])))

@@ -236,7 +236,7 @@ def test_corrected_mcnemar_of_equal_changes_is_zero() -> None:
 
 
 def test_mcnemar_takes_two_categories_and_three_kinds() -> None:
-    with pytest.raises(CountsError, match="mcnemar needs 2 × 2, got 3 × 3"):
+    with pytest.raises(CountsError, match="table"):
         mcnemar(np.eye(3, dtype=int))
     with pytest.raises(ParameterError, match="kind: needs one of exact, uncorrected"):
         mcnemar([[1, 2], [3, 4]], kind="yates")  # type: ignore[arg-type]

@@ -17,7 +17,7 @@ from masrel.agreement import (
     fleiss_kappa,
     percent_agreement,
 )
-from masrel.errors import UndefinedStatisticWarning
+from masrel.errors import MasrelError, UndefinedStatisticWarning
 from masrel.intervals import jackknife
 
 NAMES = get_args(WeightName)
@@ -34,6 +34,13 @@ def agreement(name: object, scale: list[float] | list[str]) -> list[list[float]]
 def disagreement(name: str, scale: list[object]) -> np.ndarray:
     """Return v."""
     return np.asarray(declared_weights(name, scale).v)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("scale", [[1, "a"], ["a", 1], [1, [2]], [1, {}]])
+def test_a_scale_of_no_order_is_refused(scale: list[object]) -> None:
+    for name in ("linear", "radical"):
+        with pytest.raises(MasrelError, match="categories: "):
+            declared_weights(name, scale)  # type: ignore[arg-type]
 
 
 # v above the diagonal of UNEVEN: of 1 and 2, of 1 and 4, of 2 and 4
