@@ -37,10 +37,16 @@ class _LongNote(str):
         return note
 
     @classmethod
-    def of(cls, what: str, note: str) -> "_LongNote":
-        """Return a note that says what it is of."""
+    def of(cls, what: str, note: str) -> str:
+        """Return a note that says what it is of; a count says that itself."""
+        if isinstance(note, _CountNote):
+            return note
         brief = getattr(note, "brief", note)
         return cls(what + note, what + brief if brief else "")
+
+
+class _CountNote(str):
+    """A note that begins with how many there are of what is few."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -100,6 +106,13 @@ class Interval:
     distribution : Distribution or None
         How the coefficient is distributed over resamples, or in the posterior: what
         the ends are read from. None where the method has no such thing.
+    is_one_sided : bool
+        Whether only the lower end is a bound, at the whole level.
+    units_are : {"left out", "drawn"} or None
+        What was done with units: one left out at a time, or all drawn with
+        replacement; None when nothing was.
+    raters_differ : bool
+        Whether the model of a credible interval knows how raters differ.
     """
 
     low: float
@@ -117,11 +130,10 @@ class Interval:
     notes: tuple[str, ...] = ()
     reason: str | None = None
     distribution: Distribution | None = field(default=None, compare=False, repr=False)
-
-    @property
-    def is_one_sided(self) -> bool:
-        """Whether only the lower end is a bound, at the whole level."""
-        return self.method.endswith("one-sided")
+    # no repr has these, and no document: `method` says it in words
+    is_one_sided: bool = field(default=False, repr=False)
+    units_are: Literal["left out", "drawn"] | None = field(default=None, repr=False)
+    raters_differ: bool = field(default=False, repr=False)
 
     def __str__(self) -> str:
         return _as_text(_interval_lines(self))
@@ -291,7 +303,7 @@ def as_document(result: Estimate | Interval) -> dict[str, object]:
     Returns
     -------
     dict
-        Field name to value, in the order of the fields; without a distribution.
+        Field name to value, in the order of the fields, of all that a repr has.
 
     Examples
     --------
@@ -305,7 +317,7 @@ def as_document(result: Estimate | Interval) -> dict[str, object]:
     return {
         of.name: _plain(getattr(result, of.name))
         for of in dataclasses.fields(result)
-        if of.name != "distribution"
+        if of.repr
     }
 
 
@@ -317,8 +329,6 @@ def _plain(value: object) -> object:
         return None
     if isinstance(value, str):
         return str(value)  # also of a note that has a brief form
-    if isinstance(value, dict):
-        return {key: _plain(part) for key, part in value.items()}
     if isinstance(value, tuple | list):
         return [_plain(part) for part in value]
     return value

@@ -59,6 +59,12 @@ def test_a_grade_off_the_scale_is_named() -> None:
         MODIFIED_ASHWORTH.code("1.5")
 
 
+INTERVAL_KEYS = [
+    "low", "high", "median", "level", "kind", "method", "target", "unit",
+    "n_resamples", "n_undefined", "monte_carlo_error", "seed", "notes", "reason",
+]  # fmt: skip
+
+
 def test_a_document_has_every_field_and_no_nan() -> None:
     interval = Interval(
         low=0.1,
@@ -68,11 +74,14 @@ def test_a_document_has_every_field_and_no_nan() -> None:
         method="m",
         target="items",
         monte_carlo_error=(0.01, math.nan),
+        is_one_sided=True,
     )
     document = as_document(estimate(value=math.nan, interval=interval, reason="0/0"))
     assert list(document) == [f.name for f in dataclasses.fields(Estimate)]
     assert document["value"] is None
     assert document["interval"]["high"] is None  # type: ignore[index]
+    # keys of JSON stay: what the method says in words is not among them
+    assert list(document["interval"]) == INTERVAL_KEYS  # type: ignore[call-overload]
     assert document["interval"]["monte_carlo_error"] == [0.01, None]  # type: ignore[index]
 
 

@@ -165,6 +165,7 @@ def _interval(
         n_undefined=values.size - drawn.size,
         monte_carlo_error=(low[1], high[1]),
         seed=seed,
+        is_one_sided=one_sided,
         distribution=Distribution(
             values=0.5 * (ends[:-1] + ends[1:]),
             weights=1.0 / (_SHOWN * widths),

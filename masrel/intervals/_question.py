@@ -39,14 +39,14 @@ from masrel.errors import (
     ParameterError,
     SmallSampleWarning,
 )
-from masrel.estimates import Estimate, Interval, Target, Unit
+from masrel.estimates import Estimate, Interval, Target, Unit, _CountNote
 
 Statistic = str | Callable[..., Estimate] | Coefficient
 """A coefficient: its name, its public function, or its entry in the register."""
 
 HELD = (
-    "the ordinal metric, which depends on the ratings, is held as it was found in all "
-    "of them"
+    "the ordinal metric, which depends on how often each grade was given, was taken "
+    "from all ratings once, as if other ratings would give the same"
 )
 
 _MAX_PLACES = 1 << 23  # numbers of features that are held at once
@@ -437,7 +437,9 @@ def warn_small(
         what += " with a pair of ratings"
     if count == 1:
         what = singular(what)
-    note = f"{count} {what}: below {minimum} the interval may cover less than it says"
+    note = _CountNote(
+        f"{count} {what}: below {minimum} the interval may cover less than it says"
+    )
     warn_caller(note, SmallSampleWarning)
     return (note,)
 

@@ -243,6 +243,7 @@ def rho_interval(
         target=problem.target,
         notes=notes,
         distribution=posterior.distribution(),
+        is_one_sided=one_sided,
     )
 
 

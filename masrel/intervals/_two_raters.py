@@ -305,6 +305,7 @@ def table_interval(
         monte_carlo_error=errors,
         seed=seed,
         notes=notes,
+        is_one_sided=one_sided,
         distribution=fewer.distribution(
             max(low - width, min(problem.entry.lowest, low)),
             min(high + width, 1.0),

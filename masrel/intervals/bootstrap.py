@@ -213,6 +213,7 @@ def bootstrap(
         n_undefined=resamples.n_undefined,
         monte_carlo_error=None if resamples.n_drawn is None else errors,
         seed=seed,
+        units_are="drawn",
     )
     if kind == "studentized":
         return interval

@@ -381,9 +381,9 @@ def _other_items_and_raters(problem: IntervalProblem) -> tuple[Interval, str]:
         method=f"{items.method}, and {raters.method}",
         unit="both",
         notes=[
-            note if f" {of}: below" in note else _LongNote.of(f"{of}: ", note)
+            _LongNote.of(f"{of}: ", note)
             for of, part in (("items", items), ("raters", raters))
             for note in part.notes
         ],
     )
-    return interval, why
+    return replace(interval, units_are="left out"), why

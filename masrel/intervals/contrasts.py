@@ -158,6 +158,7 @@ def difference(
             method=method,
             target="items",
             unit=unit,
+            units_are="left out",
             notes=notes,
         )
     return Estimate(

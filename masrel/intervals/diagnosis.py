@@ -182,7 +182,7 @@ def diagnose(
     Warns
     -----
     SmallSampleWarning
-        Below 10 items, with intervals.
+        Below 10 items with a pair of ratings, with intervals.
     UndefinedStatisticWarning
         If the coefficient of all raters is undefined.
 
@@ -250,7 +250,11 @@ def diagnose(
         problem = pose(replace(coded, codes=coded.codes[:, others]))
     estimate = entry(problem.coded, weights=weights)
     at = None if target is None else level
-    notes = () if at is None else warn_small(estimate.n_items, 10, "items")
+    notes = (
+        ()
+        if at is None
+        else warn_small(estimate.n_items_paired, 10, "items", estimate.n_items)
+    )
     codes, freq = distinct_rows(coded.codes, coded.n_categories)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MasrelWarning)  # the arrays say it

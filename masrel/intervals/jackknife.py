@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -129,18 +129,19 @@ class _LeftOut:
     def interval(self, *, lowest: float | None = None) -> Interval:
         """Return an interval around the value, or on the logit above `lowest`."""
         unit = "two-way" if self.unit == "both" else self.unit.removesuffix("s")
+        method = f"{unit} jackknife"
         if self.reason is not None:
-            method = f"{unit} jackknife"
             return self.problem.undefined(self.reason, method=method, unit=self.unit)
         scale = "" if lowest is None else " on the logit"
-        return self.problem.by_t(
+        interval = self.problem.by_t(
             math.sqrt(self.variance),
             self.df,
             lowest=lowest,
-            method=f"{unit} jackknife, t({self.df:g}){scale}",
+            method=f"{method}, t({self.df:g}){scale}",
             unit=self.unit,
             notes=self.notes,
         )
+        return replace(interval, units_are="left out")
 
 
 def _leave_out(problem: IntervalProblem, clusters: Integers | None = None) -> _LeftOut:

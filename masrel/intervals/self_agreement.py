@@ -199,6 +199,7 @@ def _quantity(
             level=level,
             kind="credible",
             method=_METHOD,
+            raters_differ=True,
             target=target,
         ),
     )

@@ -68,10 +68,9 @@ def promise(interval: Interval, noun: Noun) -> str:
     premises = "these ratings, the prior and the model of how raters differ"
     if interval.target == "items":
         premises = "these ratings and the prior"
-    elif interval.method.startswith("Dirichlet-multinomial"):  # it knows of no rater
+    elif not interval.raters_differ:
         premises = "these ratings, the prior and raters who differ by chance alone"
-    is_one_sided = interval.is_one_sided
-    where = "above the lower end" if is_one_sided else "inside"
+    where = "above the lower end" if interval.is_one_sided else "inside"
     return (
         f"given {premises}, the value that would be found if {population}, "
         f"without end, lies {where} with probability {level}"
@@ -80,7 +79,7 @@ def promise(interval: Interval, noun: Noun) -> str:
 
 def origin(interval: Interval, noun: Noun) -> str:
     """Return in brackets what the ends of an interval came from."""
-    if interval.unit is None:
+    if interval.unit is None or interval.units_are is None:
         return ""
     one = {"items": noun, "raters": "rater", "clusters": f"cluster of {noun}s"}
     many = {
@@ -89,7 +88,7 @@ def origin(interval: Interval, noun: Noun) -> str:
         "both": f"{noun}s and raters",
         "clusters": f"clusters of {noun}s",
     }[interval.unit]
-    if "bootstrap" in interval.method:
+    if interval.units_are == "drawn":
         return f" (from {many} drawn with replacement)"
     if interval.unit == "both":
         return f" (from leaving out {many}, one at a time)"

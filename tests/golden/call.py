@@ -52,13 +52,17 @@ class Stream:
         return sum(self._random() for _ in range(12)) - 6.0
 
 
+NOT_STORED = {"distribution", "is_one_sided", "units_are", "raters_differ"}
+"""Fields of an interval that its JSON has not either: its method says them in words."""
+
+
 def plain(value: object) -> object:
-    """Dataclasses, arrays and tuples as what JSON has; no distribution."""
+    """Dataclasses, arrays and tuples as what JSON has."""
     if dataclasses.is_dataclass(value):
         return {
             of.name: plain(getattr(value, of.name))
             for of in dataclasses.fields(value)
-            if of.name != "distribution"
+            if of.name not in NOT_STORED
         }
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()

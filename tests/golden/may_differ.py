@@ -66,7 +66,7 @@ KINDS = {
     "lifted": r"is lifted halfway",
     "extended": r"is extended from",
     "careless": r"careless raters are not covered",
-    "held": r"metric, which depends on the ratings, is held",
+    "held": r"ordinal metric, which depends .*, was taken from all ratings once",
     "prior": r"so the prior weighs|rests on the prior, too",
     "one value": r"both ends are one value",
     "infinite": r"studentized values are infinite",

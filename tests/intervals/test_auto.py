@@ -156,12 +156,13 @@ def test_perfect_agreement_is_bounded_from_below_by_the_model(
     assert found.high == 1.0
     assert found.kind == "credible"
     assert found.method == "Dirichlet-multinomial posterior, one-sided"
+    assert found.is_one_sided
     assert "rests on the prior" in found.notes[1]
 
 
 def test_perfect_agreement_of_patterns_has_a_lower_bound_too() -> None:
     found = quietly("conger_kappa", PERFECT)
-    assert (found.high, found.method[-9:]) == (1.0, "one-sided")
+    assert (found.high, found.is_one_sided) == (1.0, True)
 
 
 def test_a_posterior_is_widened_to_an_estimate_that_it_leaves_out() -> None:
@@ -215,7 +216,7 @@ def test_two_raters_who_always_agree_have_a_lower_bound() -> None:
     # one less the share of these over chance, Beta(0.75, 16.75) / 0.5.
     rough = 1.0 - 2.0 * betaincinv(0.75, 16.75, 0.95)
     assert found.low == pytest.approx(rough, abs=0.02)
-    assert (found.high, found.method[-9:]) == (1.0, "one-sided")
+    assert (found.high, found.is_one_sided) == (1.0, True)
     assert any("the prior weighs" in note for note in found.notes)
 
 
@@ -273,6 +274,16 @@ def test_the_rule_counts_items_outside_the_commonest_category() -> None:
     assert "jackknife" in method(30, 200)
     assert "jackknife" in method(20, 40)
     assert "posterior" in method(19, 40)
+
+
+def test_notes_for_both_say_whose_they_are_but_counts_say_it_themselves() -> None:
+    singles = [[0, None, None, None]] * 10
+    notes = chosen([*MEDIUM[:9], *singles], "both", categories=LABELS).notes
+    starts = [note.split(" ")[0] for note in notes]
+    assert starts == ["chosen", "items:", "4", "raters:", "careless"]
+    rare = np.zeros((40, 6), dtype=int)
+    rare[:3, :2] = 1
+    assert chosen(rare, "both").notes[1][:8] == "3 items "
 
 
 @pytest.mark.parametrize("target", ["raters", "both"])

@@ -1,6 +1,7 @@
 """Diagnosis: by the functions whose numbers it puts together, by hand, and refusals."""
 
 import itertools
+import warnings
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from masrel.agreement import COEFFICIENTS, specific_agreement
+from masrel.errors import SmallSampleWarning
 from masrel.intervals import diagnose, difference, estimate
 
 KINDS = [
@@ -150,6 +152,17 @@ def test_a_reference_is_left_out_of_all_else() -> None:
         assert getattr(with_it, name) == pytest.approx(
             getattr(without, name), nan_ok=True, rel=1e-14
         )
+
+
+@pytest.mark.parametrize(("n_pairs", "is_small"), [(9, True), (10, False)])
+def test_few_items_with_a_pair_are_warned_of(n_pairs: int, is_small: bool) -> None:
+    single = [[0.0, np.nan, np.nan, np.nan]] * 20
+    table = [*np.nan_to_num(drawn(n_pairs)).tolist(), *single]
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found = diagnose(table, target="items", categories=[0, 1, 2])
+    said = [w for w in caught if issubclass(w.category, SmallSampleWarning)]
+    assert (len(said), len(found.notes)) == (is_small, is_small)
 
 
 def test_a_rater_without_ratings_changes_nothing() -> None:

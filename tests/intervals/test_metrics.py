@@ -61,11 +61,11 @@ def test_every_resample_has_the_metric_of_its_ratings(metric: Metric) -> None:
 def test_many_grades_hold_the_ordinal_metric_and_say_so() -> None:
     ratings = np.random.default_rng(3).integers(0, 50, (40, 1)) + np.array([0, 1, 1])
     held = jackknife("krippendorff_alpha", ratings, target="items", metric="ordinal")
-    assert any("is held as it was found" in note for note in held.notes)
+    assert any("metric" in note for note in held.notes)
     few = jackknife("krippendorff_alpha", RATINGS, target="items", metric="ordinal")
-    assert not any("is held" in note for note in few.notes)
+    assert not any("metric" in note for note in few.notes)
     of_delta = analytic("krippendorff_alpha", RATINGS, target="items", metric="ordinal")
-    assert any("is held as it was found" in note for note in of_delta.notes)
+    assert any("metric" in note for note in of_delta.notes)
 
 
 def test_the_interval_metric_is_quadratic_weights() -> None:

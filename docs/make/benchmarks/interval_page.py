@@ -86,10 +86,10 @@ def _bootstrap(results: Results) -> list[str]:
         "",
         "![Work against error of the bootstrap](figures/benchmark_bootstrap.png)",
         "",
-        "Root mean square over seeds and both ends. In a and b the truth is the exact "
+        "Root mean square over seeds and both ends. In a the truth is the exact "
         "interval (★ and dashed: how long it takes; it draws",
-        "nothing, and tests hold it to fractions within 1e-13), in c four million "
-        "resamples.",
+        "nothing, and tests hold it to fractions within 1e-13), in b and c four "
+        "million resamples.",
         "",
     ]
 

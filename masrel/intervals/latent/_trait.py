@@ -455,6 +455,7 @@ def _interval(question: _Question, draws: Floats) -> Interval:
         level=question.level,
         kind="credible",
         method="ordinal latent-trait model, emcee",
+        raters_differ=True,
         target=_TARGETS[question.items],
         n_resamples=draws.size,
         monte_carlo_error=(

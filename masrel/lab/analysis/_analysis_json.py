@@ -129,8 +129,7 @@ def to_frame(results: "Iterable[Estimate] | Mapping[str, Estimate]") -> "DataFra
 def _columns() -> dict[str, tuple[str, str]]:
     # column to what it is a field of and its name there
     columns: dict[str, tuple[str, str]] = {}
-    of_interval = [field.name for field in dataclasses.fields(Interval)]
-    of_interval.remove("distribution")
+    of_interval = [field.name for field in dataclasses.fields(Interval) if field.repr]
     for field in dataclasses.fields(Estimate):
         if field.name != "interval":
             columns[field.name] = ("estimate", field.name)

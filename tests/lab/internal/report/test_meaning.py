@@ -8,8 +8,10 @@ from masrel.estimates import Interval
 from masrel.lab.report._sentences import meaning
 
 
-def interval(kind: str, method: str, target: str, unit: str | None = None) -> Interval:
-    made: dict[str, Any] = {"kind": kind, "target": target, "unit": unit}
+def interval(
+    kind: str, method: str, target: str, unit: str | None = None, **made: Any
+) -> Interval:
+    made |= {"kind": kind, "target": target, "unit": unit}
     return Interval(low=0.2, high=0.8, level=0.9, method=method, **made)
 
 
@@ -31,47 +33,52 @@ CASES = [
         "inside with probability 90 %.",
     ),
     (
-        interval("credible", "ordinal latent-trait model, emcee", "raters"),
+        interval("credible", "latent trait", "raters", raters_differ=True),
         "Credible interval: given these ratings, the prior and the model of how raters "
         f"differ, the value that would be found if {OTHER_RATERS}, without end, lies "
         "inside with probability 90 %.",
     ),
     (
-        interval("credible", "ordinal latent-trait model, emcee", "both"),
+        interval("credible", "latent trait", "both", raters_differ=True),
         "Credible interval: given these ratings, the prior and the model of how raters "
         f"differ, the value that would be found if {BOTH}, without end, lies inside "
         "with probability 90 %.",
     ),
     (
-        interval("credible", f"{POSTERIOR}, one-sided", "items"),
+        interval("credible", POSTERIOR, "items", is_one_sided=True),
         "Credible bound: given these ratings and the prior, the value that would be "
         f"found if {OTHER_ITEMS}, without end, lies above the lower end with "
         "probability 90 %.",
     ),
 ]
 
+LEFT_OUT, DRAWN = {"units_are": "left out"}, {"units_are": "drawn"}
 MADE = [
     (
-        interval("confidence", "item jackknife, t(24) on the logit", "items", "items"),
+        interval("confidence", "jackknife", "items", "items", **LEFT_OUT),
         f" (from leaving out one item at a time): if {OTHER_ITEMS},",
     ),
     (
-        interval("confidence", "rater jackknife, t(7)", "raters", "raters"),
+        interval("confidence", "jackknife", "raters", "raters", **LEFT_OUT),
         f" (from leaving out one rater at a time): if {OTHER_RATERS},",
     ),
     (
-        interval("confidence", "two-way jackknife, t on the logit", "both", "both"),
+        interval("confidence", "jackknife", "both", "both", **LEFT_OUT),
         f" (from leaving out items and raters, one at a time): if {BOTH},",
     ),
     (
-        interval("confidence", "percentile bootstrap, exact", "items", "items"),
+        interval("confidence", "bootstrap", "items", "items", **DRAWN),
         f" (from items drawn with replacement): if {OTHER_ITEMS},",
     ),
     (
-        interval("confidence", "percentile bootstrap", "raters", "raters"),
+        interval("confidence", "bootstrap", "raters", "raters", **DRAWN),
         f" (from raters drawn with replacement): if {OTHER_RATERS},",
     ),
     (interval("confidence", "F distribution", "both"), f": if {BOTH},"),
+    (
+        interval("confidence", "delta method", "items", "clusters"),
+        ": if these raters graded other clusters of items like these,",
+    ),
 ]
 
 
