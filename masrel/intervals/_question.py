@@ -399,29 +399,22 @@ def cluster_codes(problem: IntervalProblem, clusters: object) -> Integers:
     return np.array([numbers[label] for label in labels])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ClusterSums:
-    """The features of items added up over each cluster."""
+def cluster_sums(
+    problem: IntervalProblem, clusters: Integers
+) -> tuple[Floats, NDArray[np.bool_], int]:
+    """Add up the features of items over each cluster, which are numbers from 0.
 
-    sums: Floats  # (n_clusters, n_features)
-    known: NDArray[np.bool_]  # those that the coefficient knows of, (n_clusters,)
-    n_paired: int  # clusters with a pair of ratings of an item
-
-    @classmethod
-    def of(cls, problem: IntervalProblem, clusters: Integers) -> "ClusterSums":
-        """Add up items whose clusters are numbers from 0."""
-        # Takes clusters (n_items,)
-        features = problem.features(problem.item_codes)
-        matters = features.any(axis=1)
-        paired = matters & ((problem.item_codes >= 0).sum(axis=1) > 1)
-        n = int(clusters.max(initial=-1)) + 1
-        sums = np.zeros((n, len(problem.sums)))
-        np.add.at(sums, clusters, features)
-        return cls(
-            sums=sums,
-            known=np.bincount(clusters[matters], minlength=n) > 0,
-            n_paired=len(np.unique(clusters[paired])),
-        )
+    Returns the sums, (n_clusters, n_features), which clusters the coefficient knows
+    of, and how many of them have a pair of ratings of an item.
+    """
+    features = problem.features(problem.item_codes)
+    matters = features.any(axis=1)
+    paired = matters & ((problem.item_codes >= 0).sum(axis=1) > 1)
+    n = int(clusters.max(initial=-1)) + 1
+    sums = np.zeros((n, len(problem.sums)))
+    np.add.at(sums, clusters, features)
+    known = np.bincount(clusters[matters], minlength=n) > 0
+    return sums, known, len(np.unique(clusters[paired]))
 
 
 # -- what is small, and what is random -------------------------------------------------

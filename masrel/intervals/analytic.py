@@ -16,10 +16,10 @@ from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval, Target, Unit
 from masrel.intervals._question import (
     HELD,
-    ClusterSums,
     IntervalProblem,
     Statistic,
     cluster_codes,
+    cluster_sums,
     pose_problem,
     warn_small,
 )
@@ -209,12 +209,12 @@ def _clustered_error(problem: IntervalProblem, clusters: Integers) -> tuple[floa
     # √[n/(n - 1) Σ_c s_c²], s_c the sum of the influences of a cluster's items:
     # Vanbelle, S. (2017). Comparing dependent kappa coefficients obtained on multilevel
     # data. Biometrical Journal, 59(5), 1016-1034. https://doi.org/10.1002/bimj.201600093
-    of = ClusterSums.of(problem, clusters)
-    rows = of.sums[of.known]
+    sums, known, n_paired = cluster_sums(problem, clusters)
+    rows = sums[known]
     none = np.empty((len(rows), 0))
     features = Features(rows.T, none.astype(np.int64), none, 0)
     once = np.ones(len(rows), dtype=np.int64)
-    return features.error(problem.slopes(problem.sums), once), of.n_paired
+    return features.error(problem.slopes(problem.sums), once), n_paired
 
 
 # -- standard errors as other programs print them --------------------------------------

@@ -18,10 +18,10 @@ from masrel.errors import ParameterError
 from masrel.estimates import Distribution, Interval, Target, Unit
 from masrel.intervals._question import (
     ROUNDING,
-    ClusterSums,
     IntervalProblem,
     Statistic,
     cluster_codes,
+    cluster_sums,
     pose_problem,
     recorded_generator,
     warn_small,
@@ -207,25 +207,25 @@ def bootstrap(
         return problem.undefined(ends, method=method, unit=unit)
     (low, high), errors = ends
     notes = (*units.notes, *_notes(resamples, n_distinct, low == high))
-    interval = replace(
+    distribution = None
+    if kind != "studentized":
+        for array in (resamples.values, resamples.weights):
+            array.flags.writeable = False
+        distribution = Distribution(
+            values=resamples.values,
+            weights=resamples.weights,
+            continuous=False,
+            words=words,
+        )
+    return replace(
         problem.confidence(low, high, method=method, unit=unit, notes=notes),
         n_resamples=resamples.n_drawn,
         n_undefined=resamples.n_undefined,
         monte_carlo_error=None if resamples.n_drawn is None else errors,
         seed=seed,
         units_are="drawn",
+        distribution=distribution,
     )
-    if kind == "studentized":
-        return interval
-    for array in (resamples.values, resamples.weights):
-        array.flags.writeable = False
-    distribution = Distribution(
-        values=resamples.values,
-        weights=resamples.weights,
-        continuous=False,
-        words=words,
-    )
-    return replace(interval, distribution=distribution)
 
 
 def _resampled(
@@ -301,9 +301,10 @@ def _item_units(problem: IntervalProblem, clusters: object) -> _Units:
     if clusters is None:
         few = warn_small(problem.n_paired_items, 16, "items", problem.n_items)
     else:
-        sums = ClusterSums.of(problem, cluster_codes(problem, clusters))
-        rows, freq = sums.sums, sums.known.astype(np.int64)
-        few = warn_small(sums.n_paired, 16, "clusters", int(freq.sum()))
+        codes = cluster_codes(problem, clusters)
+        rows, known, n_paired = cluster_sums(problem, codes)
+        freq = known.astype(np.int64)
+        few = warn_small(n_paired, 16, "clusters", int(freq.sum()))
         words = f" of {freq.sum()} clusters"
     rows, freq = _distinct_features(rows, freq)
     return _Units(

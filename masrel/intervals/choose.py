@@ -160,14 +160,11 @@ def estimate(
         raise ParameterError(
             f'clusters: needs method "auto", "analytic" or "jackknife", got "{method}"'
         )
-    if entry.formula is None:
-        result = entry(ratings, categories=categories, weights=weights, level=level)
-    else:
-        is_counted = isinstance(ratings, CountedRatings)
+    if entry.formula is not None and not isinstance(ratings, CountedRatings):
         # coded once, for all that follows
-        ratings = ratings if is_counted else entry.code(ratings, categories)
-        result = entry(ratings, categories=categories, weights=weights)
+        ratings = entry.code(ratings, categories)
         categories = None  # the ratings have them by now
+    result = entry(ratings, categories=categories, weights=weights, level=level)
     if method == "auto" and there_is is not None and clusters is None:
         return result
     ask = partial(
@@ -205,12 +202,12 @@ def _by_error(problem: IntervalProblem) -> Interval:
     """Compute the interval by the standard error, which needs no item left out."""
     error = problem.item_features.error(problem.slopes(problem.sums), problem.freq)
     df, method = problem.n_paired_items - 1, "delta method, t(n-1)"
-    reason = None if error > 0.0 else ONE_PAIR if df < 1 else NO_SPREAD
+    if error > 0.0 and not np.isnan(problem.value):
+        return problem.by_t(error, df, method=method, unit=None)
+    reason = ONE_PAIR if df < 1 else NO_SPREAD
     if np.isnan(problem.value):
         reason = "the estimate itself is undefined"
-    if reason is not None:
-        return problem.undefined(reason, method=method, unit=None)
-    return problem.by_t(error, df, method=method, unit=None)
+    return problem.undefined(reason, method=method, unit=None)
 
 
 def _choose_interval(

@@ -10,7 +10,7 @@ import itertools
 import math
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Literal, get_args
 
@@ -24,10 +24,10 @@ from masrel.agreement._labels import is_row
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval
 from masrel.intervals._question import (
-    ClusterSums,
     IntervalProblem,
     Statistic,
     cluster_codes,
+    cluster_sums,
     pose_problem,
     student_t,
     warn_small,
@@ -136,45 +136,32 @@ def difference(
     compared = _compare(
         coefficient, first, second, design, categories, weights, level, clusters
     )
-    one, other = compared.estimates
-    unit, value, reason = compared.unit, one.value - other.value, compared.reason
+    unit: _Units = "items" if clusters is None else "clusters"
     method = f"{unit.removesuffix('s')} jackknife of the difference, t"
     smaller = min(compared.problems, key=lambda problem: problem.n_paired_items)
-    if reason is not None:
-        interval = smaller.undefined(reason, method=method, unit=unit)
-    else:
-        half = student_t(level, compared.df) * compared.error
-        n_items = smaller.n_items if unit == "items" else None
-        notes = warn_small(compared.n_units, 10, unit, n_items)
-        width = 1.0 - min(problem.min_value for problem in compared.problems)
-        if value - half < -width or value + half > width:
-            space = f"[{-width:g}, {width:g}]"
-            notes += (f"cut at the ends of the parameter space {space}",)
-        interval = Interval(
-            low=max(value - half, -width),
-            high=min(value + half, width),
-            level=level,
-            kind="confidence",
-            method=method,
-            target="items",
-            unit=unit,
-            units_are="left out",
-            notes=notes,
-        )
-    return Estimate(
-        coefficient=f"difference of {one.coefficient}",
-        weights=one.weights,
-        value=value,
-        standard_error=compared.error,
-        interval=interval,
-        observed=one.observed - other.observed,
-        chance=one.chance - other.chance,
-        n_items=min(one.n_items, other.n_items),
-        n_items_paired=min(one.n_items_paired, other.n_items_paired),
-        n_raters=min(one.n_raters, other.n_raters),
-        n_categories=one.n_categories,
-        reason=one.reason or other.reason,
+    if compared.reason is not None:
+        interval = smaller.undefined(compared.reason, method=method, unit=unit)
+        return replace(compared.estimate, interval=interval)
+    value = compared.estimate.value
+    half = student_t(level, compared.df) * compared.estimate.standard_error
+    n_items = smaller.n_items if unit == "items" else None
+    notes = warn_small(compared.n_units, 10, unit, n_items)
+    width = 1.0 - min(problem.min_value for problem in compared.problems)
+    if value - half < -width or value + half > width:
+        space = f"[{-width:g}, {width:g}]"
+        notes += (f"cut at the ends of the parameter space {space}",)
+    interval = Interval(
+        low=max(value - half, -width),
+        high=min(value + half, width),
+        level=level,
+        kind="confidence",
+        method=method,
+        target="items",
+        unit=unit,
+        units_are="left out",
+        notes=notes,
     )
+    return replace(compared.estimate, interval=interval)
 
 
 def difference_test(
@@ -241,29 +228,27 @@ def difference_test(
     compared = _compare(
         coefficient, first, second, design, categories, weights, 0.5, clusters
     )
-    one, other = compared.estimates
+    estimate = compared.estimate
     return _tested(
         "difference_test",
         "both coefficients are the same",
         "t",
         (compared.df,),
-        min(one.n_items, other.n_items),
-        statistic=(one.value - other.value) / (compared.error or math.nan),
+        estimate.n_items,
+        statistic=estimate.value / (estimate.standard_error or math.nan),
         reason=compared.reason,
     )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Compared:
-    """Two estimates, and how their difference varies."""
+    """The difference of two estimates, and how it varies."""
 
     problems: list[IntervalProblem]
-    estimates: list[Estimate]
-    error: float
+    estimate: Estimate
     df: float
     reason: str | None  # why there is neither interval nor test, or None
-    unit: _Units  # what was left out
-    n_units: int  # those with a pair of ratings in the set that has fewer
+    n_units: int  # left out, with a pair of ratings in the set that has fewer
 
 
 def _compare(
@@ -291,38 +276,49 @@ def _compare(
     ]
     if design == "dependent":
         _check_same_items(problems, clusters)
-        joints = [_Joint.of(problems, clusters)]
-        variance, df = joints[0].variance(0, 1), joints[0].n - 1.0
+        joint = _Joint.of(problems, clusters)
+        variance = joint.variance(joint.without[0] - joint.without[1])
+        n_units, df = joint.n, joint.n - 1.0
     else:
         _check_other_clusters(clusters)
         pair: Any = [None, None] if clusters is None else clusters
         joints = [
             _Joint.of([problem], of) for problem, of in zip(problems, pair, strict=True)
         ]
-        parts = [joint.variance(0) for joint in joints]
-        variance, df = sum(parts), min(joint.n - 1.0 for joint in joints)
+        parts = [joint.variance(joint.without[0]) for joint in joints]
+        variance, n_units = sum(parts), min(joint.n for joint in joints)
+        df = n_units - 1.0
         if variance > 0.0:  # Satterthwaite's degrees of freedom
             df = variance**2 / sum(
                 part**2 / max(joint.n - 1, 1)
                 for part, joint in zip(parts, joints, strict=True)
             )
-    unit: _Units = "items" if clusters is None else "clusters"
     one, other = (problem.entry(problem.coded, weights=weights) for problem in problems)
+    unit = "item" if clusters is None else "cluster"
     reason = one.reason or other.reason
     if reason is None and math.isnan(variance):
-        reason = f"with one {unit.removesuffix('s')} left out an estimate is undefined"
+        reason = f"with one {unit} left out an estimate is undefined"
     elif reason is None and variance == 0.0:
-        reason = (
-            f"leaving out any {unit.removesuffix('s')} leaves the difference as it is"
-        )
+        reason = f"leaving out any {unit} leaves the difference as it is"
+    estimate = Estimate(
+        coefficient=f"difference of {one.coefficient}",
+        weights=one.weights,
+        value=one.value - other.value,
+        standard_error=math.sqrt(variance),
+        observed=one.observed - other.observed,
+        chance=one.chance - other.chance,
+        n_items=min(one.n_items, other.n_items),
+        n_items_paired=min(one.n_items_paired, other.n_items_paired),
+        n_raters=min(one.n_raters, other.n_raters),
+        n_categories=one.n_categories,
+        reason=one.reason or other.reason,
+    )
     return _Compared(
         problems=problems,
-        estimates=[one, other],
-        error=math.sqrt(variance),
+        estimate=estimate,
         df=df,
         reason=reason,
-        unit=unit,
-        n_units=min(joint.n for joint in joints),
+        n_units=n_units,
     )
 
 
@@ -368,20 +364,19 @@ class _Joint:
         units = np.arange(len(problems[0].coded.codes))
         if clusters is not None:
             units = cluster_codes(problems[0], clusters)
-        sums = [ClusterSums.of(problem, units) for problem in problems]
-        matters = np.any([of.known for of in sums], axis=0)
+        sums, known, n_paired = zip(
+            *(cluster_sums(problem, units) for problem in problems), strict=True
+        )
+        matters = np.any(known, axis=0)
         without = [
-            problem.values(problem.sums - of.sums[matters])
-            for problem, of in zip(problems, sums, strict=True)
+            problem.values(problem.sums - of_set[matters])
+            for problem, of_set in zip(problems, sums, strict=True)
         ]
-        return cls(without=np.array(without), n=min(of.n_paired for of in sums))
+        return cls(without=np.array(without), n=min(n_paired))
 
-    def variance(self, one: int, other: int | None = None) -> float:
+    def variance(self, without: Floats) -> float:
         """Return the jackknife variance of a coefficient, or of a difference."""
-        moved = self.without[one]
-        if other is not None:
-            moved = moved - self.without[other]
-        return _variance_of(moved, np.ones(moved.size, dtype=np.int64), self.n)
+        return _variance_of(without, np.ones(without.size, dtype=np.int64), self.n)
 
     @property
     def covariance(self) -> Floats:
@@ -591,7 +586,8 @@ def differences(
     each = np.array([estimate.value for estimate in estimates])
     values, errors = each[:, None] - each, np.zeros((len(each),) * 2)
     for i, j in itertools.combinations(range(len(each)), 2):
-        errors[i, j] = errors[j, i] = math.sqrt(joint.variance(i, j))
+        moved = joint.without[i] - joint.without[j]
+        errors[i, j] = errors[j, i] = math.sqrt(joint.variance(moved))
     if reason is None and not errors.any():
         left_out = unit.removesuffix("s")
         reason = f"leaving out any {left_out} leaves all differences as they are"
@@ -622,7 +618,7 @@ def differences(
         level=level,
         method=f"{unit.removesuffix('s')} jackknife, {_METHODS[simultaneous]}",
         quantile=quantile,
-        equality=_hotelling(each, joint, reason),
+        equality=_hotelling(each, joint, reason or _too_few(len(each), joint.n)),
         n_units=joint.n,
         unit=unit,
         notes=notes,
@@ -728,7 +724,6 @@ def _hotelling(values: Floats, joint: _Joint, reason: str | None) -> Significanc
     """Test that all coefficients are the same: T² = (Cκ)ᵀ (C V Cᵀ)⁻¹ Cκ."""
     g, n, v, statistic = len(values), joint.n, joint.covariance, math.nan
     df = (g - 1.0, n - g + 1.0)
-    reason = reason or _too_few(g, n)
     if reason is None:
         # C takes each from the first
         sizes, axes = np.linalg.eigh(v[1:, 1:] - v[1:, :1] - v[:1, 1:] + v[0, 0])

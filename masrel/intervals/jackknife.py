@@ -13,10 +13,10 @@ from masrel.estimates import Interval, Target, Unit
 from masrel.intervals._question import (
     COLUMNS,
     ROUNDING,
-    ClusterSums,
     IntervalProblem,
     Statistic,
     cluster_codes,
+    cluster_sums,
     pose_problem,
     warn_small,
 )
@@ -160,9 +160,9 @@ def _leave_out(problem: IntervalProblem, clusters: Integers | None = None) -> _L
             values = problem.values(problem.sums - rows)
             freq, n = problem.freq, problem.n_paired_items
         elif clusters is not None:
-            left = ClusterSums.of(problem, clusters)
-            values = problem.values(problem.sums - left.sums[left.known])
-            freq, n = np.ones(len(values), dtype=np.int64), left.n_paired
+            sums, known, n = cluster_sums(problem, clusters)
+            values = problem.values(problem.sums - sums[known])
+            freq = np.ones(len(values), dtype=np.int64)
         else:
             values = np.array(
                 [problem.values(sums) for sums, _ in _without_raters(problem)]
