@@ -10,8 +10,6 @@ import io
 import json
 import re
 import tempfile
-import zipfile
-import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -24,7 +22,15 @@ import pandas as pd
 
 from masrel.errors import ParameterError
 from masrel.ratings._findings import ReadingOptions, library, refusal
-from masrel.ratings._sheet import MAX_UNPACKED, WORKBOOKS, Column, Sheet, value_text
+from masrel.ratings._sheet import (
+    MAX_UNPACKED,
+    WORKBOOKS,
+    Column,
+    Sheet,
+    read_foreign,
+    unzipped,
+    value_text,
+)
 
 _ARROW = {".parquet": "pyarrow.parquet", ".feather": "pyarrow.feather"}
 _PYREADSTAT = {
@@ -41,11 +47,6 @@ _ZIP = b"PK\3\4"  # how an archive begins
 # a cell of type error: its formula, if any, and its value
 _ERROR_CELL = re.compile(
     rb'<c\s[^>]*?\bt="e"[^>]*>(?:<f[^>]*?(?:/>|>[^<]*</f>))?<v>([^<]*)</v>'
-)
-# what readers of other formats raise for bytes that are not theirs
-_ANY: tuple[type[Exception], ...] = (
-    *(ValueError, TypeError, KeyError, OSError, RuntimeError, EOFError),
-    *(zipfile.BadZipFile, zlib.error),
 )
 _SOLID = re.compile(r"[^ \t\n\r]")
 _ENCODED = (".sav", ".zsav", ".dta", ".sas7bdat", ".xpt")  # pyreadstat takes theirs
@@ -123,36 +124,6 @@ def column_of(name: str, title: str, values: "pd.Series[Any]") -> Column:
     return Column.of(np.where(codes < 0, len(each), codes), texts).rows(slice(None))
 
 
-def read_foreign(
-    name: str, suffix: str, read: Callable[[], Any], *errors: type[Exception]
-) -> Any:
-    """Read by a library that raises what it likes for bytes of other formats."""
-    try:
-        return read()
-    except _ANY + errors as error:
-        lines = str(error).strip().splitlines() or [type(error).__name__]
-        line = lines[0][:200].rstrip(". ")
-        raise refusal(name, "damaged", suffix=suffix, error=line) from error
-
-
-def _unzipped(
-    name: str,
-    suffix: str,
-    data: bytes,
-    most: int,
-    do: str,
-    chosen: re.Pattern[str],
-) -> dict[str, bytes]:
-    # the files of an archive that are chosen, if all is not more than fits the memory
-    packed = read_foreign(name, suffix, lambda: zipfile.ZipFile(io.BytesIO(data)))
-    if sum(member.file_size for member in packed.infolist()) > most:
-        raise refusal(name, "unpacked", most=most, it="", do=do)
-    meant = list(filter(chosen.fullmatch, packed.namelist()))
-    return {
-        file: read_foreign(name, suffix, partial(packed.read, file)) for file in meant
-    }
-
-
 def _workbook(
     name: str, suffix: str, data: bytes, chosen: str | None, facts: dict[str, Any]
 ) -> tuple[pd.DataFrame, int]:
@@ -160,8 +131,8 @@ def _workbook(
     calamine = library(name, "python_calamine")
     if data.startswith(_ZIP):  # not an .xls
         do = "save its sheet as CSV, since a large table of text is read piece by piece"
-        sheets = re.compile(r"xl/worksheets/.*\.xml")  # not of .ods
-        files = _unzipped(name, suffix, data, _MAX_WORKBOOK, do, sheets)
+        sheets = r"xl/worksheets/.*\.xml"  # not of .ods
+        files = unzipped(name, suffix, data, _MAX_WORKBOOK, do, sheets)
         # errors of formulas, such as #N/A, which calamine gives as empty cells
         errors = Counter(e for xml in files.values() for e in _ERROR_CELL.findall(xml))
         if errors:
@@ -285,9 +256,7 @@ def _records(name: str, suffix: str, data: bytes) -> list[tuple[str, Any]]:
     if not data.startswith(_ZIP):  # a pipe has no name that says .zip
         return [("", value) for value in _json_values(name, suffix, data)]
     do = "unpack it and leave files out"
-    # a Mac adds a folder to every archive
-    chosen = re.compile(r"(?!__MACOSX/).*\.(jsonl?|csv)", re.IGNORECASE)
-    files = _unzipped(name, ".zip", data, MAX_UNPACKED, do, chosen)
+    files = unzipped(name, ".zip", data, MAX_UNPACKED, do, r".*\.(jsonl?|csv)")
     if not files:
         raise refusal(name, "no export")
     return [

@@ -182,7 +182,7 @@ _TEXTS = {
     "library": "reading it needs {library}: pip install 'masrel[{extra}]'",
     "damaged": "is damaged, or no {suffix} file ({error})",
     "members": "needed one file in it, got {n}: {members}",
-    "unpacked": "is more than {most} bytes when {it}unpacked: {do}",
+    "unpacked": "is more than {most} bytes when unpacked: {do}",
     "kind": "needed text, got a file of the kind {suffix}",
     "no stream": "--stream: needed a Parquet file, or text in UTF-8 with a separator "
     "that is no blank, as it stands and not packed, without --transpose, --sheet and "

@@ -9,7 +9,7 @@ import re
 import unicodedata
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from itertools import pairwise
 
@@ -55,7 +55,7 @@ class Grades:
     """The texts of a table's cells as grades."""
 
     scale: Scale
-    codes: Codes  # (n_texts,): place in the scale, -1 where missing
+    codes: Codes  # (n_rows, n_columns): place in the scale, -1 where missing
     merged: dict[str, list[str]] = field(default_factory=dict)  # grade to its spellings
     n_missing: dict[str, int] = field(default_factory=dict)  # code to number of cells
     findings: list[Finding] = field(default_factory=list)
@@ -66,10 +66,8 @@ def is_number(text: str) -> bool:
     return bool(_NUMBER.fullmatch(text)) and math.isfinite(float(text))
 
 
-def graded(
-    sheet: Sheet, places: Sequence[int], options: ReadingOptions
-) -> tuple[Column, Grades]:
-    """Return the cells of some columns, row by row, and which grades they are."""
+def graded(sheet: Sheet, places: Sequence[int], options: ReadingOptions) -> Grades:
+    """Return which grades the cells of some columns are."""
     number: dict[str, int] = {}
     codes = np.empty((len(sheet.numbers), len(places)), dtype=np.int64)
     for k, column in enumerate(sheet.columns[place] for place in places):
@@ -84,7 +82,8 @@ def graded(
         row, k = divmod(int(np.argmax(cells.is_text(text))), len(places))
         return f"{sheet.where(row)}, column {sheet.header[places[k]]!r}"
 
-    return cells, _grades(sheet, freq, options, where)
+    grades = _grades(sheet, freq, options, where)
+    return replace(grades, codes=grades.codes[cells.codes].reshape(codes.shape))
 
 
 def _grades(
@@ -93,7 +92,7 @@ def _grades(
     options: ReadingOptions,
     where: Callable[[str], str],
 ) -> Grades:
-    # the grade of each text; freq: how many cells have it
+    # of the texts, as if they were the cells; freq: how many cells have each
     declared, codes = _declared(options)
     # codes of missing grades; numbers among those that are named by their value
     absent = {code for code in USUAL_MISSING if code not in declared} | set(codes)

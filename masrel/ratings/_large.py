@@ -24,7 +24,7 @@ import numpy as np
 import pandas as pd
 
 from masrel.errors import RatingsError
-from masrel.ratings._exports import column_of, read_foreign, sheet_of, table_frame
+from masrel.ratings._exports import column_of, sheet_of, table_frame
 from masrel.ratings._findings import (
     USUAL_MISSING,
     Finding,
@@ -42,6 +42,7 @@ from masrel.ratings._sheet import (
     decoded,
     finished,
     line_of,
+    read_foreign,
     read_text,
     reader_of,
 )

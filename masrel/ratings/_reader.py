@@ -310,8 +310,8 @@ def _grouped(
     from masrel.ratings import _large
 
     groups = _large.groups_of(answer, sheet, layout)
-    cells, grades = graded(groups, layout.grades, options)
-    codes, freq = grades.codes[cells.codes], groups.freq
+    grades, freq = graded(groups, layout.grades, options), groups.freq
+    codes = grades.codes.ravel()
     n_cells = np.repeat(freq, len(layout.grades))
     n_missing, *counts = np.bincount(codes + 1, n_cells, len(grades.scale.grades) + 1)
     names, findings = [sheet.header[place] for place in layout.raters], []
@@ -322,7 +322,7 @@ def _grouped(
         findings = doubt_items(sheet, layout, int(freq.sum()), n_rows)
     else:
         _large.refuse_repeated(answer, sheet, layout)
-        rows = codes.reshape(len(freq), -1)
+        rows = grades.codes
         findings = doubt_columns(sheet, layout, rows, grades.scale, freq)
     rows, place = np.unique(rows.astype(np.int8), axis=0, return_inverse=True)
     freq = np.bincount(place.ravel(), freq).astype(np.int64)
@@ -417,18 +417,17 @@ def _rated(
     # a long or a wide table
     n_rows, n_raters = len(sheet.numbers), len(layout.raters)
     row = np.arange(n_rows)
+    grades = graded(sheet, layout.grades, options)
+    codes = grades.codes.ravel()
     if layout.kind == "long":
         item = named(sheet, "item", layout.item)
         rater = named(sheet, "rater", layout.raters)
-        cells, grades = graded(sheet, layout.grades, options)
         findings = findings + doubt_items(sheet, layout, len(item.texts), n_rows)
     else:
         names = [sheet.header[place] for place in layout.raters]
         rater = Column(np.tile(np.arange(n_raters), n_rows), names)
-        cells, grades = graded(sheet, layout.grades, options)
-        table = grades.codes[cells.codes].reshape(n_rows, n_raters)
         findings = findings + doubt_columns(
-            sheet, layout, table, grades.scale, sheet.freq
+            sheet, layout, grades.codes, grades.scale, sheet.freq
         )
         item = Column(row, [str(n) for n in range(1, n_rows + 1)])
         if layout.item:
@@ -438,7 +437,6 @@ def _rated(
     part, names_of_parts = _parts(sheet, layout)
     groups = sorted({names.get("group", "") for names in names_of_parts})
     findings += doubt_names("groups", groups)
-    codes = grades.codes[cells.codes]
     # part, item, rater, grade and row of each rating
     ratings = [part[row], item.codes[row], rater.codes, codes, row]
     once, scale = _one_each(sheet, layout, options, ratings, item, rater, grades.scale)

@@ -44,6 +44,12 @@ DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "bla
 """Separators, and what they are called."""
 
 MAX_UNPACKED = 256_000_000
+_PIECE_BY_PIECE = "unpack it, since a large table is read piece by piece"
+# what readers of other formats raise for bytes that are not theirs
+_ANY: tuple[type[Exception], ...] = (
+    *(ValueError, TypeError, KeyError, OSError, RuntimeError, EOFError),
+    *(zipfile.BadZipFile, zlib.error, lzma.LZMAError),
+)
 _BOMS = (
     (codecs.BOM_UTF8, "utf-8"),
     (codecs.BOM_UTF32_LE, "utf-32"),
@@ -249,32 +255,46 @@ def unpacked(name: str, data: bytes, *, is_export: bool) -> tuple[str, bytes]:
     """Return what is in a packed file, by its suffix: the name without it, and it."""
     packed = next((e for mark, e in _PACKED.items() if data.startswith(mark)), None)
     suffix = packed or Path(name).suffix.lower()  # a pipe has no suffix
-    inner = name[: -len(suffix)] if name.lower().endswith(suffix) else name
-    stored = io.BytesIO(data)
+    if suffix in _OPENED:
+        file = partial(_OPENED[suffix], io.BytesIO(data))
+        inner = name[: -len(suffix)] if name.lower().endswith(suffix) else name
+        data = read_foreign(name, suffix, lambda: file().read(MAX_UNPACKED + 1))
+        if len(data) > MAX_UNPACKED:  # it would fill the memory
+            raise refusal(name, "unpacked", most=MAX_UNPACKED, do=_PIECE_BY_PIECE)
+        return inner, data
+    if suffix != ".zip" or is_export:  # which may have a file of each annotator
+        return name, data
+    files = unzipped(name, suffix, data, MAX_UNPACKED, _PIECE_BY_PIECE, ".*[^/]")
+    if len(files) != 1:
+        some = ", ".join(list(files)[:5])
+        raise refusal(name, "members", n=len(files), members=some)
+    return next(iter(files.items()))
+
+
+def unzipped(
+    name: str, suffix: str, data: bytes, most: int, do: str, chosen: str
+) -> dict[str, bytes]:
+    """Return files of an archive that are chosen, if all fits the memory."""
+    # chosen: what matches their names; do: what is to be done if it does not fit
+    packed = read_foreign(name, suffix, lambda: zipfile.ZipFile(io.BytesIO(data)))
+    if sum(member.file_size for member in packed.infolist()) > most:
+        raise refusal(name, "unpacked", most=most, do=do)
+    # a Mac adds a folder to every archive
+    meant = re.compile(f"(?!__MACOSX/)({chosen})", re.IGNORECASE | re.DOTALL)
+    files = filter(meant.fullmatch, packed.namelist())
+    return {f: read_foreign(name, suffix, partial(packed.read, f)) for f in files}
+
+
+def read_foreign(
+    name: str, suffix: str, read: Callable[[], Any], *errors: type[Exception]
+) -> Any:
+    """Read by a library that raises what it likes for bytes of other formats."""
     try:
-        if suffix in _OPENED:
-            data = _OPENED[suffix](stored).read(MAX_UNPACKED + 1)
-        elif suffix == ".zip":
-            archive = zipfile.ZipFile(stored)
-            members = [m for m in archive.namelist() if not m.endswith("/")]
-            if len(members) > 1 and is_export:  # such as a file of each annotator
-                return f"{inner}.zip", data
-            if len(members) != 1:
-                some = ", ".join(members[:5])
-                raise refusal(name, "members", n=len(members), members=some)
-            inner = members[0]
-            data = archive.open(inner).read(MAX_UNPACKED + 1)
-        else:
-            return name, data
-    except (
-        *(OSError, EOFError, zlib.error, lzma.LZMAError, zipfile.BadZipFile),
-        *(RuntimeError, NotImplementedError),  # encrypted, packed in another way
-    ) as error:
-        raise refusal(name, "damaged", suffix=suffix, error=error) from error
-    if len(data) > MAX_UNPACKED:  # it would fill the memory
-        do = "unpack it, since a large table is read piece by piece"
-        raise refusal(name, "unpacked", most=MAX_UNPACKED, it="it is ", do=do)
-    return inner, data
+        return read()
+    except _ANY + errors as error:
+        lines = str(error).strip().splitlines() or [type(error).__name__]
+        line = lines[0][:200].rstrip(". ")
+        raise refusal(name, "damaged", suffix=suffix, error=line) from error
 
 
 def decoded(name: str, data: bytes, encoding: str | None, n_before: int = 0) -> str:
