@@ -16,6 +16,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 from masrel.errors import ParameterError
 
@@ -66,7 +67,9 @@ def write_files(
     parts: dict[Path, Path] = {}
     try:
         for path, data in contents.items():
-            parts[path] = _write_part(path, data, within, mode)
+            parts[path], descriptor = new_part(path, within, mode)
+            with on_disk(path, descriptor) as out:
+                out.write(data.encode() if isinstance(data, str) else data)
         for path in contents:
             with naming(path):
                 os.replace(parts[path], path)
@@ -79,23 +82,13 @@ def write_files(
         sync_folder(folder)
 
 
-def _write_part(
-    path: Path, data: bytes | str, within: Path | None, mode: int | None
-) -> Path:
-    """Write what a file is to hold into a new one beside it, which is returned."""
-    part, descriptor = new_part(path, within, mode)
-    try:
-        with naming(path):
-            remaining = memoryview(data.encode() if isinstance(data, str) else data)
-            while remaining:
-                remaining = remaining[os.write(descriptor, remaining) :]
-            os.fsync(descriptor)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
-    finally:
-        os.close(descriptor)
-    return part
+@contextmanager
+def on_disk(path: Path, descriptor: int) -> Iterator[BinaryIO]:
+    """Give an open part to write into, which is on disk at the end, and then closed."""
+    with naming(path), os.fdopen(descriptor, "wb") as out:
+        yield out
+        out.flush()
+        os.fsync(descriptor)
 
 
 def new_part(

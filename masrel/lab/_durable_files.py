@@ -16,6 +16,7 @@ from masrel._files import (
     make_folder,
     naming,
     new_part,
+    on_disk,
     refuse_record,
     remove_left_over,
     sync_folder,
@@ -32,13 +33,9 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
     refuse_record(path)
     part, descriptor = new_part(path)
     try:
+        with on_disk(path, descriptor) as out:
+            yield out
         with naming(path):
-            try:
-                with os.fdopen(descriptor, "wb", closefd=False) as out:
-                    yield out
-                os.fsync(descriptor)
-            finally:
-                os.close(descriptor)
             os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)

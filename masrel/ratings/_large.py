@@ -177,13 +177,16 @@ def database_of(
     atexit.unregister(gc.freeze)  # which DuckDB would take for a leak
     with (
         TemporaryDirectory(prefix="masrel-") as folder,
-        duckdb.connect() as database,
+        duckdb.connect(
+            config={
+                "memory_limit": _MEMORY,
+                "temp_directory": folder,
+                "threads": min(4, os.cpu_count() or 1),
+            }
+        ) as database,
         ThreadPoolExecutor(1) as thread,  # so that Ctrl-C is heard, and progress shown
     ):
         database.execute("SET enable_progress_bar_print = false")
-        database.execute(f"SET memory_limit = '{_MEMORY}'")
-        database.execute(f"SET temp_directory = {_quoted(folder)}")
-        database.execute(f"SET threads = {min(4, os.cpu_count() or 1)}")
 
         def answer(query: str, **frames: pd.DataFrame) -> pd.DataFrame:
             for title, frame in frames.items():

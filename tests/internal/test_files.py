@@ -89,7 +89,7 @@ def test_permissions_stay(mode: int, tmp_path: Path) -> None:
     assert stat.S_IMODE(secret.stat().st_mode) == mode
 
 
-@pytest.mark.parametrize("call", ["write", "fsync", "replace"])
+@pytest.mark.parametrize("call", ["open", "fdopen", "fsync", "replace"])
 def test_a_full_disk_leaves_all_as_it_was_and_names_the_file(
     call: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
