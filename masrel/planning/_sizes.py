@@ -71,8 +71,8 @@ def precision(study: Study, *, progress: Progress | None = None) -> Plan:
     >>> round(plan.expected_half_width, 4), round(plan.assurance, 3)
     (0.0995, 0.513)
     """
-    is_whole = study.n_items is not None and study.n_raters is not None
-    refuse((not is_whole, "n_items, n_raters: a study that is shown needs both"))
+    is_open = None in (study.n_items, study.n_raters)
+    refuse((is_open, "n_items, n_raters: a study that is shown needs both"))
     design = design_of(study)
     check_has_numbers(design)
     return _plan_of(design, progress)
@@ -305,7 +305,7 @@ def _plan_of(design: Design, progress: Progress | None = None) -> Plan:
         model=model.name,
         prevalences=model.prevalences,
         table=model.table,
-        cost=design.cost(design.n_items, design.n_raters),
+        cost=design.cost,
         method=study.method if is_formula else by_studies,
         monte_carlo_error=errors.get(number_of(study), 0.0),
         errors=errors,
@@ -330,24 +330,24 @@ class _Search:
     def __init__(self, design: Design, progress: Progress | None = None) -> None:
         self.design, self._progress = design, progress
         self._plans: dict[int, Plan] = {}
-        self._name, self.lowest, self.highest = "raters", design.min_raters, _MAX_RATERS
+        self._name, self.lowest = "raters", design.min_raters
+        self.highest = int(min(design.max_raters, _MAX_RATERS))
         if design.study.n_items is None:
             self._name, self.highest = "items", _MAX_ITEMS
             self.lowest = _FEWEST_ITEMS + design.is_icc
-        self.min_cost = self._cost(self.lowest)
 
-    def _sizes(self, n: int) -> tuple[int, int]:
-        known = (self.design.n_items, self.design.n_raters)
-        return (n, known[1]) if self._name == "items" else (known[0], n)
+    def sized(self, n: int) -> Design:
+        """Return the design of a size."""
+        return self.design.of_size(**{f"n_{self._name}": n})
 
-    def _cost(self, n: int) -> float:
-        return self.design.cost(*self._sizes(n))
+    def cost(self, n: int) -> float:
+        """Return what a size costs."""
+        return self.sized(n).cost
 
     def at(self, n: int) -> Plan:
         """Return the plan of a size, computed once."""
         if n not in self._plans:
-            design = self.design.of_size(*self._sizes(n))
-            self._plans[n] = _plan_of(design, self._progress)
+            self._plans[n] = _plan_of(self.sized(n), self._progress)
         return self._plans[n]
 
     def reached(self) -> Plan:
@@ -387,7 +387,7 @@ class _Search:
             sizes = range(low, high)
             return self._stable(low + bisect_left(sizes, True, key=self._is_met))
         n = highest
-        if is_items and not self.design.of_size(*self._sizes(20)).has_rows:
+        if is_items and not self.sized(20).has_rows:
             n = min(n, 200)  # a study of so many whose ratings are drawn one by one
         best, (name, words) = self.at(n), aim_words(study)
         note = (
@@ -406,8 +406,7 @@ class _Search:
         if chance_of(study) is None or not is_exact or self._name == "raters":
             return plan
         around = range(max(self.lowest, int(0.85 * n)), int(1.25 * n) + 2)
-        designs = (self.design.of_size(*self._sizes(size)) for size in around)
-        if sum(design.n_tables for design in designs) > _MAX_SCAN:
+        if sum(self.sized(size).n_tables for size in around) > _MAX_SCAN:
             note = "larger sizes were not looked at: a chance can fall with one more"
             return replace(plan, notes=(note,))
         first = next(size for size in around if self._is_met(size))
@@ -416,13 +415,12 @@ class _Search:
             f"{first} {self._name} reach it first, but {stable - 1} do not: the "
             "chance goes up and down"
         )
-        notes = () if first == stable else (note,)
-        return replace(self.at(stable), notes=notes)
+        return replace(self.at(stable), notes=() if first == stable else (note,))
 
     def affordable(self, limit: float) -> int:
         """Return the largest size that costs no more than a limit; 0 if none does."""
         sizes = range(self.lowest, self.highest + 1)
-        n_sizes = bisect_right(sizes, limit * (1.0 + 1e-12), key=self._cost)
+        n_sizes = bisect_right(sizes, limit * (1.0 + 1e-12), key=self.cost)
         return self.lowest + n_sizes - 1 if n_sizes else 0
 
     def _affordable_size(self) -> int:
@@ -431,7 +429,7 @@ class _Search:
         refuse(
             (
                 n in (0, self.highest),
-                f"max_cost: needs a limit between {self.min_cost:g}, of the "
+                f"max_cost: needs a limit between {self.cost(self.lowest):g}, of the "
                 f"smallest study, and what some study costs; got {limit:g}",
             )
         )
@@ -450,15 +448,16 @@ def _cheapest(design: Design, progress: Progress | None) -> Plan:
     _check_prices(study)
     limit, is_counted = study.max_cost or math.inf, not has_aim(study)
     most = int(min(design.max_raters, _MAX_RATERS))
-    smallest = _Search(design.of_size(None, design.min_raters), progress)
-    needed = f"needs at least {smallest.min_cost:g}, of the smallest study"
-    refuse((limit < smallest.min_cost, f"max_cost: {needed}; got {limit:g}"))
+    smallest = _Search(design.of_size(n_raters=design.min_raters), progress)
+    least = smallest.cost(smallest.lowest)
+    needed = f"needs at least {least:g}, of the smallest study"
+    refuse((limit < least, f"max_cost: {needed}; got {limit:g}"))
     best = smallest.at(smallest.lowest)
     if math.isinf(limit):
         best = _first_that_reaches(design, most, progress)
         limit = best.cost
     for n_raters in range(design.min_raters, most + 1):
-        search = _Search(design.of_size(None, n_raters), progress)
+        search = _Search(design.of_size(n_raters=n_raters), progress)
         n = search.affordable(limit)
         if n == 0 or n_worse >= _PATIENCE:
             break
@@ -509,7 +508,7 @@ def _check_prices(study: Study) -> None:
 def _first_that_reaches(design: Design, most: int, progress: Progress | None) -> Plan:
     for n_items, n_raters in _STEPS:
         n_raters = max(min(n_raters, most), design.min_raters)
-        search = _Search(design.of_size(None, n_raters), progress)
+        search = _Search(design.of_size(n_raters=n_raters), progress)
         if (plan := search.at(n_items)).reaches_aim:
             return plan
     return _reaching(search.reached())

@@ -23,11 +23,11 @@ from masrel.planning._study_plan import Progress, limits_of
 from masrel.planning._truth import (
     AGREEMENT,
     MAX_TABLES,
+    MODELS,
     ONE_WAY,
     Design,
     Floats,
     Integers,
-    draw_ratings,
 )
 
 # numbers, their Monte Carlo errors, and how many studies were drawn
@@ -116,11 +116,15 @@ def simulated(design: Design, rng: np.random.Generator, n_studies: int) -> Float
 
 def draw(design: Design, rng: np.random.Generator, n: int) -> Integers:
     """Draw the ratings of n studies, (n, n_items, n_columns)."""
-    if design.entry.shape == "ratings":
-        return draw_ratings(design.model, rng, (n, design.n_items, design.n_raters))
-    # a rater's two gradings are those of two raters who never differ in bias
-    pairs = draw_ratings(design.model, rng, (n, design.n_items * design.n_raters, 2))
-    return pairs.reshape(n, design.n_items, 2 * design.n_raters)
+    size = (n, design.n_items, design.n_raters)
+    if design.entry.shape == "pairs":
+        # a rater's two gradings are those of two raters who never differ in bias
+        size = (n, design.n_items * design.n_raters, 2)
+    _, drawn = MODELS[design.model.name]
+    codes = drawn(design.model, rng, size)
+    if design.model.p_missing > 0.0:
+        codes[rng.random(size) < design.model.p_missing] = -1
+    return codes.reshape(n, design.n_items, -1)
 
 
 def outcomes_of(
@@ -160,16 +164,15 @@ def _wald(design: Design, weight: Floats, codes: Integers) -> Floats:
     is_normal = design.study.interval == "normal"
     t = stdtrit(np.maximum(n_paired - 1.0, 1.0), upper)
     half = error * (ndtri(upper) if is_normal else t)
-    is_cut = design.study.interval == "analytic"
-    if is_cut:  # there is none without spread
+    if design.study.interval == "analytic":  # there is none without spread
         half = np.where((error > 0.0) & (n_paired > 1), half, np.nan)
-    return _around(design, design.problem.values(sums), half, is_cut=is_cut)
+    return _around(design, design.problem.values(sums), half)
 
 
-def _around(design: Design, value: Floats, half: Floats, *, is_cut: bool) -> Floats:
+def _around(design: Design, value: Floats, half: Floats) -> Floats:
     # intervals as an analysis gives them are cut at the ends of the scale
     low, high = value - half, value + half
-    if not is_cut:
+    if design.study.interval in ("t", "normal"):
         return np.column_stack([np.where(np.isnan(low), np.nan, half), low, high])
     low = np.maximum(low, np.minimum(design.entry.lowest, value))
     high = np.minimum(high, 1.0)
@@ -187,11 +190,10 @@ def _raters_left_out(design: Design, codes: Integers) -> Floats:
     )
     variance = (r - 1) ** 2 / r * np.var(without, axis=0, ddof=1)
     half = stdtrit(r - 1, 0.5 + 0.5 * design.level) * np.sqrt(variance)
-    if design.study.interval == "t":
-        return _around(design, value, half, is_cut=False)
-    outcomes = _around(design, value, half, is_cut=True)
-    for study in np.flatnonzero(~(variance > 1e-3 / codes[0].size)):
-        outcomes[study] = _chosen(design, codes[study])
+    outcomes = _around(design, value, half)
+    if design.study.interval != "t":
+        for study in np.flatnonzero(~(variance > 1e-3 / codes[0].size)):
+            outcomes[study] = _chosen(design, codes[study])
     return outcomes
 
 

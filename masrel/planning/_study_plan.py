@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from numbers import Integral, Real
+from types import UnionType
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -58,7 +59,6 @@ class LatentModel:
 
     def __post_init__(self) -> None:
         """Check what must be positive or ascending."""
-        ascending = all(a < b for a, b in itertools.pairwise(self.thresholds))
         refuse(
             (
                 not (self.noise_sd > 0.0 and self.rater_sd >= 0.0),
@@ -66,7 +66,8 @@ class LatentModel:
                 f"{self.noise_sd:g} and {self.rater_sd:g}",
             ),
             (
-                not (self.thresholds and ascending),
+                not self.thresholds
+                or any(a >= b for a, b in itertools.pairwise(self.thresholds)),
                 f"model: needs ascending thresholds, got {self.thresholds}",
             ),
         )
@@ -186,12 +187,29 @@ class Study:
             is_absent = value is None and name not in _ALWAYS
             is_right = is_absent or (isinstance(value, of_kind) and holds(value))
             refuse((not is_right, f"{name}: needs {needed}, got {value_text(value)}"))
-        _check_together(self)
-        object.__setattr__(self, "rng", _seed(self.rng))
+        is_of_items = self.interval in _OF_ITEMS_ALONE and self.target != "items"
+        refuse(
+            (
+                self.sides == 1 and self.level <= 0.5,
+                f"level: needs more than 0.5 with one side, got {self.level:g}",
+            ),
+            (
+                is_of_items or (self.interval, self.target) == ("t", "both"),
+                f'interval: "{self.interval}" is not of target "{self.target}", where '
+                '"auto" and "jackknife" are',
+            ),
+            (
+                self.prior is not None and self.method != "goodness-of-fit",
+                f'prior: is of method "goodness-of-fit" alone, got "{self.method}"',
+            ),
+        )
+        if not isinstance(self.rng, Integral):
+            seed = int(np.random.default_rng(self.rng).integers(2**63))
+            object.__setattr__(self, "rng", seed)
 
 
 # what is needed, of which kind it is, and whether it is right
-_Rule = tuple[str, type, Callable[[Any], bool]]
+_Rule = tuple[str, type | UnionType, Callable[[Any], bool]]
 
 
 def _whole(least: int) -> _Rule:
@@ -224,6 +242,11 @@ _RULES: dict[str, _Rule] = {
     "n_items": _whole(2),
     **dict.fromkeys(("n_raters", "n_studies"), _whole(1)),
     "sides": _one_of(1, 2),
+    "rng": (
+        "a seed of at least 0",
+        Integral | np.random.Generator,
+        lambda x: isinstance(x, np.random.Generator) or x >= 0,
+    ),
     "target": (
         "items, raters or both: what a new study draws anew",
         object,
@@ -234,35 +257,6 @@ _RULES: dict[str, _Rule] = {
 }
 # what is never None
 _ALWAYS = ("level", "p_missing", "rater_share", "sides", "target", "interval", "method")
-
-
-def _check_together(study: Study) -> None:
-    # what is in range by itself, and does not fit the rest
-    target, interval = study.target, study.interval
-    is_of_items = interval in _OF_ITEMS_ALONE and target != "items"
-    refuse(
-        (
-            study.sides == 1 and study.level <= 0.5,
-            f"level: needs more than 0.5 with one side, got {study.level:g}",
-        ),
-        (
-            is_of_items or (interval, target) == ("t", "both"),
-            f'interval: "{interval}" is not of target "{target}", where "auto" and '
-            '"jackknife" are',
-        ),
-        (
-            study.prior is not None and study.method != "goodness-of-fit",
-            f'prior: is of method "goodness-of-fit" alone, got "{study.method}"',
-        ),
-    )
-
-
-def _seed(rng: np.random.Generator | int | None) -> int:
-    if rng is None or isinstance(rng, np.random.Generator):
-        return int(np.random.default_rng(rng).integers(2**63))
-    is_seed = isinstance(rng, int | np.integer) and rng >= 0
-    refuse((not is_seed, f"rng: needs a seed of at least 0, got {rng!r}"))
-    return int(rng)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -383,8 +377,10 @@ class Plan:
 
 def limits_of(study: Study) -> tuple[float, float]:
     """Return the limits of the interval, infinite where there is none."""
-    low = -math.inf if study.lower is None else study.lower
-    return low, math.inf if study.upper is None else study.upper
+    return (
+        -math.inf if study.lower is None else study.lower,
+        math.inf if study.upper is None else study.upper,
+    )
 
 
 def has_aim(study: Study) -> bool:

@@ -2,7 +2,7 @@
 
 In: what a `Study` declares. Out: an `ItemModel`, its distinct rows of ratings, how
 probable each is, and drawn ratings of whole studies; and a `Design`, whose model has
-the value that is taken to be true. A model is two functions, a row of `_MODELS`; the
+the value that is taken to be true. A model is two functions, a row of `MODELS`; the
 coefficient of a design is a function of sums over items.
 """
 
@@ -81,10 +81,10 @@ def declared_model(study: Study) -> ItemModel:
             latent=study.model,
             p_missing=study.p_missing,
         )
-    name, known = str(study.model), ", ".join(_MODELS)
+    name, known = str(study.model), ", ".join(MODELS)
     refuse(
         (
-            name not in _MODELS,
+            name not in MODELS,
             f"model: needs one of {known}, or a LatentModel, since models of one kappa "
             f"differ in precision; got {value_text(study.model)}",
         )
@@ -175,7 +175,7 @@ def probabilities(model: ItemModel, rows: Integers, *, ordered: bool) -> Floats:
     n_raters = rows.shape[1]
     counts = (rows[:, :, None] == np.arange(len(model.scale))).sum(axis=1)
     n = counts.sum(axis=1)
-    probability, _ = _MODELS[model.name]
+    probability, _ = MODELS[model.name]
     p = probability(model, rows, counts)  # counts (n_rows, n_categories)
     p = p * model.p_missing ** (n_raters - n) * (1.0 - model.p_missing) ** n
     if not ordered:  # as many rows have these counts: R! / Π n_k!
@@ -232,15 +232,6 @@ def _table(model: ItemModel, rows: Integers, _counts: Integers) -> Floats:
 Size = tuple[int, int, int]  # studies, items, raters
 
 
-def draw_ratings(model: ItemModel, rng: np.random.Generator, size: Size) -> Integers:
-    """Draw the ratings of whole studies, (n_studies, n_items, n_raters)."""
-    _, draw = _MODELS[model.name]
-    codes = draw(model, rng, size)
-    if model.p_missing > 0.0:
-        codes[rng.random(size) < model.p_missing] = -1
-    return codes
-
-
 def _draw_mixture(model: ItemModel, rng: np.random.Generator, size: Size) -> Integers:
     codes = _places(np.cumsum(model.prevalences), rng.random(size))
     one = rng.random(size[:2]) < model.kappa
@@ -282,7 +273,7 @@ def _places(cumulated: Floats, u: Floats) -> Integers:
 
 
 # how probable rows of ratings are, and how they are drawn
-_MODELS: dict[
+MODELS: dict[
     str,
     tuple[
         Callable[[ItemModel, Integers, Integers], Floats],
@@ -387,10 +378,9 @@ class Design:
         """The most raters that there can be."""
         return 2 if self.model.name == "table" else self.entry.n_raters[1] or math.inf
 
-    def of_size(self, n_items: int | None, n_raters: int | None) -> "Design":
-        """Return the design with other numbers of items and raters."""
-        study = replace(self.study, n_items=n_items, n_raters=n_raters)
-        design = Design.of(study, self.model)
+    def of_size(self, **sizes: int) -> "Design":
+        """Return the design with another number of items, or of raters."""
+        design = Design.of(replace(self.study, **sizes), self.model)  # type: ignore[arg-type]
         _check_size(design)
         return design
 
@@ -398,11 +388,13 @@ class Design:
         """Return the design whose true coefficient is a value."""
         return Design.of(replace(self.study, value=value), _model_at(self, value))
 
-    def cost(self, n_items: int, n_raters: int) -> float:
-        """Return what a study of a size costs."""
+    @property
+    def cost(self) -> float:
+        """What a study costs."""
+        n, r = self.n_items, self.n_raters
         per_item, per_rater, per_rating = self.study.prices or (0.0, 0.0, 1.0)
-        n_ratings = n_items * n_raters * (2 if self.entry.shape == "pairs" else 1)
-        return per_item * n_items + per_rater * n_raters + per_rating * n_ratings
+        n_ratings = n * r * (2 if self.entry.shape == "pairs" else 1)
+        return per_item * n + per_rater * r + per_rating * n_ratings
 
     # -- distinct rows of ratings, and the coefficient as a function of sums ----------
 
@@ -448,8 +440,7 @@ class Design:
     def features(self, codes: Integers) -> Floats:
         """Return features of ratings (…, n_raters), (…, n_features)."""
         rows = codes.reshape(-1, codes.shape[-1])
-        features = self.problem.features(rows)
-        return features.reshape(*codes.shape[:-1], -1)
+        return self.problem.features(rows).reshape(*codes.shape[:-1], -1)
 
     @np.errstate(invalid="ignore")  # 0/0 where there is no coefficient
     def population(self) -> tuple[float, float]:
@@ -562,10 +553,9 @@ def _with_value(design: Design) -> Design:
     study, value = design.study, design.study.value
     if isinstance(study.model, LatentModel) or study.model == "table":
         implied = _true_value(design)
-        is_other = value is not None and abs(implied - value) > 5e-3
         refuse(
             (
-                is_other,
+                value is not None and abs(implied - value) > 5e-3,
                 f"value: the model has {implied:.4f}, so it needs none, got {value}",
             )
         )
