@@ -214,14 +214,12 @@ def _of_options(arguments: dict[str, Any], report: Report) -> "tuple[Plan, ...]"
 
 
 def _is_grid(arguments: dict[str, Any], ranges: dict[str, Any]) -> bool:
-    # several sizes or truths, or an aim at a known size
+    # several sizes or truths
     several = any(len(values) > 1 for values in ranges.values())
-    is_known = {"n_items", "n_raters"} <= ranges.keys()
-    has_chance = not arguments.keys().isdisjoint({"power", "assurance"})
     is_table = arguments.get("model") == "table"
     is_rows = isinstance(arguments.get("prevalences", [0.0])[0], list) and not is_table
     is_shared = not arguments.keys().isdisjoint({"executor", "scheduler"})
-    return several or is_rows or (is_known and has_chance) or is_shared
+    return several or is_rows or is_shared
 
 
 def _refuse(arguments: dict[str, Any], names: Iterable[str], why: str) -> None:

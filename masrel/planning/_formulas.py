@@ -29,7 +29,14 @@ import numpy as np
 from masrel._input import refuse
 from masrel.planning._studies import all_studies, icc_ratio
 from masrel.planning._study_plan import FORMULAS, chance_of
-from masrel.planning._truth import ONE_WAY, Design, Floats, probabilities, rows_of
+from masrel.planning._truth import (
+    ONE_WAY,
+    Design,
+    Floats,
+    at_value,
+    probabilities,
+    rows_of,
+)
 
 _NORMAL = NormalDist()
 
@@ -94,7 +101,7 @@ def _wald_items(design: Design) -> float:
     null, power = design.study.null, design.study.power
     if null is None or power is None:
         return _width_items(design)
-    sd_0, sd_1 = design.at_value(null).item_sd, design.item_sd
+    sd_0, sd_1 = at_value(design, null).item_sd, design.item_sd
     z_b = _NORMAL.inv_cdf(power)
     return ((_z(design) * sd_0 + z_b * sd_1) / (design.value - null)) ** 2
 
@@ -108,7 +115,7 @@ def _wald_numbers(design: Design) -> dict[str, float]:
         "expected_high": design.value + half,
     }
     if (null := design.study.null) is not None:
-        of_null = _z(design) * design.at_value(null).item_sd
+        of_null = _z(design) * at_value(design, null).item_sd
         difference = abs(design.value - null) * math.sqrt(design.n_items)
         numbers["power"] = _NORMAL.cdf((difference - of_null) / design.item_sd)
     return numbers
@@ -130,7 +137,7 @@ def _cells(design: Design) -> Floats:
 
 def _chi_square_per_item(design: Design, limit: float) -> float:
     """Return Σ_h (P_h(κ) - P_h(limit))² / P_h(limit) [2]_."""
-    p, p_limit = _cells(design), _cells(design.at_value(limit))
+    p, p_limit = _cells(design), _cells(at_value(design, limit))
     occurs = p_limit > 0.0
     return float(((p - p_limit)[occurs] ** 2 / p_limit[occurs]).sum())
 
@@ -159,7 +166,7 @@ def _fit_numbers(design: Design) -> dict[str, float]:
 
     # O'Hagan, Stevens and Campbell (2005)
     power = beta(*prior).expect(
-        lambda value: _fit_power(design.at_value(value), null), epsrel=1e-9
+        lambda value: _fit_power(at_value(design, value), null), epsrel=1e-9
     )
     return {"power": float(power)}
 

@@ -23,7 +23,7 @@ from masrel.planning._study_plan import (
     Study,
     aim_words,
     chance_of,
-    check_one_aim,
+    check_aim,
     has_aim,
     is_met,
     number_of,
@@ -73,6 +73,7 @@ def precision(study: Study, *, progress: Progress | None = None) -> Plan:
     """
     is_open = None in (study.n_items, study.n_raters)
     refuse((is_open, "n_items, n_raters: a study that is shown needs both"))
+    check_aim(study, is_solved=False)
     design = design_of(study)
     check_has_numbers(design)
     return _plan_of(design, progress)
@@ -132,15 +133,8 @@ def sample_size(study: Study, *, progress: Progress | None = None) -> Plan:
             f"for; got {got}",
         )
     )
-    check_one_aim(study)
+    check_aim(study, is_solved=True)
     design = design_of(study)
-    refuse(
-        (
-            not has_aim(study) and study.max_cost is None,
-            "half_width: needs an aim: a half-width, a lower or upper limit, or a null "
-            "value with power; got none",
-        )
-    )
     if n_known == 0:
         return _cheapest(design, progress)
     return _reaching(_Search(design, progress).reached())
@@ -235,14 +229,8 @@ def _several(values: Any) -> Sequence[Any]:
 def _check_grid(
     study: Study, is_solved: list[bool], executor: object, scheduler: object
 ) -> None:
-    if any(is_solved) or chance_of(study) is not None:
-        check_one_aim(study)
     refuse(
         (all(is_solved), "n_items, n_raters: a grid needs one of them, got none"),
-        (
-            any(is_solved) and not has_aim(study),
-            "half_width: needs an aim, where one of the sizes is solved for; got none",
-        ),
         (
             study.method != "auto",
             f"method: a grid is by auto, exact where it can be; got {study.method}",
@@ -256,6 +244,7 @@ def _check_grid(
             'scheduler: is of executor "dask" alone, got none',
         ),
     )
+    check_aim(study, is_solved=any(is_solved))
 
 
 def _planned(design: Design) -> Plan:

@@ -220,14 +220,20 @@ def _one_of(*choices: object) -> _Rule:
     return f"one of {', '.join(map(str, choices))}", object, lambda x: x in choices
 
 
-_CHANCE: _Rule = ("a number in (0, 1)", Real, lambda x: 0.0 < x < 1.0)
-_SHARE: _Rule = ("a number in [0, 1)", Real, lambda x: 0.0 <= x < 1.0)
-_ON_SCALE: _Rule = ("a number in [-1, 1]", Real, lambda x: -1.0 <= x <= 1.0)
 _RULES: dict[str, _Rule] = {
     "half_width": ("a number in (0, 1]", Real, lambda x: 0.0 < x <= 1.0),
-    **dict.fromkeys(("power", "assurance", "level"), _CHANCE),
-    **dict.fromkeys(("lower", "upper", "null", "value"), _ON_SCALE),
-    **dict.fromkeys(("p_missing", "rater_share"), _SHARE),
+    **dict.fromkeys(
+        ("power", "assurance", "level"),
+        ("a number in (0, 1)", Real, lambda x: 0.0 < x < 1.0),
+    ),
+    **dict.fromkeys(
+        ("lower", "upper", "null", "value"),
+        ("a number in [-1, 1]", Real, lambda x: -1.0 <= x <= 1.0),
+    ),
+    **dict.fromkeys(
+        ("p_missing", "rater_share"),
+        ("a number in [0, 1)", Real, lambda x: 0.0 <= x < 1.0),
+    ),
     "max_cost": ("a number above 0", Real, lambda x: x > 0.0),
     "prices": (
         "three numbers of at least 0",
@@ -431,11 +437,16 @@ def reached_words(study: Study, plan: Plan) -> str:
     )
 
 
-def check_one_aim(study: Study) -> None:
-    """Check that a study whose size is solved for has one aim, and all of it."""
+def check_aim(study: Study, *, is_solved: bool) -> None:
+    """Check that a study has one aim, and all of it, if it needs any.
+
+    It does where its size is solved for, or where it names a chance.
+    """
     null, power = study.null, study.power
     limits = study.lower is not None or study.upper is not None
     n_aims = limits + (study.half_width is not None) + (null is not None)
+    if not is_solved and chance_of(study) is None:
+        return
     refuse(
         (
             n_aims > 1,
@@ -457,6 +468,11 @@ def check_one_aim(study: Study) -> None:
         (
             study.assurance is not None and not has_aim(study),
             "assurance: needs half_width, lower or upper",
+        ),
+        (
+            not has_aim(study) and study.max_cost is None,
+            "half_width: needs an aim: a half-width, a lower or upper limit, or a null "
+            "value with power; got none",
         ),
     )
 

@@ -384,10 +384,6 @@ class Design:
         _check_size(design)
         return design
 
-    def at_value(self, value: float) -> "Design":
-        """Return the design whose true coefficient is a value."""
-        return Design.of(replace(self.study, value=value), _model_at(self, value))
-
     @property
     def cost(self) -> float:
         """What a study costs."""
@@ -561,7 +557,7 @@ def _with_value(design: Design) -> Design:
         )
         return Design.of(replace(study, value=implied), design.model)
     refuse((value is None, "value: needs the true coefficient, got none"))
-    return design.at_value(design.value)
+    return at_value(design, design.value)
 
 
 def _true_value(design: Design) -> float:
@@ -571,13 +567,14 @@ def _true_value(design: Design) -> float:
     return Design.of(replace(design.study, n_raters=n_raters), model).population()[0]
 
 
-def _model_at(design: Design, value: float) -> ItemModel:
-    """Return the model whose true coefficient is a value."""
+def at_value(design: Design, value: float) -> Design:
+    """Return the design whose true coefficient is a value."""
     from scipy.optimize import brentq  # loaded when a plan is made
 
+    study = replace(design.study, value=value)
     model, title = design.model, design.entry.title
     if model.name == "table":
-        return _table_at(design, value)
+        return Design.of(study, _table_at(design, value))
     # noise from much to little, or kappa from chance to agreement
     ends = (-4.0, 4.0) if model.name == "latent" else (0.0, 1.0)
 
@@ -591,22 +588,22 @@ def _model_at(design: Design, value: float) -> ItemModel:
         )
     )
     low, high = map(short_of, ends)
-    if min(abs(low), abs(high)) < 1e-12:
-        return model.with_parameter(ends[abs(high) < 1e-12])
-    refuse(
-        (
-            math.isnan(low) or math.isnan(high),
-            f"prevalences: {title} is undefined with these, {list(model.prevalences)}: "
-            "it needs two categories that occur",
-        ),
-        (
-            not low < 0.0 < high,
-            f"value: {title} under {model.name} lies between {low + value:z.3f} and "
-            f"{high + value:z.3f} with these prevalences, got {value:g}",
-        ),
-    )
-    root = float(brentq(short_of, *ends, xtol=1e-15, rtol=1e-14))
-    return model.with_parameter(root)
+    x = ends[abs(high) < 1e-12]
+    if not min(abs(low), abs(high)) < 1e-12:
+        refuse(
+            (
+                math.isnan(low) or math.isnan(high),
+                f"prevalences: {title} is undefined with these, "
+                f"{list(model.prevalences)}: it needs two categories that occur",
+            ),
+            (
+                not low < 0.0 < high,
+                f"value: {title} under {model.name} lies between {low + value:z.3f} "
+                f"and {high + value:z.3f} with these prevalences, got {value:g}",
+            ),
+        )
+        x = float(brentq(short_of, *ends, xtol=1e-15, rtol=1e-14))
+    return Design.of(study, model.with_parameter(x))
 
 
 def _table_at(design: Design, value: float) -> ItemModel:

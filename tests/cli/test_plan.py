@@ -172,7 +172,7 @@ def test_a_study_has_its_own_plan(
         (("--raters", "5:1:1"), "needs numbers as 10,20"),
         (("--raters", "2"), "--half-width: needs an aim"),
         ((), "--items, --raters: needs exactly one of them"),
-        (("--items", "5,6"), "--half-width: needs an aim, where one of the sizes is"),
+        (("--items", "5,6"), "--half-width: needs an aim"),
         (("--value", "0.4,0.6"), "--items, --raters: a grid needs one of them"),
         (("--items", "0", "--raters", "2"), "--items: needs a whole number above 1"),
         (("--raters", "2", "--prevalences", "a"), "needs numbers as 10,20"),
