@@ -159,7 +159,7 @@ def first_plan(seed: int) -> dict[str, list[str]]:
 
 def _affordable(of: Table, names: list[str], stream: Stream) -> list[str]:
     # of measurements with gaps, which are fitted by steps, three coefficients a table
-    slow = [name for name in names if COEFFICIENTS[name].kernel is None]
+    slow = [name for name in names if COEFFICIENTS[name].formula is None]
     if not of.has_gaps:
         return names
     kept = {stream.one_of(slow) for _ in range(3)}
@@ -170,9 +170,9 @@ def _applies(method: str, coefficient: str) -> bool:
     entry, (first, *rest) = COEFFICIENTS[coefficient], method.split()
     if first == "value":
         return True
-    if first == "estimate" and entry.kernel is None:
+    if first == "estimate" and entry.formula is None:
         return entry.interval_target in rest
-    return entry.kernel is not None and (
+    return entry.formula is not None and (
         entry.shape == "ratings" or first != "posterior"
     )
 

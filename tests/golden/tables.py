@@ -44,8 +44,16 @@ OF_COUNTED = (
 OF_POSTERIOR = ("fleiss_kappa", "scott_pi", "krippendorff_alpha")
 
 
-UNPICKED = ("lin_ccc", "sem", "sem_consistency", "mdc", "mdc_consistency")
-"""Coefficients of which only values are stored: others are picked by their places."""
+PICKED = (
+    "percent_agreement", "cohen_kappa", "conger_kappa", "fleiss_kappa", "light_kappa",
+    "scott_pi", "brennan_prediger", "gwet_ac", "krippendorff_alpha", "stratified_kappa",
+    "pooled_kappa", "kendall_w", "robinson_a", "icc_1", "icc_1k", "icc_c1", "icc_ck",
+    "icc_a1", "icc_ak",
+)  # fmt: skip
+"""Coefficients whose intervals are stored, picked by their places here.
+
+Of a new one only values are: it would move the places of all others.
+"""
 
 
 def cases() -> list[Case]:
@@ -153,16 +161,17 @@ def _applicable(table: Drawn, method: str, *, every: bool) -> list[str]:
     two = len(table.rows[0]) == 2
     return [
         name
-        for name, entry in COEFFICIENTS.items()
-        if name not in UNPICKED
-        if every
-        or (
-            (two or entry.n_raters != (2, 2))
-            and (entry.formula or (method == "estimate" and entry.has_interval))
-            and (method != "posterior" or two or name in OF_POSTERIOR)
-            and (method != "posterior" or entry.shape == "ratings")
-        )
+        for name in PICKED
+        if every or _applies(COEFFICIENTS[name], method, two=two)
     ]
+
+
+def _applies(entry: agreement.Coefficient, method: str, *, two: bool) -> bool:
+    has_interval = entry.formula or (method == "estimate" and entry.has_interval)
+    if not has_interval or (entry.n_raters == (2, 2) and not two):
+        return False
+    is_modelled = entry.shape == "ratings" and (two or entry.name in OF_POSTERIOR)
+    return method != "posterior" or is_modelled
 
 
 def _title(name: str, method: str, options: dict[str, object]) -> str:
@@ -241,7 +250,8 @@ def _p_and_bands(table: Drawn) -> list[object]:
 
 def _differences(seed: int, table: Drawn) -> dict:
     # the same items in two halves of the raters, and other items of as many raters
-    names = [n for n, e in COEFFICIENTS.items() if e.formula and e.shape == "ratings"]
+    entries = [COEFFICIENTS[name] for name in PICKED]
+    names = [e.name for e in entries if e.formula and e.shape == "ratings"]
     name, half = names[seed // 2 % len(names)], len(table.rows[0]) // 2
     first = [row[:half] for row in table.rows] if half > 1 else table.rows
     second = [row[-half:] for row in table.rows] if half > 1 else table.rows[::-1]
