@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel._input import shown, warn_caller
-from masrel.agreement._codes import CountedRatings, refuse_measurements
+from masrel.agreement._codes import CountedRatings, count_ratings, refuse_measurements
 from masrel.agreement._labels import Label
 from masrel.agreement._weights import (
     NO_PAIR,
@@ -120,6 +120,8 @@ class Formula:
 
     name: str
     title: str  # as a sentence has it
+    # from ratings and categories to those that count: of two raters, say
+    count: Callable[..., CountedRatings] = count_ratings
     # codes (n_rows, n_raters), the disagreement v of every two categories, a matrix or
     # an operator, and `repeats`, how often each code is there, to features
     features: Callable[..., Features]
@@ -151,7 +153,8 @@ class Formula:
 
 def estimate(
     formula: Formula,
-    counted: CountedRatings,
+    ratings: object,
+    categories: Sequence[Label] | None,
     weights: WeightsLike,
     *,
     n_raters: int | None = None,
@@ -162,6 +165,7 @@ def estimate(
 
     `why` takes weights, D_o and D_e, and returns the reason why they make no value.
     """
+    counted = formula.count(ratings, categories)
     made = declared_weights(weights, counted.categories, declared=counted.declared)
     v, freq, size = made.v, counted.freq, counted.size
     are_many = len(counted.categories) > _MANY_GRADES and not counted.declared
@@ -222,12 +226,12 @@ def divide(numerator: Floats, denominator: Floats, none: float = math.nan) -> Fl
 # -- checks --------------------------------------------------------------------------
 
 
-def check_level(level: float) -> None:
-    """Check the level of an interval, or the probability of a word."""
+def check_level(level: float, name: str = "level") -> None:
+    """Check the level of an interval, or another share that is none or all of it."""
     is_number = isinstance(level, int | float | np.integer | np.floating)
     # a level so near to 1 that its upper quantile is that of 1 has no ends
     if not (is_number and 0.0 < level < 1.0 and 0.5 + 0.5 * level < 1.0):
-        raise ParameterError(f"level: needs (0, 1), got {shown(level)}")
+        raise ParameterError(f"{name}: needs (0, 1), got {shown(level)}")
 
 
 def check_population(population: int, n_items: int) -> None:

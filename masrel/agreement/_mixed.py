@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize, minimize_scalar, root
 from scipy.special import chdtri, expit, fdtri
 
-from masrel.agreement._engine import deviations
+from masrel.agreement._engine import Floats, deviations
 from masrel.estimates import _LongNote
 
-_Floats = NDArray[np.float64]
 _Numbers = NDArray[Any]  # real, or complex for slopes
 
 _EXACT = 1e-15
@@ -41,11 +40,11 @@ class _Likelihood:
     # Sums of products are of the raters, in k contrasts of which the first is their
     # mean, and of the ratings less the levels of raters: of what these are within
     # items, and of their sums over items of so many ratings. Nothing large cancels.
-    sizes: _Floats  # (g,): ratings of an item
-    freq: _Floats  # (g,): items of that size
-    between: _Floats  # (g, k + 1, k + 1)
-    within: _Floats  # (k + 1, k + 1)
-    basis: _Floats  # (k + 1, 2): μ and the ratings, made of these
+    sizes: Floats  # (g,): ratings of an item
+    freq: Floats  # (g,): items of that size
+    between: Floats  # (g, k + 1, k + 1)
+    within: Floats  # (k + 1, k + 1)
+    basis: Floats  # (k + 1, 2): μ and the ratings, made of these
     n_ratings: int
     has_raters: bool
 
@@ -82,15 +81,15 @@ class _Likelihood:
         ratios[:, : u.shape[1]] = np.sinh(u) ** 2
         return self.deviance(ratios)
 
-    def _height(self, u: _Floats) -> float:
+    def _height(self, u: Floats) -> float:
         return float(self.at(u[None])[0])
 
-    def slopes(self, u: _Floats) -> _Floats:
+    def slopes(self, u: Floats) -> Floats:
         """Return those of the deviance at one u, by the complex step."""
         steps = u + 1j * _TINY * np.eye(len(u))
         return np.asarray(self.at(steps).imag / _TINY)
 
-    def maximum(self, precision: float) -> _Floats:
+    def maximum(self, precision: float) -> Floats:
         """Return the ratios (2,) of highest likelihood."""
         # from the best of a grid, the first of those that differ by rounding; ratios
         # are about as large as 1 / residual at most
@@ -103,10 +102,10 @@ class _Likelihood:
         ratios[: len(u)] = np.where(np.abs(u) < _NONE, 0.0, np.sinh(u) ** 2)
         return ratios
 
-    def information(self, ratios: _Floats) -> _Floats:
+    def information(self, ratios: Floats) -> Floats:
         """Return tr(P V_i P V_j) of items, raters and residual, times residual²."""
 
-        def slopes(ratios: _Floats) -> _Floats:
+        def slopes(ratios: Floats) -> Floats:
             steps = ratios + 1j * _TINY * np.eye(2)
             return np.asarray(self.parts(steps)[0].imag / _TINY)
 
@@ -158,7 +157,7 @@ class Components:
     n_ratings: int
     unit: float  # in those of the ratings
     has_raters: bool  # whether they are told from the residual
-    ratios: _Floats = field(default_factory=lambda: np.zeros(2))
+    ratios: Floats = field(default_factory=lambda: np.zeros(2))
     likelihood: _Likelihood | None = None  # None without residual
 
     @property
@@ -211,7 +210,7 @@ class Components:
         return low / (1.0 + low), high / (1.0 + high)
 
 
-def components(values: _Floats, *, has_raters: bool) -> Components | str:
+def components(values: Floats, *, has_raters: bool) -> Components | str:
     """Return the variances of a table with gaps, or why there are none."""
     # values (n_items, n_raters), nan where there is no rating; without raters these
     # are part of the residual

@@ -341,7 +341,7 @@ def _named(name: str, categories: tuple[Label, ...]) -> Weights:
     elif n:
         values = spread_values(categories)
         v = np.full((n, n), math.nan)
-        if name == "ratio" and sums_to_zero(values, itself=True):
+        if name == "ratio" and (sums_to_zero(values) or 0.0 in values):
             reason = NO_RATIO
         else:
             matrix = _MATRICES[name](values)
@@ -353,10 +353,9 @@ def _named(name: str, categories: tuple[Label, ...]) -> Weights:
     return Weights(name=name, n_categories=n, v=v, reason=reason, line=line)
 
 
-def sums_to_zero(values: Floats, *, itself: bool) -> bool:
-    """Return whether two different values, or one and itself, sum to 0."""
-    has_zero = itself and bool((values == 0.0).any())
-    return has_zero or len(np.intersect1d(values[values > 0.0], -values)) > 0
+def sums_to_zero(values: Floats) -> bool:
+    """Return whether two different values sum to 0."""
+    return len(np.intersect1d(values[values > 0.0], -values)) > 0
 
 
 def category_values(categories: Sequence[Label]) -> Floats:

@@ -116,13 +116,13 @@ def p_value(
 
     check_option("alternative", alternative, get_args(Alternative))
     value = 0.0 if null is None else _finite("null", null)
-    entry = COEFFICIENTS.get(_checked(estimate).coefficient)
+    reason = _why_untestable(estimate)
+    entry = COEFFICIENTS.get(estimate.coefficient)
     if null is None and entry is not None and not entry.chance_corrected:
         raise ParameterError(
             f"null: needs a value for {entry.title}: it is not corrected for chance, "
             "so that 0 is not what chance gives"
         )
-    reason = _why_untestable(estimate)
     if reason is not None:
         undefined(f"p-value of {estimate.coefficient}", reason)
         return math.nan
@@ -182,15 +182,6 @@ def equivalence_p_value(estimate: Estimate, *, low: float, high: float) -> float
     return max(above, p_value(estimate, null=high, alternative="less"))
 
 
-def _checked(estimate: object) -> Estimate:
-    """Check that a result is an estimate."""
-    if not isinstance(estimate, Estimate):
-        raise ParameterError(
-            f"estimate: needs an Estimate, got {type(estimate).__name__}"
-        )
-    return estimate
-
-
 def _finite(name: str, value: float) -> float:
     """Check a number."""
     is_number = isinstance(value, int | float | np.integer | np.floating)
@@ -201,6 +192,10 @@ def _finite(name: str, value: float) -> float:
 
 def _why_untestable(estimate: Estimate) -> str | None:
     """Return why an estimate has no law around it, or None."""
+    if not isinstance(estimate, Estimate):
+        raise ParameterError(
+            f"estimate: needs an Estimate, got {type(estimate).__name__}"
+        )
     if math.isnan(estimate.value):
         return estimate.reason or "the estimate itself is undefined"
     if estimate.standard_error == 0.0:
@@ -339,7 +334,7 @@ def bands(estimate: Estimate, *, scale: BandScale = "landis_koch") -> tuple[Band
     [('almost perfect', 0.0), ('substantial', 0.06), ('moderate', 0.5)]
     """
     check_option("scale", scale, _SCALES)
-    reason = _why_untestable(_checked(estimate))
+    reason = _why_untestable(estimate)
     if reason is not None:
         undefined(f"band of {estimate.coefficient}", reason)
     every: list[Band] = []
@@ -449,6 +444,6 @@ def _between(estimate: Estimate, low: float, high: float) -> float:
     from scipy.special import ndtr
 
     value, error = estimate.value, estimate.standard_error
-    if low > value:
-        return float(ndtr((value - low) / error) - ndtr((value - high) / error))
-    return float(ndtr((high - value) / error) - ndtr((low - value) / error))
+    side = -1.0 if low > value else 1.0
+    ends = ndtr(side * (np.array([low, high]) - value) / error)
+    return float(abs(ends[1] - ends[0]))

@@ -188,6 +188,7 @@ _SCOTT = replace(
     _FLEISS,
     name="scott_pi",
     title="Scott's pi",
+    count=partial(two_raters, title="Scott's pi"),
     features=_complete_features,
     resampled=None,
 )
@@ -247,6 +248,7 @@ def _conger_resampled(codes: Codes, v: Any, freq: Integers | None = None) -> Res
 _CONGER = Formula(
     name="conger_kappa",
     title="Conger's kappa",
+    count=raters_told_apart,
     features=_conger_features,
     disagreements=_conger_disagreements,
     resampled=_conger_resampled,
@@ -305,8 +307,7 @@ def percent_agreement(
     >>> percent_agreement([["a", "a"], ["a", "b"]]).value
     0.5
     """
-    counted = count_ratings(ratings, categories)
-    return estimate(_PERCENT, counted, weights, population=population)
+    return estimate(_PERCENT, ratings, categories, weights, population=population)
 
 
 def fleiss_kappa(
@@ -367,8 +368,7 @@ def fleiss_kappa(
     >>> round(fleiss_kappa([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
     0.333
     """
-    counted = count_ratings(ratings, categories)
-    return estimate(_FLEISS, counted, weights, population=population)
+    return estimate(_FLEISS, ratings, categories, weights, population=population)
 
 
 def brennan_prediger(
@@ -426,8 +426,9 @@ def brennan_prediger(
     >>> round(brennan_prediger([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
     0.333
     """
-    counted = count_ratings(ratings, categories)
-    return estimate(_BRENNAN_PREDIGER, counted, weights, population=population)
+    return estimate(
+        _BRENNAN_PREDIGER, ratings, categories, weights, population=population
+    )
 
 
 def gwet_ac(
@@ -485,8 +486,7 @@ def gwet_ac(
     >>> round(gwet_ac([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
     0.333
     """
-    counted = count_ratings(ratings, categories)
-    return estimate(_GWET, counted, weights, population=population)
+    return estimate(_GWET, ratings, categories, weights, population=population)
 
 
 def scott_pi(
@@ -542,8 +542,7 @@ def scott_pi(
     >>> round(scott_pi([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
     0.333
     """
-    counted = two_raters(ratings, categories, _SCOTT.title)
-    return estimate(_SCOTT, counted, weights, population=population)
+    return estimate(_SCOTT, ratings, categories, weights, population=population)
 
 
 def conger_kappa(
@@ -602,8 +601,7 @@ def conger_kappa(
     >>> conger_kappa([["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"]]).value
     0.5
     """
-    counted = raters_told_apart(ratings, categories)
-    return estimate(_CONGER, counted, weights, population=population)
+    return estimate(_CONGER, ratings, categories, weights, population=population)
 
 
 def category_kappa(

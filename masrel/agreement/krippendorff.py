@@ -205,7 +205,7 @@ def krippendorff_alpha(
     # items with fewer than two ratings are no part of the sample
     paired = counted.chosen(rows=counted.size > 1)
     return estimate(
-        _ALPHA, paired, made, n_raters=counted.n_raters, population=population
+        _ALPHA, paired, None, made, n_raters=counted.n_raters, population=population
     )
 
 
@@ -242,7 +242,7 @@ def _ratio(categories: Sequence[Label]) -> Floats:
             "metric: ratio needs a matrix of every two categories, which is made of at "
             f"most {MANY}, got {len(values)}; interval needs none"
         )
-    if sums_to_zero(values, itself=False):
+    if sums_to_zero(values):
         raise ParameterError(
             "metric: ratio needs values of which no two sum to 0, got "
             f"{', '.join(map(str, values.tolist()))}"

@@ -7,12 +7,12 @@ from statistics import NormalDist
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from masrel._input import check_option
 from masrel.agreement._codes import complete_values, rated_part, rating_values
 from masrel.agreement._engine import (
     NO_SPREAD,
+    Floats,
     check_level,
     deviations,
     measured,
@@ -20,10 +20,9 @@ from masrel.agreement._engine import (
 )
 from masrel.agreement._labels import Label
 from masrel.agreement.icc import _Anova, _too_few
-from masrel.errors import ParameterError, RatingsError
+from masrel.errors import RatingsError
 from masrel.estimates import Estimate, Interval
 
-_Floats = NDArray[np.float64]
 _Parts = list[tuple[float, float]]  # of a variance, each with its degrees of freedom
 
 ErrorKind = Literal["agreement", "consistency"]
@@ -190,7 +189,7 @@ def _error(
 
 
 def _variance_parts(
-    values: _Floats, kind: ErrorKind
+    values: Floats, kind: ErrorKind
 ) -> tuple[_Parts, float, tuple[str, ...]] | str:
     """Return what adds up to the error's variance, its unit and notes, or why not."""
     n, k = values.shape
@@ -284,8 +283,8 @@ class LimitsOfAgreement:
     upper_interval: Interval
     inner: tuple[float, float]
     outer: tuple[float, float]
-    averages: _Floats = field(compare=False, repr=False)
-    differences: _Floats = field(compare=False, repr=False)
+    averages: Floats = field(compare=False, repr=False)
+    differences: Floats = field(compare=False, repr=False)
     n_items: int
     reason: str | None = None
 
@@ -350,10 +349,8 @@ def limits_of_agreement(
     >>> print(f"{limits.mean:.2f}, {limits.lower:.2f} to {limits.upper:.2f}")
     0.00, -2.77 to 2.77
     """
-    for name, value in (("share", share), ("level", level)):
-        is_number = isinstance(value, int | float | np.number)
-        if not (is_number and 0.0 < value < 1.0):
-            raise ParameterError(f"{name}: needs (0, 1), got {value!r}")
+    check_level(share, "share")
+    check_level(level)
     values = complete_values(ratings, categories)
     if values.shape[1] != 2:
         raise RatingsError(
@@ -521,7 +518,7 @@ def lin_ccc(
     )
 
 
-def _concordance(values: _Floats) -> tuple[float, float, _Floats]:
+def _concordance(values: Floats) -> tuple[float, float, Floats]:
     """Return the coefficient, its error, and the coefficient without each item."""
     # 1 - Σ (x_j - x_l)² within items over that between them, and its delta method
     n, k = values.shape
@@ -549,7 +546,7 @@ def _concordance(values: _Floats) -> tuple[float, float, _Floats]:
     return 1.0 - ratio, error, without
 
 
-def _error_of_two(values: _Floats, rho: float) -> float:
+def _error_of_two(values: Floats, rho: float) -> float:
     # that of [1], here without a division by r
     (xx, xy), (_, yy) = np.cov(values.T, ddof=0)
     if xx == 0.0 or yy == 0.0:
@@ -567,7 +564,7 @@ def _error_of_two(values: _Floats, rho: float) -> float:
 
 
 def _interval(
-    values: _Floats, value: float, error: float, without: _Floats, level: float
+    values: Floats, value: float, error: float, without: Floats, level: float
 ) -> Interval:
     """Return the interval, on Fisher's z."""
     n, k = values.shape

@@ -41,8 +41,7 @@ Deletion = Literal["listwise", "pairwise"]
 
 def _every_two(codes: Codes) -> Integers:
     # columns of every two raters
-    every_two = list(itertools.combinations(range(codes.shape[1]), 2))
-    return np.array(every_two).reshape(-1, 2)
+    return np.array(np.triu_indices(codes.shape[1], 1)).T
 
 
 def _own_two(codes: Codes) -> Integers:
@@ -121,6 +120,7 @@ def _stratified(sums: Floats, v: Any) -> tuple[Floats, Floats, Floats]:
 _COHEN = Formula(
     name="cohen_kappa",
     title="Cohen's kappa",
+    count=partial(two_raters, title="Cohen's kappa"),
     features=partial(_features, lambda _: np.array([[0, 1]])),
     disagreements=_mean_of_tables,
 )
@@ -202,8 +202,7 @@ def cohen_kappa(
     >>> cohen_kappa([["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"]]).value
     0.5
     """
-    counted = two_raters(ratings, categories, _COHEN.title)
-    return estimate(_COHEN, counted, weights, population=population)
+    return estimate(_COHEN, ratings, categories, weights, population=population)
 
 
 def light_kappa(
@@ -272,6 +271,7 @@ def light_kappa(
     return estimate(
         _LIGHT_PAIRWISE if deletion == "pairwise" else _LIGHT,
         counted,
+        None,
         weights,
         population=population,
         why=partial(_why_no_mean, columns),
@@ -356,7 +356,7 @@ def stratified_kappa(
     """
     counted = count_ratings(code_pairs(pairs, categories))
     n_raters = _raters_with_pairs(counted)
-    return estimate(_STRATIFIED, counted, weights, n_raters=n_raters)
+    return estimate(_STRATIFIED, counted, None, weights, n_raters=n_raters)
 
 
 def pooled_kappa(
@@ -416,7 +416,7 @@ def pooled_kappa(
     """
     counted = count_ratings(code_pairs(pairs, categories))
     n_raters = _raters_with_pairs(counted)
-    return estimate(_POOLED_PAIRS, counted, weights, n_raters=n_raters)
+    return estimate(_POOLED_PAIRS, counted, None, weights, n_raters=n_raters)
 
 
 def _raters_with_pairs(counted: CountedRatings) -> int:
