@@ -490,7 +490,7 @@ def _has_error(claim: Claim, kappa: _Floats, error: _Floats) -> _Flags:
     expected = {"standard_error": error, "low": kappa - reach, "high": kappa + reach}
     ends = {"low": -1.0, "high": 1.0}
     fits = [
-        _near(expected[key], number, ends.get(key))
+        _near(expected[key], number, ends.get(key, 0.0))
         for key, number in claim.printed().items()
         if key in expected
     ]
@@ -508,9 +508,8 @@ def _has_p(claim: Claim, values: dict[str, _Floats], test: str) -> _Flags:
     return _near(p, printed)
 
 
-def _near(values: _Floats, printed: PrintedNumber, end: float | None = None) -> _Flags:
-    # end: of the scale, where intervals may have been cut off
-    reach = float(printed.half_unit) + _SLACK
-    is_end = end is not None and float(printed.value) == end
-    is_cut = values * (end or 1.0) > 1 if is_end else False
-    return np.asarray((abs(values - float(printed.value)) <= reach) | is_cut)
+def _near(values: _Floats, printed: PrintedNumber, end: float = 0.0) -> _Flags:
+    # end: -1 or 1 of the scale, where intervals may have been cut off
+    value, reach = float(printed.value), float(printed.half_unit) + _SLACK
+    is_cut = (value == end) & (values * end > 1)
+    return np.asarray((abs(values - value) <= reach) | is_cut)
