@@ -22,6 +22,8 @@ from masrel.estimates import Significance
 McnemarKind = Literal["exact", "uncorrected", "corrected"]
 """The binomial distribution, or chi-squared without or with continuity correction."""
 
+_SAME_MARGINS = "both ratings have the same margins"
+
 
 def contingency_table(
     ratings: object, *, categories: Sequence[Label] | None = None
@@ -156,8 +158,8 @@ def bowker(table: ArrayLike) -> Significance:
     changed = b + c > 0
     b, c = b[changed], c[changed]
     statistic = float(((b - c) ** 2 / (b + c)).sum())
-    hypothesis = "the table is symmetric"
-    return _chi_squared("bowker", hypothesis, statistic, len(b), int(cells.sum()))
+    n = int(cells.sum())
+    return _chi_squared("bowker", "the table is symmetric", statistic, len(b), n)
 
 
 def stuart_maxwell(table: ArrayLike) -> Significance:
@@ -201,8 +203,8 @@ def stuart_maxwell(table: ArrayLike) -> Significance:
     """
     cells = check_table(table)
     statistic, df = _margin_statistic(cells)
-    hypothesis = "both ratings have the same margins"
-    return _chi_squared("stuart_maxwell", hypothesis, statistic, df, int(cells.sum()))
+    n = int(cells.sum())
+    return _chi_squared("stuart_maxwell", _SAME_MARGINS, statistic, df, n)
 
 
 def bhapkar(table: ArrayLike) -> Significance:
@@ -249,8 +251,7 @@ def bhapkar(table: ArrayLike) -> Significance:
     # all items changed one way, but for rounding
     is_infinite = df > 0 and statistic >= n * (1.0 - 1e-12)
     statistic = math.inf if is_infinite else statistic / (1.0 - statistic / max(n, 1))
-    hypothesis = "both ratings have the same margins"
-    return _chi_squared("bhapkar", hypothesis, statistic, df, n)
+    return _chi_squared("bhapkar", _SAME_MARGINS, statistic, df, n)
 
 
 def _margin_statistic(cells: NDArray[np.int64]) -> tuple[float, int]:
@@ -325,7 +326,7 @@ def prevalence_index(table: ArrayLike) -> float:
     """
     (a, b), (c, d) = check_two_by_two(table)
     n = a + b + c + d
-    return abs(a - d) / n if n else _no_item("the prevalence index")
+    return abs(a - d) / n if n else _no_number("the prevalence index")
 
 
 def bias_index(table: ArrayLike) -> float:
@@ -363,7 +364,7 @@ def bias_index(table: ArrayLike) -> float:
     """
     (a, b), (c, d) = check_two_by_two(table)
     n = a + b + c + d
-    return abs(b - c) / n if n else _no_item("the bias index")
+    return abs(b - c) / n if n else _no_number("the bias index")
 
 
 def kappa_max(table: ArrayLike) -> float:
@@ -403,12 +404,11 @@ def kappa_max(table: ArrayLike) -> float:
     first, second = cells.sum(axis=1).tolist(), cells.sum(axis=0).tolist()
     n = sum(first)
     if n == 0:
-        return _no_item("the largest kappa")
+        return _no_number("the largest kappa")
     agreeing = sum(map(min, first, second))
     by_chance = sum(r * c for r, c in zip(first, second, strict=True))
     if by_chance == n * n:
-        undefined("the largest kappa", NO_CHANCE)
-        return math.nan
+        return _no_number("the largest kappa", NO_CHANCE)
     return float((n * agreeing - by_chance) / (n * n - by_chance))
 
 
@@ -456,6 +456,6 @@ def specific_agreement(table: ArrayLike) -> tuple[float, ...]:
     return tuple(t / n if n else math.nan for t, n in zip(twice, used, strict=True))
 
 
-def _no_item(title: str) -> float:
-    undefined(title, NO_PAIR)
+def _no_number(title: str, reason: str = NO_PAIR) -> float:
+    undefined(title, reason)
     return math.nan

@@ -568,14 +568,13 @@ def _interval(
 ) -> Interval:
     """Return the interval, on Fisher's z."""
     n, k = values.shape
-    low = high = value
     reason = None
     if math.isnan(error):
-        low = high = math.nan
         reason = "no error: fewer than three items, or a rater without variance"
     elif abs(value) < 1.0 and error < 1e-15:  # of rounding
-        low, high, reason = math.nan, math.nan, NO_SPREAD
-    elif abs(value) < 1.0:
+        reason = NO_SPREAD
+    low = high = value if reason is None else math.nan
+    if reason is None and abs(value) < 1.0:
         z = math.atanh(value)
         if k == 2:
             quantile = NormalDist().inv_cdf(0.5 + 0.5 * level)

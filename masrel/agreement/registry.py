@@ -383,7 +383,7 @@ _ALL = (
 COEFFICIENTS: dict[str, Coefficient] = {entry.name: entry for entry in _ALL}
 """Name to coefficient."""
 
-_BY_ALIAS = {alias: entry for entry in _ALL for alias in entry.aliases}
+_BY_NAME = {name: entry for entry in _ALL for name in (entry.name, *entry.aliases)}
 
 
 def coefficient(name: str) -> Coefficient:
@@ -413,15 +413,13 @@ def coefficient(name: str) -> Coefficient:
     'brennan_prediger'
     """
     is_text = isinstance(name, str)
-    if is_text and name in _BY_ALIAS:
-        return _BY_ALIAS[name]
-    if not is_text or name not in COEFFICIENTS:
-        meant = _meant_by(name) if is_text else None
-        raise ParameterError(
-            f"coefficient: needs one of {', '.join(COEFFICIENTS)}, got {name!r}"
-            + ("" if meant is None else f"; did you mean {meant}?")
-        )
-    return COEFFICIENTS[name]
+    if is_text and name in _BY_NAME:
+        return _BY_NAME[name]
+    meant = _meant_by(name) if is_text else None
+    raise ParameterError(
+        f"coefficient: needs one of {', '.join(COEFFICIENTS)}, got {name!r}"
+        + ("" if meant is None else f"; did you mean {meant}?")
+    )
 
 
 def _meant_by(name: str) -> str | None:
@@ -429,9 +427,8 @@ def _meant_by(name: str) -> str | None:
     import difflib  # loaded only for an error
 
     typed = name.strip().lower().replace(" ", "_").replace("-", "_").replace("'", "")
-    names = [*COEFFICIENTS, *_BY_ALIAS]
-    parts = [known for known in names if typed in known.split("_")]
+    parts = [known for known in _BY_NAME if typed in known.split("_")]
     if parts:
         return parts[0] if len(parts) == 1 else None
-    near = difflib.get_close_matches(typed, names, n=1, cutoff=0.75)
+    near = difflib.get_close_matches(typed, _BY_NAME, n=1, cutoff=0.75)
     return near[0] if near else None
