@@ -186,8 +186,13 @@ def _refuse_doubtful(
     }
     for code, texts in doubts.items():
         if texts:
-            facts = {"codes": quoted(texts), "grade": f"{texts[0][1:]}+"}
-            raise refuse(code, texts, other="".join(others[:1]), **facts)
+            raise refuse(
+                code,
+                texts,
+                codes=quoted(texts),
+                grade=f"{texts[0][1:]}+",
+                other="".join(others[:1]),
+            )
 
 
 def _observed(
@@ -277,13 +282,14 @@ def _doubts(
     code, strays = "number", numbers
     if sum(map(met.__getitem__, others)) <= n_ratings / 2:
         forms = set(map(normal_form, numbers))  # those are named already
-        halves = {text for text in others if _HALF_GRADE.fullmatch(text)}
-        strays = [t for t in others if t not in halves and normal_form(t) not in forms]
+        strays = [t for t in others if not _HALF_GRADE.fullmatch(t)]
+        strays = [text for text in strays if normal_form(text) not in forms]
         code = "no number"
     if strays:
-        facts = {"got": listed(strays), "codes": quoted(strays)}
-        facts["where"] = where(strays[0])
-        findings.append(Finding(code, **facts))
+        finding = Finding(
+            code, got=listed(strays), where=where(strays[0]), codes=quoted(strays)
+        )
+        findings.append(finding)
     return findings
 
 

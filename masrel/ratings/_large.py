@@ -77,7 +77,8 @@ class Source:
 def source_of(path: Path, options: ReadingOptions) -> Source:
     """Open a file for DuckDB."""
     is_other = options.transpose or options.source or options.sheet
-    kind, has_duckdb = path.suffix.lower(), options.stream or find_spec("duckdb")
+    kind = path.suffix.lower()
+    has_duckdb = options.stream or find_spec("duckdb")
     if path.is_file() and has_duckdb and not is_other:
         if kind == ".parquet" and options.encoding is None and not options.no_header:
             return _parquet(path, options)

@@ -157,8 +157,12 @@ def _usual(sheet: Sheet, role: str, taken: set[int]) -> tuple[int, ...]:
     named = (k for k, n in enumerate(sheet.header) if n.casefold() in usual)
     places = tuple(place for place in named if place not in taken)
     if len(places) > 1:
-        names = " and ".join(sheet.header[place] for place in places)
-        raise sheet.refuse("role twice", where=sheet.at(0), role=role, names=names)
+        raise sheet.refuse(
+            "role twice",
+            where=sheet.at(0),
+            role=role,
+            names=" and ".join(sheet.header[place] for place in places),
+        )
     return places
 
 
@@ -219,8 +223,11 @@ def _wide(
 
 
 def named(sheet: Sheet, role: str, places: Sequence[int]) -> Column:
-    """Return what items or raters are called, by one column or several together."""
+    """Return what items or raters are called: by columns together, or by numbers."""
     columns = [sheet.columns[place] for place in places]
+    if not columns:
+        n_rows = len(sheet.numbers)
+        return Column(np.arange(n_rows), [str(n) for n in range(1, n_rows + 1)])
     for place, column in zip(places, columns, strict=True):
         for text in set(USUAL_MISSING).intersection(column.texts):
             row = int(np.argmax(column.is_text(text)))
@@ -251,9 +258,13 @@ def rated_twice(
     if layout.kind == "wide":
         guess = ", --rater and --grade name the columns of one row a rating"
     guess += ", --no-item says that no column names items" * layout.is_item_guessed
-    where = " and ".join(sheet.where(row) for row in rows.tolist())
-    facts = {"item": item, "rater": rater, "guess": guess}
-    return sheet.refuse("twice", rows=where, **facts)
+    return sheet.refuse(
+        "twice",
+        rows=" and ".join(sheet.where(row) for row in rows.tolist()),
+        item=item,
+        rater=rater,
+        guess=guess,
+    )
 
 
 # ---- what looks as if it were something else ----
@@ -289,8 +300,9 @@ def doubt_columns(
     if odd & named:
         doubtful = odd | named if len(odd) < len(names) else odd & named
         wrong = [names[k] for k in sorted(doubtful)]
-        columns = ", ".join(map(repr, wrong))
-        raise sheet.refuse("no raters", columns=columns, names=quoted(wrong))
+        raise sheet.refuse(
+            "no raters", columns=", ".join(map(repr, wrong)), names=quoted(wrong)
+        )
     findings += [
         Finding("named rater", column=names[k], name=quoted([names[k]]))
         for k in sorted(named)

@@ -310,7 +310,8 @@ def _grouped(
     from masrel.ratings import _large
 
     groups = _large.groups_of(answer, sheet, layout)
-    grades, freq = graded(groups, layout.grades, options), groups.freq
+    grades = graded(groups, layout.grades, options)
+    freq = groups.freq
     codes = grades.codes.ravel()
     n_cells = np.repeat(freq, len(layout.grades))
     n_missing, *counts = np.bincount(codes + 1, n_cells, len(grades.scale.grades) + 1)
@@ -417,10 +418,10 @@ def _rated(
     # a long or a wide table
     n_rows, n_raters = len(sheet.numbers), len(layout.raters)
     row = np.arange(n_rows)
+    item = named(sheet, "item", layout.item)
     grades = graded(sheet, layout.grades, options)
     codes = grades.codes.ravel()
     if layout.kind == "long":
-        item = named(sheet, "item", layout.item)
         rater = named(sheet, "rater", layout.raters)
         findings = findings + doubt_items(sheet, layout, len(item.texts), n_rows)
     else:
@@ -429,9 +430,6 @@ def _rated(
         findings = findings + doubt_columns(
             sheet, layout, grades.codes, grades.scale, sheet.freq
         )
-        item = Column(row, [str(n) for n in range(1, n_rows + 1)])
-        if layout.item:
-            item = named(sheet, "item", layout.item)
         row = np.repeat(row, n_raters)
     findings += doubt_names("raters", rater.texts) + doubt_names("items", item.texts)
     part, names_of_parts = _parts(sheet, layout)
@@ -650,9 +648,13 @@ def _whole_numbers(sheet: Sheet, layout: Layout) -> Codes:
         numbers = [float(text) if is_number(text) else -1.0 for text in texts]
         for code, n in enumerate(numbers):
             if not (n >= 0 and n.is_integer() and n < 2**53):
-                where = sheet.where(int(np.argmax(column.codes == code)))
-                text = column.texts[code]
-                raise sheet.refuse("count", where, kind=layout.kind, text=text)
+                row = int(np.argmax(column.codes == code))
+                raise sheet.refuse(
+                    "count",
+                    sheet.where(row),
+                    kind=layout.kind,
+                    text=column.texts[code],
+                )
         table.append(np.array(numbers, dtype=np.int64)[column.codes])
     if not any(column.any() for column in table):
         raise sheet.refuse("no counts", kind=layout.kind)
@@ -666,6 +668,9 @@ def _names_of_rows(sheet: Sheet, layout: Layout, names: list[str]) -> list[str]:
         raise sheet.refuse("rows of table", n=len(names), n_rows=n_rows)
     rows = sheet.columns[layout.item[0]].cells() if layout.item else names
     if set(rows) != set(names):
-        met, known = ", ".join(map(repr, rows)), ", ".join(map(repr, names))
-        raise sheet.refuse("names of table", rows=met, names=known)
+        raise sheet.refuse(
+            "names of table",
+            rows=", ".join(map(repr, rows)),
+            names=", ".join(map(repr, names)),
+        )
     return rows

@@ -70,6 +70,7 @@ _MARKS = {  # how files begin that are no text, and what their names end in
     b"(\xb5/\xfd": ".zst, which is not read",
     b"%PDF": ".pdf, which is not read",
 }
+_UNPLAIN = re.compile(r"[^\x21-\x7e]")  # blanks, and letters that may have two forms
 _SNIFFED = 20  # lines that the separator is found in
 _CHUNK = 1 << 14  # records that are taken apart at once
 _END = "\0"  # a record behind the last, which a quote that stays open swallows
@@ -89,7 +90,9 @@ class Column:
     def of(cls, codes: Codes, cells: Iterable[str]) -> "Column":
         """Take cells that may differ by blanks or Unicode forms alone."""
         number: dict[str, int] = {}
-        places = [number.setdefault(plain(cell), len(number)) for cell in cells]
+        if _UNPLAIN.search("".join(cells)):  # names and grades have none, as a rule
+            cells = map(plain, cells)
+        places = [number.setdefault(cell, len(number)) for cell in cells]
         return cls(np.array(places, dtype=np.int64)[codes], list(number))
 
     def rows(self, chosen: Any) -> "Column":
@@ -266,8 +269,7 @@ def unpacked(name: str, data: bytes, *, is_export: bool) -> tuple[str, bytes]:
         return name, data
     files = unzipped(name, suffix, data, MAX_UNPACKED, _PIECE_BY_PIECE, ".*[^/]")
     if len(files) != 1:
-        some = ", ".join(list(files)[:5])
-        raise refusal(name, "members", n=len(files), members=some)
+        raise refusal(name, "members", n=len(files), members=", ".join(list(files)[:5]))
     return next(iter(files.items()))
 
 
@@ -347,10 +349,13 @@ def read_text(
     # R's write.table has no name above its row names
     has_row_names = bool(below) and set(below) == {n_names + 1}
     if n_names + has_row_names < 2:
-        first = text.splitlines()[0].strip()[:60]
-        mark = DELIMITERS.get(delimiter, repr(delimiter))
-        facts = {"line": n_before + 1, "delimiter": mark, "first": first}
-        raise refusal(name, "other separator", **facts)
+        raise refusal(
+            name,
+            "other separator",
+            line=n_before + 1,
+            delimiter=DELIMITERS.get(delimiter, repr(delimiter)),
+            first=text.splitlines()[0].strip()[:60],
+        )
     sheet = Sheet(
         name=name,
         sha256=sha256,
@@ -501,9 +506,13 @@ def checked_records(
             wrong = (k for k, record in enumerate(records) if len(record) != width)
             if (k := next(wrong, None)) is not None:
                 code = "open quote" if records[k][-1].endswith(_END) else "width"
-                facts = {"n": len(records[k]), "cells": ", ".join(records[k])[:60]}
-                where = sheet.at(n_rows + k)
-                raise sheet.refuse(code, where=where, width=width, **facts)
+                raise sheet.refuse(
+                    code,
+                    where=sheet.at(n_rows + k),
+                    width=width,
+                    n=len(records[k]),
+                    cells=", ".join(records[k])[:60],
+                )
         yield records
         n_rows += len(records)
     if not is_closed:
