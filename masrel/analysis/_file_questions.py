@@ -493,13 +493,18 @@ def _diagnosis(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
             least = sorted(known, key=itemgetter("value"))[:_SHOWN_PAIRS]
             texts.insert(0, note("least", n=len(least), n_all=len(shown)))
             shown = least
+        explained = [
+            note(key)
+            for key in ("change", "standard_error", "agreement")
+            if any(row.get(key) is not None for row in shown)
+        ]
         panels = [(group, result) for group, _, result, _ in parts]
         yield Answer(
             name=f"diagnosis_{kind}",
             rows=[{**keys, **row} for _, keys, _, rows in parts for row in rows[kind]],
             shown=shown,
             heads={"group": by} if by else {},
-            notes=tuple(texts),
+            notes=(*explained, *texts),
             of=of.get(kind, ""),
             grades=grades if kind == "confusion" else (),
             figure=tuple(panels) if kind == "pairs" else (),

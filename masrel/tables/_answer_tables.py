@@ -1,26 +1,26 @@
 """Tables, JSON, sentences and the figure of answers to questions about a file."""
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from masrel._input import refuse
 from masrel.agreement import COEFFICIENTS, BandScale, benchmark, strength
-from masrel.analysis._file_estimates import AgreementRow, Answer, Row, note
-from masrel.errors import ParameterError
+from masrel.analysis._file_estimates import AgreementRow, Answer, Row
 from masrel.estimates import Estimate, Interval, Target, _plain, as_document
 from masrel.tables._estimate_words import (
     forest_row,
     origin,
     pair_words,
     promise,
-    row_notes,
     sentence,
 )
 from masrel.tables._tables import SIMULATED, Column, Table, capital, percent, table_of
 
 if TYPE_CHECKING:
-    from masrel.plots._drawn_values import Forest, ForestRow
+    from masrel.plots._drawn_values import Forest
 
 _CAPTIONS = {
     "agreement": "Agreement of the raters in {of}",
@@ -28,7 +28,7 @@ _CAPTIONS = {
     "categories": "Agreement on each category against all others",
     "symmetry": "Do the changes from one rater to the other balance?",
     "indices": "Prevalence, bias and agreement on each category",
-    "limits_of_agreement": "Limits of agreement{of}",
+    "limits_of_agreement": "Limits of agreement{in_unit}",
     "diagnosis_raters": "What each rater adds to {of}",
     "diagnosis_pairs": "{of} of every two raters",
     "diagnosis_categories": "Agreement on each category",
@@ -122,9 +122,6 @@ _COLUMNS: dict[str, tuple[Column, ...]] = {
     ),
 }
 
-# columns of diagnoses that a note explains, which has their name
-_EXPLAINED = ("change", "standard_error", "agreement")
-
 _OF_ESTIMATES = (
     *_COEFFICIENT,
     _VALUE,
@@ -162,9 +159,7 @@ def answer_table(
     """Return the table of an answer."""
     # bands: whose words for values; explain: whether notes say what intervals promise;
     # in_sentences: whether notes are for `agreement_sentences`
-    of, estimates = answer.of, answer.estimates
-    if answer.name == "limits_of_agreement":
-        of = f" ({of})" if of else ""
+    estimates = answer.estimates
     shown = answer.rows if answer.shown is None else answer.shown
     notes, after = list(answer.notes), []
     if estimates:
@@ -173,35 +168,71 @@ def answer_table(
         notes += [] if in_sentences else _paired_note(estimates)
         after = [] if bands is None else [_words_note(estimates, bands)]
     columns = _columns(answer, shown, bands)
-    is_diagnosis = answer.name.startswith("diagnosis")
-    if is_diagnosis:
-        of_page = [
-            c.key for c in columns if any(r.get(c.key) is not None for r in shown)
-        ]
-        notes = [*(note(key) for key in _EXPLAINED if key in of_page), *notes]
     # what groups of rows are called in notes
     by = "groups" if answer.name == "differences" else ", ".join(answer.heads.values())
+    named = [row for row in shown if "title" in row]
+    in_unit = f" ({answer.of})" if answer.of else ""
     return table_of(
         answer.name,
-        _CAPTIONS[answer.name].format(of=of),
+        _CAPTIONS[answer.name].format(of=answer.of, in_unit=in_unit),
         columns,
         shown,
-        hide_empty=is_diagnosis and not answer.grades,
+        hide_empty=answer.name.startswith("diagnosis") and not answer.grades,
         in_units=tuple(at for at, row in enumerate(estimates) if _is_in_units(row)),
-        notes=(
-            *notes,
-            *row_notes([_with_texts(row) for row in shown if "title" in row], by),
-            *after,
-        ),
+        notes=(*notes, *_row_notes(named, by), *after),
         data=data,
     )
 
 
-def _with_texts(row: Row) -> Row:
-    # as notes on rows are made of
-    reason = row.get("reason")
-    texts = [] if reason is None else [f"undefined: {reason}"]
-    return {"group": "", "texts": texts, **row}
+def _row_notes(rows: Sequence[Row], by: str) -> tuple[str, ...]:
+    """Return the notes on rows, what is of the same rows as one note."""
+    # A note names its rows, unless it holds for all that it could be of.
+    # rows: each with its title, its group, why it is undefined or else its texts, and
+    # those of its interval if it has one; by: what groups are called
+    rows_of: dict[tuple[str, bool], list[Row]] = {}
+    for row in rows:
+        undefined = [f"undefined: {row['reason']}"] if row.get("reason") else []
+        for text in row.get("texts", undefined):
+            rows_of.setdefault((text, False), []).append(row)
+        for text in row.get("interval_texts") or ():
+            rows_of.setdefault((text, True), []).append(row)
+    n_intervals = sum(row.get("interval_texts") is not None for row in rows)
+    texts_of: dict[str, list[str]] = {}
+    for (text, is_of_interval), subset in rows_of.items():
+        is_of_all = len(subset) == (n_intervals if is_of_interval else len(rows))
+        start = text if is_of_all else _names(subset, rows, by)
+        texts_of.setdefault(start, []).extend([] if is_of_all else [text])
+    return tuple(
+        f"{start}: {'; '.join(texts)}." if texts else f"{start}."
+        for start, texts in texts_of.items()
+    )
+
+
+def _names(subset: Sequence[Row], rows: Sequence[Row], by: str) -> str:
+    # The coefficients that a note holds for, with their groups unless it holds for all;
+    # three or more that follow each other in the table by the first and the last. The
+    # groups alone where it holds for every coefficient of them.
+    every: dict[str, list[str]] = {}
+    some: dict[str, list[str]] = {}
+    for groups_of, of in ((every, rows), (some, subset)):
+        for row in of:
+            groups_of.setdefault(row["title"], []).append(row.get("group", ""))
+    names: list[str] = []
+    for groups, of_groups in itertools.groupby(every, key=some.get):
+        titles = list(of_groups)
+        if groups is None:
+            continue
+        if by and len(titles) == len(every):
+            # of several levels, as North: test, the names say enough
+            return (
+                "; ".join(groups) if "," in by else f"{capital(by)} {', '.join(groups)}"
+            )
+        is_of_all = all(every[title] == groups for title in titles)
+        which = "" if is_of_all else f" ({', '.join(groups)})"
+        if len(titles) > 2:
+            titles = [f"{titles[0]} to {titles[-1]}"]
+        names += [f"{title}{which}" for title in titles]
+    return "; ".join(names)
 
 
 def _columns(
@@ -259,25 +290,30 @@ def _cells(
     # what columns show, and the texts of notes: how the interval was made, what to know
     # of it, and why a value is undefined
     estimate, interval = row.estimate, row.estimate.interval
-    cells: Row = {key: getattr(estimate, key) for key in _OF_ESTIMATE}
-    cells |= dict.fromkeys(heads, row.group)
-    cells |= {"title": row.title, "group": row.group, "interval_texts": None}
     # without observed agreement a statistic as a rule has no error either
     numbers = (estimate.observed, estimate.standard_error)
     has_none = all(map(math.isnan, numbers)) and estimate.reason is None
-    cells["standard_error"] = None if has_none else estimate.standard_error
-    cells["words"] = None if bands is None else _word(row, bands)
     undefined = [] if estimate.reason is None else [f"undefined: {estimate.reason}"]
-    cells["texts"] = [*undefined, *row.notes]
+    cells: Row = {
+        **{key: getattr(estimate, key) for key in _OF_ESTIMATE},
+        **dict.fromkeys(heads, row.group),
+        "title": row.title,
+        "group": row.group,
+        "standard_error": None if has_none else estimate.standard_error,
+        "words": None if bands is None else _word(row, bands),
+        "texts": [*undefined, *row.notes],
+        "interval_texts": None,
+    }
     if interval is not None:
-        cells |= {key: getattr(interval, key) for key in _OF_INTERVAL}
         texts = []
         if interval.reason is None:
             texts.append(_interval_note(interval, explain))
         elif interval.reason != estimate.reason:
             texts.append(f"no interval ({interval.method}): {interval.reason}")
         brief = filter(None, (getattr(of, "brief", of) for of in interval.notes))
-        cells["interval_texts"] = [*texts, *(interval.notes if explain else brief)]
+        texts += interval.notes if explain else brief
+        cells |= {key: getattr(interval, key) for key in _OF_INTERVAL}
+        cells["interval_texts"] = texts
     return cells
 
 
@@ -319,10 +355,10 @@ def _paired_note(rows: Sequence[AgreementRow]) -> list[str]:
         for row in rows
         if row.estimate.n_items_paired < row.estimate.n_items
     }
-    counts = {of: f"{e.n_items_paired} of {e.n_items}" for of, e in fewer.items()}
     if not fewer:
         return []
     pair = pair_words(next(iter(fewer.values())))
+    counts = {of: f"{e.n_items_paired} of {e.n_items}" for of, e in fewer.items()}
     if len({row.group for row in rows}) == 1:
         return [f"{count} items have {pair}." for count in counts.values()]
     of_groups = ", ".join(f"{count} ({group})" for group, count in counts.items())
@@ -344,11 +380,10 @@ def _interval_note(interval: Interval, explain: bool) -> str:
 
 def _words_note(rows: Sequence[AgreementRow], bands: BandScale) -> str:
     named = [row for row in rows if _word(row, bands) is not None]
-    laws = []
-    if any(row.lower_bound is not None for row in named):
-        laws.append("its interval (one-sided)")
-    if any(row.lower_bound is None for row in named):
-        none = " where there is none" if laws else ""
+    bounded = [row for row in named if row.lower_bound is not None]
+    laws = ["its interval (one-sided)"] if bounded else []
+    if len(bounded) < len(named):
+        none = " where there is none" if bounded else ""
         laws.append(f"a normal law around the estimate{none}")
     by = f", by {', or by '.join(laws)}" if laws else ""
     if any(r.lower_bound is None and r.estimate.standard_error == 0.0 for r in named):
@@ -361,15 +396,14 @@ def _words_note(rows: Sequence[AgreementRow], bands: BandScale) -> str:
 
 def agreement_sentences(answer: Answer, *, bands: BandScale | None, data: str) -> str:
     """Return a sentence for every estimate, one a line."""
+    stamp = f"{SIMULATED}. " if data == "simulated" else ""
     lines = []
     for row in answer.estimates:
-        word = None if bands is None else _word(row, bands)
         earned = ""
-        if bands is not None and word not in (None, "undefined"):
+        if bands is not None and (word := _word(row, bands)) not in (None, "undefined"):
             earned = f"at least {word} after {_SOURCES[bands]}"
-        of_group = [f"{capital(by)} {row.group}: " for by in answer.heads.values()]
-        stamp = [f"{SIMULATED}. "] * (data == "simulated")
-        lines.append("".join([*stamp, *of_group, sentence(row.estimate, word=earned)]))
+        group = "".join(f"{capital(by)} {row.group}: " for by in answer.heads.values())
+        lines.append(f"{stamp}{group}{sentence(row.estimate, word=earned)}")
     return "\n".join(lines)
 
 
@@ -382,12 +416,10 @@ def _why_null(estimate: Estimate) -> list[str]:
         is_error = nulls == ["standard_error"]
         who = "one item" if is_error else COEFFICIENTS[estimate.coefficient].title
         why.append(f"{', '.join(nulls)}: null, {who} has none")
-    interval = estimate.interval
-    ends = () if interval is None else (("low", interval.low), ("high", interval.high))
     return why + [
         f"interval.{name}: null, there is no bound"
-        for name, end in ends
-        if math.isinf(end)
+        for name in ("low", "high")
+        if math.isinf(getattr(estimate.interval, name, 0.0))
     ]
 
 
@@ -397,30 +429,27 @@ def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> "Forest":
 
     # what is in the units of the ratings is on no axis of agreement
     rows = [row for row in rows if not _is_in_units(row)]
-    if not rows:
-        raise ParameterError(
+    refuse(
+        (
+            not rows,
             "--figure: shows coefficients of agreement, got only estimates in the "
-            "units of the ratings"
+            "units of the ratings",
         )
+    )
     population = _POPULATIONS[target]
     several = len({row.group for row in rows}) > 1
+    drawn = []
+    for row in rows:
+        # what neither the axis nor the legend says of the interval
+        details = []
+        if interval := row.estimate.interval:
+            details += ["one-sided"] if interval.is_one_sided else []
+            is_other = interval.target != target
+            details += [f"other {_POPULATIONS[interval.target]}"] if is_other else []
+        group = row.group if several else ""
+        detail = ", ".join(details)
+        drawn.append(forest_row(row.title, row.estimate, detail=detail, group=group))
     return Forest(
-        rows=tuple(_forest_row(row, target, has_group=several) for row in rows),
+        rows=tuple(drawn),
         axis_label=f"agreement (1 is perfect); intervals for other {population}",
-    )
-
-
-def _forest_row(row: AgreementRow, target: Target, *, has_group: bool) -> "ForestRow":
-    interval = row.estimate.interval
-    # what neither the axis nor the legend says of the interval
-    details = []
-    if interval is not None:
-        details += ["one-sided"] if interval.is_one_sided else []
-        if interval.target != target:
-            details.append(f"other {_POPULATIONS[interval.target]}")
-    return forest_row(
-        row.title,
-        row.estimate,
-        detail=", ".join(details),
-        group=row.group if has_group else "",
     )

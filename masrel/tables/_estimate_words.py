@@ -1,15 +1,13 @@
 """Estimates, intervals and notes in words: what they are, and what they promise."""
 
-import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from masrel.agreement import COEFFICIENTS
 from masrel.estimates import Estimate, Interval
 from masrel.tables._tables import (
-    capital,
     counted,
     interval_text,
     number,
@@ -127,14 +125,14 @@ def _uncertainty(estimate: Estimate, shown: Callable[[float], str]) -> list[str]
     errors = [] if math.isnan(error) else [f"SE = {shown(error)}"]
     if interval is None:
         return errors
-    name = f"{percent(interval.level)} % {_SHORT_KINDS[interval.kind]}"
+    level, method = percent(interval.level), interval.method.split(",")[0]
+    name = f"{level} % {_SHORT_KINDS[interval.kind]}"
     if interval.reason is not None:
         return [*errors, f"no {name} ({interval.reason})"]
-    method = interval.method.split(",")[0]
+    low, high = shown(interval.low), shown(interval.high)
     if interval.is_one_sided:
-        name = f"{percent(interval.level)} % {interval.kind} lower bound"
-        return [f"{name} {shown(interval.low)} ({method})"]
-    return [f"{name} [{shown(interval.low)}, {shown(interval.high)}] ({method})"]
+        return [f"{level} % {interval.kind} lower bound {low} ({method})"]
+    return [f"{name} [{low}, {high}] ({method})"]
 
 
 _SHORT_KINDS = {"confidence": "CI", "credible": "credible interval"}
@@ -144,55 +142,3 @@ def _apa(value: float) -> str:
     # two decimals, no 0 before the point: none of the coefficients can exceed 1
     text = number(value, 2)
     return text.removeprefix("0") if value >= 0.0 else text.replace("−0.", "−.")
-
-
-def row_notes(rows: Sequence[Mapping[str, Any]], by: str) -> tuple[str, ...]:
-    """Return the notes on rows, what is of the same rows as one note."""
-    # A note names its rows, unless it holds for all that it could be of.
-    # rows: each with its title, its group, and its texts without the end of the
-    # sentence: of it, and of its interval if it has one; by: what groups are called
-    rows_of: dict[tuple[str, bool], list[Mapping[str, Any]]] = {}
-    for row in rows:
-        for text in row["texts"]:
-            rows_of.setdefault((text, False), []).append(row)
-        for text in row.get("interval_texts") or ():
-            rows_of.setdefault((text, True), []).append(row)
-    n_intervals = sum(row.get("interval_texts") is not None for row in rows)
-    texts_of: dict[str, list[str]] = {}
-    for (text, is_of_interval), subset in rows_of.items():
-        is_of_all = len(subset) == (n_intervals if is_of_interval else len(rows))
-        start = text if is_of_all else _names(subset, rows, by)
-        texts_of.setdefault(start, []).extend([] if is_of_all else [text])
-    return tuple(
-        f"{start}: {'; '.join(texts)}." if texts else f"{start}."
-        for start, texts in texts_of.items()
-    )
-
-
-def _names(
-    subset: Sequence[Mapping[str, Any]], rows: Sequence[Mapping[str, Any]], by: str
-) -> str:
-    # The coefficients that a note holds for, with their groups unless it holds for all;
-    # three or more that follow each other in the table by the first and the last. The
-    # groups alone where it holds for every coefficient of them.
-    every: dict[str, list[str]] = {}
-    some: dict[str, list[str]] = {}
-    for groups_of, of in ((every, rows), (some, subset)):
-        for row in of:
-            groups_of.setdefault(row["title"], []).append(row["group"])
-    names: list[str] = []
-    for groups, of_groups in itertools.groupby(every, key=some.get):
-        titles = list(of_groups)
-        if groups is None:
-            continue
-        if by and len(titles) == len(every):
-            # of several levels, as North: test, the names say enough
-            return (
-                "; ".join(groups) if "," in by else f"{capital(by)} {', '.join(groups)}"
-            )
-        is_of_all = all(every[title] == groups for title in titles)
-        which = "" if is_of_all else f" ({', '.join(groups)})"
-        if len(titles) > 2:
-            titles = [f"{titles[0]} to {titles[-1]}"]
-        names += [f"{title}{which}" for title in titles]
-    return "; ".join(names)

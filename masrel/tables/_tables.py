@@ -222,39 +222,31 @@ def as_csv(table: Table, *, raw: bool = False) -> str:
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow([*(cell(column.key) for _, column in places), "data"])
     for row in table.rows:
-        cells = [row[i] for i, _ in places]
-        known = [
-            None if isinstance(c, float) and not math.isfinite(c) else c for c in cells
+        cells = [
+            None if isinstance(c, float) and not math.isfinite(c) else c
+            for c in (row[i] for i, _ in places)
         ]
-        shown = [cell(c) if isinstance(c, str) else c for c in known]
+        shown = [cell(c) if isinstance(c, str) else c for c in cells]
         writer.writerow([*shown, table.data])  # None is written as nothing
     return out.getvalue()
 
 
 def as_text(table: Table, *, width: int | None = None) -> str:
-    """Return a table for a screen of fixed-width letters, its notes wrapped."""
+    """Return a table for a screen of fixed-width letters; None wraps no note."""
     columns, body = page_cells(table)
     head = [column.heading for column in columns]
     lines = aligned([head, *body], [column.align for column in columns], rule=True)
-    read, notes = wrapped(table.read, width), wrapped(table.notes, width)
-    return "\n".join([table.labelled_caption, *read, *lines, *notes])
-
-
-def wrapped(notes: Sequence[str], width: int | None) -> list[str]:
-    """Return notes as lines of a width, those that go on indented; None is no width."""
-    if width is None:
-        return list(notes)
-    lines = [
-        textwrap.wrap(
-            note,
+    read, notes = table.read, table.notes
+    if width is not None:
+        wrapper = textwrap.TextWrapper(
             width,
             subsequent_indent="  ",
             break_long_words=False,
             break_on_hyphens=False,
         )
-        for note in notes
-    ]
-    return [line for note in lines for line in note]
+        read = tuple(line for text in read for line in wrapper.wrap(text))
+        notes = tuple(line for text in notes for line in wrapper.wrap(text))
+    return "\n".join([table.labelled_caption, *read, *lines, *notes])
 
 
 def aligned(
