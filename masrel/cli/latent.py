@@ -23,7 +23,6 @@ from masrel.errors import ParameterError, RatingsError
 from masrel.ratings._findings import ReadingOptions
 
 if TYPE_CHECKING:
-    from masrel.intervals import LatentTrait
     from masrel.ratings import RatingsFile, RatingsPart
 
 
@@ -78,20 +77,30 @@ def latent(
             f"grades met are text: {', '.join(ratings.scale.grades[:6])}"
         )
     notes = (*what_was_read(ratings), *(f"warning: {w}" for w in ratings.warnings))
-    result = _sample(
-        ratings,
-        _part(ratings, file, only),
-        items=items,
-        level=level,
-        seed=seed,
-        compare=not one_prior,
-        is_quiet=output.quiet,
-    )
+    part = _part(ratings, file, only)
+    # imported here: they load slowly, and a call that is refused needs none of them
+    import numpy as np
+    import pandas as pd
+
+    from masrel.agreement import code_ratings
+    from masrel.intervals import latent_trait
     from masrel.plots._drawn_values import Drawn
     from masrel.tables._latent_trait import latent_document, latent_table
     from masrel.tables._tables import SIMULATED
 
     grades, simulated = ratings.scale.grades, ratings.simulated
+    cells = np.array([*grades, None], dtype=object)[code_ratings(part.ratings).codes]
+    table = pd.DataFrame(cells, index=part.items, columns=part.raters, dtype=object)
+    with progress("sampling", " steps", is_quiet=output.quiet) as report:
+        result = latent_trait(
+            table,
+            items=items,
+            categories=list(grades),
+            level=level,
+            compare=not one_prior,
+            progress=report,
+            rng=seed,
+        )
     write_output(
         output,
         document=lambda: latent_document(result),
@@ -119,34 +128,3 @@ def _part(ratings: "RatingsFile", file: Path, session: str | None) -> "RatingsPa
             f"{file}: holds {len(parts)} sessions ({known}); --only chooses one"
         )
     raise RatingsError(f"{file}: --only: holds no session {session}, but {known}")
-
-
-def _sample(
-    ratings: "RatingsFile",
-    part: "RatingsPart",
-    *,
-    items: Literal["fixed", "random"],
-    level: float,
-    seed: int,
-    compare: bool,
-    is_quiet: bool,
-) -> "LatentTrait":
-    import numpy as np
-    import pandas as pd
-
-    from masrel.agreement import code_ratings
-    from masrel.intervals.latent._trait import latent_trait
-
-    codes = code_ratings(part.ratings).codes
-    grades = np.array([*ratings.scale.grades, None], dtype=object)[codes]
-    table = pd.DataFrame(grades, index=part.items, columns=part.raters, dtype=object)
-    with progress("sampling", " steps", is_quiet=is_quiet) as report:
-        return latent_trait(
-            table,
-            items=items,
-            categories=list(ratings.scale.grades),
-            level=level,
-            compare=compare,
-            progress=report,
-            rng=seed,
-        )

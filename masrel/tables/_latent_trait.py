@@ -62,26 +62,6 @@ def _rows(result: "LatentTrait") -> Iterator[dict[str, object]]:
 
 
 def _notes(result: "LatentTrait") -> Iterator[str]:
-    yield from _meanings(result)
-    yield f"Prior: {result.prior.words}."
-    if result.other is not None:
-        yield f"Other prior: {result.other.prior.words}."
-    unlikely = _unlikely(result)
-    if unlikely:
-        yield (
-            "The model does not make ratings like these (predictive check): "
-            f"{'; '.join(unlikely)}."
-        )
-    else:
-        yield "The model makes ratings like these (predictive check)."
-    yield (
-        f"{result.n_chains} chains of {result.n_steps} steps; R-hat at most "
-        f"{number(result.r_hat, 4)}, effective size at least {number(result.ess, 0)}; "
-        f"seed {result.seed}."
-    )
-
-
-def _meanings(result: "LatentTrait") -> Iterator[str]:
     # what the numbers are about, and their unit
     interval = result.kappa.interval
     if interval is not None:
@@ -103,16 +83,24 @@ def _meanings(result: "LatentTrait") -> Iterator[str]:
             f"Neighbouring thresholds are {number(distance, 2)} apart on average: a "
             "bias of that is about one grade."
         )
-
-
-def _unlikely(result: "LatentTrait") -> list[str]:
-    # what of the ratings the model would hardly make
-    return [
+    yield f"Prior: {result.prior.words}."
+    if result.other is not None:
+        yield f"Other prior: {result.other.prior.words}."
+    unlikely = [
         f"{check.name} {significant(check.observed, 3)}, expected "
         f"{significant(check.low, 3)} to {significant(check.high, 3)}"
         for check in result.checks
         if not _UNLIKELY <= check.p_value <= 1.0 - _UNLIKELY
     ]
+    makes, which = "makes", ""
+    if unlikely:
+        makes, which = "does not make", f": {'; '.join(unlikely)}"
+    yield f"The model {makes} ratings like these (predictive check){which}."
+    yield (
+        f"{result.n_chains} chains of {result.n_steps} steps; R-hat at most "
+        f"{number(result.r_hat, 4)}, effective size at least {number(result.ess, 0)}; "
+        f"seed {result.seed}."
+    )
 
 
 def latent_document(result: "LatentTrait") -> dict[str, object]:

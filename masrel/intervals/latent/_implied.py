@@ -18,14 +18,14 @@ from scipy.special import ndtr
 
 from masrel.agreement._engine import Floats
 from masrel.agreement._labels import Codes
+from masrel.intervals._quadrature import beta_nodes
 from masrel.intervals.latent._model import Traits
 
 Items = Literal["fixed", "random"]
 """Whether kappa is for these items, or for new ones of their population."""
 
 _MAX_W = 5.5  # where the sum over a rater's w ends, on either side
-_STEPS = 30  # points on either side of the centre of a tanh-sinh quadrature
-_MAX_T = 2.9  # where its weights end
+_N_NODES = 69  # of a tanh-sinh quadrature
 _MAX_Z = 8.5  # standard deviations of an item
 _CHUNK = 400  # positions at a time
 
@@ -55,12 +55,8 @@ class Agreement:
 def grade_probabilities(traits: Traits) -> Floats:
     """Return how likely a new rater gives each grade to each of the items."""
     # -> (n, n_items, n_categories)
-    total: Floats = np.zeros(0)
-    for deviation, weight in _perceived(traits):
-        away = traits.thresholds[:, None, :] - traits.severity[:, :, None]
-        below = weight * ndtr(away / deviation[:, None, None])
-        total = below if not total.size else total + below
-    return _differences(total)
+    away = traits.thresholds[:, None, :] - traits.severity[:, :, None]
+    return _shares(traits, away)
 
 
 def agreement_on_items(traits: Traits) -> Agreement:
@@ -75,22 +71,15 @@ def agreement_on_new_items(traits: Traits) -> Agreement:
     # At each of them; the variance is an integral over θ ~ N(0, ρ), and in π_k θ
     # integrates out.
     # p_k(θ) changes within s of each threshold, however small s is. The tanh-sinh rule
-    # between neighbouring thresholds has points so close to both ends that it follows
-    # [1]_: κ is within 1e-6 for ρ < 0.99, and within 1e-5 beyond.
-    # [1] Takahasi, H., Mori, M. (1974). Double exponential formulas for numerical
-    # integration. Publ. RIMS, Kyoto University, 9(3), 721-741.
-    # https://doi.org/10.2977/prims/1195192451
-    below = np.zeros(traits.thresholds.shape)
-    for deviation, weight in _perceived(traits):
-        total = np.sqrt(traits.item_share + deviation**2)
-        below += weight * ndtr(traits.thresholds / total[:, None])
-    shares = _differences(below)
+    # between neighbouring thresholds has points so close to both ends that it follows:
+    # κ is within 1e-6 for ρ < 0.99, and within 1e-5 beyond.
+    shares = _shares(traits, traits.thresholds[:, None, :], more=traits.item_share)
     # Positions of like spread together, as the widest says how many points w needs.
     order, variance = np.argsort(traits.noise_spread), np.empty(len(shares))
     for at in range(0, len(shares), _CHUNK):
         rows = order[at : at + _CHUNK]
         variance[rows] = _variance(traits, shares, rows)
-    return Agreement.of(shares, variance)
+    return Agreement.of(shares[:, 0], variance)
 
 
 def _variance(traits: Traits, shares: Floats, rows: NDArray[np.intp]) -> Floats:
@@ -100,48 +89,37 @@ def _variance(traits: Traits, shares: Floats, rows: NDArray[np.intp]) -> Floats:
     inner = (tau / root).clip(-_MAX_Z, _MAX_Z)
     far = np.full_like(root, _MAX_Z)
     ends = np.sort(np.hstack([-far, inner, 0.0 * far, far]), axis=1)
-    point, mass = _tanh_sinh()
-    half = 0.5 * np.diff(ends, axis=1)[:, :, None]
-    z = (ends[:, :-1, None] + half * (1.0 + point)).reshape(len(root), -1)
-    weigh = (half * mass).reshape(z.shape) * np.exp(-0.5 * z**2) / np.sqrt(2.0 * np.pi)
-    below = np.zeros((*z.shape, tau.shape[1]))
-    away = tau[:, None, :] - (root * z)[:, :, None]
-    for deviation, weight in _perceived(traits, rows):
-        below += weight * ndtr(away / deviation[:, None, None])
-    square = ((_differences(below) - shares[rows, None]) ** 2).sum(axis=2)
-    return np.asarray((square * weigh).sum(axis=1))
+    nodes, mass = beta_nodes(1.0, 1.0, _N_NODES)
+    width = np.diff(ends, axis=1)[:, :, None]
+    z = (ends[:, :-1, None] + width * nodes[:, 0]).reshape(len(root), -1)
+    weigh = (width * mass).reshape(z.shape) * np.exp(-0.5 * z**2) / np.sqrt(2.0 * np.pi)
+    p = _shares(traits, tau[:, None, :] - (root * z)[:, :, None], rows)
+    return np.asarray((((p - shares[rows]) ** 2).sum(axis=2) * weigh).sum(axis=1))
 
 
-def _perceived(
-    traits: Traits, rows: NDArray[np.intp] | slice = slice(None)
-) -> list[tuple[Floats, float]]:
-    # s at each point of a trapezoid sum over w, (rows,), with the point's weight. As s²
-    # is 0 at distances of π/(2 η) from the real line, the error falls as e^(-π²/(η h))
-    # with the step h, and as e^(-2 π²/h²) (Trefethen, L. N., Weideman, J. A. C. (2014).
-    # The exponentially convergent trapezoidal rule. SIAM Review 56(3), 385-458.
-    # https://doi.org/10.1137/130932132)
+def _shares(
+    traits: Traits,
+    away: Floats,
+    rows: NDArray[np.intp] | slice = slice(None),
+    more: Floats | float = 0.0,
+) -> Floats:
+    # Of thresholds less severities, (n, m, n_categories - 1), to which new raters add
+    # their bias and noise, and severities a variance of their own: the shares of the
+    # grades, as (n, m, n_categories).
+    # A trapezoid sum over w: as s² is 0 at distances of π/(2 η) from the real line, the
+    # error falls as e^(-π²/(η h)) with the step h, and as e^(-2 π²/h²) (Trefethen,
+    # L. N., Weideman, J. A. C. (2014). The exponentially convergent trapezoidal rule.
+    # SIAM Review 56(3), 385-458. https://doi.org/10.1137/130932132)
     eta = traits.noise_spread[rows]
     n = int(np.ceil(_MAX_W * max(1.0, 2.0 * eta.max(initial=0.0))))
     points = np.linspace(-_MAX_W, _MAX_W, 2 * n + 1)
     weights = np.exp(-0.5 * points**2)
-    bias, noise = traits.bias_variance[rows], traits.noise_variance[rows]
-    return [
-        (np.sqrt(bias + noise * np.exp(2.0 * eta * w)), float(weight))
-        for w, weight in zip(points, weights / weights.sum(), strict=True)
-    ]
-
-
-def _differences(below: Floats) -> Floats:
-    # cumulative (..., n_categories - 1) -> shares (..., n_categories)
+    below = np.zeros(away.shape)
+    for w, weight in zip(points, weights / weights.sum(), strict=True):
+        noise = traits.noise_variance[rows] * np.exp(2.0 * eta * w)
+        deviation = np.sqrt(more + traits.bias_variance[rows] + noise)
+        below += weight * ndtr(away / deviation[:, None, None])
     return np.diff(below, axis=-1, prepend=0.0, append=1.0)
-
-
-def _tanh_sinh() -> tuple[Floats, Floats]:
-    # points in (-1, 1) and weights of ∫ f
-    at = np.linspace(-_MAX_T, _MAX_T, 2 * _STEPS + 1)
-    inner = 0.5 * np.pi * np.sinh(at)
-    weight = 0.5 * np.pi * np.cosh(at) / np.cosh(inner) ** 2 * (at[1] - at[0])
-    return np.tanh(inner), weight
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,10 +13,9 @@ beyond the threshold next to it: its coordinate y, which is
 √(ρ) / c log(1 + e^y) + y / √n beyond it, turns the wall of n ratings into a slope. The
 coordinate of an item that ratings hardly place is θ_i / √ρ, the unit of its prior.
 
-Raters' biases and noises have scales, √(1 - f) and η, that ratings tell only through
-them. Their coordinates are units of what the scale and the ratings leave open, so that
-they hardly change with it (`Information`); η itself has one that falls to 0 by powers
-of e, since 0 is where raters' noises are alike.
+Raters' biases and noises are in units of their scales, √(1 - f) and η, which ratings
+tell only through them; η has a coordinate by which it falls to 0 by powers of e, since
+0 is where raters' noises are alike.
 """
 
 import math
@@ -24,13 +23,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import expit, log_ndtr, ndtr, ndtri
+from scipy.special import expit, ndtr, ndtri
 
 from masrel.agreement._engine import Floats
 from masrel.agreement._labels import Codes
 from masrel.errors import ParameterError
 
 _NOISE_UNIT = 0.2  # η of about which logarithms of the noises differ in studies
+_FAR = 1e9  # where the first grade begins and the last ends: times 0 it is 0
 _PLAIN = 5.0  # variance of items' means over its error, where ratings place items
 
 
@@ -124,56 +124,6 @@ class Traits:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Scaled:
-    """Numbers z at n positions, with how they change."""
-
-    # value, by_coordinate, by_scale: (n, n_raters): z and its slopes
-    value: Floats = field(compare=False, repr=False)
-    by_coordinate: Floats = field(compare=False, repr=False)
-    by_scale: Floats = field(compare=False, repr=False)
-    # (n,) and (n, 1): Σ log ∂z/∂(coordinate), and the slope of that by s
-    log_jacobian: Floats = field(compare=False, repr=False)
-    jacobian_by_scale: Floats = field(compare=False, repr=False)
-
-
-@dataclass(frozen=True, slots=True)
-class Information:
-    """What ratings tell of numbers s z, z ~ N(0, 1): as if each was seen at m once."""
-
-    # I, m: (n_raters,): the information, one over the variance, and the place
-    amount: Floats = field(compare=False, repr=False)
-    place: Floats = field(compare=False, repr=False)
-
-    @classmethod
-    def at_peak(cls, peak: Floats, curvature: Floats, scale: float) -> "Information":
-        """Take z where the posterior has its peak, and the likelihood's curvature."""
-        amount = curvature.clip(0.0) / scale**2
-        known = scale * amount
-        # the peak is at m s I / (1 + s² I)
-        place = peak * (1.0 + scale * known) / np.where(known > 0.0, known, np.inf)
-        return cls(amount, place)
-
-    def scaled(self, coordinate: Floats, scale: Floats) -> Scaled:
-        """Return z at coordinates (n, n_raters), where scales are s, (n, 1)."""
-        # Given s, z is normal around m s I / (1 + s² I) with variance 1 / (1 + s² I).
-        # In units of that its coordinate is a unit normal whatever s is, where z itself
-        # makes a funnel of z and s.
-        known = scale * self.amount
-        precision = 1.0 + scale * known
-        root = np.sqrt(precision)
-        centre = known * self.place / precision
-        away = coordinate / root
-        slope = self.amount * self.place - (2.0 * centre + away) * known
-        return Scaled(
-            value=centre + away,
-            by_coordinate=1.0 / root,
-            by_scale=slope / precision,
-            log_jacobian=-0.5 * np.log(precision).sum(axis=1),
-            jacobian_by_scale=-(known / precision).sum(axis=1, keepdims=True),
-        )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class UnconstrainedPoint:
     """The unknowns at n positions in units of c, and the coordinates themselves."""
 
@@ -192,8 +142,8 @@ class UnconstrainedPoint:
     reach: Floats = field(compare=False, repr=False)
     stretch: Floats = field(compare=False, repr=False)
     # b, w: (n, n_raters): b_r / ω and w_r
-    b: Scaled = field(compare=False, repr=False)
-    w: Scaled = field(compare=False, repr=False)
+    b: Floats = field(compare=False, repr=False)
+    w: Floats = field(compare=False, repr=False)
     # raw_share, raw_fraction, raw_noise_sd: (n, 1): the coordinates of ρ, f and η
     raw_share: Floats = field(compare=False, repr=False)
     raw_fraction: Floats = field(compare=False, repr=False)
@@ -212,7 +162,7 @@ class UnconstrainedPoint:
 class LatentDensity:
     """The posterior of the model on unbounded coordinates."""
 
-    # A position holds, in this order: one coordinate an item; those of b_r / ω and w_r
+    # A position holds, in this order: one coordinate an item; b_r / ω and w_r
     # (n_raters each); logit ρ, logit f, and y where η = 0.2 log(1 + e^y), which falls
     # to 0 as e^y and grows as y; α; and the logarithms of the distances between
     # neighbouring T_k, from the lowest pair up.
@@ -235,16 +185,6 @@ class LatentDensity:
     # (n_items, n_categories - 1): W: weights of the thresholds between an item's
     # grades, or next to its only one
     threshold_weights: Floats = field(compare=False, repr=False)
-    # what ratings tell of b_r / c = √(1 - f) b and of log(σ_r / σ) = η w
-    of_bias: Information
-    of_noise: Information
-    # side: (n_items, n_raters): -1 for a rating in the first grade, 1 in the last,
-    # which one threshold bounds: the probability is Φ(x); 0 for others and missing ones
-    side: Floats = field(compare=False, repr=False)
-    # inner, below: (n_inner,): the others, counted through the table row by row, and
-    # the threshold below them
-    inner: NDArray[np.intp] = field(compare=False, repr=False)
-    below: NDArray[np.intp] = field(compare=False, repr=False)
 
     @classmethod
     def of(cls, codes: Codes, n_categories: int, prior: LatentPrior) -> "LatentDensity":
@@ -261,8 +201,6 @@ class LatentDensity:
         placed = (total > 0.0) & _tell_items_apart(codes)
         scale = np.where(placed, 1.0 / np.where(placed, total, 1.0), 0.0)
         beyond = placed * (is_last.astype(np.float64) - is_first)
-        (inner,) = np.nonzero((codes.ravel() > 0) & (codes.ravel() < last))
-        unknown = Information(*np.zeros((2, codes.shape[1])))
         return cls(
             prior=prior,
             codes=codes,
@@ -272,11 +210,6 @@ class LatentDensity:
             beyond=beyond,
             inside=np.where(beyond, 1.0 / np.sqrt(n_each.clip(1)), 1.0),
             threshold_weights=scale[:, None] * weight,
-            of_bias=unknown,
-            of_noise=unknown,
-            side=(codes == last).astype(np.float64) - (codes == 0),
-            inner=inner,
-            below=codes.ravel().astype(np.intp)[inner] - 1,
         )
 
     @property
@@ -305,15 +238,12 @@ class LatentDensity:
         """Return what positions (n, n_dimensions) hold."""
         at, (n_items, n_raters) = self.share_start, self.codes.shape
         parts = [n_items, n_items + n_raters, at, at + 1, at + 2, at + 3, at + 4]
-        raw_item, raw_b, raw_w, rho, f, raw_eta, anchor, log_gap = np.split(
+        raw_item, b, w, rho, f, raw_eta, anchor, log_gap = np.split(
             position, parts, axis=1
         )
         share, fraction = expit(rho), expit(f)
         root = np.sqrt(expit(-rho))
-        bias_scale = np.sqrt(expit(-f))
-        b = self.of_bias.scaled(raw_b, bias_scale)
         eta = _NOISE_UNIT * np.logaddexp(0.0, raw_eta)
-        w = self.of_noise.scaled(raw_w, eta)
         # T_k from their distances; that of α is 0
         gap = np.exp(log_gap)
         lower = -_from_right(gap[:, : self.middle])
@@ -329,8 +259,8 @@ class LatentDensity:
         item = np.where(self.placed, by_ratings, by_prior)
         return UnconstrainedPoint(
             item=item,
-            bias=bias_scale * b.value,
-            noise=np.sqrt(fraction) * np.exp(eta * w.value),
+            bias=np.sqrt(expit(-f)) * b,
+            noise=np.sqrt(fraction) * np.exp(eta * w),
             threshold=threshold,
             tau=anchor + root * threshold,
             severity=anchor + root * item,
@@ -370,13 +300,8 @@ class LatentDensity:
         # position (n, n_dimensions) -> (n,)
         with np.errstate(all="ignore"):  # far out a cell has probability 0
             point = self.point(position)
-            density = np.zeros(len(position))
-            if self.side.any():
-                x, _ = self._edge(point)
-                density += np.einsum("nir,ir->n", log_ndtr(x), np.abs(self.side))
-            if self.inner.size:
-                low, high, _ = self._inner_ends(point)
-                density += np.log(_normal_probability(low, high)).sum(axis=1)
+            low, high, _ = self._cells(point)
+            density = np.log(_normal_probability(low, high)).sum(axis=1)
             density += self._log_prior(point)
         return np.where(np.isfinite(density), density, -np.inf)
 
@@ -393,8 +318,8 @@ class LatentDensity:
             -0.5 * point.severity**2 / point.share + 0.5 * np.logaddexp(0.0, -rho),
             -0.5 * point.raw_item**2,
         )
-        density = of_items.sum(axis=1) + point.b.log_jacobian + point.w.log_jacobian
-        density -= 0.5 * (point.b.value**2 + point.w.value**2).sum(axis=1)
+        density = of_items.sum(axis=1)
+        density -= 0.5 * (point.b**2 + point.w**2).sum(axis=1)
         # Beta density and Jacobian of the logit: ρ^a (1 - ρ)^b
         shares = a * np.logaddexp(0.0, -rho) + b * np.logaddexp(0.0, rho)
         shares += c * np.logaddexp(0.0, -f) + d * np.logaddexp(0.0, f)
@@ -419,26 +344,17 @@ class LatentDensity:
         # unknowns in units of c
         return int(self.placed.sum()) + self.n_categories - 2
 
-    def _edge(self, point: UnconstrainedPoint) -> tuple[Floats, Floats]:
-        # how far within its grade each rating at an end of the scale lies, in its
-        # rater's noises, (n, n_items, n_raters), and one over those, (n, 1, n_raters)
-        sharp = (1.0 / point.noise)[:, None, :]
-        x = point.item[:, :, None] + point.bias[:, None, :]
-        first, last = point.threshold[:, 0], point.threshold[:, -1]
-        x -= np.where(self.side > 0, last[:, None, None], first[:, None, None])
-        x *= sharp
-        x *= self.side
-        return x, sharp
-
-    def _inner_ends(self, point: UnconstrainedPoint) -> tuple[Floats, Floats, Floats]:
-        # of each rating between two thresholds both ends in its rater's noises, and
-        # the noise under one: three of shape (n, n_inner)
-        item, rater = np.divmod(self.inner, self.codes.shape[1])
+    def _cells(self, point: UnconstrainedPoint) -> tuple[Floats, Floats, Floats]:
+        # of each rating both ends of its grade in its rater's noises, and one over
+        # these: three of shape (n, n_ratings)
+        item, rater = np.nonzero(self.codes >= 0)
+        grade = self.codes[item, rater]
         sharp = (1.0 / point.noise)[:, rater]
         centre = point.item[:, item] + point.bias[:, rater]
-        low = (point.threshold[:, self.below] - centre) * sharp
-        high = (point.threshold[:, self.below + 1] - centre) * sharp
-        return low, high, sharp
+        far = np.full((len(centre), 1), _FAR)
+        ends = np.hstack([-far, point.threshold, far])
+        low, high = ends[:, grade] - centre, ends[:, grade + 1] - centre
+        return low * sharp, high * sharp, sharp
 
     def gradient(self, position: Floats) -> Floats:
         """Return the gradient of `log_density`; 0 where that is -inf."""
@@ -454,42 +370,25 @@ class LatentDensity:
     ) -> tuple[Floats, Floats, Floats, Floats]:
         # of the log-likelihood by u_i, (n, n_items); by b_r and log σ_r, (n, n_raters);
         # and by T_k, (n, n_categories - 1)
-        x, sharp = self._edge(point)
-        hazard = x * x
-        hazard *= -0.5
-        np.exp(hazard, out=hazard)
-        hazard /= ndtr(x)
-        hazard *= self.side / np.sqrt(2.0 * np.pi)
-        x *= self.side
-        x *= hazard
-        hazard *= sharp
-        threshold = np.zeros_like(point.threshold)
-        # einsum and not a product of matrices, whose threads cost more than they save
-        threshold[:, 0] -= np.einsum("nir,ir->n", hazard, self.side < 0)
-        threshold[:, -1] -= np.einsum("nir,ir->n", hazard, self.side > 0)
-        item, bias = hazard.sum(axis=2), hazard.sum(axis=1)
-        log_noise = -x.sum(axis=1)
-        if not self.inner.size:
-            return item, bias, log_noise, threshold
-        low, high, sharp = self._inner_ends(point)
+        low, high, sharp = self._cells(point)
         probability = _normal_probability(low, high)
         at_low = _normal_density(low) / probability
         at_high = _normal_density(high) / probability
-        wide = low * at_low - high * at_high
+        by_place, by_noise = np.zeros((2, len(low), *self.codes.shape))
+        by_noise[:, self.codes >= 0] = low * at_low - high * at_high
         at_low *= sharp
         at_high *= sharp
-        by_cell, by_noise = np.zeros((2, len(low), *self.side.shape))
-        by_cell.reshape(len(low), -1)[:, self.inner] = at_low - at_high
-        by_noise.reshape(len(low), -1)[:, self.inner] = wide
-        # (n_inner, n_categories - 1): 1 where a threshold is the one below
-        is_below = (self.below[:, None] == np.arange(threshold.shape[1])) * 1.0
-        by_threshold = -np.einsum("nr,rk->nk", at_low, is_below)
-        by_threshold[:, 1:] += np.einsum("nr,rk->nk", at_high, is_below[:, :-1])
+        by_place[:, self.codes >= 0] = at_low - at_high
+        grade = self.codes[self.codes >= 0]
+        is_grade = (grade[:, None] == np.arange(self.n_categories)) * 1.0
+        # einsum and not a product of matrices, whose threads cost more than they save
+        above = np.einsum("nr,rk->nk", at_high, is_grade)[:, :-1]
+        below = np.einsum("nr,rk->nk", at_low, is_grade)[:, 1:]
         return (
-            item + by_cell.sum(axis=2),
-            bias + by_cell.sum(axis=1),
-            log_noise + by_noise.sum(axis=1),
-            threshold + by_threshold,
+            by_place.sum(axis=2),
+            by_place.sum(axis=1),
+            by_noise.sum(axis=1),
+            above - below,
         )
 
     def _prior_slopes(
@@ -528,18 +427,15 @@ class LatentDensity:
         up = _from_right(threshold)[:, self.middle + 1 :]
         loose = np.where(placed, 0.0, by_item)  # moves against the thresholds with α
         anchor = item.sum(axis=1) + tau.sum(axis=1) - (loose / root).sum(axis=1)
-        b, w = point.b, point.w
-        by_b = np.sqrt(1.0 - point.fraction) * by_bias - b.value
-        by_w = point.noise_sd * by_noise - w.value
         return np.hstack(
             [
                 by_raw_item,
-                by_b * b.by_coordinate,
-                by_w * w.by_coordinate,
+                np.sqrt(1.0 - point.fraction) * by_bias - point.b,
+                point.noise_sd * by_noise - point.w,
                 self._by_share(point, item, tau, loose)
                 + through.sum(axis=1, keepdims=True),
-                self._by_fraction(point, by_bias, by_b, by_noise),
-                self._by_noise_sd(point, by_noise, by_w),
+                self._by_fraction(point, by_bias, by_noise),
+                self._by_noise_sd(point, by_noise),
                 anchor[:, None],
                 1.0 + np.asarray(point.gap * np.hstack([down, up])),
             ]
@@ -564,25 +460,20 @@ class LatentDensity:
         )
 
     def _by_fraction(
-        self, point: UnconstrainedPoint, by_bias: Floats, by_b: Floats, by_noise: Floats
+        self, point: UnconstrainedPoint, by_bias: Floats, by_noise: Floats
     ) -> Floats:
         # by logit f, (n, 1): √(1 - f) scales b, and √f all noises
         c, d = self.prior.noise_fraction
-        f, b = point.fraction, point.b
-        bias = (by_bias * b.value + by_b * b.by_scale).sum(axis=1, keepdims=True)
-        bias += b.jacobian_by_scale
-        noise = 0.5 * by_noise.sum(axis=1, keepdims=True)
-        slope = (1.0 - f) * (noise + c) - f * (0.5 * np.sqrt(1.0 - f) * bias + d)
-        return np.asarray(slope)
+        f = point.fraction
+        bias = (by_bias * point.bias).sum(axis=1, keepdims=True)
+        noise = by_noise.sum(axis=1, keepdims=True)
+        return np.asarray((1.0 - f) * (0.5 * noise + c) - f * (0.5 * bias + d))
 
-    def _by_noise_sd(
-        self, point: UnconstrainedPoint, by_noise: Floats, by_w: Floats
-    ) -> Floats:
+    def _by_noise_sd(self, point: UnconstrainedPoint, by_noise: Floats) -> Floats:
         # by the coordinate of η, (n, 1), which scales w
-        raw, w = point.raw_noise_sd, point.w
-        noises = (by_noise * w.value + by_w * w.by_scale).sum(axis=1, keepdims=True)
-        of_prior = point.noise_sd / self.prior.noise_spread**2
-        by_eta = noises + w.jacobian_by_scale - of_prior
+        raw = point.raw_noise_sd
+        by_eta = (by_noise * point.w).sum(axis=1, keepdims=True)
+        by_eta -= point.noise_sd / self.prior.noise_spread**2
         return np.asarray(by_eta * _NOISE_UNIT * expit(raw) + expit(-raw))
 
 

@@ -5,17 +5,15 @@ adapting has no distribution to converge to.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import Protocol
+from dataclasses import dataclass, field
 
 import emcee
 import numpy as np
 from arviz_stats.base import array_stats
-from scipy.optimize import minimize
 
 from masrel.agreement._engine import Floats
 from masrel.errors import ConvergenceError
-from masrel.intervals.latent._model import Information, LatentDensity
+from masrel.intervals.latent._model import LatentDensity
 
 MAX_R_HAT = 1.01
 
@@ -33,13 +31,12 @@ LONGEST = 1.15  # the longest step length of a proposal, over the fitted one
 SHORTEST = 0.27  # the shortest, as a share of the longest
 _EXPECTED_STEPS = 1_000  # of a chain, before any is checked: studies take 400 to 2300
 _N_CURVED = 32  # chains at whose places the curvature is averaged
-_UNKNOWN = 0.3  # deviation in which chains begin around ρ', f' and η
+_UNKNOWN = 0.3  # deviation of every coordinate in which chains begin
 _WIDER = 2.0  # from where a variance of the draws is believed over the curvature
 _MAX_KEPT = 500  # positions of a chain; beyond, every other one is dropped
 _N_CHAINS = 64
 _MANY = 1_000  # ratings from which half as many chains do: a step then costs by them
 _MIN_CURVATURE = 0.2  # least curvature that is believed
-_MAX_DROP = 0.75  # how far below the mode chains may begin, per dimension
 
 Progress = Callable[[int, int], object]
 """Called with how many steps are made, and how many are expected in all."""
@@ -47,82 +44,30 @@ Progress = Callable[[int, int], object]
 _Proposal = Callable[[Floats, np.random.RandomState], tuple[Floats, Floats]]
 
 
-def _n_chains(density: LatentDensity) -> int:
-    return _N_CHAINS // 2 if density.side.size > _MANY else _N_CHAINS
-
-
 def n_warm_up_steps() -> int:
     """Return how many steps of every chain are thrown away."""
     return sum(_WARM_UP)
 
 
-def begin(
-    density: LatentDensity, generator: np.random.Generator
-) -> tuple[LatentDensity, Floats, Floats]:
-    """Return starts (n_chains, d) that are spread as a normal, and its covariance."""
-    # The density comes back with coordinates fitted to the ratings. The joint density
-    # has its mode in a spike of next to no volume: the peak is looked for with ρ, f
-    # and η held.
-    at = density.share_start
-    loose = np.delete(np.arange(density.n_dimensions), slice(at, at + 3))
-    peak = density.start()
-
-    def downhill(part: Floats) -> tuple[float, Floats]:
-        row = np.array(peak)
-        row[loose] = part
-        value, slope = density.log_density(row[None]), density.gradient(row[None])
-        return -float(value[0]), -slope[0, loose]
-
-    optimum = minimize(downhill, peak[loose], jac=True, method="L-BFGS-B")
-    peak[loose] = optimum.x
-    density, peak = _informed(density, peak)
-    held = np.ix_(loose, loose)
-    covariance = _UNKNOWN**2 * np.eye(peak.size)
-    covariance[held] = _inverse(_curvature(density, peak[None])[held])
-    away = generator.standard_normal((_n_chains(density), peak.size))
-    away = away @ np.linalg.cholesky(covariance).T
-    lowest = -optimum.fun - _MAX_DROP * peak.size
-    while (low := ~(density.log_density(peak + away) > lowest)).any():
-        away[low] *= 0.8  # walls of the likelihood are nearer than a normal's
-    return density, peak + away, covariance
+def begin(density: LatentDensity, generator: np.random.Generator) -> Floats:
+    """Return where chains start, (n_chains, n_dimensions)."""
+    n_chains = _N_CHAINS // 2 if density.codes.size > _MANY else _N_CHAINS
+    away = generator.standard_normal((n_chains, density.n_dimensions))
+    return density.start() + _UNKNOWN * away
 
 
-def _informed(density: LatentDensity, peak: Floats) -> tuple[LatentDensity, Floats]:
-    # -> with coordinates of biases and noises that know what ratings tell of each, as
-    # seen at the peak; and the peak in them
-    point, (first, n) = density.point(peak[None]), density.codes.shape
-    curvature = np.diag(_curvature(density, peak[None])) - 1.0
-    of_bias, of_noise = slice(first, first + n), slice(first + n, first + 2 * n)
-    bias_scale = float(np.sqrt(1.0 - point.fraction[0, 0]))
-    noise_scale = float(point.noise_sd[0, 0])
-    density = replace(
-        density,
-        of_bias=Information.at_peak(peak[of_bias], curvature[of_bias], bias_scale),
-        of_noise=Information.at_peak(peak[of_noise], curvature[of_noise], noise_scale),
-    )
-    peak = np.array(peak)
-    peak[first : first + 2 * n] = 0.0
-    return density, peak
-
-
-def _curvature(density: "SmoothDensity", positions: Floats) -> Floats:
-    # minus the second derivatives, (d, d), averaged over positions (n, d)
+def _covariance(density: LatentDensity, positions: Floats) -> Floats:
+    # (d, d): the inverse of minus the mean second derivatives at positions (n, d)
     n, d = positions.shape
     around = 1e-4 * np.eye(d)
     total = np.zeros((d, d))
     for first in range(0, d, _N_CHAINS):  # no more rows at once than there are chains
         rows = around[first : first + _N_CHAINS]
         for position in positions:
-            slope = density.gradient(position - rows) - density.gradient(
-                position + rows
-            )
+            before, after = position - rows, position + rows
+            slope = density.gradient(before) - density.gradient(after)
             total[first : first + len(rows)] += slope
-    return np.asarray(0.5 * (total + total.T) / (2e-4 * n))
-
-
-def _inverse(curvature: Floats) -> Floats:
-    # -> a covariance
-    values, axes = np.linalg.eigh(curvature)
+    values, axes = np.linalg.eigh(0.5 * (total + total.T) / (2e-4 * n))
     return np.asarray((axes / values.clip(_MIN_CURVATURE)) @ axes.T)
 
 
@@ -148,16 +93,6 @@ def quantile_error(chains: Floats, share: float) -> float:
     return float(error)
 
 
-class SmoothDensity(Protocol):
-    """A log-density with its slopes, of many positions at once."""
-
-    def log_density(self, position: Floats) -> Floats:
-        """Return the logarithm, (n,), at positions (n, n_dimensions)."""
-
-    def gradient(self, position: Floats) -> Floats:
-        """Return its slopes, (n, n_dimensions)."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chains:
     """Draws of several quantities, converged."""
@@ -170,6 +105,10 @@ class Chains:
     diagnostics: dict[str, Floats] = field(compare=False, repr=False)
     n_steps: int  # steps of every chain after warm-up, kept or not
 
+    def draws(self, name: str, index: int = 0) -> Floats:
+        """Return the draws of one number, (n_chains, at most n_kept)."""
+        return self.values[name][..., index]
+
     @property
     def worst(self) -> tuple[float, float]:
         """The largest R-hat and the smallest effective size."""
@@ -178,10 +117,9 @@ class Chains:
 
 
 def sample_smooth(
-    density: SmoothDensity,
+    density: LatentDensity,
     quantities: Callable[[Floats], dict[str, Floats]],
     start: Floats,
-    covariance: Floats,
     *,
     generator: np.random.Generator,
     n_steps: int,
@@ -189,7 +127,7 @@ def sample_smooth(
     progress: Progress | None = None,
 ) -> Chains:
     """Sample a density by Hamiltonian proposals until its quantities have converged."""
-    # shape of start: (n_chains, n_dimensions); of covariance: n_dimensions squared
+    # shape of start: (n_chains, n_dimensions)
     n_made, n_expected = 0, _EXPECTED_STEPS
 
     def report(n_steps: int) -> None:
@@ -198,7 +136,7 @@ def sample_smooth(
         if progress is not None:
             progress(n_made, max(n_made, n_expected))
 
-    walkers = _warm_up(density, start, covariance, generator, report)
+    walkers = _warm_up(density, start, generator, report)
     positions = np.empty((len(start), 0, start.shape[1]))
     total, thin, more = 0, 1, n_steps
     while total < max_steps:
@@ -241,7 +179,7 @@ class Walkers:
     def __init__(
         self,
         log_density: Callable[[Floats], Floats],
-        proposal: Callable[[Floats, np.random.RandomState], tuple[Floats, Floats]],
+        proposal: _Proposal,
         start: Floats,
         generator: np.random.Generator,
     ) -> None:
@@ -271,15 +209,14 @@ class Walkers:
 
 
 def _warm_up(
-    density: SmoothDensity,
+    density: LatentDensity,
     start: Floats,
-    covariance: Floats,
     generator: np.random.Generator,
     report: Callable[[int], object],
 ) -> Walkers:
     # fits the metric to where the chains went and the step to how many proposals
     # were taken
-    step = _FIRST_STEP
+    step, covariance = _FIRST_STEP, np.eye(start.shape[1])
     for stage, n_steps in enumerate(_WARM_UP):
         root = np.linalg.cholesky(covariance).astype(np.float64)
         positions = []
@@ -292,7 +229,7 @@ def _warm_up(
             step *= float(np.exp(walkers.acceptance - _BEST_ACCEPTANCE))
             step = min(max(step, _STEPS[0]), _STEPS[1])
         if stage < len(_WARM_UP) - 1:
-            covariance = _inverse(_curvature(density, start[:_N_CURVED]))
+            covariance = _covariance(density, start[:_N_CURVED])
             if stage > 0:
                 late = np.concatenate(positions[len(positions) // 2 :], axis=1)
                 covariance = _widened(covariance, late)

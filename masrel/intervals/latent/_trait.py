@@ -310,20 +310,6 @@ class _Question:
     seed: int | None  # the seed to be recorded
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LatentFit:
-    """The model after the data."""
-
-    density: LatentDensity  # what was sampled
-    chains: Chains = field(repr=False)  # draws of all that `LatentChains` has, by name
-    # of two new raters, at the positions where kappa was computed
-    agreement: Agreement = field(repr=False)
-
-    def draws(self, name: str, index: int = 0) -> Floats:
-        """Return the draws of one number, (n_chains, at most n_kept)."""
-        return self.chains.values[name][..., index]
-
-
 def fit_latent(
     density: LatentDensity,
     items: Items,
@@ -332,24 +318,24 @@ def fit_latent(
     n_steps: int,
     max_steps: int,
     progress: Progress | None = None,
-) -> LatentFit:
+) -> tuple[Chains, Agreement]:
     """Sample the model until every reported quantity has converged."""
-    agreement: list[Agreement] = []
+
+    def agreement(positions: Floats) -> Agreement:
+        if items == "random":
+            some = density.traits(_some(positions, _MAX_KAPPAS))
+            return agreement_on_new_items(some)
+        flat = positions.reshape(-1, density.n_dimensions)
+        return agreement_on_items(density.traits(flat))
 
     def quantities(positions: Floats) -> dict[str, Floats]:
-        flat = positions.reshape(-1, density.n_dimensions)
-        traits = density.traits(flat)
-        if items == "fixed":
-            agreement[:] = [agreement_on_items(traits)]
-        else:
-            some = density.traits(_some(positions, _MAX_KAPPAS))
-            agreement[:] = [agreement_on_new_items(some)]
+        traits = density.traits(positions.reshape(-1, density.n_dimensions))
         # Severities and thresholds can all move together: from the mean of these items
         # they are known better than from the mean of their population.
         centre = traits.severity.mean(axis=1, keepdims=True)
         shares = (traits.item_share, traits.bias_variance, traits.noise_variance)
         columns = {
-            "kappa": agreement[0].kappa[:, None],
+            "kappa": agreement(positions).kappa[:, None],
             "severity": traits.severity - centre,
             "bias": traits.bias,
             "noise": traits.noise,
@@ -362,18 +348,16 @@ def fit_latent(
             name: of.reshape(n_chains, -1, of.shape[1]) for name, of in columns.items()
         }
 
-    density, start, covariance = begin(density, generator)
     chains = sample_smooth(
         density,
         quantities,
-        start,
-        covariance,
+        begin(density, generator),
         generator=generator,
         n_steps=n_steps,
         max_steps=max_steps,
         progress=progress,
     )
-    return LatentFit(density=density, chains=chains, agreement=agreement[0])
+    return chains, agreement(chains.positions)
 
 
 def _some(positions: Floats, max_draws: int) -> Floats:
@@ -396,36 +380,37 @@ def _summarize(
             left = question.n_runs - (other is not None)
             question.progress(before + n_made, before + left * n_expected)
 
-    fit = fit_latent(
-        LatentDensity.of(data.codes, len(data.categories), prior),
+    density = LatentDensity.of(data.codes, len(data.categories), prior)
+    chains, agreement = fit_latent(
+        density,
         question.items,
         generator=generator,
         n_steps=question.n_steps,
         max_steps=question.max_steps,
         progress=progress,
     )
-    some = fit.density.traits(_some(fit.chains.positions, _REPLICATES))
+    some = density.traits(_some(chains.positions, _REPLICATES))
 
     def part(name: str, of: Sequence[str]) -> tuple[Quantity, ...]:
-        diagnostics = fit.chains.diagnostics[name].tolist()
+        diagnostics = chains.diagnostics[name].tolist()
         return tuple(
             Quantity(
                 name=whose,
-                value=float(np.median(fit.draws(name, k))),
-                interval=_interval(question, fit.draws(name, k)),
+                value=float(np.median(chains.draws(name, k))),
+                interval=_interval(question, chains.draws(name, k)),
                 r_hat=r_hat,
                 ess=ess,
             )
             for k, (whose, (r_hat, ess)) in enumerate(zip(of, diagnostics, strict=True))
         )
 
-    r_hat, ess = fit.chains.worst
+    r_hat, ess = chains.worst
     thresholds = [
         f"{low} | {high}" for low, high in itertools.pairwise(data.categories)
     ]
-    chains = {**fit.chains.values, "kappa": fit.draws("kappa")}
+    draws = {**chains.values, "kappa": chains.draws("kappa")}
     return LatentTrait(
-        kappa=_kappa(question, fit, other),
+        kappa=_kappa(question, chains.draws("kappa"), agreement, prior, other),
         items=part("severity", data.items),
         raters=part("bias", data.raters),
         noises=part("noise", data.raters),
@@ -438,10 +423,10 @@ def _summarize(
         other=other,
         r_hat=r_hat,
         ess=ess,
-        n_chains=len(fit.chains.positions),
-        n_steps=fit.chains.n_steps,
+        n_chains=len(chains.positions),
+        n_steps=chains.n_steps,
         seed=question.seed,
-        chains=LatentChains(**chains) if question.keep_chains else None,
+        chains=LatentChains(**draws) if question.keep_chains else None,
     )
 
 
@@ -466,8 +451,13 @@ def _interval(question: _Question, draws: Floats) -> Interval:
     )
 
 
-def _kappa(question: _Question, fit: LatentFit, other: LatentTrait | None) -> Estimate:
-    draws = fit.draws("kappa")
+def _kappa(
+    question: _Question,
+    draws: Floats,
+    agreement: Agreement,
+    prior: LatentPrior,
+    other: LatentTrait | None,
+) -> Estimate:
     shown = np.sort(draws.ravel()[:: -(-draws.size // _SHOWN)])
     notes: tuple[str, ...] = ()
     if other is not None and other.kappa.interval is not None:
@@ -481,7 +471,7 @@ def _kappa(question: _Question, fit: LatentFit, other: LatentTrait | None) -> Es
             values=shown,
             weights=np.full(shown.size, 1.0 / shown.size),
             continuous=False,
-            words=f"posterior draws of kappa, prior {fit.density.prior.words}",
+            words=f"posterior draws of kappa, prior {prior.words}",
         ),
     )
     codes = question.ratings.codes
@@ -492,8 +482,8 @@ def _kappa(question: _Question, fit: LatentFit, other: LatentTrait | None) -> Es
         value=float(np.median(draws)),
         standard_error=float(draws.std()),
         interval=interval,
-        observed=float(np.median(fit.agreement.observed)),
-        chance=float(np.median(fit.agreement.chance)),
+        observed=float(np.median(agreement.observed)),
+        chance=float(np.median(agreement.chance)),
         n_items=n_items,
         n_items_paired=int(((codes >= 0).sum(axis=1) > 1).sum()),
         n_raters=n_raters,

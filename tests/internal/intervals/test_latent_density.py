@@ -1,7 +1,6 @@
 """The latent-trait density against a textbook in scalars."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +8,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from masrel.intervals import LatentPrior
-from masrel.intervals.latent._model import Information, LatentDensity, grade_shares
+from masrel.intervals.latent._model import LatentDensity, grade_shares
 
 Floats = NDArray[np.float64]
 PRIORS = [LatentPrior(), LatentPrior.other()]
@@ -29,11 +28,6 @@ def natural(x: Floats, like: LatentDensity) -> Floats:
     def away(y: float, slope: float) -> float:
         # of an item with one grade, beyond the threshold next to it
         return math.sqrt(rho) * math.log(1 + math.exp(y)) + unit * slope * y
-
-    def spread(x: Floats, scale: float, of: Information) -> Floats:
-        # of numbers of one scale, that were seen at m with variance 1 / I
-        weight = scale**2 * of.amount / (1 + scale**2 * of.amount)
-        return weight * of.place + scale * x / np.sqrt(1 + scale**2 * of.amount)
 
     tau = [anchor]
     for gap in gaps[: like.middle][::-1]:
@@ -59,8 +53,8 @@ def natural(x: Floats, like: LatentDensity) -> Floats:
     return np.array(
         [
             *theta,
-            *(unit * spread(b, math.sqrt(1 - f), like.of_bias)),
-            *(log_noise + spread(w, eta, like.of_noise)),
+            *(unit * math.sqrt(1 - f) * b),
+            *(log_noise + eta * w),
             rho,
             f,
             eta,
@@ -69,21 +63,10 @@ def natural(x: Floats, like: LatentDensity) -> Floats:
     )
 
 
-def informed(codes: NDArray[np.int64], n: int, prior: LatentPrior) -> LatentDensity:
-    """Return a density that knows something of each rater."""
-    density = LatentDensity.of(codes, n, prior)
-    m = codes.shape[1]
-    known = {
-        "of_bias": Information(amount=np.arange(m) * 7.0, place=0.3 - np.arange(m)),
-        "of_noise": Information(amount=np.arange(m) * 9.0, place=np.arange(m) - 0.4),
-    }
-    return replace(density, **known)  # type: ignore[arg-type]
-
-
 def textbook(x: Floats, codes: NDArray[np.int64], n: int, prior: LatentPrior) -> float:
     """Log-density in natural unknowns, and the Jacobian by differences."""
     n_items, n_raters = codes.shape
-    like = informed(codes, n, prior)
+    like = LatentDensity.of(codes, n, prior)
     unknowns = natural(x, like)
     theta, b, log_sigma = np.split(
         unknowns[: n_items + 2 * n_raters], [n_items, n_items + n_raters]
@@ -136,7 +119,7 @@ def test_items_that_ratings_tell_apart_are_placed_by_them() -> None:
 @pytest.mark.parametrize("n_categories", [3, 5, 6])
 def test_density_is_the_textbook_one(prior: LatentPrior, n_categories: int) -> None:
     codes = np.minimum(RATINGS, n_categories - 1)  # of 3, items have only the last
-    density = informed(codes, n_categories, prior)
+    density = LatentDensity.of(codes, n_categories, prior)
     x = positions(density, 8)
     theirs = [textbook(row, codes, n_categories, prior) for row in x]
     off = density.log_density(x) - theirs
@@ -146,7 +129,7 @@ def test_density_is_the_textbook_one(prior: LatentPrior, n_categories: int) -> N
 @pytest.mark.parametrize("prior", PRIORS)
 def test_two_grades_have_one_threshold(prior: LatentPrior) -> None:
     codes = np.array([[0, 1], [1, 1]])
-    density = informed(codes, 2, prior)
+    density = LatentDensity.of(codes, 2, prior)
     assert density.n_dimensions == 2 + 4 + 3 + 1
     x = positions(density, 6)
     off = density.log_density(x) - [textbook(row, codes, 2, prior) for row in x]
@@ -157,7 +140,7 @@ def test_two_grades_have_one_threshold(prior: LatentPrior) -> None:
 @pytest.mark.parametrize("n_categories", [2, 3, 6])
 def test_slopes_are_those_of_the_density(prior: LatentPrior, n_categories: int) -> None:
     codes = np.minimum(RATINGS, n_categories - 1)
-    density = informed(codes, n_categories, prior)
+    density = LatentDensity.of(codes, n_categories, prior)
     x = positions(density, 10)
     for k, h in enumerate(1e-5 * np.eye(density.n_dimensions)):
         numerical = (density.log_density(x + h) - density.log_density(x - h)) / 2e-5
@@ -174,7 +157,7 @@ def test_thresholds_ascend_around_the_one_that_halves_the_ratings() -> None:
 
 
 def test_far_out_the_density_is_zero_and_not_nan() -> None:
-    density = informed(RATINGS, 5, LatentPrior())
+    density = LatentDensity.of(RATINGS, 5, LatentPrior())
     far = np.vstack([s * 800.0 * np.eye(density.n_dimensions) for s in (1, -1)])
     assert not np.isnan(density.log_density(far)).any()
     assert np.isfinite(density.gradient(far)).all()

@@ -66,7 +66,7 @@ def places(rng: np.random.Generator, prior: LatentPrior) -> dict[str, float]:
         # Given such ratings the truth is still a draw from the posterior.
         if (np.ptp(study.codes, axis=1) > 0).any():
             break
-    fit = fit_latent(
+    chains, _ = fit_latent(
         LatentDensity.of(study.codes, 3, prior), "random",
         generator=rng, n_steps=60, max_steps=3_840,
     )  # fmt: skip
@@ -74,7 +74,7 @@ def places(rng: np.random.Generator, prior: LatentPrior) -> dict[str, float]:
     centre = truth.severity.mean()
 
     def place(part: str, value: float, at: int = 0) -> float:
-        below = fit.draws(part, at) < value
+        below = chains.draws(part, at) < value
         return float((below.sum() + 0.5) / (below.size + 1))  # neither 0 nor 1
 
     return {

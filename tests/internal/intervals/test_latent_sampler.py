@@ -43,7 +43,7 @@ def coordinates(position: Floats) -> dict[str, Floats]:
 def drawn(seed: int) -> Chains:
     rng = np.random.default_rng(seed)
     return sample_smooth(
-        Normal(), coordinates, 0.1 * rng.normal(size=(64, 3)), np.eye(3),
+        Normal(), coordinates, 0.1 * rng.normal(size=(64, 3)),
         generator=rng, n_steps=300, max_steps=4_800,
     )  # fmt: skip
 
@@ -134,7 +134,7 @@ def test_sampling_without_data_gives_the_prior_back(
     monkeypatch.setattr(f"{SAMPLER}.MIN_ESS", 1_000.0)  # a thousand draws tell laws
     monkeypatch.setattr(f"{SAMPLER}.MAX_R_HAT", 1.05)
     result = sample_smooth(
-        model, unknowns, start, np.eye(model.n_dimensions),
+        model, unknowns, start,
         generator=rng, n_steps=200, max_steps=8_000,
     )  # fmt: skip
     laws = [
@@ -163,7 +163,7 @@ def test_progress_counts_every_step_and_few_positions_are_kept() -> None:
     rng = np.random.default_rng(1)
     with pytest.raises(ConvergenceError):
         sample_smooth(
-            Normal(), strange, rng.normal(size=(8, 3)), np.eye(3),
+            Normal(), strange, rng.normal(size=(8, 3)),
             generator=rng, n_steps=500, max_steps=4000,
             progress=lambda *counts: seen.append(counts),
         )  # fmt: skip
