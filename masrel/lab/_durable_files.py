@@ -1,12 +1,13 @@
 """Files of a study that are written bit by bit, added to, or stand in a new folder."""
 
 import errno
+import io
 import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
+from typing import TextIO
 
 from masrel._files import (
     BINARY,
@@ -28,13 +29,15 @@ _NO_WAIT = getattr(os, "O_NONBLOCK", 0)
 
 
 @contextmanager
-def new_file(path: Path) -> Iterator[BinaryIO]:
-    """Give a file to write an output into bit by bit; at the end it gets its name."""
+def new_file(path: Path) -> Iterator[TextIO]:
+    """Give a text to write an output into bit by bit; at the end it gets its name."""
     refuse_record(path)
     part, descriptor = new_part(path)
     try:
         with on_disk(path, descriptor) as out:
-            yield out
+            text = io.TextIOWrapper(out, encoding="utf-8", newline="")
+            yield text
+            text.detach()  # with all of it, and not closed before it is on disk
         with naming(path):
             os.replace(part, path)
     finally:

@@ -1,7 +1,6 @@
 """The file of samples of ``masrel trace``: what the controller commands."""
 
 import csv
-import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -41,8 +40,7 @@ def write_samples(
     n_rows = _n_samples(documents, rate_hz)
     several = len(scenes) > 1
     with (
-        new_file(csv_file) as file,
-        io.TextIOWrapper(file, encoding="utf-8", newline="") as out,
+        new_file(csv_file) as out,
         tqdm(total=n_rows, desc="samples", delay=1.0, disable=quiet or None) as bar,
     ):
         out.write("# simulated: true\n")
