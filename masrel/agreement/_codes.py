@@ -508,7 +508,7 @@ def count_ratings(
         codes=codes,
         freq=freq,
         categories=coded.categories,
-        n_raters=coded.n_raters,
+        n_raters=_raters_of(codes),
         declared=coded.declared,
         source=coded,
     )

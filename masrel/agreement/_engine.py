@@ -179,6 +179,7 @@ def estimate(
     n_paired = int(freq @ (size > 1))
     with np.errstate(divide="ignore", invalid="ignore"):
         d_o, d_e, slope = formula.disagreements(sums, v)
+    n_tables = d_o.size
     if why is not None:
         reason = why(made, d_o, d_e)
     elif not n_paired:
@@ -187,30 +188,25 @@ def estimate(
         reason = made.reason or (None if d_e.all() else made.no_chance)
     value = error = math.nan
     if reason is None:
-        value = _mean(1.0 - d_o / d_e)
+        value = float((1.0 - d_o / d_e).sum()) / n_tables
         error = features.error(slope, freq, population)
     else:
         undefined(formula.title, reason)
         if made.reason is not None or np.isnan(d_o).any():
-            d_o = d_e = np.array([math.nan])
+            d_o = d_e = np.full(n_tables, math.nan)
     return Estimate(
         coefficient=formula.name,
         weights=made.name,
         value=value,
         standard_error=error,
-        observed=1.0 - _mean(d_o),
-        chance=1.0 - _mean(d_e),
+        observed=1.0 - float(d_o.sum()) / n_tables,
+        chance=1.0 - float(d_e.sum()) / n_tables,
         n_items=n_items,
         n_items_paired=n_paired,
         n_raters=counted.n_raters if n_raters is None else n_raters,
         n_categories=made.n_categories,
         reason=reason,
     )
-
-
-def _mean(of_tables: Floats) -> float:
-    """Return the mean over tables, which numpy takes twice as long for."""
-    return float(of_tables.sum()) / of_tables.size
 
 
 # -- what formulas have in common ----------------------------------------------------
