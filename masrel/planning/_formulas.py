@@ -66,6 +66,14 @@ def size_by_formula(design: Design) -> int:
     return math.ceil((_icc_items if is_icc else items)(design))
 
 
+def items_nearby(design: Design) -> int:
+    """Return about how many items a half-width needs, where a formula says it."""
+    if design.is_icc:
+        return math.ceil(_n_icc_width(design))
+    is_wald = design.study.target == "items" and design.model.has_rows
+    return math.ceil(_width_items(design)) if is_wald else 20
+
+
 def _z(design: Design) -> float:
     """Return the normal quantile that leaves (1 - level)/sides in a tail."""
     level, sides = design.study.level, design.study.sides

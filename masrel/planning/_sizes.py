@@ -11,6 +11,7 @@ from masrel._input import refuse
 from masrel.errors import ParameterError
 from masrel.planning._formulas import (
     check_has_numbers,
+    items_nearby,
     numbers_by_formula,
     size_by_formula,
 )
@@ -31,7 +32,7 @@ from masrel.planning._study_plan import (
 from masrel.planning._truth import Design, design_of
 
 _FEWEST_ITEMS, _MAX_ITEMS, _MAX_RATERS = 2, 100_000, 60
-_FIRST_ITEMS = 20  # the size that is looked at first; twice as many follow
+_FAR = 1.3  # times a size: where a formula asks for more, the size does not do
 _MAX_SCAN = 1_500_000  # tables that are looked at around a size
 _PATIENCE = 4  # numbers of raters that are no better, after which none will be
 _CHEAPER = 1.0 - 1e-9
@@ -364,15 +365,18 @@ class _Search:
     def up_to(self, highest: int) -> Plan:
         """Return the plan of the smallest size that is no larger than one."""
         study, is_items = self.design.study, self._name == "items"
-        # low does not reach the aim, but for the lowest; high may
-        low, high = self.lowest, min(_FIRST_ITEMS if is_items else self.lowest, highest)
+        guess = items_nearby(self.design) if is_items else self.lowest
+        # near the guess: low does not reach the aim, but for the lowest; high may
+        low, high = self.lowest, min(max(guess, self.lowest), highest)
+        if guess > _FAR * highest:
+            low = highest + 1
         while low <= highest and not self._is_met(high):
             low, high = high + 1, min(2 * high, highest)
         if low <= highest:
             sizes = range(low, high)
             return self._stable(low + bisect_left(sizes, True, key=self._is_met))
         n = highest
-        if is_items and not self.sized(_FIRST_ITEMS).has_rows:
+        if is_items and not self.sized(20).has_rows:
             n = min(n, 200)  # a study of so many whose ratings are drawn one by one
         best, (name, words) = self.at(n), aim_words(study)
         note = (
