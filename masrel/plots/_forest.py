@@ -7,9 +7,8 @@ smeared and a stem and a bar of one height are one share.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import groupby
-from operator import attrgetter
+from operator import itemgetter
 from typing import Any, Literal
 
 import numpy as np
@@ -21,7 +20,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from masrel.estimates import Distribution
+from masrel.estimates import Interval
 from masrel.plots._drawn_values import Forest, ForestRow
 from masrel.plots._style import BLACK, BLUE, DASHES, GREY, ORANGE
 from masrel.tables._tables import percent
@@ -42,20 +41,26 @@ _INTERVALS: dict[str, dict[str, Any]] = {
     "credible": {"color": ORANGE, "linewidth": 5.0, "solid_capstyle": "butt"},
 }
 _DOT: dict[str, Any] = {"marker": "o", "color": BLACK, "markersize": 5}
-_ZERO: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "linestyle": DASHES}
+_ZERO: dict[str, Any] = {
+    "color": GREY,
+    "linewidth": 0.8,
+    "linestyle": DASHES,
+    "zorder": 0.9,  # behind every ridge
+}
 
 _Floats = NDArray[np.float64]
 
-# What a ridge is made of, its colour and its name in the legend.
+# What a ridge is made of: places (of bars their edges) and heights of each part, all
+# heights in one unit.
 _Part = Literal["density", "stems", "bars"]
-_PART_COLOURS: dict[_Part, str] = {"density": ORANGE, "stems": BLUE, "bars": BLUE}
-_PART_NAMES: dict[_Part, str] = {
-    "density": "posterior density, each to its own height",
-    "stems": "resamples of one value, each row to its own height",
-    "bars": "resamples together in bars, each row to its own height",
+_Ridge = dict[_Part, tuple[_Floats, _Floats]]
+_PARTS: dict[_Part, tuple[str, str]] = {  # colour, and name in the legend
+    "density": (ORANGE, "posterior density, each to its own height"),
+    "stems": (BLUE, "resamples of one value, each row to its own height"),
+    "bars": (BLUE, "resamples together in bars, each row to its own height"),
 }
-_RIDGE_ALPHA = 0.35
-_STEM_MARK: dict[str, Any] = {  # in the legend
+_ALPHA = 0.35
+_STEM: dict[str, Any] = {  # in the legend
     "linestyle": "none",
     "marker": "|",
     "markersize": 9,
@@ -71,50 +76,25 @@ _FAINT = 0.01  # of the greatest height: what is below it needs no room
 _SAME = 1e-9  # values as near as this are one value, computed in another order
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Ridge:
-    # places (of bars their edges) and heights of each part, all heights in one unit
-    parts: dict[_Part, tuple[_Floats, _Floats]]
-    lowest: float  # where it begins to be seen
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Placed:
-    # a row, and how many inches from the top its parts are
-    row: ForestRow
-    ridge: _Ridge | None  # above its interval
-    top: float
-    line: float  # where its interval is
-    bottom: float
-    heading: float | None  # of its group, if it is the first of it
-
-
 def forest_figure(forest: Forest) -> Figure:
     """Return a forest of estimates."""
-    places = _placed(forest.rows)
-    bottom = places[-1].bottom + 0.05
-    handles = _legend_handles(places)
-    figure = Figure(figsize=(7.2, bottom + 0.6 + 0.17 * len(handles)))
+    rows = forest.rows
+    ridges = [_ridge(row.interval) for row in rows]
+    figure = Figure()
     axes = figure.add_subplot()
-    values = [row.value for row in forest.rows if row.value is not None]
-    ends = [row.interval.low for row in forest.rows if row.interval is not None]
-    ridges = [place.ridge.lowest for place in places if place.ridge is not None]
-    left = max(min([0.0, *values, *ends, *ridges]), _LEFT) - 0.05
+    values = [row.value for row in rows if row.value is not None]
+    ends = [row.interval.low for row in rows if row.interval is not None]
+    lowest = [_lowest(ridge) for ridge in ridges if ridge]
+    left = max(min([0.0, *values, *ends, *lowest]), _LEFT) - 0.05
     axes.set_xlim(left, _RIGHT)
-    axes.set_ylim(bottom, 0.0)
-    # where rows next to each other have a zero: one line for all of them
-    for has_zero, group in groupby(places, key=attrgetter("row.has_zero")):
-        if has_zero:
-            run = list(group)
-            axes.plot([0.0, 0.0], [run[0].top, run[-1].bottom], **_ZERO, zorder=1.0)
-    for place in places:
-        if place.heading is not None:
-            _at_left(axes, place.heading, place.row.group, weight="bold")
-        _draw_row(axes, place, left)
+    bottom = _draw_rows(axes, rows, ridges)
+    axes.set_ylim(bottom + 0.05, 0.0)
     axes.set_yticks([])
     axes.spines["left"].set_visible(False)
     axes.grid(axis="x")
     axes.set_xlabel(forest.axis_label)
+    handles = _legend_handles(rows, ridges)
+    figure.set_size_inches(7.2, bottom + 0.65 + 0.17 * len(handles))
     # each kind of interval with two marks, and a dot with one
     dots = [h for h in handles if isinstance(h, Line2D) and h.get_linestyle() == "None"]
     figure.legend(
@@ -128,37 +108,35 @@ def forest_figure(forest: Forest) -> Figure:
     return figure
 
 
-def _placed(rows: Sequence[ForestRow]) -> list[_Placed]:
-    # every row with its place, from the top down
-    places: list[_Placed] = []
+def _draw_rows(
+    axes: Axes, rows: Sequence[ForestRow], ridges: Sequence[_Ridge]
+) -> float:
+    # from the top down, in inches; how far they reach
     bottom, group = 0.0, ""
-    for row in rows:
-        top, heading = bottom, None
+    spans = []
+    for row, ridge in zip(rows, ridges, strict=True):
+        top = bottom
         if row.group and row.group != group:
-            heading = bottom + 0.6 * _GROUP
+            _at_left(axes, top + 0.6 * _GROUP, row.group, weight="bold")
             bottom += _GROUP
         group = row.group
         text = _LINE + (_DETAIL if row.detail else 0.0)
-        shown = None if row.interval is None else row.interval.distribution
-        bottom += text + (0.0 if shown is None else _RIDGE)
-        places.append(
-            _Placed(
-                row=row,
-                ridge=None if shown is None else _ridge(shown),
-                top=top,
-                line=bottom - 0.5 * text,
-                bottom=bottom,
-                heading=heading,
-            )
-        )
-    return places
+        bottom += text + (_RIDGE if ridge else 0.0)
+        _draw_row(axes, row, ridge, bottom - 0.5 * text)
+        spans.append((row.has_zero, top, bottom))
+    # where rows next to each other have a zero: one line for all of them
+    for has_zero, of_both in groupby(spans, key=itemgetter(0)):
+        if has_zero:
+            _, tops, bottoms = zip(*of_both, strict=True)
+            axes.plot([0.0, 0.0], [tops[0], bottoms[-1]], **_ZERO)
+    return bottom
 
 
-def _draw_row(axes: Axes, place: _Placed, left: float) -> None:
-    row, y, interval = place.row, place.line, place.row.interval
-    if place.ridge is not None:
+def _draw_row(axes: Axes, row: ForestRow, ridge: _Ridge, y: float) -> None:
+    left, interval = axes.get_xlim()[0], row.interval
+    if ridge:
         base, top = y - 0.3 * _LINE, y - 0.3 * _LINE - 0.95 * _RIDGE
-        _draw_ridge(axes, place.ridge, base=base, top=top)
+        _draw_ridge(axes, ridge, base=base, top=top)
     if interval is not None:
         look = _INTERVALS[interval.kind]
         axes.plot([max(interval.low, left), interval.high], [y, y], **look)
@@ -199,24 +177,23 @@ def _at_left(
     )
 
 
-def _legend_handles(places: Sequence[_Placed]) -> list[Artist]:
+def _legend_handles(
+    rows: Sequence[ForestRow], ridges: Sequence[_Ridge]
+) -> list[Artist]:
     # what the legend explains, each mark once
     handles: dict[str, Artist] = {}
-    if any(place.row.value is not None for place in places):
+    if any(row.value is not None for row in rows):
         handles["estimate"] = Line2D([], [], linestyle="none", **_DOT)
-    for place in places:
-        if place.row.interval is not None:
-            interval = place.row.interval
-            label = f"{percent(interval.level)} % {interval.kind} interval"
-            handles[label] = Line2D([], [], **_INTERVALS[interval.kind])
-        for part in () if place.ridge is None else place.ridge.parts:
-            colour = _PART_COLOURS[part]
-            handles[_PART_NAMES[part]] = (
-                Line2D([], [], color=colour, **_STEM_MARK)
+    for row, ridge in zip(rows, ridges, strict=True):
+        if row.interval is not None:
+            label = f"{percent(row.interval.level)} % {row.interval.kind} interval"
+            handles[label] = Line2D([], [], **_INTERVALS[row.interval.kind])
+        for part in ridge:
+            colour, label = _PARTS[part]
+            handles[label] = (
+                Line2D([], [], color=colour, **_STEM)
                 if part == "stems"
-                else Patch(
-                    facecolor=(colour, _RIDGE_ALPHA), edgecolor=colour, linewidth=0.8
-                )
+                else Patch(facecolor=(colour, _ALPHA), edgecolor=colour, linewidth=0.8)
             )
     for label, handle in handles.items():
         handle.set_label(label)
@@ -224,13 +201,13 @@ def _legend_handles(places: Sequence[_Placed]) -> list[Artist]:
 
 
 def _draw_ridge(axes: Axes, ridge: _Ridge, *, base: float, top: float) -> None:
-    """Draw a ridge between two heights; its own greatest height is the top."""
-    highest = max(heights.max() for _, heights in ridge.parts.values())
+    # between two heights; its own greatest height is the top
+    highest = _highest(ridge)
     # stems come last: they stand in front of bars
-    for part, (places, heights) in reversed(ridge.parts.items()):
-        colour, tops = _PART_COLOURS[part], base + (top - base) * heights / highest
+    for part, (places, heights) in reversed(ridge.items()):
+        colour, tops = _PARTS[part][0], base + (top - base) * heights / highest
         line: dict[str, Any] = {"color": colour, "linewidth": 0.8}
-        face: dict[str, Any] = {"color": colour, "alpha": _RIDGE_ALPHA}
+        face: dict[str, Any] = {"color": colour, "alpha": _ALPHA}
         if part == "density":
             axes.fill_between(places, base, tops, linewidth=0.0, **face)
             axes.plot(places, tops, **line)
@@ -241,27 +218,38 @@ def _draw_ridge(axes: Axes, ridge: _Ridge, *, base: float, top: float) -> None:
             axes.stairs(tops, places, baseline=base, **line)
 
 
-def _ridge(distribution: Distribution) -> _Ridge:
-    """Return what is drawn of a distribution."""
-    parts: dict[_Part, tuple[_Floats, _Floats]] = {}
-    if distribution.continuous:
-        places, heights = distribution.values, distribution.weights
-        parts["density"] = places, heights
-    else:
-        # every value once, with its share of the finite ones: both (n_distinct,)
-        finite = np.isfinite(distribution.values)
-        values, weights = distribution.values[finite], distribution.weights[finite]
-        starts = np.flatnonzero(np.diff(values, prepend=-np.inf) > _SAME)
-        values, shares = values[starts], np.add.reduceat(weights, starts)
-        single = (shares.size <= _MAX_STEMS) | (shares >= _STEM_SHARE)
-        if single.any():
-            parts["stems"] = values[single], shares[single]
-        if not single.all():
-            parts["bars"] = _bars(values[~single], shares[~single])
-        edges, heights = _bars(values, shares)  # as if there were no stems
-        places = edges[:-1]
-    visible = places[heights > _FAINT * heights.max()]
-    return _Ridge(parts=parts, lowest=float(visible.min()))
+def _highest(ridge: _Ridge) -> float:
+    return max(float(heights.max()) for _, heights in ridge.values())
+
+
+def _lowest(ridge: _Ridge) -> float:
+    # where it begins to be seen
+    faint = _FAINT * _highest(ridge)
+    return min(
+        float(places[: heights.size][heights > faint].min(initial=1.0))
+        for places, heights in ridge.values()
+    )
+
+
+def _ridge(interval: Interval | None) -> _Ridge:
+    # what is drawn of its distribution; nothing where it has none
+    if interval is None or interval.distribution is None:
+        return {}
+    shown = interval.distribution
+    if shown.continuous:
+        return {"density": (shown.values, shown.weights)}
+    # every value once, with its share of the finite ones: both (n_distinct,)
+    finite = np.isfinite(shown.values)
+    values, weights = shown.values[finite], shown.weights[finite]
+    starts = np.flatnonzero(np.diff(values, prepend=-np.inf) > _SAME)
+    values, shares = values[starts], np.add.reduceat(weights, starts)
+    single = (shares.size <= _MAX_STEMS) | (shares >= _STEM_SHARE)
+    ridge: _Ridge = {}
+    if single.any():
+        ridge["stems"] = values[single], shares[single]
+    if not single.all():
+        ridge["bars"] = _bars(values[~single], shares[~single])
+    return ridge
 
 
 def _bars(values: _Floats, shares: _Floats) -> tuple[_Floats, _Floats]:

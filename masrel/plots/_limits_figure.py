@@ -29,12 +29,7 @@ _MAX_IN_A_ROW = 2
 _MAX_IN_A_LINE = 24  # letters of both raters
 _DOT: dict[str, Any] = {"color": BLUE, "alpha": 0.6}
 _SMALLEST, _LARGEST = 14.0, 160.0  # areas of dots, points²
-_NAMES = ("upper limit", "mean", "lower limit")
-_LOOKS: tuple[dict[str, Any], ...] = (
-    {"color": ORANGE, "linestyle": (0, (6, 2))},
-    {"color": BLACK, "linestyle": "-"},
-    {"color": ORANGE, "linestyle": (0, (6, 2))},
-)
+_LIMIT: dict[str, Any] = {"color": ORANGE, "linestyle": (0, (6, 2))}
 _SHADES = LinearSegmentedColormap.from_list("items", ["#D6E6F2", "#5BA3D0", "#003A5D"])
 
 
@@ -69,17 +64,11 @@ def limits_figure(panels: "Sequence[Panel]", unit: str) -> Figure:
         axes.margins(x=0.06, y=0.08)
     for axes in places[n:]:
         axes.set_visible(False)
-    mark: dict[str, Any] = {"linestyle": "none", "marker": "o", "markeredgewidth": 0.0}
+    mark = {"linestyle": "none", "marker": "o", "markeredgewidth": 0.0, **_DOT}
     marks = [
-        Line2D(
-            [],
-            [],
-            markersize=(area * of) ** 0.5,
-            label=counted(of, "item"),
-            **mark,
-            **_DOT,
-        )
-        for of in ([1, most] if most > 1 else [])
+        Line2D([], [], markersize=(area * n) ** 0.5, label=counted(n, "item"), **mark)
+        for n in (1, most)
+        if most > 1
     ]
     name = f"{percent(level)} % confidence interval, exact"
     band = Line2D([], [], color=GREY, alpha=0.3, linewidth=6.0, label=name)
@@ -112,12 +101,11 @@ def _draw_lines(axes: Axes, panel: "LimitsOfAgreement") -> None:
     axes.axhline(0.0, color=GREY, linewidth=0.7, linestyle=DASHES, zorder=1.0)
     if math.isnan(panel.mean):
         return
-    lines = (
-        (panel.upper, panel.upper_interval),
-        (panel.mean, panel.mean_interval),
-        (panel.lower, panel.lower_interval),
-    )
-    for (value, ends), name, look in zip(lines, _NAMES, _LOOKS, strict=True):
+    for name, value, ends, look in (
+        ("upper limit", panel.upper, panel.upper_interval, _LIMIT),
+        ("mean", panel.mean, panel.mean_interval, {"color": BLACK}),
+        ("lower limit", panel.lower, panel.lower_interval, _LIMIT),
+    ):
         axes.axhspan(
             ends.low, ends.high, color=GREY, alpha=0.16, linewidth=0.0, zorder=0.5
         )

@@ -52,13 +52,16 @@ def rater_figure(parts: "Sequence[tuple[str, Diagnosis]]", title: str) -> Figure
     grid = figure.subplots(
         len(parts), len(widths), squeeze=False, width_ratios=widths, height_ratios=sizes
     )
-    values = [_pairs(result) for _, result in parts]
+    orders = [np.argsort(-result.mean_values, kind="stable") for _, result in parts]
+    values = [_pairs(part[1], order) for part, order in zip(parts, orders, strict=True)]
     lowest = math.floor(10.0 * min(np.nanmin(of, initial=0.9) for of in values)) / 10.0
-    for (name, result), of_part, (axes, *panels) in zip(
-        parts, values, grid, strict=True
+    for (name, result), order, of_part, (axes, *panels) in zip(
+        parts, orders, values, grid, strict=True
     ):
-        order = _best_first(result)
-        image = _heatmap(axes, result, of_part[order], lowest, letters)
+        raters = [short_name(result.raters[place]) for place in order]
+        others = [] if result.reference is None else [short_name(result.reference)]
+        image = _heatmap(axes, of_part, raters, others, lowest)
+        axes.tick_params(length=0, labelsize=letters)
         axes.set_ylabel(name)
         for panel in panels:
             _influence(panel, result, order, cell)
@@ -84,22 +87,20 @@ def rater_figure(parts: "Sequence[tuple[str, Diagnosis]]", title: str) -> Figure
     return figure
 
 
-def _best_first(result: "Diagnosis") -> NDArray[np.intp]:
-    # the raters who agree best with the others first
-    means = np.where(np.isnan(result.mean_values), -math.inf, result.mean_values)
-    return np.argsort(-means, kind="stable")
-
-
-def _pairs(result: "Diagnosis") -> _Floats:
-    # by rater, columns in their order, and then with the reference if there is one
-    values = result.pair_values[:, _best_first(result)]
+def _pairs(result: "Diagnosis", order: NDArray[np.intp]) -> _Floats:
+    # by rater, and then with the reference if there is one
+    values = result.pair_values[np.ix_(order, order)]
     if result.reference is None:
         return values
-    return np.column_stack([values, result.reference_values])
+    return np.column_stack([values, result.reference_values[order]])
 
 
 def _heatmap(
-    axes: Axes, result: "Diagnosis", values: _Floats, lowest: float, letters: float
+    axes: Axes,
+    values: _Floats,
+    raters: Sequence[str],
+    others: Sequence[str],
+    lowest: float,
 ) -> AxesImage:
     n_rows, n_columns = values.shape
     image = axes.imshow(
@@ -110,32 +111,25 @@ def _heatmap(
         aspect="auto",
         interpolation="nearest",
     )
-    names = [short_name(result.raters[place]) for place in _best_first(result)]
-    others = [] if result.reference is None else [short_name(result.reference)]
-    axes.set_xticks(range(n_columns), [*names, *others], rotation=90, fontsize=letters)
-    axes.set_yticks(range(n_rows), names, fontsize=letters)
+    axes.set_xticks(range(n_columns), [*raters, *others], rotation=90)
+    axes.set_yticks(range(n_rows), raters)
     axes.xaxis.tick_top()
-    axes.tick_params(length=0)
     axes.spines[:].set_visible(False)
     # white between the cells, so that each is seen by itself
     width = 1.0 if n_rows <= _MAX_NUMBERS else 0.4
-    axes.hlines(
-        np.arange(0.5, n_rows - 1.0), -0.5, n_columns - 0.5, "w", linewidth=width
-    )
-    axes.vlines(
-        np.arange(0.5, n_columns - 1.0), -0.5, n_rows - 0.5, "w", linewidth=width
-    )
+    edges = np.arange(0.5, n_columns - 1.0)
+    axes.hlines(edges[: n_rows - 1], -0.5, n_columns - 0.5, "w", linewidth=width)
+    axes.vlines(edges, -0.5, n_rows - 0.5, "w", linewidth=width)
     if n_columns > n_rows:
         axes.axvline(n_rows - 0.5, color="w", linewidth=6.0)
     if n_rows <= _MAX_NUMBERS:
         for (row, column), value in np.ndenumerate(values):
             if not math.isnan(value):
                 is_dark = value - lowest > 0.55 * (1.0 - lowest)
-                text = number(float(value), 2).replace("0.", ".", 1)
                 axes.text(
                     column,
                     row,
-                    text,
+                    number(float(value), 2).replace("0.", ".", 1),
                     ha="center",
                     va="center",
                     fontsize=8,

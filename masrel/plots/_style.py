@@ -29,9 +29,6 @@ ALARM = "#A63C00"  # darker, so that letters in it can be read on white
 DASHES = (0, (4, 3))
 """Line style of what is a reference, not data."""
 
-_NO_STYLE = ("backend", "backend_fallback")
-"""What says how figures are shown, not how they look."""
-
 SHADES = {"pre-catch": "#FFFFFF", "catch": "#D9D9D9", "post-catch": "#F0F0F0"}
 """Background of each phase of a stretch."""
 
@@ -79,8 +76,11 @@ def short_name(name: str) -> str:
     return f"{name[:half]}…{name[-half:]}"
 
 
+# without what says how figures are shown, not how they look
 _DEFAULTS = {
-    key: value for key, value in mpl.rcParamsDefault.items() if key not in _NO_STYLE
+    key: value
+    for key, value in mpl.rcParamsDefault.items()
+    if key not in ("backend", "backend_fallback")
 }
 
 
@@ -88,11 +88,8 @@ _DEFAULTS = {
 def house_style(*, parse_math: bool = False) -> Iterator[None]:
     """Draw in the house style alone: a reader's own matplotlibrc changes nothing."""
     # parse_math: as powers of ten need it; a title or a name may have any letters in it
-    with mpl.rc_context():
-        # not mpl.rcdefaults, which reads every style that matplotlib has
-        mpl.rcParams.update(_DEFAULTS)
-        mpl.rcParams.update(STYLE)
-        mpl.rcParams["text.parse_math"] = parse_math
+    # not mpl.rcdefaults, which reads every style that matplotlib has
+    with mpl.rc_context({**_DEFAULTS, **STYLE, "text.parse_math": parse_math}):
         yield
 
 

@@ -34,7 +34,7 @@ from masrel.tables._tables import percent
 _INTENDED_X = -1.3  # where intended grades stand; raters are at 0, 1, 2, ...
 _SHADES = LinearSegmentedColormap.from_list("grades", ["#F2F6FA", "#7FB6DA", "#003A5D"])
 
-_UPRIGHT_LETTERS = 7  # of a rater's name that fits above a column
+_UPRIGHT_LETTERS = 7  # of a rater's name, or a grade's, that fits above a column
 
 _MOST_NUMBERS = 20  # grades up to which counts are written in the cells
 _DARK = 0.6  # share from which on a cell is so dark that letters are white
@@ -173,6 +173,8 @@ def _draw_counts(
     axes.set_xticks(range(0, n_columns, every), scale[::every])
     axes.tick_params(length=0)
     axes.xaxis.tick_top()
+    if max(map(len, scale)) > _UPRIGHT_LETTERS:
+        axes.tick_params(axis="x", rotation=90)
     axes.spines[:].set_visible(False)
 
 

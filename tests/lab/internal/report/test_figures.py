@@ -228,7 +228,7 @@ def drawn_axes(*rows: ForestRow) -> Axes:
 
 
 def lines_at_zero(axes: Axes) -> list[tuple[float, float]]:
-    found = (line.get_xydata() for line in axes.lines if line.get_zorder() == 1.0)
+    found = (line.get_xydata() for line in axes.lines if line.get_zorder() < 1.0)
     return [(ends[0][1], ends[1][1]) for ends in found]
 
 

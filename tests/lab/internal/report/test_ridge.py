@@ -6,8 +6,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import StepPatch
 
-from masrel.estimates import Distribution
-from masrel.plots._forest import _draw_ridge, _ridge
+from masrel.estimates import Distribution, Interval
+from masrel.plots._forest import _draw_ridge, _lowest, _Ridge, _ridge
 
 
 def resamples(values: list[float], shares: list[float]) -> Distribution:
@@ -16,9 +16,22 @@ def resamples(values: list[float], shares: list[float]) -> Distribution:
     )
 
 
+def ridge(distribution: Distribution) -> _Ridge:
+    shown = Interval(
+        low=0.3,
+        high=0.7,
+        level=0.95,
+        kind="credible",
+        method="m",
+        target="items",
+        distribution=distribution,
+    )
+    return _ridge(shown)
+
+
 def drawn(distribution: Distribution) -> Axes:
     axes = Figure().add_subplot()
-    _draw_ridge(axes, _ridge(distribution), base=0.0, top=1.0)
+    _draw_ridge(axes, ridge(distribution), base=0.0, top=1.0)
     return axes
 
 
@@ -43,7 +56,7 @@ def half_at_one(n_others: int = 200) -> Distribution:
 
 def test_few_values_are_stems_as_high_as_their_shares() -> None:
     few = resamples([-0.2, 0.5, 1.0], [0.2, 0.5, 0.3])
-    assert tuple(_ridge(few).parts) == ("stems",)
+    assert tuple(ridge(few)) == ("stems",)
     assert stems(drawn(few)) == pytest.approx({-0.2: 0.4, 0.5: 1.0, 1.0: 0.6})
 
 
@@ -55,7 +68,7 @@ def test_values_that_differ_by_rounding_are_one() -> None:
 def test_a_point_mass_among_many_values_stays_a_line_where_it_is() -> None:
     mass = half_at_one()
     axes = drawn(mass)
-    assert tuple(_ridge(mass).parts) == ("stems", "bars")
+    assert tuple(ridge(mass)) == ("stems", "bars")
     assert stems(axes) == {1.0: 1.0}
     # the bars hold the other half, in the unit of the stem, which is a half high
     assert bars(axes)[1].sum() == pytest.approx(1.0)
@@ -65,7 +78,7 @@ def test_bars_hold_every_resample_within_their_edges() -> None:
     rng = np.random.default_rng(5)
     values = np.sort(rng.normal(0.4, 0.1, 4000))
     many = resamples(list(values), [1 / 4000] * 4000)
-    assert tuple(_ridge(many).parts) == ("bars",)
+    assert tuple(ridge(many)) == ("bars",)
     edges, heights = bars(drawn(many))
     assert edges[0] < values[0]
     assert values[-1] <= edges[-1]
@@ -99,7 +112,7 @@ def test_a_density_keeps_its_shape_and_reaches_the_top_once() -> None:
     bell = Distribution(values=at, weights=density, continuous=True, words="p")
     (line,) = drawn(bell).lines
     np.testing.assert_allclose(line.get_ydata(), density / density.max())
-    assert tuple(_ridge(bell).parts) == ("density",)
+    assert tuple(ridge(bell)) == ("density",)
 
 
 def test_a_faint_tail_needs_no_room() -> None:
@@ -107,5 +120,5 @@ def test_a_faint_tail_needs_no_room() -> None:
     bell = Distribution(
         values=at, weights=np.exp(-200.0 * (at - 0.5) ** 2), continuous=True, words="p"
     )
-    assert 0.3 < _ridge(bell).lowest < 0.4
-    assert _ridge(half_at_one()).lowest < 0.1
+    assert 0.3 < _lowest(ridge(bell)) < 0.4
+    assert _lowest(ridge(half_at_one())) < 0.1
