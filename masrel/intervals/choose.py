@@ -285,7 +285,7 @@ def _outside_commonest(problem: IntervalProblem) -> tuple[int, bool]:
     codes = problem.codes  # (n_rows, n_raters)
     rated = codes >= 0
     freq = np.broadcast_to(problem.freq[:, None], codes.shape)
-    commonest = np.bincount(codes[rated], weights=freq[rated]).argmax()
+    commonest = np.bincount(codes[rated], weights=freq[rated], minlength=1).argmax()
     is_outside = (rated & (codes != commonest)).any(axis=1)
     outside = int(problem.freq @ (is_outside & (rated.sum(axis=1) >= 2)))
     return outside, outside < _SEVERAL and 2 * outside < problem.n_paired_items
