@@ -200,6 +200,13 @@ _POPULATIONS: dict[Target, str] = {
 }
 
 
+def _population(interval: Interval) -> str:
+    """Return what an interval generalises to."""
+    if interval.unit == "clusters":
+        return "other clusters of items"
+    return _POPULATIONS[interval.target]
+
+
 def _estimate_lines(estimate: Estimate) -> _Lines:
     """Return the coefficient and, where there is one, its interval."""
     name, text = estimate.coefficient, f"undefined ({estimate.reason})"
@@ -218,14 +225,11 @@ def _interval_lines(interval: Interval) -> _Lines:
     ends = f"{interval.low:.4g} to {interval.high:.4g}"
     if interval.reason is not None:
         ends = f"undefined ({interval.reason})"
-    population = _POPULATIONS[interval.target]
-    if interval.unit == "clusters":
-        population = population.replace("items", "clusters of items")
     median = [] if interval.median is None else [f"{interval.median:.4g}"]
     return [
         (f"{100.0 * interval.level:.6g} % {interval.kind} interval", ends),
         *(("posterior median", text) for text in median),
-        ("generalises to", population),
+        ("generalises to", _population(interval)),
         ("method", interval.method),
         *(("note", note) for note in interval.notes),
     ]

@@ -10,7 +10,7 @@ from typing import Literal, cast, get_args
 
 import numpy as np
 
-from masrel._input import check_option, refuse, shown
+from masrel._input import check_option, refuse
 from masrel.agreement import Label, Metric, WeightsLike
 from masrel.agreement._engine import Floats, Integers
 from masrel.agreement._weights import Distances
@@ -164,8 +164,7 @@ def bootstrap(
         ),
         (
             not is_whole or isinstance(n_resamples, bool) or n_resamples < 100,
-            "n_resamples: needs a whole number of at least 100, got "
-            f"{shown(n_resamples)}",
+            f"n_resamples: needs a whole number of at least 100, got {n_resamples!r}",
         ),
         (
             kind == "studentized" and target != "items",

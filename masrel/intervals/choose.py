@@ -38,7 +38,14 @@ from masrel._input import check_option
 from masrel.agreement import CountedRatings, Label
 from masrel.agreement._engine import NO_SPREAD, ONE_PAIR, Integers
 from masrel.errors import ParameterError
-from masrel.estimates import Estimate, Interval, Target, _LongNote
+from masrel.estimates import (
+    _POPULATIONS,
+    Estimate,
+    Interval,
+    Target,
+    _LongNote,
+    _population,
+)
 from masrel.intervals._question import (
     IntervalProblem,
     Statistic,
@@ -71,7 +78,6 @@ _CARELESS = (
     "careless raters are not covered, of whom so few may include none: where one rater "
     "in five is careless, 95 % intervals of 5 raters held in about 70 % of studies"
 )
-_OTHERS = {"items": "items", "raters": "raters", "both": "items and raters"}
 
 
 def estimate(
@@ -150,10 +156,10 @@ def estimate(
     entry = find_entry(coefficient, metric)
     check_option("target", target, get_args(Target))
     there_is = entry.interval_target
-    if method == "auto" and there_is not in (None, target):
+    if method == "auto" and there_is is not None and there_is != target:
         raise ParameterError(
-            f"target: the interval of {entry.title} generalises to other "
-            f'{_OTHERS[str(there_is)]}, which is "{there_is}", and it has no other; '
+            f"target: the interval of {entry.title} generalises to "
+            f'{_POPULATIONS[there_is]}, which is "{there_is}", and it has no other; '
             f'got "{target}"'
         )
     if clusters is not None and method in ("bootstrap", "posterior"):
@@ -182,9 +188,9 @@ def estimate(
             result = replace(result, standard_error=error)
     if method == "auto":
         interval, why = _choose_interval(ask(entry, ratings), clusters)
-        others = _OTHERS[target] if clusters is None else "clusters of items"
-        notes = (_LongNote(f"chosen for other {others}: {why}"), *interval.notes)
-        interval = replace(interval, target=target, notes=notes)
+        interval = replace(interval, target=target)
+        chosen = _LongNote(f"chosen for {_population(interval)}: {why}")
+        interval = replace(interval, notes=(chosen, *interval.notes))
     else:
         function = {
             "analytic": partial(analytic, clusters=clusters),

@@ -276,22 +276,23 @@ def _compare(
     ]
     if design == "dependent":
         _check_same_items(problems, clusters)
-        joint = _Joint.of(problems, clusters)
-        variance = joint.variance(joint.without[0] - joint.without[1])
-        n_units, df = joint.n, joint.n - 1.0
+        (of_first, of_second), n_units = _without_units(problems, clusters)
+        variance = _variance_of(of_first - of_second, n_units)
+        df = n_units - 1.0
     else:
         _check_other_clusters(clusters)
         pair: Any = [None, None] if clusters is None else clusters
-        joints = [
-            _Joint.of([problem], of) for problem, of in zip(problems, pair, strict=True)
+        of_sets = [
+            _without_units([problem], of)
+            for problem, of in zip(problems, pair, strict=True)
         ]
-        parts = [joint.variance(joint.without[0]) for joint in joints]
-        variance, n_units = sum(parts), min(joint.n for joint in joints)
+        parts = [_variance_of(values, n) for (values,), n in of_sets]
+        variance, n_units = sum(parts), min(n for _, n in of_sets)
         df = n_units - 1.0
         if variance > 0.0:  # Satterthwaite's degrees of freedom
             df = variance**2 / sum(
-                part**2 / max(joint.n - 1, 1)
-                for part, joint in zip(parts, joints, strict=True)
+                part**2 / max(n - 1, 1)
+                for part, (_, n) in zip(parts, of_sets, strict=True)
             )
     one, other = (problem.entry(problem.coded, weights=weights) for problem in problems)
     unit = "item" if clusters is None else "cluster"
@@ -351,40 +352,34 @@ def _check_other_clusters(clusters: object) -> None:
         )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Joint:
-    """Coefficients of several sets with each item, or cluster, left out."""
+def _without_units(
+    problems: Sequence[IntervalProblem], clusters: object
+) -> tuple[Floats, int]:
+    """Return coefficients of several sets without each item, or each cluster.
 
-    without: Floats = field(repr=False)  # (n_sets, n_units), of units that matter
-    n: int  # those with a pair of ratings, of the set that has the fewest
+    Only units that matter are left out, each of all sets at once: (n_sets, n_units);
+    and how many of these have a pair of ratings, of the set that has the fewest.
+    """
+    units = np.arange(len(problems[0].coded.codes))
+    if clusters is not None:
+        units = cluster_codes(problems[0], clusters)
+    sums, known, n_paired = zip(
+        *(cluster_sums(problem, units) for problem in problems), strict=True
+    )
+    matters = np.any(known, axis=0)
+    without = [
+        problem.values(problem.sums - of_set[matters])
+        for problem, of_set in zip(problems, sums, strict=True)
+    ]
+    return np.array(without), min(n_paired)
 
-    @classmethod
-    def of(cls, problems: Sequence[IntervalProblem], clusters: object) -> "_Joint":
-        """Leave out each item, or each cluster, of all sets at once."""
-        units = np.arange(len(problems[0].coded.codes))
-        if clusters is not None:
-            units = cluster_codes(problems[0], clusters)
-        sums, known, n_paired = zip(
-            *(cluster_sums(problem, units) for problem in problems), strict=True
-        )
-        matters = np.any(known, axis=0)
-        without = [
-            problem.values(problem.sums - of_set[matters])
-            for problem, of_set in zip(problems, sums, strict=True)
-        ]
-        return cls(without=np.array(without), n=min(n_paired))
 
-    def variance(self, without: Floats) -> float:
-        """Return the jackknife variance of a coefficient, or of a difference."""
-        return _variance_of(without, np.ones(without.size, dtype=np.int64), self.n)
-
-    @property
-    def covariance(self) -> Floats:
-        """The jackknife covariance of the coefficients, (n_sets, n_sets)."""
-        if self.n < 2:
-            return np.full((len(self.without),) * 2, math.nan)
-        moved = self.without - self.without.mean(axis=1, keepdims=True)
-        return np.asarray((self.n - 1) / self.n * (moved @ moved.T))
+def _covariance(without: Floats, n: int) -> Floats:
+    """Return the jackknife covariance of the coefficients, (n_sets, n_sets)."""
+    if n < 2:
+        return np.full((len(without),) * 2, math.nan)
+    moved = without - without.mean(axis=1, keepdims=True)
+    return np.asarray((n - 1) / n * (moved @ moved.T))
 
 
 # -- all differences of several --------------------------------------------------------
@@ -574,32 +569,35 @@ def differences(
                 f"sets: need the same items, got {n_items[0]} in {names[0]!r} and {n} "
                 f"in {name!r}"
             )
-    joint = _Joint.of(problems, clusters)
+    without, n_units = _without_units(problems, clusters)
+    covariance = _covariance(without, n_units)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UndefinedStatisticWarning)  # given below
         estimates = tuple(
             problem.entry(problem.coded, weights=weights) for problem in problems
         )
     unit: _Units = "items" if clusters is None else "clusters"
-    reason = _why_undefined(estimates, names, joint, unit)
-    notes = () if reason is not None else warn_small(joint.n, 10, unit)
+    reason = _why_undefined(estimates, names, without, n_units, unit)
+    notes = () if reason is not None else warn_small(n_units, 10, unit)
     each = np.array([estimate.value for estimate in estimates])
     values, errors = each[:, None] - each, np.zeros((len(each),) * 2)
     for i, j in itertools.combinations(range(len(each)), 2):
-        moved = joint.without[i] - joint.without[j]
-        errors[i, j] = errors[j, i] = math.sqrt(joint.variance(moved))
+        variance = _variance_of(without[i] - without[j], n_units)
+        errors[i, j] = errors[j, i] = math.sqrt(variance)
     if reason is None and not errors.any():
         left_out = unit.removesuffix("s")
         reason = f"leaving out any {left_out} leaves all differences as they are"
     elif reason is None and simultaneous == "scheffe":
-        reason = _too_few(len(each), joint.n)
+        reason = _too_few(len(each), n_units)
     quantile, p_values = math.nan, np.full_like(errors, math.nan)
     if reason is None:
-        quantile, p_values = _adjusted(joint, values, errors, level, simultaneous)
+        quantile, p_values = _adjusted(
+            covariance, n_units - 1.0, values, errors, level, simultaneous
+        )
     half = np.where(errors > 0.0, quantile * errors, math.nan)
-    alone = np.sqrt(np.diag(joint.covariance))
+    alone = np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore"):
-        correlation = joint.covariance / np.outer(alone, alone)
+        correlation = covariance / np.outer(alone, alone)
     arrays = {
         "standard_errors": alone,
         "correlation": correlation,
@@ -618,8 +616,10 @@ def differences(
         level=level,
         method=f"{unit.removesuffix('s')} jackknife, {_METHODS[simultaneous]}",
         quantile=quantile,
-        equality=_hotelling(each, joint, reason or _too_few(len(each), joint.n)),
-        n_units=joint.n,
+        equality=_hotelling(
+            each, covariance, n_units, reason or _too_few(len(each), n_units)
+        ),
+        n_units=n_units,
         unit=unit,
         notes=notes,
         reason=reason,
@@ -627,14 +627,18 @@ def differences(
 
 
 def _why_undefined(
-    estimates: Sequence[Estimate], names: Sequence[str], joint: _Joint, unit: _Units
+    estimates: Sequence[Estimate],
+    names: Sequence[str],
+    without: Floats,
+    n_units: int,
+    unit: _Units,
 ) -> str | None:
     for name, estimate in zip(names, estimates, strict=True):
         if estimate.reason is not None:
             return f"{name}: {estimate.reason}"
-    if joint.n < 2:
+    if n_units < 2:
         return f"needs at least 2 {unit} with ratings in every set"
-    for name, values in zip(names, joint.without, strict=True):
+    for name, values in zip(names, without, strict=True):
         if np.isnan(values).any():
             left_out = unit.removesuffix("s")
             return f"{name}: with one {left_out} left out the estimate is undefined"
@@ -648,7 +652,8 @@ def _too_few(g: int, n: int) -> str | None:
 
 
 def _adjusted(
-    joint: _Joint,
+    covariance: Floats,
+    df: float,
     values: Floats,
     errors: Floats,
     level: float,
@@ -658,7 +663,7 @@ def _adjusted(
     from scipy.optimize import brentq
     from scipy.special import fdtrc, fdtri, stdtr
 
-    g, df = len(values), joint.n - 1.0
+    g = len(values)
     t = np.abs(values / np.where(errors > 0.0, errors, math.nan))
     one, other = np.nonzero(np.triu(errors) > 0.0)
     if simultaneous == "bonferroni" or len(one) == 1:  # of two sets they are the same
@@ -670,7 +675,7 @@ def _adjusted(
         factor = (g - 1.0) * df / rest
         quantile = math.sqrt(factor * float(fdtri(g - 1.0, rest, level)))
         return quantile, fdtrc(g - 1.0, rest, t**2 / factor)
-    sizes, axes = np.linalg.eigh(joint.covariance)
+    sizes, axes = np.linalg.eigh(covariance)
     root = axes * np.sqrt(np.maximum(sizes, 0.0))  # root @ root.T is the covariance
     contrasts = (root[one] - root[other]) / errors[one, other][:, None]
     exceeded, rank = _largest_t(contrasts, df)
@@ -720,9 +725,9 @@ def _largest_t(contrasts: Floats, df: float) -> tuple[Callable[[float], float], 
     return exceeded, rank
 
 
-def _hotelling(values: Floats, joint: _Joint, reason: str | None) -> Significance:
+def _hotelling(values: Floats, v: Floats, n: int, reason: str | None) -> Significance:
     """Test that all coefficients are the same: T² = (Cκ)ᵀ (C V Cᵀ)⁻¹ Cκ."""
-    g, n, v, statistic = len(values), joint.n, joint.covariance, math.nan
+    g, statistic = len(values), math.nan
     df = (g - 1.0, n - g + 1.0)
     if reason is None:
         # C takes each from the first

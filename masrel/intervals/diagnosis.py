@@ -372,7 +372,7 @@ def _changes(
             has_pair = matters & (rated.sum(axis=1) - is_rated > 1)
             n = min(everyone.n_paired_items, int(freq @ has_pair))
             often = freq * (matters | (everyone.freq > 0))
-            errors[rater] = math.sqrt(_variance_of(change, often, n))
+            errors[rater] = math.sqrt(_variance_of(change, n, often))
             half[rater] = student_t(level, n - 1) * errors[rater]
     changes = without - problem.value
     half[errors == 0.0] = math.nan  # leaving out any item leaves it as it is

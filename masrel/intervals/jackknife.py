@@ -158,17 +158,17 @@ def _leave_out(problem: IntervalProblem, clusters: Integers | None = None) -> _L
         if unit == "items":
             rows = problem.features(problem.codes)
             values = problem.values(problem.sums - rows)
-            freq, n = problem.freq, problem.n_paired_items
+            n = problem.n_paired_items
         elif clusters is not None:
             sums, known, n = cluster_sums(problem, clusters)
             values = problem.values(problem.sums - sums[known])
-            freq = np.ones(len(values), dtype=np.int64)
         else:
             values = np.array(
                 [problem.values(sums) for sums, _ in _without_raters(problem)]
             )
-            freq, n = np.ones(len(values), dtype=np.int64), problem.n_paired_raters
-        variance += _variance_of(values, freq, n)
+            n = problem.n_paired_raters
+        freq = problem.freq if unit == "items" else np.ones(len(values), dtype=np.int64)
+        variance += _variance_of(values, n, freq)
         if np.isnan(values).any():
             reason = f"with one of the {unit} left out the estimate is undefined"
             break
@@ -190,13 +190,15 @@ def _leave_out(problem: IntervalProblem, clusters: Integers | None = None) -> _L
     )
 
 
-def _variance_of(replicates: Floats, freq: Integers, n: int) -> float:
+def _variance_of(replicates: Floats, n: int, freq: Integers | None = None) -> float:
     """Return (n - 1)/n Σ (θ_i - mean)² of estimates with one left out [1]_."""
     # Takes replicates (n_distinct,), freq (n_distinct,); n are those with a pair. What
     # is observed is a mean over these alone, whose variance this factor makes unbiased;
     # single ratings move the mean of chance by little, and there 1 would do as well.
     if n < 2:  # nothing is left
         return math.nan
+    if freq is None:
+        freq = np.ones(replicates.size, dtype=np.int64)
     moved = replicates - replicates[0]  # so that no change at all is exactly 0
     deviations = moved - freq @ moved / freq.sum()
     variance = float((n - 1) / n * (freq @ deviations**2))
