@@ -117,6 +117,9 @@ class Coefficient:
     tells_raters_apart : bool
         Whether who rated what matters to its value; False where counts of raters per
         item and category are enough.
+    rho : {"any raters", "raters alike"} or None
+        Of which raters its value in the population is that of Fleiss' κ, which is ρ of
+        the Dirichlet-multinomial model; None of others.
     needs_order : bool
         Whether grades without an order have no such coefficient, whatever the weights.
     """
@@ -136,6 +139,7 @@ class Coefficient:
     weighted: bool = True
     interval_target: Target | None = None
     tells_raters_apart: bool = True
+    rho: Literal["any raters", "raters alike"] | None = None
     in_units: bool = False
     by_name_only: bool = False
     code: Callable[..., CodedRatings] = code_ratings
@@ -145,6 +149,11 @@ class Coefficient:
     def has_interval(self) -> bool:
         """Whether it comes with an interval, and takes its level."""
         return self.interval_target is not None
+
+    @property
+    def raters_matter(self) -> bool:
+        """Whether other raters with the same counts would have another value."""
+        return self.tells_raters_apart and self.rho != "any raters"
 
     @property
     def needs_order(self) -> bool:
@@ -230,6 +239,7 @@ _ALL = (
         function=cohen_kappa,
         references=("cohen1960",),
         formula=_COHEN,
+        rho="raters alike",
         n_raters=(2, 2),
     ),
     Coefficient(
@@ -238,6 +248,7 @@ _ALL = (
         function=conger_kappa,
         references=("conger1980",),
         formula=_CONGER,
+        rho="raters alike",
     ),
     Coefficient(
         name="fleiss_kappa",
@@ -245,6 +256,7 @@ _ALL = (
         function=fleiss_kappa,
         references=("fleiss1971",),
         formula=_FLEISS,
+        rho="any raters",
         tells_raters_apart=False,
     ),
     Coefficient(
@@ -253,6 +265,7 @@ _ALL = (
         function=light_kappa,
         references=("light1971",),
         formula=_LIGHT,
+        rho="raters alike",
     ),
     Coefficient(
         name="scott_pi",
@@ -260,6 +273,7 @@ _ALL = (
         function=scott_pi,
         references=("scott1955",),
         formula=_SCOTT,
+        rho="any raters",
         n_raters=(2, 2),
     ),
     Coefficient(
@@ -289,6 +303,7 @@ _ALL = (
         function=krippendorff_alpha,
         references=("hayes2007",),
         formula=_ALPHA,
+        rho="any raters",
         tells_raters_apart=False,
         properties=_EVERY - {"items twice"},
     ),

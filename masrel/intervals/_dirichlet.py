@@ -12,7 +12,11 @@ import numpy as np
 
 from masrel.agreement._engine import Floats
 from masrel.estimates import Distribution, Interval
-from masrel.intervals._question import IntervalProblem, recorded_generator
+from masrel.intervals._question import (
+    WITHOUT_END,
+    IntervalProblem,
+    recorded_generator,
+)
 from masrel.intervals._rho import (
     METHOD,
     Prior,
@@ -32,7 +36,6 @@ _MAX_CATEGORIES = 100  # of which a prior makes pairs
 _SHOWN = 30  # points of a density
 _SWEEPS = 5  # of Gibbs: given ρ the shares soon forget where they began
 _AT_ONCE = 1 << 21  # numbers drawn at once
-_WITHOUT_END = 1e9  # items of a population, in which corrections for few vanish
 
 
 def alike_interval(
@@ -52,7 +55,7 @@ def alike_interval(
     weights = (1.0 - rho) * shares[:, pairs[0]] * shares[:, pairs[1]]
     weights[:, pairs[0] == pairs[1]] += rho * shares
     rows = problem.features(pairs.T)
-    values = problem.values(_WITHOUT_END * (weights @ rows))
+    values = problem.values(WITHOUT_END * (weights @ rows))
     return _interval(problem, values, METHOD, prior.description, one_sided, seed)
 
 
@@ -71,7 +74,7 @@ def patterns_interval(
     n_left, values, size = n_draws, [], max(1, _AT_ONCE // shapes.size)
     while n_left > 0:
         freq = generator.standard_gamma(shapes, (min(size, n_left), shapes.size))
-        freq *= _WITHOUT_END / problem.n_items
+        freq *= WITHOUT_END / problem.n_items
         values.append(problem.values(freq @ rows))
         n_left -= size
     drawn = np.concatenate(values)

@@ -53,6 +53,9 @@ _MAX_PLACES = 1 << 23  # numbers of features that are held at once
 _FEW_GRADES = 128  # up to which the features of every item are held
 _MAX_REMADE = 40  # categories up to which that metric is made anew from their pairs
 
+WITHOUT_END = 1e15
+"""Items of a population, in which corrections for few vanish."""
+
 COLUMNS = {"ratings": 1, "pairs": 2}
 """Columns of codes that a rater has, by what a coefficient takes."""
 
@@ -89,6 +92,11 @@ class IntervalProblem:
     max_df: float = math.inf  # degrees of freedom, where other parts have as few
 
     @property
+    def is_rho(self) -> bool:
+        """Whether the value is ρ of the Dirichlet-multinomial model, as it pools."""
+        return self.unweighted and self.entry.rho == "any raters"
+
+    @property
     def n_raters(self) -> int:
         """Raters who matter."""
         return int(self.codes.shape[1]) // COLUMNS[self.entry.shape]
@@ -123,6 +131,12 @@ class IntervalProblem:
     def values(self, sums: Floats) -> Floats:
         """Return the coefficient for sums of shape (..., n_features)."""
         return self.formula.value(sums, self.v)
+
+    def disagreements(self, sums: Floats) -> tuple[Floats, Floats]:
+        """Return D_o and D_e for sums of shape (..., n_features)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            d_o, d_e, _ = self.formula.disagreements(sums, self.v)
+        return d_o, d_e
 
     def slopes(self, sums: Floats) -> Floats:
         """Return the derivatives of the coefficient in sums (..., n_features)."""

@@ -12,7 +12,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
-from typing import Literal
 
 import numpy as np
 from scipy.special import betainc
@@ -23,24 +22,12 @@ from masrel.agreement._weights import MANY
 from masrel.errors import ConvergenceError
 from masrel.estimates import Distribution, Interval
 from masrel.intervals._quadrature import beta_nodes, solve_quantile
-from masrel.intervals._question import IntervalProblem, recorded_generator
+from masrel.intervals._question import (
+    WITHOUT_END,
+    IntervalProblem,
+    recorded_generator,
+)
 from masrel.intervals._rho import prior_note, where_the_prior_weighs
-
-ChanceAgreement = Literal["none", "uniform", "pooled", "pooled, Gwet", "margins"]
-"""What disagreement by chance is made of."""
-
-CHANCE_AGREEMENT: dict[str, ChanceAgreement] = {
-    "percent_agreement": "none",
-    "brennan_prediger": "uniform",
-    "scott_pi": "pooled",
-    "fleiss_kappa": "pooled",
-    "krippendorff_alpha": "pooled",
-    "gwet_ac": "pooled, Gwet",
-    "cohen_kappa": "margins",
-    "conger_kappa": "margins",
-    "light_kappa": "margins",
-}
-"""Coefficients of two raters; those of one kind have one value in the population."""
 
 _NOTED_DRAWS = 2_000  # for the interval under another prior: a note has three digits
 _ITEMS = 1.5  # that the default prior is worth, by the study of coverage
@@ -66,32 +53,20 @@ class Nodes:
 
     @classmethod
     def of(
-        cls, chance: ChanceAgreement, v: Floats, weights: Floats, x: Floats, y: Floats
+        cls, problem: IntervalProblem, weights: Floats, x: Floats, y: Floats
     ) -> "Nodes":
         """Compute what the coefficient needs."""
-        # v (n_categories, n_categories), weights (n,), x (n, n_categories), y (n,
-        # n_categories (n_categories - 1))
-        q = len(v)
-        first, second = np.nonzero(~np.eye(q, dtype=bool))
-        rows, columns = y @ np.eye(q)[first], y @ np.eye(q)[second]
-        if chance in ("none", "uniform"):
-            level = np.full(len(weights), 1.0 if chance == "none" else v.mean())
-            e = [level, 2.0 * level, level]
-        else:
-            if chance != "margins":
-                rows = columns = 0.5 * (rows + columns)
-            u, rest = v, 0.0
-            if chance == "pooled, Gwet":
-                # 1 - g Σ p (1 - p) = 1 - g + g Σ p², g = T_w / (q (q - 1))
-                g = (q * q - v.sum()) / (q * (q - 1))
-                u, rest = g * np.eye(q), 1.0 - g
-            e = [
-                rest + ((x @ u) * x).sum(axis=1),
-                2.0 * rest + ((x @ u) * columns).sum(axis=1) + ((rows @ u) * x).sum(1),
-                rest + ((rows @ u) * columns).sum(axis=1),
-            ]
-        d = y @ v[first, second]
-        return cls(weights=weights, d=d, e_0=e[0], e_1=e[1], e_2=e[2])
+        # x has a column for each category, y for each pair of unequal ones
+        q = problem.coded.n_categories
+        apart = np.stack(np.nonzero(~np.eye(q, dtype=bool)), axis=1)
+        alike = np.repeat(np.arange(q)[:, None], 2, axis=1)
+        agreed = WITHOUT_END * (x @ problem.features(alike))
+        differed = WITHOUT_END * (y @ problem.features(apart))
+        # D_e is quadratic in t: known at three of its values, it is known at all
+        sums = np.stack([agreed, 0.5 * (agreed + differed), differed])
+        observed, (e_0, half, e_2) = (of[..., 0] for of in problem.disagreements(sums))
+        e_1 = 4.0 * half - e_0 - e_2
+        return cls(weights=weights, d=observed[2], e_0=e_0, e_1=e_1, e_2=e_2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -166,8 +141,7 @@ class TablePosterior:
 
 
 def table_quantiles(
-    chance: ChanceAgreement,
-    v: Floats,
+    problem: IntervalProblem,
     cells: Floats,
     shares: Sequence[float],
     *,
@@ -176,21 +150,22 @@ def table_quantiles(
 ) -> tuple[TablePosterior, list[float], TablePosterior]:
     """Integrate, or draw, the posterior of a coefficient of two raters."""
     # -> the posterior, its quantiles, and one of fewer nodes for its density;
-    # v and the parameters of the Dirichlet, both (n_categories, n_categories)
-    agreeing = np.eye(len(v), dtype=bool)
+    # cells, the parameters of the Dirichlet, (n_categories, n_categories)
+    agreeing = np.eye(len(cells), dtype=bool)
     of_nodes = partial(
         TablePosterior,
         disagreeing=float(cells[~agreeing].sum()),
         agreeing=float(cells.trace()),
     )
-    if len(v) > 2:
+    if len(cells) > 2:
         if generator is None:  # only how often they agree matters: any x and y
-            x, y = (np.full((1, n), 1.0 / n) for n in (len(v), cells.size - len(v)))
+            n = len(cells)
+            x, y = (np.full((1, of), 1.0 / of) for of in (n, n * n - n))
         else:
             x = generator.dirichlet(cells[agreeing], size=n_draws)
             y = generator.dirichlet(cells[~agreeing], size=n_draws)
         every, some = (
-            Nodes.of(chance, v, np.full(n, 1.0 / n), x[:n], y[:n])
+            Nodes.of(problem, np.full(n, 1.0 / n), x[:n], y[:n])
             for n in (len(x), min(len(x), _SHOWN_DRAWS))
         )
         posterior = of_nodes(nodes=lambda _: every)
@@ -198,7 +173,7 @@ def table_quantiles(
         return posterior, ends, of_nodes(nodes=lambda _: some)
     for n in _NODES:
         posterior, fewer = (
-            of_nodes(nodes=grid_nodes(chance, v, cells, m)) for m in (n, 3 * n // 4)
+            of_nodes(nodes=grid_nodes(problem, cells, m)) for m in (n, 3 * n // 4)
         )
         ends = [posterior.quantile(share) for share in shares]
         again = [fewer.probability(end) for end in ends]
@@ -208,21 +183,21 @@ def table_quantiles(
 
 
 def grid_nodes(
-    chance: ChanceAgreement, v: Floats, cells: Floats, n: int
+    problem: IntervalProblem, cells: Floats, n: int
 ) -> Callable[[float], Nodes]:
     """Return the nodes of two categories, for the coefficient at a value."""
-    # both v and cells are 2 by 2
+    # of the Dirichlet of two by two cells
     x, of_x = beta_nodes(float(cells[0, 0]), float(cells[1, 1]), n)
 
     @lru_cache(maxsize=1)
     def nodes(least: float) -> Nodes:
         y, of_y = np.full((1, 2), 0.5), np.ones(1)
-        if chance == "margins":  # else y does not matter
+        if problem.entry.raters_matter:  # else y does not matter
             y, of_y = beta_nodes(float(cells[0, 1]), float(cells[1, 0]), n, least)
         weights = np.outer(of_x, of_y).ravel()
         large = weights > _NEGLIGIBLE
         x_each, y_each = np.repeat(x, len(y), axis=0), np.tile(y, (len(x), 1))
-        return Nodes.of(chance, v, weights[large], x_each[large], y_each[large])
+        return Nodes.of(problem, weights[large], x_each[large], y_each[large])
 
     def at(value: float) -> Nodes:
         # With margins and r = 1 - `value` the coefficient can be at most a negative
@@ -261,15 +236,16 @@ def table_interval(
     table = pair_table(problem.codes, q, problem.freq)
     prior, description = table_prior(concentration, q)
     generator, seed, errors = None, None, None
-    chance = CHANCE_AGREEMENT[problem.entry.name]
-    away = problem.v[~np.eye(q, dtype=bool)]
-    only_agreement_matters = chance in ("none", "uniform") and not np.ptp(away)
-    is_drawn = q > 2 and not only_agreement_matters
+    # x and y do not matter where all misses count alike, and chance is the same of one
+    # category, of two, ... of all
+    alike = np.repeat(np.arange(q)[:, None], 2, axis=1)
+    _, chance = problem.disagreements(problem.features(alike).cumsum(axis=0))
+    is_drawn = q > 2 and bool(np.ptp(chance) or not problem.unweighted)
     if is_drawn:
         generator, seed = recorded_generator(rng)
     tail = (1.0 - problem.level) * (1.0 if one_sided else 0.5)
     shares = (tail, 0.5) if one_sided else (tail, 0.5, 1.0 - tail)
-    of_cells = partial(table_quantiles, chance, problem.v, shares=shares)
+    of_cells = partial(table_quantiles, problem, shares=shares)
     posterior, ends, fewer = of_cells(
         table + prior, generator=generator, n_draws=n_draws
     )
@@ -316,11 +292,10 @@ def table_interval(
 
 def table_refusal(problem: IntervalProblem) -> str:
     """Return why there is no table of two raters to ask, or nothing."""
-    name, n_raters = problem.entry.name, problem.n_raters
-    if name not in CHANCE_AGREEMENT or n_raters != 2:
+    if problem.n_raters != 2:
         return (
-            f'model: "table" applies to {", ".join(CHANCE_AGREEMENT)} of exactly two '
-            f"raters; got {name} of {n_raters}"
+            'model: "table" applies to exactly two raters; got '
+            f"{problem.entry.name} of {problem.n_raters}"
         )
     if problem.coded.n_categories > MANY:
         return (

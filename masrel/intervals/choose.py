@@ -59,7 +59,7 @@ from masrel.intervals._question import (
 from masrel.intervals.analytic import _clustered_error, analytic
 from masrel.intervals.bootstrap import bootstrap
 from masrel.intervals.jackknife import _leave_out, _variance_of_cells, jackknife
-from masrel.intervals.posterior import _RHO_COEFFICIENTS, posterior
+from masrel.intervals.posterior import posterior
 
 if TYPE_CHECKING:
     from masrel.agreement import Metric, WeightsLike
@@ -260,7 +260,7 @@ def _choose_interval(
 def _jackknife_with_spread(problem: IntervalProblem) -> tuple[Interval, str]:
     """Leave items out, or raters, unless that says nothing."""
     n_items, target = problem.n_paired_items, problem.target
-    modelled = problem.unweighted and problem.entry.name in _RHO_COEFFICIENTS
+    modelled = problem.is_rho
     sizes = (problem.codes >= 0).sum(axis=1)
     n_ratings = int(problem.freq @ np.where(sizes > 1, sizes, 0))
     left_out = _leave_out(problem)
@@ -306,20 +306,14 @@ def _posterior(problem: IntervalProblem, alike: bool) -> Interval | None:
         patterns_interval,
     )
     from masrel.intervals._rho import DEFAULT_PRIOR, extended, rho_interval
-    from masrel.intervals._two_raters import (
-        CHANCE_AGREEMENT,
-        table_interval,
-        table_refusal,
-    )
+    from masrel.intervals._two_raters import table_interval, table_refusal
 
     if no_posterior(problem):
         return None
-    name, unweighted = problem.entry.name, problem.unweighted
-    chance, small = CHANCE_AGREEMENT.get(name), problem.n_paired_items <= _MANY
-    alike = alike and unweighted and chance is not None and small
-    is_rho = alike and chance in ("pooled", "margins")
+    small = problem.n_paired_items <= _MANY
+    alike = alike and problem.unweighted and small
     one_sided = not problem.value < 1.0
-    if is_rho or (small and unweighted and name in _RHO_COEFFICIENTS):
+    if (alike and problem.entry.rho) or (small and problem.is_rho):
         interval = rho_interval(problem, DEFAULT_PRIOR, one_sided=one_sided)
     elif alike:
         interval = alike_interval(

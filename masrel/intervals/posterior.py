@@ -15,10 +15,6 @@ if TYPE_CHECKING:
     from masrel.agreement import WeightsLike
     from masrel.intervals._rho import PriorName
 
-# Coefficients whose value in the population is ρ of the Dirichlet-multinomial model,
-# whoever the raters; raters alike share it by other coefficients, too.
-_RHO_COEFFICIENTS = ("fleiss_kappa", "scott_pi", "krippendorff_alpha")
-
 _MIN_DRAWS = 100
 
 _Model = Literal["auto", "dirichlet-multinomial", "table", "patterns"]
@@ -164,7 +160,7 @@ def posterior(
         patterns_interval,
     )
     from masrel.intervals._rho import METHOD, Prior, nothing_to_learn, rho_interval
-    from masrel.intervals._two_raters import CHANCE_AGREEMENT, table_interval
+    from masrel.intervals._two_raters import table_interval
 
     checked_prior = Prior.of(prior, 1.0 if concentration is None else concentration)
     model = _checked_model(problem, model, weights)
@@ -184,9 +180,7 @@ def posterior(
             f'model: "{model}" has one prior; got prior="{prior}"',
         ),
     )
-    # the value of some in the population is ρ where raters are alike
-    kind = CHANCE_AGREEMENT.get(problem.entry.name)
-    is_rho = is_alike and kind in ("pooled", "margins")
+    is_rho = is_alike and problem.entry.rho is not None
     is_exact = is_rho or model == "table"
     reason = nothing_to_learn(problem) if is_exact else no_posterior(problem)
     if reason is not None:
@@ -207,15 +201,13 @@ def _checked_model(
     problem: IntervalProblem, model: _Model, weights: "WeightsLike"
 ) -> _Model:
     """Check what was chosen, and return the model, which may be left to the data."""
-    from masrel.intervals._two_raters import CHANCE_AGREEMENT, table_refusal
+    from masrel.intervals._two_raters import table_refusal
 
-    name = problem.entry.name
     check_option("model", model, get_args(_Model))
-    if model == "auto" and problem.unweighted and name in _RHO_COEFFICIENTS:
+    if model == "auto" and problem.is_rho:
         model = "dirichlet-multinomial"
     elif model == "auto":
         model = "table" if problem.n_raters == 2 else "patterns"
-    has_alike = problem.unweighted and name in CHANCE_AGREEMENT
     of_table = table_refusal(problem)
     refuse(
         (
@@ -228,9 +220,9 @@ def _checked_model(
             f"coefficient: there is no posterior of {problem.entry.title}",
         ),
         (
-            model == "dirichlet-multinomial" and not has_alike,
+            model == "dirichlet-multinomial" and not problem.unweighted,
             "model: the Dirichlet-multinomial model applies to unweighted "
-            f"{', '.join(CHANCE_AGREEMENT)}; got {name} with weights={weights!r}",
+            f"coefficients; got {problem.entry.name} with weights={weights!r}",
         ),
         (model == "table" and of_table, of_table),
     )

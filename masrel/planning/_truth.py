@@ -320,7 +320,7 @@ class Design:
     @property
     def ordered(self) -> bool:
         """Whether it matters which rater gave which rating."""
-        tells_apart = self.entry.tells_raters_apart and self.entry.name != "scott_pi"
+        tells_apart = self.entry.raters_matter
         return self.model.name == "table" or tells_apart
 
     @property
