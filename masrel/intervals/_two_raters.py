@@ -58,10 +58,10 @@ class Nodes:
         """Compute what the coefficient needs."""
         # x has a column for each category, y for each pair of unequal ones
         q = problem.coded.n_categories
-        apart = np.stack(np.nonzero(~np.eye(q, dtype=bool)), axis=1)
-        alike = np.repeat(np.arange(q)[:, None], 2, axis=1)
-        agreed = WITHOUT_END * (x @ problem.features(alike))
-        differed = WITHOUT_END * (y @ problem.features(apart))
+        unequal = np.stack(np.nonzero(~np.eye(q, dtype=bool)), axis=1)
+        equal = np.repeat(np.arange(q)[:, None], 2, axis=1)
+        agreed = WITHOUT_END * (x @ problem.features(equal))
+        differed = WITHOUT_END * (y @ problem.features(unequal))
         # D_e is quadratic in t: known at three of its values, it is known at all
         sums = np.stack([agreed, 0.5 * (agreed + differed), differed])
         observed, (e_0, half, e_2) = (of[..., 0] for of in problem.disagreements(sums))
@@ -238,8 +238,8 @@ def table_interval(
     generator, seed, errors = None, None, None
     # x and y do not matter where all misses count alike, and chance is the same of one
     # category, of two, ... of all
-    alike = np.repeat(np.arange(q)[:, None], 2, axis=1)
-    _, chance = problem.disagreements(problem.features(alike).cumsum(axis=0))
+    equal = np.repeat(np.arange(q)[:, None], 2, axis=1)
+    _, chance = problem.disagreements(problem.features(equal).cumsum(axis=0))
     is_drawn = q > 2 and bool(np.ptp(chance) or not problem.unweighted)
     if is_drawn:
         generator, seed = recorded_generator(rng)

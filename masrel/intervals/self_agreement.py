@@ -262,12 +262,10 @@ class _Posterior:
         """Return quantiles of one rater's kappa."""
         # Given m and g it is a mixture of Betas, one a term of the likelihood.
         pairs = self.raters[rater]
-        # every other mean, which is as good
-        masses, points = self.masses[::2], self.mean.points[::2]
-        at, of = np.nonzero(_weighs(masses))
-        up, down = _parameters(points[at], _GRID[of])
+        at, of = np.nonzero(_weighs(self.masses))
+        up, down = _parameters(self.mean.points[at], _GRID[of])
         terms = pairs.log_terms(up, down)
-        mass = np.exp(terms - log_sum_exp(terms)[:, None]) * masses[at, of, None]
+        mass = np.exp(terms - log_sum_exp(terms)[:, None]) * self.masses[at, of, None]
         node, j = np.nonzero(_weighs(mass))
         weights = mass[node, j] / mass[node, j].sum()
         up, down = up[node] + pairs.agree - j, down[node] + pairs.differ + j
@@ -279,7 +277,7 @@ class _Posterior:
 
     def sd_quantiles(self, shares: Sequence[float]) -> list[float]:
         """Return quantiles of the standard deviation of kappa over raters."""
-        # of √(m (1 - m) g), to about 1e-4: it has a kink in m
+        # of √(m (1 - m) g), to about 2e-4: it has a kink in m
         variance = expit(self.mean.points) * expit(-self.mean.points)
 
         def probability(deviation: float) -> float:
