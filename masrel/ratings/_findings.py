@@ -60,7 +60,8 @@ class ReadingOptions:
         """The options that need the whole file in memory."""
         names = ("by", "session", "clusters", "counts", "table")
         options = [f"--{name}" for name in names if getattr(self, name)]
-        return options + [f"--repeated {self.repeated}"] * (self.repeated != "error")
+        is_kept = self.repeated == "error"
+        return options if is_kept else [*options, f"--repeated {self.repeated}"]
 
     def check(self) -> None:
         """Refuse what is wrong whatever the file is."""
@@ -176,6 +177,7 @@ _TEXTS = {
     # the file
     "folder": "needed a file, got a folder",
     "absent": "no such file",
+    "device": "needed a file or a pipe, got a device",
     "empty": "needed a header and rows, the file is empty",
     "no records": "needed a header and rows, the file has none",
     "no rows": "needed rows of ratings below the names, got none",

@@ -247,11 +247,14 @@ def bytes_of(path: Path | str) -> bytes:
     """Return the bytes of a file, or of standard input for "-"."""
     if str(path) == "-":
         return sys.stdin.buffer.read()
-    if not Path(path).exists():
+    path = Path(path)
+    if not path.exists():
         raise refusal(str(path), "absent")
-    if Path(path).is_dir():
+    if path.is_dir():
         raise refusal(str(path), "folder")
-    return Path(path).read_bytes()
+    if path.is_char_device() or path.is_block_device():  # which may have no end
+        raise refusal(str(path), "device")
+    return path.read_bytes()
 
 
 def unpacked(name: str, data: bytes, *, is_export: bool) -> tuple[str, bytes]:

@@ -141,7 +141,7 @@ def test_a_file_that_is_written_bit_by_bit_is_on_disk_before_it_has_its_name(
     tmp_path: Path, events: list[str]
 ) -> None:
     with new_file(tmp_path / "a") as out:
-        out.write(b"x")
+        out.write("x")
     assert events == ["part", "= a", tmp_path.name]
 
 
@@ -168,7 +168,7 @@ def test_what_a_kill_leaves_is_taken_away_after_a_day(tmp_path: Path) -> None:
         os.utime(left, (yesterday, yesterday))
         write_file(path, "new")
         assert not left.exists()
-        out.write(b"whole")
+        out.write("whole")
     assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {
         "a.csv": "new",
         "b.csv": "whole",

@@ -220,7 +220,7 @@ def test_it_is_a_table_on_the_screen() -> None:
         (("--speed-deg-s", 9), "--speed-deg-s: needs V1, V2 and V3 with --tardieu"),
         (
             ("--speed-deg-s", 9, "--speed-deg-s", 8, "--speed-deg-s", 7),
-            "speeds: need three above 0 deg/s, .*, got 9, 8, 7",
+            "speed-deg-s: need three above 0 deg/s, .*, got 9, 8, 7",
         ),
         (
             ("--from-deg", 150),

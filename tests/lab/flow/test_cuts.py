@@ -171,7 +171,7 @@ def test_a_kill_at_any_call_leaves_old_bytes_or_new_ones(
         run(*call)
     cuts.check()
     assert contents(root) != cuts.before
-    assert len(cuts.left) > 5
+    assert len(cuts.left) >= 5
     assert not list(root.rglob(".masrel-*"))
     assert contents(root) == cuts.left[-1]  # what comes last is a sync of the folder
 
