@@ -186,7 +186,7 @@ def _rows_of(
 ) -> list[list[Any]]:
     # an array or nested sequences -> n_items lists of labels, of such a width or as
     # the first
-    if isinstance(table, np.ndarray):
+    if isinstance(table, np.ndarray) and width is None:
         return list(table.tolist())
     if not is_row(table):
         raise RatingsError(
@@ -339,6 +339,11 @@ def code_pairs(
     """Check pairs of ratings per rater and lay them side by side as codes."""
     # Takes pairs (n_raters, n_items, 2)
     if isinstance(pairs, CodedRatings):
+        if pairs.codes.shape[1] % 2:
+            raise RatingsError(
+                "pairs: needs two columns of ratings per rater, got "
+                f"{pairs.codes.shape[1]} columns"
+            )
         return code_ratings(pairs, categories)
     if not is_row(pairs):
         raise RatingsError(

@@ -377,8 +377,8 @@ def spread_values(categories: Sequence[Label]) -> Floats:
     span = float(values.max()) - float(values.min()) if len(values) > 1 else 1.0
     if len(set(values.tolist())) < len(values) or not 1e-75 < span < 1e75:
         raise ParameterError(
-            "categories: weights need numbers that floats tell apart, and a range of "
-            f"1e-75 to 1e75, got {shown(categories)}"
+            "categories: weights need finite numbers that floats tell apart, with a "
+            f"range of 1e-75 to 1e75, got {shown(categories)}"
         )
     return values
 

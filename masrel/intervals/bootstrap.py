@@ -181,6 +181,8 @@ def bootstrap(
         metric=metric,
         level=level,
     )
+    if rng is not None:
+        recorded_generator(rng)  # or an error, even where nothing is drawn
     of_items = target == "items" or clusters is not None
     units = _item_units(problem, clusters) if of_items else _rater_units(problem)
     method = f"{kind} bootstrap{units.words}"
@@ -235,8 +237,6 @@ def _resampled(
     rng: np.random.Generator | int | None,
 ) -> tuple["_Resamples", int, int | None]:
     """Return values of resamples, how many distinct ones there are, and the seed."""
-    if rng is not None:
-        recorded_generator(rng)  # or an error, even where nothing is drawn
     n_distinct = 1
     for freq in units.freqs:
         n, others = int(freq.sum()), freq.size - 1

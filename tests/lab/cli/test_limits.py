@@ -104,7 +104,7 @@ def test_a_small_packed_table_that_is_large(
     packed = tmp_path / "table.csv.gz"
     packed.write_bytes(gzip.compress(b"item,A,B\n" + b"1,1,1\n" * 1000))
     done = masrel("agree", packed, "--target", "items")
-    refused(done, "more than 1000 bytes when it is unpacked")
+    refused(done, "more than 1000 bytes when unpacked")
 
 
 def test_a_simulated_hand_does_not_take_an_hour(study: Path, masrel: Caller) -> None:
