@@ -65,16 +65,12 @@ class CodedRatings:
     @property
     def n_raters(self) -> int:
         """Raters with at least one rating."""
-        return _raters_of(self.codes)
+        return int((self.codes >= 0).any(axis=0).sum())
 
     @property
     def n_categories(self) -> int:
         """Declared categories."""
         return len(self.categories)
-
-
-def _raters_of(codes: Codes) -> int:
-    return int((codes >= 0).any(axis=0).sum())
 
 
 def code_ratings(
@@ -460,7 +456,7 @@ class CountedRatings:
             self,
             codes=codes,
             freq=self.freq[rows],
-            n_raters=_raters_of(codes),
+            n_raters=int((codes >= 0).any(axis=0).sum()),
             repeats=None if self.repeats is None else self.repeats[rows],
             source=None,
         )
@@ -513,7 +509,7 @@ def count_ratings(
         codes=codes,
         freq=freq,
         categories=coded.categories,
-        n_raters=_raters_of(codes),
+        n_raters=int((codes >= 0).any(axis=0).sum()),
         declared=coded.declared,
         source=coded,
     )

@@ -167,14 +167,15 @@ def estimate(
     """
     counted = formula.count(ratings, categories)
     made = declared_weights(weights, counted.categories, declared=counted.declared)
-    v, freq, size = made.v, counted.freq, counted.size
+    v, codes, freq, repeats = made.v, counted.codes, counted.freq, counted.repeats
+    size = (codes >= 0 if repeats is None else repeats).sum(axis=1)
     are_many = len(counted.categories) > _MANY_GRADES and not counted.declared
     if are_many and made.counts_misses:
         refuse_measurements(counted)
     n_items = int(freq @ (size > 0))
     if population is not None:
         check_population(population, n_items)
-    features = formula.features(counted.codes, v, counted.repeats)
+    features = formula.features(codes, v, repeats)
     sums, freq = features.summed(freq)
     n_paired = int(freq @ (size > 1))
     with np.errstate(divide="ignore", invalid="ignore"):
