@@ -163,7 +163,7 @@ def _on_scale(
         return f"ratings: row {row}, column {rest[0] if rest else repr(column)}"
 
     coded, known = label_codes([[label] for label in labels], scale, where)
-    return np.append(coded[:, 0], coded.dtype.type(MISSING))[codes], known
+    return np.append(coded.ravel(), coded.dtype.type(MISSING))[codes], known
 
 
 def check_scale(known: tuple[Label, ...], categories: Sequence[Label] | None) -> None:

@@ -22,6 +22,8 @@ def test_numbers_are_ordered_by_value_and_not_as_text() -> None:
 def test_every_kind_of_missing_value_is_missing() -> None:
     frame = pd.DataFrame({"a": ["x", None], "b": [pd.NA, "y"], "c": [np.nan, "x"]})
     assert code_ratings(frame).codes.tolist() == [[0, -1, -1], [-1, 1, 0]]
+    nothing = code_ratings(np.full((2, 2), np.nan), [1, 2])
+    assert nothing.codes.tolist() == [[-1, -1], [-1, -1]]
     assert code_ratings(np.array([[1.0, np.nan], [2.0, 1.0]])).codes.tolist() == [
         [0, -1],
         [1, 0],
