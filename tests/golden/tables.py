@@ -50,10 +50,10 @@ PICKED = (
     "pooled_kappa", "kendall_w", "robinson_a", "icc_1", "icc_1k", "icc_c1", "icc_ck",
     "icc_a1", "icc_ak",
 )  # fmt: skip
-"""Coefficients whose intervals are stored, picked by their places here.
+"""Coefficients whose intervals are stored, picked by their places here."""
 
-Of a new one only values are: it would move the places of all others.
-"""
+VALUED = (*PICKED, "lin_ccc", "sem", "sem_consistency", "mdc", "mdc_consistency")
+"""Coefficients whose values are stored. A new one stands in no table of before."""
 
 
 def cases() -> list[Case]:
@@ -83,9 +83,9 @@ def _coefficients(seed: int) -> dict:
     made: dict = {"ratings": _text(table), "categories": table.categories}
     if table.is_counts:
         return made | _from_counts(table, seed)
-    for name, entry in COEFFICIENTS.items():
+    for name in VALUED:
         options = {"categories": table.categories, "weights": _weights(name, seed)}
-        made[name] = outcome(entry, _shaped(table, name), **options)
+        made[name] = outcome(COEFFICIENTS[name], _shaped(table, name), **options)
     return made
 
 
@@ -130,7 +130,7 @@ def _from_counts(table: Drawn, seed: int) -> dict:
             table.rows,
             weights=WEIGHTS[seed % 3],
         )
-        for name, entry in sorted(COEFFICIENTS.items())
+        for name, entry in sorted((name, COEFFICIENTS[name]) for name in PICKED)
         if entry.formula and not entry.tells_raters_apart
     }
 
