@@ -200,8 +200,10 @@ def grid_nodes(
         return Nodes.of(problem, weights[large], x_each[large], y_each[large])
 
     def at(value: float) -> Nodes:
-        # With margins and r = 1 - `value` the coefficient can be at most a negative
-        # value only where r 2 y (1 - y) is at least -`value`; beyond that the
+        if problem.entry.rho != "raters alike":
+            return nodes(0.0)
+        # With chance of margins and r = 1 - `value` the coefficient can be at most a
+        # negative value only where r 2 y (1 - y) is at least -`value`; beyond that the
         # probability is 0, and a grid over all y would not see where it begins.
         below = max(-value, 0.0)
         product = below / (1.0 + below)  # least 2 y (1 - y)

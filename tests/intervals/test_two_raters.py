@@ -1,6 +1,7 @@
 """The posterior of two raters' table: by hand, by other integrals, by drawing it."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,6 +69,15 @@ def test_raters_who_never_agree_are_as_uncertain_as_draws_say(n: int, row: int) 
 
 def ends(result: Interval) -> tuple[float, float]:
     return result.low, result.high
+
+
+def test_raters_who_are_told_apart_in_vain_change_nothing() -> None:
+    entry = COEFFICIENTS["brennan_prediger"]
+    found = [
+        ends(posterior(of, pairs([[2, 3], [1, 1]]), target="items", model="table"))
+        for of in (entry, replace(entry, tells_raters_apart=True))
+    ]
+    assert found[0] == pytest.approx(found[1], abs=1e-9)
 
 
 # One pair in agreement, each of 2 × 2 cells of prior 1/2: the share of agreeing pairs
