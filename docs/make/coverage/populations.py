@@ -1,0 +1,131 @@
+"""Populations whose coefficients are known, to draw studies of other items from.
+
+A population is kinds of items, how frequent each is, and how every rater grades it.
+What is true of a coefficient is computed from the pairs of raters, not by the package.
+"""
+
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import ndtr, ndtri, roots_jacobi
+
+from docs.make.coverage.latent import severities
+from docs.make.coverage.studies import Codes, Floats
+
+Shares = tuple[float, ...]
+"""Shares of the grades, in their order."""
+
+MISSING = -1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Population:
+    """Kinds of items, (n_kinds,), and chances of grades, (n_kinds, n_raters, q)."""
+
+    kinds: Floats = field(repr=False)
+    chances: Floats = field(repr=False)
+    p_missing: float = 0.0  # of every rating by itself
+
+    def draw(self, n_items: int, rng: np.random.Generator) -> Codes:
+        """Draw the ratings of a study, (n_items, n_raters)."""
+        of_items = self.chances[rng.choice(self.kinds.size, n_items, p=self.kinds)]
+        up_to = of_items.cumsum(axis=-1)[..., :-1]
+        uniform = rng.random((*of_items.shape[:2], 1))
+        codes = (uniform >= up_to).sum(axis=-1).astype(np.int8)
+        codes[rng.random(codes.shape) < self.p_missing] = MISSING
+        return codes
+
+    def truth(self, coefficient: str, weights: str = "identity") -> float:
+        """Return the coefficient of all items and these raters."""
+        # ratings are missing of every rater alike, and leave it as it is
+        q = self.chances.shape[-1]
+        place = np.arange(q, dtype=np.float64)
+        v = (place[:, None] != place).astype(np.float64)
+        if weights == "quadratic":
+            v = ((place[:, None] - place) / (q - 1)) ** 2
+        by_rater = np.einsum("s,srk->rk", self.kinds, self.chances)
+        pairs = list(combinations(range(len(by_rater)), 2))
+        observed = np.mean([
+            np.einsum(
+                "s,sk,sl,kl->", self.kinds, self.chances[:, i], self.chances[:, j], v
+            )
+            for i, j in pairs
+        ])  # fmt: skip
+        shares = by_rater.mean(axis=0)
+        chance = {
+            "percent_agreement": 1.0,
+            "brennan_prediger": v.mean(),
+            "conger_kappa": np.mean([by_rater[i] @ v @ by_rater[j] for i, j in pairs]),
+            "gwet_ac": 1.0
+            - (1.0 - v).sum() * (shares * (1.0 - shares)).sum() / (q * (q - 1)),
+        }.get(coefficient, shares @ v @ shares)
+        return float(1.0 - observed / chance)
+
+
+def dirichlet_multinomial(shares: Shares, kappa: float, n_raters: int) -> Population:
+    """Return raters alike: an item's chances of the grades are Dirichlet."""
+    kinds, chances = np.ones(1), np.ones((1, 0))
+    a = np.array(shares) * (1.0 / kappa - 1.0)
+    # grade by grade, each a Beta share of what those before leave
+    n_nodes = max(round(200 ** (1.0 / (len(shares) - 1))), 12)
+    for k in range(len(shares) - 1):
+        x, weight = roots_jacobi(n_nodes, a[k + 1 :].sum() - 1.0, a[k] - 1.0)
+        share = np.tile(0.5 * (1.0 + x), kinds.size)
+        left = np.repeat(1.0 - chances.sum(axis=1), n_nodes)
+        kinds = np.outer(kinds, weight / weight.sum()).ravel()
+        chances = np.column_stack([np.repeat(chances, n_nodes, axis=0), left * share])
+    rest = 1.0 - chances.sum(axis=1)
+    grades = np.column_stack([chances, np.maximum(rest, 0.0)])
+    return Population(kinds=kinds, chances=np.repeat(grades[:, None], n_raters, axis=1))
+
+
+def latent_trait(
+    shares: Shares, kappa: float, n_raters: int, bias: float = 0.5
+) -> Population:
+    """Return raters who see a severity, N(0, 1), with bias and noise, and cut it.
+
+    Biases are evenly spaced quantiles with a standard deviation of `bias` that of the
+    noise, which is such that Fleiss' kappa is `kappa`.
+    """
+    severity, kinds = severities(0.08)
+    biases = ndtri((np.arange(n_raters) + 0.5) / n_raters)
+    biases *= bias / biases.std()
+    up_to = ndtri(np.cumsum(shares)[:-1])
+
+    def of(log_noise: float) -> Population:
+        noise = np.exp(log_noise)
+        cuts = up_to * np.hypot(1.0, noise * np.hypot(1.0, bias))
+        seen = severity[:, None, None] + noise * biases[:, None]
+        below = ndtr((cuts - seen) / noise)
+        edge = np.zeros((*below.shape[:2], 1))
+        chances = np.diff(np.concatenate([edge, below, edge + 1.0], axis=-1), axis=-1)
+        return Population(kinds=kinds, chances=chances)
+
+    noise = brentq(lambda x: of(x).truth("fleiss_kappa") - kappa, -4.0, 3.0)
+    return of(noise)
+
+
+CLASSES = {
+    # hit rates of raters where there is nothing, and where there is something
+    "alike": ((0.98, 0.85),),
+    "one lax rater": ((0.85, 0.85), *((0.98, 0.85),) * 11),
+    "two groups of raters": ((0.99, 0.7), (0.95, 0.95)),
+}
+"""Raters of a latent class, turn by turn."""
+
+
+def latent_class(shares: Shares, raters: str, n_raters: int) -> Population:
+    """Return items with a true grade, which a rater hits or takes for a neighbour."""
+    q = len(shares)
+    kinds_of_raters = CLASSES[raters]
+    chances = np.zeros((q, n_raters, q))
+    for j in range(n_raters):
+        hit = np.full(q, kinds_of_raters[j % len(kinds_of_raters)][1])
+        hit[0] = kinds_of_raters[j % len(kinds_of_raters)][0]
+        for k in range(q):
+            near = [m for m in (k - 1, k + 1) if 0 <= m < q]
+            chances[k, j, near] = (1.0 - hit[k]) / len(near)
+            chances[k, j, k] = hit[k]
+    return Population(kinds=np.array(shares), chances=chances)
