@@ -122,8 +122,8 @@ def estimate(
         Where randomness comes from, for methods that draw.
     clusters : sequence of labels, length n_items, optional
         The cluster of every item, such as the patient of a site: what a new study
-        would draw anew, with `target` "items" and `method` "auto", "analytic" or
-        "jackknife". Each item by itself when not given.
+        would draw anew, with `target` "items" and any `method` but "posterior". Each
+        item by itself when not given.
 
     Returns
     -------
@@ -162,10 +162,8 @@ def estimate(
             f'{_POPULATIONS[there_is]}, which is "{there_is}", and it has no other; '
             f'got "{target}"'
         )
-    if clusters is not None and method in ("bootstrap", "posterior"):
-        raise ParameterError(
-            f'clusters: needs method "auto", "analytic" or "jackknife", got "{method}"'
-        )
+    if clusters is not None and method == "posterior":
+        raise ParameterError('clusters: needs a method other than "posterior"')
     if entry.formula is not None and not isinstance(ratings, CountedRatings):
         # coded once, for all that follows
         ratings = entry.code(ratings, categories)
@@ -195,7 +193,9 @@ def estimate(
         function = {
             "analytic": partial(analytic, clusters=clusters),
             "jackknife": partial(jackknife, clusters=clusters),
-            "bootstrap": partial(bootstrap, n_resamples=n_resamples, rng=rng),
+            "bootstrap": partial(
+                bootstrap, n_resamples=n_resamples, rng=rng, clusters=clusters
+            ),
             "posterior": partial(posterior, rng=rng),
         }[method]
         interval = function(entry, ratings, **ask.keywords)

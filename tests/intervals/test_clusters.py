@@ -15,6 +15,7 @@ from masrel.agreement import COEFFICIENTS
 from masrel.errors import ParameterError, SmallSampleWarning
 from masrel.intervals import (
     analytic,
+    bootstrap,
     difference,
     difference_test,
     differences,
@@ -82,6 +83,14 @@ def test_the_jackknife_leaves_out_every_cluster_once(name: str) -> None:
     assert found.low == pytest.approx(value - half, rel=1e-9)
     assert found.high == pytest.approx(min(value + half, 1.0), rel=1e-9)
     assert found.method == "cluster jackknife, t(14)"
+
+
+@pytest.mark.filterwarnings("ignore::masrel.errors.SmallSampleWarning")
+def test_an_estimate_draws_clusters_where_the_bootstrap_is_asked_for() -> None:
+    ratings, clusters = drawn(9, 4)
+    asked = {"target": "items", "clusters": clusters, "rng": 2, "n_resamples": 500}
+    found = estimate("gwet_ac", ratings, method="bootstrap", **asked)  # type: ignore[arg-type]
+    assert found.interval == bootstrap("gwet_ac", ratings, **asked)  # type: ignore[arg-type]
 
 
 def test_by_default_clusters_are_left_out_on_the_logit() -> None:
