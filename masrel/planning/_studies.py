@@ -234,7 +234,13 @@ def _events(design: Design, outcomes: Floats) -> Floats:
     if study.null is not None:  # the end on the side of the null lies beyond it
         is_above = design.value >= study.null
         events["power"] = low > study.null if is_above else high < study.null
-    events["coverage"] = (low <= design.value + _TINY) & (design.value - _TINY <= high)
+    from_below, from_above = low <= design.value + _TINY, high >= design.value - _TINY
+    events["coverage"] = from_below & from_above
+    if study.sides == 1:  # one end is the bound: that on the side of what is asked
+        is_lower = study.lower is not None or study.upper is None
+        if study.null is not None:
+            is_lower = design.value >= study.null
+        events["coverage"] = from_below if is_lower else from_above
     return np.column_stack(list(events.values()))
 
 

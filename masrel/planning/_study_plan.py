@@ -308,7 +308,7 @@ class Plan:
         Chance that the interval excludes the null value, or lies inside the limits of
         equivalence; ``nan`` without either.
     coverage : float
-        How often the interval holds `value`.
+        How often the interval holds `value`; of one side, how often its bound does.
     p_undefined : float
         How often a study has no coefficient or no interval.
     monte_carlo_error : float
