@@ -329,8 +329,7 @@ def decoded(name: str, data: bytes, encoding: str | None, n_before: int = 0) -> 
         line = n_before + text.count("\n", 0, text.index("\0")) + 1
         hint = "; --encoding utf-16 may be right" if 0 in data[:4] else ""
         raise refusal(name, "zero byte", line=line, hint=hint)
-    text = text.removeprefix("\ufeff")
-    return text if "\n" in text else text.replace("\r", "\n")  # of an old Mac
+    return text.removeprefix("\ufeff")
 
 
 # ---- text ----

@@ -94,6 +94,7 @@ READ: list[tuple[str, dict[str, Any], list[list[str | None]], dict[str, Any]]] =
             "warnings": [],
         },
     ),
+    (WIDE.replace("\n", "\r"), {}, TABLE, {"n_items": 3}),  # of an old Mac
     # columns by name
     (LONG, {}, TABLE, {"rater": "rater", "grade": "grade", "n_missing": 0}),
     *(
@@ -329,7 +330,7 @@ def test_counts(
 ) -> None:
     file = read(tmp_path, text, **options)
     assert file.read["grades"] == grades
-    assert list(file.read["grades"]) == list(file.scale.grades)
+    assert list(file.read["grades"]) == list(file.scale.grades) == list(grades)
     assert file.read["n_raters"] == n_raters
     values = []
     for part in file.parts:
