@@ -20,17 +20,12 @@ def check_option(name: str, value: object, options: Collection[object]) -> None:
     """Check that an argument is one of its options."""
     if not isinstance(value, str) or value not in options:
         known = ", ".join(map(str, options))
-        raise ParameterError(f"{name}: needs one of {known}, got {value_text(value)}")
-
-
-def value_text(value: object) -> str:
-    """Return a value as a message has it."""
-    return "nothing" if value is None else repr(value)
+        raise ParameterError(f"{name}: needs one of {known}, got {shown(value)}")
 
 
 def shown(value: object) -> str:
     """Return what a message shows of a value: one line, and not a long one."""
-    text = " ".join(f"{value!r}".split())
+    text = "nothing" if value is None else " ".join(f"{value!r}".split())
     return text if len(text) <= 80 else f"{text[:77]}..."
 
 

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from masrel._input import refuse
 from masrel.agreement import CodedRatings, Coefficient, Significance, code_ratings, holm
 from masrel.analysis._file_estimates import (
     Answer,
@@ -24,7 +23,7 @@ from masrel.analysis._file_estimates import (
     parts_of,
     placed,
 )
-from masrel.errors import RatingsError
+from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import as_document
 from masrel.ratings import RatingsFile, RatingsPart
 
@@ -107,13 +106,11 @@ def comparisons(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
 def _difference_rows(
     file: RatingsFile, coefficients: Sequence[Coefficient], questions: Questions
 ) -> Answer:
-    refuse(
-        (
-            len(file.parts) < 2,
+    if len(file.parts) < 2:
+        raise ParameterError(
             "--compare: needs two groups or more, so --by with the column that tells "
-            "them apart",
+            "them apart"
         )
-    )
     pairs = {
         (first, second): _groups_of((one, other))
         for (one, first, _), (other, second, _) in itertools.combinations(

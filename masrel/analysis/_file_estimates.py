@@ -370,12 +370,8 @@ def entries(
 
     is_of_others = not questions.takes_all and _OF_METRIC not in questions.names
     needed = f"--metric {questions.metric}: is of {_OF_METRIC}, which is not among "
-    refuse(
-        (
-            questions.metric and is_of_others,
-            f"{needed}--coefficients {','.join(questions.names)}",
-        )
-    )
+    if questions.metric and is_of_others:
+        raise ParameterError(f"{needed}--coefficients {','.join(questions.names)}")
     n_raters = max(len(part.raters) for part in parts) or file.read["n_raters"]
     chosen = (
         COEFFICIENTS.values()
@@ -395,13 +391,11 @@ def entries(
             and (file.is_ordered or not entry.needs_order)
         ]
     for entry in fitting:
-        refuse(
-            (
-                entry.shape == "pairs",
+        if entry.shape == "pairs":
+            raise ParameterError(
                 f"--coefficients: {entry.name} takes each rater's grades of two "
-                "sessions: --session COL --retest computes it",
+                "sessions: --session COL --retest computes it"
             )
-        )
         if entry.needs_order:
             check_order(file, entry.name)
     return fitting
@@ -409,13 +403,11 @@ def entries(
 
 def check_order(file: "RatingsFile", what: str) -> None:
     """Refuse what needs the order of grades, where it is the alphabet's alone."""
-    refuse(
-        (
-            not file.is_ordered,
+    if not file.is_ordered:
+        raise ParameterError(
             f"{what}: needs grades that are numbers or --categories with every grade "
-            f"in order, the grades met are text: {', '.join(file.scale.grades)}",
+            f"in order, the grades met are text: {', '.join(file.scale.grades)}"
         )
-    )
 
 
 def on_grades(ratings: _Ratings, entry: "Coefficient", file: "RatingsFile") -> _Ratings:

@@ -54,6 +54,7 @@ from masrel.analysis._file_estimates import (
 )
 from masrel.errors import (
     MasrelWarning,
+    ParameterError,
     RatingsError,
     UndefinedStatisticWarning,
 )
@@ -79,14 +80,12 @@ def answers(
             f"({', '.join(sessions)}), so that raters graded the same item more than "
             f"once; --by {file.read['session']} estimates each"
         )
-    refuse(
-        (
-            questions.weights != "identity" and not file.is_ordered,
+    if questions.weights != "identity" and not file.is_ordered:
+        raise ParameterError(
             f"--weights {questions.weights}: needs --categories with every grade of "
             f"the scale in order, the grades met are text: "
-            f"{', '.join(file.scale.grades)}",
+            f"{', '.join(file.scale.grades)}"
         )
-    )
     others = file
     if questions.reference is not None:
         others = _without_reference(file, questions.reference)
@@ -116,13 +115,10 @@ def _without_reference(file: RatingsFile, reference: str) -> RatingsFile:
         with placed("--diagnose"):
             coded = code_ratings(part.ratings)
         others = [place for place, name in enumerate(part.raters) if name != reference]
-        refuse(
-            (
-                len(others) == len(part.raters),
-                f"--reference: needs one of {', '.join(part.raters)}, got "
-                f"{reference!r}",
+        if len(others) == len(part.raters):
+            raise ParameterError(
+                f"--reference: needs one of {', '.join(part.raters)}, got {reference!r}"
             )
-        )
         raters = tuple(part.raters[place] for place in others)
         ratings = replace(coded, codes=coded.codes[:, others])
         parts.append(replace(part, raters=raters, ratings=ratings))
@@ -459,7 +455,8 @@ def _diagnosis(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
         questions = replace(questions, coefficients=["fleiss_kappa"])
     several = f"--coefficients {','.join(questions.names)}"
     needed = f"--diagnose: needs one coefficient, got {several}"
-    refuse((len(questions.names) > 1, needed))
+    if len(questions.names) > 1:
+        raise ParameterError(needed)
     (entry,) = entries(questions, file, file.parts)
     title, grades = questions.title(entry), file.scale.grades
     parts = []

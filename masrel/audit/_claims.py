@@ -15,7 +15,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from masrel._input import check_option, listed, not_utf8, refuse, value_text
+from masrel._input import check_option, listed, not_utf8, refuse, shown
 from masrel.errors import ParameterError, RatingsError
 
 # what becomes of a tie: the even neighbour, or the one further from 0
@@ -179,13 +179,12 @@ class Claim:
             most = min(most, self.n_items - 1) if key == "n_unrated" else most
             is_in = _is_whole(count) and least <= count <= most
             needed = f"needs a whole number from {least} to {most}"
-            refuse((not is_in, f"{key}: {needed}, got {value_text(count)}"))
-        refuse(
-            (
-                self.agreement is None and self.kappa is None,
-                "agreement, kappa: needs at least one of them, got neither",
+            if not is_in:
+                raise ParameterError(f"{key}: {needed}, got {shown(count)}")
+        if self.agreement is None and self.kappa is None:
+            raise ParameterError(
+                "agreement, kappa: needs at least one of them, got neither"
             )
-        )
         check_option("agreement_weights", self.agreement_weights, (*WEIGHTS, "any"))
         check_option("kappa_weights", self.kappa_weights, (*WEIGHTS, "any"))
         check_option("rounding", self.rounding, (*RULES, "either"))
@@ -316,7 +315,8 @@ def _claims_of(text: str) -> tuple[Claim, ...]:
         if line.strip(" ,;") and not line.startswith("#")
     }
     needed = f"needs a line of column names and a row a claim, got {len(lines)} lines"
-    refuse((len(lines) < 2, needed))
+    if len(lines) < 2:
+        raise ParameterError(needed)
     first = next(iter(lines.values()))
     separator = ";" if first.count(";") > first.count(",") else ","
     (_, head), *rows = [

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel._input import refuse
 from masrel.analysis._file_estimates import (
     OF_MEASUREMENTS,
     USUAL,
@@ -32,6 +31,7 @@ from masrel.cli._reading import (
     table_options,
     what_was_read,
 )
+from masrel.errors import ParameterError
 from masrel.ratings._findings import ReadingOptions
 
 if TYPE_CHECKING:
@@ -227,12 +227,10 @@ def agree(
     """
     questions = questions.checked(reading.by, reading.clusters)
     has_figure = questions.target or questions.diagnose or questions.limits_of_agreement
-    refuse(
-        (
-            output.figure is not None and not has_figure,
-            "--figure: shows intervals, so it needs --target raters, items or both",
+    if output.figure is not None and not has_figure:
+        raise ParameterError(
+            "--figure: shows intervals, so it needs --target raters, items or both"
         )
-    )
     ratings = read_file(file, reading)
     from masrel.analysis._file_questions import answers
     from masrel.tables._answer_tables import agreement_sentences, answer_table

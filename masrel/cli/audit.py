@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel._input import refuse
 from masrel.cli._options import (
     OutputOptions,
     output_options,
     write_output,
 )
 from masrel.cli._paths import note_inputs
+from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
     from masrel.audit import Claim
@@ -108,14 +108,16 @@ def _claims(source: Path, texts: _Texts) -> "tuple[Claim, ...]":
     from masrel.audit import read_claims
 
     needed = "has claims of its own, so it needs no option that has one"
-    refuse((texts, f"{source}: {needed}"))
+    if texts:
+        raise ParameterError(f"{source}: {needed}")
     file = source
     if source.is_dir():
         from masrel.lab.protocol import StudyPaths
 
         file = StudyPaths(source).claims_file
         needed = "needs a file of claims, ratings/claims.csv, got none"
-        refuse((not file.exists(), f"{source}: {needed}"))
+        if not file.exists():
+            raise ParameterError(f"{source}: {needed}")
     note_inputs(file)
     return read_claims(file)
 
@@ -128,10 +130,12 @@ def _claim(texts: _Texts) -> "Claim":
     ends = texts.get("interval", ())
     values |= dict(zip(("low", "high"), ends, strict=False))
     for name in ("n_items", "n_categories"):
-        refuse((name not in texts, f"{name}: needed without a SOURCE, got none"))
+        if name not in texts:
+            raise ParameterError(f"{name}: needed without a SOURCE, got none")
     for name, other in _BESIDE.items():
         alone = name in texts and other not in texts
-        refuse((alone, f"{name}: needs --{other} beside it, got none"))
+        if alone:
+            raise ParameterError(f"{name}: needs --{other} beside it, got none")
     return claim_of(values)
 
 

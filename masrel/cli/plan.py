@@ -16,6 +16,7 @@ from masrel.cli._options import (
     write_output,
 )
 from masrel.cli._paths import InputFile
+from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
     from masrel.planning import Plan
@@ -238,7 +239,8 @@ def _with_pilot(arguments: dict[str, Any]) -> dict[str, Any]:
 
     parts = read_ratings(path).parts
     needed = f"--pilot: needs the ratings of one group and session, {path} has "
-    refuse((len(parts) != 1, f"{needed}{len(parts)}"))
+    if len(parts) != 1:
+        raise ParameterError(f"{needed}{len(parts)}")
     names = ("coefficient", "target", "weights", "level")
     of_pilot = {name: arguments[name] for name in names if name in arguments}
     made = pilot(ratings=parts[0].ratings, **of_pilot)

@@ -72,7 +72,8 @@ def precision(study: Study, *, progress: Progress | None = None) -> Plan:
     (0.0995, 0.513)
     """
     is_open = None in (study.n_items, study.n_raters)
-    refuse((is_open, "n_items, n_raters: a study that is shown needs both"))
+    if is_open:
+        raise ParameterError("n_items, n_raters: a study that is shown needs both")
     check_aim(study, is_solved=False)
     design = design_of(study)
     check_has_numbers(design)
@@ -126,13 +127,11 @@ def sample_size(study: Study, *, progress: Progress | None = None) -> Plan:
     """
     n_known = (study.n_items is not None) + (study.n_raters is not None)
     got = "both" if n_known else "none, and no prices by which to find the cheapest"
-    refuse(
-        (
-            n_known == 2 or (n_known == 0 and study.prices is None),
+    if n_known == 2 or (n_known == 0 and study.prices is None):
+        raise ParameterError(
             "n_items, n_raters: needs exactly one of them, since the other is solved "
-            f"for; got {got}",
+            f"for; got {got}"
         )
-    )
     check_aim(study, is_solved=True)
     design = design_of(study)
     if n_known == 0:
@@ -309,7 +308,8 @@ def _plan_of(design: Design, progress: Progress | None = None) -> Plan:
 
 def _reaching(plan: Plan) -> Plan:
     # the plan, or the refusal that is its note
-    refuse((plan.reaches_aim is False, "".join(plan.notes[:1])))
+    if plan.reaches_aim is False:
+        raise ParameterError("".join(plan.notes[:1]))
     return plan
 
 
@@ -415,13 +415,11 @@ class _Search:
     def _affordable_size(self) -> int:
         limit = self.design.study.max_cost or 0.0
         n = self.affordable(limit)
-        refuse(
-            (
-                n in (0, self.highest),
+        if n in (0, self.highest):
+            raise ParameterError(
                 f"max_cost: needs a limit between {self.cost(self.lowest):g}, of the "
-                f"smallest study, and what some study costs; got {limit:g}",
+                f"smallest study, and what some study costs; got {limit:g}"
             )
-        )
         return n
 
 
@@ -440,7 +438,8 @@ def _cheapest(design: Design, progress: Progress | None) -> Plan:
     smallest = _Search(design.of_size(n_raters=design.min_raters), progress)
     least = smallest.cost(smallest.lowest)
     needed = f"needs at least {least:g}, of the smallest study"
-    refuse((limit < least, f"max_cost: {needed}; got {limit:g}"))
+    if limit < least:
+        raise ParameterError(f"max_cost: {needed}; got {limit:g}")
     best = smallest.at(smallest.lowest)
     if math.isinf(limit):
         best = _first_that_reaches(design, most, progress)
@@ -459,14 +458,12 @@ def _cheapest(design: Design, progress: Progress | None) -> Plan:
                 limit, is_counted = plan.cost * _CHEAPER, True
         else:
             n_worse += is_counted
-    refuse(
-        (
-            best.reaches_aim is False,
+    if best.reaches_aim is False:
+        raise ParameterError(
             f"max_cost: {aim_words(study)[1]} is not reached for {limit:g}; the best "
             f"that can be had is {best.n_items} items and {best.n_raters} raters, "
-            f"which cost {best.cost:g} and reach {reached_words(study, best)}",
+            f"which cost {best.cost:g} and reach {reached_words(study, best)}"
         )
-    )
     return best
 
 

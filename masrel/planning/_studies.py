@@ -14,10 +14,9 @@ from typing import Any
 import numpy as np
 from scipy.special import fdtr, fdtri, gammaln, ndtri, stdtrit
 
-from masrel._input import refuse
 from masrel.agreement import CodedRatings
 from masrel.agreement.icc import _absolute_ends
-from masrel.errors import MasrelWarning
+from masrel.errors import MasrelWarning, ParameterError
 from masrel.intervals import estimate
 from masrel.planning._study_plan import Progress, limits_of
 from masrel.planning._truth import (
@@ -61,13 +60,11 @@ def shown(design: Design, progress: Progress | None = None) -> Shown:
         return _drawn(design, progress)
     if design.is_icc and design.study.coefficient != AGREEMENT:
         return _exact_icc(design), {}, 0
-    refuse(
-        (
-            design.n_tables > 20 * MAX_TABLES,
+    if design.n_tables > 20 * MAX_TABLES:
+        raise ParameterError(
             'method: "exact" sums over all studies that differ, of which there are '
-            f'{design.n_tables:g}; "simulation" draws some of them',
+            f'{design.n_tables:g}; "simulation" draws some of them'
         )
-    )
     total = np.zeros((3, len(NUMBERS)))
     for freq, p in all_studies(design.n_items, design.p):
         total += _moments(design, outcomes_of(design, design.rows, freq), p)

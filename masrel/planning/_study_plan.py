@@ -11,9 +11,9 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from masrel._input import refuse, value_text
+from masrel._input import refuse, shown
 from masrel.agreement import Label, WeightsLike, code_ratings
-from masrel.errors import RatingsError, UndefinedStatisticWarning
+from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Target
 from masrel.intervals import estimate
 
@@ -186,7 +186,8 @@ class Study:
             value = getattr(self, name)
             is_absent = value is None and name not in _ALWAYS
             is_right = is_absent or (isinstance(value, of_kind) and holds(value))
-            refuse((not is_right, f"{name}: needs {needed}, got {value_text(value)}"))
+            if not is_right:
+                raise ParameterError(f"{name}: needs {needed}, got {shown(value)}")
         is_of_items = self.interval in _OF_ITEMS_ALONE and self.target != "items"
         refuse(
             (

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln, ndtr, ndtri
 
-from masrel._input import refuse, value_text
+from masrel._input import refuse, shown
 from masrel.agreement import CodedRatings, Coefficient, Label, coefficient
 from masrel.errors import MasrelWarning, ParameterError
 from masrel.intervals._question import IntervalProblem, pose_problem
@@ -82,13 +82,11 @@ def declared_model(study: Study) -> ItemModel:
             p_missing=study.p_missing,
         )
     name, known = str(study.model), ", ".join(MODELS)
-    refuse(
-        (
-            name not in MODELS,
+    if name not in MODELS:
+        raise ParameterError(
             f"model: needs one of {known}, or a LatentModel, since models of one kappa "
-            f"differ in precision; got {value_text(study.model)}",
+            f"differ in precision; got {shown(study.model)}"
         )
-    )
     shares = _shares(study, is_table=name == "table")
     is_table = shares.ndim == 2
     margins = 0.5 * (shares.sum(axis=0) + shares.sum(axis=1)) if is_table else shares
@@ -145,12 +143,10 @@ def _scale(study: Study, q: int) -> tuple[Label, ...]:
     if study.categories is None or isinstance(study.categories, int):
         return tuple(range(q))
     n_different = len(set(study.categories))
-    refuse(
-        (
-            (len(study.categories), n_different) != (q, q),
-            f"categories: needs {q} that differ, as the model has, got {n_different}",
+    if (len(study.categories), n_different) != (q, q):
+        raise ParameterError(
+            f"categories: needs {q} that differ, as the model has, got {n_different}"
         )
-    )
     return tuple(study.categories)
 
 
@@ -467,13 +463,11 @@ def design_of(study: Study) -> Design:
         _check_normal(study, entry)
         design = Design.of(study, ItemModel(name="normal"))
     else:
-        refuse(
-            (
-                entry.formula is None,
+        if entry.formula is None:
+            raise ParameterError(
                 f"coefficient: {entry.title} cannot be planned for: it is no function "
-                f"of sums over items; the others and {', '.join(FORMS)} can",
+                f"of sums over items; the others and {', '.join(FORMS)} can"
             )
-        )
         design = _with_value(Design.of(study, declared_model(study)))
     value, null, lower, upper = design.value, study.null, study.lower, study.upper
     refuse(
@@ -511,7 +505,7 @@ def _check_normal(study: Study, entry: Coefficient) -> None:
         (study.model is not None, f"model: {absent}; got {study.model!r}"),
         (
             value is None or not 0.0 < value < 1.0,
-            f"value: {entry.title} needs a number in (0, 1), got {value_text(value)}",
+            f"value: {entry.title} needs a number in (0, 1), got {shown(value)}",
         ),
         (
             study.target != target,
@@ -549,14 +543,13 @@ def _with_value(design: Design) -> Design:
     study, value = design.study, design.study.value
     if isinstance(study.model, LatentModel) or study.model == "table":
         implied = _true_value(design)
-        refuse(
-            (
-                value is not None and abs(implied - value) > 5e-3,
-                f"value: the model has {implied:.4f}, so it needs none, got {value}",
+        if value is not None and abs(implied - value) > 5e-3:
+            raise ParameterError(
+                f"value: the model has {implied:.4f}, so it needs none, got {value}"
             )
-        )
         return Design.of(replace(study, value=implied), design.model)
-    refuse((value is None, "value: needs the true coefficient, got none"))
+    if value is None:
+        raise ParameterError("value: needs the true coefficient, got none")
     return at_value(design, design.value)
 
 
@@ -581,12 +574,8 @@ def at_value(design: Design, value: float) -> Design:
     def short_of(x: float) -> float:
         return _true_value(replace(design, model=model.with_parameter(x))) - value
 
-    refuse(
-        (
-            not model.prevalences,
-            "model: a LatentModel has one value, and no null value",
-        )
-    )
+    if not model.prevalences:
+        raise ParameterError("model: a LatentModel has one value, and no null value")
     low, high = map(short_of, ends)
     x = ends[abs(high) < 1e-12]
     if not min(abs(low), abs(high)) < 1e-12:
@@ -616,6 +605,7 @@ def _table_at(design: Design, value: float) -> ItemModel:
     share = (value - at_chance) / (_true_value(design) - at_chance)
     other = chance + share * (table - chance)
     none = f"value: no table with these margins is as far from chance as {value:g}"
-    refuse((other.min() < -1e-12, none))
+    if other.min() < -1e-12:
+        raise ParameterError(none)
     rows = tuple(map(tuple, np.maximum(other, 0.0).tolist()))
     return replace(design.model, table=rows)

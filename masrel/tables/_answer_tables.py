@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from masrel._input import refuse
 from masrel.agreement import COEFFICIENTS, BandScale, benchmark, strength
 from masrel.analysis._file_estimates import AgreementRow, Answer, Row
+from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Interval, Target, _plain, as_document
 from masrel.tables._estimate_words import (
     forest_row,
@@ -429,13 +429,11 @@ def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> "Forest":
 
     # what is in the units of the ratings is on no axis of agreement
     rows = [row for row in rows if not _is_in_units(row)]
-    refuse(
-        (
-            not rows,
+    if not rows:
+        raise ParameterError(
             "--figure: shows coefficients of agreement, got only estimates in the "
-            "units of the ratings",
+            "units of the ratings"
         )
-    )
     population = _POPULATIONS[target]
     several = len({row.group for row in rows}) > 1
     drawn = []
