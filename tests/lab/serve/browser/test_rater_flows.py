@@ -1,6 +1,8 @@
 """Sessions at a rater's tablet, in Chromium."""
 
 import re
+from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -338,18 +340,34 @@ LANGUAGES = {
 }
 
 
-def test_a_page_speaks_the_language_of_its_study(stage: Stage) -> None:
-    english = stage.study.protocol.read_text(encoding="utf-8")
+@pytest.fixture
+def protocol(stage: Stage) -> Iterator[Path]:
+    """The protocol, which is again what it was when a flow ends, however it ends."""
+    text = stage.study.protocol.read_text(encoding="utf-8")
+    yield stage.study.protocol
+    replace(stage.study.protocol, text)
+
+
+def replace(path: Path, text: str) -> None:
+    """Change a file at once: the server and a session may read it at any time."""
+    beside = path.with_suffix(".new")
+    beside.write_text(text, encoding="utf-8")
+    beside.replace(path)
+
+
+def test_a_page_speaks_the_language_of_its_study(stage: Stage, protocol: Path) -> None:
+    english = protocol.read_text(encoding="utf-8")
     rater = stage.session()
+    rater.wait_for("instructions")  # the session has read its protocol
     for language, (title, go_on) in LANGUAGES.items():
-        other = english.replace("[study]", f'[study]\nlanguage = "{language}"')
-        stage.study.protocol.write_text(other, encoding="utf-8")
+        replace(
+            protocol, english.replace("[study]", f'[study]\nlanguage = "{language}"')
+        )
         rater.page.reload()
         rater.wait_for("instructions")
         assert rater.page.locator("html").get_attribute("lang") == language
         assert rater.page.locator("h1").inner_text() == title
         assert rater.page.get_by_role("button", name=go_on, exact=True).is_visible()
-    stage.study.protocol.write_text(english, encoding="utf-8")
 
 
 def test_an_address_lets_in_one_browser_once(stage: Stage) -> None:
