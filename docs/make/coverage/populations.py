@@ -4,16 +4,16 @@ A population is kinds of items, how frequent each is, and how every rater grades
 What is true of a coefficient is computed from the pairs of raters, not by the package.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import ndtr, ndtri, roots_jacobi
 
-from docs.make.coverage.latent import severities
-from docs.make.coverage.studies import Codes, Floats
-
+Floats = NDArray[np.float64]
+Codes = NDArray[np.int8]
 Shares = tuple[float, ...]
 """Shares of the grades, in their order."""
 
@@ -27,10 +27,16 @@ class Population:
     kinds: Floats = field(repr=False)
     chances: Floats = field(repr=False)
     p_missing: float = 0.0  # of every rating by itself
+    n_drawn: int | None = None  # raters drawn of these, with replacement, in each study
+    are_fixed: bool = False  # every study has all these items, once each
 
     def draw(self, n_items: int, rng: np.random.Generator) -> Codes:
         """Draw the ratings of a study, (n_items, n_raters)."""
-        of_items = self.chances[rng.choice(self.kinds.size, n_items, p=self.kinds)]
+        of_items = self.chances
+        if not self.are_fixed:
+            of_items = of_items[rng.choice(self.kinds.size, n_items, p=self.kinds)]
+        if self.n_drawn is not None:
+            of_items = of_items[:, rng.integers(of_items.shape[1], size=self.n_drawn)]
         up_to = of_items.cumsum(axis=-1)[..., :-1]
         uniform = rng.random((*of_items.shape[:2], 1))
         codes = (uniform >= up_to).sum(axis=-1).astype(np.int8)
@@ -38,30 +44,41 @@ class Population:
         return codes
 
     def truth(self, coefficient: str, weights: str = "identity") -> float:
-        """Return the coefficient of all items and these raters."""
+        """Return the coefficient of all items and these raters, or all such raters."""
         # ratings are missing of every rater alike, and leave it as it is
-        q = self.chances.shape[-1]
+        chances = self.chances
+        if self.n_drawn is not None:
+            # two raters drawn are independent, and each grades as raters do in the mean
+            chances = chances.mean(axis=1, keepdims=True).repeat(2, axis=1)
+        q = chances.shape[-1]
         place = np.arange(q, dtype=np.float64)
         v = (place[:, None] != place).astype(np.float64)
         if weights == "quadratic":
             v = ((place[:, None] - place) / (q - 1)) ** 2
-        by_rater = np.einsum("s,srk->rk", self.kinds, self.chances)
+        by_rater = np.einsum("s,srk->rk", self.kinds, chances)
         pairs = list(combinations(range(len(by_rater)), 2))
         observed = np.mean([
-            np.einsum(
-                "s,sk,sl,kl->", self.kinds, self.chances[:, i], self.chances[:, j], v
-            )
+            np.einsum("s,sk,sl,kl->", self.kinds, chances[:, i], chances[:, j], v)
             for i, j in pairs
         ])  # fmt: skip
         shares = by_rater.mean(axis=0)
+        of_pairs = np.mean([by_rater[i] @ v @ by_rater[j] for i, j in pairs])
         chance = {
             "percent_agreement": 1.0,
             "brennan_prediger": v.mean(),
-            "conger_kappa": np.mean([by_rater[i] @ v @ by_rater[j] for i, j in pairs]),
+            "conger_kappa": of_pairs,
+            "cohen_kappa": of_pairs,
             "gwet_ac": 1.0
             - (1.0 - v).sum() * (shares * (1.0 - shares)).sum() / (q * (q - 1)),
         }.get(coefficient, shares @ v @ shares)
         return float(1.0 - observed / chance)
+
+    def with_items_fixed(self, n_items: int) -> "Population":
+        """Return so many items, of each kind in proportion, the same in all studies."""
+        places = (np.arange(n_items) + 0.5) / n_items
+        of_items = self.chances[np.searchsorted(self.kinds.cumsum(), places)]
+        kinds = np.full(n_items, 1.0 / n_items)
+        return replace(self, kinds=kinds, chances=of_items, are_fixed=True)
 
 
 def dirichlet_multinomial(shares: Shares, kappa: float, n_raters: int) -> Population:
@@ -82,14 +99,21 @@ def dirichlet_multinomial(shares: Shares, kappa: float, n_raters: int) -> Popula
 
 
 def latent_trait(
-    shares: Shares, kappa: float, n_raters: int, bias: float = 0.5
+    shares: Shares,
+    kappa: float,
+    n_raters: int,
+    bias: float = 0.5,
+    n_drawn: int | None = None,
 ) -> Population:
     """Return raters who see a severity, N(0, 1), with bias and noise, and cut it.
 
     Biases are evenly spaced quantiles with a standard deviation of `bias` that of the
     noise, which is such that Fleiss' kappa is `kappa`.
     """
-    severity, kinds = severities(0.08)
+    # the trapezoid rule under the normal density: 1e-9 off for noise of a step
+    severity = np.arange(-7.0, 7.04, 0.08)
+    kinds = np.exp(-0.5 * severity**2)
+    kinds /= kinds.sum()
     biases = ndtri((np.arange(n_raters) + 0.5) / n_raters)
     biases *= bias / biases.std()
     up_to = ndtri(np.cumsum(shares)[:-1])
@@ -101,7 +125,7 @@ def latent_trait(
         below = ndtr((cuts - seen) / noise)
         edge = np.zeros((*below.shape[:2], 1))
         chances = np.diff(np.concatenate([edge, below, edge + 1.0], axis=-1), axis=-1)
-        return Population(kinds=kinds, chances=chances)
+        return Population(kinds=kinds, chances=chances, n_drawn=n_drawn)
 
     noise = brentq(lambda x: of(x).truth("fleiss_kappa") - kappa, -4.0, 3.0)
     return of(noise)
@@ -129,3 +153,14 @@ def latent_class(shares: Shares, raters: str, n_raters: int) -> Population:
             chances[k, j, near] = (1.0 - hit[k]) / len(near)
             chances[k, j, k] = hit[k]
     return Population(kinds=np.array(shares), chances=chances)
+
+
+def some_careless(shares: Shares, n_drawn: int) -> Population:
+    """Return raters of whom one in five grades at random, and items with a true grade.
+
+    The others see it nine times in ten, and else grade at random, too.
+    """
+    at_random = np.tile(shares, (len(shares), 1))
+    careful = 0.9 * np.eye(len(shares)) + 0.1 * at_random
+    chances = np.stack([at_random, *[careful] * 4], axis=1)
+    return Population(kinds=np.array(shares), chances=chances, n_drawn=n_drawn)
