@@ -66,12 +66,20 @@ def size_by_formula(design: Design) -> int:
     return math.ceil((_icc_items if is_icc else items)(design))
 
 
-def items_nearby(design: Design) -> int:
-    """Return about how many items a half-width needs, where a formula says it."""
+def items_nearby(design: Design) -> float | None:
+    """Return about how many items an aim needs, where a formula says it."""
     if design.is_icc:
-        return math.ceil(_n_icc_width(design))
+        return _n_icc_width(design)
     is_wald = design.study.target == "items" and design.model.has_rows
-    return math.ceil(_width_items(design)) if is_wald else 20
+    return items_by_half(design, _z(design) * design.item_sd) if is_wald else None
+
+
+def items_by_half(design: Design, half: float) -> float:
+    """Return n of an aim by the half-width of one item, which goes with 1/√n [1]_."""
+    # with power 1 - β it is to be smaller by z_a/(z_a + z_b)
+    power, z = design.study.power, _z(design)
+    z_b = 0.0 if power is None else _NORMAL.inv_cdf(power)
+    return (half * max(1.0 + z_b / z, 0.0) / _half(design)) ** 2
 
 
 def _z(design: Design) -> float:
@@ -91,16 +99,11 @@ def _half(design: Design) -> float:
 # -- Wald intervals -------------------------------------------------------------------
 
 
-def _width_items(design: Design) -> float:
-    """Return n of a Wald half-width z sd/√n [1]_."""
-    return (_z(design) * design.item_sd / _half(design)) ** 2
-
-
 def _wald_items(design: Design) -> float:
     """Return n of a width, or n = ((z_a sd_0 + z_b sd_1)/(κ_1 - κ_0))² [4]_."""
     null, power = design.study.null, design.study.power
     if null is None or power is None:
-        return _width_items(design)
+        return items_by_half(design, _z(design) * design.item_sd)
     sd_0, sd_1 = at_value(design, null).item_sd, design.item_sd
     z_b = _NORMAL.inv_cdf(power)
     return ((_z(design) * sd_0 + z_b * sd_1) / (design.value - null)) ** 2

@@ -11,6 +11,7 @@ from masrel._input import refuse
 from masrel.errors import ParameterError
 from masrel.planning._formulas import (
     check_has_numbers,
+    items_by_half,
     items_nearby,
     numbers_by_formula,
     size_by_formula,
@@ -32,6 +33,7 @@ from masrel.planning._study_plan import (
 from masrel.planning._truth import Design, design_of
 
 _FEWEST_ITEMS, _MAX_ITEMS, _MAX_RATERS = 2, 100_000, 60
+_SOME_ITEMS = 20  # of a study that is looked at first, where no formula says a size
 _FAR = 1.3  # times a size: where a formula asks for more, the size does not do
 _MAX_SCAN = 1_500_000  # tables that are looked at around a size
 _PATIENCE = 4  # numbers of raters that are no better, after which none will be
@@ -365,13 +367,16 @@ class _Search:
     def up_to(self, highest: int) -> Plan:
         """Return the plan of the smallest size that is no larger than one."""
         study, is_items = self.design.study, self._name == "items"
-        guess = items_nearby(self.design) if is_items else self.lowest
-        # near the guess: low does not reach the aim, but for the lowest; high may
-        low, high = self.lowest, min(max(guess, self.lowest), highest)
+        guess = max(self._guess() if is_items else 1, self.lowest)
+        # by growing steps from the guess: none below low reaches the aim, high may
+        low, high, step = self.lowest, min(guess, highest), 1 + guess // 30
         if guess > _FAR * highest:
             low = highest + 1
+        while low < high and self._is_met(below := max(low, high - step)):
+            high, step = below, 2 * step
+        low = max(low, high - step + 1)
         while low <= highest and not self._is_met(high):
-            low, high = high + 1, min(2 * high, highest)
+            low, high, step = high + 1, min(high + step, highest), 2 * step
         if low <= highest:
             sizes = range(low, high)
             return self._stable(low + bisect_left(sizes, True, key=self._is_met))
@@ -384,6 +389,13 @@ class _Search:
             f"can be had with {n} is {reached_words(study, best)}"
         )
         return replace(best, notes=(note,), reaches_aim=False)
+
+    def _guess(self) -> int:
+        # about how many items reach the aim
+        if (n := items_nearby(self.design)) is None:
+            half = math.sqrt(_SOME_ITEMS) * self.at(_SOME_ITEMS).expected_half_width
+            n = items_by_half(self.design, half)
+        return _SOME_ITEMS if math.isnan(n) else math.ceil(n)
 
     def _is_met(self, n: int) -> bool:
         return bool(self.at(n).reaches_aim)

@@ -27,6 +27,7 @@ from masrel.planning._truth import (
     Design,
     Floats,
     Integers,
+    rows_of,
 )
 
 # numbers, their Monte Carlo errors, and how many studies were drawn
@@ -43,13 +44,14 @@ _OF_DEFINED = np.array([True, True, True, False, False, True, False])
 
 _PLACES = 1 << 20  # numbers held at once
 _TINY = 1e-12
+_NEVER = math.log(1e-18)  # so improbable that all such studies together do not count
 _LEAST = 1e-13  # of a half-width: what rounding may leave above the aim
 _TASK = 10_000  # studies that are drawn before their Monte Carlo error is looked at
 _CHOSEN_TASK, _RESAMPLED_TASK = 250, 50  # with intervals study by study; resamples
 _MAX_TASKS = 100
 # Monte Carlo errors that are small enough, of a half-width and of a chance; twice as
 # much where intervals are chosen study by study
-_RELATIVE, _SMALL = 0.003, {"assurance": 0.004, "power": 0.004}
+_RELATIVE, _SMALL = 0.003, {"assurance": 0.0045, "power": 0.0045}
 _NODES = 4001  # of the sum over log F; smooth, so that it converges at once
 _HALVES = 60  # of the distance of two nodes
 
@@ -106,9 +108,24 @@ def simulated(design: Design, rng: np.random.Generator, n_studies: int) -> Float
             freq = rng.multinomial(design.n_items, design.p, size=n)
             outcomes = outcomes_of(design, design.rows, freq)
         else:
-            outcomes = outcomes_of(design, draw(design, rng, n))
+            outcomes = outcomes_of(design, *_counted(design, draw(design, rng, n)))
         total += _moments(design, outcomes, np.ones(n))
     return total
+
+
+def _counted(design: Design, codes: Integers) -> tuple[Integers, Integers | None]:
+    """Return the distinct rows of drawn ratings, and how often studies have each."""
+    # codes (n_studies, n_items, n_columns) -> as `outcomes_of` takes them
+    n, n_items, n_columns = codes.shape
+    least = -int(design.model.p_missing > 0.0)
+    n_codes = len(design.model.scale) - least
+    n_rows = n_codes**n_columns
+    if design.is_chosen or n_rows > n_items * n_columns:  # more than there are ratings
+        return codes, None
+    studies, digits = np.arange(n)[:, None], np.moveaxis(codes - least, -1, 0)
+    places = np.ravel_multi_index((studies, *digits), (n, *(n_codes,) * n_columns))
+    freq = np.bincount(places.ravel(), minlength=n * n_rows).reshape(n, n_rows)
+    return rows_of(design.model, n_columns, ordered=True), freq
 
 
 def draw(design: Design, rng: np.random.Generator, n: int) -> Integers:
@@ -130,13 +147,13 @@ def outcomes_of(
     """Return half-width, low and high of studies, (n_studies, 3)."""
     # ratings of each (n_studies, n_items, n_columns), or how often each distinct row
     # (n_rows, n_columns) occurs in it (n_studies, n_rows)
-    if design.leaves_raters_out:
-        return _raters_left_out(design, codes)
     if not design.is_chosen:
         weight = np.ones(codes.shape[:2]) if freq is None else freq.astype(np.float64)
-        return _wald(design, weight, codes)
+        by_formula = _raters_left_out if design.leaves_raters_out else _wald
+        return by_formula(design, weight, codes)
     studies = codes if freq is None else [codes.repeat(row, axis=0) for row in freq]
-    return np.array([_chosen(design, study) for study in studies])
+    chosen = [_chosen(design, study) for study in studies]
+    return np.array(chosen).reshape(-1, 3)  # of no study, too
 
 
 @np.errstate(invalid="ignore")  # 0/0 where a study has no coefficient
@@ -151,12 +168,14 @@ def _wald(design: Design, weight: Floats, codes: Integers) -> Floats:
     # a pair of ratings of an item; in a retest of one rater
     is_pair = design.entry.shape == "pairs"
     is_paired = is_rated if is_pair else (codes >= 0).sum(axis=-1) >= 2
-    n = (weight * is_rated).sum(axis=1)
-    n_paired = (weight * is_paired).sum(axis=1)
+    n, n_paired = (
+        np.einsum(f"sr,{rows[:-1]}->s", weight, which)
+        for which in (is_rated, is_paired)
+    )
     n = np.where(n > 1, n, np.nan)
     # √[Σ (n u_i)² / (n (n - 1))] about the mean, as of every estimate
-    u = is_rated * (u - (weight * u).sum(axis=1, keepdims=True) / n[:, None])
-    error = np.sqrt((weight * u**2).sum(axis=1) * n / (n - 1.0))
+    u = is_rated * (u - np.einsum("sr,sr,s->s", weight, u, 1.0 / n)[:, None])
+    error = np.sqrt(np.einsum("sr,sr,sr->s", weight, u, u) * n / (n - 1.0))
     upper = 0.5 + 0.5 * design.level
     is_normal = design.study.interval == "normal"
     t = stdtrit(np.maximum(n_paired - 1.0, 1.0), upper)
@@ -177,20 +196,23 @@ def _around(design: Design, value: Floats, half: Floats) -> Floats:
 
 
 @np.errstate(invalid="ignore")
-def _raters_left_out(design: Design, codes: Integers) -> Floats:
+def _raters_left_out(design: Design, weight: Floats, codes: Integers) -> Floats:
     # The rater jackknife of `intervals` for all studies at once; what that leaves
     # undefined or without spread is left to the choice of `intervals`, one by one.
-    r = design.n_raters
-    every = [codes, *(np.delete(codes, rater, axis=2) for rater in range(r))]
+    # weight and codes as `_wald` takes them
+    r, rows = design.n_raters, "rf" if codes.ndim == 2 else "srf"
+    every = [codes, *(np.delete(codes, rater, axis=-1) for rater in range(r))]
     value, *without = (
-        design.problem.values(design.features(of).sum(axis=1)) for of in every
+        design.problem.values(np.einsum(f"sr,{rows}->sf", weight, design.features(of)))
+        for of in every
     )
     variance = (r - 1) ** 2 / r * np.var(without, axis=0, ddof=1)
     half = stdtrit(r - 1, 0.5 + 0.5 * design.level) * np.sqrt(variance)
     outcomes = _around(design, value, half)
     if design.study.interval != "t":
-        for study in np.flatnonzero(~(variance > 1e-3 / codes[0].size)):
-            outcomes[study] = _chosen(design, codes[study])
+        for study in np.flatnonzero(~(variance > 1e-3 / (design.n_items * r))):
+            its, n = codes if codes.ndim == 2 else codes[study], weight[study]
+            outcomes[study] = _chosen(design, its.repeat(n.astype(int), axis=0))
     return outcomes
 
 
@@ -266,14 +288,16 @@ def _named(names: Sequence[str], numbers: Floats) -> dict[str, float]:
 
 def all_studies(n: int, p: Floats) -> Iterator[tuple[Integers, Floats]]:
     """Yield how often each row occurs in every study, and how probable that is."""
-    # n items fall between bars among as many places; some studies at a time
+    # n items fall between bars among as many places; some studies at a time, without
+    # those that are never met
     log_p, n_places = np.log(np.maximum(p, 1e-300)), n + len(p) - 1
     bars = itertools.combinations(range(n_places), len(p) - 1)
     while some := list(itertools.islice(bars, _PLACES // len(p))):
         ends = np.pad(np.array(some), ((0, 0), (1, 1)), constant_values=(-1, n_places))
         freq = np.diff(ends, axis=1) - 1
         logs = gammaln(n + 1) - gammaln(freq + 1.0).sum(axis=1) + freq @ log_p
-        yield freq, np.exp(logs)
+        is_met = logs > _NEVER
+        yield freq[is_met], np.exp(logs[is_met])
 
 
 # -- intraclass correlations: mean squares of normal ratings --------------------------

@@ -231,8 +231,7 @@ Size = tuple[int, int, int]  # studies, items, raters
 def _draw_mixture(model: ItemModel, rng: np.random.Generator, size: Size) -> Integers:
     codes = _places(np.cumsum(model.prevalences), rng.random(size))
     one = rng.random(size[:2]) < model.kappa
-    codes[one] = codes[one][:, :1]
-    return codes
+    return np.where(one[..., None], codes[..., :1], codes)
 
 
 def _draw_dirichlet(model: ItemModel, rng: np.random.Generator, size: Size) -> Integers:
@@ -255,7 +254,7 @@ def _draw_latent(model: ItemModel, rng: np.random.Generator, size: Size) -> Inte
     )
     bias = latent.rater_sd * rng.standard_normal((n_studies, 1, n_raters))
     y = trait + bias + latent.noise_sd * rng.standard_normal(size)
-    return np.searchsorted(np.array(latent.thresholds), y).astype(np.int64)
+    return np.searchsorted(np.array(latent.thresholds), y).astype(np.int64, copy=False)
 
 
 def _draw_table(model: ItemModel, rng: np.random.Generator, size: Size) -> Integers:
@@ -265,7 +264,7 @@ def _draw_table(model: ItemModel, rng: np.random.Generator, size: Size) -> Integ
 
 def _places(cumulated: Floats, u: Floats) -> Integers:
     # the last is left out, so that rounding leads past no end
-    return np.searchsorted(cumulated[:-1], u, side="right").astype(np.int64)
+    return np.searchsorted(cumulated[:-1], u, side="right").astype(np.int64, copy=False)
 
 
 # how probable rows of ratings are, and how they are drawn
