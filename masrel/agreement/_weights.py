@@ -143,7 +143,8 @@ class Weights:
     Attributes
     ----------
     name : str
-        Name of the weights; ``"custom"`` for a matrix of the caller.
+        Name of the weights; ``"custom"`` for a matrix of the caller, and that of its
+        file where the command line read one.
     n_categories : int
         Declared categories.
     v : ndarray, shape (n_categories, n_categories), or Distances
@@ -174,6 +175,9 @@ class Weights:
     def no_chance(self) -> str:
         """Why chance agreement is 1, if it is."""
         return NO_CHANCE if self.tells_apart else NO_CHANCE_BY_WEIGHTS
+
+    def __str__(self) -> str:
+        return self.name
 
     def as_floats(self) -> Floats:
         """Return w, a matrix as `weights=` takes it; ``nan`` for a reason."""
@@ -290,7 +294,7 @@ def declared_weights(
                 f'"{weights.name}" of {weights.n_categories}'
             )
         return weights
-    v = 1.0 - _checked_matrix(weights, len(categories))
+    v = 1.0 - _checked_matrix(weights, categories)
     return Weights(name="custom", n_categories=len(categories), v=v)
 
 
@@ -303,20 +307,27 @@ def _check_order(categories: Sequence[Label], declared: bool) -> None:
         )
 
 
-def _checked_matrix(weights: Any, n_categories: int) -> Floats:
+def _checked_matrix(weights: Any, categories: Sequence[Label]) -> Floats:
     try:
         table = np.asarray(weights)
     except ValueError as error:
         raise ParameterError("weights: needs rows of the same length") from error
-    if table.shape != (n_categories, n_categories) or table.dtype.kind not in "iufb":
+    if table.shape != (len(categories),) * 2 or table.dtype.kind not in "iufb":
         raise ParameterError(
-            f"weights: needs {n_categories} × {n_categories} numbers, one per pair of "
-            f"categories, got shape {table.shape} of {table.dtype}"
+            f"weights: needs {len(categories)} × {len(categories)} numbers, one per "
+            f"pair of categories, got shape {table.shape} of {table.dtype}"
         )
-    if not np.isfinite(table).all() or (table > 1).any():
-        raise ParameterError("weights: needs finite numbers of at most 1")
-    if (table != table.T).any() or (np.diagonal(table) != 1).any():
-        raise ParameterError("weights: needs a symmetric matrix with 1 on its diagonal")
+    is_same = np.eye(len(categories), dtype=bool)
+    for needed, is_wrong in (
+        ("finite numbers of at most 1", ~np.isfinite(table) | (table > 1)),
+        ("1 on the diagonal", is_same & (table != 1)),
+        ("a symmetric matrix", table != table.T),
+    ):
+        for k, m in np.argwhere(is_wrong):
+            raise ParameterError(
+                f"weights: needs {needed}, got {table[k, m]:g} in the row of "
+                f"{categories[k]} and the column of {categories[m]}"
+            )
     return table.astype(np.float64)
 
 

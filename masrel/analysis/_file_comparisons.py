@@ -210,7 +210,7 @@ def _equality_rows(
     rows: list[Row] = [
         {
             "coefficient": entry.name,
-            "weights": questions.weights_of(entry),
+            "weights": str(questions.weights_of(entry)),
             "test": result.name,
             "statistic": result.statistic,
             "distribution": result.distribution,

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
         Coefficient,
         CountedRatings,
         Metric,
-        WeightName,
     )
     from masrel.ratings import RatingsFile, RatingsPart
 
@@ -60,7 +59,9 @@ class Questions:
     """What is to be told of a file: estimates, and a table for each question."""
 
     coefficients: list[str] | None  # names, or "all" alone; None for the usual ones
-    weights: "WeightName"  # for coefficients that take any; checked with the rest
+    # a name or `Weights`, for coefficients that take any; checked with the rest. A file
+    # until the scale is known
+    weights: Any
     target: Target | None  # what a new study would draw anew; no interval when None
     interval: Literal["auto", "analytic", "jackknife", "bootstrap", "posterior"]
     level: float
@@ -96,7 +97,7 @@ class Questions:
         is_measured = self.limits_of_agreement and self.weights == "identity"
         return list(OF_MEASUREMENTS if is_measured else USUAL)
 
-    def weights_of(self, entry: "Coefficient") -> "WeightName":
+    def weights_of(self, entry: "Coefficient") -> Any:
         """Return the weights, of a coefficient that takes any."""
         return self.weights if entry.weighted else "identity"
 
@@ -110,7 +111,12 @@ class Questions:
         by_metric = {} if self.metric is None else {"metric": self.metric}
         return {
             "coefficients": self.names,
-            "weights": self.weights,
+            "weights": str(self.weights),
+            **(
+                {}
+                if isinstance(self.weights, str)
+                else {"weight_matrix": self.weights.as_floats().round(15).tolist()}
+            ),
             "target": self.target,
             "interval": self.interval,
             "level": self.level,
@@ -177,8 +183,7 @@ class Questions:
         )
         of_items = self.compare or clusters is not None
         target = "items" if of_items else self.target
-        weights: Any = plain_name(self.weights)
-        return replace(self, weights=weights, target=target)
+        return replace(self, weights=plain_name(self.weights), target=target)
 
     def between_raters(self, file: "RatingsFile") -> "Questions | None":
         """Return what is estimated between raters; None where that is nothing."""

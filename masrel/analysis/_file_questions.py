@@ -20,6 +20,7 @@ from masrel.agreement import (
     CodedRatings,
     Label,
     Significance,
+    Weights,
     bhapkar,
     bias_index,
     bowker,
@@ -80,7 +81,11 @@ def answers(
             f"({', '.join(sessions)}), so that raters graded the same item more than "
             f"once; --by {file.read['session']} estimates each"
         )
-    if questions.weights != "identity" and not file.is_ordered:
+    if not (
+        questions.weights == "identity"
+        or file.is_ordered
+        or isinstance(questions.weights, Weights)
+    ):
         raise ParameterError(
             f"--weights {questions.weights}: needs --categories with every grade of "
             f"the scale in order, the grades met are text: "

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from masrel.cli._options import progress, split_commas
+from masrel.cli._paths import InputFile
 from masrel.ratings._findings import ReadingOptions
 
 if TYPE_CHECKING:
@@ -28,6 +29,14 @@ def read_file(file: Path, options: ReadingOptions) -> "RatingsFile":
             report(n_bytes >> 20, n_expected >> 20)
 
         return read_ratings(file, progress=show, **arguments)
+
+
+def weights_of_option(text: str) -> "str | Path":
+    """Return a name of weights, or the file of a matrix."""
+    # no name has a dot or a slash
+    return (
+        text if text.isalpha() else InputFile(path_type=Path).convert(text, None, None)
+    )
 
 
 reading_options = [

@@ -29,6 +29,7 @@ from masrel.cli._reading import (
     read_file,
     reading_options,
     table_options,
+    weights_of_option,
     what_was_read,
 )
 from masrel.errors import ParameterError
@@ -85,11 +86,12 @@ _question_options = grouped(
     ),
     click.option(
         "--weights",
+        type=weights_of_option,
         default="identity",
-        metavar="NAME",
+        metavar="NAME|FILE",
         show_default=True,
         help="identity, linear, quadratic, ordinal, radical, ratio, circular or "
-        "bipolar.",
+        "bipolar; or the file of a matrix, as w.csv.",
     ),
     click.option(
         "--metric",
@@ -232,6 +234,17 @@ def agree(
             "--figure: shows intervals, so it needs --target raters, items or both"
         )
     ratings = read_file(file, reading)
+    if isinstance(questions.weights, Path):
+        from masrel.ratings._reader import read_weights
+
+        questions = replace(
+            questions,
+            weights=read_weights(
+                questions.weights,
+                ratings.scale.grades,
+                is_ordered=ratings.is_ordered,
+            ),
+        )
     from masrel.analysis._file_questions import answers
     from masrel.tables._answer_tables import agreement_sentences, answer_table
     from masrel.tables._tables import SIMULATED

@@ -16,6 +16,7 @@ from masrel.cli._options import (
     write_output,
 )
 from masrel.cli._paths import InputFile
+from masrel.cli._reading import weights_of_option
 from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -93,7 +94,13 @@ _MODELS = ("mixture", "dirichlet-multinomial", "latent", "table")
     metavar="SHARES",
     help="Of the categories, as 0.7,0.3; several with ;, or the rows of a table.",
 )
-@click.option("--weights", help="[default: identity]")
+@click.option(
+    "--weights",
+    type=weights_of_option,
+    metavar="NAME|FILE",
+    help="A name, or the file of a matrix in the order of the categories, as w.csv.  "
+    "[default: identity]",
+)
 @click.option(
     "--model", type=click.Choice(_MODELS), help="How the ratings of an item come about."
 )
@@ -167,6 +174,10 @@ def plan(study: Path | None, toml: bool, output: OutputOptions, **options: Any) 
             output.figure is not None and max(map(len, sizes)) < 2,
             "--figure: needs several --items or --raters, as 20:60:10",
         ),
+        (
+            toml and isinstance(arguments.get("weights"), Path),
+            "--toml: a protocol has weights by name, got a file",
+        ),
     )
     from masrel.tables import _planning_tables as tables
 
@@ -232,6 +243,10 @@ def _refuse(arguments: dict[str, Any], names: Iterable[str], why: str) -> None:
 def _with_pilot(arguments: dict[str, Any]) -> dict[str, Any]:
     # what nobody gave is what a pilot had
     arguments = {"coefficient": "fleiss_kappa", "target": None, **arguments}
+    if isinstance(weights := arguments.get("weights"), Path):
+        from masrel.ratings._reader import read_weights
+
+        arguments["weights"] = read_weights(weights)
     if (path := arguments.pop("pilot", None)) is None:
         return arguments
     from masrel.planning import pilot

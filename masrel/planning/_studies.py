@@ -118,13 +118,13 @@ def _counted(design: Design, codes: Integers) -> tuple[Integers, Integers | None
     # codes (n_studies, n_items, n_columns) -> as `outcomes_of` takes them
     n, n_items, n_columns = codes.shape
     least = -int(design.model.p_missing > 0.0)
-    n_codes = len(design.model.scale) - least
-    n_rows = n_codes**n_columns
+    n_rows = (n_codes := len(design.model.scale) - least) ** n_columns
     if design.is_chosen or n_rows > n_items * n_columns:  # more than there are ratings
         return codes, None
-    studies, digits = np.arange(n)[:, None], np.moveaxis(codes - least, -1, 0)
-    places = np.ravel_multi_index((studies, *digits), (n, *(n_codes,) * n_columns))
-    freq = np.bincount(places.ravel(), minlength=n * n_rows).reshape(n, n_rows)
+    # the study, then a digit of each rating: the place of a row among those of all
+    digits = np.arange(n)[:, None], *np.moveaxis(codes - least, -1, 0)
+    places = np.ravel_multi_index(digits, (n, *(n_codes,) * n_columns)).ravel()
+    freq = np.bincount(places, minlength=n * n_rows).reshape(n, n_rows)
     return rows_of(design.model, n_columns, ordered=True), freq
 
 
@@ -149,11 +149,11 @@ def outcomes_of(
     # (n_rows, n_columns) occurs in it (n_studies, n_rows)
     if not design.is_chosen:
         weight = np.ones(codes.shape[:2]) if freq is None else freq.astype(np.float64)
-        by_formula = _raters_left_out if design.leaves_raters_out else _wald
-        return by_formula(design, weight, codes)
+        return (_raters_left_out if design.leaves_raters_out else _wald)(
+            design, weight, codes
+        )
     studies = codes if freq is None else [codes.repeat(row, axis=0) for row in freq]
-    chosen = [_chosen(design, study) for study in studies]
-    return np.array(chosen).reshape(-1, 3)  # of no study, too
+    return np.array([_chosen(design, study) for study in studies]).reshape(-1, 3)
 
 
 @np.errstate(invalid="ignore")  # 0/0 where a study has no coefficient
@@ -211,8 +211,10 @@ def _raters_left_out(design: Design, weight: Floats, codes: Integers) -> Floats:
     outcomes = _around(design, value, half)
     if design.study.interval != "t":
         for study in np.flatnonzero(~(variance > 1e-3 / (design.n_items * r))):
-            its, n = codes if codes.ndim == 2 else codes[study], weight[study]
-            outcomes[study] = _chosen(design, its.repeat(n.astype(int), axis=0))
+            ratings = codes if codes.ndim == 2 else codes[study]
+            outcomes[study] = _chosen(
+                design, ratings.repeat(weight[study].astype(np.int64), axis=0)
+            )
     return outcomes
 
 
@@ -296,8 +298,7 @@ def all_studies(n: int, p: Floats) -> Iterator[tuple[Integers, Floats]]:
         ends = np.pad(np.array(some), ((0, 0), (1, 1)), constant_values=(-1, n_places))
         freq = np.diff(ends, axis=1) - 1
         logs = gammaln(n + 1) - gammaln(freq + 1.0).sum(axis=1) + freq @ log_p
-        is_met = logs > _NEVER
-        yield freq[is_met], np.exp(logs[is_met])
+        yield freq[logs > _NEVER], np.exp(logs[logs > _NEVER])
 
 
 # -- intraclass correlations: mean squares of normal ratings --------------------------

@@ -16,9 +16,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from masrel.agreement import CodedRatings, CountedRatings, count_ratings
+from masrel.agreement import (
+    CodedRatings,
+    CountedRatings,
+    Weights,
+    count_ratings,
+    declared_weights,
+)
 from masrel.agreement._codes import count_items, count_table
-from masrel.errors import RatingsError
+from masrel.errors import ParameterError, RatingsError
 from masrel.ratings._findings import (
     Finding,
     ReadingOptions,
@@ -674,3 +680,44 @@ def _names_of_rows(sheet: Sheet, layout: Layout, names: list[str]) -> list[str]:
             names=", ".join(map(repr, names)),
         )
     return rows
+
+
+# ---- a matrix of weights ----
+
+
+@long_cells()
+def read_weights(
+    path: Path, grades: Sequence[str] = (), *, is_ordered: bool = True
+) -> Weights:
+    """Return the weights in a file: a matrix, or a table with the grades around it."""
+    # grades: of the scale, in the order that a matrix needs if they have one; where
+    # none are known it is a matrix
+    sheet = _read_sheet(path, ReadingOptions(no_header=True, delimiter=None))
+    columns = [[text.replace(",", ".") for text in c.cells()] for c in sheet.columns]
+    labels, names = [c[0] for c in columns[1:]], [g.replace(",", ".") for g in grades]
+    rows, places = [*range(len(columns[0]))], [*range(len(columns))]
+    if names and not (is_number(columns[0][0]) and is_ordered):
+        for stated in (labels, columns[0][1:]):
+            if sorted(stated) != sorted(names):
+                raise ParameterError(
+                    f"{path}: needs the grades {', '.join(names)} in its first row and "
+                    "its first column, each once, or numbers alone in the order of "
+                    "--categories; missing: "
+                    f"{', '.join(sorted({*names} - {*stated})) or 'none'}; not among "
+                    f"them: {', '.join(sorted({*stated} - {*names})) or 'none'}"
+                )
+        rows = [columns[0].index(name, 1) for name in names]
+        places = [1 + labels.index(name) for name in names]
+    for k, m in ((k, m) for k in rows for m in places):
+        if not is_number(columns[m][k]):
+            raise ParameterError(
+                f"{path}: {sheet.where(k)}, column {m + 1}: needs a number, got "
+                f"{columns[m][k]!r}"
+            )
+    return replace(
+        declared_weights(
+            [[float(columns[m][k]) for m in places] for k in rows],
+            names or sheet.header,
+        ),
+        name=path.name,
+    )

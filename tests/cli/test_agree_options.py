@@ -13,6 +13,7 @@ from masrel.agreement import (
     COEFFICIENTS,
     Metric,
     WeightName,
+    fleiss_kappa,
     krippendorff_alpha,
 )
 from tests.cli.process import Caller, Done
@@ -243,6 +244,48 @@ def test_grades_of_several_labels_are_sets(masrel: Caller, tmp_path: Path) -> No
         )
         alpha = krippendorff_alpha(sets, metric=metric)
         assert of_alpha["value"] == pytest.approx(alpha.value, abs=1e-14)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "1,.75,.25,0\n.75,1,.5,0\n.25,.5,1,.5\n0,0,.5,1\n",
+        # in another order, with commas as decimal marks
+        "grade;2;1;3;1+\n1;0,25;1;0;0,75\n3;0,5;0;1;0\n1+;0,5;0,75;0;1\n"
+        "2;1;0,25;0,5;0,5\n",
+    ],
+)
+def test_weights_of_a_file_are_those_of_a_matrix(
+    masrel: Caller, wide: Path, tmp_path: Path, text: str
+) -> None:
+    (tmp_path / "w.csv").write_text(text, encoding="utf-8")
+    options = ("--categories", ",".join(SCALE), "--weights", tmp_path / "w.csv")
+    done = masrel("agree", wide, *options, "--json", "-")
+    matrix = [
+        [1, 0.75, 0.25, 0],
+        [0.75, 1, 0.5, 0],
+        [0.25, 0.5, 1, 0.5],
+        [0, 0, 0.5, 1],
+    ]
+    kappa = fleiss_kappa(ROWS, categories=SCALE, weights=matrix)
+    (_, of_kappa) = estimates(done)
+    assert of_kappa["value"] == pytest.approx(kappa.value, abs=1e-14)
+    assert of_kappa["standard_error"] == pytest.approx(kappa.standard_error, abs=1e-14)
+    assert of_kappa["weights"] == "w.csv"
+    assert json.loads(done.out)["options"]["weight_matrix"] == matrix
+
+
+def test_grades_without_an_order_have_weights_by_name(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    path, weights = tmp_path / "shapes.csv", tmp_path / "w.csv"
+    path.write_text("item,Kim,Lee\n1,a,b\n2,b,b\n3,c,b\n4,a,a\n", encoding="utf-8")
+    weights.write_text(",c,b,a\nc,1,0,0\nb,0,1,.5\na,0,.5,1\n", encoding="utf-8")
+    (of_agreement, _) = estimates(
+        masrel("agree", path, "--weights", weights, "--json", "-")
+    )
+    assert of_agreement["value"] == (0.5 + 1 + 0 + 1) / 4
+    assert "--categories" in refused(masrel("agree", path, "--weights", "linear"))
 
 
 @pytest.mark.parametrize(

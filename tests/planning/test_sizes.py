@@ -1,6 +1,7 @@
 """Sizes: the smallest that reaches an aim, and one sentence where none can."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -188,3 +189,24 @@ def test_the_size_of_an_agreement_of_a_table_is_that_of_a_share() -> None:
         method="wald",
     )
     assert sample_size(study).n_items == 182
+
+
+@pytest.mark.parametrize(
+    "aim",
+    [
+        # the guess knows no t, no cut at the ends of the scale and no assurance
+        *(
+            {"half_width": half, "interval": "t"}
+            for half in (0.4, 0.3, 0.25, 0.2, 0.16)
+        ),
+        {"half_width": 0.3, "lower": None, "upper": None, "interval": "normal"},
+        {"half_width": None, "upper": 0.9, "interval": "t"},
+        {"half_width": 0.25, "assurance": 0.05, "interval": "t", "method": "exact"},
+        {"half_width": 0.25, "assurance": 0.95, "interval": "t", "method": "exact"},
+    ],
+)
+def test_one_item_fewer_does_not_reach_the_aim(aim: dict[str, Any]) -> None:
+    study = Study(**{**KAPPA, "n_raters": 2, **aim})
+    n = sample_size(study).n_items
+    assert precision(replace(study, n_items=n)).reaches_aim
+    assert not precision(replace(study, n_items=n - 1)).reaches_aim
