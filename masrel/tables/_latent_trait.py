@@ -45,11 +45,11 @@ def latent_table(
 
 def _rows(result: "LatentTrait") -> Iterator[dict[str, object]]:
     quantities: list[tuple[str, Iterable[Quantity]]] = [
-        ("severity", result.items),
-        ("threshold", result.thresholds),
         ("bias", result.raters),
         ("noise", result.noises),
         ("share of variance", result.shares),
+        ("threshold", result.thresholds),
+        ("severity", result.items),
     ]
     cells = [("kappa", "two new raters", result.kappa.value, result.kappa.interval)]
     cells += [
