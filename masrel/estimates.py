@@ -13,6 +13,7 @@ __all__ = [
     "Distribution",
     "Estimate",
     "Interval",
+    "IntervalMethod",
     "Significance",
     "Target",
     "Unit",
@@ -21,6 +22,17 @@ __all__ = [
 
 Target = Literal["items", "raters", "both"]
 """What a new study would draw anew: the population an interval generalises to."""
+
+IntervalMethod = Literal[
+    "auto",
+    "auto-2026.1",
+    "auto-2026.2",
+    "analytic",
+    "jackknife",
+    "bootstrap",
+    "posterior",
+]
+"""Kinds of intervals; "auto" is the newest of the rules that choose one."""
 
 Unit = Literal["items", "raters", "both", "clusters"]
 """What is resampled or left out."""

@@ -6,11 +6,11 @@ In: a `RatingsFile` and how estimates are made. Out: a row for every coefficient
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from masrel._input import refuse
 from masrel.errors import MasrelError, ParameterError
-from masrel.estimates import Estimate, Interval, Target
+from masrel.estimates import Estimate, Interval, IntervalMethod, Target
 
 if TYPE_CHECKING:
     from masrel.agreement import (
@@ -63,7 +63,7 @@ class Questions:
     # until the scale is known
     weights: Any
     target: Target | None  # what a new study would draw anew; no interval when None
-    interval: Literal["auto", "analytic", "jackknife", "bootstrap", "posterior"]
+    interval: IntervalMethod
     level: float
     # n_resamples, seed: for intervals that draw
     n_resamples: int

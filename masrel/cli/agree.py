@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import click
 
@@ -33,6 +33,7 @@ from masrel.cli._reading import (
     what_was_read,
 )
 from masrel.errors import ParameterError
+from masrel.estimates import IntervalMethod
 from masrel.ratings._findings import ReadingOptions
 
 if TYPE_CHECKING:
@@ -108,10 +109,10 @@ _question_options = grouped(
     ),
     click.option(
         "--interval",
-        type=click.Choice(["auto", "analytic", "jackknife", "bootstrap", "posterior"]),
+        type=click.Choice(get_args(IntervalMethod)),
         default="auto",
         show_default=True,
-        help="Kind of interval; auto chooses by target and size.",
+        help="Kind of interval; auto is the newest rule that chooses one.",
     ),
     click.option(
         "--level",

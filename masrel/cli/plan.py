@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
@@ -18,6 +18,7 @@ from masrel.cli._options import (
 from masrel.cli._paths import InputFile
 from masrel.cli._reading import weights_of_option
 from masrel.errors import ParameterError
+from masrel.estimates import IntervalMethod
 
 if TYPE_CHECKING:
     from masrel.planning import Plan
@@ -54,7 +55,7 @@ def _prevalences(text: str) -> list[Any]:
     return rows if len(rows) > 1 else rows[0]
 
 
-_INTERVALS = ("auto", "analytic", "jackknife", "bootstrap", "posterior", "t", "normal")
+_INTERVALS = (*get_args(IntervalMethod), "t", "normal")
 _METHODS = ("auto", "exact", "simulation", "wald", "goodness-of-fit")
 _MODELS = ("mixture", "dirichlet-multinomial", "latent", "table")
 

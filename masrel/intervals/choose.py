@@ -27,9 +27,10 @@ categories are rare is noted.
 Items and raters are counted that have a pair of ratings.
 """
 
+import math
 from collections.abc import Sequence
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import partial, reduce
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
@@ -42,6 +43,7 @@ from masrel.estimates import (
     _POPULATIONS,
     Estimate,
     Interval,
+    IntervalMethod,
     Target,
     _LongNote,
     _population,
@@ -64,8 +66,36 @@ from masrel.intervals.posterior import posterior
 if TYPE_CHECKING:
     from masrel.agreement import Metric, WeightsLike
 
-_Method = Literal["auto", "analytic", "jackknife", "bootstrap", "posterior"]
-"""Kinds of intervals; "auto" chooses one by target and size."""
+
+_Model = Literal["alike", "usual", "patterns"]
+"""Raters alike, what `posterior` takes unless told, or each rater as he or she is."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Rule:
+    """A rule that chooses an interval."""
+
+    name: str
+    many_raters: float  # of whom a model of raters alike is too sure
+
+    def models(self, problem: IntervalProblem, *, few: bool) -> tuple[_Model, ...]:
+        """Return whose posterior covers best, few items or rare categories."""
+        n, r = problem.n_paired_items, problem.n_paired_raters
+        if few:  # two raters have a table of their own
+            return ("alike",) if r > 2 else ("usual",)
+        if r < self.many_raters or not problem.unweighted:
+            return ("alike",)
+        # few items do not tell patterns, and the two are sure of different things
+        return ("patterns",) if n >= _SEVERAL else ("alike", "patterns")
+
+
+_RULES = {
+    "auto-2026.1": _Rule("auto-2026.1", math.inf),
+    "auto-2026.2": _Rule("auto-2026.2", 4),
+}
+"""Rules by name, the newest last."""
+
+_NEWEST = list(_RULES.values())[-1]
 
 _FEW = 10  # items, and raters, below which a posterior covers best
 _SEVERAL = 30  # items, below which a jackknife alone ends too low
@@ -85,7 +115,7 @@ def estimate(
     ratings: object,
     *,
     target: Target,
-    method: _Method = "auto",
+    method: IntervalMethod = "auto",
     categories: Sequence[Label] | None = None,
     weights: "WeightsLike" = "identity",
     metric: "Metric | None" = None,
@@ -105,8 +135,10 @@ def estimate(
     target : {"items", "raters", "both"}
         What a new study would draw anew. There is no default.
     method : {"auto", "analytic", "jackknife", "bootstrap", "posterior"}, optional
-        Kind of interval; "auto" chooses by target and size, and a note says what and
-        why. The functions of the same names have more options.
+        Kind of interval; "auto" chooses by target and size. Its rule has a name, by
+        which it can be had again when there is a newer one, such as "auto-2026.1": the
+        interval's `method` says it, and a note what was chosen and why. The functions
+        of the same names have more options.
     categories : sequence, optional
         The declared scale in order.
     weights : str or array_like, optional
@@ -150,13 +182,14 @@ def estimate(
     >>> ratings = [["a", "a", "a"], ["a", "b", "a"], ["b", "b", "b"]] * 4
     >>> result = estimate("fleiss_kappa", ratings, target="items")
     >>> result.interval.method
-    'item jackknife, t(11) on the logit'
+    'item jackknife, t(11) on the logit, chosen by auto-2026.2'
     """
-    check_option("method", method, get_args(_Method))
+    check_option("method", method, get_args(IntervalMethod))
+    rule = _NEWEST if method == "auto" else _RULES.get(method)
     entry = find_entry(coefficient, metric)
     check_option("target", target, get_args(Target))
     there_is = entry.interval_target
-    if method == "auto" and there_is is not None and there_is != target:
+    if rule is not None and there_is is not None and there_is != target:
         raise ParameterError(
             f"target: the interval of {entry.title} generalises to "
             f'{_POPULATIONS[there_is]}, which is "{there_is}", and it has no other; '
@@ -169,7 +202,7 @@ def estimate(
         ratings = entry.code(ratings, categories)
         categories = None  # the ratings have them by now
     result = entry(ratings, categories=categories, weights=weights, level=level)
-    if method == "auto" and there_is is not None and clusters is None:
+    if rule is not None and there_is is not None and clusters is None:
         return result
     ask = partial(
         pose_problem,
@@ -184,9 +217,10 @@ def estimate(
         if result.reason is None:
             error, _ = _clustered_error(problem, clusters)
             result = replace(result, standard_error=error)
-    if method == "auto":
-        interval, why = _choose_interval(ask(entry, ratings), clusters)
-        interval = replace(interval, target=target)
+    if rule is not None:
+        interval, why = _choose_interval(ask(entry, ratings), rule, clusters)
+        by_rule = f"{interval.method}, chosen by {rule.name}"
+        interval = replace(interval, target=target, method=by_rule)
         chosen = _LongNote(f"chosen for {_population(interval)}: {why}")
         interval = replace(interval, notes=(chosen, *interval.notes))
     else:
@@ -217,7 +251,7 @@ def _by_error(problem: IntervalProblem) -> Interval:
 
 
 def _choose_interval(
-    problem: IntervalProblem, clusters: Integers | None = None
+    problem: IntervalProblem, rule: _Rule = _NEWEST, clusters: Integers | None = None
 ) -> tuple[Interval, str]:
     """Compute the interval that covers best, and say what it is and why."""
     if clusters is not None:
@@ -237,14 +271,13 @@ def _choose_interval(
     if problem.n_paired_items == 0:
         return _leave_out(problem).interval(), "no item has ratings of two raters"
     if problem.target == "both":
-        return _other_items_and_raters(problem)
+        return _other_items_and_raters(problem, rule)
     few = problem.n_paired_items < _FEW and problem.n_paired_raters < _FEW
     outside, rare = _outside_commonest(problem)
     interval = None
     if (few or rare) and problem.target != "raters":
-        # of more than two raters; two have a table of their own
-        alike = not few or problem.n_paired_raters > 2
-        interval = _posterior(problem, alike)
+        models = rule.models(problem, few=few)
+        interval = reduce(_joined, (_posterior(problem, model) for model in models))
     if interval is None:
         return _jackknife_with_spread(problem)
     if few:
@@ -268,7 +301,7 @@ def _jackknife_with_spread(problem: IntervalProblem) -> tuple[Interval, str]:
     accident = _ACCIDENT * (1.0 - problem.value) / n_ratings if modelled else 0.0
     if not left_out.variance > accident:
         if modelled or target == "items":
-            interval = _posterior(problem, False)
+            interval = _posterior(problem, "usual")
             if interval is not None:
                 why = "leaving any out says next to nothing, so that a model must"
                 return interval, why
@@ -297,7 +330,7 @@ def _outside_commonest(problem: IntervalProblem) -> tuple[int, bool]:
     return outside, outside < _SEVERAL and 2 * outside < problem.n_paired_items
 
 
-def _posterior(problem: IntervalProblem, alike: bool) -> Interval | None:
+def _posterior(problem: IntervalProblem, model: _Model) -> Interval | None:
     """Compute the posterior, one-sided where the estimate is perfect or undefined."""
     # imported here: they load scipy
     from masrel.intervals._dirichlet import (
@@ -311,9 +344,10 @@ def _posterior(problem: IntervalProblem, alike: bool) -> Interval | None:
     if no_posterior(problem):
         return None
     small = problem.n_paired_items <= _MANY
-    alike = alike and problem.unweighted and small
+    alike = model == "alike" and problem.unweighted and small
+    is_rho = model == "usual" and problem.is_rho and small
     one_sided = not problem.value < 1.0
-    if (alike and problem.entry.rho) or (small and problem.is_rho):
+    if (alike and problem.entry.rho) or is_rho:
         interval = rho_interval(problem, DEFAULT_PRIOR, one_sided=one_sided)
     elif alike:
         interval = alike_interval(
@@ -328,6 +362,20 @@ def _posterior(problem: IntervalProblem, alike: bool) -> Interval | None:
             problem, n_draws=_DRAWS, rng=_SEED, one_sided=one_sided
         )
     return interval if one_sided else extended(problem, interval)
+
+
+def _joined(one: Interval | None, other: Interval | None) -> Interval | None:
+    """Return an interval that holds two of one problem."""
+    if one is None or other is None:
+        return one
+    return replace(
+        other,
+        low=min(one.low, other.low),
+        high=max(one.high, other.high),
+        method=f"{one.method}, joined with {other.method}",
+        notes=tuple(dict.fromkeys((*one.notes, *other.notes))),
+        distribution=None,
+    )
 
 
 def _lift(problem: IntervalProblem, interval: Interval) -> Interval:
@@ -348,7 +396,9 @@ def _lift(problem: IntervalProblem, interval: Interval) -> Interval:
     return replace(interval, high=halfway, notes=(*interval.notes, note))
 
 
-def _other_items_and_raters(problem: IntervalProblem) -> tuple[Interval, str]:
+def _other_items_and_raters(
+    problem: IntervalProblem, rule: _Rule
+) -> tuple[Interval, str]:
     # Either end is as far from the estimate as other items alone, and as other raters
     # alone, would put it: these distances squared and added, less what both hold of the
     # disagreement of a rater on an item, which is never taken as more than either has.
@@ -361,7 +411,7 @@ def _other_items_and_raters(problem: IntervalProblem) -> tuple[Interval, str]:
         return problem.undefined(reason, method=method, unit="both"), "one item"
     common = student_t(problem.level, df) ** 2 * _variance_of_cells(problem)
     parts = (replace(problem, target=of, max_df=df) for of in ("items", "raters"))
-    items, raters = (_choose_interval(of)[0] for of in parts)
+    items, raters = (_choose_interval(of, rule)[0] for of in parts)
     why = "what items left out and raters left out move"
     for part in (items, raters):
         if part.reason is not None:

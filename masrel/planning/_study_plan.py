@@ -14,13 +14,11 @@ import numpy as np
 from masrel._input import refuse, shown
 from masrel.agreement import Label, WeightsLike, code_ratings
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
-from masrel.estimates import Estimate, Target
+from masrel.estimates import Estimate, IntervalMethod, Target
 from masrel.intervals import estimate
 
 Method = Literal["auto", "wald", "goodness-of-fit", "exact", "simulation"]
-Interval = Literal[
-    "auto", "t", "normal", "analytic", "jackknife", "bootstrap", "posterior"
-]
+Interval = Literal[IntervalMethod, "t", "normal"]
 Progress = Callable[[int, int], None]  # what is done, and of how many
 
 FORMULAS = ("wald", "goodness-of-fit")

@@ -334,7 +334,7 @@ class Design:
         return (
             self.study.target == "raters"
             and self.entry.shape == "ratings"
-            and self.study.interval in ("auto", "t", "jackknife")
+            and self.study.interval.startswith(("auto", "t", "jackknife"))
         )
 
     @property

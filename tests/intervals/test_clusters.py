@@ -98,7 +98,7 @@ def test_by_default_clusters_are_left_out_on_the_logit() -> None:
     found = estimate("gwet_ac", ratings, target="items", clusters=list(clusters))
     interval = found.interval
     assert interval is not None
-    assert interval.method == "cluster jackknife, t(19) on the logit"
+    assert interval.method.startswith("cluster jackknife, t(19) on the logit")
     assert interval.low < found.value < interval.high < 1.0
     assert "generalises to: other clusters of items" in str(found)
     plain = jackknife("gwet_ac", ratings, target="items", clusters=clusters)

@@ -21,7 +21,7 @@ from docs.make.coverage.populations import (
 )
 from docs.make.coverage.study import Cell, Method, Study
 from masrel.agreement import CodedRatings
-from masrel.estimates import Interval
+from masrel.estimates import Interval, IntervalMethod
 from masrel.intervals import estimate, jackknife, posterior
 
 DOCS = Path(__file__).parents[2]
@@ -63,9 +63,10 @@ DECIDING: tuple[Design, ...] = (
 """Of each family, which makes 60 cells, by which the rule is chosen."""
 
 KAPPAS = (0.6, 0.4, 0.8)
+# Brennan and Prediger's is percent agreement on another scale: the same coverage
 BINARY = (
     "fleiss_kappa", "conger_kappa", "krippendorff_alpha", "gwet_ac",
-    "brennan_prediger", "percent_agreement",
+    "percent_agreement",
 )  # fmt: skip
 ORDERED = (*BINARY, "fleiss_kappa, quadratic", "gwet_ac, quadratic")
 
@@ -135,17 +136,24 @@ def _population(
     return Population(kinds=made.kinds, chances=made.chances, p_missing=p_missing)
 
 
-def _default(name: str, ratings: CodedRatings, weights: str) -> Interval | None:
-    return estimate(name, ratings, target="items", weights=weights).interval
+def _chosen(
+    rule: IntervalMethod, name: str, ratings: CodedRatings, weights: str
+) -> Interval | None:
+    asked = estimate(name, ratings, target="items", method=rule, weights=weights)
+    return asked.interval
 
 
-def _model(name: str, ratings: CodedRatings, weights: str) -> Interval | None:
-    return posterior(name, ratings, target="items", weights=weights, rng=1)
-
-
-def _patterns(name: str, ratings: CodedRatings, weights: str) -> Interval | None:
+def _posterior(
+    model: str, name: str, ratings: CodedRatings, weights: str
+) -> Interval | None:
     return posterior(
-        name, ratings, target="items", weights=weights, model="patterns", rng=1
+        name,
+        ratings,
+        target="items",
+        weights=weights,
+        model=model,  # type: ignore[arg-type]
+        n_draws=2_000,
+        rng=1,
     )
 
 
@@ -154,9 +162,10 @@ def _jackknife(name: str, ratings: CodedRatings, weights: str) -> Interval | Non
 
 
 METHODS: dict[str, Method] = {
-    "auto": _default,
-    "posterior": _model,
-    "patterns": _patterns,
+    "auto-2026.1": partial(_chosen, "auto-2026.1"),
+    "auto-2026.2": partial(_chosen, "auto-2026.2"),
+    "alike": partial(_posterior, "dirichlet-multinomial"),
+    "patterns": partial(_posterior, "patterns"),
     "jackknife": _jackknife,
 }
 

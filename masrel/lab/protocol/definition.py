@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from masrel.estimates import Target
+from masrel.estimates import IntervalMethod, Target
 from masrel.lab.elbow.parameters import PostCatch, ResidualReading
 from masrel.lab.protocol._gates import GateKeys
 from masrel.lab.protocol._keys import _Identifier, _Table, _Text
@@ -275,9 +275,7 @@ class EstimatePlan(_Table, frozen=True, kw_only=True):
     models: Literal["standard", "dummy", "all"] = "standard"
     sessions: Annotated[tuple[str, ...], Meta(min_length=1, max_length=2)]
     target: Target
-    interval: Literal[
-        "none", "auto", "analytic", "jackknife", "bootstrap", "posterior"
-    ] = "none"
+    interval: Literal["none", IntervalMethod] = "none"
 
 
 class Analysis(_Table, frozen=True, kw_only=True):
