@@ -158,6 +158,7 @@ def _rules(folder: Path) -> str:
         if not (folder / name).exists():
             continue
         rows = read(folder / name)
+        rows = rows[rows["answered"] > 0.0]  # a method may have none of a coefficient
         # of each cell the coefficient that is covered least
         lines = ["family", *_CELL]
         worst = rows.groupby([*lines, "method"], sort=False)["coverage"].min()
