@@ -5,32 +5,25 @@ those of highest restricted likelihood. Items with as many ratings enter togethe
 sums: after one pass over the ratings only matrices of raters by raters are left.
 """
 
-import math
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq, minimize, minimize_scalar, root
-from scipy.special import chdtri, expit, fdtri
+from scipy.optimize import minimize, root
 
 from masrel.agreement._engine import Floats, deviations
+from masrel.agreement._profile import EXACT, ends, profile_ends
 from masrel.estimates import _LongNote
 
 _Numbers = NDArray[Any]  # real, or complex for slopes
-
-_EXACT = 1e-15
-"""Residual sum of squares, as a share of all, that is as good as a perfect fit."""
 
 _TINY = 1e-30
 """Imaginary step of which the square is nothing: slopes then have no rounding."""
 
 _NONE = 5e-5
 """√ratio of a variance that no ratings tell from 0: to 1e-8 it makes no difference."""
-
-_LOW, _LOWEST = -7.0, -50.0
-"""Logits of a correlation of next to nothing, and of one as good as 0."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,29 +114,6 @@ class _Likelihood:
         traces[2, 2] = self.n_ratings - 1 - ratios @ slope - ratios @ traces[:2, 2]
         return traces
 
-    def profile(self, logit: float, absolute: bool, last: float) -> float:
-        """Return the deviance where the correlation has a logit, raters likeliest."""
-        odds = math.exp(logit)
-
-        def at(u: Any) -> Any:
-            of_raters = np.sinh(np.atleast_1d(u)) ** 2
-            of_items = odds * (1.0 + absolute * of_raters)
-            return self.deviance(np.column_stack([of_items, of_raters]))
-
-        if not self.has_raters:
-            return float(at(0.0)[0])
-        # there may be more than one valley
-        around = last * np.geomspace(1e-2, 1e2, 9)
-        grid = np.arcsinh(
-            np.sqrt(np.sort([0.0, *np.geomspace(1e-4, 1e4, 24), *around]))
-        )
-        best = int(np.argmin(at(grid)))
-        ends = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
-        valley = minimize_scalar(
-            lambda u: at(u)[0], bounds=ends, method="bounded", options={"xatol": 1e-8}
-        )
-        return float(min(valley.fun, at(0.0)[0]))
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Components:
@@ -176,38 +146,22 @@ class Components:
     def icc_ends(self, *, absolute: bool, level: float) -> tuple[float, float]:
         """Return the ends of the interval of a single rating's correlation."""
         # absolute: whether the variance of raters counts as error
-        if self.likelihood is None:
-            return self._ends_without_residual(absolute, level)
-        profile, last = self.likelihood.profile, float(self.ratios[1])
-        least = float(self.likelihood.deviance(self.ratios[None])[0])
-        highest = least + float(chdtri(1, 1.0 - level))
-        odds = float(self.ratios[0]) / (1.0 + absolute * last)
-        best = max(math.log(odds), _LOWEST) if odds > 0.0 else _LOWEST
+        n, k, likelihood = self.n_items, self.n_raters, self.likelihood
+        if likelihood is None:
+            if not absolute or self.raters == 0.0:
+                return 1.0, 1.0
+            squares = k * self.items, n * self.raters, 0.0
+            low, high = profile_ends(n, k, squares, level)
+            return float(low), float(high)
 
-        def above(logit: float) -> float:
-            return profile(logit, absolute, last) - highest
+        def deviance(a: Floats, x: Floats) -> Floats:
+            of_raters = self.has_raters * (x - 1.0) / n
+            ratios = np.stack([(a - 1.0) / k, of_raters], axis=-1)
+            return likelihood.deviance(ratios.reshape(-1, 2)).reshape(a.shape)
 
-        def end(inner: float, outer: float, step: float) -> float:
-            while above(outer) < 0.0:
-                inner, outer, step = outer, outer + 2.0 * step, 2.0 * step
-            logit = brentq(above, inner, outer, xtol=1e-12, rtol=1e-14)
-            return float(expit(logit))
-
-        low = 0.0 if above(_LOWEST) <= 0.0 else end(best, best - 1.0, -1.0)
-        return low, end(best, max(best, _LOW) + 1.0, 1.0)
-
-    def _ends_without_residual(
-        self, absolute: bool, level: float
-    ) -> tuple[float, float]:
-        # of two variances that are known but for their degrees of freedom
-        if not absolute or self.raters == 0.0:
-            return 1.0, 1.0
-        of_items, of_raters = self.n_items - 1, self.n_raters - 1
-        upper = 0.5 + 0.5 * level
-        ratio = self.items / self.raters
-        low = ratio / float(fdtri(of_items, of_raters, upper))
-        high = ratio * float(fdtri(of_raters, of_items, upper))
-        return low / (1.0 + low), high / (1.0 + high)
+        a, x = 1.0 + self.ratios * (k, n)
+        low, high = ends(deviance, a, x, n=n, k=k, level=level, absolute=absolute)
+        return float(low), float(high)
 
 
 def components(values: Floats, *, has_raters: bool) -> Components | str:
@@ -242,7 +196,7 @@ def components(values: Floats, *, has_raters: bool) -> Components | str:
         unit=unit,
         has_raters=has_raters,
     )
-    squares, none = float((rest**2).sum()), _EXACT * float((centred**2).sum())
+    squares, none = float((rest**2).sum()), EXACT * float((centred**2).sum())
     if squares <= none:
         # items and raters are known but for a constant, and their variances simple
         if levels @ laplacian @ levels <= none:

@@ -1,12 +1,14 @@
 """What mean squares say: intraclass correlations, Robinson's A, and W, of ranks.
 
-A table with gaps has no mean squares: variances are then estimated by restricted
-maximum likelihood, and the interval is read from its profile.
+The interval of absolute agreement is read from the profile of the restricted
+likelihood, which depends on a complete table by its mean squares alone. A table with
+gaps has none: there the likelihood gives the variances, too.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -15,16 +17,25 @@ from numpy.typing import NDArray
 from masrel._input import check_option
 from masrel.agreement._codes import complete_values, rated_part, rating_values
 from masrel.agreement._engine import (
+    NO_SPREAD,
+    Features,
+    Formula,
     check_level,
     deviations,
     measured,
     undefined,
 )
-from masrel.agreement._labels import Label
+from masrel.agreement._labels import Codes, Label
+from masrel.errors import ParameterError, RatingsError
 from masrel.estimates import Estimate, Interval, Significance, Target
 
 IccForm = Literal["ICC(1)", "ICC(1,k)", "ICC(C,1)", "ICC(C,k)", "ICC(A,1)", "ICC(A,k)"]
 """One-way; consistency and absolute agreement; of one rating and of the mean of k."""
+
+_Method = Literal["auto", "auto-2026.1", "auto-2026.2", "F"]
+"""How the interval is made: by the newest rule, by an older, or from F always."""
+
+_BY_F = ("F", "auto-2026.1")
 
 _NAMES: dict[IccForm, str] = {
     "ICC(1)": "icc_1",
@@ -36,7 +47,15 @@ _NAMES: dict[IccForm, str] = {
 }
 """Form to its name in the register."""
 
+_ROUNDING = 1e-13
+"""Share of the sum of all squares that is none."""
+
 _ALL_ALIKE = "0/0: neither items nor ratings of an item differ"
+
+_OUTSIDE = (
+    "the value takes a variance as less than 0; the profile likelihood takes none so, "
+    "and its interval is drawn out to the value"
+)
 
 _Answer = tuple[float, Interval | None, str | None]
 """Value, interval and why there is none."""
@@ -48,6 +67,7 @@ def icc(
     form: IccForm = "ICC(A,1)",
     categories: Sequence[Label] | None = None,
     level: float = 0.95,
+    interval: _Method = "auto",
 ) -> Estimate:
     """Estimate an intraclass correlation with its interval.
 
@@ -63,22 +83,27 @@ def icc(
         text.
     level : float, optional
         Level of the interval.
+    interval : {"auto", "auto-2026.1", "F"}, optional
+        How the interval is made. "auto" is the newest rule: exact from the F
+        distribution for one-way and consistency forms of complete tables, and else from
+        the profile likelihood. "F" has for absolute agreement what most programs print,
+        which is too short where raters differ in level; so has "auto-2026.1" where no
+        rating is missing.
 
     Returns
     -------
     Estimate
-        The coefficient, named after its form: ``"icc_a1"`` is ICC(A,1). The interval,
-        from the F distribution, or from the profile likelihood where ratings are
-        missing, generalises to other items and, for absolute agreement and one-way
-        forms, to other raters too. There is no delta-method error; observed and chance
-        agreement do not exist.
+        The coefficient, named after its form: ``"icc_a1"`` is ICC(A,1). Its interval
+        generalises to other items and, for absolute agreement and one-way forms, to
+        other raters too. There is no delta-method error; observed and chance agreement
+        do not exist.
 
     Raises
     ------
     RatingsError
         If the ratings are not such a table, or text without categories.
     ParameterError
-        If the form is unknown, or the level is not within (0, 1).
+        If an option is invalid, or `interval` is "F" and ratings are missing.
 
     Warns
     -----
@@ -91,8 +116,10 @@ def icc(
     -----
     A complete table has mean squares. Where its total variance is estimated as less
     than 0, which takes items that hardly differ, the formula's value lies outside
-    [-1, 1] and there is no interval. The interval of ICC(A,k) is that of ICC(A,1)
-    stepped up by Spearman and Brown's formula.
+    [-1, 1] and there is no interval. Where the variance of items alone is, so is the
+    value; the profile likelihood, of variances of 0 or more, leaves it out, and the
+    interval is drawn out to it. The interval of ICC(A,k) is that of ICC(A,1) stepped
+    up by Spearman and Brown's formula.
 
     Where ratings are missing, all that there are count: the variances of items, raters
     and residual are estimated by restricted maximum likelihood [3]_, each 0 or more;
@@ -129,11 +156,19 @@ def icc(
     """
     check_option("form", form, get_args(IccForm))
     check_level(level)
+    check_option("interval", interval, get_args(_Method))
     values = rated_part(rating_values(ratings, categories))
-    answer = _with_gaps if np.isnan(values).any() else _without_gaps
-    value, interval, reason = answer(values, form, level)
+    if not np.isnan(values).any():
+        value, confidence, reason = _without_gaps(values, form, level, interval)
+    elif interval == "F":
+        raise ParameterError(
+            'interval: "F" needs every rating, and some are missing; "auto" needs none '
+            "of them, or leave out the items without"
+        )
+    else:
+        value, confidence, reason = _with_gaps(values, form, level)
     return measured(
-        _NAMES[form], values, categories, value, interval=interval, reason=reason
+        _NAMES[form], values, categories, value, interval=confidence, reason=reason
     )
 
 
@@ -269,6 +304,7 @@ def kendall_w(
     *,
     categories: Sequence[Label] | None = None,
     ties: bool = True,
+    level: float = 0.95,
 ) -> Estimate:
     """Estimate how far raters put the items into the same order.
 
@@ -280,16 +316,21 @@ def kendall_w(
         The declared scale in order; needed for text.
     ties : bool, optional
         Whether to correct for ties; without it W cannot reach 1 when there are any.
+    level : float, optional
+        Level of the interval.
 
     Returns
     -------
     Estimate
-        W within [0, 1]. It has no delta-method error, observed or chance agreement.
+        W within [0, 1] with its interval for other items, ranked by these raters.
+        There is no observed or chance agreement.
 
     Raises
     ------
     RatingsError
         If the ratings are not such a table, or text without categories.
+    ParameterError
+        If the level is not within (0, 1).
 
     Warns
     -----
@@ -299,7 +340,9 @@ def kendall_w(
 
     Notes
     -----
-    Items with a missing rating are left out.
+    Items with a missing rating are left out. What the interval holds is W of very many
+    such items. The error is of what each item moves W by, itself and by the ranks of
+    the others; the interval is Student's t on the logit.
 
     References
     ----------
@@ -313,11 +356,19 @@ def kendall_w(
     >>> kendall_w([[1, 1, 2], [2, 3, 1], [3, 2, 3]]).value
     0.4444444444444444
     """
+    check_level(level)
     values = complete_values(ratings, categories)
-    value, reason = _w(values, ties=ties)
-    weights = "tie-corrected" if ties else "uncorrected"
+    value, error, reason = _w(values, ties=ties)
+    confidence = None if reason else _w_interval(value, error, len(values), level)
     return measured(
-        "kendall_w", values, categories, value, weights=weights, reason=reason
+        "kendall_w",
+        values,
+        categories,
+        value,
+        weights="tie-corrected" if ties else "uncorrected",
+        standard_error=error,
+        interval=confidence,
+        reason=reason,
     )
 
 
@@ -357,7 +408,7 @@ def kendall_w_test(
     """
     values = complete_values(ratings, categories)
     n, m = values.shape
-    w, reason = _w(values, ties=ties)
+    w, _, reason = _w(values, ties=ties)
     statistic = p = math.nan
     if reason is None:
         from scipy.special import chdtrc
@@ -378,14 +429,15 @@ def kendall_w_test(
 
 @dataclass(frozen=True, slots=True)
 class _Anova:
-    # mean squares of [1], of items, raters, residual, and within items, in unit²
-    n: int
+    # mean squares of [1], of items, raters, residual, and within items, in unit², of
+    # one table or of many
+    n: Any
     k: int
-    items: float
-    raters: float
-    residual: float
-    within: float
-    unit: float
+    items: Any
+    raters: Any
+    residual: Any
+    within: Any
+    unit: float = 1.0
 
     @classmethod
     def of(cls, values: NDArray[np.float64]) -> "_Anova":
@@ -408,7 +460,24 @@ class _Anova:
             unit,
         )
 
-    def error(self, form: str) -> float:
+    @classmethod
+    def of_sums(cls, sums: NDArray[Any]) -> "_Anova":
+        # sums of _features, (..., 3 + k)
+        n, of_items, squares, *of_raters = np.moveaxis(sums, -1, 0)
+        k, total = len(of_raters), sum(of_raters)
+        parts = np.stack([
+            n * of_items - total**2,
+            k * sum(x**2 for x in of_raters) - total**2,
+            n * (k * squares - of_items),
+        ])  # fmt: skip
+        parts[abs(parts) <= _ROUNDING * abs(n * k * squares)] = 0.0
+        rows, columns, within = parts / (n * k)
+        rest = (within - columns) / ((n - 1) * (k - 1))
+        return cls(
+            n, k, rows / (n - 1), columns / (k - 1), rest, within / (n * (k - 1))
+        )
+
+    def error(self, form: str) -> Any:
         return self.within if form.startswith("ICC(1") else self.residual
 
     def df(self, form: str) -> tuple[float, float]:
@@ -416,7 +485,7 @@ class _Anova:
         error = self.n * (self.k - 1) if one_way else (self.n - 1) * (self.k - 1)
         return float(self.n - 1), float(error)
 
-    def denominator(self, form: str) -> float:
+    def denominator(self, form: str) -> Any:
         # denominators of Table 4 of [1]
         of_raters = self.raters - self.residual if form.startswith("ICC(A") else 0.0
         if form.endswith("k)"):
@@ -424,8 +493,48 @@ class _Anova:
         error = (self.k - 1) * self.error(form)
         return self.items + error + self.k * of_raters / self.n
 
-    def value(self, form: str) -> float:
+    def value(self, form: str) -> Any:
         return (self.items - self.error(form)) / self.denominator(form)
+
+
+def _features(
+    codes: Codes, values: NDArray[np.float64], _repeats: object = None
+) -> Features:
+    """Return of every item: 1, its sum squared, the sum of squares, each rating."""
+    rated = codes >= 0
+    some, none = rated.any(axis=1), np.empty((len(codes), 0))
+    if (some & ~rated.all(axis=1)).any():
+        raise RatingsError(
+            "ratings: an ICC with items left out, drawn, or in clusters needs every "
+            "rating, and some are missing: leave out the items that not every rater "
+            "rated; without clusters its own interval takes all ratings there are"
+        )
+    x = np.where(rated, values[codes], 0.0)
+    dense = np.vstack([some, x.sum(axis=1) ** 2, (x * x).sum(axis=1), x.T])
+    return Features(dense, none.astype(np.int64), none, 0)
+
+
+def _disagreements(
+    form: IccForm, sums: NDArray[Any], _values: object
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Return D_o and D_e, of which 1 - D_o/D_e is the value, and its slope."""
+    anova = _Anova.of_sums(sums)
+    d_e = anova.denominator(form)[..., None]
+    d_o = d_e - (anova.items - anova.error(form))[..., None]
+    steps = sums[..., None, :] + 1e-30j * np.eye(sums.shape[-1])  # no rounding
+    return d_o, d_e, _Anova.of_sums(steps).value(form).imag * 1e30
+
+
+_FORMULAS = {
+    form: Formula(
+        name=name,
+        title=form,
+        features=_features,
+        disagreements=partial(_disagreements, form),
+    )
+    for form, name in _NAMES.items()
+}
+"""The coefficients of complete tables as functions of sums over items."""
 
 
 def _too_few(values: NDArray[np.float64]) -> str | None:
@@ -444,7 +553,9 @@ def _no_variance(
     return None if why is None else undefined(form, why)
 
 
-def _without_gaps(values: NDArray[np.float64], form: IccForm, level: float) -> _Answer:
+def _without_gaps(
+    values: NDArray[np.float64], form: IccForm, level: float, method: _Method
+) -> _Answer:
     """Return value, interval and reason by mean squares."""
     anova = _Anova.of(values)
     reason = _no_variance(values, anova, form)
@@ -453,21 +564,26 @@ def _without_gaps(values: NDArray[np.float64], form: IccForm, level: float) -> _
         reason = undefined(form, why)
     if reason is not None:
         return math.nan, None, reason
-    low, high, reason = _ends(anova, form, level)
+    value, notes = anova.value(form), list[str]()
+    by_f = method in _BY_F or not form.startswith("ICC(A")
+    low, high, reason = _ends(anova, form, level, by_f)
+    if not by_f and not low <= value <= high and reason is None:
+        low, high, notes = min(low, value), max(high, value), [_OUTSIDE]
     interval = Interval(
         low=low,
         high=high,
         level=level,
         kind="confidence",
-        method="F distribution",
+        method="F distribution" if by_f else "profile likelihood",
         target=_target_of(form),
+        notes=tuple(notes),
         reason=reason,
     )
-    return anova.value(form), interval, None
+    return value, interval, None
 
 
 def _ends(
-    anova: _Anova, form: IccForm, level: float
+    anova: _Anova, form: IccForm, level: float, by_f: bool
 ) -> tuple[float, float, str | None]:
     """Return the ends of the interval, and why there are none."""
     from scipy.special import fdtri
@@ -482,9 +598,13 @@ def _ends(
         if not anova.denominator(form) > 0.0:
             why = "the variance of the raters' mean is estimated as less than 0"
             return math.nan, math.nan, why
-        squares = (anova.items, anova.raters, anova.residual)
-        rho = anova.value("ICC(A,1)")
-        low, high = map(float, _absolute_ends(anova.n, k, squares, rho, level))
+        if by_f:
+            low, high = _f_ends(anova, level)
+        else:
+            from masrel.agreement._profile import profile_ends
+
+            squares = anova.items, anova.raters, anova.residual
+            low, high = map(float, profile_ends(anova.n, k, squares, level))
     else:
         # Table 7 of [1]: F over its upper and lower quantiles, for a single rating
         first, second = anova.df(form)
@@ -498,15 +618,13 @@ def _ends(
     return low, high, None
 
 
-def _absolute_ends(
-    n: int, k: int, squares: tuple[Any, Any, Any], rho: Any, level: float
-) -> tuple[Any, Any]:
-    """Return the ends of ICC(A,1), of one table or of many; ``nan`` without any."""
-    # Table 7 of [1], Case 2A and 3A, with Satterthwaite's degrees at ICC(A,1); squares
-    # are the mean ones of items, raters and residual, each a number or (...)
+def _f_ends(anova: _Anova, level: float) -> tuple[float, float]:
+    """Return the ends of ICC(A,1) by F; ``nan`` without any."""
+    # Table 7 of [1], Case 2A and 3A, with Satterthwaite's degrees at ICC(A,1)
     from scipy.special import fdtri
 
-    rows, columns, error = squares
+    n, k, rho = anova.n, anova.k, anova.value("ICC(A,1)")
+    rows, columns, error = anova.items, anova.raters, anova.residual
     # times (1 - ρ), so that ρ may be 1
     a, b = k * rho / n, (1 - rho) + k * rho * (n - 1) / n
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -520,8 +638,8 @@ def _absolute_ends(
         low = n * (rows - f_low * error) / (f_low * rest + n * rows)
         high = n * (f_high * rows - error) / (rest + n * f_high * rows)
     # nan, or the ends would leave ρ out
-    holds = (f_low >= 1.0) & (f_high >= 1.0)
-    return np.where(holds, low, np.nan), np.where(holds, high, np.nan)
+    holds = f_low >= 1.0 and f_high >= 1.0
+    return (float(low), float(high)) if holds else (math.nan, math.nan)
 
 
 def _with_gaps(values: NDArray[np.float64], form: IccForm, level: float) -> _Answer:
@@ -569,23 +687,59 @@ def _stepped_up(rho: float, k: int) -> float:
     return -math.inf if denominator <= 0.0 else k * rho / denominator
 
 
-def _w(values: NDArray[np.float64], *, ties: bool) -> tuple[float, str | None]:
-    """Return W, or why there is none."""
+def _w(values: NDArray[np.float64], *, ties: bool) -> tuple[float, float, str | None]:
+    """Return W and its standard error, or why there is none."""
     n, m = values.shape
     if why := _too_few(values):
-        return math.nan, undefined("Kendall's W", why)
-    # ranks are doubled, so that those of ties are whole, and S four times as large
-    sums, tied = np.zeros(n, dtype=np.int64), 0
-    for column in values.T:
-        _, place, freq = np.unique(column, return_inverse=True, return_counts=True)
-        # the mean rank of a tie, doubled: those below twice, then t + 1
-        sums += (2 * (np.cumsum(freq) - freq) + freq + 1)[place]
-        tied += sum(t**3 - t for t in freq.tolist())
+        return math.nan, math.nan, undefined("Kendall's W", why)
+    columns = [
+        np.unique(column, return_inverse=True, return_counts=True)[1:]
+        for column in values.T
+    ]
+    # ranks less their mean, doubled, so that those of ties are whole: items below, less
+    # items above; S is then four times as large
+    ranks = [(2 * np.cumsum(freq) - freq - n)[place] for place, freq in columns]
+    sums = np.sum(ranks, axis=0)
     # 12 S / (m² (n³ - n) - m ΣT), as in Kendall (1948), in whole numbers of any size
-    numerator = 3 * sum((s - m * (n + 1)) ** 2 for s in sums.tolist())
-    whole = m**2 * (n**3 - n)
-    denominator = whole - m * tied if ties else whole
+    denominator = m**2 * (n**3 - n)
+    if ties:
+        tied = sum(t**3 - t for _, freq in columns for t in freq.tolist())
+        denominator -= m * tied
     if denominator == 0:
         why = "0/0: every rater gives all items one rating"
-        return math.nan, undefined("Kendall's W", why)
-    return numerator / denominator, None
+        return math.nan, math.nan, undefined("Kendall's W", why)
+    w = 3 * sum(s**2 for s in sums.tolist()) / denominator
+
+    def above(of: NDArray[Any], place: NDArray[np.intp]) -> NDArray[np.float64]:
+        # Σ over the items above each, and half of those tied with it
+        by_place = np.bincount(place, of)
+        return np.asarray((of.sum() - np.cumsum(by_place) + by_place / 2.0)[place])
+
+    # What an item moves S by: itself, and the ranks of the items above it. Where there
+    # are ties it moves the spread of each rater's ranks likewise.
+    moves = sums.astype(float) ** 2
+    for rank, (place, _) in zip(ranks, columns, strict=True):
+        moves += 4.0 * above(sums, place)
+        if ties:
+            moves -= w * m * (rank.astype(float) ** 2 + 4.0 * above(rank, place))
+    # √[n² Σ u² / ((n - 1)(n - 2))], which covers as leaving items out one by one does
+    scale = 3.0 * n / denominator / math.sqrt((n - 1) * (n - 2)) if n > 2 else math.nan
+    return w, scale * float(np.linalg.norm(moves - moves.mean())), None
+
+
+def _w_interval(w: float, error: float, n: int, level: float) -> Interval:
+    """Return an interval symmetric on the logit."""
+    from scipy.special import expit, logit, stdtrit
+
+    is_inside = 0.0 < w < 1.0 and error > _ROUNDING
+    t = stdtrit(n - 1, 0.5 + 0.5 * level)
+    half = t * error / (w * (1.0 - w)) if is_inside else math.nan
+    return Interval(
+        low=float(expit(logit(w) - half)),
+        high=float(expit(logit(w) + half)),
+        level=level,
+        kind="confidence",
+        method=f"delta method, t({n - 1}) on the logit",
+        target="items",
+        reason=None if is_inside else NO_SPREAD,
+    )

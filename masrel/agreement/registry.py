@@ -6,16 +6,20 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, get_args
 
+import numpy as np
+
 from masrel._input import check_option, shown
 from masrel.agreement._codes import (
     CodedRatings,
     code_pairs,
     code_ratings,
     count_ratings,
+    rating_values,
 )
-from masrel.agreement._engine import Formula
+from masrel.agreement._engine import Formula, deviations
 from masrel.agreement._labels import Label
 from masrel.agreement._weights import Weights, WeightsLike, is_identity
+from masrel.agreement.icc import _FORMULAS as ICC_FORMULAS
 from masrel.agreement.icc import _NAMES as ICC_NAMES
 from masrel.agreement.icc import _target_of as icc_target
 from masrel.agreement.icc import icc, kendall_w, robinson_a
@@ -106,6 +110,8 @@ class Coefficient:
         Whether it takes weights.
     interval_target : {"items", "raters", "both"} or None
         What the interval that it comes with generalises to; None without one.
+    takes_interval : bool
+        Whether its function takes the kind of its interval, or the name of a rule.
     in_units : bool
         Whether its value is in the units of the ratings.
     by_name_only : bool
@@ -138,6 +144,7 @@ class Coefficient:
     chance_corrected: bool = True
     weighted: bool = True
     interval_target: Target | None = None
+    takes_interval: bool = False
     tells_raters_apart: bool = True
     rho: Literal["any raters", "raters alike"] | None = None
     in_units: bool = False
@@ -200,9 +207,16 @@ class Coefficient:
         )
 
     def disagreement(self, coded: CodedRatings, weights: "WeightsLike") -> Weights:
-        """Return how much two categories disagree where no weights are taken."""
+        """Return how much categories disagree where no weights are taken, or weigh."""
         self._refuse_weights(weights)
-        return _metric_weights(self.metric or "nominal", count_ratings(coded))
+        if self.metric is not None:
+            return _metric_weights(self.metric, count_ratings(coded))
+        # what categories weigh, less what the first rating does, in some unit
+        met, n = coded.codes[coded.codes >= 0], coded.n_categories
+        places = np.append(met[:1], np.arange(n)).astype(np.int64)
+        values = rating_values(replace(coded, codes=places[:, None]), None)
+        v = deviations(values)[0][-n:, 0] if n else values[:, 0]
+        return Weights(name="identity", n_categories=n, v=v)
 
     def _refuse_weights(self, weights: "WeightsLike") -> None:
         if not is_identity(weights):
@@ -337,6 +351,7 @@ _ALL = (
         lowest=0.0,
         chance_corrected=False,
         weighted=False,
+        interval_target="items",
     ),
     Coefficient(
         name="robinson_a",
@@ -355,7 +370,8 @@ _ALL = (
             title=form,
             function=partial(icc, form=form),
             references=("mcgraw1996",),
-            formula=None,
+            formula=ICC_FORMULAS[form],
+            takes_interval=True,
             properties=(_RANKS - {"items twice"}) | {"perfect agreement"},
             lowest=-math.inf,
             highest=math.inf if form == "ICC(A,k)" else 1.0,

@@ -119,7 +119,9 @@ def _difference_rows(
     }
     # one that was named is refused rather than left out
     can = [
-        of for of in coefficients if of.formula is not None or not questions.takes_all
+        of
+        for of in coefficients
+        if (of.formula is not None and not of.has_interval) or not questions.takes_all
     ]
     rows = [row for of in can for row in _differences(of, file, pairs, questions)]
     is_clustered = any(of.clusters is not None for of in pairs.values())

@@ -356,7 +356,8 @@ def agreement(file: "RatingsFile", questions: Questions) -> Answer:
         keys = dict.fromkeys(heads, group)
         of_part = replace(questions, clusters=part.clusters)
         for entry in entries(questions, file, [part]):
-            ratings = part.ratings if entry.formula is None else part.counted
+            is_counted = entry.formula is not None and not entry.has_interval
+            ratings = part.counted if is_counted else part.ratings
             ratings = on_grades(ratings, entry, file)
             estimates.append(estimate_row(entry, ratings, keys, of_part))
     return Answer(

@@ -112,7 +112,8 @@ _question_options = grouped(
         type=click.Choice(get_args(IntervalMethod)),
         default="auto",
         show_default=True,
-        help="Kind of interval; auto is the newest rule that chooses one.",
+        help="Kind of interval; auto is the newest rule that chooses one; analytic is "
+        "by formula, of ICC for both from F.",
     ),
     click.option(
         "--level",
@@ -366,12 +367,12 @@ def _offer_interval(answer: Answer, questions: Questions) -> None:
     rows = answer.estimates if answer.name == "agreement" else ()
     entries = [COEFFICIENTS[row.estimate.coefficient] for row in rows]
     if not any(
-        entry.formula is not None and row.estimate.reason is None
+        not entry.has_interval and entry.formula is not None and not row.estimate.reason
         for entry, row in zip(entries, rows, strict=True)
     ):
         return
     more, but = ["--target", "items"], ""
-    without = [e for e in entries if e.formula is None and e.interval_target != "items"]
+    without = [e for e in entries if e.formula is None and not e.has_interval]
     if without and not questions.takes_all:  # named, they would be refused
         others = (entry.name for entry in entries if entry not in without)
         more = ["--coefficients", ",".join(dict.fromkeys(others)), *more]

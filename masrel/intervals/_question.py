@@ -154,11 +154,12 @@ class IntervalProblem:
     ) -> Interval:
         """Return an interval by Student's t, or by the normal of infinite degrees.
 
-        With `lowest` it is symmetric on the logit of the place between that and 1; at
-        either end itself there is none.
+        With `lowest` it is symmetric on the logit of the place between that and 1, and
+        on Fisher's z where there is no lowest; at either end itself there is none.
         """
         half = student_t(self.level, df) * error
         low, high = self.value - half, self.value + half
+        lowest = None if lowest is None else max(lowest, -1.0)
         if lowest is not None and lowest < self.value < 1.0:
             from scipy.special import expit, logit
 
@@ -247,9 +248,16 @@ def pose_problem(
     n_raters = coded.codes.shape[1]
     if most is not None and n_raters > most:
         n_raters = coded.n_raters  # those without any rating are none
-    if entry.shape == "ratings" and not fewest <= n_raters <= (most or n_raters):
-        needed = f"{fewest}" if most == fewest else f"at least {fewest}"
-        raise ParameterError(f"{entry.title} needs {needed} raters, got {n_raters}")
+    needed = f"{fewest}" if most == fewest else f"at least {fewest}"
+    has_enough = entry.shape == "pairs" or fewest <= n_raters <= (most or n_raters)
+    refuse(
+        (not has_enough, f"{entry.title} needs {needed} raters, got {n_raters}"),
+        (
+            entry.formula is not None and entry.has_interval and target != "items",
+            f"target: of {entry.title} items are left out or drawn, or clusters of "
+            f'them, so it needs "items"; got "{target}"',
+        ),
+    )
     formula = entry.formula
     notes: tuple[str, ...] = ()
     if formula is None:
@@ -257,7 +265,7 @@ def pose_problem(
             f"coefficient: {entry.title} is no function of sums over items: there is "
             "no such interval of it"
         )
-    if entry.metric is None:
+    if entry.weighted:
         made = declared_weights(weights, coded.categories, declared=coded.declared)
     else:
         made = entry.disagreement(coded, weights)

@@ -171,6 +171,8 @@ def analytic(
         estimate = problem.entry(problem.coded, weights=weights)
     unit: Unit | None = None
     method, error = "delta method", estimate.standard_error
+    if problem.entry.has_interval:  # and, beside it, no error of its own
+        error = problem.item_features.error(problem.slopes(problem.sums), problem.freq)
     n, n_items = estimate.n_items_paired, estimate.n_items
     if convention is not None:
         method, error = _NAMES[convention], _error_by(convention, problem, estimate)

@@ -188,8 +188,12 @@ def estimate(
     rule = _NEWEST if method == "auto" else _RULES.get(method)
     entry = find_entry(coefficient, metric)
     check_option("target", target, get_args(Target))
-    there_is = entry.interval_target
-    if rule is not None and there_is is not None and there_is != target:
+    there_is = entry.interval_target or target
+    by_formula = method == "analytic" and there_is == target
+    is_own = (
+        entry.has_interval and clusters is None and (rule is not None or by_formula)
+    )
+    if is_own and there_is not in (target, "both"):
         raise ParameterError(
             f"target: the interval of {entry.title} generalises to "
             f'{_POPULATIONS[there_is]}, which is "{there_is}", and it has no other; '
@@ -197,13 +201,18 @@ def estimate(
         )
     if clusters is not None and method == "posterior":
         raise ParameterError('clusters: needs a method other than "posterior"')
-    if entry.formula is not None and not isinstance(ratings, CountedRatings):
+    if is_own and entry.takes_interval:
+        kind = "F" if rule is None else rule.name
+        entry = replace(entry, function=partial(entry.function, interval=kind))
+    is_counted = isinstance(ratings, CountedRatings)
+    if entry.formula is not None and not (entry.has_interval or is_counted):
         # coded once, for all that follows
         ratings = entry.code(ratings, categories)
         categories = None  # the ratings have them by now
     result = entry(ratings, categories=categories, weights=weights, level=level)
-    if rule is not None and there_is is not None and clusters is None:
-        return result
+    if is_own:
+        by_rule = rule.name if rule is not None and entry.takes_interval else ""
+        return _with_own_target(result, target, by_rule)
     ask = partial(
         pose_problem,
         target=target,
@@ -236,6 +245,21 @@ def estimate(
     if interval.target != "items" and result.n_raters < _MANY_RATERS:
         interval = replace(interval, notes=(*interval.notes, _CARELESS))
     return replace(result, interval=interval)
+
+
+def _with_own_target(result: Estimate, target: Target, rule: str) -> Estimate:
+    """Say of the interval that comes with it who chose it, and what else it is for."""
+    interval = result.interval
+    if interval is not None and rule:
+        interval = replace(interval, method=f"{interval.method}, chosen by {rule}")
+        result = replace(result, interval=interval)
+    if interval is None or interval.target == target:
+        return result
+    note = (
+        f"asked for {_POPULATIONS[target]}: there is this interval, for "
+        f"{_POPULATIONS[interval.target]}, and so rather too wide"
+    )
+    return replace(result, interval=replace(interval, notes=(*interval.notes, note)))
 
 
 def _by_error(problem: IntervalProblem) -> Interval:

@@ -216,7 +216,7 @@ def _checked_model(
             f'"items"; for other raters use the jackknife; got "{problem.target}"',
         ),
         (
-            problem.entry.shape == "pairs",
+            problem.entry.shape == "pairs" or problem.entry.has_interval,
             f"coefficient: there is no posterior of {problem.entry.title}",
         ),
         (

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import fdtr, fdtri, gammaln, ndtri, stdtrit
 
 from masrel.agreement import CodedRatings
-from masrel.agreement.icc import _absolute_ends
+from masrel.agreement._profile import profile_ends
 from masrel.errors import MasrelWarning, ParameterError
 from masrel.intervals import estimate
 from masrel.planning._study_plan import Progress, limits_of
@@ -371,6 +371,5 @@ def _drawn_agreement(
     columns = (n * of_raters + residual) * rng.chisquare(k - 1, n_studies) / (k - 1)
     df = (n - 1) * (k - 1)
     rest = residual * rng.chisquare(df, n_studies) / df
-    value = (rows - rest) / (rows + (k - 1) * rest + k * (columns - rest) / n)
-    low, high = _absolute_ends(n, k, (rows, columns, rest), value, design.level)
+    low, high = profile_ends(n, k, (rows, columns, rest), design.level)
     return np.column_stack([0.5 * (high - low), low, high])

@@ -462,7 +462,7 @@ def design_of(study: Study) -> Design:
         _check_normal(study, entry)
         design = Design.of(study, ItemModel(name="normal"))
     else:
-        if entry.formula is None:
+        if entry.formula is None or entry.has_interval:
             raise ParameterError(
                 f"coefficient: {entry.title} cannot be planned for: it is no function "
                 f"of sums over items; the others and {', '.join(FORMS)} can"

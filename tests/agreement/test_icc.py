@@ -71,10 +71,37 @@ def test_intervals_from_the_quantiles_of_f() -> None:
 
 def test_published_interval_of_absolute_agreement() -> None:
     # as R's psych and irr print it for Table 2: ICC(A,1) 0.29 (0.019, 0.761)
-    found = icc(TABLE_2).interval
+    found = icc(TABLE_2, interval="F").interval
     assert found is not None
     assert (found.low, found.high) == pytest.approx((0.0188, 0.7611), abs=5e-4)
-    assert found.target == "both"
+    assert (found.target, found.method) == ("both", "F distribution")
+    assert icc(TABLE_2).interval != found
+    for form in ("ICC(1)", "ICC(C,k)"):  # exact by F, whatever is asked for
+        assert icc(TABLE_2, form=form, interval="F") == icc(TABLE_2, form=form)  # type: ignore[arg-type]
+
+
+def test_a_missing_cell_changes_the_interval_of_agreement_by_little() -> None:
+    rng = np.random.default_rng(2)
+    ratings = rng.normal(size=(60, 1)) + [0.9, 0.0, -0.4] + rng.normal(size=(60, 3)) / 2
+    for form in ("ICC(A,1)", "ICC(A,k)"):
+        whole = icc(ratings, form=form).interval  # type: ignore[arg-type]
+        gap = ratings.copy()
+        gap[0, 0] = np.nan
+        other = icc(gap, form=form).interval  # type: ignore[arg-type]
+        assert whole is not None
+        assert other is not None
+        assert (whole.low, whole.high) == pytest.approx(
+            (other.low, other.high), abs=3e-3
+        )
+        assert whole.method == "profile likelihood"
+
+
+def test_a_value_below_0_draws_the_interval_out_to_it() -> None:
+    found = icc([[1, 4, 2], [4, 1, 3], [2, 3, 3], [3, 2, 2]])
+    assert found.interval is not None
+    assert found.interval.low == found.value < 0.0 < found.interval.high
+    assert "takes a variance as less than 0" in found.interval.notes[0]
+    assert icc(TABLE_2).interval.notes == ()  # type: ignore[union-attr]
 
 
 tables = st.integers(2, 4).flatmap(
@@ -158,6 +185,10 @@ def test_mean_of_raters_on_items_that_do_not_differ_is_a_division_by_zero() -> N
 def test_wrong_options_are_one_sentence() -> None:
     with pytest.raises(ParameterError, match=r"form: needs one of ICC\(1\), .*'ICC2'"):
         icc(TABLE_2, form="ICC2")  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match=r"interval: needs one of auto, .*, F"):
+        icc(TABLE_2, interval="f")  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match='interval: "F" needs every rating'):
+        icc([*TABLE_2, [1, 2, 3, None]], interval="F")
     for level in (0.0, 1.0, 95, math.nan):
         with pytest.raises(ParameterError, match=r"level: needs \(0, 1\), got"):
             icc(TABLE_2, level=level)
@@ -167,7 +198,8 @@ def test_the_interval_of_a_mean_has_no_end_beyond_its_pole() -> None:
     # Spearman and Brown's 2 ρ / (1 + ρ) falls to -∞ at ρ = -1; the low end of
     # ICC(A,1) lies below that here, so that of ICC(A,2) has no bound.
     ratings = np.array([[2, 2], [5, 4], [2, 3]])
-    single, mean = icc(ratings, form="ICC(A,1)"), icc(ratings, form="ICC(A,k)")
+    single = icc(ratings, form="ICC(A,1)", interval="F")
+    mean = icc(ratings, form="ICC(A,k)", interval="F")
     assert single.interval is not None
     assert mean.interval is not None
     assert single.interval.low < -1 < single.interval.high < 1

@@ -90,11 +90,21 @@ def test_the_likelihood_is_highest_there(name: str) -> None:
         assert value == pytest.approx(of_items / (of_items + error), rel=1e-6)
 
 
-@pytest.mark.parametrize("form", SINGLE)
+WHOLE = np.array([[9, 2, 5, 8], [6, 1, 3, 2], [8, 4, 6, 8], [7, 1, 2, 6.0]])
+
+
+@pytest.mark.parametrize(
+    ("ratings", "form"),
+    [
+        # where raters make two valleys
+        *((table("icc_missing-03"), form) for form in SINGLE),
+        (WHOLE, "ICC(A,1)"),
+        (WHOLE + np.arange(4)[:, None] * 4, "ICC(A,1)"),
+    ],
+)
 def test_ends_are_where_the_profile_is_a_quantile_of_chi_squared_higher(
-    form: IccForm,
+    ratings: Floats, form: IccForm
 ) -> None:
-    ratings = table("icc_missing-03")  # where raters make two valleys
     dense = Dense(ratings, has_raters=form != "ICC(1)")
     interval = icc(ratings, form=form, level=0.9).interval
     assert interval is not None
@@ -103,7 +113,7 @@ def test_ends_are_where_the_profile_is_a_quantile_of_chi_squared_higher(
         odds = end / (1.0 - end)
         profile = min(
             dense.deviance(odds * (1.0 + r if form == "ICC(A,1)" else 1.0), r)
-            for r in (0.0, *np.geomspace(1e-3, 10.0, 150))
+            for r in (0.0, *np.geomspace(1e-3, 50.0, 180))
         )
         assert profile - least == pytest.approx(stats.chi2.ppf(0.9, 1), abs=2e-3)
 
@@ -118,11 +128,17 @@ def test_without_residual_by_hand() -> None:
     assert consistency.value == 1.0
     assert consistency.interval is not None
     assert (consistency.interval.low, consistency.interval.high) == (1.0, 1.0)
-    # F of two variances with 2 and 1 degrees of freedom
+    # Of two variances with 2 and 1 degrees of freedom the likelihood ratio at odds of
+    # 8 t is 2 log t + 3 log((2/t + 1)/3): of t^-1 = y, y^-2 (2 y + 1)³ = 27 exp(χ²).
     interval = icc(ratings, form="ICC(A,1)").interval
     assert interval is not None
-    odds = 8.0 / stats.f.ppf(0.975, 2, 1)
-    assert interval.low == pytest.approx(odds / (1.0 + odds), rel=1e-9)
+    for end in (interval.low, interval.high):
+        t = end / (1.0 - end) / 8.0
+        ratio = 2.0 * math.log(t) + 3.0 * math.log((2.0 / t + 1.0) / 3.0)
+        assert ratio == pytest.approx(stats.chi2.ppf(0.95, 1), rel=1e-9)
+    whole = icc([[1, 2], [3, 4], [5, 6]]).interval  # the same variances
+    assert whole is not None
+    assert (whole.low, whole.high) == pytest.approx((interval.low, interval.high))
 
 
 def test_one_way_by_hand() -> None:

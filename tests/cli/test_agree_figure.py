@@ -63,7 +63,7 @@ def test_the_figure_says_what_the_table_says(masrel: Caller, tmp_path: Path) -> 
     svg = file.read_text("utf-8")
     assert "0.626 [0.214, 1.000]" in svg
     assert "intervals for other items and raters" in svg
-    assert svg.count(">other items<") == 2  # of ICC(C,1) and ICC(C,k) alone
+    assert svg.count(">other items<") == 3  # of ICC(C,1), ICC(C,k) and W alone
     assert "95 % confidence interval" in svg
     masrel("agree", TABLE_V, *wanted[:3], "items", "--figure", file)
     svg = file.read_text("utf-8")

@@ -73,6 +73,8 @@ KINDS = {
     "pairs drawn": r"pairs of values are drawn",
     "mean of k": r"k is the (\d+) raters",
     "REML": r"variances by REML",
+    "drawn out": r"its interval is drawn out to the value",
+    "asked for": r"asked for other (.+): there is this interval",
     # reasons
     "chance is 1": r"chance agreement is 1",
     "scale of one": r"a scale of one category|one category is declared",

@@ -159,7 +159,7 @@ def first_plan(seed: int) -> dict[str, list[str]]:
 
 def _affordable(of: Table, names: list[str], stream: Stream) -> list[str]:
     # of measurements with gaps, which are fitted by steps, three coefficients a table
-    slow = [name for name in names if COEFFICIENTS[name].formula is None]
+    slow = [name for name in names if not _is_kappa(name)]
     if not of.has_gaps:
         return names
     kept = {stream.one_of(slow) for _ in range(3)}
@@ -170,11 +170,15 @@ def _applies(method: str, coefficient: str) -> bool:
     entry, (first, *rest) = COEFFICIENTS[coefficient], method.split()
     if first == "value":
         return True
-    if first == "estimate" and entry.formula is None:
-        return entry.interval_target in rest
-    return entry.formula is not None and (
-        entry.shape == "ratings" or first != "posterior"
-    )
+    if first == "estimate" and not _is_kappa(coefficient):
+        return entry.interval_target in rest and coefficient != "kendall_w"
+    return _is_kappa(coefficient) and (entry.shape == "ratings" or first != "posterior")
+
+
+def _is_kappa(coefficient: str) -> bool:
+    # a function of sums over items without an interval of its own
+    entry = COEFFICIENTS[coefficient]
+    return entry.formula is not None and not entry.has_interval
 
 
 def rounded(answer: dict) -> dict:

@@ -167,7 +167,9 @@ def _applicable(table: Drawn, method: str, *, every: bool) -> list[str]:
 
 
 def _applies(entry: agreement.Coefficient, method: str, *, two: bool) -> bool:
-    has_interval = entry.formula or (method == "estimate" and entry.has_interval)
+    has_interval = entry.formula and not entry.has_interval
+    if method == "estimate" and entry.name != "kendall_w":
+        has_interval = entry.formula or entry.has_interval
     if not has_interval or (entry.n_raters == (2, 2) and not two):
         return False
     is_modelled = entry.shape == "ratings" and (two or entry.name in OF_POSTERIOR)
@@ -251,7 +253,8 @@ def _p_and_bands(table: Drawn) -> list[object]:
 def _differences(seed: int, table: Drawn) -> dict:
     # the same items in two halves of the raters, and other items of as many raters
     entries = [COEFFICIENTS[name] for name in PICKED]
-    names = [e.name for e in entries if e.formula and e.shape == "ratings"]
+    entries = [e for e in entries if e.formula and not e.has_interval]
+    names = [e.name for e in entries if e.shape == "ratings"]
     name, half = names[seed // 2 % len(names)], len(table.rows[0]) // 2
     first = [row[:half] for row in table.rows] if half > 1 else table.rows
     second = [row[-half:] for row in table.rows] if half > 1 else table.rows[::-1]

@@ -25,7 +25,11 @@ from masrel.intervals import (
 
 FILE = Path(__file__).parents[1] / "oracles" / "several_kappas.json"
 SETTINGS = json.loads(FILE.read_text(encoding="utf-8"))["settings"]
-KINDS = [n for n, e in COEFFICIENTS.items() if e.formula and e.shape == "ratings"]
+KINDS = [
+    name
+    for name, e in COEFFICIENTS.items()
+    if e.formula and e.shape == "ratings" and not e.has_interval
+]
 
 
 def drawn(

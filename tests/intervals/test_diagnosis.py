@@ -15,7 +15,10 @@ from masrel.intervals import diagnose, difference, estimate
 KINDS = [
     name
     for name, entry in COEFFICIENTS.items()
-    if entry.formula and entry.shape == "ratings" and entry.n_raters[1] is None
+    if entry.formula
+    and entry.weighted
+    and entry.shape == "ratings"
+    and entry.n_raters[1] is None
 ]
 
 

@@ -116,7 +116,7 @@ def made(coefficient: str, seed: int) -> tuple[object, int]:
     entry = COEFFICIENTS[coefficient]
     if entry.n_raters[1] == 2:
         codes = codes[:, :2]
-    if seed % 2:
+    if seed % 2 and not (entry.has_interval and entry.formula):
         codes[1:][rng.random((n - 1, codes.shape[1])) < 0.1] = None
     if entry.shape == "pairs":
         return [codes[:, :2], codes[:, 1:3]], q
@@ -153,8 +153,15 @@ def test_an_interval_holds_its_estimate(
             "weights": weights[seed % len(weights)],
             "level": level,
         }
-        if method.endswith(OF_RATERS) and entry.n_raters[1] == 2:
-            with pytest.raises(ParameterError, match="at least 3 raters"):
+        is_chosen = method.startswith("estimate")
+        is_of_items = entry.has_interval and not (
+            is_chosen and entry.interval_target == "both"
+        )
+        if method.endswith(OF_RATERS) and (entry.n_raters[1] == 2 or is_of_items):
+            match = "at least 3 raters"
+            if is_of_items:
+                match = "it has no other" if is_chosen else "items are left out"
+            with pytest.raises(ParameterError, match=match):
                 PROMISE[method](coefficient, ratings, **options)
             continue
         with warnings.catch_warnings(record=True) as noted:

@@ -27,7 +27,9 @@ FULL: Table = [["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"], ["a", "a"]]
 SINGLES: Table = [["a", None]] * 15 + [[None, "b"]] * 10
 PAIRS_ONLY = ["krippendorff_alpha", "cohen_kappa", "scott_pi"]
 WITH_KERNEL = [
-    name for name, entry in COEFFICIENTS.items() if entry.formula is not None
+    name
+    for name, entry in COEFFICIENTS.items()
+    if entry.formula is not None and not entry.has_interval
 ]
 OF_ANY_RATERS = [
     name

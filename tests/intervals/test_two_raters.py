@@ -21,7 +21,7 @@ TAILS = (0.025, 0.975)
 COEFFICIENTS_OF_PAIRS = [
     name
     for name, entry in COEFFICIENTS.items()
-    if entry.formula is not None and entry.shape == "ratings"
+    if entry.formula is not None and entry.shape == "ratings" and entry.weighted
 ]
 
 

@@ -1,0 +1,177 @@
+"""Intraclass correlations as functions of sums over items: item by item, with `icc`."""
+
+from typing import Any, get_args
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from masrel.agreement import COEFFICIENTS, IccForm, icc
+from masrel.errors import (
+    MasrelError,
+    ParameterError,
+    RatingsError,
+    SmallSampleWarning,
+)
+from masrel.estimates import Interval
+from masrel.intervals import analytic, bootstrap, difference, estimate, jackknife
+
+FORMS: dict[str, IccForm] = {
+    name: form
+    for form in get_args(IccForm)
+    for name, entry in COEFFICIENTS.items()
+    if entry.title == form
+}
+RNG = np.random.default_rng(4)
+RATINGS = RNG.normal(size=(24, 1)) + [0.4, 0.0, -0.2] + 0.6 * RNG.normal(size=(24, 3))
+GAP: Any = RATINGS.tolist()
+GAP[3][1] = None
+PATIENTS = [f"p{i // 2}" for i in range(24)]
+
+
+def half(interval: Interval | None) -> float:
+    assert interval is not None
+    return (interval.high - interval.low) / 2.0
+
+
+@pytest.mark.parametrize(("name", "form"), FORMS.items())
+@pytest.mark.parametrize("clusters", [None, PATIENTS])
+def test_the_jackknife_is_of_the_coefficient_without_each(
+    name: str, form: IccForm, clusters: list[str] | None
+) -> None:
+    units = np.array(clusters or range(24))
+    without = np.array([
+        icc(RATINGS[units != unit], form=form).value for unit in np.unique(units)
+    ])  # fmt: skip
+    n = len(without)
+    error = np.sqrt((n - 1) / n * ((without - without.mean()) ** 2).sum())
+    found = jackknife(name, RATINGS, target="items", clusters=clusters)
+    t = stats.t.ppf(0.975, n - 1)
+    assert found.high == pytest.approx(
+        min(icc(RATINGS, form=form).value + t * error, 1)
+    )
+    assert found.target == "items"
+    if clusters is not None:
+        chosen = estimate(name, RATINGS, target="items", clusters=clusters)
+        # symmetric on Fisher's z
+        assert chosen.interval is not None
+        low, high = np.arctanh([chosen.interval.low, chosen.interval.high])
+        value = chosen.value
+        assert np.tanh((low + high) / 2.0) == pytest.approx(value, rel=1e-9)
+        assert (high - low) / 2.0 == pytest.approx(t * error / (1 - value**2), rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["icc_1", "icc_ck", "icc_a1"])
+def test_the_bootstrap_has_the_quantiles_of_a_loop(name: str) -> None:
+    # Quantiles of 1 500 resamples each are off by some .01; four times as much is let.
+    found = bootstrap(name, RATINGS, target="items", n_resamples=1500, rng=1)
+    rng = np.random.default_rng(2)
+    values = [
+        icc(RATINGS[rng.integers(0, 24, 24)], form=FORMS[name]).value
+        for _ in range(1500)
+    ]
+    low, high = np.quantile(values, [0.025, 0.975])
+    assert (found.low, found.high) == pytest.approx((low, high), abs=0.04)
+    # and where all resamples of few items are taken, of their coefficient
+    three = RATINGS[:3]
+    with pytest.warns(SmallSampleWarning):
+        exact = bootstrap(name, three, target="items")
+    assert exact.distribution is not None
+    values = {
+        round(icc(three[list(rows)], form=FORMS[name]).value, 9)
+        for rows in np.ndindex(3, 3, 3)
+        if len(set(rows)) > 1
+    }
+    shown = {round(float(x), 9) for x in exact.distribution.values}
+    assert values <= shown
+
+
+def test_the_error_of_clusters_is_the_jackknifes_of_many() -> None:
+    rng = np.random.default_rng(6)
+    ratings = rng.normal(size=(600, 1)) + rng.normal(size=(600, 3))
+    clusters = np.repeat(np.arange(300), 2)
+    for name in FORMS:
+        options: Any = {"target": "items", "clusters": clusters}
+        one, other = (of(name, ratings, **options) for of in (analytic, jackknife))
+        assert half(one) == pytest.approx(half(other), rel=0.03)
+        alone = analytic(name, ratings, target="items")
+        assert half(alone) == pytest.approx(half(one), rel=0.2)
+
+
+def test_clustered_intervals_cover() -> None:
+    # 30 patients with two sites, whose ratings go together by half: of 400 studies at
+    # 94 % fewer than 362 cover with probability .005. Without clusters 84 % do.
+    rng, covered, as_items = np.random.default_rng(8), 0, 0
+    levels = np.array([0.3, 0.0, -0.3])
+    truth = 1.0 / (1.0 + levels.var(ddof=1) + 0.5)
+    for _ in range(400):
+        patients = np.sqrt(0.9) * rng.normal(size=(30, 1, 1))
+        sites = patients + np.sqrt(0.1) * rng.normal(size=(30, 2, 1))
+        noise = np.sqrt(0.45) * rng.normal(size=(30, 1, 3))
+        ratings = sites + levels + noise + np.sqrt(0.05) * rng.normal(size=(30, 2, 3))
+        rows, clusters = ratings.reshape(60, 3), np.repeat(np.arange(30), 2)
+        found = estimate("icc_a1", rows, target="items", clusters=clusters).interval
+        alone = jackknife("icc_a1", rows, target="items")
+        assert found is not None
+        covered += found.low <= truth <= found.high
+        as_items += alone.low <= truth <= alone.high
+    assert covered >= 362 > as_items
+
+
+def test_the_interval_that_comes_with_it_answers_with_a_note() -> None:
+    own = icc(RATINGS).interval
+    assert own is not None
+    for target in ("items", "raters"):
+        found = estimate("icc_a1", RATINGS, target=target).interval  # type: ignore[arg-type]
+        assert found is not None
+        assert (found.low, found.high, found.target) == (own.low, own.high, "both")
+        assert found.notes[-1].startswith(f"asked for other {target}: ")
+    # the rule says its name, and the one before had the ends from F where all are there
+    of: Any
+    for of, rule, kind in (
+        (RATINGS, "auto", "auto"),
+        (RATINGS, "auto-2026.1", "F"),
+        (GAP, "auto-2026.1", "auto"),
+    ):
+        found = estimate("icc_a1", of, target="both", method=rule).interval  # type: ignore[arg-type]
+        by = icc(of, interval=kind).interval  # type: ignore[arg-type]
+        assert found is not None
+        assert by is not None
+        assert (found.low, found.high, found.target) == (by.low, by.high, "both")
+        assert found.method.startswith(f"{by.method}, chosen by auto-2026.")
+    assert estimate("kendall_w", RATINGS, target="items").interval is not None
+    with pytest.raises(
+        ParameterError, match='generalises to other items, which is "it'
+    ):
+        estimate("icc_c1", RATINGS, target="both")
+    # by formula: from F for its own target, by the error for other items alone
+    by_f = estimate("icc_a1", RATINGS, target="both", method="analytic").interval
+    assert by_f == icc(RATINGS, interval="F").interval
+    by_error = estimate("icc_a1", RATINGS, target="items", method="analytic").interval
+    assert by_error == analytic("icc_a1", RATINGS, target="items")
+
+
+def test_what_has_no_such_interval_is_said() -> None:
+    with pytest.raises(RatingsError, match="leave out the items that not every rater"):
+        estimate("icc_a1", GAP, target="items", clusters=PATIENTS)
+    for asked in (
+        {"target": "both", "clusters": PATIENTS},
+        {"target": "raters", "method": "jackknife"},
+    ):
+        with pytest.raises(ParameterError, match='it needs "items"'):
+            estimate("icc_a1", RATINGS, **asked)  # type: ignore[arg-type]
+    with pytest.raises(MasrelError, match="weights: ICC"):
+        jackknife("icc_a1", RATINGS, target="items", weights="linear")
+    with pytest.raises(RatingsError, match="declared scale in order"):
+        jackknife("icc_a1", [["a", "b"], ["b", "b"]], target="items")
+
+
+def test_two_sets_of_raters_are_compared() -> None:
+    noisy = RATINGS + np.random.default_rng(1).normal(size=RATINGS.shape)
+    found = difference("icc_a1", RATINGS, noisy, design="dependent")
+    assert found.value == icc(RATINGS).value - icc(noisy).value
+    moved = [
+        icc(np.delete(RATINGS, i, 0)).value - icc(np.delete(noisy, i, 0)).value
+        for i in range(24)
+    ]
+    assert found.standard_error == pytest.approx(23**0.5 * np.std(moved), rel=1e-9)
