@@ -509,7 +509,7 @@ def _features(
             "rating, and some are missing: leave out the items that not every rater "
             "rated; without clusters its own interval takes all ratings there are"
         )
-    x = np.where(rated, values[codes], 0.0)
+    x = np.append(values, 0.0)[codes]  # a rater without any rating adds nothing
     dense = np.vstack([some, x.sum(axis=1) ** 2, (x * x).sum(axis=1), x.T])
     return Features(dense, none.astype(np.int64), none, 0)
 

@@ -12,6 +12,7 @@ from masrel.errors import (
     ParameterError,
     RatingsError,
     SmallSampleWarning,
+    UndefinedStatisticWarning,
 )
 from masrel.estimates import Interval
 from masrel.intervals import analytic, bootstrap, difference, estimate, jackknife
@@ -160,6 +161,9 @@ def test_what_has_no_such_interval_is_said() -> None:
     ):
         with pytest.raises(ParameterError, match='it needs "items"'):
             estimate("icc_a1", RATINGS, **asked)  # type: ignore[arg-type]
+    nothing = [[None, None], [None, None]]
+    with pytest.warns(UndefinedStatisticWarning):
+        assert jackknife("icc_a1", nothing, target="items").reason
     with pytest.raises(MasrelError, match="weights: ICC"):
         jackknife("icc_a1", RATINGS, target="items", weights="linear")
     with pytest.raises(RatingsError, match="declared scale in order"):

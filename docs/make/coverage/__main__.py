@@ -120,9 +120,12 @@ def _population(
     return drawn.with_items_fixed(n_items) if target == "raters" else drawn
 
 
-def run(n_studies: int, *, quiet: bool) -> pd.DataFrame:
+def run(n_studies: int, *, processes: int = 1, quiet: bool) -> pd.DataFrame:
     """Run all, and return the rows with the name of their study."""
-    found = [(of.name, of.run(n_studies, quiet=quiet)) for of in studies()]
+    found = [
+        (of.name, of.run(n_studies, processes=processes, quiet=quiet))
+        for of in studies()
+    ]
     rows = pd.concat([rows.assign(study=name) for name, rows in found])
     return rows[["study", *rows.columns.drop("study")]].reset_index(drop=True)
 
@@ -131,12 +134,13 @@ def main() -> None:
     """Draw, count, and write."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--studies", type=int, default=N_STUDIES, help="in every cell")
+    parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--page", action="store_true", help="from the rows there are")
     parser.add_argument("--quiet", action="store_true", help="say nothing")
     parser.add_argument("--into", type=Path, default=DOCS, help="folder of the page")
     options = parser.parse_args()
     if not options.page:
-        rows = run(options.studies, quiet=options.quiet)
+        rows = run(options.studies, processes=options.processes, quiet=options.quiet)
         rows.to_csv(options.into / "coverage.csv", index=False, float_format="%.4g")
     write_page(options.into)
 
