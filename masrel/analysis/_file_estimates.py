@@ -55,30 +55,60 @@ _BY_ITEM = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Questions:
+class Estimating:
+    """What is estimated of ratings, and how.
+
+    Parameters
+    ----------
+    coefficients : list of str or None
+        Names of coefficients, or ``["all"]``, all that fit; None for the usual ones.
+    weights : str or Weights or array_like
+        Weights of coefficients that take any.
+    metric : str or None
+        Krippendorff's difference function, in place of weights.
+    target : {"items", "raters", "both"} or None
+        What a new study would draw anew; no interval when None.
+    interval : str
+        Kind of interval; ``"auto"`` is the newest rule that chooses one.
+    level : float
+        Level of intervals.
+    n_resamples, seed : int
+        Of intervals that draw.
+    words : str or None
+        Whose words for values; the best that the true value reaches with 95 %
+        probability is named.
+
+    Examples
+    --------
+    >>> Estimating(target="items").interval
+    'auto'
+    """
+
+    coefficients: list[str] | None = None
+    # checked with the rest; a file until the scale is known
+    weights: Any = "identity"
+    metric: "Metric | None" = None
+    target: Target | None = None
+    interval: IntervalMethod = "auto"
+    level: float = 0.95
+    n_resamples: int = 10_000
+    seed: int = 0
+    words: "BandScale | None" = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Questions(Estimating):
     """What is to be told of a file: estimates, and a table for each question."""
 
-    coefficients: list[str] | None  # names, or "all" alone; None for the usual ones
-    # a name or `Weights`, for coefficients that take any; checked with the rest. A file
-    # until the scale is known
-    weights: Any
-    target: Target | None  # what a new study would draw anew; no interval when None
-    interval: IntervalMethod
-    level: float
-    # n_resamples, seed: for intervals that draw
-    n_resamples: int
-    seed: int
-    words: "BandScale | None"  # whose words for values
-    metric: "Metric | None"  # of Krippendorff's alpha
-    retest: bool
-    each_category: bool
-    symmetry: bool
-    indices: bool
-    compare: bool
-    diagnose: bool
-    reference: str | None
-    limits_of_agreement: bool
-    unit: str | None
+    retest: bool = False
+    each_category: bool = False
+    symmetry: bool = False
+    indices: bool = False
+    compare: bool = False
+    diagnose: bool = False
+    reference: str | None = None
+    limits_of_agreement: bool = False
+    unit: str | None = None
     clusters: tuple[str, ...] = ()  # that of every item of the part, if items have any
 
     @property

@@ -1,6 +1,7 @@
 """The options of verbs that read any file of ratings, and what they say of it."""
 
-from dataclasses import asdict
+from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -8,7 +9,7 @@ import click
 
 from masrel.cli._options import progress, split_commas
 from masrel.cli._paths import InputFile
-from masrel.ratings._findings import ReadingOptions
+from masrel.ratings._findings import Reading
 
 if TYPE_CHECKING:
     from masrel.ratings import RatingsFile
@@ -16,19 +17,18 @@ if TYPE_CHECKING:
 _SHOWN = 12  # raters that are named
 
 
-def read_file(file: Path, options: ReadingOptions) -> "RatingsFile":
+def read_file(file: Path, options: Reading) -> "RatingsFile":
     """Read a file of ratings as the options say."""
     from masrel.ratings import read_ratings
 
-    arguments = asdict(options)
     codes = map(split_commas, options.missing_codes)
-    arguments["missing_codes"] = [code for listed in codes for code in listed]
+    options = replace(options, missing_codes=tuple(chain.from_iterable(codes)))
     with progress("reading", "MB", is_quiet=False) as report:
 
         def show(n_bytes: int, n_expected: int) -> None:
             report(n_bytes >> 20, n_expected >> 20)
 
-        return read_ratings(file, progress=show, **arguments)
+        return read_ratings(file, options, progress=show)
 
 
 def weights_of_option(text: str) -> "str | Path":

@@ -34,7 +34,7 @@ from masrel.cli._reading import (
 )
 from masrel.errors import ParameterError
 from masrel.estimates import IntervalMethod
-from masrel.ratings._findings import ReadingOptions
+from masrel.ratings._findings import Reading
 
 if TYPE_CHECKING:
     from masrel.plots._drawn_values import Content, Drawn
@@ -186,7 +186,7 @@ _question_options = grouped(
 @click.argument("file", type=InputFile(path_type=Path, allow_dash=True))
 @grouped(
     "reading",
-    ReadingOptions,
+    Reading,
     *reading_options,
     *table_options,
     click.option("--by", metavar="COL", help="Estimate each group of this column."),
@@ -217,7 +217,7 @@ _question_options = grouped(
 )
 def agree(
     file: Path,
-    reading: ReadingOptions,
+    reading: Reading,
     questions: Questions,
     explain: bool,
     output: OutputOptions,
@@ -317,7 +317,7 @@ def _notes(ratings: "RatingsFile", questions: Questions, first: Answer) -> list[
 
 def _record(
     ratings: "RatingsFile",
-    reading: ReadingOptions,
+    reading: Reading,
     questions: Questions,
     answers: Sequence[Answer],
     notes: list[str],

@@ -20,7 +20,7 @@ from masrel.cli._reading import (
     what_was_read,
 )
 from masrel.errors import ParameterError, RatingsError
-from masrel.ratings._findings import ReadingOptions
+from masrel.ratings._findings import Reading
 
 if TYPE_CHECKING:
     from masrel.ratings import RatingsFile, RatingsPart
@@ -37,7 +37,7 @@ _DRAWER = "masrel.plots._latent_scale:latent_figure"
     required=True,
     help="Whether kappa is for these items, or for new ones like them.",
 )
-@grouped("reading", ReadingOptions, *reading_options)
+@grouped("reading", Reading, *reading_options)
 @click.option("--only", metavar="SESSION", help="Which session, of several.")
 @click.option("--level", default=0.95, show_default=True, help="Level of intervals.")
 @click.option("--seed", default=0, show_default=True, help="Seed of the sampler.")
@@ -55,7 +55,7 @@ _DRAWER = "masrel.plots._latent_scale:latent_figure"
 def latent(
     file: Path,
     items: Literal["fixed", "random"],
-    reading: ReadingOptions,
+    reading: Reading,
     only: str | None,
     level: float,
     seed: int,

@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 
 from masrel.errors import ParameterError
-from masrel.ratings._findings import ReadingOptions, library, refusal
+from masrel.ratings._findings import Reading, library, refusal
 from masrel.ratings._sheet import (
     MAX_UNPACKED,
     WORKBOOKS,
@@ -60,7 +60,7 @@ def read_typed(
     sha256: Callable[[], str],
     suffix: str,
     data: bytes,
-    options: ReadingOptions,
+    options: Reading,
 ) -> Sheet:
     """Read a file whose cells have types, or the export of an annotation tool."""
     facts: dict[str, Any] = {"format": suffix.removeprefix(".")}

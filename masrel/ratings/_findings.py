@@ -15,36 +15,91 @@ Repeated = Literal["error", "first", "last", "mean"]
 USUAL_MISSING = ("", "NA")
 """Cells that stand for a missing grade unless the scale has them."""
 
+_SEPARATORS = {"tab": "\t", "\\t": "\t", "space": " ", "blanks": " ", "auto": None}
 _SHOWN = 6  # texts that a message lists
 _LONGEST = 60  # letters of a text that it shows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ReadingOptions:
-    """What a caller says of a file; None and () are for the file to tell."""
+class Reading:
+    """How a file of ratings is read; None and () are for the file to tell.
 
-    item: tuple[str, ...] = ()  # columns that name the item together
+    Parameters
+    ----------
+    item : str or tuple of str
+        Column of the items; several name an item together.
+    rater, grade : str or None
+        Columns of a long table, one row a rating.
+    raters, ignore : str or tuple of str
+        Columns of a wide table that are raters, and columns that are left aside.
+    no_item, no_header : bool
+        Whether no column names the items; whether the first line is a row.
+    session, by : str or None
+        Columns of the sessions, and of groups that are told apart.
+    clusters : str or None
+        Column of the clusters that items come in, such as patients with several
+        sites: one of each item.
+    repeated : {"error", "first", "last", "mean"}
+        What becomes of a second grade of an item by the same rater.
+    categories : sequence of str or None
+        Every grade of the scale, in order; the grades met unless given.
+    missing_codes : sequence of str
+        Cells that stand for a missing grade, beside empty ones and NA.
+    decimal, delimiter, encoding, sheet : str or None
+        Decimal mark, separator of cells (tab and blanks by name), encoding, and sheet
+        of a workbook.
+    transpose : bool
+        Whether a row is a rater and a column an item.
+    counts, table : bool
+        Whether it is a table of counts, items by categories, or a contingency table
+        of two raters, the first of them in the rows.
+    source : str or None
+        The annotation tool whose export it is.
+    stream : bool or None
+        Whether DuckDB groups it to the rows of ratings that differ, so that a
+        file may be larger than memory; by its size unless given.
+
+    Raises
+    ------
+    ParameterError
+        If options contradict each other.
+
+    Examples
+    --------
+    >>> Reading(item="patient", raters=("Kim", "Lee")).raters
+    ('Kim', 'Lee')
+    """
+
+    item: str | tuple[str, ...] = ()
     rater: str | None = None
     grade: str | None = None
-    raters: tuple[str, ...] = ()  # columns of a wide table
-    ignore: tuple[str, ...] = ()  # columns that are left aside
-    no_item: bool = False  # whether every column is a rater, or a category
-    no_header: bool = False  # whether the first line is a row like the others
+    raters: str | tuple[str, ...] = ()
+    ignore: str | tuple[str, ...] = ()
+    no_item: bool = False
+    no_header: bool = False
     session: str | None = None
     by: str | None = None
     clusters: str | None = None
     repeated: Repeated = "error"
-    categories: Sequence[str] | None = None  # every grade of the scale in order
-    missing_codes: tuple[str, ...] = ()  # beside the usual ones
+    categories: Sequence[str] | None = None
+    missing_codes: Sequence[str] = ()
     decimal: str = "."
-    delimiter: str | None = "auto"  # None or auto is for the file to tell
+    delimiter: str | None = None
     encoding: str | None = None
-    sheet: str | None = None  # of a workbook
-    transpose: bool = False  # whether raters are rows
-    counts: bool = False  # whether it is a table of items by categories
-    table: bool = False  # whether it is a contingency table of two raters
-    source: str | None = None  # annotation tool whose export it is
+    sheet: str | None = None
+    transpose: bool = False
+    counts: bool = False
+    table: bool = False
+    source: str | None = None
     stream: bool | None = None
+
+    def __post_init__(self) -> None:
+        mark = _SEPARATORS.get(self.delimiter or "auto", self.delimiter)
+        object.__setattr__(self, "delimiter", mark)
+        for name in ("item", "raters", "ignore"):
+            if isinstance(value := getattr(self, name), str):
+                object.__setattr__(self, name, (value,))
+        self._check()
 
     def record(self) -> dict[str, object]:
         """Return what the caller said, as plain values for JSON."""
@@ -52,7 +107,7 @@ class ReadingOptions:
         return {
             name: list(value) if isinstance(value, tuple) else value
             for name, value in values.items()
-            if value != getattr(ReadingOptions(), name)
+            if value != getattr(Reading(), name)
         }
 
     @property
@@ -63,7 +118,7 @@ class ReadingOptions:
         is_kept = self.repeated == "error"
         return options if is_kept else [*options, f"--repeated {self.repeated}"]
 
-    def check(self) -> None:
+    def _check(self) -> None:
         """Refuse what is wrong whatever the file is."""
         mark, is_counted = self.delimiter, self.counts or self.table
         is_long = bool(self.rater or self.grade)

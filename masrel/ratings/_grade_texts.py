@@ -19,7 +19,7 @@ from masrel.errors import ParameterError, RatingsError
 from masrel.ratings._findings import (
     USUAL_MISSING,
     Finding,
-    ReadingOptions,
+    Reading,
     listed,
     quoted,
 )
@@ -66,7 +66,7 @@ def is_number(text: str) -> bool:
     return bool(_NUMBER.fullmatch(text)) and math.isfinite(float(text))
 
 
-def graded(sheet: Sheet, places: Sequence[int], options: ReadingOptions) -> Grades:
+def graded(sheet: Sheet, places: Sequence[int], options: Reading) -> Grades:
     """Return which grades the cells of some columns are."""
     number: dict[str, int] = {}
     codes = np.empty((len(sheet.numbers), len(places)), dtype=np.int64)
@@ -89,7 +89,7 @@ def graded(sheet: Sheet, places: Sequence[int], options: ReadingOptions) -> Grad
 def _grades(
     sheet: Sheet,
     freq: dict[str, int],
-    options: ReadingOptions,
+    options: Reading,
     where: Callable[[str], str],
 ) -> Grades:
     # of the texts, as if they were the cells; freq: how many cells have each
@@ -130,7 +130,7 @@ def _grades(
     )
 
 
-def _declared(options: ReadingOptions) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _declared(options: Reading) -> tuple[tuple[str, ...], tuple[str, ...]]:
     # categories and codes of missing grades as cells are
     declared = tuple(map(plain, options.categories or ()))
     codes = tuple(map(plain, options.missing_codes))
@@ -169,7 +169,7 @@ def _declared_grades(
 
 
 def _refuse_doubtful(
-    number: dict[str, Decimal | None], options: ReadingOptions, refuse: _Refuse
+    number: dict[str, Decimal | None], options: Reading, refuse: _Refuse
 ) -> None:
     # what may be no grade, or one of two
     commas = [text for text in number if _DECIMAL_COMMA.fullmatch(text)]

@@ -28,7 +28,7 @@ from masrel.ratings._exports import column_of, sheet_of, table_frame
 from masrel.ratings._findings import (
     USUAL_MISSING,
     Finding,
-    ReadingOptions,
+    Reading,
     library,
 )
 from masrel.ratings._layout import Layout, rated_twice
@@ -74,7 +74,7 @@ class Source:
     recheck: Callable[[], None]  # refuses the first record that is none of the table
 
 
-def source_of(path: Path, options: ReadingOptions) -> Source:
+def source_of(path: Path, options: Reading) -> Source:
     """Open a file for DuckDB."""
     is_other = options.transpose or options.source or options.sheet
     kind = path.suffix.lower()
@@ -87,7 +87,7 @@ def source_of(path: Path, options: ReadingOptions) -> Source:
     raise NoStreamError(Finding("no stream"))
 
 
-def _parquet(path: Path, options: ReadingOptions) -> Source:
+def _parquet(path: Path, options: Reading) -> Source:
     name = str(path)
     parquet = library(name, "pyarrow.parquet")
     file = read_foreign(name, ".parquet", lambda: parquet.ParquetFile(path))
@@ -115,7 +115,7 @@ def _parquet(path: Path, options: ReadingOptions) -> Source:
     )
 
 
-def _text(path: Path, options: ReadingOptions) -> Source:
+def _text(path: Path, options: Reading) -> Source:
     name, kind = str(path), TEXT_FORMATS[path.suffix.lower()]
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)

@@ -12,7 +12,7 @@ from masrel.errors import RatingsError
 from masrel.ratings._findings import (
     USUAL_MISSING,
     Finding,
-    ReadingOptions,
+    Reading,
     listed,
     quoted,
 )
@@ -87,7 +87,7 @@ class Layout:
     is_item_guessed: bool = False
 
 
-def find_layout(sheet: Sheet, options: ReadingOptions) -> Layout:
+def find_layout(sheet: Sheet, options: Reading) -> Layout:
     """Decide which column is what, or say which option would."""
     named = {
         option: _columns_of(sheet, option, getattr(options, option))
@@ -200,7 +200,7 @@ def _long(
 
 def _wide(
     sheet: Sheet,
-    options: ReadingOptions,
+    options: Reading,
     named: dict[str, tuple[int, ...]],
     taken: set[int],
 ) -> Layout:

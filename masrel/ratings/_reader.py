@@ -27,8 +27,7 @@ from masrel.agreement._codes import count_items, count_table
 from masrel.errors import ParameterError, RatingsError
 from masrel.ratings._findings import (
     Finding,
-    ReadingOptions,
-    Repeated,
+    Reading,
     refusal,
 )
 from masrel.ratings._grade_texts import Grades, graded, is_number
@@ -63,7 +62,6 @@ from masrel.scales import Scale
 if TYPE_CHECKING:
     from masrel.ratings._large import Answer
 
-_SEPARATORS = {"tab": "\t", "\\t": "\t", "space": " ", "blanks": " ", "auto": None}
 _LARGE_TEXT = 256 << 20  # bytes of text from which it is read as a stream
 _MAX_DENSE = 20_000_000  # places, items by raters, that are always kept one by one
 _MAX_SPARSE = 8  # places a rating beyond which only counts are kept
@@ -136,29 +134,8 @@ class RatingsFile:
 @long_cells()
 def read_ratings(
     path: Path | str,
+    reading: Reading | None = None,
     *,
-    item: str | Sequence[str] = (),
-    rater: str | None = None,
-    grade: str | None = None,
-    raters: Sequence[str] = (),
-    ignore: Sequence[str] = (),
-    no_item: bool = False,
-    no_header: bool = False,
-    session: str | None = None,
-    by: str | None = None,
-    clusters: str | None = None,
-    repeated: Repeated = "error",
-    categories: Sequence[str] | None = None,
-    missing_codes: Sequence[str] = (),
-    decimal: str = ".",
-    delimiter: str | None = None,
-    encoding: str | None = None,
-    sheet: str | None = None,
-    transpose: bool = False,
-    counts: bool = False,
-    table: bool = False,
-    source: str | None = None,
-    stream: bool | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> RatingsFile:
     r"""Read any file of ratings, or say in one sentence which option would.
@@ -168,37 +145,8 @@ def read_ratings(
     path : Path or str
         The file; "-" is standard input. Text, workbooks, Parquet, Feather, JSON,
         SPSS, Stata and SAS, packed or not; ``docs/ratings.md`` has every shape.
-    item : str or sequence of str, optional
-        Column of the items; several name an item together.
-    rater, grade : str, optional
-        Columns of a long table, one row a rating.
-    raters, ignore : sequence of str, optional
-        Columns of a wide table that are raters, and columns that are left aside.
-    no_item, no_header : bool, optional
-        Whether no column names the items; whether the first line is a row.
-    session, by : str, optional
-        Columns of the sessions, and of groups that are told apart.
-    clusters : str, optional
-        Column of the clusters that items come in, such as patients with several
-        sites: one of each item.
-    repeated : {"error", "first", "last", "mean"}, optional
-        What becomes of a second grade of an item by the same rater.
-    categories : sequence of str, optional
-        Every grade of the scale, in order; the grades met unless given.
-    missing_codes : sequence of str, optional
-        Cells that stand for a missing grade, beside empty ones and NA.
-    decimal, delimiter, encoding, sheet : str, optional
-        Decimal mark, separator of cells, encoding, and sheet of a workbook.
-    transpose : bool, optional
-        Whether a row is a rater and a column an item.
-    counts, table : bool, optional
-        Whether it is a table of counts, items by categories, or a contingency table
-        of two raters, the first of them in the rows.
-    source : str, optional
-        The annotation tool whose export it is.
-    stream : bool, optional
-        Whether DuckDB groups it to the rows of ratings that differ, so that a
-        file may be larger than memory; by its size unless given.
+    reading : Reading, optional
+        How it is read; the file tells what is not given.
     progress : callable, optional
         Takes how many bytes of how many are read of a stream.
 
@@ -212,7 +160,7 @@ def read_ratings(
     RatingsError
         If the file is no table of ratings, or could be more than one.
     ParameterError
-        If options contradict each other, or `categories` are no scale.
+        If `reading` has categories that are no scale.
 
     Examples
     --------
@@ -224,33 +172,9 @@ def read_ratings(
     >>> file.scale.name, file.read["raters"], file.read["n_missing"]
     ('MAS', ['Kim', 'Lee'], 1)
     """
-    options = ReadingOptions(
-        item=(item,) if isinstance(item, str) else tuple(item),
-        rater=rater,
-        grade=grade,
-        raters=tuple(raters),
-        ignore=tuple(ignore),
-        no_item=no_item,
-        no_header=no_header,
-        session=session,
-        by=by,
-        clusters=clusters,
-        repeated=repeated,
-        categories=None if categories is None else tuple(categories),
-        missing_codes=tuple(missing_codes),
-        decimal=decimal,
-        delimiter=_SEPARATORS.get(delimiter or "auto", delimiter),
-        encoding=encoding,
-        sheet=sheet,
-        transpose=transpose,
-        counts=counts,
-        table=table,
-        source=source,
-        stream=stream,
-    )
-    options.check()
-    suffix, is_large = Path(path).suffix.lower(), bool(stream)
-    if stream is None and not options.whole and Path(path).is_file():
+    options = reading or Reading()
+    suffix, is_large = Path(path).suffix.lower(), bool(options.stream)
+    if options.stream is None and not options.whole and Path(path).is_file():
         is_large = Path(path).stat().st_size >= _LARGE_TEXT or suffix == ".parquet"
     if is_large:
         streamed = _streamed(Path(path), options, progress or (lambda *_: None))
@@ -267,7 +191,7 @@ def read_ratings(
     return read(cells, layout, options, findings)
 
 
-def _read_sheet(path: Path | str, options: ReadingOptions) -> Sheet:
+def _read_sheet(path: Path | str, options: Reading) -> Sheet:
     """Read a file of any format as columns of text."""
     name, data = str(path), bytes_of(path)
     if not data:
@@ -287,7 +211,7 @@ def _read_sheet(path: Path | str, options: ReadingOptions) -> Sheet:
 
 
 def _streamed(
-    path: Path, options: ReadingOptions, progress: Callable[[int, int], None]
+    path: Path, options: Reading, progress: Callable[[int, int], None]
 ) -> RatingsFile | None:
     # by DuckDB; None if the file is to be read as a whole
     from masrel.ratings import _large  # with pandas
@@ -310,7 +234,7 @@ def _streamed(
 
 
 def _grouped(
-    answer: "Answer", sheet: Sheet, layout: Layout, options: ReadingOptions
+    answer: "Answer", sheet: Sheet, layout: Layout, options: Reading
 ) -> RatingsFile:
     # the rows of ratings that differ, how often each is there, and their grades
     from masrel.ratings import _large
@@ -354,7 +278,7 @@ def _grouped(
 def _file_of(
     sheet: Sheet,
     layout: Layout,
-    options: ReadingOptions,
+    options: Reading,
     grades: Grades,
     parts: Sequence[RatingsPart],
     counts: Codes,
@@ -419,7 +343,7 @@ def _file_of(
 
 
 def _rated(
-    sheet: Sheet, layout: Layout, options: ReadingOptions, findings: list[Finding]
+    sheet: Sheet, layout: Layout, options: Reading, findings: list[Finding]
 ) -> RatingsFile:
     # a long or a wide table
     n_rows, n_raters = len(sheet.numbers), len(layout.raters)
@@ -504,7 +428,7 @@ def _parts(sheet: Sheet, layout: Layout) -> tuple[Codes, list[dict[str, str]]]:
 def _one_each(
     sheet: Sheet,
     layout: Layout,
-    options: ReadingOptions,
+    options: Reading,
     ratings: list[Codes],
     item: Column,
     rater: Column,
@@ -598,7 +522,7 @@ def _clusters(sheet: Sheet, place: int, items: Column, row: Codes) -> tuple[str,
 
 
 def _counted(
-    sheet: Sheet, layout: Layout, options: ReadingOptions, findings: list[Finding]
+    sheet: Sheet, layout: Layout, options: Reading, findings: list[Finding]
 ) -> RatingsFile:
     # a table of counts, or a contingency table
     names = [sheet.header[place] for place in layout.raters]
@@ -692,7 +616,7 @@ def read_weights(
     """Return the weights in a file: a matrix, or a table with the grades around it."""
     # grades: of the scale, in the order that a matrix needs if they have one; where
     # none are known it is a matrix
-    sheet = _read_sheet(path, ReadingOptions(no_header=True, delimiter=None))
+    sheet = _read_sheet(path, Reading(no_header=True, delimiter=None))
     columns = [[text.replace(",", ".") for text in c.cells()] for c in sheet.columns]
     labels, names = [c[0] for c in columns[1:]], [g.replace(",", ".") for g in grades]
     rows, places = [*range(len(columns[0]))], [*range(len(columns))]

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from masrel._collector import collector_off
 from masrel.errors import ParameterError, RatingsError
-from masrel.ratings._findings import ReadingOptions, refusal
+from masrel.ratings._findings import Reading, refusal
 
 Codes = NDArray[np.int64]
 
@@ -194,7 +194,7 @@ class Sheet:
         )
 
 
-def finished(sheet: Sheet, options: ReadingOptions) -> Sheet:
+def finished(sheet: Sheet, options: Reading) -> Sheet:
     """Turn a sheet as it was stored as the options say, and check its names."""
     header, columns = list(sheet.header), list(sheet.columns)
     if options.transpose or options.no_header:
@@ -336,7 +336,7 @@ def decoded(name: str, data: bytes, encoding: str | None, n_before: int = 0) -> 
 
 
 def read_text(
-    name: str, sha256: Callable[[], str], text: str, kind: str, options: ReadingOptions
+    name: str, sha256: Callable[[], str], text: str, kind: str, options: Reading
 ) -> Sheet:
     """Take a text apart: its comments, its separator, its records."""
     declared = re.match(r'"?sep=(.)"?(\r\n|\n|\r)', text, re.IGNORECASE)

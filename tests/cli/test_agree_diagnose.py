@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from masrel import intervals
-from masrel.ratings import read_ratings
+from masrel.ratings import Reading, read_ratings
 from tests.cli.process import Caller
 
 Record = dict[str, Any]
@@ -62,7 +62,7 @@ def record(masrel: Caller, *arguments: object) -> Record:
 def test_a_diagnosis_is_that_of_the_library(masrel: Caller, wide: Path) -> None:
     arguments = (wide, "--ignore", "site", "--diagnose", "--target", "items")
     document = record(masrel, *arguments, "--reference", "Gold")
-    (part,) = read_ratings(wide, ignore=["site"]).parts
+    (part,) = read_ratings(wide, Reading(ignore=["site"])).parts
     expected = intervals.diagnose(
         part.ratings, target="items", raters=part.raters, reference="Gold"
     )
@@ -144,7 +144,7 @@ def test_clusters_are_left_out_as_in_the_library(masrel: Caller, sites: Path) ->
     document = record(masrel, sites, *names, "--coefficients", "scott_pi")
     (row,) = document["estimates"]
     (part,) = read_ratings(
-        sites, item="patient,tooth", ignore=["side"], clusters="patient"
+        sites, Reading(item="patient,tooth", ignore=["side"], clusters="patient")
     ).parts
     assert part.clusters[:4] == ("p0", "p1", "p1", "p2")
     expected = intervals.estimate(
@@ -163,7 +163,9 @@ def test_groups_with_clusters_in_common_are_compared_cluster_by_cluster(
     coefficients = ("--coefficients", "fleiss_kappa")
     document = record(masrel, sites, *names, "--compare", *coefficients)
     (row,) = document["differences"]
-    file = read_ratings(sites, item="patient,tooth", by="side", clusters="patient")
+    file = read_ratings(
+        sites, Reading(item="patient,tooth", by="side", clusters="patient")
+    )
     first, second = file.parts
     rows = len(first.items) + len(second.items)
     stacked = []

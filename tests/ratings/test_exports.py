@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from masrel.errors import MasrelError
-from masrel.ratings import read_ratings
+from masrel.ratings import Reading, read_ratings
 from tests.ratings.by_name import grades
 
 
@@ -300,7 +300,7 @@ def test_what_is_read(name: str, tmp_path: Path) -> None:
         content = json.dumps(content)
     path = tmp_path / file_name
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    file = read_ratings(path, source=source, **options)
+    file = read_ratings(path, Reading(source=source, **options))
     assert grades(file) == expected
     assert file.read["dropped"] == dropped
     assert file.read["format"] == f"{source} export"
@@ -314,6 +314,6 @@ def test_what_is_refused(
     path = tmp_path / ("e.csv" if is_csv else "e.json")
     path.write_text(content if isinstance(content, str) else json.dumps(content))
     with pytest.raises(MasrelError) as refusal:
-        read_ratings(path, source=source, **options)
+        read_ratings(path, Reading(source=source, **options))
     assert re.search(words, str(refusal.value))
     assert "\n" not in str(refusal.value)

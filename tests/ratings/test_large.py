@@ -13,7 +13,7 @@ import pytest
 
 from masrel.agreement import coefficient
 from masrel.errors import ParameterError, RatingsError
-from masrel.ratings import RatingsFile, _large, read_ratings
+from masrel.ratings import RatingsFile, Reading, _large, read_ratings
 
 pyarrow = pytest.importorskip("pyarrow")
 parquet = pytest.importorskip("pyarrow.parquet")
@@ -39,8 +39,8 @@ def written(path: Path, columns: dict[str, Any]) -> Path:
 
 def both(path: Path, **options: Any) -> tuple[RatingsFile, RatingsFile]:
     return (
-        read_ratings(path, stream=True, **options),
-        read_ratings(path, stream=False, **options),
+        read_ratings(path, Reading(stream=True, **options)),
+        read_ratings(path, Reading(stream=False, **options)),
     )
 
 
@@ -193,9 +193,9 @@ def test_what_is_refused_is_refused_where_it_stands(
 ) -> None:
     path = written(tmp_path / "table.parquet", columns)
     with pytest.raises(RatingsError, match=words):
-        read_ratings(path, stream=True)
+        read_ratings(path, Reading(stream=True))
     with pytest.raises(RatingsError, match=words.split(":")[0]):
-        read_ratings(path, stream=False)
+        read_ratings(path, Reading(stream=False))
 
 
 def test_a_second_line_of_names_is_refused(
@@ -205,7 +205,7 @@ def test_a_second_line_of_names_is_refused(
     path = tmp_path / "wide.csv"
     path.write_text("id,A,B\np2,2,2\n\np3,2,1\nid,A,B\np4,1,1\n")
     with pytest.raises(RatingsError, match="line 5: holds the names of the columns"):
-        read_ratings(path, stream=True)
+        read_ratings(path, Reading(stream=True))
 
 
 HEAD = "id,A,B\n" + "".join(f"p{k},{k % 3},{k // 2 % 3}\n" for k in range(500))
@@ -241,7 +241,7 @@ def test_a_wrong_line_of_a_text_is_refused_where_it_stands(
     path.write_bytes(f"{HEAD}{line}\nq,1,2\n".replace("\n", end).encode("latin-1"))
     for stream in (True, False):
         with pytest.raises(RatingsError, match=words):
-            read_ratings(path, stream=stream)
+            read_ratings(path, Reading(stream=stream))
 
 
 @pytest.mark.parametrize(
@@ -253,16 +253,16 @@ def test_what_needs_the_whole_file_is_no_stream(
 ) -> None:
     path = written(tmp_path / "long.parquet", long_columns(None, list(range(400))))
     with pytest.raises(ParameterError, match="needs the whole file in memory"):
-        read_ratings(path, stream=True, **options)
+        read_ratings(path, Reading(stream=True, **options))
 
 
 def test_a_packed_file_is_no_stream(tmp_path: Path) -> None:
     path = tmp_path / "wide.csv.gz"
     path.write_bytes(gzip.compress(b"id,A,B\np1,1,2\n"))
     with pytest.raises(RatingsError, match="--stream: needed a Parquet file"):
-        read_ratings(path, stream=True)
+        read_ratings(path, Reading(stream=True))
     with pytest.raises(RatingsError, match="no such file"):
-        read_ratings(tmp_path / "none.csv", stream=True)
+        read_ratings(tmp_path / "none.csv", Reading(stream=True))
     assert len(read_ratings(path).parts) == 1
 
 
@@ -289,7 +289,7 @@ class TestSize:
         columns = {"id": np.arange(400), "A": values[:, 0], "B": values[:, 1]}
         path = written(tmp_path / "wide.parquet", columns)
         with pytest.raises(RatingsError, match=r"more than 120 .*--no-stream"):
-            read_ratings(path, stream=True)
+            read_ratings(path, Reading(stream=True))
         monkeypatch.setattr(_large, "_LARGE_TABLE", 1000)
         assert not any(map(self.is_note, read_ratings(path).warnings))
 
@@ -301,7 +301,7 @@ class TestSize:
         columns = long_columns(ORDER, [f"p{k}" for k in range(400)])
         path = written(tmp_path / "long.parquet", columns)
         with pytest.raises(RatingsError, match=r"masrel\[big\]"):
-            read_ratings(path, stream=True)
+            read_ratings(path, Reading(stream=True))
         monkeypatch.setattr(_large, "_LARGE_TABLE", 1000)
         assert not any(map(self.is_note, read_ratings(path).warnings))
 
@@ -313,7 +313,7 @@ class TestSize:
 def test_progress_ends_with_the_whole_file(tmp_path: Path) -> None:
     path = written(tmp_path / "long.parquet", long_columns(None, list(range(400))))
     steps: list[tuple[int, int]] = []
-    read_ratings(path, stream=True, progress=lambda *step: steps.append(step))
+    read_ratings(path, Reading(stream=True), progress=lambda *step: steps.append(step))
     size = path.stat().st_size
     assert steps[-1] == (size, size)
 
@@ -333,5 +333,5 @@ def test_ctrl_c_leaves_no_file_behind(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        read_ratings(path, stream=True, progress=interrupt)
+        read_ratings(path, Reading(stream=True), progress=interrupt)
     assert list(folder.iterdir()) == []

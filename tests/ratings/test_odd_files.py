@@ -14,7 +14,7 @@ import pytest
 
 from masrel.agreement import fleiss_kappa, percent_agreement
 from masrel.errors import MasrelError, UndefinedStatisticWarning
-from masrel.ratings import read_ratings
+from masrel.ratings import Reading, read_ratings
 
 Values = tuple[float, float]
 
@@ -37,7 +37,7 @@ def outcome(
     path = folder / f"r{ending}"
     path.write_bytes(data if isinstance(data, bytes) else data.encode())
     try:
-        file = read_ratings(path, **options)
+        file = read_ratings(path, Reading(**options))
     except MasrelError as error:
         message = str(error)
         assert "\n" not in message

@@ -15,7 +15,7 @@ import pytest
 
 from masrel.agreement import CodedRatings, CountedRatings, fleiss_kappa
 from masrel.errors import ParameterError, RatingsError
-from masrel.ratings import RatingsFile, read_ratings
+from masrel.ratings import RatingsFile, Reading, read_ratings
 from masrel.scales import MODIFIED_ASHWORTH
 from tests.cli.process import Caller
 
@@ -29,7 +29,7 @@ TABLE = [["1", "1", "2"], ["2", "2", None], ["3", None, "3"]]
 def read(folder: Path, text: str, **options: Any) -> RatingsFile:
     path = folder / "r.csv"
     path.write_text(text, encoding="utf-8")
-    return read_ratings(path, **options)
+    return read_ratings(path, Reading(**options))
 
 
 def grades_of(file: RatingsFile) -> list[list[list[str | None]]]:
@@ -490,4 +490,4 @@ def test_an_end_from_outside_is_one_sentence(
 def test_an_encoding_that_is_given_outdoes_a_mark(tmp_path: Path) -> None:
     path = tmp_path / "r.csv"
     path.write_bytes("ÿþ,Kim,Lee\nA,1,1\nB,2,1\n".encode("latin-1"))  # UTF-16's mark
-    assert read_ratings(path, encoding="latin-1").read["item"] == ["ÿþ"]
+    assert read_ratings(path, Reading(encoding="latin-1")).read["item"] == ["ÿþ"]

@@ -17,7 +17,7 @@ import pandas as pd
 import pytest
 
 from masrel.errors import ParameterError, RatingsError
-from masrel.ratings import read_ratings
+from masrel.ratings import Reading, read_ratings
 from tests.ratings.by_name import grades
 
 LONG = {
@@ -261,7 +261,7 @@ def test_what_is_read(name: str, tmp_path: Path) -> None:
     ending, write, options, expected, facts = READ[name]
     path = tmp_path / f"r.{ending}"
     write(path)
-    file = read_ratings(path, **options)
+    file = read_ratings(path, Reading(**options))
     is_by_name = isinstance(next(iter(expected)), tuple)
     assert (grades(file) if is_by_name else file.read["grades"]) == expected
     assert {key: file.read[key] for key in facts} == facts
@@ -342,7 +342,7 @@ def test_what_is_refused(
     path = tmp_path / f"r.{ending}"
     write(path)
     with pytest.raises((RatingsError, ParameterError), match=words) as refusal:
-        read_ratings(path, **options)
+        read_ratings(path, Reading(**options))
     assert "\n" not in str(refusal.value)
 
 
@@ -356,11 +356,11 @@ def test_a_table_of_sas(tmp_path: Path) -> None:
         for k, cell in enumerate(row, start=1)
     }
     options: dict[str, Any] = {"item": "id", "ignore": ["workshop", "gender"]}
-    assert grades(read_ratings(packed, **options)) == answers
+    assert grades(read_ratings(packed, Reading(**options))) == answers
     path = tmp_path / "r.sas7bdat"
     path.write_bytes(gzip.decompress(packed.read_bytes())[:70_000])
     with pytest.raises(RatingsError, match=r"r\.sas7bdat: is damaged"):
-        read_ratings(path, **options)
+        read_ratings(path, Reading(**options))
 
 
 LIBRARIES = {
