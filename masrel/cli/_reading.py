@@ -14,8 +14,6 @@ from masrel.ratings._findings import Reading
 if TYPE_CHECKING:
     from masrel.ratings import RatingsFile
 
-_SHOWN = 12  # raters that are named
-
 
 def read_file(file: Path, options: Reading) -> "RatingsFile":
     """Read a file of ratings as the options say."""
@@ -127,61 +125,3 @@ table_options = [
     ),
 ]
 """Options of verbs that need not know who rated what."""
-
-
-def what_was_read(file: "RatingsFile") -> list[str]:
-    """Return the lines that say what was read, above a table."""
-    from masrel.tables._tables import counted
-
-    read = file.read
-    form = [read["format"], read.get("delimiter"), read.get("encoding")]
-    if read.get("sheet"):
-        form.append(f"sheet {read['sheet']}")
-    names = read["raters"]
-    raters = ", ".join(names[:_SHOWN])
-    if len(names) > _SHOWN:
-        raters += f" and {len(names) - _SHOWN} more"
-    items = ""
-    if read["item"] and read["layout"] != "table":
-        columns = [repr(name) if name else "the first column" for name in read["item"]]
-        items = f" named by {' and '.join(columns)}"
-    if read.get("clusters"):
-        items += f" in {counted(read['n_clusters'], 'cluster')} by {read['clusters']!r}"
-    counts = f"{counted(read['n_items'], 'item')}{items}, "
-    counts += counted(read["n_raters"], "rater")
-    first = f"Read {', '.join(filter(None, form))}: {counts}"
-    return [first + (f" ({raters})." if raters else "."), " ".join(_of_grades(file))]
-
-
-def _of_grades(file: "RatingsFile") -> list[str]:
-    read, scale = file.read, file.scale
-    grades = list(read["grades"].items())
-    listed = ", ".join(f"{grade} ×{n}" for grade, n in grades[:_SHOWN])
-    if len(grades) > _SHOWN:
-        listed = f"{len(grades)} from {grades[0][0]} to {grades[-1][0]}"
-    parts = [f"Grades: {listed}."]
-    if read["n_missing"]:
-        codes = ", ".join(f"{c or 'empty'} ×{n}" for c, n in read["missing"].items())
-        parts.append(f"Missing: {codes or read['n_missing']}.")
-    if read["n_repeated"]:
-        parts.append(f"Repeated: {read['n_repeated']}, {read['repeated']} taken.")
-    if read["dropped"]:
-        rows = ", ".join(f"{n} {why}" for why, n in read["dropped"].items())
-        parts.append(f"Rows left out: {rows}.")
-    merged = {g: s for g, s in read["merged"].items() if len(s) > 1}
-    if merged:
-        same = "; ".join(
-            f"{' = '.join(spellings)}" for spellings in list(merged.values())[:_SHOWN]
-        )
-        parts.append(f"The same grade: {same}.")
-    if scale.name == "MAS":
-        parts.append(
-            f"Scale: the Modified Ashworth Scale, {', '.join(scale.grades)}, told by "
-            "its grade 1+; --categories declares another."
-        )
-    elif scale.name == "observed":
-        parts.append(
-            "Scale: the grades met (AC and Brennan-Prediger depend on it; --categories "
-            "declares another)."
-        )
-    return parts

@@ -30,7 +30,6 @@ from masrel.cli._reading import (
     reading_options,
     table_options,
     weights_of_option,
-    what_was_read,
 )
 from masrel.errors import ParameterError
 from masrel.estimates import IntervalMethod
@@ -248,28 +247,21 @@ def agree(
             ),
         )
     from masrel.analysis._file_questions import answers
-    from masrel.tables._answer_tables import agreement_sentences, answer_table
+    from masrel.tables._answer_tables import agreement_sentences
+    from masrel.tables._first_screen import first_screen, reading_notes
     from masrel.tables._tables import SIMULATED
 
     others, answered = answers(ratings, questions)
-    data = "simulated" if others.simulated else "foreign"
-    first, *more = [
-        answer_table(
-            answer,
-            bands=questions.words,
-            explain=explain,
-            in_sentences=output.sentence and answer.name == "agreement",
-            data=data,
-        )
-        for answer in answered
-    ]
-    notes = _notes(others, questions, answered[0])
-    read = tuple(what_was_read(others))
-    table = replace(first, read=read, notes=(*notes, *first.notes))
+    table, *more = first_screen(
+        *(others, questions, answered), explain=explain, in_sentences=output.sentence
+    )
+    notes = reading_notes(others, questions, answered[0])
     is_sentence = output.sentence and answered[0].name == "agreement"
     sentences = ""
     if is_sentence:
-        sentences = agreement_sentences(answered[0], bands=questions.words, data=data)
+        sentences = agreement_sentences(
+            answered[0], bands=questions.words, data=table.data
+        )
     width, widest = _WIDTHS
     if sys.stdout.isatty():
         width = min(shutil.get_terminal_size((width, 24)).columns, widest)
@@ -279,40 +271,15 @@ def agree(
         text=lambda: sentences if is_sentence else table,
         figure=lambda: _figure(answered, questions),
         stamp=SIMULATED if others.simulated else "",
-        notes=(*read, *notes),
+        notes=(*table.read, *notes),
         more=more,
         width=width,
     )
     if is_sentence:
-        echo_notes((*read, *table.notes))
+        echo_notes((*table.read, *table.notes))
     # what came through a pipe is gone
     if questions.target is None and Path(others.read["file"]).is_file():
         _offer_interval(answered[0], questions)
-
-
-def _notes(ratings: "RatingsFile", questions: Questions, first: Answer) -> list[str]:
-    """Return what may have been read wrongly, and what is left out of it."""
-    from masrel.agreement import COEFFICIENTS
-
-    # of measurements it is warned unless all coefficients weigh how far they lie from
-    # each other
-    estimates = [row.estimate for row in first.estimates if first.name == "agreement"]
-    is_warned = not estimates or any(
-        not COEFFICIENTS[estimate.coefficient].needs_order
-        and estimate.weights in ("identity", "nominal")
-        for estimate in estimates
-    )
-    notes = [
-        f"warning: {text}"
-        for text in ratings.warnings
-        if is_warned or text.code != "measurements"
-    ]
-    if questions.takes_all and not ratings.is_ordered:
-        notes.append(
-            "Left out: the six forms of ICC, Kendall's W and Robinson's A, which need "
-            "grades that are numbers or --categories with every grade in order."
-        )
-    return notes
 
 
 def _record(

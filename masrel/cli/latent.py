@@ -14,11 +14,7 @@ from masrel.cli._options import (
     write_output,
 )
 from masrel.cli._paths import InputFile
-from masrel.cli._reading import (
-    read_file,
-    reading_options,
-    what_was_read,
-)
+from masrel.cli._reading import read_file, reading_options
 from masrel.errors import ParameterError, RatingsError
 from masrel.ratings._findings import Reading
 
@@ -76,6 +72,8 @@ def latent(
             "--categories: the model needs every grade of the scale in order, the "
             f"grades met are text: {', '.join(ratings.scale.grades[:6])}"
         )
+    from masrel.tables._first_screen import what_was_read
+
     notes = (*what_was_read(ratings), *(f"warning: {w}" for w in ratings.warnings))
     part = _part(ratings, file, only)
     # imported here: they load slowly, and a call that is refused needs none of them
