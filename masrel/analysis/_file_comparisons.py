@@ -90,9 +90,10 @@ def _groups_of(parts: Sequence[RatingsPart]) -> _Groups:
 
 
 def _rated_rows(part: RatingsPart, coded: CodedRatings) -> dict[str, int]:
-    # item to its row; an item that nobody rated is none
+    # item to its row; an item that nobody rated is none, one without a name the group's
     rated = np.max(coded.codes, axis=1) >= 0
-    return {item: row for row, item in enumerate(part.items) if rated[row]}
+    items = part.items or [f"{part.group} {row}" for row in range(len(rated))]
+    return {item: row for row, item in enumerate(items) if rated[row]}
 
 
 def comparisons(file: RatingsFile, questions: Questions) -> Iterator[Answer]:

@@ -181,6 +181,10 @@ def _retest(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
             f"--retest: compares the sessions of column {column!r}, so that --by must "
             "not take them apart",
         ),
+        (
+            not file.parts[0].items,
+            "--retest: needs ratings of items with names, and not --frequency",
+        ),
     )
     estimates: list[AgreementRow] = []
     sessions, left_out = {}, []

@@ -65,6 +65,11 @@ reading_options = [
     ),
     click.option("--session", metavar="COL", help="Column of the sessions."),
     click.option(
+        "--frequency",
+        metavar="COL",
+        help="Column of how many items each row stands for (one row a pattern).",
+    ),
+    click.option(
         "--repeated",
         type=click.Choice(["error", "first", "last", "mean"]),
         default="error",

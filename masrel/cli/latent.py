@@ -88,7 +88,9 @@ def latent(
 
     grades, simulated = ratings.scale.grades, ratings.simulated
     cells = np.array([*grades, None], dtype=object)[code_ratings(part.ratings).codes]
-    table = pd.DataFrame(cells, index=part.items, columns=part.raters, dtype=object)
+    table = pd.DataFrame(
+        cells, index=part.items or None, columns=part.raters, dtype=object
+    )
     with progress("sampling", " steps", is_quiet=output.quiet) as report:
         result = latent_trait(
             table,

@@ -39,6 +39,8 @@ class Reading:
     clusters : str or None
         Column of the clusters that items come in, such as patients with several
         sites: one of each item.
+    frequency : str or None
+        Column that says how many items each row of a wide table stands for.
     repeated : {"error", "first", "last", "mean"}
         What becomes of a second grade of an item by the same rater.
     categories : sequence of str or None
@@ -80,6 +82,7 @@ class Reading:
     session: str | None = None
     by: str | None = None
     clusters: str | None = None
+    frequency: str | None = None
     repeated: Repeated = "error"
     categories: Sequence[str] | None = None
     missing_codes: Sequence[str] = ()
@@ -113,7 +116,7 @@ class Reading:
     @property
     def whole(self) -> list[str]:
         """The options that need the whole file in memory."""
-        names = ("by", "session", "clusters", "counts", "table")
+        names = ("by", "session", "clusters", "frequency", "counts", "table")
         options = [f"--{name}" for name in names if getattr(self, name)]
         is_kept = self.repeated == "error"
         return options if is_kept else [*options, f"--repeated {self.repeated}"]
@@ -147,6 +150,16 @@ class Reading:
             (
                 self.clusters and is_counted,
                 "--clusters: counts do not say which item is which, so needs ratings",
+            ),
+            (
+                self.frequency and (is_long or is_counted or self.session),
+                "--frequency: says how many items a row of a wide table stands for, "
+                "and not with --rater, --grade, --counts, --table or --session",
+            ),
+            (
+                self.frequency and (self.clusters or self.repeated != "error"),
+                "--frequency: items that a row stands for have no names, as --clusters "
+                "and --repeated need",
             ),
             (
                 self.missing_codes and is_counted,
@@ -334,7 +347,7 @@ _TEXTS = {
     "stream": "read as a stream: names of items that differ by spelling alone, or sum "
     "up others, are not looked for",
     # tables of counts
-    "count": "--{kind} needs whole numbers from 0, got {text!r}",
+    "count": "--{kind} needs whole numbers from 0 to 1e12, got {text!r}",
     "no counts": "--{kind}: needed at least one rating, got none",
     "other categories": "--categories: needed those of the columns, {names}, in order, "
     "got {categories}",

@@ -41,7 +41,10 @@ STUDY_COLUMNS = ("session", "rater", "model", "repeat", "grade")
 
 # Options that name columns, and which two may name the same: groups may be sessions,
 # raters, or part of the items' names, as clusters may be.
-_NAMED = ("raters", "ignore", "item", "rater", "grade", "session", "by", "clusters")
+_NAMED = (
+    *("raters", "ignore", "item", "rater", "grade", "session", "by", "clusters"),
+    "frequency",
+)
 _MAY_BE_BOTH = (
     *({"by", "session"}, {"by", "rater"}, {"by", "item"}, {"by", "clusters"}),
     {"clusters", "item"},
@@ -83,6 +86,7 @@ class Layout:
     session: int | None = None
     by: int | None = None
     clusters: int | None = None
+    frequency: int | None = None
     # whether the item is the first column because nothing else was said of it
     is_item_guessed: bool = False
 
@@ -105,10 +109,12 @@ def find_layout(sheet: Sheet, options: Reading) -> Layout:
     taken = set(named.get("ignore", ()))
     session = named.get("session") or _usual(sheet, "session", taken)
     by, clusters = named.get("by", ()), named.get("clusters", ())
+    often = named.get("frequency", ())
     taken |= {*session, *by, *clusters} - ({*clusters} & {*named.get("item", ())})
+    taken |= {*often}
     is_counted = options.counts or options.table
     # the corner of a transposed table names its rows, which are now its columns
-    is_wide = is_counted or "raters" in named or options.no_item
+    is_wide = is_counted or "raters" in named or options.no_item or bool(often)
     is_wide |= sheet.is_transposed and not {"rater", "grade"} & named.keys()
     layout = None if is_wide else _long(sheet, named, taken)
     if layout is None:
@@ -118,6 +124,7 @@ def find_layout(sheet: Sheet, options: Reading) -> Layout:
         session=None if is_counted or not session else session[0],
         by=by[0] if by else None,
         clusters=clusters[0] if clusters else None,
+        frequency=often[0] if often else None,
     )
 
 
@@ -214,12 +221,23 @@ def _wide(
         if not item:
             item = tuple([place for place in places if place not in others][:1])
             is_guessed = bool(item)
+        # patterns of ratings need no names, as items do
+        if "frequency" in named:
+            is_guessed = False
+            item = tuple(place for place in item if names_rows(sheet, place))
     raters = raters or tuple(k for k in places if k not in taken.union(item))
     if not raters:
         raise sheet.refuse("no rater", where=sheet.at(0))
     return Layout(
         kind=kind, item=item, raters=raters, grades=raters, is_item_guessed=is_guessed
     )
+
+
+def names_rows(sheet: Sheet, place: int) -> bool:
+    """Return whether a column is called as names of items are, and all differ."""
+    n_rows, name = len(sheet.numbers), sheet.header[place]
+    is_name = _ITEM_NAME.fullmatch(name) is not None
+    return not name or (is_name and len(sheet.columns[place].texts) == n_rows)
 
 
 def named(sheet: Sheet, role: str, places: Sequence[int]) -> Column:

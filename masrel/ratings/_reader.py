@@ -66,6 +66,7 @@ _LARGE_TEXT = 256 << 20  # bytes of text from which it is read as a stream
 _MAX_DENSE = 20_000_000  # places, items by raters, that are always kept one by one
 _MAX_SPARSE = 8  # places a rating beyond which only counts are kept
 _MAX_COUNTS = 200_000_000  # places, items by categories, of counts
+_MAX_COUNT = 10**12  # of a row
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,6 +189,8 @@ def read_ratings(
         findings.append(Finding("errors", errors=shown))
     layout = find_layout(cells, options)
     read = _counted if layout.kind in ("counts", "table") else _rated
+    if layout.frequency is not None:
+        cells, read = _standing_for(cells, layout.frequency), _patterns
     return read(cells, layout, options, findings)
 
 
@@ -241,10 +244,8 @@ def _grouped(
 
     groups = _large.groups_of(answer, sheet, layout)
     grades = graded(groups, layout.grades, options)
-    freq = groups.freq
-    codes = grades.codes.ravel()
-    n_cells = np.repeat(freq, len(layout.grades))
-    n_missing, *counts = np.bincount(codes + 1, n_cells, len(grades.scale.grades) + 1)
+    freq, codes = groups.freq, grades.codes.ravel()
+    n_missing, *counts = _often(grades, freq)
     names, findings = [sheet.header[place] for place in layout.raters], []
     if layout.kind == "long":
         rater, n_rows = named(groups, "rater", layout.raters), int(freq.sum())
@@ -255,24 +256,43 @@ def _grouped(
         _large.refuse_repeated(answer, sheet, layout)
         rows = grades.codes
         findings = doubt_columns(sheet, layout, rows, grades.scale, freq)
-    rows, place = np.unique(rows.astype(np.int8), axis=0, return_inverse=True)
-    freq = np.bincount(place.ravel(), freq).astype(np.int64)
-    ratings = CountedRatings(
-        codes=rows,
-        freq=freq,
-        categories=grades.scale.values,
-        n_raters=int((rows >= 0).any(axis=0).sum()),
-    )
+    ratings = _distinct(rows, freq, grades.scale)
     return _file_of(
         *(groups, layout, options, grades),
         [RatingsPart(raters=tuple(names), ratings=ratings)],
-        np.array(counts, dtype=np.int64),
+        np.array(counts),
         [*findings, *doubt_names("raters", names), Finding("stream")],
         raters=names,
         n_items=int(freq.sum()),
         n_raters=len(names),
         n_missing=int(n_missing),
     )
+
+
+def _often(grades: Grades, freq: Codes) -> Codes:
+    # how often there is no grade, and each of the scale, by how often each row is there
+    n_cells = np.repeat(freq, grades.codes.shape[1])
+    n = np.bincount(grades.codes.ravel() + 1, n_cells, len(grades.scale.grades) + 1)
+    return n.astype(np.int64)
+
+
+def _distinct(rows: Codes, freq: Codes, scale: Scale) -> CountedRatings:
+    # rows of ratings that differ, of rows that are there so often
+    q = len(scale.grades)
+    rows = rows.astype(np.min_scalar_type(-q - 1))
+    rows, place = np.unique(rows, axis=0, return_inverse=True)
+    return CountedRatings(
+        codes=rows,
+        freq=np.bincount(place.ravel(), freq).astype(np.int64),
+        categories=scale.values,
+        n_raters=int((rows >= 0).any(axis=0).sum()),
+        declared=_is_declared(scale),
+    )
+
+
+def _is_declared(scale: Scale) -> bool:
+    # numbers that nobody declared may be measurements rather than grades
+    return scale.name != "observed" or not all(map(is_number, scale.grades))
 
 
 def _file_of(
@@ -290,8 +310,8 @@ def _file_of(
     # the record
     scale, header = grades.scale, sheet.header
     of_long = (*layout.raters, *layout.grades) if layout.kind == "long" else (None,) * 2
-    roles = ("rater", "grade", "session", "by")
-    places = (*of_long, layout.session, layout.by)
+    roles = ("rater", "grade", "session", "by", "frequency")
+    places = (*of_long, layout.session, layout.by, layout.frequency)
     used = {*layout.item, *layout.raters, *layout.grades, *places, layout.clusters}
     findings = (*findings, *grades.findings)
     record = {
@@ -480,10 +500,9 @@ def _put_together(
         codes = np.full(shape, -1, dtype=np.min_scalar_type(-q - 1))
         codes[items.codes, raters.codes] = grade
         codes.setflags(write=False)
-        # numbers that nobody declared may be measurements rather than grades
-        is_text = not all(map(is_number, scale.grades))
-        declared = scale.name != "observed" or is_text
-        return CodedRatings(codes=codes, categories=scale.values, declared=declared)
+        return CodedRatings(
+            codes=codes, categories=scale.values, declared=_is_declared(scale)
+        )
 
     is_dense = shape[0] * shape[1] <= max(_MAX_DENSE, _MAX_SPARSE * len(grade))
     if is_dense or shape[0] * q > _MAX_COUNTS:
@@ -518,6 +537,52 @@ def _clusters(sheet: Sheet, place: int, items: Column, row: Codes) -> tuple[str,
     return tuple(cluster.texts[code] for code in of_item.tolist())
 
 
+# ---- rows that stand for several items ----
+
+
+def _standing_for(sheet: Sheet, place: int) -> Sheet:
+    # the rows that stand for an item at least
+    freq = _whole_numbers(sheet, place, "frequency")
+    rows = freq > 0
+    if not rows.any():
+        raise sheet.refuse("no counts", kind="frequency")
+    return replace(
+        sheet,
+        columns=tuple(column.rows(rows) for column in sheet.columns),
+        numbers=sheet.numbers[rows],
+        freq=freq[rows],
+    )
+
+
+def _patterns(
+    sheet: Sheet, layout: Layout, options: Reading, findings: list[Finding]
+) -> RatingsFile:
+    # a wide table whose rows are patterns of ratings
+    names = [sheet.header[place] for place in layout.raters]
+    grades, freq = graded(sheet, layout.grades, options), sheet.freq
+    findings = findings + doubt_columns(sheet, layout, grades.codes, grades.scale, freq)
+    findings += doubt_names("raters", names)
+    part, names_of_parts = _parts(sheet, layout)
+    parts = [
+        RatingsPart(
+            group=of.get("group"),
+            session=of.get("session"),
+            raters=tuple(names),
+            ratings=_distinct(grades.codes[part == k], freq[part == k], grades.scale),
+        )
+        for k, of in enumerate(names_of_parts)
+    ]
+    n_missing, *counts = _often(grades, freq).tolist()
+    return _file_of(
+        *(sheet, layout, options, grades, parts, np.array(counts), findings),
+        item=[],  # names are those of rows
+        raters=names,
+        n_items=int(freq.sum()),
+        n_raters=len(names),
+        n_missing=n_missing,
+    )
+
+
 # ---- tables of counts ----
 
 
@@ -526,7 +591,11 @@ def _counted(
 ) -> RatingsFile:
     # a table of counts, or a contingency table
     names = [sheet.header[place] for place in layout.raters]
-    table = _whole_numbers(sheet, layout)
+    table = np.column_stack(
+        [_whole_numbers(sheet, place, layout.kind) for place in layout.raters]
+    )
+    if not table.any():
+        raise sheet.refuse("no counts", kind=layout.kind)
     findings = findings + doubt_counts(sheet, layout, table)
     name, order = "observed", list(range(len(names)))
     if options.categories is not None:
@@ -570,25 +639,16 @@ def _counted(
     )
 
 
-def _whole_numbers(sheet: Sheet, layout: Layout) -> Codes:
-    # -> (n_rows, n_categories)
-    table = []
-    for column in (sheet.columns[place] for place in layout.raters):
-        texts = [text or "0" for text in column.texts]
-        numbers = [float(text) if is_number(text) else -1.0 for text in texts]
-        for code, n in enumerate(numbers):
-            if not (n >= 0 and n.is_integer() and n < 2**53):
-                row = int(np.argmax(column.codes == code))
-                raise sheet.refuse(
-                    "count",
-                    sheet.where(row),
-                    kind=layout.kind,
-                    text=column.texts[code],
-                )
-        table.append(np.array(numbers, dtype=np.int64)[column.codes])
-    if not any(column.any() for column in table):
-        raise sheet.refuse("no counts", kind=layout.kind)
-    return np.column_stack(table)
+def _whole_numbers(sheet: Sheet, place: int, kind: str) -> Codes:
+    # -> (n_rows,)
+    column, empty = sheet.columns[place], "" if kind == "frequency" else "0"
+    numbers = [float(t) if is_number(t := u or empty) else -1.0 for u in column.texts]
+    for code, n in enumerate(numbers):
+        if not (n >= 0 and n.is_integer() and n <= _MAX_COUNT):
+            where = sheet.where(int(np.argmax(column.codes == code)))
+            text = column.texts[code]
+            raise sheet.refuse("count", where, place, kind=kind, text=text)
+    return np.array(numbers, dtype=np.int64)[column.codes]
 
 
 def _names_of_rows(sheet: Sheet, layout: Layout, names: list[str]) -> list[str]:
