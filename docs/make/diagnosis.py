@@ -18,7 +18,7 @@ SEES = (0.65, 0.7, 0.6, 0.7, 0.3, 0.85, 0.85, 0.9)  # how often each sees what i
 
 
 def draw(path: Path) -> None:
-    """Draw what ``masrel agree --diagnose`` shows of ratings with such raters."""
+    """Draw what ``masrel diagnose`` shows of ratings with such raters."""
     rng = np.random.default_rng(1)
     true = rng.integers(0, len(CATEGORIES), N_ITEMS)
     guesses = rng.integers(0, len(CATEGORIES), (N_ITEMS, len(SEES)))
@@ -32,7 +32,7 @@ def draw(path: Path) -> None:
             for (item, rater), code in np.ndenumerate(codes):
                 name = f"R{rater + 1}"
                 lines.writerow([item + 1, name, CATEGORIES[code], "simulated"])
-        call = ["agree", table, "--categories", ",".join(CATEGORIES), "--diagnose"]
+        call = ["diagnose", table, "--categories", ",".join(CATEGORIES)]
         options = ["--target", "items", "--figure", path]
         subprocess.run([sys.executable, "-m", "masrel", *call, *options], check=True)
 

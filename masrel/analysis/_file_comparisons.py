@@ -45,9 +45,10 @@ class _Groups:
     clusters: tuple[str, ...] | tuple[tuple[str, ...], ...] | None
 
 
-def _groups_of(parts: Sequence[RatingsPart]) -> _Groups:
+def _groups_of(name: str, parts: Sequence[RatingsPart]) -> _Groups:
     """Return groups with the same items in the same rows; others have their own."""
-    with placed("--compare"):
+    # name: the file's
+    with placed(name):
         coded = [code_ratings(part.ratings) for part in parts]
     rated = [_rated_rows(*both) for both in zip(parts, coded, strict=True)]
     items = [frozenset(rows) for rows in rated]
@@ -70,7 +71,7 @@ def _groups_of(parts: Sequence[RatingsPart]) -> _Groups:
             cluster = part.clusters[row] if part.clusters else ""
             if (known := clusters.setdefault((names, item), cluster)) != cluster:
                 raise RatingsError(
-                    f"--compare: item {item!r} needs one cluster in all groups, got "
+                    f"{name}: item {item!r} needs one cluster in all groups, got "
                     f"{known!r} and {cluster!r}"
                 )
     row_of = {item: row for row, item in enumerate(clusters)}
@@ -107,13 +108,13 @@ def comparisons(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
 def _difference_rows(
     file: RatingsFile, coefficients: Sequence[Coefficient], questions: Questions
 ) -> Answer:
+    name, by = file.read["file"], file.read["by"]
     if len(file.parts) < 2:
         raise ParameterError(
-            "--compare: needs two groups or more, so --by with the column that tells "
-            "them apart"
+            f"--by: needs a column that tells two groups or more apart, {by!r} has one"
         )
     pairs = {
-        (first, second): _groups_of((one, other))
+        (first, second): _groups_of(name, (one, other))
         for (one, first, _), (other, second, _) in itertools.combinations(
             parts_of(file), 2
         )
@@ -165,7 +166,7 @@ def _differences(
             "weights": questions.weights_of(entry),
             "clusters": groups.clusters,
         }
-        with placed("--compare", f"{first} and {second}"):
+        with placed(file.read["file"], f"{first} and {second}"):
             estimate = difference(entry, *ratings, level=questions.level, **of_pair)
             test = difference_test(entry, *ratings, **of_pair)
         row: Row = {
@@ -203,7 +204,7 @@ def _differences(
 def _equality_rows(
     file: RatingsFile, coefficients: Sequence[Coefficient], questions: Questions
 ) -> Answer:
-    groups = _groups_of(file.parts)
+    groups = _groups_of(file.read["file"], file.parts)
     results = [
         (entry, test, result)
         for entry in coefficients

@@ -28,7 +28,7 @@ USUAL = ("percent_agreement", "fleiss_kappa")
 """The coefficients that are estimated where none are named."""
 
 OF_MEASUREMENTS = ("icc_a1", "lin_ccc")
-"""The same where limits of agreement show that grades are measurements."""
+"""Those beside limits of agreement, whose grades are measurements."""
 
 # The coefficient that has metrics, and those of each rater's grades of two sessions
 _OF_METRIC = "krippendorff_alpha"
@@ -40,18 +40,11 @@ _SURE_TWO_SIDED = 0.90  # the level of which the lower end alone is as sure
 # What is named as a coefficient and is a table of its own
 _TABLES = {
     **dict.fromkeys(("mcnemar", "bowker", "stuart_maxwell", "bhapkar"), "--symmetry"),
-    "bland_altman": "--limits-of-agreement",
+    "bland_altman": "masrel limits",
 }
 
-
-_BY_ITEM = (
-    "retest",
-    "each_category",
-    "symmetry",
-    "indices",
-    "diagnose",
-    "limits_of_agreement",
-)
+# tables that take every item by itself
+_BY_ITEM = ("retest", "each_category", "symmetry", "indices")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,14 +93,12 @@ class Estimating:
 class Questions(Estimating):
     """What is to be told of a file: estimates, and a table for each question."""
 
+    command: str = "agree"  # the other ones have a table of their own
     retest: bool = False
     each_category: bool = False
     symmetry: bool = False
     indices: bool = False
-    compare: bool = False
-    diagnose: bool = False
     reference: str | None = None
-    limits_of_agreement: bool = False
     unit: str | None = None
     clusters: tuple[str, ...] = ()  # that of every item of the part, if items have any
 
@@ -121,11 +112,7 @@ class Questions(Estimating):
         """The coefficients that are named, or the usual ones."""
         if self.coefficients is not None:
             return self.coefficients
-        if self.metric is not None:
-            return [_OF_METRIC]
-        # weights are those of a kappa
-        is_measured = self.limits_of_agreement and self.weights == "identity"
-        return list(OF_MEASUREMENTS if is_measured else USUAL)
+        return list(USUAL) if self.metric is None else [_OF_METRIC]
 
     def weights_of(self, entry: "Coefficient") -> Any:
         """Return the weights, of a coefficient that takes any."""
@@ -156,63 +143,33 @@ class Questions(Estimating):
             **by_metric,
         }
 
-    def checked(self, by: str | None, clusters: str | None) -> "Questions":
+    def checked(self, clusters: str | None) -> "Questions":
         """Return the same with defaults, or refuse what excludes each other."""
         from masrel.agreement._engine import check_level
         from masrel.agreement._weights import plain_name
 
         check_level(self.level)  # nothing else looks at it where there is no interval
         for name in self.names:
-            if option := _TABLES.get(name.lower().replace("-", "_")):
+            if other := _TABLES.get(name.lower().replace("-", "_")):
                 raise ParameterError(
-                    f"--coefficients: needed coefficients, got {name!r}: {option} has "
+                    f"--coefficients: needed coefficients, got {name!r}: {other} has "
                     "that table"
                 )
         by_item = [name for name in _BY_ITEM if getattr(self, name)]
-        other = f"--{by_item[0].replace('_', '-')}" if by_item else None
-        got = f"--target {self.target}"
-        of_raters = self.target in ("raters", "both")
+        option = f"--{by_item[0].replace('_', '-')}" if by_item else None
         refuse(
             (
-                self.reference is not None and not self.diagnose,
-                "--reference: belongs to --diagnose, got it alone",
-            ),
-            (
-                self.unit is not None and not self.limits_of_agreement,
-                "--unit: belongs to --limits-of-agreement, got it alone",
-            ),
-            (
-                self.diagnose and self.limits_of_agreement,
-                "--diagnose and --limits-of-agreement: each has a figure, so needs one "
-                "of them, got both",
-            ),
-            (
-                self.diagnose and of_raters,
-                "--diagnose: is of these raters, so its intervals generalise to other "
-                f"items: --target items or none, got {got}",
-            ),
-            (
-                clusters is not None and other is not None,
-                f"--clusters: {other} takes every item by itself, so needs one of "
+                clusters is not None and option is not None,
+                f"--clusters: {option} takes every item by itself, so needs one of "
                 "them, got both",
             ),
             (
-                clusters is not None and of_raters,
+                clusters is not None and self.target in ("raters", "both"),
                 "--clusters: what is left out is a cluster of items, so it takes "
-                f"--target items, got {got}",
-            ),
-            (
-                self.compare and by is None,
-                "--compare: needs --by with the column that tells the groups apart",
-            ),
-            (
-                self.compare and of_raters,
-                "--compare: a difference generalises to other items, so it takes "
-                f"--target items, got {got}",
+                f"--target items, got --target {self.target}",
             ),
         )
-        of_items = self.compare or clusters is not None
-        target = "items" if of_items else self.target
+        target = self.target if clusters is None else "items"
         return replace(self, weights=plain_name(self.weights), target=target)
 
     def between_raters(self, file: "RatingsFile") -> "Questions | None":
@@ -365,12 +322,12 @@ def parts_of(file: "RatingsFile") -> "Iterator[tuple[RatingsPart, str, Row]]":
 
 
 @contextmanager
-def placed(option: str, place: str | None = "") -> Iterator[None]:
-    """Say of a refusal which option it is of, and which part of the file."""
+def placed(start: str, place: str | None = "") -> Iterator[None]:
+    """Say of a refusal which file or option it is of, and which part of the file."""
     try:
         yield
     except MasrelError as error:
-        where = f"{option}: {place}" if place else option
+        where = f"{start}: {place}" if place else start
         raise type(error)(f"{where}: {error}") from error
 
 

@@ -102,13 +102,9 @@ def answers(
         further = [
             answer
             for name, question in _QUESTIONS.items()
-            if getattr(questions, name)
-            for answer in question(
-                file if name in _WITH_REFERENCE else others, questions
-            )
+            if name == questions.command or getattr(questions, name, False)
+            for answer in question(file, questions)
         ]
-        if between is not None and questions.compare:
-            further += comparisons(others, between)
         first = [] if between is None else [agreement(others, between)]
     return others, first + further
 
@@ -117,7 +113,7 @@ def _without_reference(file: RatingsFile, reference: str) -> RatingsFile:
     """Return the ratings of all but the rater whom the others are held against."""
     parts = []
     for part in file.parts:
-        with placed("--diagnose"):
+        with placed(file.read["file"]):
             coded = code_ratings(part.ratings)
         others = [place for place, name in enumerate(part.raters) if name != reference]
         if len(others) == len(part.raters):
@@ -291,12 +287,14 @@ def _table(
     name: str,
     file: RatingsFile,
     rows_of: Callable[[RatingsPart], Iterable[tuple[Row, ...]]],
+    start: str = "",
 ) -> Answer:
     """Return rows of two raters of each part, and what a table shows of each."""
+    # start: the option that a refusal begins with, where there is one
     # rows_of: a row for JSON, and the cells of each row of a table that it becomes
     rows, shown = [], []
     for part, group, keys in parts_of(file):
-        with placed(f"--{name.replace('_', '-')}", group):
+        with placed(start or file.read["file"], group):
             for row, *cells in rows_of(part):
                 rows.append({**keys, **row})
                 shown += [{**rows[-1], "group": group, **of} for of in cells]
@@ -310,7 +308,7 @@ def _table(
 
 def _symmetry(file: RatingsFile, _: Questions) -> Iterator[Answer]:
     """Give whether changes between categories go both ways alike often."""
-    answer = _table("symmetry", file, _symmetry_rows)
+    answer = _table("symmetry", file, _symmetry_rows, "--symmetry")
     texts = {"binomial": "exact_test", "chi-squared": "test"}
     notes = [
         note(texts[row["distribution"]], test=row["test"], hypothesis=row["hypothesis"])
@@ -352,7 +350,9 @@ def _symmetry_rows(part: RatingsPart) -> Iterator[tuple[Row, Row]]:
 
 def _indices(file: RatingsFile, _: Questions) -> Iterator[Answer]:
     """Give what the margins of two raters and two categories do to kappa."""
-    answer = _table("indices", file, partial(_of_margins, file.scale.grades))
+    answer = _table(
+        "indices", file, partial(_of_margins, file.scale.grades), "--indices"
+    )
     notes = tuple(map(note, ("pabak", "on_category", "largest")))
     yield replace(answer, notes=notes)
 
@@ -412,7 +412,7 @@ _QUANTITIES = {"mean": "Mean", "lower": "Lower limit", "upper": "Upper limit"}
 
 def _limits(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
     """Give between which bounds the differences of two raters lie."""
-    check_order(file, "--limits-of-agreement")
+    check_order(file, file.read["file"])
     panels = []
 
     def rows_of(part: RatingsPart) -> Iterator[tuple[Row, ...]]:
@@ -458,19 +458,16 @@ def _diagnosis(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
     """Give raters, pairs, categories and confusions of every part of the ratings."""
     from masrel.intervals.diagnosis import diagnose
 
-    if questions.takes_all or (
-        questions.coefficients is None and questions.metric is None
-    ):
+    if questions.coefficients is None and questions.metric is None:
         questions = replace(questions, coefficients=["fleiss_kappa"])
-    several = f"--coefficients {','.join(questions.names)}"
-    needed = f"--diagnose: needs one coefficient, got {several}"
-    if len(questions.names) > 1:
-        raise ParameterError(needed)
+    if questions.takes_all or len(questions.names) > 1:
+        names = ",".join(questions.names)
+        raise ParameterError(f"--coefficients: needs one coefficient, got {names}")
     (entry,) = entries(questions, file, file.parts)
     title, grades = questions.title(entry), file.scale.grades
     parts = []
     for part, group, keys in parts_of(file):
-        with placed("--diagnose", group):
+        with placed(file.read["file"], group):
             result = diagnose(
                 on_grades(code_ratings(part.ratings), entry, file),
                 coefficient=entry,
@@ -603,8 +600,7 @@ _QUESTIONS = {
     "diagnose": _diagnosis,
     "symmetry": _symmetry,
     "indices": _indices,
-    "limits_of_agreement": _limits,
+    "limits": _limits,
+    "compare": comparisons,
 }
-"""Options to what answers them, in the order in which it is shown."""
-
-_WITH_REFERENCE = ("retest", "diagnose")
+"""Options and commands to what answers them, in the order in which it is shown."""

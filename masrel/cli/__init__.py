@@ -29,11 +29,14 @@ __all__ = ["main"]
 GROUPS = {
     "Ratings you have": {
         "agree": "Agreement of the raters in any file, no study needed.",
-        "audit": "Whether any table gives the agreement that a paper prints.",
+        "compare": "Whether groups of ratings differ in agreement.",
+        "diagnose": "Which rater, which pair and which category disagree.",
+        "limits": "Limits of agreement of two raters who measured.",
         "latent": "Biases and noises of the raters in any file, items on one scale.",
+        "plan": "How many items and raters a study needs, and what it can show.",
+        "audit": "Whether any table gives the agreement that a paper prints.",
     },
     "A study": {
-        "plan": "How many items and raters a study needs, and what it can show.",
         "init": "Make a new study from a template.",
         "check": "Validate a study and say every error.",
         "schedule": "Draw the schedules of a study, once.",
@@ -72,7 +75,7 @@ VERBS = {verb: text for verbs in GROUPS.values() for verb, text in verbs.items()
 """Verb to summary. The verb ``x`` is the command ``x`` of the module ``x``."""
 
 # verbs that need no study; the modules of the others are in the laboratory
-_STATISTICS = ("agree", "audit", "latent", "plan")
+_STATISTICS = tuple(GROUPS["Ratings you have"])
 
 # parameters whose options are called otherwise
 _CALLED = {

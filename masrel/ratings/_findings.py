@@ -32,6 +32,8 @@ class Reading:
         Columns of a long table, one row a rating.
     raters, ignore : str or tuple of str
         Columns of a wide table that are raters, and columns that are left aside.
+    reference : str or None
+        The rater whom others are held against, whatever the column is called.
     no_item, no_header : bool
         Whether no column names the items; whether the first line is a row.
     session, by : str or None
@@ -77,6 +79,7 @@ class Reading:
     grade: str | None = None
     raters: str | tuple[str, ...] = ()
     ignore: str | tuple[str, ...] = ()
+    reference: str | None = None
     no_item: bool = False
     no_header: bool = False
     session: str | None = None

@@ -1,4 +1,4 @@
-"""masrel agree --diagnose and --clusters: as computed by the library, and refusals."""
+"""masrel diagnose and compare, and --clusters: as computed by the library."""
 
 import json
 from pathlib import Path
@@ -52,16 +52,17 @@ def sites(tmp_path: Path) -> Path:
     return path
 
 
-def record(masrel: Caller, *arguments: object) -> Record:
-    done = masrel("agree", *arguments, "--json", "-")
+def record(masrel: Caller, *call: object) -> Record:
+    done = masrel(*call, "--json", "-")
     assert done.code in (0, None), done.err
     document: Record = json.loads(done.out)
     return document
 
 
 def test_a_diagnosis_is_that_of_the_library(masrel: Caller, wide: Path) -> None:
-    arguments = (wide, "--ignore", "site", "--diagnose", "--target", "items")
-    document = record(masrel, *arguments, "--reference", "Gold")
+    arguments = (wide, "--ignore", "site", "--target", "items")
+    document = record(masrel, "diagnose", *arguments, "--reference", "Gold")
+    assert document["format"] == "masrel diagnose 1"
     (part,) = read_ratings(wide, Reading(ignore=["site"])).parts
     expected = intervals.diagnose(
         part.ratings, target="items", raters=part.raters, reference="Gold"
@@ -90,11 +91,10 @@ def test_the_reference_is_in_no_estimate_between_raters(
     masrel: Caller, wide: Path
 ) -> None:
     ratings = (wide, "--ignore", "site", "--coefficients", "gwet_ac")
-    further = ("--each-category", "--target", "items")
-    with_it = record(masrel, *ratings, *further, "--diagnose", "--reference", "Gold")
-    without = record(masrel, *ratings, *further, "--ignore", "Gold")
+    ratings = (*ratings, "--target", "items")
+    with_it = record(masrel, "diagnose", *ratings, "--reference", "Gold")
+    without = record(masrel, "agree", *ratings, "--ignore", "Gold")
     assert with_it["estimates"] == without["estimates"]
-    assert with_it["categories"] == without["categories"]
     (estimate,) = with_it["estimates"]
     for row in with_it["diagnosis_raters"]:
         assert row["without"] - row["change"] == pytest.approx(estimate["value"])
@@ -111,27 +111,27 @@ def test_of_many_raters_the_pairs_that_agree_least_are_shown(
         lines.append(f"i{k}," + ",".join(map(str, seen)))
     path = tmp_path / "many.csv"
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    document = record(masrel, path, "--diagnose")
+    document = record(masrel, "diagnose", path)
     assert len(document["diagnosis_pairs"]) == 45
-    out = masrel("agree", path, "--diagnose").out
+    out = masrel("diagnose", path).out
     assert "The 20 pairs that agree least; --json has 45." in out
     lowest = min(row["value"] for row in document["diagnosis_pairs"])
     below = out.split("every two raters\n")[1].splitlines()
     assert below[2].split()[2].replace("−", "-") == f"{lowest:.3f}"
 
 
-@pytest.mark.parametrize("option", ["--diagnose", "--compare"])
+@pytest.mark.parametrize("command", ["diagnose", "compare"])
 def test_sets_of_labels_are_taken_as_such(
-    masrel: Caller, tmp_path: Path, option: str
+    masrel: Caller, tmp_path: Path, command: str
 ) -> None:
     rows = [("x", "a;b", "a", "a"), ("x", "b", "b", "b;c"), ("x", "c", "c", "c")]
     rows += [("y", "b", "b", "b"), ("y", "a;c", "c", "a"), ("y", "c", "c", "c")]
     path = tmp_path / "sets.csv"
     lines = [",".join((str(k), *row)) for k, row in enumerate(rows)]
     path.write_text("item,g,A,B,C\n" + "\n".join(lines) + "\n", encoding="utf-8")
-    document = record(masrel, path, "--by", "g", "--metric", "jaccard", option)
+    document = record(masrel, command, path, "--by", "g", "--metric", "jaccard")
     values = [row["value"] for row in document["estimates"]]
-    if option == "--compare":
+    if command == "compare":
         (row,) = document["differences"]
         assert row["value"] == pytest.approx(values[0] - values[1], rel=1e-12)
     else:
@@ -141,7 +141,7 @@ def test_sets_of_labels_are_taken_as_such(
 
 def test_clusters_are_left_out_as_in_the_library(masrel: Caller, sites: Path) -> None:
     names = ("--item", "patient,tooth", "--ignore", "side", "--clusters", "patient")
-    document = record(masrel, sites, *names, "--coefficients", "scott_pi")
+    document = record(masrel, "agree", sites, *names, "--coefficients", "scott_pi")
     (row,) = document["estimates"]
     (part,) = read_ratings(
         sites, Reading(item="patient,tooth", ignore=["side"], clusters="patient")
@@ -161,7 +161,7 @@ def test_groups_with_clusters_in_common_are_compared_cluster_by_cluster(
 ) -> None:
     names = ("--item", "patient,tooth", "--by", "side", "--clusters", "patient")
     coefficients = ("--coefficients", "fleiss_kappa")
-    document = record(masrel, sites, *names, "--compare", *coefficients)
+    document = record(masrel, "compare", sites, *names, *coefficients)
     (row,) = document["differences"]
     file = read_ratings(
         sites, Reading(item="patient,tooth", by="side", clusters="patient")

@@ -1,4 +1,4 @@
-"""masrel agree: tables below that of agreement, by hand, published, and as computed."""
+"""masrel agree and compare: further tables, by hand, published, and as computed."""
 
 import csv
 import itertools
@@ -60,8 +60,8 @@ def pairs_of(table: Sequence[Sequence[int]], names: str) -> list[tuple[str, str,
     return [(f"I{n}", *pair) for n, pair in enumerate(both)]
 
 
-def record(masrel: Caller, *arguments: object) -> Record:
-    done = masrel("agree", *arguments, "--json", "-")
+def record(masrel: Caller, *arguments: object, command: str = "agree") -> Record:
+    done = masrel(command, *arguments, "--json", "-")
     assert done.code in (0, None), done.err
     document: Record = json.loads(done.out)
     return document
@@ -254,7 +254,8 @@ def test_indices_by_hand(masrel: Caller, tmp_path: Path) -> None:
 def test_differences_of_clinics_are_those_of_the_library(
     masrel: Caller, clinics: Path
 ) -> None:
-    document = record(masrel, clinics, "--by", "clinic", "--compare")
+    document = record(masrel, clinics, "--by", "clinic", command="compare")
+    assert document["format"] == "masrel compare 1"
     found = [
         row for row in document["differences"] if row["coefficient"] == "fleiss_kappa"
     ]
@@ -300,8 +301,8 @@ def test_groups_of_the_same_items_are_compared_item_by_item(
     ]
     rows = rows[:10] + rows[10:][::-1]  # by name, not by place
     path = write(tmp_path / "w.csv", "when,item,Kim,Lee", rows)
-    names = ("--by", "when", "--compare", "--coefficients", "percent_agreement")
-    (row,) = record(masrel, path, *names)["differences"]
+    names = ("--by", "when", "--coefficients", "percent_agreement")
+    (row,) = record(masrel, path, *names, command="compare")["differences"]
     both = [[float(p[0] == p[1]) for p in of.split()] for of in (before, after)]
     expected = stats.ttest_rel(*both)
     assert row["design"] == "dependent"
@@ -330,8 +331,8 @@ def test_three_groups_of_other_items_are_tested_for_equality(
     masrel: Caller, tmp_path: Path
 ) -> None:
     path = three_groups(tmp_path, same_items=False)
-    names = ("--by", "when", "--compare", "--coefficients", "scott_pi")
-    document = record(masrel, path, *names)
+    names = ("--by", "when", "--coefficients", "scott_pi")
+    document = record(masrel, path, *names, command="compare")
     estimates, tests = document["estimates"], document["equality"]
     assert [test["test"] for test in tests] == ["equality_test", "donner_test"]
     precision = np.array([e["standard_error"] for e in estimates]) ** -2.0
@@ -353,8 +354,8 @@ def test_three_groups_of_the_same_items_are_tested_by_hotellings_t2(
     expected = intervals.differences(
         "cohen_kappa", sets, categories=["0", "1"]
     ).equality
-    names = ("--by", "when", "--compare", "--coefficients", "cohen_kappa")
-    (test,) = record(masrel, path, *names)["equality"]
+    names = ("--by", "when", "--coefficients", "cohen_kappa")
+    (test,) = record(masrel, path, *names, command="compare")["equality"]
     assert test["statistic"] == pytest.approx(expected.statistic, rel=1e-12)
     assert test["df"] == [2.0, 38.0]
     assert test["p_value"] == pytest.approx(expected.p_value, rel=1e-12)

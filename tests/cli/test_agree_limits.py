@@ -1,4 +1,4 @@
-"""`masrel agree` of measurements: SEM, concordance, and limits of agreement drawn."""
+"""Measurements: `masrel limits`, and SEM and concordance of `masrel agree`."""
 
 import json
 from pathlib import Path
@@ -20,7 +20,7 @@ def pairs(tmp_path: Path) -> Path:
 
 
 def test_table_and_record_are_those_of_the_library(masrel: Caller, pairs: Path) -> None:
-    call = ("agree", pairs, "--limits-of-agreement", "--unit", "deg")
+    call = ("limits", pairs, "--unit", "deg")
     limits = limits_of_agreement(PAIRS)
     out = masrel(*call).out
     assert "Limits of agreement (deg)" in out
@@ -36,19 +36,10 @@ def test_table_and_record_are_those_of_the_library(masrel: Caller, pairs: Path) 
 def test_limits_come_with_coefficients_of_measurements(
     masrel: Caller, pairs: Path
 ) -> None:
-    def names(*more: str) -> list[str]:
-        call = ("agree", pairs, "--limits-of-agreement", "--json", "-", *more)
-        document = json.loads(masrel(*call).out)
-        return [estimate["coefficient"] for estimate in document["estimates"]]
-
-    for target in ((), ("--target", "items"), ("--target", "both")):
-        assert names(*target) == ["icc_a1", "lin_ccc"]
-    assert names("--coefficients", "scott_pi") == ["scott_pi"]
-    assert names("--metric", "interval") == ["krippendorff_alpha"]
-    assert names("--weights", "linear") == ["percent_agreement", "fleiss_kappa"]
-    concordance = json.loads(
-        masrel("agree", pairs, "--limits-of-agreement", "--json", "-").out
-    )["estimates"][1]
+    document = json.loads(masrel("limits", pairs, "--json", "-").out)
+    assert document["format"] == "masrel limits 1"
+    _, concordance = document["estimates"]
+    assert [e["coefficient"] for e in document["estimates"]] == ["icc_a1", "lin_ccc"]
     assert concordance["value"] == lin_ccc(PAIRS).value
     assert concordance["interval"]["low"] == lin_ccc(PAIRS).interval.low
 

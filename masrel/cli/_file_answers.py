@@ -1,0 +1,310 @@
+"""What the commands that estimate agreement have in common: options, and answers."""
+
+import shlex
+import shutil
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
+
+import click
+
+from masrel.analysis._file_estimates import USUAL, Answer, Questions
+from masrel.cli._options import (
+    Command,
+    Decorator,
+    OutputOptions,
+    echo_notes,
+    grouped,
+    output_options,
+    split_commas,
+    write_output,
+)
+from masrel.cli._paths import InputFile
+from masrel.cli._reading import (
+    read_file,
+    reading_options,
+    table_options,
+    weights_of_option,
+)
+from masrel.errors import ParameterError
+from masrel.estimates import IntervalMethod
+from masrel.ratings._findings import Reading
+
+if TYPE_CHECKING:
+    from masrel.plots._drawn_values import Content, Drawn
+    from masrel.ratings import RatingsFile
+
+# of notes where there is no terminal, and the largest in one
+_WIDTHS = (88, 100)
+
+_DRAWERS = {
+    "diagnosis_pairs": "masrel.plots._rater_pairs:rater_figure",
+    "limits_of_agreement": "masrel.plots._limits_figure:limits_figure",
+}
+
+
+def _list_register(
+    context: click.Context, _: click.Parameter, value: list[str] | None
+) -> list[str] | None:
+    # "list" needs no file: it is seen before the file is missed
+    if value != ["list"] or context.resilient_parsing:
+        return value
+    from masrel.agreement import COEFFICIENTS
+    from masrel.tables._tables import aligned
+
+    lines = [("name", "title", "raters", "weights", "also called")]
+    for entry in COEFFICIENTS.values():
+        fewest, most = entry.n_raters
+        raters = str(fewest) if most == fewest else f"{fewest} or more"
+        if entry.shape == "pairs":
+            raters += ", each twice (--retest)"
+        weights = "any" if entry.weighted else "none"
+        aliases = ", ".join(entry.aliases)
+        lines.append((entry.name, entry.title, raters, weights, aliases))
+    click.echo("\n".join(aligned(lines, ["left"] * 5, rule=True)))
+    context.exit()
+
+
+_ESTIMATING = {
+    "coefficients": click.option(
+        "--coefficients",
+        metavar="NAMES",
+        show_default=",".join(USUAL),
+        type=split_commas,
+        is_eager=True,
+        callback=_list_register,
+        help="Names of coefficients, separated by commas; all that fit (but "
+        "lin_ccc, sem and mdc); or list, which prints them and ends.",
+    ),
+    "weights": click.option(
+        "--weights",
+        type=weights_of_option,
+        default="identity",
+        metavar="NAME|FILE",
+        show_default=True,
+        help="identity, linear, quadratic, ordinal, radical, ratio, circular or "
+        "bipolar; or the file of a matrix, as w.csv.",
+    ),
+    "metric": click.option(
+        "--metric",
+        type=click.Choice(
+            ["nominal", "ordinal", "interval", "ratio", "jaccard", "masi"]
+        ),
+        help="Krippendorff's alpha by his difference function in place of weights; "
+        "jaccard and masi take grades of several labels: a;b, a|b or ['a', 'b'].",
+    ),
+    "target": click.option(
+        "--target",
+        type=click.Choice(["items", "raters", "both"]),
+        help="What a new study would draw anew; no interval without it.",
+    ),
+    "interval": click.option(
+        "--interval",
+        type=click.Choice(get_args(IntervalMethod)),
+        default="auto",
+        show_default=True,
+        help="Kind of interval; auto is the newest rule that chooses one; analytic is "
+        "by formula, of ICC for both from F.",
+    ),
+    "level": click.option(
+        "--level",
+        default=0.95,
+        show_default=True,
+        help="Level of intervals.",
+    ),
+    "resamples": click.option(
+        "--resamples", "n_resamples", default=10_000, show_default=True
+    ),
+    "seed": click.option(
+        "--seed", default=0, show_default=True, help="Seed of resampling."
+    ),
+    "words": click.option(
+        "--words",
+        type=click.Choice(["landis_koch", "altman", "fleiss", "cicchetti"]),
+        help="Name the best band that the true value reaches with 95 % probability.",
+    ),
+}
+"""How estimates are made, by names of options."""
+
+by_option = click.option(
+    "--by", metavar="COL", help="Estimate each group of this column."
+)
+clusters_option = click.option(
+    "--clusters",
+    metavar="COL",
+    help="Column of the clusters that items come in, such as patients with several "
+    "sites: they are left out as a whole.",
+)
+
+
+def answering(
+    *reading: Callable[..., Any],
+    estimating: Sequence[str],
+    questions: Sequence[Callable[..., Any]] = (),
+    figure: str,
+    sentence: str | None = None,
+) -> Decorator:
+    """Return what a command takes: a file, how it is read, what is asked, and forms."""
+    # reading, questions: options of the command's own; estimating: names of those
+    # that it shares with others; figure, sentence: helps of these forms
+    shared = [_ESTIMATING[name] for name in estimating]
+    explain = click.option(
+        "--explain", is_flag=True, help="Say in notes what every interval promises."
+    )
+    decorators = (
+        click.argument("file", type=InputFile(path_type=Path, allow_dash=True)),
+        grouped("reading", Reading, *reading_options, *table_options, *reading),
+        grouped("questions", Questions, *shared, *questions),
+        explain,
+        output_options(
+            json="Write a record of all here; - prints it, and nothing else, on "
+            "stdout.",
+            figure=figure,
+            csv="Print every digit as CSV.",
+            latex="Print a LaTeX table.",
+            sentence=sentence,
+        ),
+    )
+
+    def decorate(command: Command) -> Command:
+        for decorator in reversed(decorators):
+            command = decorator(command)
+        return command
+
+    return decorate
+
+
+def show_answers(
+    file: Path,
+    reading: Reading,
+    questions: Questions,
+    *,
+    explain: bool,
+    output: OutputOptions,
+) -> None:
+    """Read a file, and print or write what is asked of it."""
+    questions = replace(
+        questions.checked(reading.clusters), reference=reading.reference
+    )
+    has_figure = questions.target or questions.command in ("diagnose", "limits")
+    if output.figure is not None and not has_figure:
+        raise ParameterError(
+            "--figure: shows intervals, so it needs --target raters, items or both"
+        )
+    ratings = read_file(file, reading)
+    if isinstance(questions.weights, Path):
+        from masrel.ratings._reader import read_weights
+
+        questions = replace(
+            questions,
+            weights=read_weights(
+                questions.weights,
+                ratings.scale.grades,
+                is_ordered=ratings.is_ordered,
+            ),
+        )
+    from masrel.analysis._file_questions import answers
+    from masrel.tables._answer_tables import agreement_sentences
+    from masrel.tables._first_screen import first_screen, reading_notes
+    from masrel.tables._tables import SIMULATED
+
+    others, answered = answers(ratings, questions)
+    table, *more = first_screen(
+        *(others, questions, answered), explain=explain, in_sentences=output.sentence
+    )
+    notes = reading_notes(others, questions, answered[0])
+    is_sentence = output.sentence and answered[0].name == "agreement"
+    sentences = ""
+    if is_sentence:
+        sentences = agreement_sentences(
+            answered[0], bands=questions.words, data=table.data
+        )
+    width, widest = _WIDTHS
+    if sys.stdout.isatty():
+        width = min(shutil.get_terminal_size((width, 24)).columns, widest)
+    write_output(
+        output,
+        document=lambda: _record(others, reading, questions, answered, notes),
+        text=lambda: sentences if is_sentence else table,
+        figure=lambda: _figure(answered, questions),
+        stamp=SIMULATED if others.simulated else "",
+        notes=(*table.read, *notes),
+        more=more,
+        width=width,
+    )
+    if is_sentence:
+        echo_notes((*table.read, *table.notes))
+    # what came through a pipe is gone
+    if questions.target is None and Path(others.read["file"]).is_file():
+        _offer_interval(answered[0], questions)
+
+
+def _record(
+    ratings: "RatingsFile",
+    reading: Reading,
+    questions: Questions,
+    answers: Sequence[Answer],
+    notes: list[str],
+) -> dict[str, object]:
+    """Return everything for JSON."""
+    from masrel import __version__
+    from masrel.tables._answer_tables import answer_documents
+
+    read, scale = dict(ratings.read), ratings.scale
+    documents = {of.name: answer_documents(of, questions.words) for of in answers}
+    return {
+        "masrel": __version__,
+        "file": read.pop("file"),
+        "sha256": ratings.sha256(),
+        "options": {**questions.record(), "by": read["by"]},
+        "scale": {
+            "name": scale.name,
+            "grades": list(scale.grades),
+            "values": list(scale.values),
+        },
+        "read": {**read, "options": reading.record()},
+        "notes": notes,
+        "estimates": documents.pop("agreement", []),
+        **documents,
+    }
+
+
+def _figure(answers: Sequence[Answer], questions: Questions) -> "Content | Drawn":
+    """Return what is drawn: the figure of an answer, else of the estimates."""
+    from masrel.plots._drawn_values import Drawn
+    from masrel.tables._answer_tables import agreement_forest
+
+    for answer in answers:
+        if answer.figure:
+            return Drawn(_DRAWERS[answer.name], (answer.figure, answer.of))
+    first, *others = answers
+    rows = first.estimates
+    if first.name != "agreement":
+        rows += tuple(row for of in others for row in of.estimates)
+    return agreement_forest(rows, questions.target or "items")
+
+
+def _offer_interval(answer: Answer, questions: Questions) -> None:
+    """Print the command that gives an interval, where there is none."""
+    from masrel.agreement import COEFFICIENTS
+
+    rows = answer.estimates if answer.name == "agreement" else ()
+    entries = [COEFFICIENTS[row.estimate.coefficient] for row in rows]
+    if not any(
+        not entry.has_interval and entry.formula is not None and not row.estimate.reason
+        for entry, row in zip(entries, rows, strict=True)
+    ):
+        return
+    more, but = ["--target", "items"], ""
+    without = [e for e in entries if e.formula is None and not e.has_interval]
+    if without and not questions.takes_all:  # named, they would be refused
+        others = (entry.name for entry in entries if entry not in without)
+        more = ["--coefficients", ",".join(dict.fromkeys(others)), *more]
+        but = f" (without {', '.join(dict.fromkeys(e.title for e in without))})"
+    arguments = sys.argv[2:]  # as they were typed
+    # what follows a -- is no option
+    parts = [*more, *arguments] if "--" in arguments else [*arguments, *more]
+    command = shlex.join(["masrel", questions.command, *parts])
+    click.echo(f"no interval; for other items like these{but}: {command}", err=True)

@@ -1,0 +1,53 @@
+"""``masrel diagnose``: which rater, pair and category agreement is lost by."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import click
+
+from masrel.analysis._file_estimates import Questions
+from masrel.cli._file_answers import answering, by_option, show_answers
+from masrel.cli._options import OutputOptions, split_commas
+from masrel.ratings._findings import Reading
+
+
+@click.command("diagnose")
+@answering(
+    by_option,
+    click.option(
+        "--reference",
+        metavar="RATER",
+        help="The rater that the others are held against, and that is in no estimate "
+        "between raters.",
+    ),
+    estimating=("weights", "metric", "level"),
+    questions=[
+        click.option(
+            "--coefficients",
+            metavar="NAME",
+            type=split_commas,
+            show_default="fleiss_kappa",
+            help="Name of the coefficient; masrel agree --coefficients list has all.",
+        ),
+        click.option(
+            "--target",
+            type=click.Choice(["items"]),
+            help="Intervals for other items, graded by these raters; none without it.",
+        ),
+    ],
+    figure="Draw raters, pairs and confusions into this .png, .svg or .pdf.",
+)
+def diagnose(
+    file: Path,
+    reading: Reading,
+    questions: Questions,
+    explain: bool,
+    output: OutputOptions,
+) -> None:
+    """Say which rater, which pair and which category of FILE disagree.
+
+    Every pair of raters, all raters without each, every category, and what each rater
+    says where another says something else. FILE is whatever masrel agree reads.
+    """
+    questions = replace(questions, command="diagnose")
+    show_answers(file, reading, questions, explain=explain, output=output)
