@@ -257,12 +257,14 @@ _TEXTS = {
     "members": "needed one file in it, got {n}: {members}",
     "unpacked": "is more than {most} bytes when unpacked: {do}",
     "kind": "needed text, got a file of the kind {suffix}",
+    "html": "is HTML, as web programs call .xls, too: open it in a spreadsheet program "
+    "and save it as .xlsx or CSV",
     "no stream": "--stream: needed a Parquet file, or text in UTF-8 with a separator "
     "that is no blank, as it stands and not packed, without --transpose, --sheet and "
     "--from",
     # text
     "encoding": "line {line}: needed {encoding} text, got the byte 0x{byte:02x}; "
-    "--encoding {likely} may be right",
+    "--encoding {hint}",
     "zero byte": "line {line}: needed text, got a zero byte{hint}",
     "comment or header": "line {line}: begins with # and has as many cells as the line "
     "below: take the # away if it is the header, or the line if it is a comment",

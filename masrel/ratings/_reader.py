@@ -55,6 +55,7 @@ from masrel.ratings._sheet import (
     finished,
     long_cells,
     read_text,
+    refuse_html,
     unpacked,
 )
 from masrel.scales import Scale
@@ -201,6 +202,7 @@ def _read_sheet(path: Path | str, options: Reading) -> Sheet:
         raise refusal(name, "empty")
     sha256 = partial(str, hashlib.sha256(data).hexdigest())  # which pickle takes
     inner, data = unpacked(name, data, is_export=options.source is not None)
+    refuse_html(name, data)
     suffix = Path(inner).suffix.lower()
     if options.sheet is not None and suffix not in WORKBOOKS:
         raise refusal(name, "no workbook", sheet=options.sheet)

@@ -70,6 +70,24 @@ _MARKS = {  # how files begin that are no text, and what their names end in
     b"(\xb5/\xfd": ".zst, which is not read",
     b"%PDF": ".pdf, which is not read",
 }
+_HTML = re.compile(
+    rb"\s*<(!doctype\s+html|html|head|meta|body|div|style|table)\b", re.IGNORECASE
+)
+# Encodings of one byte a letter, and letters beyond ASCII that are frequent in them.
+_WESTERN, _CYRILLIC = "àáâãäåæçèéêëìíîïñòóôõöøùúûüßœ", "оеаинтсрвл"
+_LETTERS = {
+    "cp1252": _WESTERN,
+    "cp1250": "áéíóúýäöüßąćčďęěłńňőřśšťůűźżž",
+    "cp1254": "âçğıîöşü",
+    "cp1251": _CYRILLIC,
+    "koi8-r": _CYRILLIC,
+    "cp866": _CYRILLIC,
+    "cp1253": "αάοόιίεέτσςνηήυρ",
+    "cp1255": "יולאמהרבתנ",
+    "mac-roman": _WESTERN,
+    "cp850": _WESTERN,
+}
+_WORD = re.compile(r"[^\W\d_]*[^\W\d_\0-\x7f][^\W\d_]*")  # with a letter beyond ASCII
 _UNPLAIN = re.compile(r"[^\x21-\x7e]")  # blanks, and letters that may have two forms
 _SNIFFED = 20  # lines that the separator is found in
 _CHUNK = 1 << 14  # records that are taken apart at once
@@ -302,6 +320,13 @@ def read_foreign(
         raise refusal(name, "damaged", suffix=suffix, error=line) from error
 
 
+def refuse_html(name: str, data: bytes) -> None:
+    """Refuse what web programs export as if it were a workbook."""
+    head = data[:1000].replace(b"\0", b"")  # in UTF-16, too
+    if _HTML.match(head.lstrip(b"\xef\xbb\xbf\xff\xfe")):
+        raise refusal(name, "html")
+
+
 def decoded(name: str, data: bytes, encoding: str | None, n_before: int = 0) -> str:
     """Return bytes as text, by the encoding, or by their mark, or as UTF-8."""
     # n_before: lines of the file before these
@@ -310,16 +335,20 @@ def decoded(name: str, data: bytes, encoding: str | None, n_before: int = 0) -> 
     for mark, suffix in _MARKS.items():
         if data.startswith(mark):
             raise refusal(name, "kind", suffix=suffix)
+    if marked is None and re.fullmatch("utf[-_]?16", encoding, re.IGNORECASE):
+        encoding = _of_two_bytes(data) or encoding
     try:
         text = data.decode("utf-8-sig" if encoding == "utf-8" else encoding)
     except UnicodeDecodeError as error:
+        line = n_before + len((data[: error.start] + b"x").splitlines())
+        likely = _of_two_bytes(data) or _likely(data, error.start)
         raise refusal(
             name,
             "encoding",
-            line=n_before + len((data[: error.start] + b"x").splitlines()),
+            line=line,
             encoding=encoding,
             byte=data[error.start],
-            likely="utf-16" if 0 in data[:100] else "cp1252 or latin-1",
+            hint=f"{likely} may be right" if likely else "names the right one",
         ) from error
     except (LookupError, ValueError) as error:
         raise ParameterError(
@@ -327,9 +356,51 @@ def decoded(name: str, data: bytes, encoding: str | None, n_before: int = 0) -> 
         ) from error
     if "\0" in text:
         line = n_before + text.count("\n", 0, text.index("\0")) + 1
-        hint = "; --encoding utf-16 may be right" if 0 in data[:4] else ""
+        likely = _of_two_bytes(data)
+        hint = f"; --encoding {likely} may be right" if likely else ""
         raise refusal(name, "zero byte", line=line, hint=hint)
     return text.removeprefix("\ufeff")
+
+
+def _of_two_bytes(data: bytes) -> str:
+    # which UTF-16 bytes without a mark are, by where their zeros are, or none
+    even, odd = data[:4000:2].count(0), data[1:4000:2].count(0)
+    if 4 * max(even, odd) < len(data[:4000:2]) or min(even, odd) > max(even, odd) / 4:
+        return ""
+    return "utf-16-be" if even > odd else "utf-16-le"
+
+
+def _likely(data: bytes, wrong: int) -> str:
+    # the encodings of bytes that are frequent letters in words, the first wrong one at
+    # a place; none if there is no such encoding
+    if "\ufffd" not in data.decode("utf-8", "replace"):
+        return "utf-8"
+    part = data[max(0, wrong - 1000) : wrong + 20_000]
+    texts = {name: part.decode(name, "replace") for name in _LETTERS}
+    share = {name: _share(text, _LETTERS[name]) for name, text in texts.items()}
+    best = max(share.values())
+    alike = {texts[name]: name for name in reversed(texts) if share[name] == best}
+    names = list(alike.values())[:-3:-1]  # of each text that it may be, the first
+    return " or ".join(names) if best > 1 / 2 else ""
+
+
+def _share(text: str, letters: str) -> float:
+    # the part of the letters beyond ASCII that is frequent, if nearly all that is there
+    # beyond ASCII are letters in words of one alphabet and one letter case
+    is_latin = letters[0] < "\u0250"
+    words = [word for word in _WORD.findall(text) if len(word) > 1]  # not à
+    accented = [
+        letter
+        for word in words
+        if word in (word.lower(), word.title(), word.upper())
+        if is_latin == any(map(str.isascii, word))
+        for letter in (word.lower() if is_latin else word)
+        if not letter.isascii()
+    ]
+    n_frequent = sum(letter in letters for letter in accented)
+    n_others = len(re.findall(r"[^\0-\x7f]", text)) - len(accented)
+    n_others -= len(_WORD.findall(text)) - len(words)
+    return n_frequent / len(accented) if 10 * n_others < len(accented) else 0.0
 
 
 # ---- text ----
