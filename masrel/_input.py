@@ -1,5 +1,6 @@
 """What comes in: the rules that it breaks, as a sentence, and what is warned of."""
 
+import re
 import sys
 import warnings
 from collections.abc import Collection, Iterable
@@ -42,6 +43,11 @@ def not_utf8(error: UnicodeDecodeError) -> str:
     line = error.object.count(b"\n", 0, error.start) + 1
     byte = error.object[error.start]
     return f"line {line}: needed UTF-8 text, got the byte {byte:#04x}; save it as UTF-8"
+
+
+def split_names(text: str) -> list[str]:
+    """Return the names between commas, some of which hold one, as ICC(2,1)."""
+    return [name.strip() for name in re.split(r",(?![^(]*\))", text)]
 
 
 def listed(names: Iterable[str]) -> str:

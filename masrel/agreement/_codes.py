@@ -34,6 +34,7 @@ _MAX_KEYS = 1 << 22  # different rows that are counted in a table rather than so
 _BLOCK = 1 << 14  # items at once: they stay in the cache, and BLAS starts no threads
 _MAX_PLACES = 100_000_000  # that are made of counts, where ratings are gone through
 _MAX_SIDE = 4000  # categories of a table of pairs
+_TO_LIST = ("to_pylist", "tolist")  # of arrays of Arrow; and of numpy and pandas
 _MEASURED = 0.8  # of the ratings are different numbers where those are measurements
 
 # -- item by item ---------------------------------------------------------------------
@@ -222,6 +223,42 @@ def _plain_table(
         scale = scales[0] if len(set(scales)) == 1 else None
     are_numbers = all(isinstance(of, np.dtype) and of.kind in "iuf" for of in types)
     return ratings.to_numpy(None if are_numbers else object), scale
+
+
+def side_by_side(first: Any, second: Any) -> Any:
+    """Return the labels of two raters as a table, or the one table that is given."""
+    if second is None:
+        return first
+    columns = [_labels_of(first), _labels_of(second)]
+    lengths = [len(labels) for labels in columns if labels is not None]
+    if len(lengths) < 2:
+        raise RatingsError(
+            "ratings, other: needs the labels of two raters, a sequence each, or one "
+            f"table alone, got {type(first).__name__} and {type(second).__name__}"
+        )
+    if lengths[0] != lengths[1]:
+        raise RatingsError(
+            "ratings, other: needs a label of every item from both raters, in one "
+            f"order, or None, got {lengths[0]} and {lengths[1]} labels"
+        )
+    if hasattr(first, "iloc") and hasattr(second, "iloc"):
+        if not first.index.equals(second.index):
+            raise RatingsError(
+                "ratings, other: needs two Series of one index, got two that differ: "
+                "pandas.concat([a, b], axis=1) puts labels together by their index, "
+                "a.to_numpy() and b.to_numpy() by their place"
+            )
+        return first.to_frame("first").assign(second=second)
+    return list(zip(*columns, strict=True))
+
+
+def _labels_of(rater: Any) -> list[Any] | None:
+    # of a sequence of labels; None of anything else
+    if not is_row(rater) or len(getattr(rater, "shape", (0,))) != 1:
+        return None
+    to_list = next((t for t in _TO_LIST if hasattr(rater, t)), None)
+    labels = list(rater) if to_list is None else getattr(rater, to_list)()
+    return None if any(map(is_row, labels)) else labels
 
 
 Repeated = Literal["error", "first", "last"]

@@ -12,6 +12,7 @@ from masrel.agreement._codes import (
     check_table,
     check_two_by_two,
     pair_table,
+    side_by_side,
     two_raters,
 )
 from masrel.agreement._engine import undefined
@@ -26,7 +27,10 @@ _SAME_MARGINS = "both ratings have the same margins"
 
 
 def contingency_table(
-    ratings: object, *, categories: Sequence[Label] | None = None
+    ratings: object,
+    other: object = None,
+    *,
+    categories: Sequence[Label] | None = None,
 ) -> NDArray[np.int64]:
     """Count the pairs of ratings of two raters.
 
@@ -34,6 +38,9 @@ def contingency_table(
     ----------
     ratings : nested sequence, array_like or DataFrame, shape (n_items, 2)
         Labels or numbers; items with a missing rating are left out.
+    other : sequence of str, int or float, shape (n_items,), optional
+        The labels of the second rater, where `ratings` are those of the first: item by
+        item in the same order, of Series by the same index.
     categories : sequence of str, int or float, optional
         The declared scale in order; the labels met when not given.
 
@@ -52,7 +59,9 @@ def contingency_table(
     >>> contingency_table([["a", "a"], ["a", "b"], ["b", "b"]]).tolist()
     [[1, 1], [0, 1]]
     """
-    counted = two_raters(ratings, categories, "a contingency table")
+    counted = two_raters(
+        side_by_side(ratings, other), categories, "a contingency table"
+    )
     return pair_table(counted.codes, counted.n_categories, counted.freq)
 
 

@@ -6,10 +6,11 @@ gaps has none: there the likelihood gives the variances, too.
 """
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Literal, get_args
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +46,17 @@ _NAMES: dict[IccForm, str] = {
     "ICC(A,1)": "icc_a1",
     "ICC(A,k)": "icc_ak",
 }
-"""Form to its name in the register."""
+"""Form, as McGraw and Wong call it, to its name in the register."""
+
+_ALIASES: dict[IccForm, tuple[str, ...]] = {
+    "ICC(1)": ("ICC(1,1)", "ICC1"),
+    "ICC(1,k)": ("ICC(k)", "ICC1k"),
+    "ICC(C,1)": ("ICC(3,1)", "ICC3"),
+    "ICC(C,k)": ("ICC(3,k)", "ICC3k"),
+    "ICC(A,1)": ("ICC(2,1)", "ICC2"),
+    "ICC(A,k)": ("ICC(2,k)", "ICC2k"),
+}
+"""Form to what Shrout and Fleiss call it, and psych."""
 
 _ROUNDING = 1e-13
 """Share of the sum of all squares that is none."""
@@ -61,10 +72,29 @@ _Answer = tuple[float, Interval | None, str | None]
 """Value, interval and why there is none."""
 
 
+def _bare(name: object) -> str:
+    # ICC(2, k) and icc(2,k), icc_2k and ICC2k; not ICC(2), which is another elsewhere
+    return re.sub(r"[\s_-]", "", str(name).lower())
+
+
+_FORM_OF: dict[str, IccForm] = {
+    _bare(name): form
+    for form, aliases in _ALIASES.items()
+    for name in (form, _NAMES[form], *aliases)
+}
+
+
+def _form_of(name: str) -> IccForm:
+    """Return the form that has a name."""
+    form = _FORM_OF.get(_bare(name), name)
+    check_option("form", form, get_args(IccForm))
+    return cast(IccForm, form)
+
+
 def icc(
     ratings: object,
     *,
-    form: IccForm = "ICC(A,1)",
+    form: IccForm | str = "ICC(A,1)",
     categories: Sequence[Label] | None = None,
     level: float = 0.95,
     interval: _Method = "auto",
@@ -77,7 +107,9 @@ def icc(
         Numbers, or labels of a declared scale; None and ``nan`` are missing.
     form : {"ICC(1)", "ICC(1,k)", "ICC(C,1)", "ICC(C,k)", "ICC(A,1)", "ICC(A,k)"}
         One-way random; two-way consistency; two-way absolute agreement; of a single
-        rating or of the mean of all raters.
+        rating or of the mean of all raters. The names of Shrout and Fleiss and of psych
+        are understood, too: "ICC(2,1)" and "ICC2" are "ICC(A,1)", "ICC(3,1)" and "ICC3"
+        are "ICC(C,1)".
     categories : sequence of str, int or float, optional
         The declared scale in order: numbers count by value, text by rank. Needed for
         text.
@@ -154,7 +186,7 @@ def icc(
     >>> round(icc(table).value, 2)
     0.3
     """
-    check_option("form", form, get_args(IccForm))
+    form = _form_of(form)
     check_level(level)
     check_option("interval", interval, get_args(_Method))
     values = rated_part(rating_values(ratings, categories))
@@ -175,7 +207,7 @@ def icc(
 def icc_f_test(
     ratings: object,
     *,
-    form: IccForm = "ICC(A,1)",
+    form: IccForm | str = "ICC(A,1)",
     categories: Sequence[Label] | None = None,
 ) -> Significance:
     """Test whether items differ at all: F of the items' mean square.
@@ -218,7 +250,7 @@ def icc_f_test(
     >>> print(icc_f_test(table))
     icc_f_test: 11.03, F(5, 15), p = 0.000135
     """
-    check_option("form", form, get_args(IccForm))
+    form = _form_of(form)
     values = complete_values(ratings, categories)
     anova = _Anova.of(values)
     reason = _no_variance(values, anova, form)

@@ -22,6 +22,7 @@ from masrel.agreement._codes import (
     count_ratings,
     item_counts,
     raters_told_apart,
+    side_by_side,
     two_raters,
 )
 from masrel.agreement._engine import (
@@ -491,6 +492,7 @@ def gwet_ac(
 
 def scott_pi(
     ratings: object,
+    other: object = None,
     *,
     categories: Sequence[Label] | None = None,
     weights: "WeightsLike" = "identity",
@@ -502,6 +504,9 @@ def scott_pi(
     ----------
     ratings : nested sequence, array_like or DataFrame, shape (n_items, 2)
         Labels or numbers; None and ``nan`` are missing.
+    other : sequence of str, int or float, shape (n_items,), optional
+        The labels of the second rater, where `ratings` are those of the first: item by
+        item in the same order, of Series by the same index.
     categories : sequence of str, int or float, optional
         The declared scale in order; the labels met when not given.
     weights : str or array_like, shape (n_categories, n_categories), optional
@@ -541,8 +546,11 @@ def scott_pi(
     --------
     >>> round(scott_pi([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
     0.333
+    >>> round(scott_pi(["a", "b", "a"], ["a", "b", "b"]).value, 3)
+    0.333
     """
-    return estimate(_SCOTT, ratings, categories, weights, population=population)
+    table = side_by_side(ratings, other)
+    return estimate(_SCOTT, table, categories, weights, population=population)
 
 
 def conger_kappa(

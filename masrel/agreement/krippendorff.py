@@ -134,6 +134,7 @@ def krippendorff_alpha(
     categories: Sequence[Label] | None = None,
     weights: "WeightsLike" = None,
     metric: Metric | None = None,
+    level_of_measurement: Metric | None = None,
     population: int | None = None,
 ) -> Estimate:
     """Estimate Krippendorff's alpha from an item × rater table.
@@ -152,6 +153,9 @@ def krippendorff_alpha(
         counts the ratings between two grades and is not the weights "ordinal". The last
         two are distances of sets: of ratings that are sets of labels, or text with
         semicolons between labels.
+    level_of_measurement : str, optional
+        What the krippendorff package calls `metric`. Its rows are raters, and ours are
+        items: a table with fewer rows than columns is refused.
     population : int, optional
         Items there are in all, for the finite-population correction.
 
@@ -167,8 +171,8 @@ def krippendorff_alpha(
     RatingsError
         If the ratings are not such a table.
     ParameterError
-        If an option is invalid, both `weights` and `metric` are given, or they do not
-        fit the categories.
+        If an option is invalid, more than one of `weights`, `metric` and
+        `level_of_measurement` is given, or they do not fit the categories.
 
     Warns
     -----
@@ -198,9 +202,18 @@ def krippendorff_alpha(
     >>> round(krippendorff_alpha([["a", "a"], ["b", "b"], ["a", "b"]]).value, 3)
     0.444
     """
-    if weights is not None and metric is not None:
+    names = (weights, metric, level_of_measurement)
+    if sum(name is not None for name in names) > 1:
         raise ParameterError("weights, metric: needs one of them, got both")
     counted = count_ratings(ratings, categories)
+    if level_of_measurement is not None:
+        metric, (n_rows, n_columns) = level_of_measurement, counted.coded.codes.shape
+        if n_rows < n_columns:
+            raise ParameterError(
+                f"level_of_measurement: {n_rows} rows and {n_columns} columns may be "
+                "raters by items, as the krippendorff package takes them: rows are "
+                "items here, so turn the table, or say metric if it is as it should be"
+            )
     made = weights if metric is None else _metric_weights(metric, counted)
     # items with fewer than two ratings are no part of the sample
     paired = counted.chosen(rows=counted.size > 1)

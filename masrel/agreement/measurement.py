@@ -9,7 +9,12 @@ from typing import Literal, get_args
 import numpy as np
 
 from masrel._input import check_option
-from masrel.agreement._codes import complete_values, rated_part, rating_values
+from masrel.agreement._codes import (
+    complete_values,
+    rated_part,
+    rating_values,
+    side_by_side,
+)
 from masrel.agreement._engine import (
     NO_SPREAD,
     Floats,
@@ -291,6 +296,7 @@ class LimitsOfAgreement:
 
 def limits_of_agreement(
     ratings: object,
+    other: object = None,
     *,
     categories: Sequence[Label] | None = None,
     share: float = 0.95,
@@ -302,6 +308,9 @@ def limits_of_agreement(
     ----------
     ratings : nested sequence, array_like or DataFrame, shape (n_items, 2)
         Numbers, or labels of a declared scale; None and ``nan`` are missing.
+    other : sequence of str, int or float, shape (n_items,), optional
+        The labels of the second rater, where `ratings` are those of the first: item by
+        item in the same order, of Series by the same index.
     categories : sequence of str, int or float, optional
         The declared scale in order: numbers count by value, text by rank. Needed for
         text.
@@ -351,7 +360,7 @@ def limits_of_agreement(
     """
     check_level(share, "share")
     check_level(level)
-    values = complete_values(ratings, categories)
+    values = complete_values(side_by_side(ratings, other), categories)
     if values.shape[1] != 2:
         raise RatingsError(
             "limits of agreement: need the ratings of two raters, got "
@@ -438,6 +447,7 @@ def _tolerance_factor(n: int, share: float, confidence: float) -> float:
 
 def lin_ccc(
     ratings: object,
+    other: object = None,
     *,
     categories: Sequence[Label] | None = None,
     level: float = 0.95,
@@ -448,6 +458,9 @@ def lin_ccc(
     ----------
     ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
         Numbers, or labels of a declared scale; None and ``nan`` are missing.
+    other : sequence of str, int or float, shape (n_items,), optional
+        The labels of the second rater, where `ratings` are those of the first: item by
+        item in the same order, of Series by the same index.
     categories : sequence of str, int or float, optional
         The declared scale in order: numbers count by value, text by rank. Needed for
         text.
@@ -496,7 +509,7 @@ def lin_ccc(
     0.8
     """
     check_level(level)
-    values = complete_values(ratings, categories)
+    values = complete_values(side_by_side(ratings, other), categories)
     value, error, interval = math.nan, math.nan, None
     reason = _too_few(values)
     if reason is None and values.min() == values.max():

@@ -20,6 +20,7 @@ from masrel.agreement._codes import (
     complete_rows,
     count_ratings,
     raters_told_apart,
+    side_by_side,
     two_raters,
 )
 from masrel.agreement._engine import (
@@ -147,6 +148,7 @@ _POOLED_PAIRS = Formula(
 
 def cohen_kappa(
     ratings: object,
+    other: object = None,
     *,
     categories: Sequence[Label] | None = None,
     weights: "WeightsLike" = "identity",
@@ -158,6 +160,9 @@ def cohen_kappa(
     ----------
     ratings : nested sequence, array_like or DataFrame, shape (n_items, 2)
         Labels or numbers; None and ``nan`` are missing.
+    other : sequence of str, int or float, shape (n_items,), optional
+        The labels of the second rater, where `ratings` are those of the first: item by
+        item in the same order, of Series by the same index.
     categories : sequence of str, int or float, optional
         The declared scale in order; the labels met when not given.
     weights : str or array_like, shape (n_categories, n_categories), optional
@@ -201,8 +206,14 @@ def cohen_kappa(
     --------
     >>> cohen_kappa([["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"]]).value
     0.5
+
+    The same, a sequence a rater:
+
+    >>> cohen_kappa(["a", "a", "b", "b"], ["a", "b", "b", "b"]).value
+    0.5
     """
-    return estimate(_COHEN, ratings, categories, weights, population=population)
+    table = side_by_side(ratings, other)
+    return estimate(_COHEN, table, categories, weights, population=population)
 
 
 def light_kappa(

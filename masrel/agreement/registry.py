@@ -19,8 +19,11 @@ from masrel.agreement._codes import (
 from masrel.agreement._engine import Formula, deviations
 from masrel.agreement._labels import Label
 from masrel.agreement._weights import Weights, WeightsLike, is_identity
+from masrel.agreement.icc import _ALIASES as ICC_ALIASES
+from masrel.agreement.icc import _FORM_OF as ICC_FORM_OF
 from masrel.agreement.icc import _FORMULAS as ICC_FORMULAS
 from masrel.agreement.icc import _NAMES as ICC_NAMES
+from masrel.agreement.icc import _bare as icc_bare
 from masrel.agreement.icc import _target_of as icc_target
 from masrel.agreement.icc import icc, kendall_w, robinson_a
 from masrel.agreement.kappas import (
@@ -371,6 +374,7 @@ _ALL = (
             function=partial(icc, form=form),
             references=("mcgraw1996",),
             formula=ICC_FORMULAS[form],
+            aliases=ICC_ALIASES[form],
             takes_interval=True,
             properties=(_RANKS - {"items twice"}) | {"perfect agreement"},
             lowest=-math.inf,
@@ -415,6 +419,7 @@ COEFFICIENTS: dict[str, Coefficient] = {entry.name: entry for entry in _ALL}
 """Name to coefficient."""
 
 _BY_NAME = {name: entry for entry in _ALL for name in (entry.name, *entry.aliases)}
+_BY_ICC = {bare: COEFFICIENTS[ICC_NAMES[of]] for bare, of in ICC_FORM_OF.items()}
 
 
 def coefficient(name: str) -> Coefficient:
@@ -440,12 +445,12 @@ def coefficient(name: str) -> Coefficient:
     --------
     >>> coefficient("fleiss_kappa").title
     "Fleiss' κ"
-    >>> coefficient("randolph_kappa").name
-    'brennan_prediger'
+    >>> coefficient("randolph_kappa").name, coefficient("ICC(2,1)").name
+    ('brennan_prediger', 'icc_a1')
     """
     is_text = isinstance(name, str)
-    if is_text and name in _BY_NAME:
-        return _BY_NAME[name]
+    if is_text and (entry := _BY_NAME.get(name) or _BY_ICC.get(icc_bare(name))):
+        return entry
     meant = _meant_by(name) if is_text else None
     raise ParameterError(
         f"coefficient: needs one of {', '.join(COEFFICIENTS)}, got {name!r}"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
+from masrel._input import split_names
 from masrel.analysis._file_estimates import USUAL, Answer, Questions
 from masrel.cli._options import (
     Command,
@@ -18,7 +19,6 @@ from masrel.cli._options import (
     echo_notes,
     grouped,
     output_options,
-    split_commas,
     write_output,
 )
 from masrel.cli._paths import InputFile
@@ -72,7 +72,7 @@ _ESTIMATING = {
         "--coefficients",
         metavar="NAMES",
         show_default=",".join(USUAL),
-        type=split_commas,
+        type=split_names,
         is_eager=True,
         callback=_list_register,
         help="Names of coefficients, separated by commas; all that fit (but "

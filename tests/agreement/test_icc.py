@@ -183,8 +183,10 @@ def test_mean_of_raters_on_items_that_do_not_differ_is_a_division_by_zero() -> N
 
 
 def test_wrong_options_are_one_sentence() -> None:
-    with pytest.raises(ParameterError, match=r"form: needs one of ICC\(1\), .*'ICC2'"):
-        icc(TABLE_2, form="ICC2")  # type: ignore[arg-type]
+    with pytest.raises(
+        ParameterError, match=r"form: needs one of ICC\(1\), .*'ICC\(2\)'"
+    ):
+        icc(TABLE_2, form="ICC(2)")
     with pytest.raises(ParameterError, match=r"interval: needs one of auto, .*, F"):
         icc(TABLE_2, interval="f")  # type: ignore[arg-type]
     with pytest.raises(ParameterError, match='interval: "F" needs every rating'):
