@@ -27,6 +27,7 @@ from masrel.planning._truth import (
     Design,
     Floats,
     Integers,
+    places_of,
     rows_of,
 )
 
@@ -78,6 +79,7 @@ def _drawn(design: Design, progress: Progress | None) -> Shown:
     n_studies, interval = design.study.n_studies, design.study.interval
     of_chosen = _RESAMPLED_TASK if interval == "bootstrap" else _CHOSEN_TASK
     size, factor = (of_chosen, 2.0) if design.is_chosen else (_TASK, 1.0)
+    size = min(size, n_studies or size)
     total, task, n_tasks = np.zeros((3, len(NUMBERS))), 0, 1
     while task < n_tasks:  # each has its own seed
         rng = np.random.default_rng([design.study.seed, task])
@@ -118,13 +120,12 @@ def _counted(design: Design, codes: Integers) -> tuple[Integers, Integers | None
     # codes (n_studies, n_items, n_columns) -> as `outcomes_of` takes them
     n, n_items, n_columns = codes.shape
     least = -int(design.model.p_missing > 0.0)
-    n_rows = (n_codes := len(design.model.scale) - least) ** n_columns
+    n_rows = (len(design.model.scale) - least) ** n_columns
     if design.is_chosen or n_rows > n_items * n_columns:  # more than there are ratings
         return codes, None
-    # the study, then a digit of each rating: the place of a row among those of all
-    digits = np.arange(n)[:, None], *np.moveaxis(codes - least, -1, 0)
-    places = np.ravel_multi_index(digits, (n, *(n_codes,) * n_columns)).ravel()
-    freq = np.bincount(places, minlength=n * n_rows).reshape(n, n_rows)
+    # the place of a row among those of all studies
+    places = places_of(design.model, codes) + n_rows * np.arange(n)[:, None]
+    freq = np.bincount(places.ravel(), minlength=n * n_rows).reshape(n, n_rows)
     return rows_of(design.model, n_columns, ordered=True), freq
 
 

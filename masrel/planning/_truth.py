@@ -36,6 +36,7 @@ FORMS = (ONE_WAY, CONSISTENCY, AGREEMENT)
 
 _MAX_ROWS = 20_000  # distinct rows above which ratings are drawn one by one
 _LARGE = 1e12  # items of a population
+_FEW = 4  # times as many items as distinct rows are many
 _WALD = ("t", "normal", "analytic")  # computed for all studies at once
 _MAX_CHOSEN = 4_000  # studies that are summed over where each has its interval chosen
 MAX_TABLES = 1_000_000  # that are summed over
@@ -156,13 +157,20 @@ def _scale(study: Study, q: int) -> tuple[Label, ...]:
 def rows_of(model: ItemModel, n_raters: int, *, ordered: bool) -> Integers:
     """List the distinct rows of ratings: all, or one of each count of categories."""
     # -> (n_rows, n_raters), -1 where a rating is missing
-    codes = range(-1 if model.p_missing > 0.0 else 0, len(model.scale))
-    rows = (
-        itertools.product(codes, repeat=n_raters)
-        if ordered
-        else itertools.combinations_with_replacement(codes, n_raters)
-    )
+    least, q = -int(model.p_missing > 0.0), len(model.scale)
+    if ordered:
+        every = np.indices((q - least,) * n_raters).reshape(n_raters, -1)
+        return every.T + least
+    rows = itertools.combinations_with_replacement(range(least, q), n_raters)
     return np.array(list(rows), dtype=np.int64).reshape(-1, n_raters)
+
+
+def places_of(model: ItemModel, codes: Integers) -> Integers:
+    """Return where ratings, (…, n_raters), are among all ordered rows, (…)."""
+    least = -int(model.p_missing > 0.0)
+    shape = (len(model.scale) - least,) * codes.shape[-1]
+    digits = tuple(np.moveaxis(codes - least, -1, 0))
+    return np.asarray(np.ravel_multi_index(digits, shape), dtype=np.int64)
 
 
 def probabilities(model: ItemModel, rows: Integers, *, ordered: bool) -> Floats:
@@ -430,8 +438,12 @@ class Design:
 
     def features(self, codes: Integers) -> Floats:
         """Return features of ratings (…, n_raters), (…, n_features)."""
-        rows = codes.reshape(-1, codes.shape[-1])
-        return self.problem.features(rows).reshape(*codes.shape[:-1], -1)
+        rows = codes.reshape(-1, n_raters := codes.shape[-1])
+        if _FEW * (len(self.model.scale) + 1) ** n_raters > len(rows):
+            return self.problem.features(rows).reshape(*codes.shape[:-1], -1)
+        # items of many studies: those of every row once
+        every = rows_of(self.model, n_raters, ordered=True)
+        return self.problem.features(every)[places_of(self.model, codes)]
 
     @np.errstate(invalid="ignore")  # 0/0 where there is no coefficient
     def population(self) -> tuple[float, float]:

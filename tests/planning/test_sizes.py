@@ -210,3 +210,16 @@ def test_one_item_fewer_does_not_reach_the_aim(aim: dict[str, Any]) -> None:
     n = sample_size(study).n_items
     assert precision(replace(study, n_items=n)).reaches_aim
     assert not precision(replace(study, n_items=n - 1)).reaches_aim
+
+
+def test_sizes_far_from_the_aim_are_told_by_few_studies() -> None:
+    raters = {**KAPPA, "model": "latent", "target": "raters", "interval": "t", "rng": 0}
+    study = Study(**raters, n_items=50, half_width=0.1)
+    found = sample_size(study)
+    whole = sample_size(replace(study, n_studies=found.n_studies))  # by as many each
+    numbers = ("n_raters", "expected_half_width", "n_studies")
+    assert [getattr(found, of) for of in numbers] == [
+        getattr(whole, of) for of in numbers
+    ]
+    few = precision(replace(study, half_width=None, n_raters=4, n_studies=700))
+    assert few.n_studies == 700
