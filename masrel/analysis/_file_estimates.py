@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from masrel._input import refuse
 from masrel.errors import MasrelError, ParameterError
 from masrel.estimates import Estimate, Interval, IntervalMethod, Target
+from masrel.ratings._findings import listed
 
 if TYPE_CHECKING:
     from masrel.agreement import (
@@ -399,7 +400,7 @@ def check_order(file: "RatingsFile", what: str) -> None:
     if not file.is_ordered:
         raise ParameterError(
             f"{what}: needs grades that are numbers or --categories with every grade "
-            f"in order, the grades met are text: {', '.join(file.scale.grades)}"
+            f"in order, the grades met are text: {listed(file.scale.grades)}"
         )
 
 

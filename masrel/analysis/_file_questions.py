@@ -81,16 +81,8 @@ def answers(
             f"({', '.join(sessions)}), so that raters graded the same item more than "
             f"once; --by {file.read['session']} estimates each"
         )
-    if not (
-        questions.weights == "identity"
-        or file.is_ordered
-        or isinstance(questions.weights, Weights)
-    ):
-        raise ParameterError(
-            f"--weights {questions.weights}: needs --categories with every grade of "
-            f"the scale in order, the grades met are text: "
-            f"{', '.join(file.scale.grades)}"
-        )
+    if questions.weights != "identity" and not isinstance(questions.weights, Weights):
+        check_order(file, f"--weights {questions.weights}")
     others = file
     if questions.reference is not None:
         others = _without_reference(file, questions.reference)

@@ -67,11 +67,9 @@ def latent(
     if seed < 0:
         raise ParameterError(f"--seed: needs at least 0, got {seed}")
     ratings = read_file(file, replace(reading, stream=False))
-    if not ratings.is_ordered:
-        raise ParameterError(
-            "--categories: the model needs every grade of the scale in order, the "
-            f"grades met are text: {', '.join(ratings.scale.grades[:6])}"
-        )
+    from masrel.analysis._file_estimates import check_order
+
+    check_order(ratings, "a latent-trait model")
     from masrel.tables._first_screen import what_was_read
 
     notes = (*what_was_read(ratings), *(f"warning: {w}" for w in ratings.warnings))

@@ -99,7 +99,7 @@ def test_without_a_terminal_lines_say_how_far_and_how_long(
 @pytest.mark.parametrize(
     ("text", "options", "said"),
     [
-        (WIDE.replace("1+", "x"), (), "--categories: the model needs every grade"),
+        (WIDE.replace("1+", "x"), (), "--categories with every grade in order"),
         (SESSIONS, (), "holds 2 sessions (first, second); --only chooses one"),
         (SESSIONS, ("--only", "third"), "holds no session third"),
         (NUMBERS, ("--level", "95"), "level: needs (0, 1), got 95"),
