@@ -292,7 +292,8 @@ def _mark_between(metric: str, categories: Sequence[Label]) -> str:
     if n_lists or len(texts) < len(plain) or len(marks) != 1:
         raise ParameterError(
             f"metric: {metric} needs sets of labels, or text that holds several in one "
-            "of these ways, x;y or x|y or ['x', 'y'], got "
+            "of these ways, x;y or x|y or ['x', 'y'] (--set-separator says what else "
+            "stands between labels of a file), got "
             f"{', '.join(map(shown, plain[:3]))}; where each is one label, the nominal "
             "metric is the same"
         )

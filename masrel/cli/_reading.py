@@ -90,7 +90,25 @@ reading_options = [
         help="Cells that are missing grades, beside empty ones and NA.",
     ),
     click.option(
-        "--decimal", default=".", metavar="CHAR", help="Decimal mark of numbers."
+        "--decimal",
+        metavar="CHAR",
+        show_default="a point",
+        help="Decimal mark of numbers.",
+    ),
+    click.option(
+        "--thousands",
+        metavar="CHAR",
+        help="Mark between thousands, such as the comma of 1,200.",
+    ),
+    click.option(
+        "--units",
+        is_flag=True,
+        help="Take the unit off, as of 5 mm or 78%: every number has the same.",
+    ),
+    click.option(
+        "--set-separator",
+        metavar="SEP",
+        help="What stands between the labels of a cell, for --metric jaccard or masi.",
     ),
     click.option(
         "--delimiter",

@@ -16,7 +16,10 @@ USUAL_MISSING = ("", "NA")
 """Cells that stand for a missing grade unless the scale has them."""
 
 _SEPARATORS = {"tab": "\t", "\\t": "\t", "space": " ", "blanks": " ", "auto": None}
+_NO_MARKS = "+-0123456789eE"  # letters of numbers
 _SHOWN = 6  # texts that a message lists
+MOST_CODES = 5
+"""Codes of missing grades that a message suggests at once."""
 _LONGEST = 60  # letters of a text that it shows
 
 
@@ -49,9 +52,15 @@ class Reading:
         Every grade of the scale, in order; the grades met unless given.
     missing_codes : sequence of str
         Cells that stand for a missing grade, beside empty ones and NA.
-    decimal, delimiter, encoding, sheet : str or None
-        Decimal mark, separator of cells (tab and blanks by name), encoding, and sheet
-        of a workbook.
+    decimal, thousands : str or None
+        Decimal mark, and the mark between thousands; a point, and none, unless the
+        grades tell. Beside a point between thousands it is a comma.
+    units : bool
+        Whether every grade is a number with one unit, which is taken off.
+    set_separator : str or None
+        What stands between the labels of a cell, so that a grade is a set of them.
+    delimiter, encoding, sheet : str or None
+        Separator of cells (tab and blanks by name), encoding, and sheet of a workbook.
     transpose : bool
         Whether a row is a rater and a column an item.
     counts, table : bool
@@ -89,7 +98,10 @@ class Reading:
     repeated: Repeated = "error"
     categories: Sequence[str] | None = None
     missing_codes: Sequence[str] = ()
-    decimal: str = "."
+    decimal: str | None = None
+    thousands: str | None = None
+    units: bool = False
+    set_separator: str | None = None
     delimiter: str | None = None
     encoding: str | None = None
     sheet: str | None = None
@@ -133,9 +145,32 @@ class Reading:
                 mark is not None and len(mark) != 1,
                 f"--delimiter: needed auto, one letter, tab or blanks, got {mark!r}",
             ),
+            *(
+                (
+                    len(value) != 1 or value in _NO_MARKS,
+                    f"--{name}: needed one letter such as a comma, got {value!r}",
+                )
+                for name in ("decimal", "thousands")
+                if (value := getattr(self, name)) is not None
+            ),
             (
-                len(self.decimal) != 1 or self.decimal in "+-0123456789eE",
-                f"--decimal: needed one letter such as a comma, got {self.decimal!r}",
+                self.decimal is not None and self.decimal == self.thousands,
+                f"--decimal, --thousands: needed two marks, got {self.decimal!r} twice",
+            ),
+            (
+                self.set_separator is not None and not self.set_separator,
+                "--set-separator: needed what stands between labels, got nothing",
+            ),
+            (
+                self.set_separator and (self.units or self.categories is not None),
+                "--set-separator: makes grades sets of labels, which have no order and "
+                f"no unit, and not {'--units' if self.units else '--categories'}",
+            ),
+            (
+                is_counted and (self.units or self.set_separator),
+                f"--{'units' if self.units else 'set-separator'}: is of grades, and "
+                f"cells of --{'counts' if self.counts else 'table'} are numbers of "
+                "ratings",
             ),
             (
                 self.stream and self.whole,
@@ -225,6 +260,14 @@ def refusal(name: str, code: str, /, **facts: Any) -> RatingsError:
 def quoted(names: Iterable[str]) -> str:
     """Return a list as an option takes it on a command line."""
     return shlex.quote(",".join(names))
+
+
+def if_missing(texts: Sequence[str]) -> str:
+    """Return how texts are counted as missing, if that can be said of so many."""
+    # an option separates its codes by commas
+    if not 0 < len(texts) <= MOST_CODES or any("," in text for text in texts):
+        return ""
+    return f"; if that is missing, --missing {quoted(texts)}"
 
 
 def listed(texts: Sequence[str], most: int = _SHOWN, more: str = "") -> str:
@@ -352,7 +395,7 @@ _TEXTS = {
     "stream": "read as a stream: names of items that differ by spelling alone, or sum "
     "up others, are not looked for",
     # tables of counts
-    "count": "--{kind} needs whole numbers from 0 to 1e12, got {text!r}",
+    "count": "--{kind} needs whole numbers from 0 to 1e12, got {text!r}{hint}",
     "no counts": "--{kind}: needed at least one rating, got none",
     "other categories": "--categories: needed those of the columns, {names}, in order, "
     "got {categories}",
@@ -373,6 +416,14 @@ _TEXTS = {
     "one, --categories with it in the scale as a grade",
     "broken": "needed a grade on one line, got {got}: a quote may be opened and not "
     "closed",
+    "thousands": "{got} may have a thousands mark: {ways}",
+    "thousands read": "{got}: read with a thousands mark; --thousands {mark} says so",
+    "groups": "--thousands: needed {mark!r} before groups of three digits, got {got}",
+    "units": "{got}: numbers with the unit {unit!r}; --units takes it off, "
+    "--categories keeps it",
+    "no unit": "--units: needed a number with the unit {unit}, got {got}{hint}",
+    "no set": "--set-separator: needed {separator!r} between labels of some cell, and "
+    "no semicolon in a label, got {got}",
     "decimal comma": "{got} looks like a number with a decimal comma: --decimal , "
     "reads it so, --categories makes it text",
     "plus": "{got} beside grades such as {other!r} may be that number or the grade "
@@ -385,12 +436,9 @@ _TEXTS = {
     "measurements: percent agreement and unweighted kappas count only those that are "
     "equal; --coefficients icc_a1 or --metric interval weigh how far they lie from "
     "each other",
-    "far": "{grades}: far from the other grades; if missing ones are meant, --missing "
-    "{codes}",
-    "no number": "no number: {got} ({where}), so that all grades are text; if that is "
-    "missing, --missing {codes}",
-    "number": "a number among grades that are text: {got} ({where}); if that is "
-    "missing, --missing {codes}",
+    "far": "{grades}: far from the other grades{hint}",
+    "no number": "no number: {got} ({where}), so that all grades are text{hint}",
+    "number": "a number among grades that are text: {got} ({where}){hint}",
     # ratings
     "twice": "{rows}: {rater!r} graded {item!r} more than once: --by or --session "
     "names a column that tells such ratings apart, --repeated first, last or "

@@ -8,18 +8,21 @@ import math
 import re
 import unicodedata
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from itertools import pairwise
 
 import numpy as np
 
+from masrel.agreement._labels import text_of_set
 from masrel.errors import ParameterError, RatingsError
 from masrel.ratings._findings import (
+    MOST_CODES,
     USUAL_MISSING,
     Finding,
     Reading,
+    if_missing,
     listed,
     quoted,
 )
@@ -31,8 +34,14 @@ _CODES = frozenset(
     sign * int(digit * n) for digit in "789" for n in range(1, 6) for sign in (1, -1)
 ) | {-1, 999999, -999999}
 
+# Thousands marks, and how each is written: there are several apostrophes and blanks.
+_MARKS = {",": ",", ".": ".", "'": "'’", " ": " \u00a0\u2009\u202f"}
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,5})?", re.ASCII)
-_DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+", re.ASCII)
+_DIGITS = r"[0-9](?:[0-9.,'’ \u00a0\u2009\u202f]*[0-9])?"  # and marks of either kind
+_DECIMAL_COMMA = re.compile(r"[+-]?\d+([.'’ \u00a0\u2009\u202f]\d{3})*,\d+", re.ASCII)
+# A number and its unit, which begins with a letter or a sign: "1+" and "4-" are grades.
+_WITH_UNIT = re.compile(rf"([+-]?[.,]?{_DIGITS})\s*((?:[^\W\d_]|[%‰°′″$€£]).*)")
+_TRUTH = {"true": "1", "false": "0"}
 _HALF_GRADE = re.compile(r"\d+([+-]+|[A-Za-z])")  # 1+, 4-, 2a: numbers, more or less
 _INVISIBLE = re.compile("[\u200b-\u200f\u2060\ufeff\u00ad]")
 # Dashes, and Cyrillic and Greek letters that look like Latin ones.
@@ -58,6 +67,7 @@ class Grades:
     codes: Codes  # (n_rows, n_columns): place in the scale, -1 where missing
     merged: dict[str, list[str]] = field(default_factory=dict)  # grade to its spellings
     n_missing: dict[str, int] = field(default_factory=dict)  # code to number of cells
+    facts: dict[str, str] = field(default_factory=dict)  # marks that were taken off
     findings: list[Finding] = field(default_factory=list)
 
 
@@ -105,18 +115,29 @@ def _grades(
     def refuse(code: str, texts: Sequence[str], **facts: str) -> RatingsError:
         return sheet.refuse(code, where(texts[0]), None, got=listed(texts), **facts)
 
-    written = dict(zip(met, met, strict=True))
-    if options.decimal != ".":
-        written = {t: "" if "." in t else t.replace(options.decimal, ".") for t in met}
-    number = {t: Decimal(w) if is_number(w) else None for t, w in written.items()}
-    findings: list[Finding] = []
+    numbers, findings = _Numbers(written=dict.fromkeys(met, "")), []
+    if not declared:
+        _refuse_missing(list(met), refuse)
+    if not options.set_separator:
+        # a number in a cell with a type has no thousands mark, and a point
+        is_text = "delimiter" in sheet.facts
+        marks = [mark for mark in _MARKS if not declared and (is_text or mark != ".")]
+        numbers = _numbers_of(list(met), options, refuse, marks)
+    number = {
+        t: Decimal(w) if is_number(w) else None for t, w in numbers.written.items()
+    }
     if declared:
         scale = Scale(name="declared", grades=declared)
         grade_of = _declared_grades(number, declared, refuse)
+    elif options.set_separator:
+        grade_of = _sets(list(met), options.set_separator, refuse)
+        grades = tuple(sorted(set(grade_of.values())))
+        scale = Scale(name="observed", grades=grades)
     else:
-        _refuse_doubtful(number, options, refuse)
-        grade_of, scale = _observed(number, options.decimal)
-        findings = _doubts(met, number, grade_of, where)
+        _refuse_plus(number, refuse)
+        grade_of, scale = _observed(number, numbers.written)
+    if not declared:
+        findings = numbers.findings + _doubts(met, number, grade_of, where)
     code = {grade: k for k, grade in enumerate(scale.grades)}
     spellings: dict[str, list[str]] = {}
     for text, grade in grade_of.items():
@@ -126,6 +147,7 @@ def _grades(
         codes=np.array([code.get(grade_of.get(t, ""), -1) for t in freq], np.int64),
         merged={g: s for g, s in spellings.items() if len(s) > 1 or s != [g]},
         n_missing={text: n for text, n in freq.items() if n and text in absent},
+        facts=numbers.facts,
         findings=findings,
     )
 
@@ -163,46 +185,54 @@ def _declared_grades(
             grade_of[text] = same[0] if same else categories[value]
     if wrong := [text for text in number if text not in grade_of]:
         likely = [text for text in wrong if normal_form(text) in _MISSING_FORMS]
-        hint = f"; --missing {quoted(likely)} if it is missing" if likely else ""
+        hint = if_missing(likely[:MOST_CODES])
         raise refuse("other grade", wrong, scale=", ".join(declared), hint=hint)
     return grade_of
 
 
-def _refuse_doubtful(
-    number: dict[str, Decimal | None], options: Reading, refuse: _Refuse
-) -> None:
-    # what may be no grade, or one of two
-    commas = [text for text in number if _DECIMAL_COMMA.fullmatch(text)]
-    rest = [text for text in number if text not in commas and not is_number(text)]
+def _refuse_missing(texts: Sequence[str], refuse: _Refuse) -> None:
+    # what may be no grade
+    likely = [text for text in texts if normal_form(text) in _MISSING_FORMS]
+    if likely:
+        raise refuse("looks missing", likely, codes=quoted(likely[:MOST_CODES]))
+    if broken := [text for text in texts if "\n" in text or "\r" in text]:
+        raise refuse("broken", broken[:1])
+
+
+def _refuse_plus(number: dict[str, Decimal | None], refuse: _Refuse) -> None:
+    # +1 beside 1 may be that number, or the grade 1+
     plus = [t for t, value in number.items() if t[0] == "+" and value is not None]
     others = [t for t, value in number.items() if t[0].isdigit() and value]
     others += [t for t in number if t[-1] == "+" and f"+{t[:-1]}" in plus]
-    is_comma = not rest and options.decimal == "."
-    doubts = {
-        "looks missing": [t for t in number if normal_form(t) in _MISSING_FORMS],
-        "broken": [t for t in number if "\n" in t or "\r" in t][:1],
-        "decimal comma": commas if is_comma else [],
-        "plus": plus if others else [],
-    }
-    for code, texts in doubts.items():
-        if texts:
-            raise refuse(
-                code,
-                texts,
-                codes=quoted(texts),
-                grade=f"{texts[0][1:]}+",
-                other="".join(others[:1]),
-            )
+    if plus and others:
+        raise refuse("plus", plus, grade=f"{plus[0][1:]}+", other=others[0])
+
+
+def _sets(texts: Sequence[str], separator: str, refuse: _Refuse) -> dict[str, str]:
+    # text to the text of the set of its labels, in one order
+    mark = separator.strip() or separator
+    is_there = any(mark in text for text in texts)
+    # a semicolon is in the text of a set
+    if wrong := [t for t in texts if not is_there or (";" in t and mark != ";")]:
+        raise refuse("no set", wrong, separator=separator)
+    labels = {}
+    for text in texts:
+        # [x, y] as lists are written, with quotes or without
+        is_list = re.fullmatch(r"\[.*\]|\{.*\}", text)
+        parts = (text[1:-1] if is_list else text).split(mark)
+        ends = "'\" " if is_list else None
+        labels[text] = text_of_set({part.strip(ends) for part in parts} - {""})
+    return dict(labels)
 
 
 def _observed(
-    number: dict[str, Decimal | None], mark: str
+    number: dict[str, Decimal | None], written: dict[str, str]
 ) -> tuple[dict[str, str], Scale]:
     # text to grade where nobody declared a scale, and the scale
     if None not in number.values():
         shortest: dict[Decimal | None, str] = {}  # of equal numbers
-        for text in sorted(number, key=lambda text: (len(text), text)):
-            shortest.setdefault(number[text], text.replace(mark, "."))
+        for text in sorted(written, key=lambda text: (len(written[text]), text)):
+            shortest.setdefault(number[text], written[text])
         grades = tuple(sorted(shortest.values(), key=Decimal))
         grade_of = {text: shortest[value] for text, value in number.items()}
         return grade_of, Scale(name="observed", grades=grades)
@@ -211,6 +241,176 @@ def _observed(
     if "1+" in number and number.keys() <= set(MODIFIED_ASHWORTH.grades):
         scale = MODIFIED_ASHWORTH
     return {text: text for text in number}, scale
+
+
+# ---- numbers: their unit, their thousands marks, their decimal mark ----
+
+
+@dataclass(slots=True, kw_only=True)
+class _Numbers:
+    """Texts as Python writes numbers."""
+
+    written: dict[str, str]  # by text; where it is none, what is no number either
+    facts: dict[str, str] = field(default_factory=dict)  # what was taken off
+    findings: list[Finding] = field(default_factory=list)
+
+
+def _numbers_of(
+    texts: Sequence[str], options: Reading, refuse: _Refuse, marks: Collection[str]
+) -> _Numbers:
+    # grades as numbers are written; what may be two numbers is refused
+    # marks: that may be of thousands unsaid; none where the scale is declared, and
+    # nothing is guessed
+    numbers = _Numbers(written=dict(zip(texts, texts, strict=True)))
+    if options.units or marks:
+        _take_unit(numbers, options, refuse)
+    _take_thousands(numbers, options, refuse, marks)
+    written = numbers.written
+    if options.decimal is None and marks:
+        commas = [text for text, n in written.items() if _DECIMAL_COMMA.fullmatch(n)]
+        if commas and all(re.fullmatch(f"[+-]?{_DIGITS}", n) for n in written.values()):
+            raise refuse("decimal comma", commas)
+    truths = {text: _TRUTH.get(text.casefold(), text) for text in texts}
+    if marks and {"0", "1"} & written.keys() and set(truths.values()) <= {"0", "1"}:
+        numbers.written = truths
+    return numbers
+
+
+def _take_unit(numbers: _Numbers, options: Reading, refuse: _Refuse) -> None:
+    # off all numbers, if that was asked for; else it is refused
+    matches = {
+        text: (match[1], unicodedata.normalize("NFKC", match[2]))
+        for text in numbers.written
+        if not is_number(text) and (match := _WITH_UNIT.fullmatch(text))
+    }
+    units = Counter(unit for _, unit in matches.values())
+    unit, n = units.most_common(1)[0] if units else ("", 0)
+    others = [t for t in numbers.written if t not in matches or matches[t][1] != unit]
+    if options.units:
+        if others:
+            stray = [t for t in others if t not in matches and not is_number(t)]
+            of = repr(unit) if unit else "of all"
+            raise refuse("no unit", others, unit=of, hint=if_missing(stray))
+        numbers.written = {text: number for text, (number, _) in matches.items()}
+        numbers.facts["unit"] = unit
+        return
+    # 2a, 2b and 3 are grades, as 1+ is; a letter behind every number may be a unit
+    are_grades = others and all(u.isalpha() and len(u) == 1 for u in units)
+    if n > max(1, len(others)) and not are_grades:
+        raise refuse("units", [t for t in matches if matches[t][1] == unit], unit=unit)
+
+
+def _take_thousands(
+    numbers: _Numbers, options: Reading, refuse: _Refuse, marks: Collection[str]
+) -> None:
+    # their marks off numbers, and a point before decimals
+    mark, written = options.thousands, numbers.written
+    if mark is None and (likely := _thousands_mark(written.values(), options, marks)):
+        mark, is_told, ways = likely
+        marked = [text for text, number in written.items() if _has(number, mark)]
+        if not is_told:
+            raise refuse("thousands", marked, ways=ways)
+        facts = {"got": listed(marked), "mark": quoted([mark])}
+        numbers.findings.append(Finding("thousands read", **facts))
+    decimal = options.decimal or _decimal_beside(mark)
+    if mark:
+        numbers.facts["thousands"] = mark
+        either = f"{_kinds(mark)}{re.escape(decimal)}"
+        like = re.compile(rf"(?=.*\d)[+-]?[\d{either}]*", re.ASCII)
+        for text, number in written.items():
+            if _grouped(mark, decimal).fullmatch(number):
+                written[text] = re.sub(f"[{_kinds(mark)}]", "", number)
+            elif _has(number, mark) and like.fullmatch(number):
+                raise refuse("groups", [text], mark=mark)
+    if decimal != ".":
+        numbers.written = {
+            text: "" if "." in number else number.replace(decimal, ".")
+            for text, number in written.items()
+        }
+
+
+def _thousands_mark(
+    texts: Collection[str], options: Reading, marks: Iterable[str]
+) -> tuple[str, bool, str] | None:
+    # the mark before three digits, nothing else, in all numbers that have it; whether
+    # the numbers tell it from a decimal mark, and the options that do
+    for mark in marks:
+        decimal = options.decimal or _decimal_beside(mark)
+        grouped = _grouped(mark, decimal)
+        fits = (
+            grouped.fullmatch(t)
+            or is_number("" if _has(t, mark) else t.replace(decimal, "."))
+            for t in texts
+        )
+        marked = [t for t in texts if _has(t, mark)] if all(fits) else []
+        if not marked or mark == decimal:
+            continue
+        rest = [t.replace(decimal, ".") for t in texts if not _has(t, mark)]
+        top = max((abs(float(number)) for number in rest), default=0.0)
+        groups = [re.split(f"[{_kinds(mark)}]", text) for text in marked]
+        # 1,200,000 and 1,200.5
+        is_sure = max(map(len, groups)) > 2 or any(decimal in text for text in marked)
+        most = 0.0 if is_sure else max(abs(float(".".join(g))) for g in groups)
+        has_decimals = any(decimal in text for text in texts)
+        # whether a mark before decimals cannot be meant
+        is_known = mark not in ",." or options.decimal is not None or has_decimals
+        # below 1,000 come numbers such as 900, not 0,900 or 0.9
+        are_below = 100.0 <= top < 1000.0
+        is_told = is_sure or (is_known and not rest)
+        is_told |= are_below and (is_known or top > 2.0 * most)
+        if mark == "." and options.decimal is None:
+            # a point is that of decimals unless numbers without it are of another size
+            is_near = top <= max(_SCALE, 2.0 * most) and not are_below
+            if is_near and not (is_sure or is_known):
+                continue
+            is_told &= not has_decimals  # a decimal comma is for the caller to say
+        ways = f"--thousands {quoted([mark])} reads it so"
+        if not is_known:
+            ways += f", --decimal {mark} as a decimal mark"
+        return mark, is_told, ways
+    return None
+
+
+# ---- numbers of items ----
+
+
+def count_of(text: str, options: Reading) -> float:
+    """Return a number of items, -1 where a text is none, or may be of thousands."""
+    mark = options.thousands or ""
+    if mark and _grouped(mark, "").fullmatch(text):
+        text = re.sub(f"[{_kinds(mark)}]", "", text)
+    is_doubtful = options.decimal is None and _grouped(".", "").fullmatch(text)
+    return float(text) if is_number(text) and not is_doubtful else -1.0
+
+
+def if_thousands(text: str) -> str:
+    """Return how a number of items is read if its mark is that of thousands."""
+    likely = (mark for mark in _MARKS if _grouped(mark, "").fullmatch(text))
+    return "".join(f"; --thousands {quoted([mark])} reads thousands" for mark in likely)
+
+
+# ---- marks ----
+
+
+def _decimal_beside(mark: str | None) -> str:
+    # the usual decimal mark beside a thousands mark
+    return "," if mark == "." else "."
+
+
+def _kinds(mark: str) -> str:
+    # of a class in a regular expression
+    return re.escape(_MARKS.get(mark, mark))
+
+
+def _has(text: str, mark: str) -> bool:
+    return any(kind in text for kind in _MARKS.get(mark, mark))
+
+
+def _grouped(mark: str, decimal: str) -> re.Pattern[str]:
+    # numbers with the mark before every three digits
+    after = rf"({re.escape(decimal)}\d*)?" if decimal else ""
+    number = rf"[+-]?[1-9]\d{{0,2}}([{_kinds(mark)}]\d{{3}})+{after}"
+    return re.compile(number, re.ASCII)
 
 
 # ---- what looks alike, or wrong ----
@@ -287,10 +487,16 @@ def _doubts(
         code = "no number"
     if strays:
         finding = Finding(
-            code, got=listed(strays), where=where(strays[0]), codes=quoted(strays)
+            code, got=listed(strays), where=where(strays[0]), hint=_hint(strays, met)
         )
         findings.append(finding)
     return findings
+
+
+def _hint(texts: Sequence[str], freq: Mapping[str, int]) -> str:
+    # a large part of the ratings is not meant as missing
+    is_rare = 4 * sum(map(freq.__getitem__, texts)) <= sum(freq.values())
+    return if_missing(texts) if is_rare else ""
 
 
 def _far_codes(grades: Sequence[str], freq: dict[str, int]) -> list[Finding]:
@@ -309,6 +515,6 @@ def _far_codes(grades: Sequence[str], freq: dict[str, int]) -> list[Finding]:
             if is_odd or is_off_scale or gap >= rest[0] + 1:
                 far = sorted(order[:n_far], key=Decimal)
                 named = ", ".join(f"{g} ({freq[g]} times)" for g in far)
-                findings.append(Finding("far", grades=named, codes=quoted(far)))
+                findings.append(Finding("far", grades=named, hint=_hint(far, freq)))
                 break
     return findings

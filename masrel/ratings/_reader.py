@@ -30,7 +30,13 @@ from masrel.ratings._findings import (
     Reading,
     refusal,
 )
-from masrel.ratings._grade_texts import Grades, graded, is_number
+from masrel.ratings._grade_texts import (
+    Grades,
+    count_of,
+    graded,
+    if_thousands,
+    is_number,
+)
 from masrel.ratings._layout import (
     Layout,
     doubt_columns,
@@ -191,7 +197,7 @@ def read_ratings(
     layout = find_layout(cells, options)
     read = _counted if layout.kind in ("counts", "table") else _rated
     if layout.frequency is not None:
-        cells, read = _standing_for(cells, layout.frequency), _patterns
+        cells, read = _standing_for(cells, layout.frequency, options), _patterns
     return read(cells, layout, options, findings)
 
 
@@ -331,6 +337,7 @@ def _file_of(
         },
         "missing": grades.n_missing,
         "merged": grades.merged,
+        **grades.facts,
         "dropped": sheet.dropped,
         "scale": {
             "name": scale.name,
@@ -542,9 +549,9 @@ def _clusters(sheet: Sheet, place: int, items: Column, row: Codes) -> tuple[str,
 # ---- rows that stand for several items ----
 
 
-def _standing_for(sheet: Sheet, place: int) -> Sheet:
+def _standing_for(sheet: Sheet, place: int, options: Reading) -> Sheet:
     # the rows that stand for an item at least
-    freq = _whole_numbers(sheet, place, "frequency")
+    freq = _whole_numbers(sheet, place, "frequency", options)
     rows = freq > 0
     if not rows.any():
         raise sheet.refuse("no counts", kind="frequency")
@@ -594,7 +601,7 @@ def _counted(
     # a table of counts, or a contingency table
     names = [sheet.header[place] for place in layout.raters]
     table = np.column_stack(
-        [_whole_numbers(sheet, place, layout.kind) for place in layout.raters]
+        [_whole_numbers(sheet, place, layout.kind, options) for place in layout.raters]
     )
     if not table.any():
         raise sheet.refuse("no counts", kind=layout.kind)
@@ -641,15 +648,16 @@ def _counted(
     )
 
 
-def _whole_numbers(sheet: Sheet, place: int, kind: str) -> Codes:
+def _whole_numbers(sheet: Sheet, place: int, kind: str, options: Reading) -> Codes:
     # -> (n_rows,)
     column, empty = sheet.columns[place], "" if kind == "frequency" else "0"
-    numbers = [float(t) if is_number(t := u or empty) else -1.0 for u in column.texts]
+    numbers = [count_of(text or empty, options) for text in column.texts]
     for code, n in enumerate(numbers):
         if not (n >= 0 and n.is_integer() and n <= _MAX_COUNT):
             where = sheet.where(int(np.argmax(column.codes == code)))
             text = column.texts[code]
-            raise sheet.refuse("count", where, place, kind=kind, text=text)
+            hint = if_thousands(text)
+            raise sheet.refuse("count", where, place, kind=kind, text=text, hint=hint)
     return np.array(numbers, dtype=np.int64)[column.codes]
 
 

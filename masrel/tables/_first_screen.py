@@ -76,6 +76,10 @@ def _of_grades(file: RatingsFile) -> list[str]:
     if read["dropped"]:
         rows = ", ".join(f"{n} {why}" for why, n in read["dropped"].items())
         parts.append(f"Rows left out: {rows}.")
+    if "unit" in read:
+        parts.append(f"Unit, left off: {read['unit']}.")
+    if "thousands" in read:
+        parts.append(f"Thousands mark, left off: {read['thousands']!r}.")
     merged = {g: s for g, s in read["merged"].items() if len(s) > 1}
     if merged:
         same = "; ".join(
