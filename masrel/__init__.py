@@ -9,18 +9,44 @@ Statistics, for anybody with ratings::
     audit       whether the numbers that a paper prints can be
 
 and `masrel.lab`, the laboratory, which stands on them and which they never import.
+`masrel.agree` goes through them in one call.
 """
 
 import importlib
-from types import ModuleType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from masrel._agree import Agreement, agree
+    from masrel.analysis._file_estimates import Estimating
+    from masrel.ratings._findings import Reading
 
 __version__ = "0.2.0.dev0"
 
-__all__ = ["agreement", "audit", "intervals", "lab", "planning", "ratings"]
+__all__ = [
+    "Agreement",
+    "Estimating",
+    "Reading",
+    "agree",
+    "agreement",
+    "audit",
+    "intervals",
+    "lab",
+    "planning",
+    "ratings",
+]
+
+_HOMES = {
+    "Agreement": "_agree",
+    "Estimating": "analysis._file_estimates",
+    "Reading": "ratings._findings",
+    "agree": "_agree",
+}
 
 
-def __getattr__(name: str) -> ModuleType:
-    # Sub-packages are loaded on first use (PEP 562): importing masrel costs nothing.
+def __getattr__(name: str) -> object:
+    # All is loaded on first use (PEP 562): importing masrel costs nothing.
+    if name in _HOMES:
+        return getattr(importlib.import_module(f"masrel.{_HOMES[name]}"), name)
     if name in __all__:
         return importlib.import_module(f"masrel.{name}")
     raise AttributeError(f"module 'masrel' has no attribute {name!r}")

@@ -11,6 +11,7 @@ from pathlib import Path
 
 PAGE = Path(__file__).parents[1] / "api.md"
 MODULES = (
+    "masrel",
     "masrel.agreement",
     "masrel.intervals",
     "masrel.audit",

@@ -6,9 +6,10 @@ In: a `RatingsFile` and how estimates are made. Out: a row for every coefficient
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from masrel._input import refuse
+from masrel._input import refuse, split_names
 from masrel.errors import MasrelError, ParameterError
 from masrel.estimates import Estimate, Interval, IntervalMethod, Target
 from masrel.ratings._findings import listed
@@ -54,10 +55,10 @@ class Estimating:
 
     Parameters
     ----------
-    coefficients : list of str or None
-        Names of coefficients, or ``["all"]``, all that fit; None for the usual ones.
-    weights : str or Weights or array_like
-        Weights of coefficients that take any.
+    coefficients : str, list of str or None
+        Names of coefficients, or ``"all"`` that fit; None for the usual ones.
+    weights : str, Path, Weights or array_like
+        Weights of coefficients that take any; a path is that of a matrix.
     metric : str or None
         Krippendorff's difference function, in place of weights.
     target : {"items", "raters", "both"} or None
@@ -78,7 +79,7 @@ class Estimating:
     'auto'
     """
 
-    coefficients: list[str] | None = None
+    coefficients: str | Sequence[str] | None = None
     # checked with the rest; a file until the scale is known
     weights: Any = "identity"
     metric: "Metric | None" = None
@@ -88,6 +89,11 @@ class Estimating:
     n_resamples: int = 10_000
     seed: int = 0
     words: "BandScale | None" = None
+
+    def __post_init__(self) -> None:
+        if (names := self.coefficients) is not None:
+            several = split_names(names) if isinstance(names, str) else list(names)
+            object.__setattr__(self, "coefficients", several)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,7 +118,7 @@ class Questions(Estimating):
     def names(self) -> list[str]:
         """The coefficients that are named, or the usual ones."""
         if self.coefficients is not None:
-            return self.coefficients
+            return list(self.coefficients)
         return list(USUAL) if self.metric is None else [_OF_METRIC]
 
     def weights_of(self, entry: "Coefficient") -> Any:
@@ -172,6 +178,21 @@ class Questions(Estimating):
         )
         target = self.target if clusters is None else "items"
         return replace(self, weights=plain_name(self.weights), target=target)
+
+    def on_scale(self, file: "RatingsFile") -> "Questions":
+        """Return the same with weights that are in a file, or a matrix."""
+        from masrel.agreement import Weights, declared_weights
+
+        weights, scale = self.weights, file.scale
+        if isinstance(weights, Path):
+            from masrel.ratings._reader import read_weights
+
+            ordered = file.is_ordered
+            weights = read_weights(weights, scale.grades, is_ordered=ordered)
+        elif not isinstance(weights, str | Weights):
+            check_order(file, "weights: a matrix")
+            weights = declared_weights(weights, scale.values)
+        return replace(self, weights=weights)
 
     def between_raters(self, file: "RatingsFile") -> "Questions | None":
         """Return what is estimated between raters; None where that is nothing."""

@@ -194,17 +194,7 @@ def show_answers(
             "--figure: shows intervals, so it needs --target raters, items or both"
         )
     ratings = read_file(file, reading)
-    if isinstance(questions.weights, Path):
-        from masrel.ratings._reader import read_weights
-
-        questions = replace(
-            questions,
-            weights=read_weights(
-                questions.weights,
-                ratings.scale.grades,
-                is_ordered=ratings.is_ordered,
-            ),
-        )
+    questions = questions.on_scale(ratings)
     from masrel.analysis._file_questions import answers
     from masrel.tables._answer_tables import agreement_sentences
     from masrel.tables._first_screen import first_screen, reading_notes

@@ -6,12 +6,13 @@ once, spans and relations are refused.
 """
 
 import csv
+import hashlib
 import io
 import json
 import re
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -20,6 +21,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from masrel._input import shown
+from masrel.agreement._labels import is_row
 from masrel.errors import ParameterError
 from masrel.ratings._findings import Reading, library, refusal
 from masrel.ratings._sheet import (
@@ -31,6 +34,8 @@ from masrel.ratings._sheet import (
     unzipped,
     value_text,
 )
+
+_TABLE = "the data"  # what a table in memory is called
 
 _ARROW = {".parquet": "pyarrow.parquet", ".feather": "pyarrow.feather"}
 _PYREADSTAT = {
@@ -50,6 +55,80 @@ _ERROR_CELL = re.compile(
 )
 _SOLID = re.compile(r"[^ \t\n\r]")
 _ENCODED = (".sav", ".zsav", ".dta", ".sas7bdat", ".xpt")  # pyreadstat takes theirs
+
+
+# ---- tables in memory ----
+
+
+def read_table(data: Any, options: Reading) -> tuple[Sheet, Reading]:
+    """Return the cells of a table in memory, and how they are read."""
+    kind = type(data).__name__
+    for name in ("delimiter", "encoding", "sheet", "source", "stream"):
+        if getattr(options, name):
+            raise ParameterError(f"--{name}: is of files, got a table ({kind})")
+    is_array = isinstance(data, list | tuple | np.ndarray)
+    frame = _rows(data) if is_array else _named(data)
+    n_above = -1  # rows count from 1, and their names are 0
+    if isinstance(frame.columns, pd.RangeIndex):  # columns that nobody named
+        n_above, places = 0, range(frame.shape[1])
+        first = [column_of(_TABLE, str(k), frame.iloc[:1, k]).texts for k in places]
+        frame = frame[1:].set_axis(["".join(texts) for texts in first], axis=1)
+        has_items = bool(options.item or options.rater or options.grade)
+        no_item = options.no_item or (is_array and not has_items)
+        options = replace(options, no_header=True, no_item=no_item)
+    sheet = sheet_of(_TABLE, str, frame, {"format": kind}, n_above)
+    return replace(sheet, sha256=partial(_digest, sheet.header, sheet.columns)), options
+
+
+def _rows(data: Any) -> pd.DataFrame:
+    # of an array, or of sequences
+    is_table = getattr(data, "ndim", 2) == 2 and all(map(is_row, data))
+    if not is_table or len(set(map(len, data))) != 1:
+        raise refusal(_TABLE, "no table", got=_got(data))
+    return pd.DataFrame(data)
+
+
+def _named(data: Any) -> pd.DataFrame:
+    # names of rows that are more than numbers are the first columns
+    if isinstance(data, Mapping):
+        try:
+            frame = pd.DataFrame(data)
+        except (ValueError, TypeError) as error:
+            raise refusal(_TABLE, "no table", got=_got(data)) from error
+    elif isinstance(data, pd.DataFrame):
+        frame = data
+    else:
+        return table_frame(_arrow(data))
+    if frame.columns.nlevels > 1:
+        joined = [" ".join(map(str, name)).strip() for name in frame.columns]
+        frame = frame.set_axis(joined, axis=1)
+    if frame.index.names == [None] and frame.index.dtype.kind in "iu":
+        return frame.reset_index(drop=True)
+    names = ["" if name is None else str(name) for name in frame.index.names]
+    return frame.reset_index(names=names, allow_duplicates=True)
+
+
+def _arrow(data: Any) -> Any:
+    # a frame of another library as a table of Arrow
+    import narwhals
+
+    try:
+        frame = narwhals.from_native(data)
+    except TypeError as error:
+        raise refusal(_TABLE, "no table", got=_got(data)) from error
+    library(_TABLE, "pyarrow")
+    if isinstance(frame, narwhals.LazyFrame):
+        frame = frame.collect()
+    return frame.to_arrow()
+
+
+def _got(data: Any) -> str:
+    return f"{type(data).__name__} {shown(data)}"
+
+
+def _digest(header: tuple[str, ...], columns: tuple[Column, ...]) -> str:
+    cells = [(column.texts, column.codes.tobytes()) for column in columns]
+    return hashlib.sha256(repr((header, cells)).encode()).hexdigest()
 
 
 # ---- files whose cells have types ----
@@ -94,6 +173,11 @@ def sheet_of(
 ) -> Sheet:
     """Return the cells of a frame as texts; n_above: rows above the names."""
     names = [str(column) for column in frame.columns]
+    orders = {
+        name: [*map(value_text, dtype.categories)]
+        for name, dtype in zip(names, frame.dtypes, strict=True)
+        if getattr(dtype, "ordered", False)
+    }
     return Sheet(
         name=name,
         sha256=sha256,
@@ -102,7 +186,7 @@ def sheet_of(
             column_of(name, title, frame.iloc[:, place])
             for place, title in enumerate(names)
         ),
-        facts=facts,
+        facts={**facts, "orders": orders} if orders else facts,
         unit="row",
         line_of=lambda number: n_above + number + 1,
     )

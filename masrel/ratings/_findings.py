@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from importlib import import_module
 from importlib.util import find_spec
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from masrel.errors import ParameterError, RatingsError
 
@@ -114,9 +114,11 @@ class Reading:
     def __post_init__(self) -> None:
         mark = _SEPARATORS.get(self.delimiter or "auto", self.delimiter)
         object.__setattr__(self, "delimiter", mark)
-        for name in ("item", "raters", "ignore"):
-            if isinstance(value := getattr(self, name), str):
-                object.__setattr__(self, name, (value,))
+        # in Python a column may be a number, and a grade
+        for name in ("item", "raters", "ignore", "missing_codes", "categories"):
+            if (value := getattr(self, name)) is not None:
+                several = [value] if isinstance(value, str | int) else value
+                object.__setattr__(self, name, tuple(map(str, several)))
         self._check()
 
     def record(self) -> dict[str, object]:
@@ -171,6 +173,10 @@ class Reading:
                 f"--{'units' if self.units else 'set-separator'}: is of grades, and "
                 f"cells of --{'counts' if self.counts else 'table'} are numbers of "
                 "ratings",
+            ),
+            (
+                self.repeated not in get_args(Repeated),
+                f"--repeated: needed error, first, last or mean, got {self.repeated!r}",
             ),
             (
                 self.stream and self.whole,
@@ -289,6 +295,8 @@ _ROW_LIKE_OTHERS = "--no-header if this line is a row like the others"
 
 _TEXTS = {
     # the file
+    "no table": "needed a path, a DataFrame, columns by name, or rows of the same "
+    "length, got {got}",
     "folder": "needed a file, got a folder",
     "absent": "no such file",
     "device": "needed a file or a pipe, got a device",

@@ -76,6 +76,18 @@ def is_number(text: str) -> bool:
     return bool(_NUMBER.fullmatch(text)) and math.isfinite(float(text))
 
 
+def with_order(sheet: Sheet, places: Sequence[int], options: Reading) -> Reading:
+    """Declare the ordered categories that all columns of grades have in a frame."""
+    orders = sheet.facts.get("orders", {})
+    order, *others = [orders.get(sheet.header[place]) for place in places]
+    is_told = options.categories or options.set_separator
+    if is_told or not order or any(other != order for other in others):
+        return options
+    absent = {*USUAL_MISSING, *options.missing_codes}
+    grades = [grade for grade in order if grade not in absent]
+    return replace(options, categories=grades)
+
+
 def graded(sheet: Sheet, places: Sequence[int], options: Reading) -> Grades:
     """Return which grades the cells of some columns are."""
     number: dict[str, int] = {}

@@ -36,6 +36,7 @@ from masrel.ratings._grade_texts import (
     graded,
     if_thousands,
     is_number,
+    with_order,
 )
 from masrel.ratings._layout import (
     Layout,
@@ -123,7 +124,8 @@ class RatingsFile:
     read : dict
         What was read, ready for JSON: format, columns, grades, missing ones, scale.
     sha256 : callable
-        Returns the hash of the file's bytes; that of a stream is read again for it.
+        Returns the hash of the file's bytes, for which a stream is read again; of a
+        table, that of its cells.
     warnings : tuple of Finding
         What may have been read wrongly, and which option would tell.
     simulated : bool
@@ -141,18 +143,20 @@ class RatingsFile:
 
 @long_cells()
 def read_ratings(
-    path: Path | str,
+    data: Any,
     reading: Reading | None = None,
     *,
     progress: Callable[[int, int], None] | None = None,
 ) -> RatingsFile:
-    r"""Read any file of ratings, or say in one sentence which option would.
+    r"""Read any file or table of ratings, or say in one sentence which option would.
 
     Parameters
     ----------
-    path : Path or str
-        The file; "-" is standard input. Text, workbooks, Parquet, Feather, JSON,
-        SPSS, Stata and SAS, packed or not; ``docs/ratings.md`` has every shape.
+    data : Path, str, DataFrame, dict of columns or array_like
+        The path of a file; "-" is standard input. Text, workbooks, Parquet, Feather,
+        JSON, SPSS, Stata and SAS, packed or not; ``docs/ratings.md`` has every shape.
+        Or a table: a DataFrame of pandas or polars, a table of Arrow, a relation of
+        DuckDB, columns by name, or rows without names.
     reading : Reading, optional
         How it is read; the file tells what is not given.
     progress : callable, optional
@@ -181,20 +185,32 @@ def read_ratings(
     ('MAS', ['Kim', 'Lee'], 1)
     """
     options = reading or Reading()
-    suffix, is_large = Path(path).suffix.lower(), bool(options.stream)
-    if options.stream is None and not options.whole and Path(path).is_file():
-        is_large = Path(path).stat().st_size >= _LARGE_TEXT or suffix == ".parquet"
+    if not isinstance(data, Path | str):
+        from masrel.ratings._exports import read_table  # with pandas
+
+        sheet, options = read_table(data, options)
+        return _read_cells(finished(sheet, options), options)
+    path = Path(data)
+    suffix, is_large = path.suffix.lower(), bool(options.stream)
+    if options.stream is None and not options.whole and path.is_file():
+        is_large = path.stat().st_size >= _LARGE_TEXT or suffix == ".parquet"
     if is_large:
-        streamed = _streamed(Path(path), options, progress or (lambda *_: None))
+        streamed = _streamed(path, options, progress or (lambda *_: None))
         if streamed is not None:
             return streamed
-    cells, findings = without_second_header(_read_sheet(path, options))
+    return _read_cells(_read_sheet(path, options), options)
+
+
+def _read_cells(sheet: Sheet, options: Reading) -> RatingsFile:
+    """Return the ratings in the cells of a file or a table."""
+    cells, findings = without_second_header(sheet)
     if not len(cells.numbers):
         raise cells.refuse("no rows")
     if errors := cells.facts.get("errors"):
         shown = ", ".join(f"{text} ×{n}" for text, n in errors.items())
         findings.append(Finding("errors", errors=shown))
     layout = find_layout(cells, options)
+    options = with_order(cells, layout.grades, options)
     read = _counted if layout.kind in ("counts", "table") else _rated
     if layout.frequency is not None:
         cells, read = _standing_for(cells, layout.frequency, options), _patterns
@@ -235,6 +251,7 @@ def _streamed(
         layout = find_layout(sheet, options)
         if layout.session is not None:
             return None
+        options = with_order(sheet, layout.grades, options)
         with _large.database_of(source, layout, progress) as answer:
             return _grouped(answer, sheet, layout, options)
     except _large.NoStreamError as error:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from masrel.agreement import COEFFICIENTS
 from masrel.analysis._file_estimates import Answer, Questions
-from masrel.ratings import RatingsFile
+from masrel.ratings import Finding, RatingsFile
 from masrel.tables._answer_tables import answer_table
 from masrel.tables._tables import Table, counted
 
@@ -99,10 +99,8 @@ def _of_grades(file: RatingsFile) -> list[str]:
     return parts
 
 
-def reading_notes(
-    ratings: RatingsFile, questions: Questions, first: Answer
-) -> list[str]:
-    """Return what may have been read wrongly, and what is left out of it."""
+def reading_warnings(ratings: RatingsFile, first: Answer) -> tuple[Finding, ...]:
+    """Return what may have been read wrongly."""
     # of measurements it is warned unless all coefficients weigh how far they lie from
     # each other
     estimates = [row.estimate for row in first.estimates if first.name == "agreement"]
@@ -111,11 +109,18 @@ def reading_notes(
         and estimate.weights in ("identity", "nominal")
         for estimate in estimates
     )
-    notes = [
-        f"warning: {text}"
-        for text in ratings.warnings
-        if is_warned or text.code != "measurements"
-    ]
+    return tuple(
+        finding
+        for finding in ratings.warnings
+        if is_warned or finding.code != "measurements"
+    )
+
+
+def reading_notes(
+    ratings: RatingsFile, questions: Questions, first: Answer
+) -> list[str]:
+    """Return what may have been read wrongly, and what is left out of it."""
+    notes = [f"warning: {text}" for text in reading_warnings(ratings, first)]
     if questions.takes_all and not ratings.is_ordered:
         notes.append(
             "Left out: the six forms of ICC, Kendall's W and Robinson's A, which need "

@@ -249,6 +249,27 @@ def as_text(table: Table, *, width: int | None = None) -> str:
     return "\n".join([table.labelled_caption, *read, *lines, *notes])
 
 
+def as_html(table: Table) -> str:
+    """Return a table for a notebook, with what was read above and notes below."""
+    from html import escape  # loaded only in a notebook
+
+    columns, body = page_cells(table)
+    rows = [[column.heading for column in columns], *body]
+    lines = [
+        "".join(
+            f"<{tag} style='text-align: {column.align}'>{escape(cell)}</{tag}>"
+            for cell, column in zip(row, columns, strict=True)
+        )
+        for tag, row in zip(("th", *("td" for _ in body)), rows, strict=True)
+    ]
+    above, below = (
+        "".join(f"<p>{escape(text)}</p>" for text in texts)
+        for texts in ((table.labelled_caption, *table.read), table.notes)
+    )
+    cells = "".join(f"<tr>{line}</tr>" for line in lines)
+    return f"<div>{above}<table>{cells}</table>{below}</div>"
+
+
 def aligned(
     rows: Sequence[Sequence[str]], aligns: Sequence[Align], *, rule: bool = False
 ) -> list[str]:

@@ -68,7 +68,8 @@ def test_no_module_imports_in_a_circle() -> None:
     ("commands", "at_most"),
     [
         (("agree",), 60),
-        (("agree", "compare", "diagnose", "limits", "latent", "plan", "audit"), 83),
+        # one of them is masrel.agree, which stands beside the version
+        (("agree", "compare", "diagnose", "limits", "latent", "plan", "audit"), 84),
     ],
 )
 def test_a_command_reaches_few_modules(commands: tuple[str, ...], at_most: int) -> None:

@@ -1,0 +1,240 @@
+"""One call from ratings in any form to their agreement, as the command line has it."""
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Any, TypeVar, get_args
+
+from masrel._input import check_option, shown
+from masrel.agreement import COEFFICIENTS, BandScale, Metric
+from masrel.analysis._file_estimates import Answer, Estimating, Questions
+from masrel.analysis._file_questions import answers
+from masrel.errors import MasrelError, ParameterError
+from masrel.estimates import Estimate, IntervalMethod, Target
+from masrel.ratings import Finding, RatingsFile, Reading, read_ratings
+from masrel.tables._answer_tables import agreement_sentences
+from masrel.tables._first_screen import first_screen, reading_warnings
+from masrel.tables._tables import Table, as_html, as_text
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_Options = TypeVar("_Options", Reading, Estimating)
+
+_WIDTH = 88  # of notes
+_CHOICES = {
+    "target": Target,
+    "interval": IntervalMethod,
+    "metric": Metric,
+    "words": BandScale,
+}
+_ASK = 'No interval; for other items like these: masrel.agree(…, target="items").'
+
+# options as messages name them, and what they are here
+_OPTION = re.compile(r"--([a-z][a-z-]*)")
+_OTHER_WORDS = {"missing": "missing_codes", "from": "source"}
+_PLACES = {
+    **{of.name: f"reading=Reading({of.name}=…)" for of in fields(Reading)},
+    **{of.name: f"estimating=Estimating({of.name}=…)" for of in fields(Estimating)},
+    **{name: f"{name}=…" for name in ("item", "rater", "grade", "raters", "target")},
+    "coefficients": "coefficients=…",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Agreement:
+    """How well raters agree: a row for every coefficient, and what was read.
+
+    Attributes
+    ----------
+    file : RatingsFile
+        The ratings, and what was read of them.
+    answer : Answer
+        The estimates with what is said of each.
+    estimating : Estimating
+        What was estimated, and how.
+    """
+
+    file: RatingsFile
+    answer: Answer = field(compare=False)
+    estimating: Questions
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Every estimate with its interval."""
+        return tuple(row.estimate for row in self.answer.estimates)
+
+    @property
+    def table(self) -> "pd.DataFrame":
+        """The estimates as a DataFrame, with columns of groups first if there are any.
+
+        Its columns are coefficient, value, standard_error, low, high, method, n_items
+        and n_raters; low and high are ``nan`` where there is no interval.
+        """
+        import pandas as pd
+
+        return pd.DataFrame(
+            {
+                **row.keys,
+                "coefficient": of.coefficient,
+                "value": of.value,
+                "standard_error": of.standard_error,
+                "low": getattr(of.interval, "low", math.nan),
+                "high": getattr(of.interval, "high", math.nan),
+                "method": getattr(of.interval, "method", None),
+                "n_items": of.n_items,
+                "n_raters": of.n_raters,
+            }
+            for row, of in zip(self.answer.estimates, self.estimates, strict=True)
+        )
+
+    @property
+    def warnings(self) -> tuple[Finding, ...]:
+        """What may have been read wrongly, and which option tells."""
+        return reading_warnings(self.file, self.answer)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """How the estimates were made, and what to know of them."""
+        return self._screen.notes[len(self.warnings) :]
+
+    @property
+    def _screen(self) -> Table:
+        (screen,) = first_screen(self.file, self.estimating, [self.answer])
+        can_have = any(
+            row.estimate.interval is None
+            and row.estimate.reason is None
+            and COEFFICIENTS[row.estimate.coefficient].formula is not None
+            for row in self.answer.estimates
+        )
+        is_asked = self.estimating.target is not None or not can_have
+        return screen if is_asked else replace(screen, notes=(*screen.notes, _ASK))
+
+    def sentence(self) -> str:
+        """Return a sentence for a paper of every estimate, one a line."""
+        words, data = self.estimating.words, self._screen.data
+        return agreement_sentences(self.answer, bands=words, data=data)
+
+    def __str__(self) -> str:
+        return as_text(self._screen, width=_WIDTH)
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        return as_html(self._screen)
+
+
+def agree(
+    data: Any,
+    *,
+    item: str | Sequence[str] | None = None,
+    rater: str | None = None,
+    grade: str | None = None,
+    raters: str | Sequence[str] | None = None,
+    target: Target | None = None,
+    coefficients: str | Sequence[str] | None = None,
+    reading: Reading | None = None,
+    estimating: Estimating | None = None,
+) -> Agreement:
+    """Estimate how well the raters of a table or a file agree.
+
+    The table is read by the rules of a file, and what could be read in two ways is
+    refused in one sentence. Messages name options as the command line has them:
+    ``--no-item`` is ``Reading(no_item=True)``.
+
+    Parameters
+    ----------
+    data : DataFrame, path, dict of columns or array_like
+        Ratings: one row an item and a column a rater, or one row a rating. A DataFrame
+        of pandas or polars, a table of Arrow or a relation of DuckDB; the path of a
+        file in any form; columns by name; or rows of grades, items by raters. Ordered
+        categories are the scale in order, and a named index is a column.
+    item : str or sequence of str, optional
+        Column of the items; several name an item together.
+    rater, grade : str, optional
+        Columns of a long table, one row a rating.
+    raters : str or sequence of str, optional
+        Columns of a wide table that are raters.
+    target : {"items", "raters", "both"}, optional
+        What a new study would draw anew; no interval without it.
+    coefficients : str or sequence of str, optional
+        Names of coefficients, or "all" that fit; percent agreement and Fleiss' kappa
+        unless given.
+    reading : Reading, optional
+        How the table is read: these columns, and everything else.
+    estimating : Estimating, optional
+        What is estimated, and how: the target and coefficients, and everything else.
+
+    Returns
+    -------
+    Agreement
+        The estimates, as a DataFrame in `table`, and what was read.
+
+    Raises
+    ------
+    RatingsError
+        If it is no table of ratings, or could be more than one.
+    ParameterError
+        If an option is invalid, is given twice, or does not fit the ratings.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> frame = pd.DataFrame({"patient": ["A", "B", "C", "D", "E", "F"],
+    ...                       "Kim": [1, 2, 3, 1, 2, 3], "Lee": [1, 2, 3, 1, 3, 3]})
+    >>> result = agree(frame, target="items", coefficients="cohen_kappa")
+    >>> print(f"{result.table.loc[0, 'value']:.3f}")
+    0.750
+    """
+    how = _joined(
+        "reading",
+        reading,
+        Reading(),
+        item=item,
+        rater=rater,
+        grade=grade,
+        raters=raters,
+    )
+    what = _joined(
+        "estimating", estimating, Estimating(), target=target, coefficients=coefficients
+    )
+    for name, kind in _CHOICES.items():
+        if (value := getattr(what, name)) is not None:
+            check_option(name, value, get_args(kind))
+    values = {of.name: getattr(what, of.name) for of in fields(Estimating)}
+    questions = Questions(**values, reference=how.reference)
+    try:
+        file = read_ratings(data, how)
+        questions = questions.on_scale(file).checked(how.clusters)
+        file, (answer,) = answers(file, questions)
+    except MasrelError as error:
+        _say_in_python(error)
+        raise
+    return Agreement(file=file, answer=answer, estimating=questions)
+
+
+def _joined(
+    name: str, options: _Options | None, default: _Options, **short_cuts: Any
+) -> _Options:
+    """Return options with those that are arguments of their own."""
+    chosen = default if options is None else options
+    if not isinstance(chosen, type(default)):
+        kind = type(default).__name__
+        raise ParameterError(f"{name}: needs masrel.{kind}(…), got {shown(options)}")
+    changes = {key: value for key, value in short_cuts.items() if value is not None}
+    for key in changes:
+        if getattr(chosen, key) != getattr(default, key):
+            raise ParameterError(
+                f"{key}: needed once, got it as an argument and in {name}"
+            )
+    return replace(chosen, **changes)
+
+
+def _say_in_python(error: MasrelError) -> None:
+    """Add to an error what the options in its message are called here."""
+    options = dict.fromkeys(_OPTION.findall(str(error)))
+    names = {of: _OTHER_WORDS.get(of, of.replace("-", "_")) for of in options}
+    known = [f"--{of} is {_PLACES[n]}" for of, n in names.items() if n in _PLACES]
+    if known:
+        error.add_note(f"In Python, {'; '.join(known)}.")

@@ -1,0 +1,395 @@
+"""masrel.agree: any table in memory gives what the command gives of its file."""
+
+import json
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import duckdb
+import numpy as np
+import pandas as pd
+import polars as pl
+import pyarrow as pa
+import pytest
+
+import masrel
+from masrel.agreement import cohen_kappa, declared_weights, fleiss_kappa
+from masrel.errors import MasrelError
+from masrel.ratings import read_ratings
+from tests.cli.conftest import masrel as command
+from tests.cli.process import Caller
+
+__all__ = ["command"]
+
+WIDE = """patient,Kim,Lee,Ann
+A,1,1,2
+B,2,,2
+C,1,1,1
+D,3,3,3
+E,2,3,2
+F,1,2,1
+G,3,3,3
+H,2,2,1
+"""
+_NAMES, *_ROWS = [line.split(",") for line in WIDE.splitlines()]
+LONG = "site,patient,rater,score\n" + "".join(
+    f"{'NS'[row % 2]},{patient},{rater},{grade}\n"
+    for row, (patient, *grades) in enumerate(_ROWS)
+    for rater, grade in zip(_NAMES[1:], grades, strict=True)
+)
+COUNTS = "item,mild,severe\na,3,0\nb,1,2\nc,0,3\nd,2,1\ne,3,0\n"
+
+# a file, options of the command, and arguments of the call
+CASES: dict[str, tuple[str, str, dict[str, Any]]] = {
+    "wide": (WIDE, "", {}),
+    "interval": (
+        WIDE,
+        "--target items --coefficients ICC(2,1),fleiss_kappa",
+        {"target": "items", "coefficients": "ICC(2,1),fleiss_kappa"},
+    ),
+    "two raters": (
+        WIDE,
+        "--raters Kim,Ann --coefficients cohen_kappa",
+        {"raters": ["Kim", "Ann"], "coefficients": ["cohen_kappa"]},
+    ),
+    "groups": (
+        LONG,
+        "--by site --weights linear --target items",
+        {
+            "target": "items",
+            "reading": masrel.Reading(by="site"),
+            "estimating": masrel.Estimating(weights="linear"),
+        },
+    ),
+    "all": (
+        LONG,
+        "--ignore site --coefficients all",
+        {"coefficients": "all", "reading": masrel.Reading(ignore="site")},
+    ),
+    "counts": (COUNTS, "--counts", {"reading": masrel.Reading(counts=True)}),
+}
+
+
+def columns(path: Path) -> dict[str, list[Any]]:
+    frame = pd.read_csv(path)
+    return frame.astype(object).where(frame.notna(), None).to_dict("list")
+
+
+FORMS: dict[str, Callable[[Path], Any]] = {
+    "path": lambda path: path,
+    "text of a path": str,
+    "pandas": pd.read_csv,
+    "pandas, as text": lambda path: pd.read_csv(path, dtype=str),
+    "pandas, types of Arrow": lambda path: pd.read_csv(path, dtype_backend="pyarrow"),
+    "pandas, a part": lambda path: pd.concat([(f := pd.read_csv(path)), f])[len(f) :],
+    "pandas, index": lambda path: pd.read_csv(path, index_col=0),
+    "polars": pl.read_csv,
+    "polars, lazy": pl.scan_csv,
+    "Arrow": lambda path: pa.Table.from_pandas(pd.read_csv(path)),
+    "DuckDB": lambda path: duckdb.sql(f"SELECT * FROM '{path}'"),
+    "columns": columns,
+}
+
+
+def printed(document: dict[str, Any]) -> list[dict[str, Any]]:
+    """The rows of a document of the command that a table of the call has."""
+    of = ("coefficient", "value", "standard_error", "n_items", "n_raters")
+    ends = ("low", "high", "method")
+    return [
+        {
+            **({"site": row["site"]} if "site" in row else {}),
+            **{name: row[name] for name in of},
+            **{name: (row["interval"] or {}).get(name) for name in ends},
+        }
+        for row in document["estimates"]
+    ]
+
+
+def rows(table: pd.DataFrame) -> list[dict[Any, Any]]:
+    return table.astype(object).where(table.notna(), None).to_dict("records")
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("case", CASES)
+def test_every_form_gives_what_the_command_gives(
+    command: Caller, tmp_path: Path, case: str, form: str
+) -> None:
+    text, options, arguments = CASES[case]
+    path = tmp_path / "ratings.csv"
+    path.write_text(text, encoding="utf-8")
+    document = json.loads(command("agree", path, "--json", "-", *options.split()).out)
+    result = masrel.agree(FORMS[form](path), **arguments)
+    assert rows(result.table) == printed(document)
+    assert result.file.read["grades"] == document["read"]["grades"]
+    head = ["site"] if case == "groups" else []
+    assert [*result.table] == [
+        *(*head, "coefficient", "value", "standard_error", "low", "high", "method"),
+        *("n_items", "n_raters"),
+    ]
+
+
+GRADES = [[1, 1, 2], [2, None, 2], [1, 1, 1], [3, 3, 3]]
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        GRADES,
+        tuple(map(tuple, GRADES)),
+        np.array(GRADES, dtype=float),
+        np.array(GRADES, dtype=object),
+        np.ma.masked_invalid(np.array(GRADES, dtype=float)),
+        pd.DataFrame(GRADES, index=list("ABCD"), columns=["1", "2", "3"]),
+    ],
+)
+def test_rows_without_names_are_items_by_raters(data: Any) -> None:
+    result = masrel.agree(data)
+    value = result.table.set_index("coefficient").loc["fleiss_kappa", "value"]
+    assert value == fleiss_kappa(GRADES).value
+    assert result.file.parts[0].raters == ("1", "2", "3")
+
+
+def test_rows_of_a_row_a_rating_have_numbers_for_names() -> None:
+    long = [[item, rater, g] for item, rater, g in [("a", "K", 1), ("a", "L", 2)] * 1]
+    long += [["b", "K", 1], ["b", "L", 1], ["c", "K", 2], ["c", "L", 2]]
+    file = masrel.agree(long, item="1", rater="2", grade="3").file
+    assert (file.parts[0].items, file.parts[0].raters) == (("a", "b", "c"), ("K", "L"))
+
+
+# ---- what is read of a frame ----
+
+KIM_LEE = {"Kim": ["lo", "hi", "lo"], "Lee": ["lo", "mid", "mid"]}
+ORDER = pd.CategoricalDtype(["lo", "mid", "hi", "top"], ordered=True)
+
+
+@pytest.mark.parametrize(
+    ("frame", "items"),
+    [
+        (pd.DataFrame(KIM_LEE, index=["x", "y", "z"]), ("x", "y", "z")),
+        (pd.DataFrame(KIM_LEE, index=pd.Index([7, 8, 9], name="id")), ("7", "8", "9")),
+        (
+            pd.DataFrame(KIM_LEE, index=pd.MultiIndex.from_tuples(
+                [("N", 1), ("N", 2), ("S", 1)], names=["site", "item"])),
+            ("N 1", "N 2", "S 1"),
+        ),
+        (pd.DataFrame({"case": [5, 6, 7], **KIM_LEE}).iloc[::-1], ("7", "6", "5")),
+        ({name: dict(enumerate(labels)) for name, labels in KIM_LEE.items()}, None),
+    ],
+)  # fmt: skip
+def test_names_of_rows_are_items(frame: Any, items: tuple[str, ...] | None) -> None:
+    if items is None:  # numbers of rows are no names
+        with pytest.raises(MasrelError, match="--no-item"):
+            masrel.agree(frame)
+        return
+    item = ["site", "item"] if items[0] == "N 1" else None
+    assert masrel.agree(frame, item=item).file.parts[0].items == items
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        pd.DataFrame({"item": list("abc"), **KIM_LEE}).astype(
+            {"Kim": ORDER, "Lee": ORDER}
+        ),
+        pl.DataFrame({"item": list("abc"), **KIM_LEE}).with_columns(
+            pl.col("Kim", "Lee").cast(pl.Enum(ORDER.categories.tolist()))
+        ),
+        pd.DataFrame({"item": list("abc"), **KIM_LEE})
+        .melt("item", var_name="rater", value_name="grade")
+        .astype({"grade": ORDER}),
+    ],
+    ids=["pandas", "polars", "long"],
+)
+def test_ordered_categories_are_the_scale(frame: Any, tmp_path: Path) -> None:
+    linear = masrel.Estimating(weights="linear")
+    result = masrel.agree(frame, coefficients="fleiss_kappa", estimating=linear)
+    assert result.file.scale.grades == ("lo", "mid", "hi", "top")
+    rows = list(zip(*KIM_LEE.values(), strict=True))
+    ours = fleiss_kappa(rows, categories=["lo", "mid", "hi", "top"], weights="linear")
+    assert result.estimates[0].value == ours.value
+    if isinstance(frame, pd.DataFrame):
+        frame.to_parquet(tmp_path / "o.parquet")
+        file = read_ratings(tmp_path / "o.parquet")
+        assert (file.scale, file.read["scale"]["declared"]) == (result.file.scale, True)
+
+
+def test_other_categories_than_those_of_the_columns_may_be_declared() -> None:
+    frame = pd.DataFrame({"item": list("abc"), **KIM_LEE}, dtype="category")
+    two = masrel.agree(frame.astype({"Kim": ORDER}))  # one column alone has an order
+    assert two.file.scale.name == "observed"
+    declared = masrel.Reading(categories=["hi", "mid", "lo"], missing_codes="top")
+    frame = frame.astype({"Kim": ORDER, "Lee": ORDER})
+    assert masrel.agree(frame, reading=declared).file.scale.grades == (
+        "hi",
+        "mid",
+        "lo",
+    )
+    short = masrel.agree(frame, reading=masrel.Reading(missing_codes=["top"]))
+    assert short.file.scale.grades == ("lo", "mid", "hi")
+
+
+def test_names_and_grades_may_be_numbers() -> None:
+    frame = pd.DataFrame({0: ["a", "b", "c"], 1: [1, 2, 9], 2: [1, 3, 3]})
+    frame.columns = pd.Index([0, 1, 2])
+    how = masrel.Reading(item=0, raters=[1, 2], categories=[1, 2, 3], missing_codes=9)  # type: ignore[arg-type]
+    file = masrel.agree(frame, reading=how).file
+    assert file.read["grades"] == {"1": 2, "2": 1, "3": 2}
+    assert file.read["missing"] == {"9": 1}
+
+
+# ---- refusals ----
+
+FRAME = pd.DataFrame(
+    {"patient": list("ABCD"), "Kim": [1, 2, 1, 2], "Lee": [1, 2, 2, 2]}
+)
+ONE_WAY = {"item": "patient", "reading": masrel.Reading(item="patient")}
+
+
+@pytest.mark.parametrize(
+    ("data", "arguments", "why"),
+    [
+        ([[1, 2], [1]], {}, "rows of the same length"),
+        ([1, 2, 1], {}, "the data: needed a path, a DataFrame"),
+        ([], {}, "needed a path"),
+        (np.zeros(3), {}, "needed a path"),
+        (np.zeros((0, 2)), {}, "needed a path"),
+        (pd.Series([1, 2]), {}, "got Series"),
+        (pl.Series([1, 2]), {}, "got Series"),
+        ({"Kim": [1], "Lee": [1, 2]}, {}, "got dict"),
+        ({"Kim": 1}, {}, "got dict"),
+        (3, {}, "got int 3"),
+        (None, {}, "got NoneType"),
+        (FRAME[:0], {}, "needed rows of ratings"),
+        (FRAME.assign(Lee=[[1], [2], [1], [2]]), {}, "'Lee', value 1: needed text or"),
+        (FRAME.drop(columns="patient"), {}, "--no-item"),
+        (FRAME, {"raters": "Kim,Le"}, "did you mean 'Lee'"),
+        (
+            FRAME,
+            {"reading": masrel.Reading(encoding="utf-8")},
+            "is of files, got a tab",
+        ),
+        (FRAME, {"reading": masrel.Reading(stream=True)}, "is of files"),
+        (FRAME, ONE_WAY, "item: needed once"),
+        (FRAME, {"reading": {"item": "patient"}}, r"needs masrel.Reading\(…\)"),
+        (FRAME, {"estimating": masrel.Reading()}, r"needs masrel.Estimating\(…\)"),
+        (FRAME, {"target": "item"}, "target: needs one of items, raters, both"),
+        (FRAME, {"coefficients": "fleis_kappa"}, "did you mean"),
+        (FRAME, {"estimating": masrel.Estimating(interval="boot")}, "interval: needs"),  # type: ignore[arg-type]
+        (FRAME, {"estimating": masrel.Estimating(words="good")}, "words: needs one"),  # type: ignore[arg-type]
+        (FRAME, {"estimating": masrel.Estimating(weights=np.eye(3))}, "needs 2 × 2"),
+        (
+            FRAME.replace({1: "x", 2: "y"}),
+            {"estimating": masrel.Estimating(weights=np.eye(2))},
+            "weights: a matrix: needs grades that are numbers or --categories",
+        ),
+    ],
+)
+def test_one_sentence(data: Any, arguments: dict[str, Any], why: str) -> None:
+    with pytest.raises(MasrelError, match=why) as refused:
+        masrel.agree(data, **arguments)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_second_grade_needs_one_of_the_rules_there_are() -> None:
+    with pytest.raises(MasrelError, match="needed error, first, last or mean"):
+        masrel.Reading(repeated="frist")  # type: ignore[arg-type]
+
+
+def test_an_error_says_what_its_options_are_called_in_python() -> None:
+    with pytest.raises(MasrelError) as refused:
+        masrel.agree(FRAME.drop(columns="patient"))
+    (note,) = refused.value.__notes__
+    assert "--no-item is reading=Reading(no_item=…)" in note
+    assert "--item is item=…" in note
+    frame = FRAME.drop(columns="patient")
+    assert masrel.agree(frame, reading=masrel.Reading(no_item=True)).file.read["raters"]
+
+
+# ---- the result ----
+
+
+def test_a_matrix_of_weights_is_in_the_order_of_the_scale(tmp_path: Path) -> None:
+    matrix = [[1, 0.5, 0], [0.5, 1, 0.5], [0, 0.5, 1]]
+    path = tmp_path / "w.csv"
+    path.write_text("\n".join(",".join(map(str, row)) for row in matrix), "utf-8")
+    data = pd.DataFrame(GRADES, index=list("ABCD"), columns=["Kim", "Lee", "Ann"])
+    kappas = {
+        masrel.agree(
+            data, coefficients="fleiss_kappa", estimating=masrel.Estimating(weights=of)
+        )
+        .estimates[0]
+        .value
+        for of in (matrix, path, declared_weights(matrix, [1, 2, 3]), "linear")
+    }
+    assert kappas == {fleiss_kappa(GRADES, weights="linear").value}
+
+
+def test_without_a_target_one_line_says_how_to_ask() -> None:
+    plain, asked = masrel.agree(FRAME), masrel.agree(FRAME, target="items")
+    line = 'No interval; for other items like these: masrel.agree(…, target="items").'
+    assert (plain.notes[-1], plain.notes.count(line)) == (line, 1)
+    assert line not in asked.notes
+    assert asked.estimates[0].interval is not None
+    # there is none to ask for
+    assert line not in masrel.agree(FRAME, coefficients="icc_c1").notes
+
+
+def test_the_text_is_the_first_screen_of_the_command(
+    command: Caller, tmp_path: Path
+) -> None:
+    path = tmp_path / "ratings.csv"
+    path.write_text(WIDE, encoding="utf-8")
+    shown = str(masrel.agree(path, target="items"))
+    assert shown == command("agree", path, "--target", "items").out.rstrip("\n")
+    sentence = command("agree", path, "--sentence").out.rstrip("\n")
+    assert masrel.agree(path).sentence() == sentence
+
+
+def test_warnings_are_apart_from_notes() -> None:
+    frame = FRAME.assign(age=[1, 2, 1, 2])
+    result = masrel.agree(frame)
+    assert [finding.code for finding in result.warnings] == ["named rater"]
+    assert "age" in str(result)
+    assert not any("age" in note for note in result.notes)
+
+
+def test_html_has_the_table_and_no_markup_of_the_data() -> None:
+    frame = FRAME.rename(columns={"Kim": "<b>Kim</b>"})
+    html = masrel.agree(frame)._repr_html_()
+    assert "&lt;b&gt;Kim&lt;/b&gt;" in html
+    assert "<b>" not in html
+    assert html.count("<tr>") == 3
+
+
+def test_the_hash_is_that_of_the_cells() -> None:
+    one, other = masrel.agree(FRAME).file, masrel.agree(FRAME.set_index("patient")).file
+    assert one.sha256() == other.sha256() == pickle.loads(pickle.dumps(one)).sha256()
+    assert masrel.agree(FRAME.replace(1, 3)).file.sha256() != one.sha256()
+
+
+def test_the_frame_is_left_as_it_was() -> None:
+    frame = FRAME.set_index("patient")
+    before = frame.copy(deep=True)
+    masrel.agree(frame)
+    pd.testing.assert_frame_equal(frame, before)
+
+
+def test_it_loads_no_figures_and_no_other_frames() -> None:
+    code = (
+        "import sys, masrel; import pandas as pd; "
+        "masrel.agree(pd.DataFrame({'item': [1, 2], 'K': [1, 2], 'L': [1, 1]})); "
+        "print([m for m in ('matplotlib', 'narwhals', 'polars', 'duckdb', 'emcee', "
+        "'masrel.intervals', 'masrel.lab') if m in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"
+
+
+def test_cohens_kappa_of_two_columns_is_that_of_the_frame() -> None:
+    result = masrel.agree(FRAME, coefficients="cohen_kappa")
+    assert result.estimates[0].value == cohen_kappa(FRAME["Kim"], FRAME["Lee"]).value
