@@ -115,12 +115,7 @@ def _without_reference(file: RatingsFile, reference: str) -> RatingsFile:
         raters = tuple(part.raters[place] for place in others)
         ratings = replace(coded, codes=coded.codes[:, others])
         parts.append(replace(part, raters=raters, ratings=ratings))
-    findings = tuple(
-        finding
-        for finding in file.warnings
-        if (finding.code, finding.facts.get("column")) != ("named rater", reference)
-    )
-    return replace(file, parts=tuple(parts), warnings=findings)
+    return replace(file, parts=tuple(parts))
 
 
 # ---- each category ----

@@ -371,24 +371,26 @@ _TEXTS = {
     "contingency": "rows and columns have the same names, so that this looks like a "
     "contingency table of two raters: --table reads it as one",
     "no raters": "{columns}: no grade in common with the other columns, or the name of "
-    "something else: --ignore {names} leaves such columns aside, --raters names those "
-    "that rate",
+    "something else: {advice}",
+    "nothing in common": "{one!r} has the grades {first}, {other!r} {second}, and none "
+    "in common: if they are the same grades, write them alike, if others, --raters "
+    "{names} counts them so",
+    "frequency": "column {column!r} looks like how often each row is there: "
+    "--frequency {name} counts it so; if a row is one item, --ignore {name} together "
+    "with --raters says so",
     "first column": "{where}: the first column, {column!r}, holds grades like the "
     "others: --no-item if it is a rater, --item {name} if it names the items",
+    "grades as names": "{where}: the names of the columns, {columns}, may be grades: "
+    "--no-header if this line is a row like the others, --raters{names} if they are "
+    "raters",
+    "counts": "rows sum to {total:g}, so that this may be a table of counts, items by "
+    "categories: --counts reads it as one, --raters{names} as raters",
+    "summary row": "{item!r} sums up other rows, or is a comment: delete the line, or "
+    "name the item otherwise",
     # warnings of columns
-    "named rater": "column {column!r} counts as a rater; if it is none, --ignore "
-    "{name}",
-    "apart": "no grade in common with the other columns: {columns}; if it is no rater, "
-    "--ignore {names}",
-    "grades as names": "the names of the columns, {columns}, may be grades: "
-    "--no-header if the first line is a row like the others, --counts if cells are "
-    "numbers of raters",
+    "apart": "no value in common with the other columns: {columns}: {advice}",
     "many raters": "{n} columns count as raters of {n_items} items: --transpose if a "
     "row is a rater",
-    "item or rater": "the first column, {column!r}, is taken for the names of items: "
-    "--no-item if it is a rater, --item {name} if it names the items",
-    "counts": "rows sum to {total:g}, so that this may be a table of counts, items by "
-    "categories: --counts reads it as one",
     "second header": "{where} holds grades that occur nowhere else: if it is a second "
     "line of names, delete it",
     "numbered": "no item was rated twice: {columns} may number the rows, --item names "
@@ -412,10 +414,10 @@ _TEXTS = {
     "names of table": "--table: needed rows and columns of the same categories, got "
     "{rows} and {names}",
     "sum column": "{column!r} is the sum of the other columns: --ignore {name} leaves "
-    "it aside",
+    "it aside, --raters names the columns of categories",
     "sum row": "{where}: is the sum of the rows above: delete it",
-    "category or item": "the first column, {column!r}, is taken for the names of "
-    "items: --no-item if it is a category",
+    "category or item": "the first column, {column!r}, may name items or be a "
+    "category: --item {name} if it names them, --no-item if not",
     "items twice": "{column!r} names items more than once: each row counts as an item",
     # grades
     "no grades": "needed at least one grade, got none",

@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -14,11 +14,8 @@ from masrel.ratings._findings import (
     Finding,
     Reading,
     listed,
-    quoted,
 )
-from masrel.ratings._grade_texts import is_number, normal_form, spelled_alike
 from masrel.ratings._sheet import Codes, Column, Sheet
-from masrel.scales import Scale
 
 Kind = Literal["long", "wide", "counts", "table"]
 
@@ -50,29 +47,13 @@ _MAY_BE_BOTH = (
     {"clusters", "item"},
 )
 
-# Names of columns that are seldom those of raters.
-_NO_RATER = re.compile(
-    r"(age|sex|gender|comments?|notes?|remarks?|mean|average|avg|median|sd|total|sum|"
-    r"id|index|date|day|time|timestamp|duration|lead_time|gold|truth|ground_truth|"
-    r"reference|consensus|majority|adjudicated|weight|height|bmi|group|site|cent(er|re)|"
-    r"diagnosis|side|text|email|n|count|unnamed: \d+)",
-    re.IGNORECASE,
-)
 # Names of columns that name items: a word of these, in any case.
-_ITEM_NAME = re.compile(
+ITEM_NAME = re.compile(
     r"|#|(.*[^a-z])?(id|no|nr|num|key|code|name|participants?|[a-z]*(item|subject|patient|"
     r"person|case|row|index|unit|record|target|stimulus|image|document|sample|file|model|"
     r"video|task|label)(s|id|no|nr|name|code)?)([^a-z].*)?",
     re.IGNORECASE,
 )
-# Names of rows that summarize the others.
-_SUMMARY = re.compile(
-    r"(grand )?(total|sum|mean|average|avg|median|sd|s\.d\.|std|min|max|n|count|all)s?"
-    r"|[Σσ]|kappa|agreement",
-    re.IGNORECASE,
-)
-_MAX_COMPARED = 2000  # columns that are compared with all others
-_SHOWN = 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -236,8 +217,16 @@ def _wide(
 def names_rows(sheet: Sheet, place: int) -> bool:
     """Return whether a column is called as names of items are, and all differ."""
     n_rows, name = len(sheet.numbers), sheet.header[place]
-    is_name = _ITEM_NAME.fullmatch(name) is not None
+    is_name = ITEM_NAME.fullmatch(name) is not None
     return not name or (is_name and len(sheet.columns[place].texts) == n_rows)
+
+
+def numbers_rows(sheet: Sheet, place: int) -> bool:
+    """Return whether a column counts the rows, from 0 or from 1."""
+    texts, n_rows = sheet.columns[place].texts, len(sheet.numbers)
+    return any(
+        texts == [str(k) for k in range(first, first + n_rows)] for first in (0, 1)
+    )
 
 
 def named(sheet: Sheet, role: str, places: Sequence[int]) -> Column:
@@ -297,188 +286,3 @@ def without_second_header(sheet: Sheet) -> tuple[Sheet, list[Finding]]:
             above = np.arange(len(sheet.numbers)) <= row
             return sheet.without(above, "second header"), [finding]
     return sheet, []
-
-
-def doubt_columns(
-    sheet: Sheet, layout: Layout, codes: Codes, scale: Scale, freq: Codes
-) -> list[Finding]:
-    """Refuse or warn of columns of a wide table that are no raters."""
-    # codes (n_items, n_raters): places in the scale, -1 where missing; freq (n_items,)
-    names = [sheet.header[place] for place in layout.raters]
-    if len(layout.item) == 1 and len(names) == len(sheet.numbers) > 1:
-        if set(sheet.columns[layout.item[0]].texts) == set(names):
-            raise sheet.refuse("contingency")
-    findings = []
-    if sheet.has_header and not sheet.is_transposed:
-        findings = _first_line(sheet, layout, names, scale)
-    if layout.is_item_guessed:  # it may be a rater
-        findings += _first_column(sheet, layout.item[0], scale)
-    odd = _unlike(codes, scale) if 1 < len(names) <= _MAX_COMPARED else set()
-    named = {k for k, name in enumerate(names) if _NO_RATER.fullmatch(name)}
-    if odd & named:
-        doubtful = odd | named if len(odd) < len(names) else odd & named
-        wrong = [names[k] for k in sorted(doubtful)]
-        raise sheet.refuse(
-            "no raters", columns=", ".join(map(repr, wrong)), names=quoted(wrong)
-        )
-    findings += [
-        Finding("named rater", column=names[k], name=quoted([names[k]]))
-        for k in sorted(named)
-    ]
-    alone = [names[k] for k in sorted(odd - named)][:_SHOWN]
-    if alone:
-        findings.append(Finding("apart", columns=listed(alone), names=quoted(alone)))
-    if all(map(is_number, scale.grades)):
-        findings += _looks_counted(names, codes, scale, freq)
-    elif sheet.has_header and len(codes) > 3:
-        findings += _second_header(sheet, codes, scale)
-    unrated = np.flatnonzero((codes < 0).all(axis=0))[:_SHOWN]
-    return findings + [Finding("no grade of", rater=names[k]) for k in unrated]
-
-
-def _first_line(
-    sheet: Sheet, layout: Layout, names: Sequence[str], scale: Scale
-) -> list[Finding]:
-    # names that are grades, and more names than rows
-    grades = set(map(normal_form, scale.grades))
-    are_numbers = all(map(is_number, scale.grades))
-    n_grades = sum(
-        normal_form(name) in grades
-        or name in USUAL_MISSING
-        or (are_numbers and is_number(name))
-        for name in names
-    )
-    findings = []
-    items = [(sheet.header[p], sheet.columns[p].texts[0]) for p in layout.item]
-    # P1 above P2; a name that is no item's above its names
-    is_numbered = any(
-        re.sub(r"\d+", "0", name) == re.sub(r"\d+", "0", cell) for name, cell in items
-    )
-    is_named = items and all(_ITEM_NAME.fullmatch(name) for name, _ in items)
-    if is_numbered or (n_grades >= len(names) / 2 and not is_named):
-        columns = ", ".join(map(repr, names[:_SHOWN]))
-        findings.append(Finding("grades as names", columns=columns))
-    n_items = len(sheet.numbers)
-    if layout.is_item_guessed and len(names) > 2 * n_items:
-        findings.append(Finding("many raters", n=len(names), n_items=n_items))
-    return findings
-
-
-def _first_column(sheet: Sheet, place: int, scale: Scale) -> list[Finding]:
-    # a column that is the item because nothing else was
-    name, texts = sheet.header[place], sheet.columns[place].texts
-    numbers = {float(grade) for grade in scale.grades if is_number(grade)}
-    low, high = min(numbers, default=0.0), max(numbers, default=0.0) + 1
-    values = [float(text) for text in texts if is_number(text)]
-    n_near = sum(low <= value <= high for value in values)
-    n_in_scale = sum(value in numbers for value in values)
-    n_in_scale += sum(not is_number(t) and t in scale.grades for t in texts)
-    facts: dict[str, Any] = {"column": name, "name": quoted([name])}
-    if len(texts) < len(sheet.numbers):
-        if n_in_scale == len(texts):
-            raise sheet.refuse("first column", where=sheet.at(0), **facts)
-        return []  # refused as repeated
-    if max(n_in_scale, n_near) < len(texts) / 2 or _ITEM_NAME.fullmatch(name):
-        return []
-    return [Finding("item or rater", **facts)]
-
-
-def _unlike(codes: Codes, scale: Scale) -> set[int]:
-    # columns without a grade, or a value, in common with any other
-    n_grades = len(scale.grades)
-    rated = [np.unique(column[column >= 0]) for column in codes.T]
-    known = np.flatnonzero([len(grades) for grades in rated])
-    if len(known) < 2:
-        return set()
-    if all(map(is_number, scale.grades)):  # measurements seldom are the same twice
-        values = np.array(scale.values)
-        low, high = (values[[rated[k][end] for k in known]] for end in (0, -1))
-        n_like = ((low[:, None] <= high) & (low <= high[:, None])).sum(axis=1)
-        return set(known[n_like == 1].tolist())  # each is like itself
-    n_columns = np.bincount(np.concatenate(rated), minlength=n_grades)
-    return {int(k) for k in known if (n_columns[rated[k]] == 1).all()}
-
-
-def _looks_counted(
-    names: Sequence[str], codes: Codes, scale: Scale, freq: Codes
-) -> list[Finding]:
-    # Whole numbers whose sum is the same in every row, or in most and nowhere above
-    # what one of them is alone, as where all raters agree.
-    values = np.array([*scale.values, 0.0])  # a missing count, at -1, is 0
-    if min(codes.shape) < 2 or (values < 0).any() or (values % 1 != 0).any():
-        return []
-    sums = values[codes].sum(axis=1)
-    total = sums.max()
-    has_zeros = 0 in scale.values or bool((codes < 0).any())
-    has_zeros |= all(map(is_number, names))  # as names of grades are
-    is_most = values.max() == total
-    is_most &= np.average(sums == total, weights=freq) >= 1 / 2
-    if total < 2 or not has_zeros or not ((sums == total).all() or is_most):
-        return []
-    return [Finding("counts", total=total)]
-
-
-def _second_header(sheet: Sheet, codes: Codes, scale: Scale) -> list[Finding]:
-    # a first row whose grades occur nowhere else, while those of the others do
-    rest = np.bincount(codes[1:].ravel() + 1, minlength=len(scale.grades) + 1)[1:]
-    n_met = np.count_nonzero(rest) + bool((codes[1:] < 0).any())
-    is_known = (rest[codes[0][codes[0] >= 0]] > 0).any()
-    if is_known or (codes[0] < 0).all() or n_met > codes[1:].size / 2:
-        return []
-    return [Finding("second header", where=sheet.where(0))]
-
-
-def doubt_items(
-    sheet: Sheet, layout: Layout, n_items: int, n_rows: int
-) -> list[Finding]:
-    """Warn of a long table none of whose items was rated twice."""
-    columns = ", ".join(repr(sheet.header[place]) for place in layout.item)
-    return [Finding("numbered", columns=columns)] if n_items == n_rows > 2 else []
-
-
-def doubt_names(kind: str, names: Sequence[str]) -> list[Finding]:
-    """Warn of names that differ by spelling alone, and of what is seldom a name."""
-    findings = [
-        Finding("alike", kind=kind, names=", ".join(map(repr, group)))
-        for group in spelled_alike(names)[:_SHOWN]
-    ]
-    if kind == "items":
-        odd = [
-            name
-            for name in names
-            if name[:1] == "#"
-            or (len(name) < 14 and not name[-1].isdigit() and _SUMMARY.fullmatch(name))
-        ]
-        if 0 < len(odd) < len(names) / 2:
-            shown = ", ".join(map(repr, odd[:_SHOWN]))
-            findings.append(Finding("summary", names=shown))
-    return findings
-
-
-def doubt_counts(sheet: Sheet, layout: Layout, table: Codes) -> list[Finding]:
-    """Refuse or warn of a table of counts that has sums, or no column of items."""
-    # of a table (n_rows, n_categories)
-    names = [sheet.header[place] for place in layout.raters]
-    findings = []
-    if len(names) > 1 and (2 * table[:, -1] == table.sum(axis=1)).all():
-        facts: dict[str, Any] = {"column": names[-1], "name": quoted([names[-1]])}
-        if _SUMMARY.fullmatch(names[-1]):
-            raise sheet.refuse("sum column", **facts)
-        findings += [Finding("sum column", **facts)] * (len(names) > 2)
-    if len(table) > 2 and (2 * table[-1] == table.sum(axis=0)).all():
-        where = sheet.where(len(table) - 1)
-        items = [sheet.columns[place] for place in layout.item]
-        if items and _SUMMARY.fullmatch(items[-1].texts[items[-1].codes[-1]]):
-            raise sheet.refuse("sum row", where=where)
-        findings.append(Finding("sum row", where=where))
-    findings += doubt_names("categories", names)
-    if layout.kind == "table" or not layout.item:
-        return findings
-    name, column = sheet.header[layout.item[0]], sheet.columns[layout.item[0]]
-    are_counts = all(text.isdecimal() for text in column.texts)
-    if layout.is_item_guessed and are_counts and not _ITEM_NAME.fullmatch(name):
-        return [*findings, Finding("category or item", column=name)]
-    is_twice = len(column.texts) < len(column.codes) and layout.by is None
-    if len(layout.item) == 1 and is_twice:
-        findings.append(Finding("items twice", column=name))
-    return findings

@@ -25,6 +25,13 @@ from masrel.agreement import (
 )
 from masrel.agreement._codes import count_items, count_table
 from masrel.errors import ParameterError, RatingsError
+from masrel.ratings._doubts import (
+    doubt_columns,
+    doubt_counts,
+    doubt_item_names,
+    doubt_items,
+    doubt_names,
+)
 from masrel.ratings._findings import (
     Finding,
     Reading,
@@ -40,10 +47,6 @@ from masrel.ratings._grade_texts import (
 )
 from masrel.ratings._layout import (
     Layout,
-    doubt_columns,
-    doubt_counts,
-    doubt_items,
-    doubt_names,
     find_layout,
     named,
     rated_twice,
@@ -280,7 +283,7 @@ def _grouped(
     else:
         _large.refuse_repeated(answer, sheet, layout)
         rows = grades.codes
-        findings = doubt_columns(sheet, layout, rows, grades.scale, freq)
+        findings = doubt_columns(sheet, layout, options, rows, grades.scale, freq)
     ratings = _distinct(rows, freq, grades.scale)
     return _file_of(
         *(groups, layout, options, grades),
@@ -335,9 +338,10 @@ def _file_of(
     # the record
     scale, header = grades.scale, sheet.header
     of_long = (*layout.raters, *layout.grades) if layout.kind == "long" else (None,) * 2
-    roles = ("rater", "grade", "session", "by", "frequency")
-    places = (*of_long, layout.session, layout.by, layout.frequency)
-    used = {*layout.item, *layout.raters, *layout.grades, *places, layout.clusters}
+    roles = ("rater", "grade", "session", "by")
+    places = (*of_long, layout.session, layout.by)
+    used = {*layout.item, *layout.raters, *layout.grades, *places}
+    used |= {layout.clusters, layout.frequency}
     findings = (*findings, *grades.findings)
     record = {
         "file": sheet.name,
@@ -404,10 +408,10 @@ def _rated(
         names = [sheet.header[place] for place in layout.raters]
         rater = Column(np.tile(np.arange(n_raters), n_rows), names)
         findings = findings + doubt_columns(
-            sheet, layout, grades.codes, grades.scale, sheet.freq
+            sheet, layout, options, grades.codes, grades.scale, sheet.freq
         )
         row = np.repeat(row, n_raters)
-    findings += doubt_names("raters", rater.texts) + doubt_names("items", item.texts)
+    findings += doubt_names("raters", rater.texts) + doubt_item_names(sheet, item)
     part, names_of_parts = _parts(sheet, layout)
     groups = sorted({names.get("group", "") for names in names_of_parts})
     findings += doubt_names("groups", groups)
@@ -586,8 +590,12 @@ def _patterns(
     # a wide table whose rows are patterns of ratings
     names = [sheet.header[place] for place in layout.raters]
     grades, freq = graded(sheet, layout.grades, options), sheet.freq
-    findings = findings + doubt_columns(sheet, layout, grades.codes, grades.scale, freq)
+    findings = findings + doubt_columns(
+        sheet, layout, options, grades.codes, grades.scale, freq
+    )
     findings += doubt_names("raters", names)
+    if layout.item:
+        findings += doubt_item_names(sheet, named(sheet, "item", layout.item))
     part, names_of_parts = _parts(sheet, layout)
     parts = [
         RatingsPart(
@@ -602,6 +610,7 @@ def _patterns(
     return _file_of(
         *(sheet, layout, options, grades, parts, np.array(counts), findings),
         item=[],  # names are those of rows
+        frequency=sheet.header[layout.frequency or 0],
         raters=names,
         n_items=int(freq.sum()),
         n_raters=len(names),
@@ -622,7 +631,7 @@ def _counted(
     )
     if not table.any():
         raise sheet.refuse("no counts", kind=layout.kind)
-    findings = findings + doubt_counts(sheet, layout, table)
+    findings = findings + doubt_counts(sheet, layout, options, table)
     name, order = "observed", list(range(len(names)))
     if options.categories is not None:
         if set(options.categories) != set(names):

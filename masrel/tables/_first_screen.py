@@ -53,7 +53,7 @@ def what_was_read(file: RatingsFile) -> list[str]:
         items = f" named by {' and '.join(columns)}"
     if read.get("clusters"):
         items += f" in {counted(read['n_clusters'], 'cluster')} by {read['clusters']!r}"
-    if read["frequency"]:
+    if read.get("frequency"):
         items += f" counted by {read['frequency']!r}"
     counts = f"{counted(read['n_items'], 'item')}{items}, "
     counts += counted(read["n_raters"], "rater")

@@ -63,7 +63,7 @@ def test_a_diagnosis_is_that_of_the_library(masrel: Caller, wide: Path) -> None:
     arguments = (wide, "--ignore", "site", "--target", "items")
     document = record(masrel, "diagnose", *arguments, "--reference", "Gold")
     assert document["format"] == "masrel diagnose 1"
-    (part,) = read_ratings(wide, Reading(ignore=["site"])).parts
+    (part,) = read_ratings(wide, Reading(ignore=["site"], reference="Gold")).parts
     expected = intervals.diagnose(
         part.ratings, target="items", raters=part.raters, reference="Gold"
     )

@@ -135,14 +135,16 @@ def items(n: int) -> list[str]:
 def wide(draw: st.DrawFn, table: Table, cells: list[list[str]]) -> Layout:
     item = draw(st.sampled_from(["item", "patient", "Subject", "P", "", "#item"]))
     rows = [[item, *names(draw, len(table[0]))]]
+    options = ["--raters", ",".join(rows[0][1:])]  # or some might be no raters
     rows += [[i, *row] for i, row in zip(items(len(table)), cells, strict=True)]
-    return Layout(rows=rows, options=[])
+    return Layout(rows=rows, options=options)
 
 
 def wide_without_item(draw: st.DrawFn, table: Table, cells: list[list[str]]) -> Layout:
     rows = [names(draw, len(table[0])), *cells]
+    options = ["--no-item", "--raters", ",".join(rows[0])]
     # names of items that differ from all grades cannot be told from grades
-    return Layout(rows=rows, options=["--no-item"], needs_options=True)
+    return Layout(rows=rows, options=options, needs_options=True)
 
 
 def wide_with_metadata(draw: st.DrawFn, table: Table, cells: list[list[str]]) -> Layout:
@@ -154,9 +156,8 @@ def wide_with_metadata(draw: st.DrawFn, table: Table, cells: list[list[str]]) ->
         [*row[:place], value, *row[place:]]
         for row, value in zip(plain, [name, *(METADATA[name] * 2)], strict=False)
     ]
-    options = draw(
-        st.sampled_from([["--ignore", name], ["--raters", ",".join(raters)]])
-    )
+    named = ["--raters", ",".join(raters)]
+    options = draw(st.sampled_from([["--ignore", name, *named], named]))
     return Layout(rows=rows, options=list(options))
 
 
@@ -168,19 +169,19 @@ def row_names(draw: st.DrawFn, table: Table, cells: list[list[str]]) -> Layout:
 
 def without_header(draw: st.DrawFn, table: Table, cells: list[list[str]]) -> Layout:
     layout = wide(draw, table, cells)
-    layout.rows = layout.rows[1:]
-    layout.options, layout.has_header = ["--no-header"], False
+    numbers = ",".join(map(str, range(2, len(layout.rows.pop(0)) + 1)))
+    layout.options = ["--no-header", "--raters", numbers]
+    layout.has_header = False
     return layout
 
 
 def transposed(draw: st.DrawFn, table: Table, cells: list[list[str]]) -> Layout:
     rows = [["rater", *items(len(table))]]
     columns = zip(*cells, strict=True)
-    rows += [
-        [name, *column]
-        for name, column in zip(names(draw, len(table[0])), columns, strict=True)
-    ]
-    return Layout(rows=rows, options=["--transpose"])
+    raters = names(draw, len(table[0]))
+    rows += [[name, *of] for name, of in zip(raters, columns, strict=True)]
+    options = ["--transpose", "--raters", ",".join(raters)]
+    return Layout(rows=rows, options=options)
 
 
 def long(draw: st.DrawFn, table: Table, cells: list[list[str]]) -> Layout:

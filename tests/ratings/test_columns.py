@@ -121,20 +121,20 @@ def numbers_of(document: Any) -> list[Any]:
 
 
 @pytest.mark.parametrize(
-    "options",
+    ("command", "options"),
     [
-        ("--coefficients", "all", "--target", "items"),
+        ("agree", ("--coefficients", "all", "--target", "items")),
         *(
-            ("--interval", interval, "--target", "items")
+            ("agree", ("--interval", interval, "--target", "items"))
             for interval in ("analytic", "jackknife", "bootstrap", "posterior")
         ),
-        ("--target", "both"),
-        ("--diagnose", "--target", "items"),
-        ("--by", "sex", "--compare", "--coefficients", "fleiss_kappa"),
+        ("agree", ("--target", "both")),
+        ("diagnose", ("--target", "items")),
+        ("compare", ("--by", "sex", "--coefficients", "fleiss_kappa")),
     ],
 )
 def test_frequencies_are_rows_that_are_repeated(
-    tmp_path: Path, masrel: Caller, options: tuple[str, ...]
+    tmp_path: Path, masrel: Caller, command: str, options: tuple[str, ...]
 ) -> None:
     rng = np.random.default_rng(4)
     patterns = itertools.product("fm", "123", "123", ["1", "2", "3", ""])
@@ -151,7 +151,7 @@ def test_frequencies_are_rows_that_are_repeated(
     if "--by" not in options:
         options = (*options, "--ignore", "sex")
     counted, repeated = (
-        masrel("agree", tmp_path / name, *more, *options, "--json", "-")
+        masrel(command, tmp_path / name, *more, *options, "--json", "-")
         for name, more in (
             ("counted.csv", ("--frequency", "Freq")),
             ("repeated.csv", ("--no-item",)),
@@ -163,3 +163,149 @@ def test_frequencies_are_rows_that_are_repeated(
         for done in (counted, repeated)
     )
     assert numbers_of(ours) == pytest.approx(numbers_of(theirs), rel=1e-12, abs=1e-14)
+
+
+# ---- columns that are no raters ----
+
+GRADES = ["1,1,2", "2,2,2", "1,2,1", "3,3,3", "1,1,2"]
+SAME = ["1", "2", "1", "3", "2"]  # also grades, which alone would not be noticed
+FLAGS = ["1", "1", "0", "1", "0"]
+
+
+def beside(name: str, cells: list[str], raters: str = "Kim,Lee,Ann") -> str:
+    columns = zip("abcde", GRADES, cells, strict=True)
+    rows = (f"{item},{row},{cell}" for item, row, cell in columns)
+    return "\n".join([f"patient,{raters},{name}", *rows])
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("majority", "majority_vote", "MajorityVote", "gold", "Gold label", "gt"),
+        *(
+            "goldStandard",
+            "consensus",
+            "consensus score",
+            "adjudicated",
+            "Ground truth",
+        ),
+        *("truth", "reference", "final_label", "true.label", "total", "Total score"),
+        *(
+            "sum",
+            "mean",
+            "Mean rating",
+            "average",
+            "median",
+            "SD",
+            "agree",
+            "Agreement?",
+        ),
+        *("confidence", "Kim_conf", "conf.Lee", "KimConfidence", "certainty of Ann"),
+        *("Freq", "frequency", "count", "n", "weights", "age", "Comment", "group"),
+    ],
+)
+def test_a_column_of_such_a_name_is_no_rater(tmp_path: Path, name: str) -> None:
+    text = beside(name, SAME)
+    with pytest.raises(RatingsError, match=f"--ignore '?{name.split()[0]}") as refused:
+        read(tmp_path, text)
+    assert "--raters Kim,Lee,Ann" in str(refused.value)
+    assert read(tmp_path, text, ignore=name).read["raters"] == ["Kim", "Lee", "Ann"]
+    for options in ({"raters": ["Kim", name]}, {"reference": name}):
+        file = read(tmp_path, text, **options)
+        assert name in file.read["raters"]
+        assert not file.warnings
+
+
+@pytest.mark.parametrize(
+    ("text", "is_refused"),
+    [
+        *(
+            (beside(name, SAME), False)
+            for name in ("Max", "Goldie", "n1", "rater_2", "Meaney", "Confucius", "M")
+        ),
+        (beside("n", SAME, "k,l,m"), False),
+        *(
+            (beside(name, cells), is_refused)
+            for name in ("Kim_Lee_match", "agree.Kim.Lee", "correct")
+            for cells, is_refused in ((FLAGS, True), (SAME, False))
+        ),
+        # no grade in common with the others
+        (beside("hand", ["left", "right", "left", "left", "right"]), True),
+        (beside("bpm", ["61", "72", "83", "74", "61"]), True),
+        (beside("p", ["0.1", "1.5", "0.9", "2.5", "0.4"]), True),
+        (beside("Oh", ["4", "", "", "", ""]), False),  # two grades too few to tell
+        ("item,Kim,Lee\nA,TRUE,yes\nB,FALSE,no\nC,TRUE,no\n", True),
+        ("item,Kim,Lee\nA,a,b\nB,c,d\n", False),
+        ("item,Kim,Lee\nA,a;b,b;a\nB,b;c,c;b\nC,a;b,c;b\n", False),
+        # measurements seldom are the same twice
+        ("item,X,Y,Z\nA,1.1,1.2,61\nB,2.2,2.1,72\nC,3.3,3.4,83\n", False),
+    ],
+)
+def test_which_columns_are_no_raters(
+    tmp_path: Path, text: str, is_refused: bool
+) -> None:
+    if is_refused:
+        with pytest.raises(RatingsError, match="in common"):
+            read(tmp_path, text)
+    raters = text.splitlines()[0].split(",")[1:]
+    file = read(tmp_path, text, **({"raters": raters} if is_refused else {}))
+    assert file.read["raters"] == raters
+
+
+DIFFERENT = beside("n", SAME).replace("e,1,1,2", "e,2,1,2")
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "code"),
+    [
+        # row names are no names of items, and a first column that is one of grades
+        (ROW_NAMES, {"ignore": "Freq"}, None),
+        (ROW_NAMES, {"ignore": "Freq,sex"}, None),
+        (ROW_NAMES, {"no_item": True}, None),
+        (ROW_NAMES, {"raters": "right,left"}, None),
+        (ROW_NAMES, {"raters": "right,left", "ignore": "Freq,sex"}, "frequency"),
+        (PAIRS, {}, None),
+        (PAIRS, {"no_item": True, "ignore": "Freq"}, None),
+        (DIFFERENT, {}, None),
+        (DIFFERENT, {"ignore": "n"}, "frequency"),
+        (beside("n", SAME), {"ignore": "n"}, ""),
+        (DIFFERENT.replace("3,3,3,3", "3,3,3,.5"), {"ignore": "n"}, ""),
+    ],
+)
+def test_frequencies_that_are_not_said(
+    tmp_path: Path, text: str, options: dict[str, Any], code: str | None
+) -> None:
+    if code is None:
+        with pytest.raises(RatingsError, match=r"--frequency (Freq|n) counts"):
+            read(tmp_path, text, **options)
+    else:
+        codes = [finding.code for finding in read(tmp_path, text, **options).warnings]
+        assert codes == [code] * bool(code)
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "code"),
+    [
+        ("essay,Kim,Lee\n1,1,2\n2,2,2\n3,1,1\n4,2,1\n", {}, ""),  # rows numbered
+        ("x,Kim,Lee\n1,1,1\n2,2,3\n3,3,2\n", {}, None),  # or ranks
+        ("x,Kim,Lee\n1,1,1\n2,2,3\n3,3,2\n", {"item": "x"}, ""),
+        ("x,1,2\nA,1,2\nB,2,2\nC,1,1\n", {}, None),  # grades or raters as names
+        ("x,1,2\nA,1,2\nB,2,2\nC,1,1\n", {"item": "x"}, ""),
+        ("x,1,2\nA,1,2\nB,2,2\nC,1,1\n", {"raters": "1,2"}, ""),
+        ("item,A,B\np,2,0\nq,1,1\n", {}, "counts"),  # too few to tell
+        ("item,A,B\np,2,0\nq,1,1\nr,0,2\ns,0,2\n", {}, None),
+        ("item,A,B\np,2,0\nq,1,1\nr,0,2\ns,0,2\n", {"raters": "A,B"}, ""),
+        ("item,A,B\nsum,1,1\nit,1,2\nrun,2,2\n", {}, "summary"),  # words
+        ("item,A,B\nit,1,2\nrun,2,2\nsum,1,1\n", {}, None),
+        ("item,A,B\np,a,1\nq,b,0\nr,a,1\n", {"ignore": "B"}, ""),
+    ],
+)
+def test_rows_and_names_that_are_none(
+    tmp_path: Path, text: str, options: dict[str, Any], code: str | None
+) -> None:
+    if code is None:
+        with pytest.raises(RatingsError):
+            read(tmp_path, text, **options)
+    else:
+        codes = [finding.code for finding in read(tmp_path, text, **options).warnings]
+        assert codes == [code] * bool(code)

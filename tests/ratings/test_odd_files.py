@@ -395,50 +395,16 @@ RIGHT: dict[str, Any] = {
 }
 
 WARNED: dict[str, Any] = {
-    "total row": (BASE + "Total,8,6\n", "'Total'"),
-    "mean row": (BASE + "Mean,2,1.5\n", "'Mean'"),
-    "sd row": (BASE + "SD,2,1\n", "'SD'"),
-    "row of numbers of ratings": (BASE + "N,4,4\n", "'N'"),
     "units": (BASE.replace("Lee\n", "Lee\n-,MAS,MAS\n", 1), "line 2"),
-    "commented row": (BASE.replace("\nC", "\n#C"), "'#C'"),
     "raters differ by case": (BASE.replace("Lee", "kim"), "'Kim', 'kim'"),
     "items differ by case": (BASE.replace("B,", "a,"), "'A', 'a'"),
     "items differ by zeros": (
         BASE.replace("A,", "01,").replace("B,", "1,"),
         "'01', '1'",
     ),
-    "first line of grades": ("A,1,2\nB,2,2\nC,3,1\n", "--no-header"),
-    "first line of text grades": (
-        "A,mild,severe\nB,mild,mild\nC,severe,severe\n",
-        "--no-header",
-    ),
-    "numbers as names": (BASE.replace("item,Kim,Lee", "x,1,2"), "--no-header"),
-    "first column may be a rater": ("Kim,Lee,Oh\n1,1,1\n5,2,2\n3,4,4\n", "--no-item"),
-    "first column is called David": (
-        "David,Lee,Oh\n1,1,1\n2,2,2\n3,4,4\n",
-        "--no-item",
-    ),
     "raters as rows": (
         ",i1,i2,i3,i4,i5\nKim,1,2,3,1,2\nLee,1,2,2,2,1\n",
         "--transpose",
-    ),
-    "counts": ("item,a,b,c\nA,3,0,0\nB,1,2,0\nC,0,0,3\nD,0,3,0\n", "--counts"),
-    "counts, some missing": (
-        "item,a,b,c\nA,3,0,0\nB,1,1,0\nC,0,0,3\nD,0,3,0\n",
-        "--counts",
-    ),
-    "counts, empty for none": ("item,a,b\nA,3,\nB,1,2\nC,,3\nD,,3\n", "--counts"),
-    "column of text": (
-        "item,hand,Kim,Lee\nA,left,1,1\nB,right,2,2\nC,left,3,1\n",
-        "--ignore hand",
-    ),
-    "column of other numbers": (
-        "item,bpm,Kim,Lee\nA,61,1,1\nB,72,2,2\nC,83,3,1\n",
-        "--ignore bpm",
-    ),
-    "column called weight": (
-        "item,weight,Kim,Lee\nA,1,1,1\nB,2,2,2\nC,3,3,1\n",
-        "--ignore weight",
     ),
     "rater without grades": ("item,Kim,Lee,Oh\nA,1,1,\nB,2,1,\n", "'Oh'"),
     "eights and nines": (
@@ -473,11 +439,6 @@ WARNED: dict[str, Any] = {
         "'X', 'x'",
         {"by": "g"},
     ),
-    "counts whose first column is a category": (
-        "a,b,c\n3,0,0\n1,2,0\n0,0,3\n",
-        "--no-item",
-        {"counts": True},
-    ),
     "counts of an item twice": (
         "item,a,b\nA,3,0\nB,1,2\nA,0,3\n",
         "'item'",
@@ -491,6 +452,45 @@ WARNED: dict[str, Any] = {
 }
 
 REFUSED: dict[str, Any] = {
+    "counts whose first column is a category": (
+        "a,b,c\n3,0,0\n1,2,0\n0,0,3\n",
+        "--no-item",
+        {"counts": True},
+    ),
+    "total row": (BASE + "Total,8,6\n", "'Total' sums up"),
+    "mean row": (BASE + "Mean,2,1.5\n", "'Mean'"),
+    "sd row": (BASE + "SD,2,1\n", "'SD'"),
+    "row of numbers of ratings": (BASE + "N,4,4\n", "line 6: 'N'"),
+    "commented row": (BASE.replace("\nC", "\n#C"), "line 4: '#C'"),
+    "first line of grades": ("A,1,2\nB,2,2\nC,3,1\n", "--no-header"),
+    "first line of text grades": (
+        "A,mild,severe\nB,mild,mild\nC,severe,severe\n",
+        "--no-header",
+    ),
+    "numbers as names": (BASE.replace("item,Kim,Lee", "x,1,2"), "--no-header"),
+    "first column may be a rater": ("Kim,Lee,Oh\n1,1,1\n5,2,2\n3,4,4\n", "--no-item"),
+    "first column is called David": (
+        "David,Lee,Oh\n1,1,1\n2,2,2\n3,4,4\n",
+        "--no-item",
+    ),
+    "counts": ("item,a,b,c\nA,3,0,0\nB,1,2,0\nC,0,0,3\nD,0,3,0\n", "--counts"),
+    "counts, some missing": (
+        "item,a,b,c\nA,3,0,0\nB,1,1,0\nC,0,0,3\nD,0,3,0\n",
+        "--counts",
+    ),
+    "counts, empty for none": ("item,a,b\nA,3,\nB,1,2\nC,,3\nD,,3\n", "--counts"),
+    "column of text": (
+        "item,hand,Kim,Lee\nA,left,1,1\nB,right,2,2\nC,left,3,1\n",
+        "--ignore hand",
+    ),
+    "column of other numbers": (
+        "item,bpm,Kim,Lee\nA,61,1,1\nB,72,2,2\nC,83,3,1\n",
+        "--ignore bpm",
+    ),
+    "column called weight": (
+        "item,weight,Kim,Lee\nA,1,1,1\nB,2,2,2\nC,3,3,1\n",
+        "--frequency weight.*--ignore weight",
+    ),
     "colons": (lines(delimiter=":"), "--delimiter"),
     "two separators, no decimal comma": (
         "A;1,b;1,b\nB;2,b;2,b\n",
@@ -744,7 +744,7 @@ def test_files_that_are_refused(name: str, tmp_path: Path) -> None:
 def wide(n_items: int, n_raters: int) -> str:
     rows = [",".join(["item", *(f"r{j}" for j in range(n_raters))])]
     rows += [
-        ",".join([f"i{i}", *(str((i + j) % 3) for j in range(n_raters))])
+        ",".join([f"i{i}", *(str((i + j * j) % 3) for j in range(n_raters))])
         for i in range(n_items)
     ]
     return "\n".join([*rows, ""])
@@ -754,7 +754,7 @@ def wide(n_items: int, n_raters: int) -> str:
     ("n_items", "n_raters"), [(1, 2), (2, 2), (2, 1), (3, 2000), (2000, 3), (1, 1100)]
 )
 def test_sizes(n_items: int, n_raters: int, tmp_path: Path) -> None:
-    table = [[(i + j) % 3 for j in range(n_raters)] for i in range(n_items)]
+    table = [[(i + j * j) % 3 for j in range(n_raters)] for i in range(n_items)]
     kind, _, values = outcome(tmp_path, wide(n_items, n_raters))
     assert kind != "refused"
     assert values == values_of(table)
@@ -763,7 +763,7 @@ def test_sizes(n_items: int, n_raters: int, tmp_path: Path) -> None:
 def test_row_names_beside_many_columns(tmp_path: Path) -> None:
     header, rows = wide(4, 1500).split("\n", 1)
     data = header.removeprefix("item,") + "\n" + rows
-    table = [[(i + j) % 3 for j in range(1500)] for i in range(4)]
+    table = [[(i + j * j) % 3 for j in range(1500)] for i in range(4)]
     kind, message, values = outcome(tmp_path, data)
     assert (kind, values) == ("warned", values_of(table))
     assert "1500 columns count as raters of 4 items" in message

@@ -64,6 +64,7 @@ QUALTRICS = (
     '"{""ImportId"":""Q1""}","{""ImportId"":""Q2""}","{""ImportId"":""Q3""}"\n'
     "A,1,1\nB,2,1\nC,2,2\n"
 )
+NUMBERED = "P1,mild,severe\nP2,no,no\nP3,no,some\nP4,some,some\n"
 SEVERITY = "item,Kim,Lee\nA,mild,severe\nB,absent,mild\n"
 
 # text, options, grades of one part, what the record says
@@ -95,6 +96,12 @@ READ: list[tuple[str, dict[str, Any], list[list[str | None]], dict[str, Any]]] =
         },
     ),
     (WIDE.replace("\n", "\r"), {}, TABLE, {"n_items": 3}),  # of an old Mac
+    (
+        NUMBERED.replace("P1", "patient"),
+        {},
+        [["no", "no"], ["no", "some"], ["some", "some"]],
+        {"warnings": []},
+    ),
     # columns by name
     (LONG, {}, TABLE, {"rater": "rater", "grade": "grade", "n_missing": 0}),
     *(
@@ -236,6 +243,7 @@ def test_groups_and_sessions_are_parts(
             "line 2 and line 4: 'K' graded 'A'",
         ),
         (TWICE.replace("1", "a"), {"repeated": "mean"}, "--repeated mean"),
+        (NUMBERED, {}, "--no-header"),  # though they are no grades of other rows
         (TWICE, {"repeated": "mean", "categories": ["1", "2", "3"]}, "declared scale"),
         (BY_SITE.replace("S", ""), {"by": "site"}, "line 3, column 'site'"),
         (
@@ -359,7 +367,6 @@ def test_scales(
 
 
 UNITS = "patient,Kim,Lee\nid,level,level\nA,mild,mild\nB,mild,severe\nC,severe,severe\n"
-NUMBERED = "P1,mild,severe\nP2,no,no\nP3,no,some\nP4,some,some\n"
 ANGLES = "".join(f"i{k},{k + 0.25},{k + 0.5}\n" for k in range(40))
 BORG = "".join(f"i{k},{k},{k + 1}\n" for k in range(6, 20))
 
@@ -367,8 +374,6 @@ BORG = "".join(f"i{k},{k},{k + 1}\n" for k in range(6, 20))
 @pytest.mark.parametrize(
     ("text", "code", "is_warned"),
     [
-        (NUMBERED, "grades as names", True),  # though they are no grades of other rows
-        (NUMBERED.replace("P1", "patient"), "grades as names", False),
         (UNITS + "D,mild,mild\n", "second header", True),
         (
             UNITS.replace("id,level,level\n", "") + "D,mild,mild\n",

@@ -1,0 +1,366 @@
+"""What looks as if it were something else: columns and rows that are no ratings.
+
+In: a sheet, which column is what, and the grades. Out: warnings. What would make a
+number wrong is refused, unless `--raters` or `--reference` names it.
+"""
+
+import itertools
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from masrel.ratings._findings import (
+    USUAL_MISSING,
+    Finding,
+    Reading,
+    listed,
+    quoted,
+)
+from masrel.ratings._grade_texts import is_number, normal_form, spelled_alike
+from masrel.ratings._layout import ITEM_NAME, Layout, names_rows, numbers_rows
+from masrel.ratings._sheet import Codes, Column, Sheet
+from masrel.scales import Scale
+
+# Names of columns that are seldom those of raters.
+_OTHERS = re.compile(
+    r"(age|sex|gender|comments?|notes?|remarks?|id|index|date|day|time|timestamp|"
+    r"duration|lead_time|height|bmi|group|site|cent(er|re)|diagnosis|side|text|email|"
+    r"unnamed: \d+|(final|true)[\W_]?(label|score|grade|rating|value|class|decision))",
+    re.IGNORECASE,
+)
+# Words of names of what is made of several ratings, and of what may stand beside, as in
+# "majority_vote"; words of any such name, and of one of a column of two values.
+_SUMS = frozenset(
+    "majority gold golden consensus adjudicated adjudication truth groundtruth gt "
+    "reference mode modal mean average avg median sd std stdev variance total sum "
+    "agree agreed agreement disagree disagreement match matched unanimous kappa "
+    "n count counts freq freqs frequency frequencies weight weights".split()
+)
+_BESIDE = frozenset(
+    "label labels score scores rating ratings grade grades value values vote votes "
+    "voting voted standard class category decision answer annotation ground of all the "
+    "is are row rater raters annotator annotators percent num number overall".split()
+)
+_SURE = frozenset("conf confidence confidences certainty".split())
+_FLAGS = frozenset("agree agreed agreement disagree disagreement match correct".split())
+_FREQUENCY = re.compile(r"(n|w|wt|(counts?|freqs?|frequenc(y|ies)|weights?)\W?)", re.I)
+# Names of rows that summarize the others.
+_SUMMARY = re.compile(
+    r"(grand )?(total|sum|mean|average|avg|median|sd|s\.d\.|std|min|max|n|count|all)s?"
+    r"|[Σσ]|kappa|agreement",
+    re.IGNORECASE,
+)
+_SEVERAL = re.compile(r"[;|[{]")  # what stands in cells of several labels
+_MAX_COMPARED = 2000  # columns that are compared with all others
+_ENOUGH = 3  # ratings of a column that are some grade of another's, if both rate
+_ENOUGH_ROWS, _MANY_CATEGORIES = 4, 15  # of a table that is surely one of counts
+_SHOWN = 5
+
+
+def doubt_columns(
+    sheet: Sheet,
+    layout: Layout,
+    options: Reading,
+    codes: Codes,
+    scale: Scale,
+    freq: Codes,
+) -> list[Finding]:
+    """Refuse or warn of columns of a wide table that are no raters."""
+    # codes (n_items, n_raters): places in the scale, -1 where missing; freq (n_items,)
+    names = [sheet.header[place] for place in layout.raters]
+    findings = []
+    if layout.frequency is None:
+        findings = _frequencies(sheet, layout, options)
+    if not options.raters:
+        _refuse_other_tables(sheet, layout, options, names, scale)
+    # an item that is there twice is refused below, and no column is one of raters
+    is_long = any(len(sheet.columns[p].texts) < len(codes) for p in layout.item[:1])
+    is_long &= options.repeated == "error" and layout.session == layout.by is None
+    if not (options.raters or is_long):
+        findings += _no_raters(sheet, layout, options, codes, scale)
+    n_items = len(sheet.numbers)
+    if layout.is_item_guessed and len(names) > 2 * n_items and not sheet.is_transposed:
+        findings.append(Finding("many raters", n=len(names), n_items=n_items))
+    if not all(map(is_number, scale.grades)):
+        if sheet.has_header and len(codes) > 3:
+            findings += _second_header(sheet, codes, scale)
+    elif not options.raters and layout.frequency is None:
+        findings += _looks_counted(sheet, names, codes, scale, freq)
+    unrated = np.flatnonzero((codes < 0).all(axis=0))[:_SHOWN]
+    return findings + [Finding("no grade of", rater=names[k]) for k in unrated]
+
+
+def _refuse_other_tables(
+    sheet: Sheet, layout: Layout, options: Reading, names: Sequence[str], scale: Scale
+) -> None:
+    # a contingency table, one without names of columns, or of items
+    if len(layout.item) == 1 and len(names) == len(sheet.numbers) > 1:
+        if set(sheet.columns[layout.item[0]].texts) == set(names):
+            raise sheet.refuse("contingency")
+    # a name of a column that the caller gives is no row
+    is_named = options.item or options.ignore or options.by or options.frequency
+    if sheet.has_header and not sheet.is_transposed and not is_named:
+        _refuse_first_line(sheet, layout, names, scale)
+    if layout.is_item_guessed:
+        _refuse_first_column(sheet, layout.item[0], scale)
+
+
+def _refuse_first_line(
+    sheet: Sheet, layout: Layout, names: Sequence[str], scale: Scale
+) -> None:
+    # names that are grades
+    grades = set(map(normal_form, scale.grades))
+    are_numbers = all(map(is_number, scale.grades))
+    n_grades = sum(
+        normal_form(name) in grades
+        or name in USUAL_MISSING
+        or (are_numbers and is_number(name))
+        for name in names
+    )
+    items = [(sheet.header[p], sheet.columns[p].texts[0]) for p in layout.item]
+    # P1 above P2; a name that is no item's above its names
+    is_numbered = any(
+        re.sub(r"\d+", "0", name) == re.sub(r"\d+", "0", cell) for name, cell in items
+    )
+    is_named = items and all(ITEM_NAME.fullmatch(name) for name, _ in items)
+    if is_numbered or (n_grades >= len(names) / 2 and not is_named):
+        raise sheet.refuse(
+            "grades as names",
+            where=sheet.at(0),
+            columns=listed(names, _SHOWN),
+            names=f" {quoted(names)}" * (len(names) <= _SHOWN),
+        )
+
+
+def _refuse_first_column(sheet: Sheet, place: int, scale: Scale) -> None:
+    # a column that is the item because nothing else was, and may be a rater
+    name, texts = sheet.header[place], sheet.columns[place].texts
+    numbers = {float(grade) for grade in scale.grades if is_number(grade)}
+    low, high = min(numbers, default=0.0), max(numbers, default=0.0) + 1
+    values = [float(text) for text in texts if is_number(text)]
+    n_near = sum(low <= value <= high for value in values)
+    n_in_scale = sum(value in numbers for value in values)
+    n_in_scale += sum(not is_number(t) and t in scale.grades for t in texts)
+    is_rater = max(n_in_scale, n_near) >= len(texts) / 2 and not (
+        ITEM_NAME.fullmatch(name) or (numbers_rows(sheet, place) and values[-1] > high)
+    )
+    if len(texts) < len(sheet.numbers):
+        is_rater = n_in_scale == len(texts)
+    if is_rater:
+        where, quoted_name = sheet.at(0), quoted([name])
+        raise sheet.refuse("first column", where=where, column=name, name=quoted_name)
+
+
+# ---- columns that are no raters ----
+
+
+def _frequencies(sheet: Sheet, layout: Layout, options: Reading) -> list[Finding]:
+    # a column of how often each row is there, of rows that all differ otherwise
+    item = [] if layout.is_item_guessed else [*layout.item]
+    others = [
+        place
+        for place in range(len(sheet.header))
+        if place not in item and not names_rows(sheet, place)
+    ]
+    for place in others:
+        name, column = sheet.header[place], sheet.columns[place]
+        rows = [sheet.columns[other].codes for other in others if other != place]
+        if (
+            _FREQUENCY.fullmatch(name)
+            and not _is_of_series(name, sheet.header)
+            and not (options.raters and place in layout.raters)
+            and all(
+                is_number(t) and float(t) % 1 == 0 <= float(t) for t in column.texts
+            )
+            and 1 < len(column.codes) == len(np.unique(np.column_stack(rows), axis=0))
+        ):
+            finding = Finding("frequency", column=name, name=quoted([name]))
+            # rows that have names, but those of row numbers, may be items
+            is_item = any(not numbers_rows(sheet, place) for place in item)
+            is_left = name in ",".join(options.ignore).split(",")
+            is_left &= bool(options.raters or options.item)
+            if is_left or (is_item and place not in layout.raters):
+                return [finding]
+            raise sheet.refuse("frequency", **finding.facts)
+    return []
+
+
+def _is_of_series(name: str, header: Sequence[str]) -> bool:
+    # n beside m or o
+    return len(name) == 1 and bool({chr(ord(name) - 1), chr(ord(name) + 1)} & {*header})
+
+
+def _no_raters(
+    sheet: Sheet, layout: Layout, options: Reading, codes: Codes, scale: Scale
+) -> list[Finding]:
+    # columns with another name than a rater's, or without a grade of the others
+    names = [sheet.header[place] for place in layout.raters]
+    named = {k for k, place in enumerate(layout.raters) if _is_no_rater(sheet, place)}
+    alone, sure = _alone(codes, scale)
+    vouched = {k for k, name in enumerate(names) if name == options.reference}
+    wrong = (named | sure) - vouched
+    if wrong and not named and len(names) == 2:
+        met = [np.unique(column[column >= 0]).tolist() for column in codes.T]
+        first, second = (listed([scale.grades[k] for k in of], _SHOWN) for of in met)
+        raise sheet.refuse(
+            *("nothing in common", "", None),
+            **{"one": names[0], "other": names[1], "names": quoted(names)},
+            **{"first": first, "second": second},
+        )
+    facts = [
+        {"columns": listed([names[k] for k in sorted(of)], _SHOWN)}
+        | {"advice": _advice(names, of)}
+        for of in (wrong, alone - vouched)
+    ]
+    if wrong:
+        raise sheet.refuse("no raters", **facts[0])
+    return [Finding("apart", **facts[1])] if alone - vouched else []
+
+
+def _advice(names: Sequence[str], wrong: set[int]) -> str:
+    # how columns are left aside; a list that is long is no help
+    out = [names[k] for k in sorted(wrong)]
+    rest = [name for k, name in enumerate(names) if k not in wrong]
+    raters = f"--raters {quoted(rest)}" if 1 < len(rest) <= _SHOWN else "--raters"
+    ignored = f"--ignore {quoted(out)} leaves such columns aside, "
+    is_short = len(out) <= _SHOWN and bool(rest)
+    return f"{ignored * is_short}{raters} names those that rate"
+
+
+def _is_no_rater(sheet: Sheet, place: int) -> bool:
+    name = sheet.header[place]
+    parts = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()
+    words = set(re.findall(r"[^\W\d_]+|\d+", parts))
+    if words & _SURE or _OTHERS.fullmatch(name):
+        return True
+    if words & _FLAGS and len({*sheet.columns[place].texts} - {*USUAL_MISSING}) <= 2:
+        return True
+    key = words & _SUMS
+    return (
+        bool(key) and words <= key | _BESIDE and not _is_of_series(name, sheet.header)
+    )
+
+
+def _alone(codes: Codes, scale: Scale) -> tuple[set[int], set[int]]:
+    # columns without a grade, or a value, in common with any other, and those of them
+    # that surely should have one
+    rated = [np.unique(column[column >= 0]) for column in codes.T]
+    known = [k for k, grades in enumerate(rated) if len(grades)]
+    if not 1 < len(known) <= _MAX_COMPARED:
+        return set(), set()
+    n_columns = np.bincount(np.concatenate(rated), minlength=len(scale.grades))
+    alone = {k for k in known if (n_columns[rated[k]] == 1).all()}
+    if all(map(is_number, scale.grades)):
+        of_rest = codes[:, [k for k in known if k not in alone] or known]
+        cells = of_rest[of_rest >= 0]
+        if 2 * len(np.unique(cells)) > len(cells):  # measurements, seldom alike
+            values = np.array(scale.values)
+            low, high = (values[[rated[k][end] for k in known]] for end in (0, -1))
+            n_like = ((low[:, None] <= high) & (low <= high[:, None])).sum(axis=1)
+            return {k for k, n in zip(known, n_like, strict=True) if n == 1}, set()
+    elif any(map(_SEVERAL.search, scale.grades)):  # sets of labels, seldom equal
+        return alone, set()
+    return alone, {k for k in alone if (codes[:, k] >= 0).sum() >= _ENOUGH}
+
+
+def _looks_counted(
+    sheet: Sheet, names: Sequence[str], codes: Codes, scale: Scale, freq: Codes
+) -> list[Finding]:
+    # Whole numbers whose sum is the same in every row, or in most and nowhere above
+    # what one of them is alone, as where all raters agree.
+    values = np.array([*scale.values, 0.0])  # a missing count, at -1, is 0
+    if min(codes.shape) < 2 or (values < 0).any() or (values % 1 != 0).any():
+        return []
+    sums = values[codes].sum(axis=1)
+    total = sums.max()
+    has_zeros = 0 in scale.values or bool((codes < 0).any())
+    has_zeros |= all(map(is_number, names))  # as names of grades are
+    is_most = values.max() == total
+    is_most &= np.average(sums == total, weights=freq) >= 1 / 2
+    if total < 2 or not has_zeros or not ((sums == total).all() or is_most):
+        return []
+    raters = f" {quoted(names)}" * (len(names) <= _SHOWN)
+    finding = Finding("counts", total=total, names=raters)
+    is_sure = freq.sum() >= _ENOUGH_ROWS and len(names) <= _MANY_CATEGORIES
+    if is_sure and scale.name == "observed":
+        raise sheet.refuse("counts", **finding.facts)
+    return [finding]
+
+
+def _second_header(sheet: Sheet, codes: Codes, scale: Scale) -> list[Finding]:
+    # a first row whose grades occur nowhere else, while those of the others do
+    rest = np.bincount(codes[1:].ravel() + 1, minlength=len(scale.grades) + 1)[1:]
+    n_met = np.count_nonzero(rest) + bool((codes[1:] < 0).any())
+    is_known = (rest[codes[0][codes[0] >= 0]] > 0).any()
+    if is_known or (codes[0] < 0).all() or n_met > codes[1:].size / 2:
+        return []
+    return [Finding("second header", where=sheet.where(0))]
+
+
+def doubt_items(
+    sheet: Sheet, layout: Layout, n_items: int, n_rows: int
+) -> list[Finding]:
+    """Warn of a long table none of whose items was rated twice."""
+    columns = ", ".join(repr(sheet.header[place]) for place in layout.item)
+    return [Finding("numbered", columns=columns)] if n_items == n_rows > 2 else []
+
+
+def doubt_names(kind: str, names: Sequence[str]) -> list[Finding]:
+    """Warn of names that differ by spelling alone."""
+    return [
+        Finding("alike", kind=kind, names=", ".join(map(repr, group)))
+        for group in spelled_alike(names)[:_SHOWN]
+    ]
+
+
+def doubt_item_names(sheet: Sheet, item: Column) -> list[Finding]:
+    """Refuse or warn of items that are comments, or sum up others."""
+    odd = [
+        name
+        for name in item.texts
+        if name[:1] == "#"
+        or (len(name) < 14 and not name[-1].isdigit() and _SUMMARY.fullmatch(name))
+    ]
+    findings = doubt_names("items", item.texts)
+    if not 0 < len(odd) < len(item.texts) / 2:
+        return findings
+    if odd == item.texts[-len(odd) :] or any(name[0] == "#" for name in odd):
+        where = sheet.where(int(np.argmax(item.is_text(odd[0]))))
+        raise sheet.refuse("summary row", where, item=odd[0])
+    return [*findings, Finding("summary", names=listed(odd, _SHOWN))]
+
+
+def doubt_counts(
+    sheet: Sheet, layout: Layout, options: Reading, table: Codes
+) -> list[Finding]:
+    """Refuse or warn of a table of counts that has sums, or no column of items."""
+    # of a table (n_rows, n_categories)
+    names = [sheet.header[place] for place in layout.raters]
+    findings = []
+    are_sums = (2 * table == table.sum(axis=1)[:, None]).all(axis=0)
+    for name in [] if options.raters else itertools.compress(names, are_sums):
+        if len(names) > 2 or _SUMMARY.fullmatch(name):
+            raise sheet.refuse("sum column", column=name, name=quoted([name]))
+    if len(table) > 2 and (2 * table[-1] == table.sum(axis=0)).all():
+        where = sheet.where(len(table) - 1)
+        items = [sheet.columns[place] for place in layout.item]
+        is_named = items and _SUMMARY.fullmatch(items[-1].texts[items[-1].codes[-1]])
+        if is_named or (layout.kind == "counts" and len(table) >= _ENOUGH_ROWS):
+            raise sheet.refuse("sum row", where=where)
+        findings.append(Finding("sum row", where=where))
+    findings += doubt_names("categories", names)
+    if layout.kind == "table" or not layout.item:
+        return findings
+    name, column = sheet.header[layout.item[0]], sheet.columns[layout.item[0]]
+    are_counts = all(text.isdecimal() for text in column.texts)
+    if (
+        layout.is_item_guessed
+        and are_counts
+        and not (ITEM_NAME.fullmatch(name) or numbers_rows(sheet, layout.item[0]))
+    ):
+        raise sheet.refuse("category or item", column=name, name=quoted([name]))
+    is_twice = len(column.texts) < len(column.codes) and layout.by is None
+    if len(layout.item) == 1 and is_twice:
+        findings.append(Finding("items twice", column=name))
+    return findings
