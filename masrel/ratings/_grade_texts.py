@@ -8,7 +8,7 @@ import math
 import re
 import unicodedata
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from itertools import pairwise
@@ -131,9 +131,13 @@ def _grades(
     if not declared:
         _refuse_missing(list(met), refuse)
     if not options.set_separator:
-        # a number in a cell with a type has no thousands mark, and a point
-        is_text = "delimiter" in sheet.facts
-        marks = [mark for mark in _MARKS if not declared and (is_text or mark != ".")]
+        delimiter = sheet.facts.get("delimiter")
+        marks = {
+            mark: delimiter != "semicolon"
+            for mark in _MARKS
+            # a number in a cell with a type has a point
+            if not declared and (mark != "." or delimiter is not None)
+        }
         numbers = _numbers_of(list(met), options, refuse, marks)
     number = {
         t: Decimal(w) if is_number(w) else None for t, w in numbers.written.items()
@@ -268,11 +272,11 @@ class _Numbers:
 
 
 def _numbers_of(
-    texts: Sequence[str], options: Reading, refuse: _Refuse, marks: Collection[str]
+    texts: Sequence[str], options: Reading, refuse: _Refuse, marks: Mapping[str, bool]
 ) -> _Numbers:
     # grades as numbers are written; what may be two numbers is refused
-    # marks: that may be of thousands unsaid; none where the scale is declared, and
-    # nothing is guessed
+    # marks: that may be of thousands unsaid, and whether a point in all numbers is that
+    # of decimals; none where the scale is declared, and nothing is guessed
     numbers = _Numbers(written=dict(zip(texts, texts, strict=True)))
     if options.units or marks:
         _take_unit(numbers, options, refuse)
@@ -313,7 +317,7 @@ def _take_unit(numbers: _Numbers, options: Reading, refuse: _Refuse) -> None:
 
 
 def _take_thousands(
-    numbers: _Numbers, options: Reading, refuse: _Refuse, marks: Collection[str]
+    numbers: _Numbers, options: Reading, refuse: _Refuse, marks: Mapping[str, bool]
 ) -> None:
     # their marks off numbers, and a point before decimals
     mark, written = options.thousands, numbers.written
@@ -342,7 +346,7 @@ def _take_thousands(
 
 
 def _thousands_mark(
-    texts: Collection[str], options: Reading, marks: Iterable[str]
+    texts: Collection[str], options: Reading, marks: Mapping[str, bool]
 ) -> tuple[str, bool, str] | None:
     # the mark before three digits, nothing else, in all numbers that have it; whether
     # the numbers tell it from a decimal mark, and the options that do
@@ -373,7 +377,7 @@ def _thousands_mark(
         if mark == "." and options.decimal is None:
             # a point is that of decimals unless numbers without it are of another size
             is_near = top <= max(_SCALE, 2.0 * most) and not are_below
-            if is_near and not (is_sure or is_known):
+            if is_near and (rest or marks[mark]) and not (is_sure or is_known):
                 continue
             is_told &= not has_decimals  # a decimal comma is for the caller to say
         ways = f"--thousands {quoted([mark])} reads it so"

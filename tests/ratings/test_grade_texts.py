@@ -10,12 +10,15 @@ from masrel.ratings import RatingsFile, Reading, read_ratings
 from tests.cli.process import Caller
 
 
-def read(folder: Path, cells: str, **options: Any) -> RatingsFile:
+def read(
+    folder: Path, cells: str, *, between: str = "\t", **options: Any
+) -> RatingsFile:
     """Read cells between bars, two an item."""
     texts = cells.split("|")
-    rows = [f"i{k}\t{texts[k]}\t{texts[k + 1]}" for k in range(0, len(texts), 2)]
+    rows = [["item", "Kim", "Lee"]]
+    rows += [[f"i{k}", *texts[k : k + 2]] for k in range(0, len(texts), 2)]
     path = folder / "r.tsv"
-    path.write_text("\n".join(["item\tKim\tLee", *rows, ""]), encoding="utf-8")
+    path.write_text("\n".join(map(between.join, rows)) + "\n", encoding="utf-8")
     return read_ratings(path, Reading(**options))
 
 
@@ -106,6 +109,7 @@ BOTH = ["--thousands", "--decimal"]
                 ),
             )
         ),
+        ("1.200|1.350|2.000|1.900", {"between": ";"}, BOTH),  # of a German program
         ("1 200|90|78|3 400", {}, ["--thousands ' '"]),
         ("1.200,5|900|780|3.400", {}, ["--thousands ."]),
         ("0,125|1,200|2,500|3", {}, ["--decimal ,"]),
