@@ -149,7 +149,7 @@ class Reading:
             ),
             *(
                 (
-                    len(value) != 1 or value in _NO_MARKS,
+                    not isinstance(value, str) or len(value) != 1 or value in _NO_MARKS,
                     f"--{name}: needed one letter such as a comma, got {value!r}",
                 )
                 for name in ("decimal", "thousands")
@@ -160,8 +160,10 @@ class Reading:
                 f"--decimal, --thousands: needed two marks, got {self.decimal!r} twice",
             ),
             (
-                self.set_separator is not None and not self.set_separator,
-                "--set-separator: needed what stands between labels, got nothing",
+                self.set_separator is not None
+                and not (isinstance(self.set_separator, str) and self.set_separator),
+                "--set-separator: needed text that stands between labels, got "
+                f"{self.set_separator!r}",
             ),
             (
                 self.set_separator and (self.units or self.categories is not None),

@@ -185,7 +185,10 @@ def test_numbers_of_items_with_thousands(
     [
         {"thousands": ",", "decimal": ","},
         {"thousands": "12"},
+        {"thousands": 5},
+        {"decimal": 5},
         {"set_separator": ""},
+        {"set_separator": 3},
         {"set_separator": ",", "units": True},
         {"set_separator": ",", "categories": ["x"]},
         {"units": True, "counts": True},
