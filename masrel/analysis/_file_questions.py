@@ -79,7 +79,8 @@ def answers(
         raise RatingsError(
             f"{file.read['file']}: holds {len(sessions)} sessions "
             f"({', '.join(sessions)}), so that raters graded the same item more than "
-            f"once; --by {file.read['session']} estimates each"
+            f"once; --by {file.read['session']} estimates each, --retest compares "
+            "them"
         )
     if questions.weights != "identity" and not isinstance(questions.weights, Weights):
         check_order(file, f"--weights {questions.weights}")

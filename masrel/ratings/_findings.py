@@ -39,10 +39,6 @@ class Reading:
         The rater whom others are held against, whatever the column is called.
     no_item, no_header : bool
         Whether no column names the items; whether the first line is a row.
-    skip : int
-        How many lines of a text, or rows of a sheet, are above that of the names.
-    header : tuple of int
-        The lines, from 1, that make up the names.
     session, by : str or None
         Columns of the sessions, and of groups that are told apart.
     clusters : str or None
@@ -95,8 +91,6 @@ class Reading:
     reference: str | None = None
     no_item: bool = False
     no_header: bool = False
-    skip: int = 0
-    header: tuple[int, ...] = ()
     session: str | None = None
     by: str | None = None
     clusters: str | None = None
@@ -143,11 +137,6 @@ class Reading:
         options = [f"--{name}" for name in names if getattr(self, name)]
         is_kept = self.repeated == "error"
         return options if is_kept else [*options, f"--repeated {self.repeated}"]
-
-    @property
-    def names_at(self) -> tuple[int, ...]:
-        """The lines of the names; none where they are the first."""
-        return tuple(self.header) or ((self.skip + 1,) if self.skip else ())
 
     def _check(self) -> None:
         """Refuse what is wrong whatever the file is."""
@@ -230,16 +219,6 @@ class Reading:
                 "of a long one: needed one kind, got both",
             ),
             (
-                self.names_at != tuple(n for n in sorted({*self.names_at}) if n > 0),
-                "--skip, --header: needed numbers of lines in order, got "
-                f"{', '.join(map(str, self.names_at))}",
-            ),
-            (
-                self.header and (self.skip or self.no_header),
-                f"--{'skip' if self.skip else 'no-header'}, --header: needed one of "
-                "them, got both",
-            ),
-            (
                 self.no_item and self.item,
                 "--item, --no-item: needed one of them, got both",
             ),
@@ -314,6 +293,8 @@ def library(name: str, module: str, extra: str = "files") -> Any:
     return import_module(module)
 
 
+_ROW_LIKE_OTHERS = "--no-header if this line is a row like the others"
+
 _TEXTS = {
     # the file
     "no table": "needed a path, a DataFrame, columns by name, or rows of the same "
@@ -350,14 +331,10 @@ _TEXTS = {
     "open quote": "{where}: a quote that is opened is not closed",
     "names again": "holds the names of the columns once more: delete it; --no-header "
     "if the first line is a row like the others",
-    "no name": "{where}: needed a name for column {column}, got none{hint}",
-    "same name": "{where}: needed different names of the columns that are used, "
-    "{column!r} is there twice{hint}",
-    "titles": "needed names of columns, got {got!r}: {option} takes them from below",
-    "no line": "{option}: there are no names in {unit} {n} or below",
-    "no lines": "{option}: needed text or a workbook, whose names are in a line",
-    "note below": "{where} is left out, since it stands alone below an empty one: "
-    "{got!r}",
+    "no name": "{where}: needed a name for column {column}, got none; "
+    + _ROW_LIKE_OTHERS,
+    "same name": "{where}: needed different names of columns, {column!r} is there "
+    "twice; " + _ROW_LIKE_OTHERS,
     # workbooks, JSON, exports
     "no cells": "sheet {sheet}: needed a header and rows, got none",
     "no workbook": "--sheet {sheet}: needed a workbook",
@@ -386,12 +363,12 @@ _TEXTS = {
     "no column": "{option}: there is no column {column!r}, {columns}{hint}",
     "two roles": "{options}: needed each column once, got {column!r} twice",
     "role twice": "{where}: needed one column for the {role}, got {names}: --{role} "
-    "chooses one, --ignore leaves a column aside{hint}",
+    "chooses one, --ignore leaves a column aside",
     "unknown role": "{where}: looks like one row a rating ({known}): needs {needed}, "
     "{columns}; if its columns are raters, --raters names them, if they are items, "
-    "--transpose{hint}",
+    "--transpose",
     "no rater": "{where}: needed columns of raters, or of categories, got none",
-    "unnamed": "needed the {role}, got {got!r}{hint}",
+    "unnamed": "needed the {role}, got {got!r}",
     "no value": "needed a value",
     "contingency": "rows and columns have the same names, so that this looks like a "
     "contingency table of two raters: --table reads it as one",
@@ -416,7 +393,8 @@ _TEXTS = {
     "apart": "no value in common with the other columns: {columns}: {advice}",
     "many raters": "{n} columns count as raters of {n_items} items: --transpose if a "
     "row is a rater",
-    "second header": "{where} holds grades that occur nowhere else: {advice}",
+    "second header": "{where} holds grades that occur nowhere else: if it is a second "
+    "line of names, delete it",
     "numbered": "no item was rated twice: {columns} may number the rows, --item names "
     "the column of the items",
     "alike": "{kind} that differ by spelling alone are counted as different: {names}",
@@ -459,7 +437,7 @@ _TEXTS = {
     "no set": "--set-separator: needed {separator!r} between labels of some cell, and "
     "no semicolon in a label, got {got}",
     "decimal comma": "{got} looks like a number with a decimal comma: --decimal , "
-    "reads it so, --categories makes it text",
+    "reads it so, --set-separator , as two labels",
     "plus": "{got} beside grades such as {other!r} may be that number or the grade "
     "'{grade}': --categories with the scale in order tells",
     "alike grades": "grades that differ by spelling alone are counted as different: "
@@ -478,7 +456,7 @@ _TEXTS = {
     "names a column that tells such ratings apart, --repeated first, last or "
     "mean keeps one{guess}",
     "means": "--repeated mean: needs grades that are numbers without a declared scale, "
-    "got {grades}",
+    "got {grades}; --repeated first or last keeps one",
     "two clusters": "{rows}: needed one cluster of item {item!r} in column {column!r}, "
     "got {both}; if items are numbered in each cluster, --item names both columns",
 }
