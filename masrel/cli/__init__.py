@@ -149,8 +149,7 @@ cli = click.version_option(masrel.__version__, prog_name="masrel")(
 
 def main() -> None:
     """Run the command line and exit with its code."""
-    # What is left at the end goes with the process: no collector need look through it
-    atexit.register(gc.freeze)
+    atexit.register(_leave)
     for stream in (sys.stdout, sys.stderr):
         # One that somebody has told what to do with letters it lacks goes on doing it
         if isinstance(stream, io.TextIOWrapper) and stream.errors in _USUAL_ERRORS:
@@ -171,6 +170,13 @@ def main() -> None:
     except OSError as error:
         where = "" if error.filename is None else f"{error.filename}: "
         _fail(f"{where}{error.strerror or error}", 2)
+
+
+def _leave() -> None:
+    # What is left at the end goes with the process: no collector need look through it;
+    # but what DuckDB finds uncollected it reports on stderr.
+    if "duckdb" not in sys.modules:
+        gc.freeze()
 
 
 def _fail(error: object, code: int) -> NoReturn:

@@ -3,7 +3,7 @@
 In: a path and what the caller says of it. Out: a `RatingsFile` with what was read. The
 stages: `_sheet` or `_exports` (a file as columns of text), `_layout` (which column is
 what), `_grade_texts` (which grade a text is), and here ratings put together item by
-rater, or tables of counts; `_large` is for files larger than memory. `_findings` has
+rater, or tables of counts; `_large` is for large files. `_findings` has
 the texts of all that is refused or warned of.
 """
 
@@ -71,9 +71,9 @@ from masrel.ratings._sheet import (
 from masrel.scales import Scale
 
 if TYPE_CHECKING:
-    from masrel.ratings._large import Answer
+    from masrel.ratings._large import Answer, Source
 
-_LARGE_TEXT = 256 << 20  # bytes of text from which it is read as a stream
+_LARGE_TEXT = 32 << 20  # bytes of text from which DuckDB groups it, if it is there
 _MAX_DENSE = 20_000_000  # places, items by raters, that are always kept one by one
 _MAX_SPARSE = 8  # places a rating beyond which only counts are kept
 _MAX_COUNTS = 200_000_000  # places, items by categories, of counts
@@ -91,7 +91,8 @@ class RatingsPart:
     session : str or None
         Their session; None where the file has no such column.
     items, raters : tuple of str
-        Names, in the order in which they are met; raters without a name have none.
+        Names, in the order in which they are met; raters without a name have none, and
+        neither have the items of a stream.
     clusters : tuple of str
         The cluster of each item; empty where none are told apart.
     ratings : CodedRatings or CountedRatings
@@ -244,7 +245,7 @@ def _streamed(
     path: Path, options: Reading, progress: Callable[[int, int], None]
 ) -> RatingsFile | None:
     # by DuckDB; None if the file is to be read as a whole
-    from masrel.ratings import _large  # with pandas
+    from masrel.ratings import _large
 
     try:
         source = _large.source_of(path, options)
@@ -256,7 +257,7 @@ def _streamed(
             return None
         options = with_order(sheet, layout.grades, options)
         with _large.database_of(source, layout, progress) as answer:
-            return _grouped(answer, sheet, layout, options)
+            return _grouped(answer, source, layout, options)
     except _large.NoStreamError as error:
         if options.stream and (path.exists() or str(path) == "-"):
             text = f"{path}: {error}; --no-stream reads it as a whole"
@@ -265,31 +266,32 @@ def _streamed(
 
 
 def _grouped(
-    answer: "Answer", sheet: Sheet, layout: Layout, options: Reading
+    answer: "Answer", source: "Source", layout: Layout, options: Reading
 ) -> RatingsFile:
     # the rows of ratings that differ, how often each is there, and their grades
     from masrel.ratings import _large
 
-    groups = _large.groups_of(answer, sheet, layout)
+    groups = _large.groups_of(answer, source, layout)
     grades = graded(groups, layout.grades, options)
     freq, codes = groups.freq, grades.codes.ravel()
     n_missing, *counts = _often(grades, freq)
-    names, findings = [sheet.header[place] for place in layout.raters], []
+    names, findings = [groups.header[place] for place in layout.raters], []
     if layout.kind == "long":
         rater, n_rows = named(groups, "rater", layout.raters), int(freq.sum())
         names = rater.texts
         rows, freq = _large.patterns(answer, groups, layout, rater, codes)
-        findings = doubt_items(sheet, layout, int(freq.sum()), n_rows)
+        findings = doubt_items(groups, layout, int(freq.sum()), n_rows)
     else:
-        _large.refuse_repeated(answer, sheet, layout)
         rows = grades.codes
-        findings = doubt_columns(sheet, layout, options, rows, grades.scale, freq)
+        findings = doubt_columns(source.head, layout, options, rows, grades.scale, freq)
+        _large.refuse_repeated_items(answer, groups, layout)
+    findings += doubt_names("raters", names)
     ratings = _distinct(rows, freq, grades.scale)
     return _file_of(
         *(groups, layout, options, grades),
         [RatingsPart(raters=tuple(names), ratings=ratings)],
         np.array(counts),
-        [*findings, *doubt_names("raters", names), Finding("stream")],
+        findings + _large.doubt_names_met(answer, groups, layout),
         raters=names,
         n_items=int(freq.sum()),
         n_raters=len(names),

@@ -50,13 +50,6 @@ class Question:
 
 QUESTIONS = (
     Question(
-        name="5 000 000 rows, one a rating, 1 000 000 items",
-        file="long.csv",
-        options=(),
-        rival=CROSSTAB,
-        rival_name="pandas read_csv + crosstab",
-    ),
-    Question(
         name="100 000 × 5, one row an item, α",
         file="wide.csv",
         options=("--coefficients", "krippendorff_alpha"),
@@ -93,14 +86,6 @@ def write_files(folder: Path, scale: int) -> None:
     import pandas as pd
 
     rng = np.random.default_rng(20120831)
-    n = 5_000_000 // scale
-    order = rng.permutation(n)
-    long = {
-        "item": np.char.add("item", (order // 5).astype(str)),
-        "rater": np.char.add("r", (order % 5).astype(str)),
-        "grade": rng.integers(0, 5, n),
-    }
-    pd.DataFrame(long).to_csv(folder / "long.csv", index=False)
     wide = rng.integers(0, 5, (100_000 // scale, 5))
     frame = pd.DataFrame(wide, columns=list("ABCDE")).rename_axis("item")
     frame.to_csv(folder / "wide.csv")
