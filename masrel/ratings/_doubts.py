@@ -75,15 +75,17 @@ def doubt_columns(
     if not options.raters:
         _refuse_other_tables(sheet, layout, options, names, scale)
     # an item that is there twice is refused below, and no column is one of raters
-    is_long = any(len(sheet.columns[p].texts) < len(codes) for p in layout.item[:1])
+    is_long = any(
+        len(sheet.columns[p].texts) < len(sheet.numbers) for p in layout.item[:1]
+    )
     is_long &= options.repeated == "error" and layout.session == layout.by is None
     if not (options.raters or is_long):
-        findings += _no_raters(sheet, layout, options, codes, scale)
+        findings += _no_raters(sheet, layout, options, codes, scale, freq)
     n_items = len(sheet.numbers)
     if layout.is_item_guessed and len(names) > 2 * n_items and not sheet.is_transposed:
         findings.append(Finding("many raters", n=len(names), n_items=n_items))
     if not all(map(is_number, scale.grades)):
-        if sheet.has_header and len(codes) > 3:
+        if sheet.has_header and freq.sum() > 3:
             findings += _second_header(sheet, codes, scale)
     elif not options.raters and layout.frequency is None:
         findings += _looks_counted(sheet, names, codes, scale, freq)
@@ -192,12 +194,17 @@ def _is_of_series(name: str, header: Sequence[str]) -> bool:
 
 
 def _no_raters(
-    sheet: Sheet, layout: Layout, options: Reading, codes: Codes, scale: Scale
+    sheet: Sheet,
+    layout: Layout,
+    options: Reading,
+    codes: Codes,
+    scale: Scale,
+    freq: Codes,
 ) -> list[Finding]:
     # columns with another name than a rater's, or without a grade of the others
     names = [sheet.header[place] for place in layout.raters]
     named = {k for k, place in enumerate(layout.raters) if _is_no_rater(sheet, place)}
-    alone, sure = _alone(codes, scale)
+    alone, sure = _alone(codes, scale, freq)
     vouched = {k for k, name in enumerate(names) if name == options.reference}
     wrong = (named | sure) - vouched
     if wrong and not named and len(names) == 2:
@@ -242,7 +249,7 @@ def _is_no_rater(sheet: Sheet, place: int) -> bool:
     )
 
 
-def _alone(codes: Codes, scale: Scale) -> tuple[set[int], set[int]]:
+def _alone(codes: Codes, scale: Scale, freq: Codes) -> tuple[set[int], set[int]]:
     # columns without a grade, or a value, in common with any other, and those of them
     # that surely should have one
     rated = [np.unique(column[column >= 0]) for column in codes.T]
@@ -253,15 +260,15 @@ def _alone(codes: Codes, scale: Scale) -> tuple[set[int], set[int]]:
     alone = {k for k in known if (n_columns[rated[k]] == 1).all()}
     if all(map(is_number, scale.grades)):
         of_rest = codes[:, [k for k in known if k not in alone] or known]
-        cells = of_rest[of_rest >= 0]
-        if 2 * len(np.unique(cells)) > len(cells):  # measurements, seldom alike
+        n_cells = freq @ (of_rest >= 0).sum(axis=1)
+        if 2 * len(np.unique(of_rest[of_rest >= 0])) > n_cells:  # measurements
             values = np.array(scale.values)
             low, high = (values[[rated[k][end] for k in known]] for end in (0, -1))
             n_like = ((low[:, None] <= high) & (low <= high[:, None])).sum(axis=1)
             return {k for k, n in zip(known, n_like, strict=True) if n == 1}, set()
     elif any(map(_SEVERAL.search, scale.grades)):  # sets of labels, seldom equal
         return alone, set()
-    return alone, {k for k in alone if (codes[:, k] >= 0).sum() >= _ENOUGH}
+    return alone, {k for k in alone if freq @ (codes[:, k] >= 0) >= _ENOUGH}
 
 
 def _looks_counted(

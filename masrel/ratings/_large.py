@@ -296,8 +296,8 @@ def groups_of(answer: Answer, source: Source, layout: Layout) -> Sheet:
     is_unnamed = np.asarray(met["is_unnamed"], bool)
     is_blank = is_unnamed & groups.hold([""] * len(sheet.header))
     for row in np.flatnonzero(is_unnamed & ~is_blank)[: len(layout.item)]:
-        found = answer(f"SELECT item FROM cells WHERE n = {met['first'][row]}")
-        got = found["item"][0].replace(chr(31), " ")
+        named = answer(f"SELECT item FROM cells WHERE n = {met['first'][row]}")
+        got = named["item"][0].replace(chr(31), " ")
         only = layout.item[0] if len(layout.item) == 1 else None
         raise groups.refuse("unnamed", groups.where(row), only, role="item", got=got)
     # where no name has blanks around, they need not be looked for again
@@ -396,8 +396,8 @@ def doubt_names_met(answer: Answer, groups: Sheet, layout: Layout) -> list[Findi
     """Refuse or warn of names of items as of a file that is read as a whole."""
     # or say that it is not done, of too many
     if layout.item and groups.freq.sum() <= _MAX_NAMED:
-        queries = (f"SELECT {usual} AS found FROM items" for usual in _ARE_USUAL)
-        if any(answer(query)["found"][0] for query in queries):
+        queries = (f"SELECT {usual} AS are_usual FROM items" for usual in _ARE_USUAL)
+        if any(answer(query)["are_usual"][0] for query in queries):
             return []
         met = answer(
             "SELECT replace(min(item), chr(31), ' ') AS name, min(n) AS first FROM "

@@ -239,6 +239,10 @@ def test_simulated_ratings_are_labelled(tmp_path: Path) -> None:
         ({"id": [1, 2], "A": [None, None], "B": ["", ""]}, "needed at least one grade"),
         ({"id": list("bab"), "A": [1, 1, 2], "B": [None, 2, 2]}, "row 2 and row 4"),
         ({"id": list("bbb"), "A": [1, 1, 2], "B": [1, 2, 2]}, "row 2 and row 3"),
+        (
+            {"id": range(40), **dict.fromkeys("AB", [1, 2] * 20), "C": [7, 8] * 20},
+            "'C': no grade in common",
+        ),
         ({"id": ["p", "q", "#"], "A": [1, 1, 2], "B": [1, 2, 2]}, "row 4: '#' sums up"),
     ],
 )
