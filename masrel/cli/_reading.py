@@ -37,6 +37,11 @@ def weights_of_option(text: str) -> "str | Path":
     )
 
 
+def _line_numbers(text: str) -> tuple[int, ...]:
+    # of an option; a default stands as it is
+    return tuple(map(int, split_commas(text))) if isinstance(text, str) else text
+
+
 reading_options = [
     click.option(
         "--item",
@@ -62,6 +67,20 @@ reading_options = [
     click.option("--no-item", is_flag=True, help="No column names the items."),
     click.option(
         "--no-header", is_flag=True, help="No line of names; columns are 1, 2, 3 …"
+    ),
+    click.option(
+        "--skip",
+        type=click.IntRange(min=0),
+        default=0,
+        metavar="N",
+        help="Lines, or rows of a sheet, above the line of names.",
+    ),
+    click.option(
+        "--header",
+        type=_line_numbers,
+        default=(),
+        metavar="N,…",
+        help="Lines that make up the names; data begin below the last.",
     ),
     click.option("--session", metavar="COL", help="Column of the sessions."),
     click.option(

@@ -85,7 +85,7 @@ def doubt_columns(
     if layout.is_item_guessed and len(names) > 2 * n_items and not sheet.is_transposed:
         findings.append(Finding("many raters", n=len(names), n_items=n_items))
     if not all(map(is_number, scale.grades)):
-        if sheet.has_header and freq.sum() > 3:
+        if sheet.has_header and freq.sum() > 3 and not options.names_at:
             findings += _second_header(sheet, codes, scale)
     elif not options.raters and layout.frequency is None:
         findings += _looks_counted(sheet, names, codes, scale, freq)
@@ -302,7 +302,15 @@ def _second_header(sheet: Sheet, codes: Codes, scale: Scale) -> list[Finding]:
     is_known = (rest[codes[0][codes[0] >= 0]] > 0).any()
     if is_known or (codes[0] < 0).all() or n_met > codes[1:].size / 2:
         return []
-    return [Finding("second header", where=sheet.where(0))]
+    where, one = sheet.where(0), sheet.line_of(0)
+    if not sheet.facts.keys() & {"delimiter", "sheet"}:  # its names are in no line
+        return [
+            Finding("second header", where=where, advice="delete it if these are names")
+        ]
+    two = sheet.line_of(int(sheet.numbers[0]))
+    option = f"--header {one},{two}" if two == one + 1 else f"--skip {two - 1}"
+    advice = f"{option} if these are names, --header {one} if it is a row like others"
+    raise sheet.refuse("second header", where=where, advice=advice)
 
 
 def doubt_items(

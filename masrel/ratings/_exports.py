@@ -12,9 +12,10 @@ import json
 import re
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import compress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,12 +25,18 @@ import pandas as pd
 from masrel._input import shown
 from masrel.agreement._labels import is_row
 from masrel.errors import ParameterError
-from masrel.ratings._findings import Reading, library, refusal
+from masrel.ratings._findings import Finding, Reading, library, refusal
 from masrel.ratings._sheet import (
     MAX_UNPACKED,
+    SNIFFED,
     WORKBOOKS,
     Column,
+    Row,
     Sheet,
+    joined_names,
+    names_option,
+    no_line,
+    notes_below,
     read_foreign,
     unzipped,
     value_text,
@@ -63,7 +70,15 @@ _ENCODED = (".sav", ".zsav", ".dta", ".sas7bdat", ".xpt")  # pyreadstat takes th
 def read_table(data: Any, options: Reading) -> tuple[Sheet, Reading]:
     """Return the cells of a table in memory, and how they are read."""
     kind = type(data).__name__
-    for name in ("delimiter", "encoding", "sheet", "source", "stream"):
+    for name in (
+        "delimiter",
+        "encoding",
+        "sheet",
+        "source",
+        "stream",
+        "skip",
+        "header",
+    ):
         if getattr(options, name):
             raise ParameterError(f"--{name}: is of files, got a table ({kind})")
     is_array = isinstance(data, list | tuple | np.ndarray)
@@ -147,12 +162,13 @@ def read_typed(
         raise ParameterError(
             f"--encoding: needed a file of text, got {facts['format']}, whose is known"
         )
-    n_above, dropped = 0, dict[str, int]()
+    dropped = dict[str, int]()
     if options.source is not None:
         records = _records(name, suffix, data)
         frame, facts, dropped = _export(name, options.source, records, options.grade)
     elif suffix in WORKBOOKS:
-        frame, n_above = _workbook(name, suffix, data, options.sheet, facts)
+        rows, n_above = _workbook(name, suffix, data, options.sheet, facts)
+        return _sheet_of_rows(name, sha256, rows, n_above, facts, options)
     elif suffix in _ARROW:
         arrow = library(name, _ARROW[suffix])
         read = partial(arrow.read_table, io.BytesIO(data))
@@ -161,7 +177,7 @@ def read_typed(
         frame = _statistical(name, suffix, data, options.encoding, facts)
     else:
         frame = _objects(name, _json_values(name, suffix, data))
-    return replace(sheet_of(name, sha256, frame, facts, n_above), dropped=dropped)
+    return replace(sheet_of(name, sha256, frame, facts), dropped=dropped)
 
 
 def sheet_of(
@@ -210,8 +226,8 @@ def column_of(name: str, title: str, values: "pd.Series[Any]") -> Column:
 
 def _workbook(
     name: str, suffix: str, data: bytes, chosen: str | None, facts: dict[str, Any]
-) -> tuple[pd.DataFrame, int]:
-    # -> the cells below their names, and how many blank rows are above
+) -> tuple[list[list[Any]], int]:
+    # -> the rows of a sheet, and how many blank ones are above
     calamine = library(name, "python_calamine")
     if data.startswith(_ZIP):  # not an .xls
         do = "save its sheet as CSV, since a large table of text is read piece by piece"
@@ -240,10 +256,55 @@ def _workbook(
     if not filled:
         raise refusal(name, "no cells", sheet=chosen or ", ".join(book.sheet_names))
     ((facts["sheet"], cells),) = filled.items()
-    frame = pd.DataFrame(cells.to_python(skip_empty_area=True), dtype=object)
+    return cells.to_python(skip_empty_area=True), cells.start[0]
+
+
+def _sheet_of_rows(
+    name: str,
+    sha256: Callable[[], str],
+    rows: list[list[Any]],
+    n_above: int,
+    facts: dict[str, Any],
+    options: Reading,
+) -> Sheet:
+    # the table in rows of a workbook, which are below n_above that are empty
+    *upper, first = (line - 1 - n_above for line in options.names_at or [n_above + 1])
+    n_notes = notes_below([_texts(row) for row in rows[-SNIFFED:]])
+    rows, notes = rows[: len(rows) - n_notes], rows[len(rows) - n_notes :]
+    while first < 0 or (first < len(rows) and not any(_texts(rows[first]))):
+        first += 1
+    if first >= len(rows):
+        raise no_line(name, "row", options)
     # a column without name and cells is a space between others
-    frame = frame.loc[:, (frame != "").any(axis=0)]
-    return frame[1:].set_axis([*map(value_text, frame.iloc[0])], axis=1), cells.start[0]
+    frame = pd.DataFrame(rows[first:], dtype=object)
+    is_used = (frame != "").any(axis=0).to_numpy()
+    lines = [_texts(rows[k]) if k >= 0 else [] for k in (*upper, first)]
+    names = [*compress(joined_names(lines), is_used)]
+    frame = frame.loc[:, is_used][1:].set_axis(names, axis=1)
+    n_above += first
+    head = [
+        Row(k, k, [*compress(_texts(row), is_used)])
+        for k, row in enumerate(rows[first : first + SNIFFED], start=n_above + 1)
+    ]
+    findings = [
+        Finding(
+            "errors", errors=", ".join(f"{text} ×{n}" for text, n in errors.items())
+        )
+        for errors in [facts.get("errors")]
+        if errors
+    ]
+    if notes:
+        where, got = f"row {n_above - first + len(rows) + 1}", "".join(_texts(notes[0]))
+        findings.append(Finding("note below", where=where, got=got[:60]))
+    return replace(
+        sheet_of(name, sha256, frame, facts, n_above),
+        advice=names_option(name, "row", head, 0, options),
+        findings=tuple(findings),
+    )
+
+
+def _texts(row: Sequence[Any]) -> list[str]:
+    return [value_text(cell).strip() for cell in row]
 
 
 def table_frame(table: Any) -> pd.DataFrame:

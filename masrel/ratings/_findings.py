@@ -39,6 +39,10 @@ class Reading:
         The rater whom others are held against, whatever the column is called.
     no_item, no_header : bool
         Whether no column names the items; whether the first line is a row.
+    skip : int
+        How many lines of a text, or rows of a sheet, are above that of the names.
+    header : tuple of int
+        The lines, from 1, that make up the names.
     session, by : str or None
         Columns of the sessions, and of groups that are told apart.
     clusters : str or None
@@ -91,6 +95,8 @@ class Reading:
     reference: str | None = None
     no_item: bool = False
     no_header: bool = False
+    skip: int = 0
+    header: tuple[int, ...] = ()
     session: str | None = None
     by: str | None = None
     clusters: str | None = None
@@ -137,6 +143,11 @@ class Reading:
         options = [f"--{name}" for name in names if getattr(self, name)]
         is_kept = self.repeated == "error"
         return options if is_kept else [*options, f"--repeated {self.repeated}"]
+
+    @property
+    def names_at(self) -> tuple[int, ...]:
+        """The lines of the names; none where they are the first."""
+        return tuple(self.header) or ((self.skip + 1,) if self.skip else ())
 
     def _check(self) -> None:
         """Refuse what is wrong whatever the file is."""
@@ -219,6 +230,16 @@ class Reading:
                 "of a long one: needed one kind, got both",
             ),
             (
+                self.names_at != tuple(n for n in sorted({*self.names_at}) if n > 0),
+                "--skip, --header: needed numbers of lines in order, got "
+                f"{', '.join(map(str, self.names_at))}",
+            ),
+            (
+                self.header and (self.skip or self.no_header),
+                f"--{'skip' if self.skip else 'no-header'}, --header: needed one of "
+                "them, got both",
+            ),
+            (
                 self.no_item and self.item,
                 "--item, --no-item: needed one of them, got both",
             ),
@@ -293,8 +314,6 @@ def library(name: str, module: str, extra: str = "files") -> Any:
     return import_module(module)
 
 
-_ROW_LIKE_OTHERS = "--no-header if this line is a row like the others"
-
 _TEXTS = {
     # the file
     "no table": "needed a path, a DataFrame, columns by name, or rows of the same "
@@ -331,10 +350,14 @@ _TEXTS = {
     "open quote": "{where}: a quote that is opened is not closed",
     "names again": "holds the names of the columns once more: delete it; --no-header "
     "if the first line is a row like the others",
-    "no name": "{where}: needed a name for column {column}, got none; "
-    + _ROW_LIKE_OTHERS,
-    "same name": "{where}: needed different names of columns, {column!r} is there "
-    "twice; " + _ROW_LIKE_OTHERS,
+    "no name": "{where}: needed a name for column {column}, got none{hint}",
+    "same name": "{where}: needed different names of the columns that are used, "
+    "{column!r} is there twice{hint}",
+    "titles": "needed names of columns, got {got!r}: {option} takes them from below",
+    "no line": "{option}: there are no names in {unit} {n} or below",
+    "no lines": "{option}: needed text or a workbook, whose names are in a line",
+    "note below": "{where} is left out, since it stands alone below an empty one: "
+    "{got!r}",
     # workbooks, JSON, exports
     "no cells": "sheet {sheet}: needed a header and rows, got none",
     "no workbook": "--sheet {sheet}: needed a workbook",
@@ -363,12 +386,12 @@ _TEXTS = {
     "no column": "{option}: there is no column {column!r}, {columns}{hint}",
     "two roles": "{options}: needed each column once, got {column!r} twice",
     "role twice": "{where}: needed one column for the {role}, got {names}: --{role} "
-    "chooses one, --ignore leaves a column aside",
+    "chooses one, --ignore leaves a column aside{hint}",
     "unknown role": "{where}: looks like one row a rating ({known}): needs {needed}, "
     "{columns}; if its columns are raters, --raters names them, if they are items, "
-    "--transpose",
+    "--transpose{hint}",
     "no rater": "{where}: needed columns of raters, or of categories, got none",
-    "unnamed": "needed the {role}, got {got!r}",
+    "unnamed": "needed the {role}, got {got!r}{hint}",
     "no value": "needed a value",
     "contingency": "rows and columns have the same names, so that this looks like a "
     "contingency table of two raters: --table reads it as one",
@@ -393,8 +416,7 @@ _TEXTS = {
     "apart": "no value in common with the other columns: {columns}: {advice}",
     "many raters": "{n} columns count as raters of {n_items} items: --transpose if a "
     "row is a rater",
-    "second header": "{where} holds grades that occur nowhere else: if it is a second "
-    "line of names, delete it",
+    "second header": "{where} holds grades that occur nowhere else: {advice}",
     "numbered": "no item was rated twice: {columns} may number the rows, --item names "
     "the column of the items",
     "alike": "{kind} that differ by spelling alone are counted as different: {names}",

@@ -1,6 +1,7 @@
 """Which column of a sheet is what: named by the caller, else by its usual name."""
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -100,6 +101,8 @@ def find_layout(sheet: Sheet, options: Reading) -> Layout:
     layout = None if is_wide else _long(sheet, named, taken)
     if layout is None:
         layout = _wide(sheet, options, named, taken)
+    roles = (*layout.item, *layout.raters, *layout.grades, *session, *by, *clusters)
+    _refuse_names(sheet, {*roles, *often})
     return replace(
         layout,
         session=None if is_counted or not session else session[0],
@@ -107,6 +110,22 @@ def find_layout(sheet: Sheet, options: Reading) -> Layout:
         clusters=clusters[0] if clusters else None,
         frequency=often[0] if often else None,
     )
+
+
+def _refuse_names(sheet: Sheet, used: set[int]) -> None:
+    # columns that are used and have no name, or one that is there twice
+    twice = Counter(sheet.header)
+    for place in sorted(used):
+        name = sheet.header[place]
+        # the first may be R's or pandas' row names
+        if (twice[name] > 1) if name else place:
+            facts: dict[str, str | int] = {"column": name or place + 1}
+            if not sheet.advice:
+                facts["hint"] = "; --raters names the columns that rate"
+            if name and name in sheet.columns[place].texts:
+                facts["hint"] = "; --no-header if this line is a row like the others"
+            code = "same name" if name else "no name"
+            raise sheet.refuse(code, where=sheet.at(0), **facts)
 
 
 def _columns_of(
@@ -129,12 +148,12 @@ def _columns_of(
                     option=f"--{option}",
                     column=joined[-1],
                     columns=f"but {listed(sheet.header, 12)}",
-                    hint=f"; did you mean {near[0]!r}?" if near else "",
+                    **({"hint": f"; did you mean {near[0]!r}?"} if near else {}),
                 )
-            place = sheet.header.index(name)
-            if place in places:
+            same = [place for place, n in enumerate(sheet.header) if n == name]
+            if same[0] in places:
                 raise sheet.refuse("two roles", options=f"--{option}", column=name)
-            places.append(place)
+            places += same if option == "ignore" else same[:1]
             parts = parts[len(parts) - joined.index(name) :]
     return tuple(places)
 
@@ -277,12 +296,13 @@ def rated_twice(
 # ---- what looks as if it were something else ----
 
 
-def without_second_header(sheet: Sheet) -> tuple[Sheet, list[Finding]]:
+def without_second_header(sheet: Sheet) -> Sheet:
     """Leave Qualtrics' lines of questions and import ids out, and say so."""
     for row in range(min(2, len(sheet.numbers))):
         cells = [column.texts[column.codes[row]] for column in sheet.columns]
         if all('"ImportId"' in cell for cell in cells if cell):
             finding = Finding("qualtrics", first=sheet.where(0), last=sheet.where(row))
             above = np.arange(len(sheet.numbers)) <= row
-            return sheet.without(above, "second header"), [finding]
-    return sheet, []
+            sheet = replace(sheet, findings=(*sheet.findings, finding), advice="")
+            return sheet.without(above, "second header")
+    return sheet

@@ -207,18 +207,15 @@ def read_ratings(
 
 def _read_cells(sheet: Sheet, options: Reading) -> RatingsFile:
     """Return the ratings in the cells of a file or a table."""
-    cells, findings = without_second_header(sheet)
+    cells = without_second_header(sheet)
     if not len(cells.numbers):
-        raise cells.refuse("no rows")
-    if errors := cells.facts.get("errors"):
-        shown = ", ".join(f"{text} ×{n}" for text, n in errors.items())
-        findings.append(Finding("errors", errors=shown))
+        raise cells.refuse("no rows", cells.at(0))
     layout = find_layout(cells, options)
     options = with_order(cells, layout.grades, options)
     read = _counted if layout.kind in ("counts", "table") else _rated
     if layout.frequency is not None:
         cells, read = _standing_for(cells, layout.frequency, options), _patterns
-    return read(cells, layout, options, findings)
+    return read(cells, layout, options, list(cells.findings))
 
 
 def _read_sheet(path: Path | str, options: Reading) -> Sheet:
@@ -232,7 +229,11 @@ def _read_sheet(path: Path | str, options: Reading) -> Sheet:
     suffix = Path(inner).suffix.lower()
     if options.sheet is not None and suffix not in WORKBOOKS:
         raise refusal(name, "no workbook", sheet=options.sheet)
-    if options.source is not None or suffix in TYPED_FORMATS:
+    is_typed = options.source is not None or suffix in TYPED_FORMATS
+    if is_typed and options.names_at and (options.source or suffix not in WORKBOOKS):
+        option = "--header" if options.header else "--skip"
+        raise refusal(name, "no lines", option=option)
+    if is_typed:
         from masrel.ratings._exports import read_typed  # with pandas
 
         return finished(read_typed(name, sha256, suffix, data, options), options)
@@ -249,8 +250,8 @@ def _streamed(
 
     try:
         source = _large.source_of(path, options)
-        sheet, findings = without_second_header(source.head)
-        if findings or not len(sheet.numbers):
+        sheet = without_second_header(source.head)
+        if sheet.findings or not len(sheet.numbers):
             return None
         layout = find_layout(sheet, options)
         if layout.session is not None:

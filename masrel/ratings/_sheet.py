@@ -14,14 +14,14 @@ import sys
 import unicodedata
 import zipfile
 import zlib
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import date, datetime
 from decimal import Decimal
 from functools import partial
-from itertools import chain, count, islice
+from itertools import accumulate, chain, count, islice
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from masrel._collector import collector_off
 from masrel.errors import ParameterError, RatingsError
-from masrel.ratings._findings import Reading, refusal
+from masrel.ratings._findings import Finding, Reading, refusal
 
 Codes = NDArray[np.int64]
 
@@ -90,7 +90,11 @@ _LETTERS = {
 _WORD = re.compile(r"[^\W\d_]*[^\W\d_\0-\x7f][^\W\d_]*")  # with a letter beyond ASCII
 _INNER = re.compile(r"ς\w")  # which only ends a word, so that it is another letter
 _UNPLAIN = re.compile(r"[^\x21-\x7e]")  # blanks, and letters that may have two forms
-_SNIFFED = 20  # lines that the separator is found in
+_LINE_END = re.compile(r"\r\n|\n|\r")
+SNIFFED = 20
+"""Records that the separator and the names are found in."""
+_TAIL, _MOST_NOTES = 4096, 3  # letters at the end that notes are in, and lines of them
+_NUMBER = re.compile(r"[+-]?\d+\.?\d*")
 _CHUNK = 1 << 14  # records that are taken apart at once
 _END = "\0"  # a record behind the last, which a quote that stays open swallows
 
@@ -163,7 +167,7 @@ class Sheet:
 
     name: str  # the file, as the caller calls it
     sha256: Callable[[], str]  # of its bytes
-    header: tuple[str, ...]  # names of the columns, all different
+    header: tuple[str, ...]  # names of the columns
     columns: tuple[Column, ...] = field(repr=False)
     # (n_rows,): number of the record of every row in the file; the names are 0
     numbers: Codes = field(default_factory=lambda: np.arange(0), repr=False)
@@ -175,6 +179,8 @@ class Sheet:
     has_header: bool = True
     is_transposed: bool = False  # whether rows and columns are exchanged
     is_simulated: bool = False  # whether a comment at its head says so
+    findings: tuple[Finding, ...] = ()  # of what is left out of it
+    advice: str = ""  # the option that takes its names from where they seem to be
     unit: str = "line"  # in which a record is
     line_of: Callable[[int], int]  # number of a record to the line that it is in
 
@@ -192,7 +198,8 @@ class Sheet:
         """Return the error of this file, at a row and a column."""
         column = "" if place is None else f", column {self.header[place]!r}"
         where = f"{self.name}: {at}{column}" if at else self.name
-        return refusal(where, code, **facts)
+        hint = f"; {self.advice} takes the names from below" if self.advice else ""
+        return refusal(where, code, **{"hint": hint, **facts})
 
     def hold(self, texts: Sequence[str]) -> NDArray[np.bool_]:
         """Return which rows have these texts in their columns."""
@@ -214,7 +221,7 @@ class Sheet:
 
 
 def finished(sheet: Sheet, options: Reading) -> Sheet:
-    """Turn a sheet as it was stored as the options say, and check its names."""
+    """Turn a sheet as it was stored as the options say."""
     header, columns = list(sheet.header), list(sheet.columns)
     if options.transpose or options.no_header:
         cells = [[n, *c.cells()] for n, c in zip(header, columns, strict=True)]
@@ -232,16 +239,10 @@ def finished(sheet: Sheet, options: Reading) -> Sheet:
             header = [name for name, *_ in cells]
             cells = [rest for _, *rest in cells]
         columns = [Column.of(np.arange(len(rows)), rows) for rows in cells]
-    header = [name.strip() for name in header]
+    header = [re.sub(r"\s*[\r\n]\s*", " ", name.strip()) for name in header]
     # a separator at the end of every line makes a column without name and cells
     if header and not header[-1] and set(columns[-1].texts) <= {""}:
         header, columns = header[:-1], columns[:-1]
-    if "" in header[1:]:  # the first may be R's or pandas' row names
-        place = header.index("", 1) + 1
-        raise sheet.refuse("no name", where=sheet.at(0), column=place)
-    if len(set(header)) < len(header):
-        twice = next(name for name, n in Counter(header).items() if n > 1)
-        raise sheet.refuse("same name", where=sheet.at(0), column=twice)
     n_rows = len(columns[0].codes) if columns else 0
     sheet = replace(
         sheet,
@@ -416,13 +417,16 @@ def read_text(
     """Take a text apart: its comments, its separator, its records."""
     declared = re.match(r'"?sep=(.)"?(\r\n|\n|\r)', text, re.IGNORECASE)
     delimiter = options.delimiter or (declared.group(1) if declared else None)
-    start = declared.end() if declared else 0
-    comments, start = _comments(name, text, start, delimiter)
-    text, n_before = text[start:], text.count("\n", 0, start)
+    *upper, last = (_start_of(name, text, n, options) for n in options.names_at or [1])
+    start = _below_comments(
+        name, text, max(last, declared.end() if declared else 0), delimiter
+    )
+    head, text, n_before = text[:start], text[start:], _n_lines(text, start)
     if not text.strip():
         raise refusal(name, "no records")
-    delimiter, (n_names, *below) = _separator(name, text, delimiter)
-    called = DELIMITERS.get(delimiter, delimiter)
+    delimiter, rows, n_titles = _separator(name, text, delimiter, n_before)
+    advice = names_option(name, "line", rows, n_titles, options)
+    n_names, *below = (len(row.cells) for row in rows)
     # R's write.table has no name above its row names
     has_row_names = bool(below) and set(below) == {n_names + 1}
     if n_names + has_row_names < 2:
@@ -433,6 +437,7 @@ def read_text(
             delimiter=DELIMITERS.get(delimiter, repr(delimiter)),
             first=text.splitlines()[0].strip()[:60],
         )
+    text, findings = _without_notes(text, delimiter, n_before)
     sheet = Sheet(
         name=name,
         sha256=sha256,
@@ -440,17 +445,21 @@ def read_text(
         columns=(),
         facts={
             "format": kind,
-            "delimiter": called,
+            "delimiter": DELIMITERS.get(delimiter, delimiter),
             "encoding": options.encoding or "utf-8",
         },
-        is_simulated=any("SIMULATED" in comment for comment in comments),
+        is_simulated=bool(re.search("^#.*SIMULATED", head, re.MULTILINE)),
+        findings=findings,
+        advice=advice,
         line_of=partial(
             line_of, partial(io.StringIO, text, newline=""), delimiter, n_before
         ),
     )
-    lines = chain(io.StringIO(text, newline=""), [_END])
-    reader = reader_of(lines, delimiter)
-    header = next(record for record in reader if not _is_blank(record))
+    reader = reader_of(chain(io.StringIO(text, newline=""), [_END]), delimiter)
+    names: list[list[str]]
+    names = [next(reader_of(io.StringIO(head[k:]), delimiter), []) for k in upper]
+    names.append(next(record for record in reader if not _is_blank(record)))
+    header = joined_names(names)
     columns = _columns(sheet, reader, n_names + has_row_names)
     if has_row_names:
         is_last_empty = set(columns[-1].texts) <= {""}
@@ -458,32 +467,173 @@ def read_text(
     return replace(sheet, header=tuple(header), columns=columns)
 
 
-def _comments(
-    name: str, text: str, start: int, delimiter: str | None
-) -> tuple[list[str], int]:
-    # Lines at the head that begin with "#" are comments, unless the last of them has as
-    # many cells as the line below, and may be the header; and where the others begin.
-    comments, below, last = [], "", start
+def _start_of(name: str, text: str, line: int, options: Reading) -> int:
+    # where a line that an option names begins
+    starts = chain([0], (end.end() for end in _LINE_END.finditer(text)))
+    start = next(islice(starts, line - 1, None), len(text))
+    if start == len(text) > 0:
+        raise no_line(name, "line", options)
+    return start
+
+
+def _n_lines(text: str, end: int) -> int:
+    return sum(1 for _ in _LINE_END.finditer(text, 0, end))
+
+
+def _without_notes(
+    text: str, delimiter: str, n_before: int
+) -> tuple[str, tuple[Finding, ...]]:
+    # a text without the notes below its table, and what they are
+    lines = [] if delimiter == " " else list(io.StringIO(text[-_TAIL:], newline=""))
+    rows: list[list[str]]
+    rows = [next(reader_of([line], delimiter), []) for line in lines]
+    n_notes = notes_below(rows)
+    end = len(text) - sum(map(len, lines[len(lines) - n_notes :]))
+    if not n_notes or text.count('"', 0, end) % 2:  # they are in a cell
+        return text, ()
+    where = f"line {n_before + _n_lines(text, end) + 1}"
+    got = "".join(rows[-n_notes]).strip()[:60]
+    return text[:end], (Finding("note below", where=where, got=got),)
+
+
+def _below_comments(name: str, text: str, start: int, delimiter: str | None) -> int:
+    # Where the lines at the head end that begin with "#": they are comments, unless the
+    # last of them has as many cells as the line below, and may be the header.
+    comment, below, last = "", "", start
     for line in io.StringIO(text[start:], newline=""):
         if line.startswith("#"):
-            comments.append(line.rstrip("\r\n"))
-            last = start
-        elif line.strip() or not comments:
+            comment, last = line.rstrip("\r\n"), start
+        elif line.strip() or not comment:
             below = line.rstrip("\r\n")
             break
         start += len(line)
     for mark in [delimiter] if delimiter else [",", ";", "\t", "|"]:
-        if not comments or (mark == " " and comments[-1].startswith("# ")):
+        if not comment or (mark == " " and comment.startswith("# ")):
             continue
         n_cells, n_below = (
-            len(next(reader_of([line], mark), ())) for line in (comments[-1], below)
+            len(next(reader_of([line], mark), ())) for line in (comment, below)
         )
         if 1 < n_cells == n_below:
-            if re.match(r"#\s+[^\s,;|]", comments[-1]) and mark != "\t":
-                line_number = text.count("\n", 0, last) + 1
+            if re.match(r"#\s+[^\s,;|]", comment) and mark != "\t":
+                line_number = _n_lines(text, last) + 1
                 raise refusal(name, "comment or header", line=line_number)
-            return comments[:-1], last
-    return comments, start
+            return last
+    return start
+
+
+# ---- where the names are ----
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A row as it stands in its file."""
+
+    line: int  # the first of its lines, from 1
+    end: int  # the last
+    cells: list[str]
+
+    @property
+    def n_filled(self) -> int:
+        """How many cells are not empty."""
+        return sum(bool(cell.strip()) for cell in self.cells)
+
+
+def joined_names(lines: Sequence[Sequence[str]]) -> list[str]:
+    """Return the names that lines make up: merged cells are filled from their left."""
+    *upper, last = ([cell.strip() for cell in line] for line in lines)
+    width = len(last)
+    upper = [[*line, *[""] * width][:width] for line in upper]
+    parts: list[Iterable[str]] = [accumulate(line, _or_left) for line in upper]
+    return [" ".join(filter(None, name)) for name in zip(*parts, last, strict=True)]
+
+
+def _or_left(left: str, cell: str) -> str:
+    return cell or left
+
+
+def no_line(name: str, unit: str, options: Reading) -> RatingsError:
+    """Return the error of an option that names a line below the last."""
+    option = "--header" if options.header else "--skip"
+    return refusal(name, "no line", option=option, unit=unit, n=options.names_at[-1])
+
+
+def names_option(
+    name: str, unit: str, rows: Sequence[Row], n_titles: int, options: Reading
+) -> str:
+    """Return the option that takes the names from below the first row, or none."""
+    # n_titles: how many rows at the head have fewer cells than the table
+    first, lines = n_titles, list[int]()
+    if not options.no_header and len(options.names_at) < 2:
+        first += _n_first_cells(rows[first:])
+        lines = _lines_of_names(rows[first:])
+    line = lines[0] if lines else rows[first].line
+    option = f"--skip {line - 1}" if line > rows[0].line else ""
+    if len(lines) > 1:
+        option = f"--header {','.join(map(str, lines))}"
+    if first:
+        got = ", ".join(filter(None, rows[0].cells))[:60]
+        raise refusal(
+            f"{name}: {unit} {rows[0].line}", "titles", got=got, option=option
+        )
+    return option
+
+
+def _n_first_cells(rows: Sequence[Row]) -> int:
+    # how many rows above the names have their first cell alone, or none
+    is_title = [row.n_filled == bool(row.cells[0]) for row in rows]
+    n = is_title.index(False) if False in is_title else 0
+    are_columns = n and len(rows[n].cells) > 2
+    return n if are_columns and _are_names(rows[n].cells[1:], rows[n + 1 :]) else 0
+
+
+def _lines_of_names(rows: Sequence[Row]) -> list[int]:
+    # the first lines that make up a name of every column but the first, all different
+    upper: list[Row] = []
+    for k, row in enumerate(rows):
+        if upper and row.line != upper[-1].end + 1:
+            upper = []
+        if k and row.cells[0] and not _are_names(row.cells[1:], rows[k + 1 :]):
+            break
+        names = joined_names([*(above.cells for above in upper), row.cells])
+        if all(names[1:]) and len(set(names)) == len(names):
+            lines = [above.line for above in (*upper, row)]
+            # names without an item, or with the name of the items alone, as of pandas
+            for below in rows[k + 1 : k + 2]:
+                rest = below.n_filled - bool(below.cells[0])
+                is_name = not below.cells[0] and _are_names(below.cells, rows[k + 2 :])
+                if below.line == row.end + 1 and (is_name if rest else upper):
+                    lines.append(below.line)
+            return lines
+        upper = [*upper, row] if row.n_filled > bool(row.cells[0]) else []
+    return []
+
+
+def _are_names(cells: Sequence[str], below: Sequence[Row]) -> bool:
+    # whether no cell is there below, and no number among those that are
+    others = {cell for row in below for cell in row.cells[1:] if cell}
+    numbers = [float(cell) for cell in others if _NUMBER.fullmatch(cell)]
+    low, high = min(numbers, default=0.0), max(numbers, default=0.0)
+    return not any(
+        cell in others or (_NUMBER.fullmatch(cell) and low <= float(cell) <= high)
+        for cell in cells
+    )
+
+
+def notes_below(rows: Sequence[Sequence[str]]) -> int:
+    """Return how many rows at the end, below an empty one, have one cell of text."""
+    filled = [[cell.strip() for cell in row if cell.strip()] for row in rows]
+    while filled and not filled[-1]:
+        filled.pop()
+    first = len(filled)
+    while first and len(filled[first - 1]) == 1 and len(filled) - first < _MOST_NOTES:
+        first -= 1
+    notes, above = set(chain(*filled[first:])), set(chain(*filled[:first]))
+    are_texts = all(any(map(str.isalpha, note)) for note in notes)
+    is_apart = first and not filled[first - 1] and not notes & above
+    return len(rows) - first if notes and are_texts and is_apart else 0
+
+
+# ---- records ----
 
 
 @contextmanager
@@ -522,37 +672,72 @@ def line_of(
     return begins
 
 
-def _separator(name: str, text: str, delimiter: str | None) -> tuple[str, list[int]]:
-    # what stands between cells, and how many cells the first records have
-    head = list(islice(filter(str.strip, io.StringIO(text, newline="")), _SNIFFED))
-    widths = {
-        mark: [len(record) for record in reader_of(head, mark) if not _is_blank(record)]
-        for mark in ([delimiter] if delimiter else DELIMITERS)
-    }
+def _separator(
+    name: str, text: str, delimiter: str | None, n_before: int
+) -> tuple[str, list[Row], int]:
+    # what stands between cells, the first records, and how many of these are titles
+    lines = list(islice(io.StringIO(text, newline=""), 5 * SNIFFED))
+    marks = [delimiter] if delimiter else DELIMITERS
+    heads = {m: rows for m in marks if (rows := _head(lines, m, n_before))}
+    if not heads:
+        raise refusal(name, "no records")
+    n_titles = {mark: _n_titles(rows) for mark, rows in heads.items()}
+    widths = {mark: len(rows[0].cells) for mark, rows in heads.items()}
+    of_names = [n for mark, n in widths.items() if mark != " "]
+    for mark, n in n_titles.items():  # names between other separators are no title
+        is_prose = mark == " " and 2 * n > len(heads[mark])
+        if n > 0 and (is_prose or len(heads[mark][-1].cells) in of_names):
+            n_titles[mark] = -1
     if delimiter:
-        return delimiter, widths[delimiter]
-    # as many cells in every record, or one more below a header without row names; a
-    # decimal comma is in the rows alone
-    consistent = [
-        mark
-        for mark, (first, *below) in widths.items()
-        if first > 1 and len(set(below)) < 2 and (below or [first])[0] - first in (0, 1)
-    ]
+        return delimiter, heads[delimiter], max(n_titles[delimiter], 0)
+    # as many cells in every record, or one more below a header without row names,
+    # below the fewest titles; a decimal comma is in the rows alone
+    fewest = min((n for n in n_titles.values() if n >= 0), default=None)
+    consistent = [mark for mark, n in n_titles.items() if n == fewest]
     marked = [mark for mark in consistent if mark != " "] or consistent
-    are_decimal = not re.search(r"(?<!\d),|,(?!\d)", "".join(head))
+    are_decimal = not re.search(r"(?<!\d),|,(?!\d)", "".join(lines[:SNIFFED]))
     if "," in marked and are_decimal:  # such commas may be in numbers
         if len(marked) > 1:
             marked.remove(",")
-        elif " " in consistent and widths[" "][0] > widths[","][0]:
+        elif " " in consistent and widths[" "] > widths[","]:
             marked.append(" ")
     if len(marked) > 1:
         names = " and ".join(DELIMITERS[mark] for mark in marked)
         raise refusal(name, "two separators", names=names)
-    several = [mark for mark, n in widths.items() if n[0] > 1 and mark != " "]
+    several = [mark for mark, n in widths.items() if n > 1 and mark != " "]
     if not marked and not several:
-        raise refusal(name, "one column", first=head[0].strip())
-    mark = marked[0] if marked else max(several, key=lambda mark: widths[mark][0])
-    return mark, widths[mark]
+        raise refusal(name, "one column", first=lines[0].strip())
+    mark = marked[0] if marked else max(several, key=lambda mark: widths[mark])
+    return mark, heads[mark], max(n_titles[mark], 0)
+
+
+def _head(lines: list[str], delimiter: str, n_before: int) -> list[Row]:
+    # the first records that are not blank
+    rows, begins, reader = [], 0, reader_of(lines, delimiter)
+    for record in reader:
+        if not _is_blank(record):
+            cells = [cell.strip() for cell in record]
+            rows.append(Row(n_before + begins + 1, n_before + reader.line_num, cells))
+        begins = reader.line_num
+        if len(rows) == SNIFFED:
+            break
+    return rows
+
+
+def _n_titles(rows: list[Row]) -> int:
+    # how many rows are above those that have as many cells as the last but notes, or
+    # the header one less; -1 if others are as wide
+    widths = [len(row.cells) for row in rows]
+    while len(widths) > 2 and widths[-1] == 1:
+        widths.pop()
+    del rows[len(widths) :]
+    width, first = widths[-1], len(widths) - 1
+    while first and widths[first - 1] == width:
+        first -= 1
+    if first and 1 < widths[first - 1] == width - 1:
+        first -= rows[first].line == rows[first - 1].end + 1
+    is_table = widths[first] > 1 and first < max(len(widths) - 1, 1)
+    return first if is_table and all(w < width for w in widths[:first]) else -1
 
 
 def _columns(sheet: Sheet, reader: Any, width: int) -> tuple[Column, ...]:

@@ -181,10 +181,14 @@ TABLE: dict[str, Asked] = {
         },
     ),
     "no name": Asked(
-        code="no name", text="a,,1\nb,2,1\n", tries={"--no-header": ".1 21"}
+        code="no name",
+        text="a,,1\nb,2,1\nc,1,1\n",
+        tries={"--no-header": ".1 21 11"},
     ),
     "same name": Asked(
-        code="same name", text="a,1,1\nb,2,1\n", tries={"--no-header": "11 21"}
+        code="same name",
+        text="a,1,1\nb,2,1\nc,1,1\n",
+        tries={"--no-header": "11 21 11"},
     ),
     # ---- workbooks, JSON, exports ----
     "sheets": Asked(

@@ -395,7 +395,6 @@ RIGHT: dict[str, Any] = {
 }
 
 WARNED: dict[str, Any] = {
-    "units": (BASE.replace("Lee\n", "Lee\n-,MAS,MAS\n", 1), "line 2"),
     "raters differ by case": (BASE.replace("Lee", "kim"), "'Kim', 'kim'"),
     "items differ by case": (BASE.replace("B,", "a,"), "'A', 'a'"),
     "items differ by zeros": (
@@ -532,6 +531,10 @@ REFUSED: dict[str, Any] = {
     "names once more": (BASE + BASE, "line 6"),
     "names once more, at the end": (BASE + LINES[0], "line 6"),
     "names once more, crlf": (lines(end="\r\n") * 2, "line 6"),
+    "units": (
+        BASE.replace("Lee\n", "Lee\n-,MAS,MAS\n", 1),
+        "line 2.*--header 1,2 .*--header 1 ",
+    ),
     "an unnamed column": (BASE.replace("Kim", ""), "line 1.*column 2"),
     "an unnamed last column": (BASE.replace("Lee", ""), "line 1.*column 3"),
     "two unnamed columns": (BASE.replace("item,Kim", ","), "line 1.*column 2"),

@@ -366,7 +366,6 @@ def test_scales(
     assert file.read["scale"]["declared"] is bool(options)
 
 
-UNITS = "patient,Kim,Lee\nid,level,level\nA,mild,mild\nB,mild,severe\nC,severe,severe\n"
 ANGLES = "".join(f"i{k},{k + 0.25},{k + 0.5}\n" for k in range(40))
 BORG = "".join(f"i{k},{k},{k + 1}\n" for k in range(6, 20))
 
@@ -374,12 +373,6 @@ BORG = "".join(f"i{k},{k},{k + 1}\n" for k in range(6, 20))
 @pytest.mark.parametrize(
     ("text", "code", "is_warned"),
     [
-        (UNITS + "D,mild,mild\n", "second header", True),
-        (
-            UNITS.replace("id,level,level\n", "") + "D,mild,mild\n",
-            "second header",
-            False,
-        ),
         ("item,A,B\n" + ANGLES, "measurements", True),
         # 15 grades of Borg's scale once or twice each
         ("item,A,B\n" + BORG, "measurements", False),
