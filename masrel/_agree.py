@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
-from masrel._input import check_option, shown
+from masrel._input import check_option, refuse, shown
 from masrel.agreement import COEFFICIENTS, BandScale, Metric
 from masrel.analysis._file_estimates import Answer, Estimating, Questions
 from masrel.analysis._file_questions import answers
-from masrel.errors import MasrelError, ParameterError
+from masrel.errors import MasrelError
 from masrel.estimates import Estimate, IntervalMethod, Target
 from masrel.ratings import Finding, RatingsFile, Reading, read_ratings
 from masrel.tables._answer_tables import agreement_sentences
@@ -113,8 +113,9 @@ class Agreement:
 
     def sentence(self) -> str:
         """Return a sentence for a paper of every estimate, one a line."""
-        words, data = self.estimating.words, self._screen.data
-        return agreement_sentences(self.answer, bands=words, data=data)
+        return agreement_sentences(
+            self.answer, bands=self.estimating.words, data=self._screen.data
+        )
 
     def __str__(self) -> str:
         return as_text(self._screen, width=_WIDTH)
@@ -219,15 +220,20 @@ def _joined(
 ) -> _Options:
     """Return options with those that are arguments of their own."""
     chosen = default if options is None else options
-    if not isinstance(chosen, type(default)):
-        kind = type(default).__name__
-        raise ParameterError(f"{name}: needs masrel.{kind}(…), got {shown(options)}")
+    kind = type(default)
+    is_wrong = not isinstance(chosen, kind)
+    needed = f"{name}: needs masrel.{kind.__name__}(…), got {shown(options)}"
     changes = {key: value for key, value in short_cuts.items() if value is not None}
-    for key in changes:
-        if getattr(chosen, key) != getattr(default, key):
-            raise ParameterError(
-                f"{key}: needed once, got it as an argument and in {name}"
+    refuse(
+        (is_wrong, needed),
+        *(
+            (
+                getattr(chosen, key, None) != getattr(default, key),
+                f"{key}: needed once, got it as an argument and in {name}",
             )
+            for key in changes
+        ),
+    )
     return replace(chosen, **changes)
 
 

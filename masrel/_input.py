@@ -9,6 +9,20 @@ from masrel.errors import ParameterError
 
 _MAX_LISTED = 40
 
+USUAL_NAMES = {
+    "item": (
+        *("item", "item_id", "model", "subject", "subject_id", "patient", "patient_id"),
+        *("case", "unit", "task", "task_id", "document", "video"),
+    ),
+    "rater": (
+        *("rater", "rater_id", "annotator", "annotator_id", "coder", "coder_id"),
+        *("judge", "observer", "worker", "worker_id", "assessor", "reviewer"),
+    ),
+    "grade": ("grade", "rating", "score", "label"),
+    "session": ("session",),
+}
+"""Names of columns that are recognized, letter case aside."""
+
 
 def refuse(*rules: tuple[object, str]) -> None:
     """Raise for the first rule that is broken: whether it is, and what is said."""

@@ -4,6 +4,7 @@ In: lists, arrays, frames, counts of items, or a table of two raters. Out:
 `CodedRatings` item by item, and `CountedRatings`, which every kappa takes.
 """
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
@@ -11,12 +12,13 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel._input import check_option, shown
+from masrel._input import USUAL_NAMES, check_option, shown
 from masrel.agreement._labels import (
     MISSING,
     Codes,
     Label,
     check_categories,
+    is_missing,
     is_row,
     label_codes,
     warn_of_texts,
@@ -34,6 +36,7 @@ _MAX_KEYS = 1 << 22  # different rows that are counted in a table rather than so
 _BLOCK = 1 << 14  # items at once: they stay in the cache, and BLAS starts no threads
 _MAX_PLACES = 100_000_000  # that are made of counts, where ratings are gone through
 _MAX_SIDE = 4000  # categories of a table of pairs
+_NAME = re.compile(r"\d+(\.0)?|.*[^\d.].*")  # of an item: a number of it, or text
 _TO_LIST = ("to_pylist", "tolist")  # of arrays of Arrow; and of numpy and pandas
 _MEASURED = 0.8  # of the ratings are different numbers where those are measurements
 
@@ -215,14 +218,84 @@ def _plain_table(
         return np.asarray(ratings), scale
     if not hasattr(ratings, "to_numpy"):
         return ratings, scale
+    names = list(map(str, getattr(ratings, "columns", ())))
     if not hasattr(ratings, "iloc"):  # not pandas, whose own types are told apart here
-        return np.asarray(ratings.to_numpy()), scale
+        table = np.asarray(ratings.to_numpy())
+        _refuse_columns(names, table)
+        return table, scale
     types = list(ratings.dtypes)
     if scale is None and all(getattr(of, "ordered", False) for of in types):
         scales = [check_categories(of.categories.tolist()) for of in types]
         scale = scales[0] if len(set(scales)) == 1 else None
     are_numbers = all(isinstance(of, np.dtype) and of.kind in "iuf" for of in types)
-    return ratings.to_numpy(None if are_numbers else object), scale
+    table = ratings.to_numpy(None if are_numbers else object)
+    _refuse_columns(names, table)
+    return table, scale
+
+
+def _refuse_columns(names: Sequence[str], table: NDArray[Any]) -> None:
+    """Refuse a frame with a column of items among the raters, or one row a rating."""
+    # table (n_rows, n_columns); names alone do not tell, but with the labels below them
+    known = {_ROLE_OF.get(_letters(n)): k for k, n in reversed([*enumerate(names)])}
+    roles = {role: known[role] for role in _LONG if role in known}
+    are_text = [_is_text(labels) for labels in table.T]
+    is_mixed = {True, False} <= set(are_text)
+    if True not in are_text and "item" not in roles and len(roles) < 2:
+        return
+    labels = [list(map(str, column)) for column in table.T]
+    differ = [len(set(of)) == len(of) > 1 for of in labels]
+    of_text = are_text.index(True) if is_mixed and are_text.count(True) == 1 else -1
+    item = roles.get("item", of_text)
+    are_names = item >= 0 and differ[item] and all(map(_NAME.fullmatch, labels[item]))
+    # a model may be a rater, and rank items
+    is_item = are_names and not (_letters(names[item]) == "model" and all(differ))
+    escape = "" if is_mixed else "; frame.to_numpy() if it is not so"
+    if _is_long(roles, labels) or (is_mixed and len(names) > 2 and not is_item):
+        columns = {role: repr(names[place]) for role, place in roles.items()}
+        call = ", ".join(f"{role}={columns.get(role, '…')}" for role in _LONG)
+        raise RatingsError(
+            f"ratings: the columns {', '.join(map(repr, names[:6]))} look like one row "
+            "a rating, and a coefficient takes one row an item and one column a rater: "
+            f"masrel.agree(frame, {call}) reads them, code_long(frame, {call}) makes "
+            f"ratings of them{escape}"
+        )
+    if is_item:
+        raise RatingsError(
+            f"ratings: the column {names[item]!r} names items, and would be a rater: "
+            f"masrel.agree(frame, item={names[item]!r}) reads it so, and so does "
+            f"frame.set_index({names[item]!r}) in pandas{escape}"
+        )
+
+
+def _is_long(roles: dict[str, int], labels: Sequence[Sequence[str]]) -> bool:
+    """Return whether columns, of which some have usual names, are one row a rating."""
+    sets, n_rows = list(map(set, labels)), len(labels[0])
+    if len(sets) < 3 or len(roles) == 3:
+        return len(sets) > 2
+    # as raters who use the same words never do
+    are_apart = sum(map(len, sets)) == len(set().union(*sets))
+    if "rater" not in roles or len(roles) < 2:
+        return are_apart and all(1 < len(of) < n_rows for of in sets)
+    # names of raters come again, and are in no other column; or each item once
+    raters = sets[roles["rater"]]
+    is_name = any(raters.isdisjoint(of) for of in sets if of is not raters)
+    pairs = set(zip(*(labels[k] for k in roles.values()), strict=True))
+    return 2 * len(raters) <= n_rows and (is_name or len(pairs) == n_rows)
+
+
+def _letters(name: str) -> str:
+    return "".join(filter(str.isalnum, name.casefold()))
+
+
+def _is_text(labels: NDArray[Any]) -> bool | None:
+    # of a column, by its first label; None without one
+    return next((isinstance(of, str) for of in labels if not is_missing(of)), None)
+
+
+_LONG = ("item", "rater", "grade")
+_ROLE_OF = {
+    _letters(name): role for role, names in USUAL_NAMES.items() for name in names
+} | dict.fromkeys(("id", "participant", "participantid"), "item")
 
 
 def side_by_side(first: Any, second: Any) -> Any:

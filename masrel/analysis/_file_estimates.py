@@ -183,12 +183,11 @@ class Questions(Estimating):
         """Return the same with weights that are in a file, or a matrix."""
         from masrel.agreement import Weights, declared_weights
 
-        weights, scale = self.weights, file.scale
+        weights, scale, is_ordered = self.weights, file.scale, file.is_ordered
         if isinstance(weights, Path):
             from masrel.ratings._reader import read_weights
 
-            ordered = file.is_ordered
-            weights = read_weights(weights, scale.grades, is_ordered=ordered)
+            weights = read_weights(weights, scale.grades, is_ordered=is_ordered)
         elif not isinstance(weights, str | Weights):
             check_order(file, "weights: a matrix")
             weights = declared_weights(weights, scale.values)

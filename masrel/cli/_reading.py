@@ -1,7 +1,5 @@
 """The options of verbs that read any file of ratings, and what they say of it."""
 
-from dataclasses import replace
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,8 +17,6 @@ def read_file(file: Path, options: Reading) -> "RatingsFile":
     """Read a file of ratings as the options say."""
     from masrel.ratings import read_ratings
 
-    codes = map(split_commas, options.missing_codes)
-    options = replace(options, missing_codes=tuple(chain.from_iterable(codes)))
     with progress("reading", "MB", is_quiet=False) as report:
 
         def show(n_bytes: int, n_expected: int) -> None:

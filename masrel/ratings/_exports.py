@@ -6,7 +6,6 @@ once, spans and relations are refused.
 """
 
 import csv
-import hashlib
 import io
 import json
 import re
@@ -22,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from masrel._input import shown
+from masrel._input import refuse, shown
 from masrel.agreement._labels import is_row
 from masrel.errors import ParameterError
 from masrel.ratings._findings import Finding, Reading, library, refusal
@@ -69,30 +68,27 @@ _ENCODED = (".sav", ".zsav", ".dta", ".sas7bdat", ".xpt")  # pyreadstat takes th
 
 def read_table(data: Any, options: Reading) -> tuple[Sheet, Reading]:
     """Return the cells of a table in memory, and how they are read."""
-    kind = type(data).__name__
-    for name in (
-        "delimiter",
-        "encoding",
-        "sheet",
-        "source",
-        "stream",
-        "skip",
-        "header",
-    ):
-        if getattr(options, name):
-            raise ParameterError(f"--{name}: is of files, got a table ({kind})")
+    facts = {"format": type(data).__name__}
+    of_text = ("delimiter", "encoding", "skip", "header")
+    of_files = (*of_text, "sheet", "source", "stream")
+    refuse(
+        *(
+            (getattr(options, name), f"--{name}: is of files, got a {facts['format']}")
+            for name in of_files
+        )
+    )
     is_array = isinstance(data, list | tuple | np.ndarray)
     frame = _rows(data) if is_array else _named(data)
-    n_above = -1  # rows count from 1, and their names are 0
-    if isinstance(frame.columns, pd.RangeIndex):  # columns that nobody named
-        n_above, places = 0, range(frame.shape[1])
-        first = [column_of(_TABLE, str(k), frame.iloc[:1, k]).texts for k in places]
-        frame = frame[1:].set_axis(["".join(texts) for texts in first], axis=1)
-        has_items = bool(options.item or options.rater or options.grade)
-        no_item = options.no_item or (is_array and not has_items)
-        options = replace(options, no_header=True, no_item=no_item)
-    sheet = sheet_of(_TABLE, str, frame, {"format": kind}, n_above)
-    return replace(sheet, sha256=partial(_digest, sheet.header, sheet.columns)), options
+    if not isinstance(frame.columns, pd.RangeIndex):
+        # rows count from 1, and their names are 0
+        return sheet_of(_TABLE, str, frame, facts, -1), options
+    # columns that nobody named
+    cells = [column_of(_TABLE, str(k), frame.iloc[:1, k]) for k in frame.columns]
+    first = ["".join(column.texts) for column in cells]
+    has_items = bool(options.item or options.rater or options.grade)
+    no_item = options.no_item or (is_array and not has_items)
+    options = replace(options, no_header=True, no_item=no_item)
+    return sheet_of(_TABLE, str, frame[1:].set_axis(first, axis=1), facts), options
 
 
 def _rows(data: Any) -> pd.DataFrame:
@@ -114,9 +110,6 @@ def _named(data: Any) -> pd.DataFrame:
         frame = data
     else:
         return table_frame(_arrow(data))
-    if frame.columns.nlevels > 1:
-        joined = [" ".join(map(str, name)).strip() for name in frame.columns]
-        frame = frame.set_axis(joined, axis=1)
     if frame.index.names == [None] and frame.index.dtype.kind in "iu":
         return frame.reset_index(drop=True)
     names = ["" if name is None else str(name) for name in frame.index.names]
@@ -139,11 +132,6 @@ def _arrow(data: Any) -> Any:
 
 def _got(data: Any) -> str:
     return f"{type(data).__name__} {shown(data)}"
-
-
-def _digest(header: tuple[str, ...], columns: tuple[Column, ...]) -> str:
-    cells = [(column.texts, column.codes.tobytes()) for column in columns]
-    return hashlib.sha256(repr((header, cells)).encode()).hexdigest()
 
 
 # ---- files whose cells have types ----
@@ -188,7 +176,10 @@ def sheet_of(
     n_above: int = 0,
 ) -> Sheet:
     """Return the cells of a frame as texts; n_above: rows above the names."""
-    names = [str(column) for column in frame.columns]
+    names = [
+        " ".join(map(str, name)).strip() if isinstance(name, tuple) else str(name)
+        for name in frame.columns
+    ]
     orders = {
         name: [*map(value_text, dtype.categories)]
         for name, dtype in zip(names, frame.dtypes, strict=True)

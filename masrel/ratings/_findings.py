@@ -125,6 +125,8 @@ class Reading:
             if (value := getattr(self, name)) is not None:
                 several = [value] if isinstance(value, str | int) else value
                 object.__setattr__(self, name, tuple(map(str, several)))
+        codes = ",".join(self.missing_codes).split(",") if self.missing_codes else ()
+        object.__setattr__(self, "missing_codes", tuple(map(str.strip, codes)))
         self._check()
 
     def record(self) -> dict[str, object]:

@@ -79,13 +79,13 @@ def is_number(text: str) -> bool:
 def with_order(sheet: Sheet, places: Sequence[int], options: Reading) -> Reading:
     """Declare the ordered categories that all columns of grades have in a frame."""
     orders = sheet.facts.get("orders", {})
-    order, *others = [orders.get(sheet.header[place]) for place in places]
-    is_told = options.categories or options.set_separator
-    if is_told or not order or any(other != order for other in others):
-        return options
+    first, *others = [orders.get(sheet.header[place], []) for place in places]
     absent = {*USUAL_MISSING, *options.missing_codes}
-    grades = [grade for grade in order if grade not in absent]
-    return replace(options, categories=grades)
+    order = [grade for grade in first if grade not in absent]
+    is_told = options.categories or options.set_separator
+    if is_told or not order or any(other != first for other in others):
+        return options
+    return replace(options, categories=order)
 
 
 def graded(sheet: Sheet, places: Sequence[int], options: Reading) -> Grades:

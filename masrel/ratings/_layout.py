@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from masrel._input import USUAL_NAMES
 from masrel.errors import RatingsError
 from masrel.ratings._findings import (
     USUAL_MISSING,
@@ -19,20 +20,6 @@ from masrel.ratings._findings import (
 from masrel.ratings._sheet import Codes, Column, Sheet
 
 Kind = Literal["long", "wide", "counts", "table"]
-
-USUAL_NAMES = {
-    "item": (
-        *("item", "item_id", "model", "subject", "subject_id", "patient", "patient_id"),
-        *("case", "unit", "task", "task_id", "document", "video"),
-    ),
-    "rater": (
-        *("rater", "rater_id", "annotator", "annotator_id", "coder", "coder_id"),
-        *("judge", "observer", "worker", "worker_id", "assessor", "reviewer"),
-    ),
-    "grade": ("grade", "rating", "score", "label"),
-    "session": ("session",),
-}
-"""Names that are recognized, letter case aside."""
 
 STUDY_COLUMNS = ("session", "rater", "model", "repeat", "grade")
 """Columns of a table that `masrel ratings` writes; it has others, too."""

@@ -128,8 +128,8 @@ class RatingsFile:
     read : dict
         What was read, ready for JSON: format, columns, grades, missing ones, scale.
     sha256 : callable
-        Returns the hash of the file's bytes, for which a stream is read again; of a
-        table, that of its cells.
+        Returns the hash of the file's bytes, for which a stream is read again; nothing
+        of a table in memory.
     warnings : tuple of Finding
         What may have been read wrongly, and which option would tell.
     simulated : bool

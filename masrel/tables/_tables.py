@@ -254,20 +254,20 @@ def as_html(table: Table) -> str:
     from html import escape  # loaded only in a notebook
 
     columns, body = page_cells(table)
-    rows = [[column.heading for column in columns], *body]
+    heading = [column.heading for column in columns]
     lines = [
         "".join(
             f"<{tag} style='text-align: {column.align}'>{escape(cell)}</{tag}>"
             for cell, column in zip(row, columns, strict=True)
         )
-        for tag, row in zip(("th", *("td" for _ in body)), rows, strict=True)
+        for tag, row in (("th", heading), *(("td", row) for row in body))
     ]
     above, below = (
         "".join(f"<p>{escape(text)}</p>" for text in texts)
         for texts in ((table.labelled_caption, *table.read), table.notes)
     )
-    cells = "".join(f"<tr>{line}</tr>" for line in lines)
-    return f"<div>{above}<table>{cells}</table>{below}</div>"
+    rows = "".join(f"<tr>{line}</tr>" for line in lines)
+    return f"<div>{above}<table>{rows}</table>{below}</div>"
 
 
 def aligned(
