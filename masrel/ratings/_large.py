@@ -9,6 +9,7 @@ read again where it stands.
 
 import hashlib
 import os
+from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager
@@ -34,6 +35,7 @@ from masrel.ratings._findings import (
 from masrel.ratings._layout import Layout, rated_twice
 from masrel.ratings._sheet import (
     DELIMITERS,
+    TAIL,
     TEXT_FORMATS,
     Codes,
     Column,
@@ -45,6 +47,7 @@ from masrel.ratings._sheet import (
     read_foreign,
     read_text,
     reader_of,
+    without_notes,
 )
 
 _LARGE_TABLE = 20_000_000  # cells of a Parquet file from which it is read so
@@ -87,7 +90,7 @@ class Source:
     head: Sheet  # its first rows
     rows: str  # SQL that selects columns "0", "1" … and n, the number of a row
     column_of: Callable[[str, NDArray[Any]], Column]  # of a name and cells
-    recheck: Callable[[], None]  # refuses the first record that is none of the table
+    recheck: Callable[[], object]  # refuses the first record that is none of the table
 
 
 def source_of(path: Path, options: Reading) -> Source:
@@ -140,6 +143,8 @@ def _text(path: Path, options: Reading) -> Source:
     name, kind = str(path), TEXT_FORMATS[path.suffix.lower()]
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)
+        file.seek(max(path.stat().st_size - TAIL, 0))
+        tail = file.read().decode("utf-8", "replace")
     if len(head) == _HEAD_BYTES:  # no quote that is opened in it is closed behind
         head = head[: head.rfind(b"\n") + 1]
         while head.count(b'"') % 2:
@@ -155,14 +160,12 @@ def _text(path: Path, options: Reading) -> Source:
     width, first = len(sheet.columns), int(not options.no_header)
     n_above, n_before = sheet.line_of(0) - 1, sheet.line_of(first) - 1
     lines = partial(_lines, path, n_above)
-    sheet = replace(sheet, line_of=partial(line_of, lines, delimiter, n_above))
+    sheet = replace(
+        sheet,
+        line_of=partial(line_of, lines, delimiter, n_above),
+        findings=sheet.findings + without_notes(tail, delimiter, 0)[1],
+    )
     types = ", ".join(f"'{place}': 'VARCHAR'" for place in range(width))
-
-    def recheck() -> None:
-        reader = reader_of(chain(_lines(path, n_before), "\0"), delimiter)
-        for _ in checked_records(sheet, reader, width, first):
-            pass
-
     return Source(
         head=finished(sheet, options),
         rows=f"SELECT *, row_number() OVER () - 1 AS n FROM read_csv({_quoted(name)}, "
@@ -172,7 +175,15 @@ def _text(path: Path, options: Reading) -> Source:
         column_of=lambda _, cells: Column.of(
             np.arange(len(cells)), np.ma.filled(cells, "").tolist()
         ),
-        recheck=recheck,
+        recheck=lambda: deque(
+            checked_records(
+                sheet,
+                reader_of(chain(_lines(path, n_before), "\0"), delimiter),
+                width,
+                first,
+            ),
+            maxlen=0,
+        ),
     )
 
 

@@ -93,7 +93,7 @@ _UNPLAIN = re.compile(r"[^\x21-\x7e]")  # blanks, and letters that may have two 
 _LINE_END = re.compile(r"\r\n|\n|\r")
 SNIFFED = 20
 """Records that the separator and the names are found in."""
-_TAIL, _MOST_NOTES = 4096, 3  # letters at the end that notes are in, and lines of them
+TAIL, _MOST_NOTES = 4096, 3  # letters at the end that notes are in, and lines of them
 _NUMBER = re.compile(r"[+-]?\d+\.?\d*")
 _CHUNK = 1 << 14  # records that are taken apart at once
 _END = "\0"  # a record behind the last, which a quote that stays open swallows
@@ -437,7 +437,7 @@ def read_text(
             delimiter=DELIMITERS.get(delimiter, repr(delimiter)),
             first=text.splitlines()[0].strip()[:60],
         )
-    text, findings = _without_notes(text, delimiter, n_before)
+    text, findings = without_notes(text, delimiter, n_before)
     sheet = Sheet(
         name=name,
         sha256=sha256,
@@ -480,11 +480,11 @@ def _n_lines(text: str, end: int) -> int:
     return sum(1 for _ in _LINE_END.finditer(text, 0, end))
 
 
-def _without_notes(
+def without_notes(
     text: str, delimiter: str, n_before: int
 ) -> tuple[str, tuple[Finding, ...]]:
-    # a text without the notes below its table, and what they are
-    lines = [] if delimiter == " " else list(io.StringIO(text[-_TAIL:], newline=""))
+    """Return a text without the notes below its table, and what they are."""
+    lines = [] if delimiter == " " else list(io.StringIO(text[-TAIL:], newline=""))
     rows: list[list[str]]
     rows = [next(reader_of([line], delimiter), []) for line in lines]
     n_notes = notes_below(rows)

@@ -89,7 +89,8 @@ def run(command: Sequence[str]) -> Run:
     with subprocess.Popen(
         command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment
     ) as process:
-        _, process.returncode, usage = os.wait4(process.pid, 0)
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
     wall_s = time.perf_counter() - start
     if process.returncode:
         raise SystemExit(f"{' '.join(command[-3:])}: ended with {process.returncode}")

@@ -285,6 +285,34 @@ def test_a_text_with_lines_that_end_so(tmp_path: Path, end: str, comment: str) -
     assert_same(streamed, whole)
 
 
+@pytest.mark.parametrize(
+    ("above", "options"),
+    [
+        ("Table S3.\n", {"skip": 1}),
+        (",Kim,Kim\n", {"header": (1, 2)}),
+    ],
+)
+def test_lines_above_are_told_by_options(
+    tmp_path: Path, above: str, options: dict[str, Any]
+) -> None:
+    path = tmp_path / "wide.csv"
+    path.write_text(above + HEAD)
+    assert_same(*both(path, **options))
+
+
+def test_a_text_with_notes_below_is_read_as_a_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(_large, "_HEAD_BYTES", 1000)
+    monkeypatch.setattr("masrel.ratings._reader._LARGE_TEXT", 1000)
+    path = tmp_path / "wide.csv"
+    path.write_text(HEAD + "\nSource: the registry\n")
+    file = read_ratings(path)
+    assert not is_streamed(file)
+    assert file.read["n_ratings"] == 1000
+    assert [finding.code for finding in file.warnings] == ["note below"]
+
+
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
 @pytest.mark.parametrize(
     ("line", "words"),
