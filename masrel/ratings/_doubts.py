@@ -18,7 +18,7 @@ from masrel.ratings._findings import (
     quoted,
 )
 from masrel.ratings._grade_texts import is_number, normal_form, spelled_alike
-from masrel.ratings._layout import ITEM_NAME, Layout, names_rows, numbers_rows
+from masrel.ratings._layout import ITEM_NAME, Layout, names_rows, numbers_rows, sides_of
 from masrel.ratings._sheet import Codes, Column, Sheet
 from masrel.scales import Scale
 
@@ -98,14 +98,30 @@ def _refuse_other_tables(
 ) -> None:
     # a contingency table, one without names of columns, or of items
     if len(layout.item) == 1 and len(names) == len(sheet.numbers) > 1:
-        if set(sheet.columns[layout.item[0]].texts) == set(names):
-            raise sheet.refuse("contingency")
+        sides = sides_of(sheet.columns[layout.item[0]].texts, names)
+        if sides is not None and _are_sides(sides, scale):
+            raise sheet.refuse("contingency", names=_few(names))
     # a name of a column that the caller gives is no row
     is_named = options.item or options.ignore or options.by or options.frequency
     if sheet.has_header and not sheet.is_transposed and not is_named:
         _refuse_first_line(sheet, layout, names, scale)
     if layout.is_item_guessed:
         _refuse_first_column(sheet, layout.item[0], scale)
+
+
+def _are_sides(
+    sides: tuple[list[str], list[str], tuple[str, str]], scale: Scale
+) -> bool:
+    # and not numbered items and raters, such as item 1 and rater 1
+    categories, _, raters = sides
+    are_counts = all(grade.isdecimal() for grade in scale.grades)
+    is_numbered = all(map(is_number, categories)) and ITEM_NAME.fullmatch(raters[0])
+    return not any(raters) or (are_counts and not is_numbered)
+
+
+def _few(names: Sequence[str]) -> str:
+    # what an option takes, unless it is too long to be of help
+    return f" {quoted(names)}" if len(names) <= _SHOWN else ""
 
 
 def _refuse_first_line(
@@ -131,7 +147,7 @@ def _refuse_first_line(
             "grades as names",
             where=sheet.at(0),
             columns=listed(names, _SHOWN),
-            names=f" {quoted(names)}" * (len(names) <= _SHOWN),
+            names=_few(names),
         )
 
 
@@ -229,10 +245,9 @@ def _advice(names: Sequence[str], wrong: set[int]) -> str:
     # how columns are left aside; a list that is long is no help
     out = [names[k] for k in sorted(wrong)]
     rest = [name for k, name in enumerate(names) if k not in wrong]
-    raters = f"--raters {quoted(rest)}" if 1 < len(rest) <= _SHOWN else "--raters"
-    ignored = f"--ignore {quoted(out)} leaves such columns aside, "
-    is_short = len(out) <= _SHOWN and bool(rest)
-    return f"{ignored * is_short}{raters} names those that rate"
+    raters = f"--raters{_few(rest) * (len(rest) > 1)} names those that rate"
+    is_short = bool(rest and _few(out))
+    return f"--ignore{_few(out)} leaves such columns aside, " * is_short + raters
 
 
 def _is_no_rater(sheet: Sheet, place: int) -> bool:
@@ -287,8 +302,7 @@ def _looks_counted(
     is_most &= np.average(sums == total, weights=freq) >= 1 / 2
     if total < 2 or not has_zeros or not ((sums == total).all() or is_most):
         return []
-    raters = f" {quoted(names)}" * (len(names) <= _SHOWN)
-    finding = Finding("counts", total=total, names=raters)
+    finding = Finding("counts", total=total, names=_few(names))
     is_sure = freq.sum() >= _ENOUGH_ROWS and len(names) <= _MANY_CATEGORIES
     if is_sure and scale.name == "observed":
         raise sheet.refuse("counts", **finding.facts)

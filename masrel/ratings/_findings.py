@@ -393,10 +393,14 @@ _TEXTS = {
     "{columns}; if its columns are raters, --raters names them, if they are items, "
     "--transpose{hint}",
     "no rater": "{where}: needed columns of raters, or of categories, got none",
+    "span columns": "{begin!r} and {end!r} look like where spans begin and end, parts "
+    "of a text or a recording, which are not read; --item names the items, if all "
+    "raters have the same ones",
     "unnamed": "needed the {role}, got {got!r}{hint}",
     "no value": "needed a value",
     "contingency": "rows and columns have the same names, so that this looks like a "
-    "contingency table of two raters: --table reads it as one",
+    "contingency table of two raters: --table reads it as one, --raters{names} if a "
+    "row is an item",
     "no raters": "{columns}: no grade in common with the other columns, or the name of "
     "something else: {advice}",
     "nothing in common": "{one!r} has the grades {first}, {other!r} {second}, and none "
@@ -464,6 +468,8 @@ _TEXTS = {
     "reads it so, --set-separator , as two labels",
     "plus": "{got} beside grades such as {other!r} may be that number or the grade "
     "'{grade}': --categories with the scale in order tells",
+    "truth": "{got} beside 0 or 1 and others may be these numbers, or grades of their "
+    "own: write them alike, or --categories with all grades of the scale",
     "alike grades": "grades that differ by spelling alone are counted as different: "
     "{grades}",
     "too near": "{one} and {other} are too near to be told apart as numbers, so that "

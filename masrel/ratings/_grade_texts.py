@@ -139,6 +139,7 @@ def _grades(
             if not declared and (mark != "." or delimiter is not None)
         }
         numbers = _numbers_of(list(met), options, refuse, marks)
+        numbers.written |= {} if declared else _truth(numbers.written, refuse)
     number = {
         t: Decimal(w) if is_number(w) else None for t, w in numbers.written.items()
     }
@@ -222,6 +223,19 @@ def _refuse_plus(number: dict[str, Decimal | None], refuse: _Refuse) -> None:
     others += [t for t in number if t[-1] == "+" and f"+{t[:-1]}" in plus]
     if plus and others:
         raise refuse("plus", plus, grade=f"{plus[0][1:]}+", other=others[0])
+
+
+def _truth(written: dict[str, str], refuse: _Refuse) -> dict[str, str]:
+    # true and false beside 0 and 1: these numbers, if there are no other grades
+    number = {"true": "1", "false": "0"}
+    truths = {t: number[t.lower()] for t in written if t.lower() in number}
+    values = {Decimal(text) for text in written.values() if is_number(text)}
+    if not truths or values.isdisjoint({0, 1}):
+        return {}
+    n_numbers = sum(map(is_number, written.values()))
+    if values - {0, 1} or n_numbers + len(truths) < len(written):
+        raise refuse("truth", list(truths))
+    return truths
 
 
 def _sets(texts: Sequence[str], separator: str, refuse: _Refuse) -> dict[str, str]:

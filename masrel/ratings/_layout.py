@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Literal
@@ -17,6 +17,7 @@ from masrel.ratings._findings import (
     Reading,
     listed,
 )
+from masrel.ratings._grade_texts import is_number
 from masrel.ratings._sheet import Codes, Column, Sheet
 
 Kind = Literal["long", "wide", "counts", "table"]
@@ -35,6 +36,18 @@ _MAY_BE_BOTH = (
     {"clusters", "item"},
 )
 
+# Names of columns that name raters have one of these words.
+_RATER = re.compile(
+    "rater|annotator|coder|judge|observer|worker|assessor|reviewer|reader|user|expert|"
+    "examiner|evaluator",
+    re.IGNORECASE,
+)
+# Names of columns of where a part of a text, or of a recording, begins and ends.
+_SPAN = (
+    r"((char|token|word|span|text|offset|pos)[\W_]*)?({})([\W_]*(char|token|word|"
+    r"offset|pos|position|index|idx))?"
+)
+_BEGIN, _END = "start|begin|beginning|from|onset", "end|stop|to|offset"
 # Names of columns that name items: a word of these, in any case.
 ITEM_NAME = re.compile(
     r"|#|(.*[^a-z])?(id|no|nr|num|key|code|name|participants?|[a-z]*(item|subject|patient|"
@@ -177,8 +190,11 @@ def _long(
         roles["item"] = header.index("model"), header.index("repeat")
     roles["item"] = roles["item"] or _usual(sheet, "item", taken)
     left = set(range(len(header))) - taken.union(roles["item"])
+    _refuse_spans(sheet, roles["item"], named)
     unknown = [role for role, places in roles.items() if not places]
-    if len(unknown) == len(left) == 1:
+    # what is left over may be something else than raters
+    is_clear = unknown != ["rater"] or any(_RATER.search(header[k]) for k in left)
+    if is_clear and len(unknown) == len(left) == 1:
         roles[unknown.pop()] = tuple(left)
     if unknown:
         known = (f"the {r} is {header[p[0]]!r}" for r, p in roles.items() if p)
@@ -216,9 +232,39 @@ def _wide(
     raters = raters or tuple(k for k in places if k not in taken.union(item))
     if not raters:
         raise sheet.refuse("no rater", where=sheet.at(0))
+    if kind == "wide" and not options.frequency:
+        _refuse_spans(sheet, item, named)
     return Layout(
         kind=kind, item=item, raters=raters, grades=raters, is_item_guessed=is_guessed
     )
+
+
+def _refuse_spans(
+    sheet: Sheet, item: tuple[int, ...], named: dict[str, tuple[int, ...]]
+) -> None:
+    # columns of where a part begins and ends, unless every item is one such part
+    pair = [
+        place
+        for pattern in (_BEGIN, _END)
+        for place, name in enumerate(sheet.header)
+        if re.fullmatch(_SPAN.format(pattern), name, re.IGNORECASE)
+        if place not in named.get("ignore", ())
+    ]
+    if len(pair) != 2:
+        return
+    columns = [sheet.columns[place] for place in pair]
+    parts = [texts for texts in together(columns)[1] if not {*texts} & {*USUAL_MISSING}]
+    are_spans = all(
+        is_number(begin) and is_number(end) and float(begin) <= float(end)
+        for begin, end in parts
+    )
+    if item and not {*item} & {*pair}:
+        columns = [sheet.columns[place] for place in item]
+        both = [*columns, *(sheet.columns[place] for place in pair)]
+        are_spans &= len(together(columns)[1]) < len(together(both)[1])
+    if parts and are_spans:
+        begin, end = (sheet.header[place] for place in pair)
+        raise sheet.refuse("span columns", begin=begin, end=end)
 
 
 def names_rows(sheet: Sheet, place: int) -> bool:
@@ -226,6 +272,34 @@ def names_rows(sheet: Sheet, place: int) -> bool:
     n_rows, name = len(sheet.numbers), sheet.header[place]
     is_name = ITEM_NAME.fullmatch(name) is not None
     return not name or (is_name and len(sheet.columns[place].texts) == n_rows)
+
+
+def sides_of(
+    rows: Sequence[str], columns: Sequence[str]
+) -> tuple[list[str], list[str], tuple[str, str]] | None:
+    """Return the categories of both sides of a table, and the raters' names in them."""
+    return next(
+        (
+            (one, other, (first, second))
+            for first, one in _without_names(rows)
+            for second, other in _without_names(columns)
+            if set(one) == set(other) and len(one) == len(set(one)) == len(other)
+        ),
+        None,
+    )
+
+
+def _without_names(texts: Sequence[str]) -> Iterator[tuple[str, list[str]]]:
+    # texts as they are, and without words that all begin, or end, with
+    yield "", list(texts)
+    for mark in re.finditer(r"[\W_]+", texts[0]):
+        head, tail = texts[0][: mark.end()], texts[0][mark.start() :]
+        for name, rest in (
+            (head, [text.removeprefix(head) for text in texts]),
+            (tail, [text.removesuffix(tail) for text in texts]),
+        ):
+            if all(0 < len(r) < len(text) for r, text in zip(rest, texts, strict=True)):
+                yield re.sub(r"^[\W_]+|[\W_]+$", "", name), rest
 
 
 def numbers_rows(sheet: Sheet, place: int) -> bool:

@@ -50,6 +50,7 @@ from masrel.ratings._layout import (
     find_layout,
     named,
     rated_twice,
+    sides_of,
     together,
     without_second_header,
 )
@@ -635,6 +636,9 @@ def _counted(
     if not table.any():
         raise sheet.refuse("no counts", kind=layout.kind)
     findings = findings + doubt_counts(sheet, layout, options, table)
+    rows, sides = names, ("", "")
+    if layout.kind == "table":
+        rows, names, sides = _categories_of(sheet, layout, names)
     name, order = "observed", list(range(len(names)))
     if options.categories is not None:
         if set(options.categories) != set(names):
@@ -651,10 +655,10 @@ def _counted(
     groups = sorted(names.get("group", "") for names in names_of_parts)
     findings += doubt_names("groups", groups)
     if layout.kind == "table":
-        rows = _names_of_rows(sheet, layout, names)
         table = table[np.ix_([rows.index(names[k]) for k in order], order)]
         counted = count_table(table, categories=scale.values)
-        parts = [RatingsPart(raters=("rows", "columns"), ratings=counted)]
+        raters = (sides[0] or "rows", sides[1] or "columns")
+        parts = [RatingsPart(raters=raters, ratings=counted)]
         n_items, n_raters = int(table.sum()), 2
         counts = table.sum(axis=0) + table.sum(axis=1)
     else:
@@ -672,6 +676,7 @@ def _counted(
     grades = Grades(scale=scale, codes=np.arange(len(names)))
     return _file_of(
         *(sheet, layout, options, grades, parts, counts, findings),
+        raters=list(parts[0].raters) if any(sides) else [],
         n_items=n_items,
         n_raters=n_raters,
     )
@@ -690,19 +695,22 @@ def _whole_numbers(sheet: Sheet, place: int, kind: str, options: Reading) -> Cod
     return np.array(numbers, dtype=np.int64)[column.codes]
 
 
-def _names_of_rows(sheet: Sheet, layout: Layout, names: list[str]) -> list[str]:
-    # the categories of the rows of a contingency table
+def _categories_of(
+    sheet: Sheet, layout: Layout, names: list[str]
+) -> tuple[list[str], list[str], tuple[str, str]]:
+    # the categories of the rows and columns of a contingency table, and the raters
     n_rows = len(sheet.numbers)
     if n_rows != len(names):
         raise sheet.refuse("rows of table", n=len(names), n_rows=n_rows)
     rows = sheet.columns[layout.item[0]].cells() if layout.item else names
-    if set(rows) != set(names):
+    sides = sides_of(rows, names)
+    if sides is None:
         raise sheet.refuse(
             "names of table",
             rows=", ".join(map(repr, rows)),
             names=", ".join(map(repr, names)),
         )
-    return rows
+    return sides
 
 
 # ---- a matrix of weights ----

@@ -317,7 +317,29 @@ TABLE: dict[str, Asked] = {
     "two raters": Asked(
         code="contingency",
         text=",yes,no\nyes,2,1\nno,0,1\n",
-        tries={"--table": "yes/yes yes/yes yes/no no/no"},
+        tries={
+            "--table": "yes/yes yes/yes yes/no no/no",
+            "--raters yes,no": "21 01",
+        },
+    ),
+    "two raters by name": Asked(
+        code="contingency",
+        text=",Kim yes,Kim no\nLee yes,2,1\nLee no,0,1\n",
+        tries={
+            "--table": "yes/yes yes/yes yes/no no/no",
+            "--raters 'Kim yes,Kim no'": "21 01",
+        },
+    ),
+    "spans": Asked(
+        code="span columns",
+        text="part,start,end,rater,grade\n"
+        "u,0,4,Kim,1\nu,0,4,Lee,1\nv,5,9,Kim,1\nv,5,9,Lee,2\n",
+        tries={"--item part": "11 12"},
+    ),
+    "truth": Asked(
+        code="truth",
+        text="item,Kim,Lee\na,TRUE,1\nb,1,2\n",
+        tries={"--categories FALSE,TRUE,1,2": "TRUE/1 1/2"},
     ),
     "sums beside": Asked(
         code="sum column",

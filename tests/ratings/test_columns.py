@@ -309,3 +309,76 @@ def test_rows_and_names_that_are_none(
     else:
         codes = [finding.code for finding in read(tmp_path, text, **options).warnings]
         assert codes == [code] * bool(code)
+
+
+# ---- spans, and sides of tables ----
+
+SPANS = "doc,annotator,start,end,label\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "is_refused"),
+    [
+        *(
+            (f"{SPANS}d1,K,0,5,x\nd1,L,0,5,x\nd2,K,3,7,y\nd2,L,3,9,y\n", options, True)
+            for options in (
+                {},
+                {"item": "doc"},
+                {"item": ["doc", "start"]},
+                {"item": "doc", "rater": "annotator", "grade": "label"},
+            )
+        ),
+        ("doc,who,Begin,End,type\na,K,0,5,x\na,L,1,5,x\n", {}, True),
+        ("t,coder,char_start,charEnd,label\na,K,0,5,x\na,L,1,5,x\n", {}, True),
+        # parts that raters have in common, and names that mean something else
+        (f"{SPANS}d1,K,0,5,x\nd1,L,0,5,x\nd2,K,3,7,y\n", {"item": "doc"}, False),
+        (f"{SPANS}d1,K,7,5,x\nd1,L,0,5,x\n", {"item": "doc"}, False),
+        (f"{SPANS}d1,K,a,b,x\nd1,L,a,c,x\n", {"item": "doc"}, False),
+        ("patient,start,end\na,1,1\nb,1,2\nc,2,2\n", {}, False),
+    ],
+)
+def test_spans(
+    tmp_path: Path, text: str, options: dict[str, Any], is_refused: bool
+) -> None:
+    if is_refused:
+        with pytest.raises(RatingsError, match="spans"):
+            read(tmp_path, text, **options)
+    else:
+        assert read(tmp_path, text, **options).read["n_raters"] == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "raters", "grades"),
+    [
+        (",Omar yes,Omar no\nInes yes,5,1\nInes no,0,2\n", ["Ines", "Omar"], "no yes"),
+        (",Omar: a,Omar: b\nb (Ines),0,2\na (Ines),5,1\n", ["Ines", "Omar"], "a b"),
+        (",yes,no\nInes_yes,5,1\nInes_no,0,2\n", ["Ines", "columns"], "no yes"),
+        (
+            ",B not bad,B not good\nA not bad,5,1\nA not good,0,2\n",
+            *(["A", "B"], "not_bad not_good"),
+        ),
+        (",yes,no\nyes,5,1\nno,0,2\n", [], "no yes"),
+    ],
+)
+def test_sides_of_a_table_with_names_of_raters(
+    tmp_path: Path, text: str, raters: list[str], grades: str
+) -> None:
+    file = read(tmp_path, text, table=True)
+    assert file.read["raters"] == raters
+    assert " ".join(g.replace(" ", "_") for g in sorted(file.scale.grades)) == grades
+    counted = count_ratings(file.parts[0].ratings)
+    assert sorted(counted.freq.tolist()) == [1, 2, 5]
+    assert counted.freq[(counted.codes == 1).all(axis=1)].tolist() in ([5], [2])
+    with pytest.raises(RatingsError, match="--table"):
+        read(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        ",rater 1,rater 2\nitem 1,1,1\nitem 2,2,1\n",
+        ",Kim a,Kim b\nLee a,x,y\nLee b,y,x\n",
+    ],
+)
+def test_numbered_items_and_raters_are_no_sides(tmp_path: Path, text: str) -> None:
+    assert read(tmp_path, text).read["n_items"] == 2

@@ -111,7 +111,8 @@ READ: list[tuple[str, dict[str, Any], list[list[str | None]], dict[str, Any]]] =
             ("what,who,grade", {"item": "what", "rater": "who"}),
             ("Subject_ID,Coder,Label", {}),
             ("bild,rater,score", {}),
-            ("item,wer,score", {}),
+            ("item,wer,score", {"rater": "wer"}),
+            ("item,idreviewer,score", {}),
             ("item,rater,wert", {}),
         )
     ),
@@ -155,6 +156,13 @@ READ: list[tuple[str, dict[str, Any], list[list[str | None]], dict[str, Any]]] =
         [["1", "1"], ["2", "2"], ["10", "3"]],
         {"merged": {"1": ["1", "1.0"], "2": ["02", "2"]}},
     ),
+    (
+        "item,Kim,Lee\nA,TRUE,1\nB,false,0.0\nC,NA,1\n",
+        {},
+        [["1", "1"], ["0", "0"], [None, "1"]],
+        {"merged": {"1": ["TRUE", "1"], "0": ["false", "0.0"]}},
+    ),
+    ("item,Kim,Lee\nA,True,x\nB,x,True\n", {}, [["True", "x"], ["x", "True"]], {}),
     ("item,Kim,Lee\nA,1,1.0\nB,1+,2\n", {}, [["1", "1.0"], ["1+", "2"]], {}),
     (ZEROS, {"categories": ["1.0", "2", "3"]}, [["1.0", "1.0"], ["1.0", "2"]], {}),
     (ZEROS, {"categories": ["1", "1.0", "01", "2"]}, [["1", "1.0"], ["01", "2"]], {}),
@@ -243,6 +251,13 @@ def test_groups_and_sessions_are_parts(
             "line 2 and line 4: 'K' graded 'A'",
         ),
         (TWICE.replace("1", "a"), {"repeated": "mean"}, "--repeated mean"),
+        # raters, or what is left over
+        (LONG.replace("rater,grade", "wer,score"), {}, "needs --rater"),
+        (
+            LONG.replace("item,rater", "subject,outcome"),
+            {"item": "subject", "grade": "grade"},
+            "needs --rater",
+        ),
         (NUMBERED, {}, "--no-header"),  # though they are no grades of other rows
         (TWICE, {"repeated": "mean", "categories": ["1", "2", "3"]}, "declared scale"),
         (BY_SITE.replace("S", ""), {"by": "site"}, "line 3, column 'site'"),
