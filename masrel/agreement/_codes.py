@@ -35,6 +35,7 @@ _MAX_SPAN = 1 << 14  # of whole numbers that are codes but for a shift
 _MAX_KEYS = 1 << 22  # different rows that are counted in a table rather than sorted
 _BLOCK = 1 << 14  # items at once: they stay in the cache, and BLAS starts no threads
 _MAX_PLACES = 100_000_000  # that are made of counts, where ratings are gone through
+_MAX_MARGINS = 20_000_000  # raters by categories
 _MAX_SIDE = 4000  # categories of a table of pairs
 _NAME = re.compile(r"\d+(\.0)?|.*[^\d.].*")  # of an item: a number of it, or text
 _TO_LIST = ("to_pylist", "tolist")  # of arrays of Arrow; and of numpy and pandas
@@ -653,6 +654,12 @@ def raters_told_apart(
     counted = count_ratings(ratings, categories)
     if not counted.tells_raters_apart:
         counted = count_ratings(code_ratings(counted))  # or an error
+    n_raters, q = counted.codes.shape[1], len(counted.categories)
+    if n_raters * q > _MAX_MARGINS:
+        raise ParameterError(
+            f"ratings: {n_raters} raters and {q} different grades are too many to "
+            "count how often each rater gave each grade, which this statistic needs"
+        )
     if counted.n_raters in (0, 1, counted.codes.shape[1]):  # unless two others are left
         return counted
     return counted.chosen(raters=np.asarray((counted.codes >= 0).any(axis=0)))

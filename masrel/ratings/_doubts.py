@@ -159,7 +159,7 @@ def _refuse_first_column(sheet: Sheet, place: int, scale: Scale) -> None:
     values = [float(text) for text in texts if is_number(text)]
     n_near = sum(low <= value <= high for value in values)
     n_in_scale = sum(value in numbers for value in values)
-    n_in_scale += sum(not is_number(t) and t in scale.grades for t in texts)
+    n_in_scale += len({t for t in texts if not is_number(t)} & {*scale.grades})
     is_rater = max(n_in_scale, n_near) >= len(texts) / 2 and not (
         ITEM_NAME.fullmatch(name) or (numbers_rows(sheet, place) and values[-1] > high)
     )
