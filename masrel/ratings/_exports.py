@@ -14,17 +14,25 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import compress
+from itertools import chain, compress
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from masrel._input import refuse, shown
+from masrel._input import USUAL_NAMES, refuse, shown
 from masrel.agreement._labels import is_row
 from masrel.errors import ParameterError
-from masrel.ratings._findings import Finding, Reading, library, refusal
+from masrel.ratings._findings import (
+    Finding,
+    Reading,
+    library,
+    listed,
+    quoted,
+    refusal,
+)
+from masrel.ratings._layout import ITEM_NAME
 from masrel.ratings._sheet import (
     MAX_UNPACKED,
     SNIFFED,
@@ -34,7 +42,6 @@ from masrel.ratings._sheet import (
     Sheet,
     joined_names,
     names_option,
-    no_line,
     notes_below,
     read_foreign,
     unzipped,
@@ -59,6 +66,10 @@ _ZIP = b"PK\3\4"  # how an archive begins
 _ERROR_CELL = re.compile(
     rb'<c\s[^>]*?\bt="e"[^>]*>(?:<f[^>]*?(?:/>|>[^<]*</f>))?<v>([^<]*)</v>'
 )
+# Keys of an item in JSON: what was given to it, and what it is called.
+_GIVEN = ("annotations", "ratings")
+_ID = ("id", *USUAL_NAMES["item"])
+_USUAL = frozenset(chain(*USUAL_NAMES.values()))
 _SOLID = re.compile(r"[^ \t\n\r]")
 _ENCODED = (".sav", ".zsav", ".dta", ".sas7bdat", ".xpt")  # pyreadstat takes theirs
 
@@ -164,7 +175,7 @@ def read_typed(
     elif suffix in _PYREADSTAT:
         frame = _statistical(name, suffix, data, options.encoding, facts)
     else:
-        frame = _objects(name, _json_values(name, suffix, data))
+        frame = _objects(name, _json_values(name, suffix, data), options)
     return replace(sheet_of(name, sha256, frame, facts), dropped=dropped)
 
 
@@ -259,36 +270,31 @@ def _sheet_of_rows(
     options: Reading,
 ) -> Sheet:
     # the table in rows of a workbook, which are below n_above that are empty
-    *upper, first = (line - 1 - n_above for line in options.names_at or [n_above + 1])
-    n_notes = notes_below([_texts(row) for row in rows[-SNIFFED:]])
-    rows, notes = rows[: len(rows) - n_notes], rows[len(rows) - n_notes :]
-    while first < 0 or (first < len(rows) and not any(_texts(rows[first]))):
-        first += 1
-    if first >= len(rows):
-        raise no_line(name, "row", options)
+    *upper, last = (line - 1 - n_above for line in options.names_at or [n_above + 1])
+    n_back, note = notes_below([_texts(row) for row in rows[-SNIFFED:]])
+    rows = rows[: len(rows) - n_back]
+    below = (k for k in range(max(last, 0), len(rows)) if any(_texts(rows[k])))
+    if (first := next(below, None)) is None:
+        raise refusal(name, "no line", unit="row", n=options.names_at[-1])
     # a column without name and cells is a space between others
     frame = pd.DataFrame(rows[first:], dtype=object)
     is_used = (frame != "").any(axis=0).to_numpy()
     lines = [_texts(rows[k]) if k >= 0 else [] for k in (*upper, first)]
     names = [*compress(joined_names(lines), is_used)]
-    frame = frame.loc[:, is_used][1:].set_axis(names, axis=1)
-    n_above += first
     head = [
         Row(k, k, [*compress(_texts(row), is_used)])
-        for k, row in enumerate(rows[first : first + SNIFFED], start=n_above + 1)
+        for k, row in enumerate(rows[first : first + SNIFFED], n_above + first + 1)
     ]
-    findings = [
-        Finding(
-            "errors", errors=", ".join(f"{text} ×{n}" for text, n in errors.items())
-        )
-        for errors in [facts.get("errors")]
-        if errors
-    ]
-    if notes:
-        where, got = f"row {n_above - first + len(rows) + 1}", "".join(_texts(notes[0]))
-        findings.append(Finding("note below", where=where, got=got[:60]))
+    findings = []
+    if note:
+        where = f"row {n_above + len(rows) + 1}"
+        findings.append(Finding("note below", where=where, got=note[:60]))
+    if errors := facts.get("errors"):
+        shown = ", ".join(f"{text} ×{n}" for text, n in errors.items())
+        findings.append(Finding("errors", errors=shown))
+    frame = frame.loc[:, is_used][1:].set_axis(names, axis=1)
     return replace(
-        sheet_of(name, sha256, frame, facts, n_above),
+        sheet_of(name, sha256, frame, facts, n_above + first),
         advice=names_option(name, "row", head, 0, options),
         findings=tuple(findings),
     )
@@ -363,15 +369,89 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return value
 
 
-def _objects(name: str, values: list[Any]) -> pd.DataFrame:
-    # a list of objects, one a row; or one object of columns, as pandas and R write
+def _objects(name: str, values: list[Any], options: Reading) -> pd.DataFrame:
+    # a list of objects, one a row; one object of columns, as pandas and R write; or
+    # names of raters and items in each other
     if not values or not all(isinstance(value, dict) for value in values):
         raise refusal(name, "no objects")
-    columns = values[0].values()
-    are_columns = len(values) == 1 and set(map(type, columns)) in ({dict}, {list})
-    if are_columns and len(set(map(len, columns))) == 1:
-        return pd.DataFrame(values[0], dtype=object).reset_index(drop=True)
-    return pd.DataFrame(values, dtype=object)
+    only, kinds = values[0], set(map(type, values[0].values()))
+    if len(values) == 1 and kinds in ({dict}, {list}):
+        if _are_columns(only):
+            return pd.DataFrame(only, dtype=object).reset_index(drop=True)
+        if kinds == {dict} and any(key in of for of in only.values() for key in _GIVEN):
+            values = [{**record, "id": key} for key, record in only.items()]
+        elif kinds == {dict} and _USUAL & {*map(str.casefold, chain(*only.values()))}:
+            values = [*only.values()]  # rows by their number, as pandas writes, too
+        elif kinds == {dict}:
+            return _two_levels(name, [*only.items()], options, are_items=False)
+    nested = _annotated(name, values, options)
+    return pd.DataFrame(values, dtype=object) if nested is None else nested
+
+
+def _are_columns(columns: dict[str, Any]) -> bool:
+    # as long as each other; those of numbered rows have one for their items, too
+    (n_rows, *others), rows = map(len, columns.values()), next(iter(columns.values()))
+    is_numbered = [*rows] == [*map(str, range(n_rows))]
+    return set(others) <= {n_rows} and (
+        isinstance(rows, list)
+        or any(column.casefold() in _USUAL for column in columns)
+        or (is_numbered and any(map(ITEM_NAME.fullmatch, columns)))
+    )
+
+
+def _annotated(
+    name: str, values: list[dict[str, Any]], options: Reading
+) -> pd.DataFrame | None:
+    # objects of items, each with its annotations: by rater, in two lists, or objects
+    levels: list[tuple[Any, dict[str, Any]]] = []
+    rows: list[dict[str, Any]] = []
+    for number, record in enumerate(values, start=1):
+        item = next((record[key] for key in _ID if key in record), number)
+        of = next((record[key] for key in _GIVEN if key in record), ())
+        raters = record.get("annotators", record.get("raters"))
+        if isinstance(of, dict):
+            levels.append((item, of))
+        elif isinstance(of, str | list) and isinstance(raters, str | list):
+            both = [x.split(",") if isinstance(x, str) else x for x in (raters, of)]
+            if len(both[0]) != len(both[1]):
+                raise refusal(name, "lists", item=item, raters=both[0], grades=both[1])
+            for who, grade in zip(*both, strict=True):
+                rows.append({"item": item, "rater": who, "grade": grade})
+        elif isinstance(of, list) and all(isinstance(each, dict) for each in of):
+            rows += [{**each, "item": item} for each in of]
+    if levels and not rows:
+        return _two_levels(name, levels, options, are_items=True)
+    frame = pd.DataFrame(rows, dtype=object)
+    if (
+        levels
+        or not rows
+        or not (options.rater or {*USUAL_NAMES["rater"]} & {*frame.columns})
+    ):
+        return None
+    is_nested = frame.map(lambda cell: isinstance(cell, dict | list)).any()
+    nested = [key for key in frame.columns[is_nested] if key not in _USUAL]
+    return frame.drop(columns=nested)
+
+
+def _two_levels(
+    name: str,
+    levels: list[tuple[Any, dict[str, Any]]],
+    options: Reading,
+    *,
+    are_items: bool,
+) -> pd.DataFrame:
+    # a column of items and those of raters, who are the fewer names of two levels
+    outer = [key for key, _ in levels]
+    inner = [*dict.fromkeys(chain(*(of for _, of in levels)))]
+    table: Any = [[of.get(key) for key in inner] for _, of in levels]
+    raters, items = inner, outer
+    if not are_items and len(outer) <= len(inner):
+        raters, items, table = outer, inner, zip(*table, strict=True)
+    if len(raters) >= len(items) and not (options.raters or options.transpose):
+        few = quoted(map(str, raters)) if len(raters) < 6 else "with their names"
+        raise refusal(name, "levels", raters=few, others=listed([*map(str, items)], 5))
+    rows = [[item, *row] for item, row in zip(items, table, strict=True)]
+    return pd.DataFrame(rows, columns=["item", *raters], dtype=object)
 
 
 # ---- annotation tools ----

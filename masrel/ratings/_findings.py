@@ -356,8 +356,8 @@ _TEXTS = {
     "same name": "{where}: needed different names of the columns that are used, "
     "{column!r} is there twice{hint}",
     "titles": "needed names of columns, got {got!r}: {option} takes them from below",
-    "no line": "{option}: there are no names in {unit} {n} or below",
-    "no lines": "{option}: needed text or a workbook, whose names are in a line",
+    "no line": "--skip, --header: there are no names in {unit} {n} or below",
+    "no lines": "--skip, --header: needed text or a workbook, with names in a line",
     "note below": "{where} is left out, since it stands alone below an empty one: "
     "{got!r}",
     # workbooks, JSON, exports
@@ -367,6 +367,10 @@ _TEXTS = {
     "sheets": "needs --sheet with one of its sheets, {sheets}",
     "nested cell": "column {column!r}, value {number}: needed text or numbers, got a "
     "{kind}; --from reads exports of annotation tools",
+    "levels": "has names in two levels, and may have its raters in either: --raters "
+    "{raters} if these rate, --transpose if {others} do",
+    "lists": "item {item!r}: needed an annotator of each annotation, got {raters} and "
+    "{grades}",
     "no export": "needed .json, .jsonl or .csv in it, got none",
     "no objects": "needed a JSON list of objects, one a row; --from reads exports of "
     "annotation tools",

@@ -115,7 +115,6 @@ def find_layout(sheet: Sheet, options: Reading) -> Layout:
 def _refuse_names(sheet: Sheet, used: set[int]) -> None:
     # columns that are used and have no name, or one that is there twice
     twice = Counter(sheet.header)
-    cells = {text for place in used for text in sheet.columns[place].texts if text}
     for place in sorted(used):
         name = sheet.header[place]
         # the first may be R's or pandas' row names
@@ -123,7 +122,8 @@ def _refuse_names(sheet: Sheet, used: set[int]) -> None:
             facts: dict[str, str | int] = {"column": name or place + 1}
             if not sheet.advice:
                 facts["hint"] = "; --raters names the columns that rate"
-            if cells & {sheet.header[k] for k in used}:
+            cells = {text for place in used for text in sheet.columns[place].texts}
+            if cells & {sheet.header[k] for k in used} - {""}:
                 facts["hint"] = "; --no-header if this line is a row like the others"
             code = "same name" if name else "no name"
             raise sheet.refuse(code, where=sheet.at(0), **facts)

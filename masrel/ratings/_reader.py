@@ -232,8 +232,7 @@ def _read_sheet(path: Path | str, options: Reading) -> Sheet:
         raise refusal(name, "no workbook", sheet=options.sheet)
     is_typed = options.source is not None or suffix in TYPED_FORMATS
     if is_typed and options.names_at and (options.source or suffix not in WORKBOOKS):
-        option = "--header" if options.header else "--skip"
-        raise refusal(name, "no lines", option=option)
+        raise refusal(name, "no lines")
     if is_typed:
         from masrel.ratings._exports import read_typed  # with pandas
 

@@ -417,7 +417,7 @@ def read_text(
     """Take a text apart: its comments, its separator, its records."""
     declared = re.match(r'"?sep=(.)"?(\r\n|\n|\r)', text, re.IGNORECASE)
     delimiter = options.delimiter or (declared.group(1) if declared else None)
-    *upper, last = (_start_of(name, text, n, options) for n in options.names_at or [1])
+    *upper, last = (_start_of(name, text, n) for n in options.names_at or [1])
     start = _below_comments(
         name, text, max(last, declared.end() if declared else 0), delimiter
     )
@@ -456,8 +456,10 @@ def read_text(
         ),
     )
     reader = reader_of(chain(io.StringIO(text, newline=""), [_END]), delimiter)
-    names: list[list[str]]
-    names = [next(reader_of(io.StringIO(head[k:]), delimiter), []) for k in upper]
+    names: list[list[str]] = []
+    for start in upper:
+        above = reader_of(io.StringIO(head[start:], newline=""), delimiter)
+        names.append(next(above, []))
     names.append(next(record for record in reader if not _is_blank(record)))
     header = joined_names(names)
     columns = _columns(sheet, reader, n_names + has_row_names)
@@ -467,12 +469,12 @@ def read_text(
     return replace(sheet, header=tuple(header), columns=columns)
 
 
-def _start_of(name: str, text: str, line: int, options: Reading) -> int:
+def _start_of(name: str, text: str, line: int) -> int:
     # where a line that an option names begins
     starts = chain([0], (end.end() for end in _LINE_END.finditer(text)))
     start = next(islice(starts, line - 1, None), len(text))
     if start == len(text) > 0:
-        raise no_line(name, "line", options)
+        raise refusal(name, "no line", unit="line", n=line)
     return start
 
 
@@ -483,17 +485,16 @@ def _n_lines(text: str, end: int) -> int:
 def without_notes(
     text: str, delimiter: str, n_before: int
 ) -> tuple[str, tuple[Finding, ...]]:
-    """Return a text without the notes below its table, and what they are."""
+    """Return a text without the notes below its table, and what the first is."""
     lines = [] if delimiter == " " else list(io.StringIO(text[-TAIL:], newline=""))
     rows: list[list[str]]
     rows = [next(reader_of([line], delimiter), []) for line in lines]
-    n_notes = notes_below(rows)
-    end = len(text) - sum(map(len, lines[len(lines) - n_notes :]))
-    if not n_notes or text.count('"', 0, end) % 2:  # they are in a cell
+    n_back, note = notes_below(rows)
+    end = len(text) - sum(map(len, lines[len(lines) - n_back :]))
+    if not note or text.count('"', 0, end) % 2:  # it is in a cell
         return text, ()
     where = f"line {n_before + _n_lines(text, end) + 1}"
-    got = "".join(rows[-n_notes]).strip()[:60]
-    return text[:end], (Finding("note below", where=where, got=got),)
+    return text[:end], (Finding("note below", where=where, got=note[:60]),)
 
 
 def _below_comments(name: str, text: str, start: int, delimiter: str | None) -> int:
@@ -541,20 +542,14 @@ class Row:
 def joined_names(lines: Sequence[Sequence[str]]) -> list[str]:
     """Return the names that lines make up: merged cells are filled from their left."""
     *upper, last = ([cell.strip() for cell in line] for line in lines)
-    width = len(last)
-    upper = [[*line, *[""] * width][:width] for line in upper]
-    parts: list[Iterable[str]] = [accumulate(line, _or_left) for line in upper]
-    return [" ".join(filter(None, name)) for name in zip(*parts, last, strict=True)]
+    parts: list[Iterable[str]] = [
+        accumulate(chain(line, [""] * len(last)), _or_left) for line in upper
+    ]
+    return [" ".join(filter(None, name)) for name in zip(*parts, last, strict=False)]
 
 
 def _or_left(left: str, cell: str) -> str:
     return cell or left
-
-
-def no_line(name: str, unit: str, options: Reading) -> RatingsError:
-    """Return the error of an option that names a line below the last."""
-    option = "--header" if options.header else "--skip"
-    return refusal(name, "no line", option=option, unit=unit, n=options.names_at[-1])
 
 
 def names_option(
@@ -562,28 +557,19 @@ def names_option(
 ) -> str:
     """Return the option that takes the names from below the first row, or none."""
     # n_titles: how many rows at the head have fewer cells than the table
-    first, lines = n_titles, list[int]()
-    if not options.no_header and len(options.names_at) < 2:
-        first += _n_first_cells(rows[first:])
-        lines = _lines_of_names(rows[first:])
-    line = lines[0] if lines else rows[first].line
-    option = f"--skip {line - 1}" if line > rows[0].line else ""
+    is_known = options.no_header or len(options.names_at) > 1
+    lines = [] if is_known else _lines_of_names(rows[n_titles:])
+    option, line = "", (lines or [rows[n_titles].line])[0]
     if len(lines) > 1:
         option = f"--header {','.join(map(str, lines))}"
-    if first:
+    elif line > rows[0].line:
+        option = f"--skip {line - 1}"
+    is_title = option and rows[0].n_filled == bool(rows[0].cells[0])
+    if n_titles or (is_title and len(rows[-1].cells) > 2):
         got = ", ".join(filter(None, rows[0].cells))[:60]
-        raise refusal(
-            f"{name}: {unit} {rows[0].line}", "titles", got=got, option=option
-        )
+        where = f"{name}: {unit} {rows[0].line}"
+        raise refusal(where, "titles", got=got, option=option)
     return option
-
-
-def _n_first_cells(rows: Sequence[Row]) -> int:
-    # how many rows above the names have their first cell alone, or none
-    is_title = [row.n_filled == bool(row.cells[0]) for row in rows]
-    n = is_title.index(False) if False in is_title else 0
-    are_columns = n and len(rows[n].cells) > 2
-    return n if are_columns and _are_names(rows[n].cells[1:], rows[n + 1 :]) else 0
 
 
 def _lines_of_names(rows: Sequence[Row]) -> list[int]:
@@ -596,14 +582,13 @@ def _lines_of_names(rows: Sequence[Row]) -> list[int]:
             break
         names = joined_names([*(above.cells for above in upper), row.cells])
         if all(names[1:]) and len(set(names)) == len(names):
-            lines = [above.line for above in (*upper, row)]
             # names without an item, or with the name of the items alone, as of pandas
             for below in rows[k + 1 : k + 2]:
                 rest = below.n_filled - bool(below.cells[0])
                 is_name = not below.cells[0] and _are_names(below.cells, rows[k + 2 :])
                 if below.line == row.end + 1 and (is_name if rest else upper):
-                    lines.append(below.line)
-            return lines
+                    return [*(above.line for above in upper), row.line, below.line]
+            return [*(above.line for above in upper), row.line]
         upper = [*upper, row] if row.n_filled > bool(row.cells[0]) else []
     return []
 
@@ -619,18 +604,18 @@ def _are_names(cells: Sequence[str], below: Sequence[Row]) -> bool:
     )
 
 
-def notes_below(rows: Sequence[Sequence[str]]) -> int:
-    """Return how many rows at the end, below an empty one, have one cell of text."""
+def notes_below(rows: Sequence[Sequence[str]]) -> tuple[int, str]:
+    """Return how many rows at the end are notes below an empty one, and the first."""
     filled = [[cell.strip() for cell in row if cell.strip()] for row in rows]
     while filled and not filled[-1]:
         filled.pop()
-    first = len(filled)
-    while first and len(filled[first - 1]) == 1 and len(filled) - first < _MOST_NOTES:
-        first -= 1
-    notes, above = set(chain(*filled[first:])), set(chain(*filled[:first]))
+    n = next((k for k, row in enumerate(reversed(filled)) if len(row) != 1), 0)
+    above, notes = filled[: len(filled) - n], [*chain(*filled[len(filled) - n :])]
+    # a lone rating is a number, or there above
     are_texts = all(any(map(str.isalpha, note)) for note in notes)
-    is_apart = first and not filled[first - 1] and not notes & above
-    return len(rows) - first if notes and are_texts and is_apart else 0
+    are_notes = are_texts and not {*notes} & {*chain(*above)}
+    is_apart = 0 < n <= _MOST_NOTES and not above[-1]
+    return (len(rows) - len(above), notes[0]) if is_apart and are_notes else (0, "")
 
 
 # ---- records ----
@@ -681,13 +666,9 @@ def _separator(
     heads = {m: rows for m in marks if (rows := _head(lines, m, n_before))}
     if not heads:
         raise refusal(name, "no records")
-    n_titles = {mark: _n_titles(rows) for mark, rows in heads.items()}
     widths = {mark: len(rows[0].cells) for mark, rows in heads.items()}
     of_names = [n for mark, n in widths.items() if mark != " "]
-    for mark, n in n_titles.items():  # names between other separators are no title
-        is_prose = mark == " " and 2 * n > len(heads[mark])
-        if n > 0 and (is_prose or len(heads[mark][-1].cells) in of_names):
-            n_titles[mark] = -1
+    n_titles = {mark: _n_titles(rows, of_names) for mark, rows in heads.items()}
     if delimiter:
         return delimiter, heads[delimiter], max(n_titles[delimiter], 0)
     # as many cells in every record, or one more below a header without row names,
@@ -724,9 +705,9 @@ def _head(lines: list[str], delimiter: str, n_before: int) -> list[Row]:
     return rows
 
 
-def _n_titles(rows: list[Row]) -> int:
+def _n_titles(rows: list[Row], of_names: list[int]) -> int:
     # how many rows are above those that have as many cells as the last but notes, or
-    # the header one less; -1 if others are as wide
+    # the header one less; -1 if others are as wide, or the first by another separator
     widths = [len(row.cells) for row in rows]
     while len(widths) > 2 and widths[-1] == 1:
         widths.pop()
@@ -736,8 +717,9 @@ def _n_titles(rows: list[Row]) -> int:
         first -= 1
     if first and 1 < widths[first - 1] == width - 1:
         first -= rows[first].line == rows[first - 1].end + 1
-    is_table = widths[first] > 1 and first < max(len(widths) - 1, 1)
-    return first if is_table and all(w < width for w in widths[:first]) else -1
+    are_titles = all(w < width for w in widths[:first]) and width not in of_names
+    is_table = widths[first] > 1 and 2 * first <= len(widths)
+    return first if is_table and (are_titles or not first) else -1
 
 
 def _columns(sheet: Sheet, reader: Any, width: int) -> tuple[Column, ...]:

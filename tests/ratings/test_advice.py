@@ -207,6 +207,12 @@ TABLE: dict[str, Asked] = {
             )
         },
     ),
+    "names in two levels": Asked(
+        code="levels",
+        name="r.json",
+        text='{"Kim": {"a": 1, "b": 2}, "Lee": {"a": 1, "b": 1}}',
+        tries={"--raters Kim,Lee": "11 21", "--transpose": "12 11"},
+    ),
     # ---- columns ----
     "a name misspelt": Asked(
         code="no column",

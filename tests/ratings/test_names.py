@@ -151,8 +151,8 @@ def test_a_title_of_rows_without_names(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "options", "words"),
     [
-        (TABLE, {"skip": 9}, "--skip: .* line 10"),
-        (TABLE, {"header": (4, 9)}, "--header: .* line 9"),
+        (TABLE, {"skip": 9}, "--skip.* line 10"),
+        (TABLE, {"header": (4, 9)}, "--header.* line 9"),
         (TABLE, {"header": (1, 2), "item": "patient"}, "'patient', but 'patient P1'"),
         # what is named by the caller is no title, and no note has no letter
         (f"{TABLE}\nSource: ward 4, 2024\n", {}, "line 6: needed 4 cells"),
@@ -241,5 +241,7 @@ def test_every_way_in(tmp_path: Path, ending: str, stream: bool | None) -> None:
 
 @pytest.mark.parametrize("ending", [".json", ".sav"])
 def test_names_of_other_formats_are_in_no_line(tmp_path: Path, ending: str) -> None:
-    with pytest.raises(RatingsError, match="--skip: needed text or a workbook"):
+    with pytest.raises(
+        RatingsError, match="--skip, --header: needed text or a workbook"
+    ):
         read(tmp_path, "[]", ending, skip=1)

@@ -286,6 +286,126 @@ def test_what_a_cell_says(tmp_path: Path, value: Any, said: str) -> None:
     assert read_ratings(path).parts[0].items == (said,)
 
 
+# ---- JSON of names in each other ----
+
+BY_RATER = {
+    "Kim": {"A": "x", "B": "y", "C": None},
+    "Lee": {"A": "x", "B": "x", "C": "y"},
+}
+BY_ITEM = {item: {rater: of[item] for rater, of in BY_RATER.items()} for item in "ABC"}
+OF_NESTED = {(i, r): grade for i, of in BY_ITEM.items() for r, grade in of.items()}
+TURNED = {(rater, item): grade for (item, rater), grade in OF_NESTED.items()}
+OBJECTS = [
+    {
+        "id": item,
+        "text": "of it",
+        "annotations": [
+            {"annotator": rater, "label": grade, "at": [1, 2]}
+            for rater, grade in of.items()
+        ],
+    }
+    for item, of in BY_ITEM.items()
+]
+LISTS_OF = {
+    item: {
+        "annotators": ", ".join(of),
+        "annotations": ", ".join(grade or "" for grade in of.values()),
+        "n": 2,
+    }
+    for item, of in BY_ITEM.items()
+}
+FEW = {rater: {item: of[item] for item in "AB"} for rater, of in BY_RATER.items()}
+OF_FEW = {key: grade for key, grade in OF_NESTED.items() if key[0] != "C"}
+NUMBERED = {k: {"item": i, **of} for k, (i, of) in enumerate(BY_ITEM.items())}
+
+
+def renamed(**keys: str) -> list[dict[str, Any]]:
+    text = json.dumps(OBJECTS)
+    for old, new in keys.items():
+        text = text.replace(f'"{old}"', f'"{new}"')
+    return json.loads(text)  # type: ignore[no-any-return]
+
+
+@pytest.mark.parametrize(
+    ("value", "options", "expected"),
+    [
+        *((value, {}, OF_NESTED) for value in (BY_RATER, BY_ITEM, OBJECTS, LISTS_OF)),
+        ({i: {"annotations": of, "text": "t"} for i, of in BY_ITEM.items()}, {}, None),
+        ({i: {"ratings": of} for i, of in BY_ITEM.items()}, {}, None),
+        ([{"id": i, "ratings": of} for i, of in BY_ITEM.items()], {}, None),
+        ({of["id"]: {"annotations": of["annotations"]} for of in OBJECTS}, {}, None),
+        (
+            [
+                {"item": i, "raters": [*of], "ratings": [*of.values()]}
+                for i, of in BY_ITEM.items()
+            ],
+            *({}, None),
+        ),
+        (renamed(annotations="ratings", annotator="coder", label="score"), {}, None),
+        (renamed(annotator="by", label="is"), {"rater": "by", "grade": "is"}, None),
+        # as pandas writes a frame by its index, and a column of numbered rows
+        (NUMBERED, {}, None),
+        (
+            {
+                "patient no": dict(enumerate("ABC")),
+                **{
+                    rater: dict(enumerate(of.values()))
+                    for rater, of in BY_RATER.items()
+                },
+            },
+            {},
+            None,
+        ),
+        # the other way round
+        (BY_RATER, {"transpose": True}, TURNED),
+        (BY_ITEM, {"transpose": True}, TURNED),
+        # as many of both
+        (FEW, {"raters": "Kim,Lee"}, OF_FEW),
+        (FEW, {"transpose": True}, {(r, i): grade for (i, r), grade in OF_FEW.items()}),
+        (
+            [{"id": i, "ratings": BY_ITEM[i]} for i in "AB"],
+            {"raters": "Kim,Lee"},
+            OF_FEW,
+        ),
+    ],
+)
+def test_names_in_each_other(
+    tmp_path: Path,
+    value: Any,
+    options: dict[str, Any],
+    expected: dict[tuple[str, str], str | None] | None,
+) -> None:
+    text(tmp_path / "r.json", json.dumps(value))
+    file = read_ratings(tmp_path / "r.json", Reading(**options))
+    assert grades(file) == (expected or OF_NESTED)
+
+
+def test_lines_of_nested_json(tmp_path: Path) -> None:
+    text(tmp_path / "r.jsonl", "\n".join(map(json.dumps, OBJECTS)))
+    assert grades(read_ratings(tmp_path / "r.jsonl")) == OF_NESTED
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (FEW, "--raters Kim,Lee if these rate, --transpose if 'A', 'B' do"),
+        ([{"id": i, "ratings": BY_ITEM[i]} for i in "AB"], "--raters Kim,Lee"),
+        ([{"id": "A", "annotations": BY_ITEM["A"]}, OBJECTS[1]], "value 1: .* a dict"),
+        ({"A": {"annotators": "Kim", "annotations": "x,y"}}, "item 'A': .*annotator"),
+        ([OBJECTS[0], OBJECTS[0], OBJECTS[1]], "'Kim' graded 'A' more than once"),
+        (renamed(annotator="completed_by"), "'annotations', value 1: .* --from"),
+        ({"Kim": {"A": {"x": 1}}, "Lee": {"A": 1}}, "got a dict"),
+        ([{"id": "A", "annotations": [{"rater": "K", "label": ["x"]}]}], "got a list"),
+    ],
+)
+def test_names_in_each_other_that_are_refused(
+    tmp_path: Path, value: Any, words: str
+) -> None:
+    text(tmp_path / "r.json", json.dumps(value))
+    with pytest.raises(RatingsError, match=words):
+        read_ratings(tmp_path / "r.json")
+
+
 NO_ROWS: dict[str, list[Any]] = {"item": [], "Kim": [], "Lee": []}
 LISTS = {"item": ["A", "B"], "Kim": [[1], [2, 3]], "Lee": [1, 2]}
 REFUSED: list[tuple[str, Write, dict[str, Any], str]] = [
