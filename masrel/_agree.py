@@ -7,14 +7,18 @@ from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
 from masrel._input import check_option, refuse, shown
-from masrel.agreement import COEFFICIENTS, BandScale, Metric
+from masrel.agreement import BandScale, Metric
 from masrel.analysis._file_estimates import Answer, Estimating, Questions
 from masrel.analysis._file_questions import answers
 from masrel.errors import MasrelError
-from masrel.estimates import Estimate, IntervalMethod, Target
+from masrel.estimates import Estimate, IntervalMethod, Target, _Convention
 from masrel.ratings import Finding, RatingsFile, Reading, read_ratings
-from masrel.tables._answer_tables import agreement_sentences
-from masrel.tables._first_screen import first_screen, reading_warnings
+from masrel.tables._answer_tables import Detail, agreement_sentences
+from masrel.tables._first_screen import (
+    first_screen,
+    lacks_interval,
+    reading_warnings,
+)
 from masrel.tables._tables import Table, as_html, as_text
 
 if TYPE_CHECKING:
@@ -26,6 +30,7 @@ _WIDTH = 88  # of notes
 _CHOICES = {
     "target": Target,
     "interval": IntervalMethod,
+    "convention": _Convention,
     "metric": Metric,
     "words": BandScale,
 }
@@ -97,33 +102,33 @@ class Agreement:
     @property
     def notes(self) -> tuple[str, ...]:
         """How the estimates were made, and what to know of them."""
-        return self._screen.notes[len(self.warnings) :]
+        return self._screen("usual").notes
 
-    @property
-    def _screen(self) -> Table:
-        (screen,) = first_screen(self.file, self.estimating, [self.answer])
-        can_have = any(
-            row.estimate.interval is None
-            and row.estimate.reason is None
-            and COEFFICIENTS[row.estimate.coefficient].formula is not None
-            for row in self.answer.estimates
+    def _screen(self, detail: Detail) -> Table:
+        # in brief with a sentence of result, and what may have been read wrongly
+        is_text = detail == "brief"
+        (screen,) = first_screen(
+            *(self.file, self.estimating, [self.answer]), detail=detail, is_text=is_text
         )
-        is_asked = self.estimating.target is not None or not can_have
+        if is_text:
+            warned = (f"warning: {text}" for text in self.warnings)
+            screen = replace(screen, notes=(*screen.notes, *warned))
+        is_asked = self.estimating.target is not None or not lacks_interval(self.answer)
         return screen if is_asked else replace(screen, notes=(*screen.notes, _ASK))
 
     def sentence(self) -> str:
         """Return a sentence for a paper of every estimate, one a line."""
         return agreement_sentences(
-            self.answer, bands=self.estimating.words, data=self._screen.data
+            self.answer, bands=self.estimating.words, data=self._screen("usual").data
         )
 
     def __str__(self) -> str:
-        return as_text(self._screen, width=_WIDTH)
+        return as_text(self._screen("brief"), width=_WIDTH)
 
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
-        return as_html(self._screen)
+        return as_html(self._screen("brief"))
 
 
 def agree(

@@ -34,6 +34,9 @@ IntervalMethod = Literal[
 ]
 """Kinds of intervals; "auto" is the newest of the rules that choose one."""
 
+_Convention = Literal["irrcac", "spss", "over_n"]
+"""Whose standard error an interval is made of, where it is not our own."""
+
 Unit = Literal["items", "raters", "both", "clusters"]
 """What is resampled or left out."""
 
@@ -57,8 +60,12 @@ class _LongNote(str):
         return cls(what + note, what + brief if brief else "")
 
 
-class _CountNote(str):
-    """A note that begins with how many there are of what is few."""
+class _Caution(str):
+    """A note without which an interval would promise too much."""
+
+
+class _CountNote(_Caution):
+    """A caution that begins with how many there are of what is few."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

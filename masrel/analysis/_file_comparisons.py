@@ -187,7 +187,8 @@ def _differences(
             "title": questions.title(entry),
             "group": f"{first} and {second}",
             "items": "the same" if groups.same_items else "others",
-            "texts": (*(() if interval is None else interval.notes), *why),
+            "texts": why,
+            "interval_texts": () if interval is None else interval.notes,
             # ``nan`` where they are undefined
             "difference": estimate.value,
             "standard_error": estimate.standard_error,

@@ -11,7 +11,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from masrel._input import refuse, split_names
 from masrel.errors import MasrelError, ParameterError
-from masrel.estimates import Estimate, Interval, IntervalMethod, Target
+from masrel.estimates import (
+    Estimate,
+    Interval,
+    IntervalMethod,
+    Target,
+    _Convention,
+)
 from masrel.ratings._findings import listed
 
 if TYPE_CHECKING:
@@ -65,6 +71,9 @@ class Estimating:
         What a new study would draw anew; no interval when None.
     interval : str
         Kind of interval; ``"auto"`` is the newest rule that chooses one.
+    convention : {"irrcac", "spss", "over_n"} or None
+        Take the standard errors and intervals for other items that irrCAC, SPSS, or
+        psych and vcd print in place of ours, to have an old number again.
     level : float
         Level of intervals.
     n_resamples, seed : int
@@ -85,6 +94,7 @@ class Estimating:
     metric: "Metric | None" = None
     target: Target | None = None
     interval: IntervalMethod = "auto"
+    convention: _Convention | None = None
     level: float = 0.95
     n_resamples: int = 10_000
     seed: int = 0
@@ -132,7 +142,7 @@ class Questions(Estimating):
 
     def record(self) -> dict[str, object]:
         """Return every option that decides a number."""
-        by_metric = {} if self.metric is None else {"metric": self.metric}
+        options = {"metric": self.metric, "convention": self.convention}
         return {
             "coefficients": self.names,
             "weights": str(self.weights),
@@ -147,7 +157,7 @@ class Questions(Estimating):
             "resamples": self.n_resamples,
             "seed": self.seed,
             "words": self.words,
-            **by_metric,
+            **{name: value for name, value in options.items() if value is not None},
         }
 
     def checked(self, clusters: str | None) -> "Questions":
@@ -164,6 +174,7 @@ class Questions(Estimating):
                 )
         by_item = [name for name in _BY_ITEM if getattr(self, name)]
         option = f"--{by_item[0].replace('_', '-')}" if by_item else None
+        of_raters = self.target in ("raters", "both")
         refuse(
             (
                 clusters is not None and option is not None,
@@ -171,12 +182,28 @@ class Questions(Estimating):
                 "them, got both",
             ),
             (
-                clusters is not None and self.target in ("raters", "both"),
+                clusters is not None and of_raters,
                 "--clusters: what is left out is a cluster of items, so it takes "
                 f"--target items, got --target {self.target}",
             ),
+            (
+                self.convention is not None and of_raters,
+                "--convention: the errors that programs print take items as the "
+                f"sample, so it takes --target items, got --target {self.target}",
+            ),
+            (
+                self.convention is not None and clusters is not None,
+                "--convention: these errors know of no clusters, so it takes no "
+                "--clusters",
+            ),
+            (
+                self.convention is not None and self.interval != "auto",
+                "--convention: it is a kind of interval, so it takes no --interval, "
+                f"got {self.interval}",
+            ),
         )
-        target = self.target if clusters is None else "items"
+        of_items = clusters is not None or self.convention is not None
+        target = "items" if of_items else self.target
         return replace(self, weights=plain_name(self.weights), target=target)
 
     def on_scale(self, file: "RatingsFile") -> "Questions":
@@ -219,6 +246,7 @@ class AgreementRow:
     # what the true value reaches with 95 % by its interval; None if there is none, or
     # no word is to be named
     lower_bound: float | None = None
+    convention: _Convention | None = None  # whose error it has, if it is not ours
 
     @property
     def group(self) -> str:
@@ -243,19 +271,39 @@ class Answer:
     figure: tuple[tuple[str, Any], ...] = ()
 
 
+class Explanation(str):
+    """A note on how numbers were made, which no first screen has."""
+
+    __slots__ = ()
+
+
 _TEXTS = {
+    "left_out": "{group}Left out: {names}.",
+    "pair": "Difference: {pair}.",
+    "reference": "{rater} is the reference, and in no other estimate between raters.",
+    "least": "The {n} pairs that agree least; --json has {n_all}.",
+    "no_ends": "No intervals: --target items has them.",
+    "shared_clusters": "Groups have clusters in common, which are left out of both at "
+    "once.",
+    "shared_items": "Items the same: both groups have items of the same names, taken "
+    "for the same items, and an item is left out of both at once.",
+    "same_names": "{first} and {second}: {n} items have the same name, taken for "
+    "different items.",
+    "without": "Left out: {titles}: there is no such interval.",
+}
+"""Notes that stand below a table at once."""
+
+_EXPLANATIONS = {
     # test and retest
     "sessions": "{group}Each rater's grades of {first} and of {second}.",
-    "left_out": "{group}Left out: {names}.",
     # two raters
     "test": "{test}: whether {hypothesis}.",
     "exact_test": "{test}: whether {hypothesis}; df: the items that changed.",
     "pabak": "PABAK: 2 p_o − 1, which is Brennan-Prediger's coefficient of two "
     "categories; SE: delta method, items as the sample.",
-    "on_category": "Agreement on a category: of the ratings in it, the part that met "
-    "the same of the other rater; of two categories negative and positive agreement.",
+    "on_category": "Agreement on a category: how often, where one rater chose it, the "
+    "other chose it too; of two categories negative and positive agreement.",
     "largest": "Largest κ: what the margins of the raters allow.",
-    "pair": "Difference: {pair}.",
     "limits": "Limits: mean ∓ 1.96 standard deviations, between which 95 % of "
     "differences lie if they are normal.",
     "exact_ends": "Low, High: {level} % CI, exact (t, noncentral t), each for itself; "
@@ -265,11 +313,8 @@ _TEXTS = {
     "change": "Change: of all without the rater, less that of all: above 0 the others "
     "agree better without.",
     "standard_error": "SE: item jackknife.",
-    "agreement": "Agreement: of the ratings in the category, the part that meets the "
-    "same of another rater.",
-    "reference": "{rater} is the reference, and in no other estimate between raters.",
-    "least": "The {n} pairs that agree least; --json has {n_all}.",
-    "no_ends": "No intervals: --target items has them.",
+    "agreement": "Agreement: how often, where one rater chose the category, another "
+    "rater of the item chose it too.",
     "raters_ends": "{level} % CI: t, each by itself. They generalise to other items, "
     "rated by these raters.",
     "pairs_ends": "{level} % CI: that of {title} of the two raters alone. They "
@@ -291,13 +336,6 @@ _TEXTS = {
         )
     },
     "holm": "p (Holm): adjusted for {n} pairs, each coefficient by itself.",
-    "shared_clusters": "Groups have clusters in common, which are left out of both at "
-    "once.",
-    "shared_items": "Items the same: both groups have items of the same names, taken "
-    "for the same items, and an item is left out of both at once.",
-    "same_names": "{first} and {second}: {n} items have the same name, taken for "
-    "different items.",
-    "without": "Left out: {titles}: there is no such interval.",
     "Fleiss' weighted χ²": "Fleiss' weighted χ²: groups of other items, by their "
     "delta-method errors.",
     "Donner's goodness of fit": "Donner's goodness of fit: two raters and two "
@@ -305,13 +343,16 @@ _TEXTS = {
     "Hotelling's T² as F": "Hotelling's T² as F: groups of the same items, by their "
     "names, or of the same clusters, by the delta method.",
 }
+"""Notes on how numbers were made."""
 
 
 def note(kind: str, **values: object) -> str:
     """Return a note of a kind; a level in it is said in percent."""
     if isinstance(level := values.get("level"), float):
         values["level"] = f"{100.0 * level:g}"
-    return _TEXTS[kind].format(**values)
+    if kind in _TEXTS:
+        return _TEXTS[kind].format(**values)
+    return Explanation(_EXPLANATIONS[kind].format(**values))
 
 
 # ---- parts of a file ----
@@ -453,12 +494,14 @@ def estimate_row(
     try:
         estimate = _estimate(entry, ratings, questions, questions.level)
     except MasrelError as error:
-        if questions.target is None or not questions.takes_all:
+        # not all that is usual has an error by SPSS, say
+        is_by_program = questions.convention and questions.coefficients is None
+        is_left_out = questions.takes_all or is_by_program or entry.formula is None
+        if questions.target is None or not is_left_out:
             raise
-        no_sums = entry.formula is None
-        why = "it is no function of sums over items" if no_sums else error
+        why = "there is none for it" if entry.formula is None else error
         notes.append(f"no interval: {why}")
-        questions = replace(questions, target=None)
+        questions = replace(questions, target=None, convention=None)
         estimate = _estimate(entry, ratings, questions, questions.level)
     interval, bound = estimate.interval, None
     if interval is not None and questions.words and entry.chance_corrected:
@@ -473,6 +516,7 @@ def estimate_row(
         estimate=estimate,
         notes=tuple(notes),
         lower_bound=bound,
+        convention=None if entry.has_interval else questions.convention,
     )
 
 
@@ -493,16 +537,23 @@ def _estimate(
         )
         # one that comes with the coefficient knows of no clusters
         return replace(result, interval=None) if questions.clusters else result
+    ask: Any = {
+        "target": questions.target,
+        "categories": ratings.categories,
+        "weights": weights,
+        "level": level,
+    }
+    if questions.convention is not None:
+        from masrel.intervals.analytic import _by_convention
+
+        return _by_convention(entry, ratings, convention=questions.convention, **ask)
     from masrel.intervals.choose import estimate
 
     return estimate(
         entry,
         ratings,
-        target=questions.target,
+        **ask,
         method=questions.interval,
-        categories=ratings.categories,
-        weights=weights,
-        level=level,
         n_resamples=questions.n_resamples,
         rng=questions.seed,
         clusters=questions.clusters or None,

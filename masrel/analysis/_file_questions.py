@@ -143,6 +143,9 @@ def _categories(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
                 fleiss = coefficient("fleiss_kappa")
                 of = estimate_row(fleiss, ratings, row.keys, folded)
                 estimate = replace(row.estimate, interval=of.estimate.interval)
+                if of.convention is not None:
+                    error = of.estimate.standard_error
+                    estimate = replace(estimate, standard_error=error)
                 row = replace(of, title=row.title, estimate=estimate)
             rows.append(row)
     heads = heads_of(", ".join([*part_names(file, file.parts[0]), "category"]))

@@ -13,8 +13,6 @@ import click
 from masrel._input import split_names
 from masrel.analysis._file_estimates import USUAL, Answer, Questions
 from masrel.cli._options import (
-    Command,
-    Decorator,
     OutputOptions,
     echo_notes,
     grouped,
@@ -35,6 +33,8 @@ from masrel.ratings._findings import Reading
 if TYPE_CHECKING:
     from masrel.plots._drawn_values import Content, Drawn
     from masrel.ratings import RatingsFile
+
+Option = Callable[..., Any]
 
 # of notes where there is no terminal, and the largest in one
 _WIDTHS = (88, 100)
@@ -108,6 +108,12 @@ _ESTIMATING = {
         help="Kind of interval; auto is the newest rule that chooses one; analytic is "
         "by formula, of ICC for both from F.",
     ),
+    "convention": click.option(
+        "--convention",
+        type=click.Choice(["irrcac", "spss", "over_n"]),
+        help="Errors and intervals for other items as irrCAC, SPSS, or psych and vcd "
+        "(over_n) print them, in place of ours.",
+    ),
     "level": click.option(
         "--level",
         default=0.95,
@@ -131,6 +137,19 @@ _ESTIMATING = {
 by_option = click.option(
     "--by", metavar="COL", help="Estimate each group of this column."
 )
+_WORDING = (
+    click.option(
+        "--explain",
+        is_flag=True,
+        help="Also say how numbers were made, and what intervals promise.",
+    ),
+    click.option(
+        "--item-name",
+        default="items",
+        metavar="PLURAL",
+        help="What items are called in words, such as patients.",
+    ),
+)
 clusters_option = click.option(
     "--clusters",
     metavar="COL",
@@ -139,25 +158,33 @@ clusters_option = click.option(
 )
 
 
-def answering(
-    *reading: Callable[..., Any],
+def file_command(
+    name: str,
+    about: str,
+    *reading: Option,
     estimating: Sequence[str],
-    questions: Sequence[Callable[..., Any]] = (),
+    questions: Sequence[Option] = (),
     figure: str,
     sentence: str | None = None,
-) -> Decorator:
-    """Return what a command takes: a file, how it is read, what is asked, and forms."""
+    **fixed: Any,
+) -> click.Command:
+    """Return a command that answers questions about a file of ratings."""
     # reading, questions: options of the command's own; estimating: names of those
-    # that it shares with others; figure, sentence: helps of these forms
+    # that it shares with others; figure, sentence: helps of these forms; fixed:
+    # questions that are no options
     shared = [_ESTIMATING[name] for name in estimating]
-    explain = click.option(
-        "--explain", is_flag=True, help="Say in notes what every interval promises."
-    )
+
+    def command(
+        file: Path, reading: Reading, questions: Questions, output: OutputOptions
+    ) -> None:
+        questions = replace(questions, command=name, **fixed)
+        _show_answers(file, reading, questions, output)
+
     decorators = (
         click.argument("file", type=InputFile(path_type=Path, allow_dash=True)),
         grouped("reading", Reading, *reading_options, *table_options, *reading),
         grouped("questions", Questions, *shared, *questions),
-        explain,
+        *_WORDING,
         output_options(
             json="Write a record of all here; - prints it, and nothing else, on "
             "stdout.",
@@ -167,22 +194,13 @@ def answering(
             sentence=sentence,
         ),
     )
-
-    def decorate(command: Command) -> Command:
-        for decorator in reversed(decorators):
-            command = decorator(command)
-        return command
-
-    return decorate
+    for decorator in reversed(decorators):
+        command = decorator(command)
+    return click.command(name, help=about)(command)
 
 
-def show_answers(
-    file: Path,
-    reading: Reading,
-    questions: Questions,
-    *,
-    explain: bool,
-    output: OutputOptions,
+def _show_answers(
+    file: Path, reading: Reading, questions: Questions, output: OutputOptions
 ) -> None:
     """Read a file, and print or write what is asked of it."""
     questions = replace(
@@ -197,26 +215,39 @@ def show_answers(
     questions = questions.on_scale(ratings)
     from masrel.analysis._file_questions import answers
     from masrel.tables._answer_tables import agreement_sentences
-    from masrel.tables._first_screen import first_screen, reading_notes
+    from masrel.tables._first_screen import (
+        first_screen,
+        lacks_interval,
+        left_out,
+        reading_warnings,
+    )
     from masrel.tables._tables import SIMULATED
 
     others, answered = answers(ratings, questions)
-    table, *more = first_screen(
-        *(others, questions, answered), explain=explain, in_sentences=output.sentence
-    )
-    notes = reading_notes(others, questions, answered[0])
     is_sentence = output.sentence and answered[0].name == "agreement"
+    is_text = not (output.csv or output.latex or is_sentence)
+    table, *more = first_screen(
+        *(others, questions, answered),
+        detail="all" if output.explain else "brief" if is_text else "usual",
+        items=output.item_name,
+        is_text=is_text,
+        in_sentences=output.sentence,
+    )
+    notes = left_out(others, questions)
+    warned = [f"warning: {text}" for text in reading_warnings(others, answered[0])]
     sentences = ""
     if is_sentence:
         sentences = agreement_sentences(
-            answered[0], bands=questions.words, data=table.data
+            answered[0], bands=questions.words, data=table.data, items=output.item_name
         )
     width, widest = _WIDTHS
     if sys.stdout.isatty():
         width = min(shutil.get_terminal_size((width, 24)).columns, widest)
     write_output(
         output,
-        document=lambda: _record(others, reading, questions, answered, notes),
+        document=lambda: _record(
+            *(others, reading, questions, answered), [*warned, *notes]
+        ),
         text=lambda: sentences if is_sentence else table,
         figure=lambda: _figure(answered, questions),
         stamp=SIMULATED if others.simulated else "",
@@ -226,9 +257,11 @@ def show_answers(
     )
     if is_sentence:
         echo_notes((*table.read, *table.notes))
+    echo_notes(warned)
     # what came through a pipe is gone
-    if questions.target is None and Path(others.read["file"]).is_file():
-        _offer_interval(answered[0], questions)
+    is_there = questions.target is None and Path(others.read["file"]).is_file()
+    if is_there and answered[0].name == "agreement" and lacks_interval(answered[0]):
+        _offer_interval(questions.command, output.item_name)
 
 
 def _record(
@@ -276,25 +309,10 @@ def _figure(answers: Sequence[Answer], questions: Questions) -> "Content | Drawn
     return agreement_forest(rows, questions.target or "items")
 
 
-def _offer_interval(answer: Answer, questions: Questions) -> None:
-    """Print the command that gives an interval, where there is none."""
-    from masrel.agreement import COEFFICIENTS
-
-    rows = answer.estimates if answer.name == "agreement" else ()
-    entries = [COEFFICIENTS[row.estimate.coefficient] for row in rows]
-    if not any(
-        not entry.has_interval and entry.formula is not None and not row.estimate.reason
-        for entry, row in zip(entries, rows, strict=True)
-    ):
-        return
-    more, but = ["--target", "items"], ""
-    without = [e for e in entries if e.formula is None and not e.has_interval]
-    if without and not questions.takes_all:  # named, they would be refused
-        others = (entry.name for entry in entries if entry not in without)
-        more = ["--coefficients", ",".join(dict.fromkeys(others)), *more]
-        but = f" (without {', '.join(dict.fromkeys(e.title for e in without))})"
-    arguments = sys.argv[2:]  # as they were typed
+def _offer_interval(command: str, items: str) -> None:
+    """Print the command that gives an interval."""
+    more, arguments = ["--target", "items"], sys.argv[2:]  # as they were typed
     # what follows a -- is no option
     parts = [*more, *arguments] if "--" in arguments else [*arguments, *more]
-    command = shlex.join(["masrel", questions.command, *parts])
-    click.echo(f"no interval; for other items like these{but}: {command}", err=True)
+    call = shlex.join(["masrel", command, *parts])
+    click.echo(f"no interval; for other {items} like these: {call}", err=True)

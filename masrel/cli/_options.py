@@ -65,6 +65,8 @@ class OutputOptions:
     latex: bool = False
     sentence: bool = False  # whether sentences are printed instead of a table
     quiet: bool = False  # without progress: to tqdm `or None`, terminals alone
+    explain: bool = False  # whether notes say all
+    item_name: str = "items"  # what they are called, in the plural
 
     def __post_init__(self) -> None:
         forms = {

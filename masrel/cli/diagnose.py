@@ -1,18 +1,17 @@
 """``masrel diagnose``: which rater, pair and category agreement is lost by."""
 
-from dataclasses import replace
-from pathlib import Path
-
 import click
 
-from masrel.analysis._file_estimates import Questions
-from masrel.cli._file_answers import answering, by_option, show_answers
-from masrel.cli._options import OutputOptions, split_commas
-from masrel.ratings._findings import Reading
+from masrel.cli._file_answers import by_option, file_command
+from masrel.cli._options import split_commas
 
+diagnose = file_command(
+    "diagnose",
+    """Say which rater, which pair and which category of FILE disagree.
 
-@click.command("diagnose")
-@answering(
+    Every pair of raters, all raters without each, every category, and what each rater
+    says where another says something else. FILE is whatever masrel agree reads.
+    """,
     by_option,
     click.option(
         "--reference",
@@ -37,17 +36,3 @@ from masrel.ratings._findings import Reading
     ],
     figure="Draw raters, pairs and confusions into this .png, .svg or .pdf.",
 )
-def diagnose(
-    file: Path,
-    reading: Reading,
-    questions: Questions,
-    explain: bool,
-    output: OutputOptions,
-) -> None:
-    """Say which rater, which pair and which category of FILE disagree.
-
-    Every pair of raters, all raters without each, every category, and what each rater
-    says where another says something else. FILE is whatever masrel agree reads.
-    """
-    questions = replace(questions, command="diagnose")
-    show_answers(file, reading, questions, explain=explain, output=output)

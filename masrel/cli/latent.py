@@ -8,6 +8,7 @@ import click
 
 from masrel.cli._options import (
     OutputOptions,
+    echo_notes,
     grouped,
     output_options,
     progress,
@@ -72,7 +73,7 @@ def latent(
     check_order(ratings, "a latent-trait model")
     from masrel.tables._first_screen import what_was_read
 
-    notes = (*what_was_read(ratings), *(f"warning: {w}" for w in ratings.warnings))
+    read = tuple(what_was_read(ratings))
     part = _part(ratings, file, only)
     # imported here: they load slowly, and a call that is refused needs none of them
     import numpy as np
@@ -105,13 +106,14 @@ def latent(
         text=lambda: latent_table(
             result,
             caption=f"Latent-trait model of the ratings in {file}",
-            notes=notes,
+            read=read,
             data="simulated" if simulated else "foreign",
         ),
         figure=lambda: Drawn(_DRAWER, (result, grades)),
         stamp=SIMULATED if simulated else "",
-        notes=notes,
+        notes=read,
     )
+    echo_notes([f"warning: {text}" for text in ratings.warnings])
 
 
 def _part(ratings: "RatingsFile", file: Path, session: str | None) -> "RatingsPart":

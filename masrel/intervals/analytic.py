@@ -13,7 +13,7 @@ from masrel.agreement import COEFFICIENTS, Label, Metric, WeightsLike
 from masrel.agreement._engine import NO_SPREAD, ONE_PAIR, WHOLE, Features, Integers
 from masrel.agreement.kappas import _null_error
 from masrel.errors import ParameterError, UndefinedStatisticWarning
-from masrel.estimates import Estimate, Interval, Target, Unit
+from masrel.estimates import Estimate, Interval, Target, Unit, _Convention
 from masrel.intervals._question import (
     HELD,
     IntervalProblem,
@@ -34,14 +34,18 @@ _METHODS: dict[_Distribution, str] = {
     "fisher": "t(n-1) on Fisher's z",
 }
 
-_Convention = Literal["irrcac", "spss", "over_n"]
-"""Whose standard error an interval is made of, where it is not our own."""
-
 _NAMES: dict[_Convention, str] = {
     "irrcac": "irrCAC's error",
     "spss": "SPSS's error",
     "over_n": "delta method over n",
 }
+
+_PRINTED: dict[_Convention, _Distribution] = {
+    "irrcac": "t",
+    "spss": "normal",
+    "over_n": "normal",
+}
+"""What intervals are taken from that are printed with these errors."""
 
 
 def analytic(
@@ -164,6 +168,41 @@ def analytic(
             f'clusters: needs no convention, got "{convention}"',
         ),
     )
+    return _with_error(problem, weights, distribution, convention, clusters)[1]
+
+
+def _by_convention(
+    coefficient: Statistic,
+    ratings: object,
+    *,
+    convention: _Convention,
+    target: Target,
+    categories: Sequence[Label] | None,
+    weights: "WeightsLike",
+    level: float,
+) -> Estimate:
+    """Return an estimate with the error and the interval of another program."""
+    problem = pose_problem(
+        coefficient,
+        ratings,
+        target=target,
+        categories=categories,
+        weights=weights,
+        level=level,
+    )
+    law = _PRINTED[convention]
+    estimate, interval = _with_error(problem, weights, law, convention)
+    return replace(estimate, interval=interval)
+
+
+def _with_error(
+    problem: IntervalProblem,
+    weights: "WeightsLike",
+    distribution: _Distribution,
+    convention: _Convention | None,
+    clusters: object = None,
+) -> tuple[Estimate, Interval]:
+    """Return an estimate with a standard error, and the interval that it makes."""
     if problem.entry.metric == "ordinal":
         problem = replace(problem, notes=(HELD,))
     with warnings.catch_warnings():
@@ -180,16 +219,18 @@ def analytic(
     if clusters is not None:
         method, unit = f"{method}, of clusters", "clusters"
         error, n = _clustered_error(problem, cluster_codes(problem, clusters))
-    lowest = None
+    estimate, lowest = replace(estimate, standard_error=error), None
     if distribution in ("logit", "fisher"):
         # artanh x is half the logit of (x + 1)/2, so that both give the same ends
         lowest = problem.entry.lowest if distribution == "logit" else -1.0
     reason = estimate.reason or _why_undefined(estimate, error, n, lowest)
     if reason is not None:
-        return problem.undefined(reason, method=method, unit=unit)
+        return estimate, problem.undefined(reason, method=method, unit=unit)
     notes = warn_small(n, 10, unit or "items", None if unit else n_items)
     df = math.inf if distribution == "normal" else n - 1
-    return problem.by_t(error, df, lowest=lowest, method=method, unit=unit, notes=notes)
+    return estimate, problem.by_t(
+        error, df, lowest=lowest, method=method, unit=unit, notes=notes
+    )
 
 
 def _why_undefined(
@@ -285,7 +326,11 @@ _ERRORS: dict[str, dict[str, _ErrorOf]] = {
     },
     # of several raters that of the hypothesis that κ is 0: Fleiss, Nee, Landis (1979)
     "spss": {"cohen_kappa": _over_n, "fleiss_kappa": _null},
-    "over_n": dict.fromkeys(COEFFICIENTS, _over_n),
+    "over_n": {
+        name: _over_n
+        for name, of in COEFFICIENTS.items()
+        if of.formula is not None and not of.has_interval
+    },
 }
 
 
@@ -294,9 +339,10 @@ def _error_by(
 ) -> float:
     function = _ERRORS[convention].get(problem.entry.name)
     if function is None or (function is _null and not problem.unweighted):
+        with_weights = "" if function is None else " with weights"
         raise ParameterError(
-            f'convention: "{convention}" has no error of {problem.entry.title} with '
-            f"these weights; it has one of {', '.join(_ERRORS[convention])}"
+            f'convention: "{convention}" has no error of {problem.entry.title}'
+            f"{with_weights}; it has one of {', '.join(_ERRORS[convention])}"
         )
     is_defined = estimate.reason is None and estimate.n_items > 1
     return function(problem, estimate) if is_defined else math.nan

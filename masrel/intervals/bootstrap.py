@@ -15,7 +15,7 @@ from masrel.agreement import Label, Metric, WeightsLike
 from masrel.agreement._engine import Floats, Integers
 from masrel.agreement._weights import Distances
 from masrel.errors import ParameterError
-from masrel.estimates import Distribution, Interval, Target, Unit
+from masrel.estimates import Distribution, Interval, Target, Unit, _Caution
 from masrel.intervals._question import (
     ROUNDING,
     IntervalProblem,
@@ -464,8 +464,10 @@ def _notes(
         )
     if one_value:
         notes.append(
-            "both ends are one value, which many resamples have; that does not make it "
-            "certain"
+            _Caution(
+                "both ends are one value, which many resamples have; that does not "
+                "make it certain"
+            )
         )
     infinite = float(resamples.weights[np.isinf(resamples.values)].sum())
     if infinite:  # of ratios alone

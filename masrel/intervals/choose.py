@@ -45,6 +45,7 @@ from masrel.estimates import (
     Interval,
     IntervalMethod,
     Target,
+    _Caution,
     _LongNote,
     _population,
 )
@@ -104,7 +105,7 @@ _OUTSIDE = "items with a rating outside the commonest category"
 _DRAWS, _TABLE_DRAWS, _SEED = 2_000, 4_000, 1  # always the same, so that they repeat
 _MANY = 2_000  # items, above which the model's polynomials take long
 _MANY_RATERS = 10  # among whom careless ones are seldom missing
-_CARELESS = (
+_CARELESS = _Caution(
     "careless raters are not covered, of whom so few may include none: where one rater "
     "in five is careless, 95 % intervals of 5 raters held in about 70 % of studies"
 )
@@ -255,7 +256,7 @@ def _with_own_target(result: Estimate, target: Target, rule: str) -> Estimate:
         result = replace(result, interval=interval)
     if interval is None or interval.target == target:
         return result
-    note = (
+    note = _Caution(
         f"asked for {_POPULATIONS[target]}: there is this interval, for "
         f"{_POPULATIONS[interval.target]}, and so rather too wide"
     )
@@ -285,7 +286,7 @@ def _choose_interval(
         if left_out.reason is None and rare:
             notes = warn_small(outside, _SEVERAL, _OUTSIDE)
             left_out = replace(left_out, notes=(*notes, *left_out.notes))
-        return left_out, "left out, on a scale without ends"
+        return left_out, "clusters left out one at a time, on a logit scale"
     if problem.is_too_large and problem.target == "items":
         why = "too many different grades to leave items out one by one"
         return _by_error(problem), why
@@ -340,7 +341,7 @@ def _jackknife_with_spread(problem: IntervalProblem) -> tuple[Interval, str]:
     interval = left_out.interval(lowest=lowest)
     if modelled and n_items < _SEVERAL:
         interval = _lift(problem, interval)
-    return interval, "items left out, on a scale without ends"
+    return interval, "items left out one at a time, on a logit scale"
 
 
 def _outside_commonest(problem: IntervalProblem) -> tuple[int, bool]:

@@ -4,12 +4,20 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from masrel.agreement import COEFFICIENTS, BandScale, benchmark, strength
-from masrel.analysis._file_estimates import AgreementRow, Answer, Row
+from masrel.analysis._file_estimates import AgreementRow, Answer, Explanation, Row
 from masrel.errors import ParameterError
-from masrel.estimates import Estimate, Interval, Target, _plain, as_document
+from masrel.estimates import (
+    Estimate,
+    Interval,
+    Target,
+    _Caution,
+    _plain,
+    _population,
+    as_document,
+)
 from masrel.tables._estimate_words import (
     forest_row,
     origin,
@@ -21,6 +29,9 @@ from masrel.tables._tables import SIMULATED, Column, Table, capital, percent, ta
 
 if TYPE_CHECKING:
     from masrel.plots._drawn_values import Forest
+
+Detail = Literal["brief", "usual", "all"]
+"""How much notes say: what must be known, how numbers were made, what they promise."""
 
 _CAPTIONS = {
     "agreement": "Agreement of the raters in {of}",
@@ -38,7 +49,7 @@ _CAPTIONS = {
 }
 
 _P = Column(key="p_value", heading="p", is_p=True)
-_ITEMS = Column(key="n_items", heading="Items")
+_ITEMS = Column(key="n_items", heading="{items}")
 _VALUE = Column(key="value", heading="Value", digits=3)
 _ERROR = Column(key="standard_error", heading="SE", digits=3)
 _ENDS = (
@@ -131,9 +142,18 @@ _OF_ESTIMATES = (
     Column(key="level", heading="Level", where="csv"),
     Column(key="method", heading="Method", where="csv"),
     Column(key="target", heading="Target", where="csv"),
+    Column(key="population", heading="For other", align="left", where="page"),
     _ITEMS,
     Column(key="n_raters", heading="Raters"),
 )
+
+_CONVENTIONS = {
+    "irrcac": "SE and interval: as irrCAC prints them.",
+    "spss": "SE and interval: as SPSS prints them; the SE of Fleiss' κ holds only if κ "
+    "is 0, and its interval may cover far less than it says.",
+    "over_n": "SE and interval: delta method over n, as the R packages vcd and psych "
+    "print them of Cohen's κ.",
+}
 
 _POPULATIONS = {"items": "items", "raters": "raters", "both": "items and raters"}
 
@@ -152,22 +172,28 @@ def answer_table(
     answer: Answer,
     *,
     bands: BandScale | None,
-    explain: bool,
+    detail: Detail,
+    items: str,
     in_sentences: bool,
     data: str,
 ) -> Table:
     """Return the table of an answer."""
-    # bands: whose words for values; explain: whether notes say what intervals promise;
-    # in_sentences: whether notes are for `agreement_sentences`
+    # bands: whose words for values; items: what they are called; in_sentences: whether
+    # notes are for `agreement_sentences`
     estimates = answer.estimates
     shown = answer.rows if answer.shown is None else answer.shown
     notes, after = list(answer.notes), []
     if estimates:
-        shown = [_cells(row, answer.heads, bands, explain) for row in estimates]
+        shown = [_cells(row, answer.heads, bands, detail) for row in estimates]
         notes += _errors_note(estimates, in_sentences)
-        notes += [] if in_sentences else _paired_note(estimates)
+        notes += [] if in_sentences else _paired_note(estimates, items)
         after = [] if bands is None else [_words_note(estimates, bands)]
-    columns = _columns(answer, shown, bands)
+    columns = _columns(answer, shown, bands, items)
+    populations = {row.get("population") for row in shown} - {None}
+    if detail != "brief" or len(populations) < 2:  # a note, or the sentence, says it
+        columns = [column for column in columns if column.key != "population"]
+    if detail == "brief":
+        notes = [note for note in notes if not isinstance(note, Explanation)]
     # what groups of rows are called in notes
     by = "groups" if answer.name == "differences" else ", ".join(answer.heads.values())
     named = [row for row in shown if "title" in row]
@@ -179,12 +205,12 @@ def answer_table(
         shown,
         hide_empty=answer.name.startswith("diagnosis") and not answer.grades,
         in_units=tuple(at for at, row in enumerate(estimates) if _is_in_units(row)),
-        notes=(*notes, *_row_notes(named, by), *after),
+        notes=(*notes, *_row_notes(named, by, detail), *after),
         data=data,
     )
 
 
-def _row_notes(rows: Sequence[Row], by: str) -> tuple[str, ...]:
+def _row_notes(rows: Sequence[Row], by: str, detail: Detail) -> tuple[str, ...]:
     """Return the notes on rows, what is of the same rows as one note."""
     # A note names its rows, unless it holds for all that it could be of.
     # rows: each with its title, its group, why it is undefined or else its texts, and
@@ -194,7 +220,7 @@ def _row_notes(rows: Sequence[Row], by: str) -> tuple[str, ...]:
         undefined = [f"undefined: {row['reason']}"] if row.get("reason") else []
         for text in row.get("texts", undefined):
             rows_of.setdefault((text, False), []).append(row)
-        for text in row.get("interval_texts") or ():
+        for text in _of_detail(row.get("interval_texts") or (), detail):
             rows_of.setdefault((text, True), []).append(row)
     n_intervals = sum(row.get("interval_texts") is not None for row in rows)
     texts_of: dict[str, list[str]] = {}
@@ -236,7 +262,7 @@ def _names(subset: Sequence[Row], rows: Sequence[Row], by: str) -> str:
 
 
 def _columns(
-    answer: Answer, shown: Sequence[Row], bands: BandScale | None
+    answer: Answer, shown: Sequence[Row], bands: BandScale | None, items: str
 ) -> list[Column]:
     columns = [
         Column(key=key, heading=capital(name), align="left")
@@ -249,7 +275,7 @@ def _columns(
     for column in _COLUMNS.get(answer.name, _OF_ESTIMATES):
         if "reference" in column.key and "with_reference" not in known:
             continue
-        heading = column.heading.format(of=capital(answer.of))
+        heading = column.heading.format(of=capital(answer.of), items=capital(items))
         where = "csv" if column.key in hidden else column.where
         columns.append(replace(column, heading=heading, where=where))
     columns += [Column(key=f"said_{g}", heading=g, digits=2) for g in answer.grades]
@@ -285,7 +311,7 @@ def _cells(
     row: AgreementRow,
     heads: Mapping[str, str],
     bands: BandScale | None,
-    explain: bool,
+    detail: Detail,
 ) -> Row:
     # what columns show, and the texts of notes: how the interval was made, what to know
     # of it, and why a value is undefined
@@ -305,16 +331,24 @@ def _cells(
         "interval_texts": None,
     }
     if interval is not None:
-        texts = []
-        if interval.reason is None:
-            texts.append(_interval_note(interval, explain))
-        elif interval.reason != estimate.reason:
-            texts.append(f"no interval ({interval.method}): {interval.reason}")
-        brief = filter(None, (getattr(of, "brief", of) for of in interval.notes))
-        texts += interval.notes if explain else brief
+        texts = [] if interval.reason else [_interval_note(interval, detail)]
+        if interval.reason not in (None, estimate.reason):
+            why = f"no interval ({interval.method}): {interval.reason}"
+            texts.append(_Caution(why))
         cells |= {key: getattr(interval, key) for key in _OF_INTERVAL}
-        cells["interval_texts"] = texts
+        cells["interval_texts"] = [*texts, *interval.notes]
+        cells["population"] = _POPULATIONS[interval.target]
     return cells
+
+
+def _of_detail(notes: Sequence[str], detail: Detail) -> list[str]:
+    """Return what is told of the notes of an interval."""
+    by_detail: dict[Detail, list[str]] = {
+        "brief": [note for note in notes if isinstance(note, _Caution)],
+        "usual": [getattr(note, "brief", note) for note in notes],
+        "all": [*notes],
+    }
+    return list(filter(None, by_detail[detail]))
 
 
 def _word(row: AgreementRow, bands: BandScale) -> str | None:
@@ -337,18 +371,21 @@ def _errors_note(rows: Sequence[AgreementRow], in_sentences: bool) -> list[str]:
         None if row.estimate.interval is None else row.estimate.interval.unit
         for row in rows
         if not math.isnan(row.estimate.standard_error)
+        and row.convention is None
         and not (in_sentences and row.estimate.interval is not None)
     ]
     are_clustered = {unit == "clusters" for unit in units}
     samples = {True: "clusters", False: "items"}
-    return [
-        f"SE: delta method, {sample} as the sample."
+    conventions = {row.convention for row in rows}
+    notes = [text for name, text in _CONVENTIONS.items() if name in conventions]
+    return notes + [
+        Explanation(f"SE: delta method, {sample} as the sample.")
         for is_clustered, sample in samples.items()
         if is_clustered in are_clustered
     ]
 
 
-def _paired_note(rows: Sequence[AgreementRow]) -> list[str]:
+def _paired_note(rows: Sequence[AgreementRow], items: str) -> list[str]:
     # how many items the values rest on, where some have no pair of ratings
     fewer = {
         row.group: row.estimate
@@ -358,22 +395,21 @@ def _paired_note(rows: Sequence[AgreementRow]) -> list[str]:
     if not fewer:
         return []
     pair = pair_words(next(iter(fewer.values())))
-    counts = {of: f"{e.n_items_paired} of {e.n_items}" for of, e in fewer.items()}
-    if len({row.group for row in rows}) == 1:
-        return [f"{count} items have {pair}." for count in counts.values()]
-    of_groups = ", ".join(f"{count} ({group})" for group, count in counts.items())
-    return [f"Items that have {pair}: {of_groups}."]
+    is_one = len({row.group for row in rows}) == 1
+    counts = [
+        f"{of.n_items_paired} of {of.n_items}{'' if is_one else f' ({group})'}"
+        for group, of in fewer.items()
+    ]
+    return [f"{capital(items)} that have {pair}: {', '.join(counts)}."]
 
 
-def _interval_note(interval: Interval, explain: bool) -> str:
+def _interval_note(interval: Interval, detail: Detail) -> str:
     kind = "CI"
     if interval.kind == "credible":
         kind = "credible bound" if interval.is_one_sided else "credible interval"
     name = f"{percent(interval.level)} % {kind}, {interval.method}"
-    clusters = "clusters of " if interval.unit == "clusters" else ""
-    population = clusters + _POPULATIONS[interval.target]
-    to = f": generalises to other {population} like these"
-    if explain:
+    to = f": generalises to {_population(interval)} like these"
+    if detail == "all":
         return f"{name}{origin(interval, 'item')}{to}: {promise(interval, 'item')}"
     return name + to
 
@@ -394,7 +430,9 @@ def _words_note(rows: Sequence[AgreementRow], bands: BandScale) -> str:
     )
 
 
-def agreement_sentences(answer: Answer, *, bands: BandScale | None, data: str) -> str:
+def agreement_sentences(
+    answer: Answer, *, bands: BandScale | None, data: str, items: str = "items"
+) -> str:
     """Return a sentence for every estimate, one a line."""
     stamp = f"{SIMULATED}. " if data == "simulated" else ""
     lines = []
@@ -403,7 +441,9 @@ def agreement_sentences(answer: Answer, *, bands: BandScale | None, data: str) -
         if bands is not None and (word := _word(row, bands)) not in (None, "undefined"):
             earned = f"at least {word} after {_SOURCES[bands]}"
         group = "".join(f"{capital(by)} {row.group}: " for by in answer.heads.values())
-        lines.append(f"{stamp}{group}{sentence(row.estimate, word=earned)}")
+        lines.append(
+            f"{stamp}{group}{sentence(row.estimate, items=items, word=earned)}"
+        )
     return "\n".join(lines)
 
 

@@ -2,14 +2,26 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 
 from masrel.agreement import COEFFICIENTS
-from masrel.analysis._file_estimates import Answer, Questions
+from masrel.analysis._file_estimates import Answer, Questions, Row
+from masrel.estimates import _population
 from masrel.ratings import Finding, RatingsFile
-from masrel.tables._answer_tables import answer_table
-from masrel.tables._tables import Table, counted
+from masrel.tables._answer_tables import Detail, answer_table
+from masrel.tables._estimate_words import called
+from masrel.tables._tables import Table, counted, number, p_text, percent
 
 _SHOWN = 12  # raters that are named
+
+_SCALES = {
+    "MAS": "Scale: the Modified Ashworth Scale, {}, told by its grade 1+; --categories "
+    "declares another.",
+    "observed": "Scale: the grades met (AC and Brennan-Prediger depend on it; "
+    "--categories declares another).",
+}
+"""Scales to what is said of them where nobody declared them."""
 
 
 def first_screen(
@@ -17,48 +29,63 @@ def first_screen(
     questions: Questions,
     answered: Sequence[Answer],
     *,
-    explain: bool = False,
+    detail: Detail = "brief",
+    items: str = "items",
+    is_text: bool = True,
     in_sentences: bool = False,
 ) -> list[Table]:
     """Return the tables of answers, the first with what was read above it."""
-    # explain: whether notes say what intervals promise; in_sentences: whether those of
-    # estimates are for sentences
-    first, *more = [
+    # items: what they are called; is_text: whether a sentence of result is shown, too;
+    # in_sentences: whether notes of estimates are for sentences
+    tables = [
         answer_table(
             answer,
             bands=questions.words,
-            explain=explain,
+            detail=detail,
+            items=items,
             in_sentences=in_sentences and answer.name == "agreement",
             data="simulated" if ratings.simulated else "foreign",
         )
         for answer in answered
     ]
-    read, notes = what_was_read(ratings), reading_notes(ratings, questions, answered[0])
-    return [replace(first, read=tuple(read), notes=(*notes, *first.notes)), *more]
+    if is_text:
+        at, text = _result(answered, items)
+        tables[at] = replace(tables[at], notes=(text, *tables[at].notes))
+    first, *more = tables
+    read, notes = what_was_read(ratings, items, detail), left_out(ratings, questions)
+    return [replace(first, read=tuple(read), notes=(*first.notes, *notes)), *more]
 
 
-def what_was_read(file: RatingsFile) -> list[str]:
+def what_was_read(
+    file: RatingsFile, items: str = "items", detail: Detail = "brief"
+) -> list[str]:
     """Return the lines that say what was read, above a table."""
     read = file.read
-    form = [read["format"], read.get("delimiter"), read.get("encoding")]
-    if read.get("sheet"):
-        form.append(f"sheet {read['sheet']}")
+    form = ""
+    if detail != "brief":
+        parts = [read["format"], read.get("delimiter"), read.get("encoding")]
+        parts += [f"sheet {read['sheet']}"] if read.get("sheet") else []
+        form = f" ({', '.join(filter(None, parts))})"
     names = read["raters"]
     raters = ", ".join(names[:_SHOWN])
     if len(names) > _SHOWN:
         raters += f" and {len(names) - _SHOWN} more"
-    items = ""
+    named = ""
     if read["item"] and read["layout"] != "table":
         columns = [repr(name) if name else "the first column" for name in read["item"]]
-        items = f" named by {' and '.join(columns)}"
+        named = f" named by {' and '.join(columns)}"
     if read.get("clusters"):
-        items += f" in {counted(read['n_clusters'], 'cluster')} by {read['clusters']!r}"
+        named += f" in {counted(read['n_clusters'], 'cluster')} by {read['clusters']!r}"
     if read.get("frequency"):
-        items += f" counted by {read['frequency']!r}"
-    counts = f"{counted(read['n_items'], 'item')}{items}, "
+        named += f" counted by {read['frequency']!r}"
+    counts = f"{counted(read['n_items'], 'item', items)}{named}, "
     counts += counted(read["n_raters"], "rater")
-    first = f"Read {', '.join(filter(None, form))}: {counts}"
-    return [first + (f" ({raters})." if raters else "."), " ".join(_of_grades(file))]
+    first = f"Read {Path(read['file']).name}{form}: {counts}"
+    parts = _of_grades(file)
+    if detail != "brief" and file.scale.name in _SCALES:
+        parts.append(_SCALES[file.scale.name].format(", ".join(file.scale.grades)))
+    grades = " ".join(parts)
+    return [first + (f" ({raters})." if raters else "."), grades]
 
 
 def _of_grades(file: RatingsFile) -> list[str]:
@@ -67,9 +94,10 @@ def _of_grades(file: RatingsFile) -> list[str]:
     listed = ", ".join(f"{grade} ×{n}" for grade, n in grades[:_SHOWN])
     if len(grades) > _SHOWN:
         listed = f"{len(grades)} from {grades[0][0]} to {grades[-1][0]}"
-    parts = [f"Grades: {listed}."]
+    name = " (Modified Ashworth Scale)" if scale.name == "MAS" else ""
+    parts = [f"Grades{name}: {listed}."]
     if read["n_missing"]:
-        codes = ", ".join(f"{c or 'empty'} ×{n}" for c, n in read["missing"].items())
+        codes = ", ".join(f"{n} {c or 'empty'}" for c, n in read["missing"].items())
         parts.append(f"Missing: {codes or read['n_missing']}.")
     if read["n_repeated"]:
         parts.append(f"Repeated: {read['n_repeated']}, {read['repeated']} taken.")
@@ -86,17 +114,27 @@ def _of_grades(file: RatingsFile) -> list[str]:
             f"{' = '.join(spellings)}" for spellings in list(merged.values())[:_SHOWN]
         )
         parts.append(f"The same grade: {same}.")
-    if scale.name == "MAS":
-        parts.append(
-            f"Scale: the Modified Ashworth Scale, {', '.join(scale.grades)}, told by "
-            "its grade 1+; --categories declares another."
-        )
-    elif scale.name == "observed":
-        parts.append(
-            "Scale: the grades met (AC and Brennan-Prediger depend on it; --categories "
-            "declares another)."
-        )
     return parts
+
+
+def left_out(ratings: RatingsFile, questions: Questions) -> list[str]:
+    """Return what is left out of all that could be estimated."""
+    if not questions.takes_all or ratings.is_ordered:
+        return []
+    return [
+        "Left out: the six forms of ICC, Kendall's W and Robinson's A, which need "
+        "grades that are numbers or --categories with every grade in order."
+    ]
+
+
+def lacks_interval(answer: Answer) -> bool:
+    """Return whether some estimate has no interval and could have one."""
+    return any(
+        row.estimate.interval is None
+        and row.estimate.reason is None
+        and COEFFICIENTS[row.estimate.coefficient].formula is not None
+        for row in answer.estimates
+    )
 
 
 def reading_warnings(ratings: RatingsFile, first: Answer) -> tuple[Finding, ...]:
@@ -116,14 +154,91 @@ def reading_warnings(ratings: RatingsFile, first: Answer) -> tuple[Finding, ...]
     )
 
 
-def reading_notes(
-    ratings: RatingsFile, questions: Questions, first: Answer
-) -> list[str]:
-    """Return what may have been read wrongly, and what is left out of it."""
-    notes = [f"warning: {text}" for text in reading_warnings(ratings, first)]
-    if questions.takes_all and not ratings.is_ordered:
-        notes.append(
-            "Left out: the six forms of ICC, Kendall's W and Robinson's A, which need "
-            "grades that are numbers or --categories with every grade in order."
+# ---- what the tables come to, in one sentence ----
+
+_RESULTS = {
+    "differences": (
+        "low",
+        "{title} of {first} less that of {second} is {difference} ({level} % "
+        "confidence interval {low} to {high}; p-value {p_value}).",
+    ),
+    "equality": (
+        "p_value",
+        "The test that {title} is the same in all groups has a p-value of {p_value} "
+        "({test}).",
+    ),
+    "diagnosis_raters": (
+        "without",
+        "{of} would be highest without {rater}{group}: {without}, a change of "
+        "{change}.",
+    ),
+    "limits_of_agreement": (
+        "lower",
+        "{first} less {second}{group} is {mean}{unit} on average; 95 % of such "
+        "differences are expected between {lower} and {upper}{unit}.",
+    ),
+}
+"""Answers to a number that must be there, and what is said of its row."""
+
+
+def _result(answered: Sequence[Answer], items: str) -> tuple[int, str]:
+    """Return the place of the answer that says most, and what it says."""
+    for at in reversed(range(len(answered))):
+        name, rows, of = answered[at].name, answered[at].shown or (), answered[at].of
+        key, text = _RESULTS.get(name, ("", ""))
+        if known := [row for row in rows if (x := row.get(key)) is not None and x == x]:
+            row = max(known, key=_says_most)
+            in_units = name == "limits_of_agreement"
+            words = {key: number(x, 3, in_units=in_units) for key, x in row.items()}
+            words |= {
+                "of": of,
+                "p_value": p_text(row.get("p_value")),
+                "level": percent(row.get("level") or 0.0),
+                "unit": f" {of}" if of else "",
+                "group": f" ({row['group']})" if row.get("group") else "",
+            }
+            return at, text.format(**words)
+    return 0, _agreement(answered[0], items)
+
+
+def _says_most(row: Row) -> tuple[float, bool]:
+    # that without which agreement is highest, or of a coefficient for chance
+    return row.get("change") or 0.0, _allows_for_chance(row.get("coefficient", ""))
+
+
+def _allows_for_chance(name: str) -> bool:
+    return name in COEFFICIENTS and COEFFICIENTS[name].chance_corrected
+
+
+def _agreement(answer: Answer, items: str) -> str:
+    """Return how often raters agree, and the first kappa; of groups its ends."""
+    rows = answer.estimates
+    main = max(rows, key=lambda row: _allows_for_chance(row.estimate.coefficient))
+    estimate, name = main.estimate, called(main.estimate)
+    in_units = COEFFICIENTS[estimate.coefficient].in_units
+    value = partial(number, digits=3, in_units=in_units)
+    same = [row for row in rows if row.title == main.title]
+    if len(same) > 1:
+        known = [row for row in same if row.estimate.reason is None] or same
+        ends = sorted(known, key=lambda row: row.estimate.value)
+        low, high = (
+            f"{value(row.estimate.value)} ({row.group})" for row in (ends[0], ends[-1])
         )
-    return notes
+        return f"{name} ranges from {low} to {high}."
+    text = f"{name} is {value(estimate.value)}"
+    by_name = {(of.estimate.coefficient, of.estimate.weights): of for of in rows}
+    share = by_name.get(("percent_agreement", "identity"), main)
+    if share is not main and share.estimate.reason is None:
+        of_two = share.estimate.n_raters == 2
+        who = "The two raters" if of_two else "Two raters picked at random"
+        how_often = f"{number(100.0 * share.estimate.value, 1)} % of the time"
+        allows = f"{name}, which allows for chance, is {value(estimate.value)}"
+        text = f"{who} give the same grade {how_often}; {allows}"
+    if (interval := estimate.interval) is not None and interval.reason is None:
+        kind = f"{percent(interval.level)} % {interval.kind}"
+        what = f"interval from {value(interval.low)} to {value(interval.high)}"
+        if interval.is_one_sided:
+            what = f"lower bound of {value(interval.low)}"
+        to = _population(interval).replace("items", items)
+        text += f", with a {kind} {what} for {to} like these"
+    return f"{text}."

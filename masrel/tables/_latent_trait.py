@@ -24,7 +24,7 @@ _UNLIKELY = 0.01
 
 
 def latent_table(
-    result: "LatentTrait", *, caption: str, notes: tuple[str, ...], data: str
+    result: "LatentTrait", *, caption: str, read: tuple[str, ...], data: str
 ) -> Table:
     """Return the table of every quantity of the model with its interval."""
     rows = list(_rows(result))
@@ -38,7 +38,8 @@ def latent_table(
         caption,
         _COLUMNS if result.other is not None else _COLUMNS[:-2],
         rows,
-        notes=(*notes, *_notes(result)),
+        notes=tuple(_notes(result)),
+        read=read,
         data=data,
     )
 

@@ -191,9 +191,9 @@ def capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def counted(count: int, noun: str) -> str:
+def counted(count: int, noun: str, plural: str = "") -> str:
     """Return a count with its noun, in the plural unless there is one."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+    return f"{count} {noun}" if count == 1 else f"{count} {plural or noun + 's'}"
 
 
 def page_cells(table: Table) -> tuple[list[Column], list[list[str]]]:
@@ -246,7 +246,11 @@ def as_text(table: Table, *, width: int | None = None) -> str:
         )
         read = tuple(line for text in read for line in wrapper.wrap(text))
         notes = tuple(line for text in notes for line in wrapper.wrap(text))
-    return "\n".join([table.labelled_caption, *read, *lines, *notes])
+    if read:  # a screen of its own
+        tag = f"{table.tag} ".upper().lstrip()
+        below = ["", *notes] if notes else []
+        return "\n".join([f"{tag}{read[0]}", *read[1:], "", *lines, *below])
+    return "\n".join([table.labelled_caption, *lines, *notes])
 
 
 def as_html(table: Table) -> str:

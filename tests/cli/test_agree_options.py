@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 import pytest
+from scipy import stats
 
 from masrel.agreement import (
     COEFFICIENTS,
@@ -16,6 +17,7 @@ from masrel.agreement import (
     fleiss_kappa,
     krippendorff_alpha,
 )
+from masrel.intervals import analytic
 from tests.cli.process import Caller, Done
 
 # Four patients by three raters, one gap.
@@ -210,6 +212,46 @@ def test_a_level_is_that_of_every_interval(masrel: Caller, wide: Path) -> None:
         if e["coefficient"].startswith("icc")
     )
     assert icc["interval"]["method"] == "REML, profile likelihood"
+
+
+@pytest.mark.parametrize(
+    ("convention", "law"), [("irrcac", "t"), ("spss", "normal"), ("over_n", "normal")]
+)
+def test_a_convention_has_the_error_and_the_interval_of_its_program(
+    masrel: Caller, tmp_path: Path, convention: Any, law: Any
+) -> None:
+    pairs = [("a", "a")] * 10 + [("b", "b")] * 4 + [("a", "b")] * 6
+    path = tmp_path / "pairs.csv"
+    rows = "".join(f"{k},{a},{b}\n" for k, (a, b) in enumerate(pairs))
+    path.write_text(f"item,Kim,Lee\n{rows}", encoding="utf-8")
+    names = ("--coefficients", "cohen_kappa,fleiss_kappa", "--level", "0.8")
+    done = masrel("agree", path, *names, "--convention", convention, "--json", "-")
+    for row in estimates(done):
+        expected = analytic(
+            row["coefficient"],
+            pairs,
+            target="items",
+            level=0.8,
+            convention=convention,
+            distribution=law,
+        )
+        half = 0.5 * (expected.high - expected.low)
+        assert row["interval"]["low"] == expected.low
+        quantile = stats.t.ppf(0.9, 19 if law == "t" else 1e12)
+        assert row["standard_error"] == pytest.approx(half / quantile, rel=1e-9)
+        assert row["interval"]["method"] == expected.method
+    assert json.loads(done.out)["options"]["convention"] == convention
+
+
+def test_what_is_usual_and_has_no_such_error_keeps_its_value(
+    masrel: Caller, wide: Path
+) -> None:
+    percent, kappa = estimates(
+        masrel("agree", wide, "--convention", "spss", "--json", "-")
+    )
+    assert percent["interval"] is None
+    assert "no interval" in percent["notes"][0]
+    assert kappa["interval"]["method"] == "SPSS's error, normal"
 
 
 # Metrics of alpha.

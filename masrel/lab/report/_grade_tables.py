@@ -37,8 +37,8 @@ def categories_section(material: Material) -> Section:
         rows.append((row.grade, row.n_ratings, *numbers))
     n_models = len(entry.models)
     notes = [
-        "Agreement: of the ratings in the grade, the part that meets the same of "
-        f"another rater. Low, High: its {percent(level)} % confidence interval for "
+        "Agreement: how often, where one rater gave the grade, another rater of the "
+        f"model gave it too. Low, High: its {percent(level)} % confidence interval for "
         "these raters on other models like these. κ: Fleiss', of the grade against all "
         "others."
     ]
