@@ -8,6 +8,7 @@ read again where it stands.
 """
 
 import hashlib
+import io
 import os
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -191,7 +192,9 @@ def _lines(path: Path, n_before: int) -> Iterator[str]:
     with path.open("rb") as file:
         for number, line in enumerate(file):
             if number >= n_before:
-                yield decoded(str(path), line, None, number)
+                # at a carriage return, too, as where a file is read as a whole
+                text = decoded(str(path), line, None, number)
+                yield from io.StringIO(text, newline="")
 
 
 def _sha256(path: Path) -> str:

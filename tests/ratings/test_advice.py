@@ -12,15 +12,14 @@ import shlex
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from masrel.cli.agree import agree
 from masrel.ratings._findings import _TEXTS
 from tests.cli.process import Caller, Done
+from tests.ratings.by_hand import agreement
 
 FLAGS = {
     name
@@ -649,25 +648,11 @@ def messages(done: Done) -> dict[str | None, str]:
     return {code_of(text): text for text in texts}
 
 
-def agreement_of(ratings: str) -> tuple[list[str], dict[str, Any]]:
-    """The grades there are, and what they agree by."""
+def items_of(ratings: str) -> list[list[str | None]]:
+    """Items by raters, of a text of them."""
     mark = "[^/]+" if "/" in ratings else "."
-    items = [re.findall(mark, row) for row in ratings.split()]
-    counts = [Counter(grade for grade in row if grade != ".") for row in items]
-    pairs = [
-        Fraction(sum(n * (n - 1) for n in of.values()), of.total() * (of.total() - 1))
-        for of in counts
-        if of.total() > 1
-    ]
-    grades = sum(counts, Counter[str]())
-    observed = sum(pairs) / len(pairs) if pairs else None
-    values: dict[str, Any] = {"percent_agreement": observed}
-    chance = sum(Fraction(n, grades.total()) ** 2 for n in grades.values())
-    if observed is not None and len({of.total() for of in counts}) == 1:
-        values["fleiss_kappa"] = (
-            None if chance == 1 else (observed - chance) / (1 - chance)
-        )
-    return list(grades.elements()), values
+    rows = (re.findall(mark, row) for row in ratings.split())
+    return [[None if grade == "." else grade for grade in row] for row in rows]
 
 
 def check_answer(expected: Mapping[str, str | float | None], done: Done) -> None:
@@ -681,14 +666,14 @@ def check_answer(expected: Mapping[str, str | float | None], done: Done) -> None
                 found = found[int(key) if key.isdigit() else key]
             assert found == pytest.approx(needed, abs=1e-12), where
             continue
-        of_group, values = agreement_of(needed)
-        grades += of_group
+        items = items_of(needed)
+        grades += [grade for row in items for grade in row if grade is not None]
         met = {
             of["coefficient"]: of["value"]
             for of in document["estimates"]
             if where in ("", *map(str, of.values()))
         }
-        for name, value in values.items():
+        for name, value in agreement(items).items():
             right = None if value is None else pytest.approx(float(value), abs=1e-12)
             assert met[name] == right, (where, name)
     counts = {g.replace("; ", ";"): n for g, n in document["read"]["grades"].items()}
