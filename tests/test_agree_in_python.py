@@ -197,11 +197,16 @@ def test_names_of_rows_are_items(frame: Any, items: tuple[str, ...] | None) -> N
         pl.DataFrame({"item": list("abc"), **KIM_LEE}).with_columns(
             pl.col("Kim", "Lee").cast(pl.Enum(ORDER.categories.tolist()))
         ),
+        duckdb.sql(
+            "SELECT i AS item, k::ENUM('lo', 'mid', 'hi', 'top') AS Kim, "
+            "l::ENUM('lo', 'mid', 'hi', 'top') AS Lee FROM (VALUES ('a', 'lo', 'lo'), "
+            "('b', 'hi', 'mid'), ('c', 'lo', 'mid')) AS t(i, k, l)"
+        ),
         pd.DataFrame({"item": list("abc"), **KIM_LEE})
         .melt("item", var_name="rater", value_name="grade")
         .astype({"grade": ORDER}),
     ],
-    ids=["pandas", "polars", "long"],
+    ids=["pandas", "polars", "DuckDB", "long"],
 )
 def test_ordered_categories_are_the_scale(frame: Any, tmp_path: Path) -> None:
     linear = masrel.Estimating(weights="linear")
@@ -258,9 +263,20 @@ ONE_WAY = {"item": "patient", "reading": masrel.Reading(item="patient")}
         (np.zeros((0, 2)), {}, "needed a path"),
         (pd.Series([1, 2]), {}, "got Series"),
         (pl.Series([1, 2]), {}, "got Series"),
-        ({"Kim": [1], "Lee": [1, 2]}, {}, "got dict"),
+        ({"Kim": [1], "Lee": [1, 2]}, {}, "got dict: All arrays must be"),
         ({"Kim": 1}, {}, "got dict"),
-        (3, {}, "got int 3"),
+        (3, {}, "got int: 3"),
+        (
+            pa.table([[1], [2]], names=["Kim", "Kim"]),
+            {},
+            "Expected unique column names",
+        ),
+        (duckdb.sql("SELECT 1 AS Kim, 2 AS Kim"), {}, "Expected unique column names"),
+        (
+            pl.DataFrame({"Kim": [object()], "Lee": [1]}),
+            {},
+            "'Kim', value 1: .* object",
+        ),
         (None, {}, "got NoneType"),
         (FRAME[:0], {}, "needed rows of ratings"),
         (FRAME.assign(Lee=[[1], [2], [1], [2]]), {}, "'Lee', value 1: needed text or"),

@@ -23,7 +23,7 @@ import pandas as pd
 
 from masrel._input import USUAL_NAMES, refuse, shown
 from masrel.agreement._labels import is_row
-from masrel.errors import ParameterError
+from masrel.errors import ParameterError, RatingsError
 from masrel.ratings._findings import (
     Finding,
     Reading,
@@ -106,7 +106,7 @@ def _rows(data: Any) -> pd.DataFrame:
     # of an array, or of sequences
     is_table = getattr(data, "ndim", 2) == 2 and all(map(is_row, data))
     if not is_table or len(set(map(len, data))) != 1:
-        raise refusal(_TABLE, "no table", got=_got(data))
+        raise _no_table(data)
     return pd.DataFrame(data)
 
 
@@ -116,7 +116,7 @@ def _named(data: Any) -> pd.DataFrame:
         try:
             frame = pd.DataFrame(data)
         except (ValueError, TypeError) as error:
-            raise refusal(_TABLE, "no table", got=_got(data)) from error
+            raise _no_table(data, error) from error
     elif isinstance(data, pd.DataFrame):
         frame = data
     else:
@@ -133,16 +133,38 @@ def _arrow(data: Any) -> Any:
 
     try:
         frame = narwhals.from_native(data)
-    except TypeError as error:
-        raise refusal(_TABLE, "no table", got=_got(data)) from error
-    library(_TABLE, "pyarrow")
-    if isinstance(frame, narwhals.LazyFrame):
-        frame = frame.collect()
-    return frame.to_arrow()
+    except (TypeError, ValueError) as error:
+        raise _no_table(data, error) from error
+    arrow = library(_TABLE, "pyarrow")
+    try:
+        kinds = frame.collect_schema()
+        if isinstance(frame, narwhals.LazyFrame):
+            frame = frame.collect()
+    except ValueError as error:  # names that are there twice
+        raise _no_table(data, error) from error
+    for name, kind in kinds.items():
+        if isinstance(kind, narwhals.Object):  # of which Arrow has the address alone
+            raise refusal(_TABLE, "nested cell", column=name, number=1, kind="object")
+    table = frame.to_arrow()
+    # codes without a sign, which older versions of pyarrow give to no frame
+    coded = {
+        field.name: arrow.dictionary(
+            arrow.int32(),
+            field.type.value_type,
+            field.type.ordered or isinstance(kinds[field.name], narwhals.Enum),
+        )
+        for field in table.schema
+        if arrow.types.is_dictionary(field.type)
+    }
+    fields = [
+        field.with_type(coded.get(field.name, field.type)) for field in table.schema
+    ]
+    return table.cast(arrow.schema(fields))
 
 
-def _got(data: Any) -> str:
-    return f"{type(data).__name__} {shown(data)}"
+def _no_table(data: Any, error: Exception | None = None) -> RatingsError:
+    why = " ".join(str(error).split()) if isinstance(error, ValueError) else shown(data)
+    return refusal(_TABLE, "no table", got=f"{type(data).__name__}: {why}")
 
 
 # ---- files whose cells have types ----
