@@ -372,8 +372,7 @@ _TEXTS = {
     "lists": "item {item!r}: needed an annotator of each annotation, got {raters} and "
     "{grades}",
     "no export": "needed .json, .jsonl or .csv in it, got none",
-    "no objects": "needed a JSON list of objects, one a row; --from reads exports of "
-    "annotation tools",
+    "no objects": "needed a JSON list of objects, one a row",
     "shape": "is no export of {source}, or damaged: a record has another shape "
     "({error})",
     "no fields": "needed labels of whole items, got none; spans, regions and relations "

@@ -164,6 +164,8 @@ def _usual(sheet: Sheet, role: str, taken: set[int]) -> tuple[int, ...]:
     usual = USUAL_NAMES[role]
     named = (k for k, n in enumerate(sheet.header) if n.casefold() in usual)
     places = tuple(place for place in named if place not in taken)
+    if len({sheet.header[place] for place in places}) < len(places):
+        return ()  # names are refused, and not what is called so
     if len(places) > 1:
         raise sheet.refuse(
             "role twice",
