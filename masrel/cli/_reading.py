@@ -33,11 +33,6 @@ def weights_of_option(text: str) -> "str | Path":
     )
 
 
-def _line_numbers(text: str) -> tuple[int, ...]:
-    # of an option; a default stands as it is
-    return tuple(map(int, split_commas(text))) if isinstance(text, str) else text
-
-
 reading_options = [
     click.option(
         "--item",
@@ -73,8 +68,8 @@ reading_options = [
     ),
     click.option(
         "--header",
-        type=_line_numbers,
-        default=(),
+        type=lambda text: tuple(map(int, filter(None, split_commas(text)))),
+        default="",
         metavar="N,…",
         help="Lines that make up the names; data begin below the last.",
     ),

@@ -21,7 +21,7 @@ from dataclasses import dataclass, field, replace
 from datetime import date, datetime
 from decimal import Decimal
 from functools import partial
-from itertools import accumulate, chain, count, islice
+from itertools import chain, count, islice
 from pathlib import Path
 from typing import Any
 
@@ -536,20 +536,15 @@ class Row:
     @property
     def n_filled(self) -> int:
         """How many cells are not empty."""
-        return sum(bool(cell.strip()) for cell in self.cells)
+        return sum(map(bool, self.cells))
 
 
 def joined_names(lines: Sequence[Sequence[str]]) -> list[str]:
     """Return the names that lines make up: merged cells are filled from their left."""
     *upper, last = ([cell.strip() for cell in line] for line in lines)
-    parts: list[Iterable[str]] = [
-        accumulate(chain(line, [""] * len(last)), _or_left) for line in upper
-    ]
-    return [" ".join(filter(None, name)) for name in zip(*parts, last, strict=False)]
-
-
-def _or_left(left: str, cell: str) -> str:
-    return cell or left
+    places = range(len(last))
+    parts = [[next(filter(None, line[k::-1]), "") for k in places] for line in upper]
+    return [" ".join(filter(None, name)) for name in zip(*parts, last, strict=True)]
 
 
 def names_option(
@@ -643,18 +638,23 @@ def _is_blank(record: list[str]) -> bool:
     return len(record) < 2 and not "".join(record).strip(" \t")
 
 
+def _placed(reader: Any, n_before: int) -> Iterator[Row]:
+    # the records that are not blank; n_before: lines of the file before them
+    begins = n_before + 1
+    for record in reader:
+        if not _is_blank(record):
+            cells = [cell.strip() for cell in record]
+            yield Row(begins, n_before + reader.line_num, cells)
+        begins = n_before + reader.line_num + 1
+    yield Row(begins, begins, [])  # behind the last
+
+
 def line_of(
     lines: Callable[[], Iterable[str]], delimiter: str, n_before: int, number: int
 ) -> int:
     """Return the line where a record begins, looked up only for a message."""
-    reader, begins = reader_of(lines(), delimiter), n_before + 1
-    for record in reader:
-        if not _is_blank(record):
-            if number == 0:
-                return begins
-            number -= 1
-        begins = n_before + reader.line_num + 1
-    return begins
+    rows = _placed(reader_of(lines(), delimiter), n_before)
+    return next(islice(rows, number, None)).line
 
 
 def _separator(
@@ -663,7 +663,12 @@ def _separator(
     # what stands between cells, the first records, and how many of these are titles
     lines = list(islice(io.StringIO(text, newline=""), 5 * SNIFFED))
     marks = [delimiter] if delimiter else DELIMITERS
-    heads = {m: rows for m in marks if (rows := _head(lines, m, n_before))}
+    heads = {
+        mark: [row for row in islice(rows, SNIFFED) if row.cells]
+        for mark in marks
+        for rows in [_placed(reader_of(lines, mark), n_before)]
+    }
+    heads = {mark: rows for mark, rows in heads.items() if rows}
     if not heads:
         raise refusal(name, "no records")
     widths = {mark: len(rows[0].cells) for mark, rows in heads.items()}
@@ -690,19 +695,6 @@ def _separator(
         raise refusal(name, "one column", first=lines[0].strip())
     mark = marked[0] if marked else max(several, key=lambda mark: widths[mark])
     return mark, heads[mark], max(n_titles[mark], 0)
-
-
-def _head(lines: list[str], delimiter: str, n_before: int) -> list[Row]:
-    # the first records that are not blank
-    rows, begins, reader = [], 0, reader_of(lines, delimiter)
-    for record in reader:
-        if not _is_blank(record):
-            cells = [cell.strip() for cell in record]
-            rows.append(Row(n_before + begins + 1, n_before + reader.line_num, cells))
-        begins = reader.line_num
-        if len(rows) == SNIFFED:
-            break
-    return rows
 
 
 def _n_titles(rows: list[Row], of_names: list[int]) -> int:
