@@ -36,6 +36,7 @@ _MAY_BE_BOTH = (
     {"clusters", "item"},
 )
 
+_MANY_TEXTS = 1000  # of grades, unless most are numbers
 # Names of columns that name raters have one of these words.
 _RATER = re.compile(
     "rater|annotator|coder|judge|observer|worker|assessor|reviewer|reader|user|expert|"
@@ -236,9 +237,20 @@ def _wide(
         raise sheet.refuse("no rater", where=sheet.at(0))
     if kind == "wide" and not options.frequency:
         _refuse_spans(sheet, item, named)
+    if kind == "wide" and "raters" not in named:
+        _refuse_comments(sheet, raters)
     return Layout(
         kind=kind, item=item, raters=raters, grades=raters, is_item_guessed=is_guessed
     )
+
+
+def _refuse_comments(sheet: Sheet, raters: Sequence[int]) -> None:
+    # so many texts, few of them numbers, that hardly any is there twice
+    texts = [text for place in raters for text in sheet.columns[place].texts]
+    n, n_cells = len(texts), len(raters) * len(sheet.numbers)
+    if n > _MANY_TEXTS and 2 * n > n_cells:
+        if 2 * sum(re.search(r"\d", text) is None for text in texts) > n:
+            raise sheet.refuse("comments", n=n, n_cells=n_cells)
 
 
 def _refuse_spans(

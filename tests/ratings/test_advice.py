@@ -311,6 +311,15 @@ TABLE: dict[str, Asked] = {
             "--ignore n --raters Kim,Lee": "uu uv",
         },
     ),
+    "comments": Asked(
+        code="comments",
+        text="item,Kim,Lee,why,more\n"
+        + "".join(
+            f"{k},1,2,{'a' * (k % 23)} {'b' * (k // 23)},{'c' * k}\n"
+            for k in range(1, 520)
+        ),
+        tries={"--raters Kim,Lee": "12 " * 519},
+    ),
     "no names": Asked(
         code="grades as names",
         text="P1,1,2\nP2,2,2\nP3,1,1\n",
