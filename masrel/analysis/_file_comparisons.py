@@ -111,7 +111,8 @@ def _difference_rows(
     name, by = file.read["file"], file.read["by"]
     if len(file.parts) < 2:
         raise ParameterError(
-            f"--by: needs a column that tells two groups or more apart, {by!r} has one"
+            "--by: needs a column that tells two groups or more apart, "
+            + ("or --by-criterion" if by is None else f"{by!r} has one")
         )
     pairs = {
         (first, second): _groups_of(name, (one, other))

@@ -147,6 +147,12 @@ reading_options = [
 
 table_options = [
     click.option(
+        "--by-criterion",
+        is_flag=True,
+        help="Columns are criteria by raters, as tone_Kim, tone_Lee, gait_Kim …: "
+        "estimate each criterion; --raters then names raters.",
+    ),
+    click.option(
         "--counts",
         is_flag=True,
         help="Items by categories: how many raters chose each.",

@@ -12,7 +12,7 @@ compare = file_command(
     p-value, and Holm's adjustment of it; of three groups or more it is tested whether
     all agree as well. FILE is whatever masrel agree reads.
     """,
-    click.option("--by", metavar="COL", required=True, help="Column of the groups."),
+    click.option("--by", metavar="COL", help="Column of the groups."),
     clusters_option,
     estimating=("coefficients", "weights", "metric", "level"),
     figure="Draw each group's intervals into this .png, .svg or .pdf.",

@@ -14,11 +14,19 @@ from masrel.ratings._findings import (
     USUAL_MISSING,
     Finding,
     Reading,
+    few,
     listed,
     quoted,
 )
 from masrel.ratings._grade_texts import is_number, normal_form, spelled_alike
-from masrel.ratings._layout import ITEM_NAME, Layout, names_rows, numbers_rows, sides_of
+from masrel.ratings._layout import (
+    ITEM_NAME,
+    Layout,
+    criteria_of,
+    names_rows,
+    numbers_rows,
+    sides_of,
+)
 from masrel.ratings._sheet import Codes, Column, Sheet
 from masrel.scales import Scale
 
@@ -72,14 +80,17 @@ def doubt_columns(
     findings = []
     if layout.frequency is None:
         findings = _frequencies(sheet, layout, options)
-    if not options.raters:
+    are_named = bool(options.raters or layout.criteria)
+    if not are_named:
         _refuse_other_tables(sheet, layout, options, names, scale)
     # an item that is there twice is refused below, and no column is one of raters
     is_long = any(
         len(sheet.columns[p].texts) < len(sheet.numbers) for p in layout.item[:1]
     )
     is_long &= options.repeated == "error" and layout.session == layout.by is None
-    if not (options.raters or is_long):
+    if layout.criteria:
+        _refuse_scales(sheet, layout, codes)
+    if not (are_named or is_long):
         findings += _no_raters(sheet, layout, options, codes, scale, freq)
     n_items = len(sheet.numbers)
     if layout.is_item_guessed and len(names) > 2 * n_items and not sheet.is_transposed:
@@ -87,7 +98,7 @@ def doubt_columns(
     if not all(map(is_number, scale.grades)):
         if sheet.has_header and freq.sum() > 3 and not options.names_at:
             findings += _second_header(sheet, codes, scale)
-    elif not options.raters and layout.frequency is None:
+    elif not are_named and layout.frequency is None:
         findings += _looks_counted(sheet, names, codes, scale, freq)
     unrated = np.flatnonzero((codes < 0).all(axis=0))[:_SHOWN]
     return findings + [Finding("no grade of", rater=names[k]) for k in unrated]
@@ -100,7 +111,7 @@ def _refuse_other_tables(
     if len(layout.item) == 1 and len(names) == len(sheet.numbers) > 1:
         sides = sides_of(sheet.columns[layout.item[0]].texts, names)
         if sides is not None and _are_sides(sides, scale):
-            raise sheet.refuse("contingency", names=_few(names))
+            raise sheet.refuse("contingency", names=few(names))
     # a name of a column that the caller gives is no row
     is_named = options.item or options.ignore or options.by or options.frequency
     if sheet.has_header and not sheet.is_transposed and not is_named:
@@ -117,11 +128,6 @@ def _are_sides(
     are_counts = all(grade.isdecimal() for grade in scale.grades)
     is_numbered = all(map(is_number, categories)) and ITEM_NAME.fullmatch(raters[0])
     return not any(raters) or (are_counts and not is_numbered)
-
-
-def _few(names: Sequence[str]) -> str:
-    # what an option takes, unless it is too long to be of help
-    return f" {quoted(names)}" if len(names) <= _SHOWN else ""
 
 
 def _refuse_first_line(
@@ -147,7 +153,7 @@ def _refuse_first_line(
             "grades as names",
             where=sheet.at(0),
             columns=listed(names, _SHOWN),
-            names=_few(names),
+            names=few(names),
         )
 
 
@@ -223,6 +229,8 @@ def _no_raters(
     alone, sure = _alone(codes, scale, freq)
     vouched = {k for k, name in enumerate(names) if name == options.reference}
     wrong = (named | sure) - vouched
+    if not named:
+        _refuse_criteria(sheet, names, {names[k] for k in sure})
     if wrong and not named and len(names) == 2:
         met = [np.unique(column[column >= 0]).tolist() for column in codes.T]
         first, second = (listed([scale.grades[k] for k in of], _SHOWN) for of in met)
@@ -241,13 +249,43 @@ def _no_raters(
     return [Finding("apart", **facts[1])] if alone - vouched else []
 
 
+def _refuse_criteria(sheet: Sheet, names: Sequence[str], alone: set[str]) -> None:
+    # columns whose names have two parts that others have, too
+    ways = criteria_of(names)
+    columns = {column for way in ways for of in way.values() for column in of.values()}
+    if 2 * len(columns & alone) >= len(columns):
+        return
+    first = [next(iter(way.items())) for way in ways]
+    ones = [f"--raters{few([*of.values()])} reads {name!r}" for name, of in first]
+    is_sure = len(ways) == 1
+    raise sheet.refuse(
+        "criteria",
+        first=listed(list(ways[0]), _SHOWN),
+        second=listed(list(first[0][1]), _SHOWN),
+        advice=f"{ones[0]} alone, --by-criterion all"
+        if is_sure
+        else ", ".join(f"{one} if that is a criterion" for one in ones),
+    )
+
+
+def _refuse_scales(sheet: Sheet, layout: Layout, codes: Codes) -> None:
+    # criteria without a grade in common
+    met: dict[str, set[int]] = {}
+    for column, (criterion, _) in zip(codes.T, layout.criteria, strict=True):
+        met.setdefault(criterion, set()).update(column[column >= 0].tolist())
+    for criterion, grades in met.items():
+        others = set().union(*(of for name, of in met.items() if name != criterion))
+        if grades and others and not grades & others:
+            raise sheet.refuse("other grades", criterion=criterion)
+
+
 def _advice(names: Sequence[str], wrong: set[int]) -> str:
     # how columns are left aside; a list that is long is no help
     out = [names[k] for k in sorted(wrong)]
     rest = [name for k, name in enumerate(names) if k not in wrong]
-    raters = f"--raters{_few(rest) * (len(rest) > 1)} names those that rate"
-    is_short = bool(rest and _few(out))
-    return f"--ignore{_few(out)} leaves such columns aside, " * is_short + raters
+    raters = f"--raters{few(rest) * (len(rest) > 1)} names those that rate"
+    is_short = bool(rest and few(out))
+    return f"--ignore{few(out)} leaves such columns aside, " * is_short + raters
 
 
 def _is_no_rater(sheet: Sheet, place: int) -> bool:
@@ -302,7 +340,7 @@ def _looks_counted(
     is_most &= np.average(sums == total, weights=freq) >= 1 / 2
     if total < 2 or not has_zeros or not ((sums == total).all() or is_most):
         return []
-    finding = Finding("counts", total=total, names=_few(names))
+    finding = Finding("counts", total=total, names=few(names))
     is_sure = freq.sum() >= _ENOUGH_ROWS and len(names) <= _MANY_CATEGORIES
     if is_sure and scale.name == "observed":
         raise sheet.refuse("counts", **finding.facts)

@@ -45,6 +45,9 @@ class Reading:
         The lines, from 1, that make up the names.
     session, by : str or None
         Columns of the sessions, and of groups that are told apart.
+    by_criterion : bool
+        Whether columns such as ``tone_Kim, tone_Lee, gait_Kim, gait_Lee`` are groups,
+        one a criterion; `raters` then are the other parts of their names.
     clusters : str or None
         Column of the clusters that items come in, such as patients with several
         sites: one of each item.
@@ -99,6 +102,7 @@ class Reading:
     header: tuple[int, ...] = ()
     session: str | None = None
     by: str | None = None
+    by_criterion: bool = False
     clusters: str | None = None
     frequency: str | None = None
     repeated: Repeated = "error"
@@ -141,8 +145,11 @@ class Reading:
     @property
     def whole(self) -> list[str]:
         """The options that need the whole file in memory."""
-        names = ("by", "session", "clusters", "frequency", "counts", "table")
-        options = [f"--{name}" for name in names if getattr(self, name)]
+        names = (
+            *("by", "by_criterion", "session", "clusters", "frequency", "counts"),
+            "table",
+        )
+        options = [f"--{n.replace('_', '-')}" for n in names if getattr(self, n)]
         is_kept = self.repeated == "error"
         return options if is_kept else [*options, f"--repeated {self.repeated}"]
 
@@ -219,6 +226,12 @@ class Reading:
                 self.frequency and (self.clusters or self.repeated != "error"),
                 "--frequency: items that a row stands for have no names, as --clusters "
                 "and --repeated need",
+            ),
+            (
+                self.by_criterion
+                and (is_long or is_counted or self.frequency or self.by),
+                "--by-criterion: groups the columns of a wide table, and not with "
+                "--rater, --grade, --counts, --table, --frequency or --by",
             ),
             (
                 self.missing_codes and is_counted,
@@ -299,6 +312,11 @@ def if_missing(texts: Sequence[str]) -> str:
     if not 0 < len(texts) <= MOST_CODES or any("," in text for text in texts):
         return ""
     return f"; if that is missing, --missing {quoted(texts)}"
+
+
+def few(names: Sequence[str]) -> str:
+    """Return what an option takes behind it, unless that is too long to be of help."""
+    return f" {quoted(names)}" if len(names) <= MOST_CODES else ""
 
 
 def listed(texts: Sequence[str], most: int = _SHOWN, more: str = "") -> str:
@@ -406,6 +424,16 @@ _TEXTS = {
     "row is an item",
     "no raters": "{columns}: no grade in common with the other columns, or the name of "
     "something else: {advice}",
+    "criteria": "the columns look like criteria by raters, {first} by {second}: "
+    "{advice}, --raters with all their names takes them for raters",
+    "who rates": "--by-criterion: needs --raters with those who rate: --raters{first} "
+    "or --raters{second}",
+    "no criteria": "--by-criterion: needs columns that are called as tone_Kim, "
+    "tone_Lee, gait_Kim and gait_Lee are, got {columns}",
+    "no criterion": "--by-criterion: {columns}: no columns of all raters, {raters}: "
+    "--ignore{names} leaves them aside, --raters names those who rate",
+    "other grades": "criterion {criterion!r} has no grade in common with the others: "
+    "it needs to be read by itself, without --by-criterion",
     "nothing in common": "{one!r} has the grades {first}, {other!r} {second}, and none "
     "in common: if they are the same grades, write them alike, if others, --raters "
     "{names} counts them so",

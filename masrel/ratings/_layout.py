@@ -15,12 +15,14 @@ from masrel.ratings._findings import (
     USUAL_MISSING,
     Finding,
     Reading,
+    few,
     listed,
 )
 from masrel.ratings._grade_texts import is_number
 from masrel.ratings._sheet import Codes, Column, Sheet
 
 Kind = Literal["long", "wide", "counts", "table"]
+Criteria = dict[str, dict[str, str]]  # criterion to rater to the name of a column
 
 STUDY_COLUMNS = ("session", "rater", "model", "repeat", "grade")
 """Columns of a table that `masrel ratings` writes; it has others, too."""
@@ -43,6 +45,22 @@ _RATER = re.compile(
     "examiner|evaluator",
     re.IGNORECASE,
 )
+# Two parts of a name, or a word and a number; and a part that is a rater's.
+_PARTS = [
+    re.compile(pattern)
+    for pattern in (
+        r"(.+?)[\W_]+(.+?)\W*",
+        r"(.+)[\W_]+(.+?)\W*",
+        r"([^\W\d_]{3,})(\d+)",
+    )
+]
+_KINDS = (
+    "r|rev|obs|ann|dr|novice|nurse|doctor|physician|clinician|student|teacher|human|"
+    f"model|llm|resident|therapist|{_RATER.pattern}"
+)
+_KIND = re.compile(f"({_KINDS})s?", re.IGNORECASE)
+_PERSON = re.compile(rf"({_KINDS})[\W_]*(\d+|[a-z])?", re.IGNORECASE)
+_CODE = re.compile(r"\d+|[^\W\d_]")
 # Names of columns of where a part of a text, or of a recording, begins and ends.
 _SPAN = (
     r"((char|token|word|span|text|offset|pos)[\W_]*)?({})([\W_]*(char|token|word|"
@@ -70,6 +88,7 @@ class Layout:
     by: int | None = None
     clusters: int | None = None
     frequency: int | None = None
+    criteria: tuple[tuple[str, str], ...] = ()  # and rater, of every column of ratings
     # whether the item is the first column because nothing else was said of it
     is_item_guessed: bool = False
 
@@ -80,6 +99,7 @@ def find_layout(sheet: Sheet, options: Reading) -> Layout:
         option: _columns_of(sheet, option, getattr(options, option))
         for option in _NAMED
         if getattr(options, option)
+        if not (option == "raters" and options.by_criterion)  # parts of names
     }
     for one, other in combinations(named, 2):
         both = set(named[one]) & set(named[other])
@@ -98,8 +118,11 @@ def find_layout(sheet: Sheet, options: Reading) -> Layout:
     is_counted = options.counts or options.table
     # the corner of a transposed table names its rows, which are now its columns
     is_wide = is_counted or "raters" in named or options.no_item or bool(often)
+    is_wide |= options.by_criterion
     is_wide |= sheet.is_transposed and not {"rater", "grade"} & named.keys()
     layout = None if is_wide else _long(sheet, named, taken)
+    if options.by_criterion:
+        layout = _of_criteria(sheet, options, named.get("item", ()), taken)
     if layout is None:
         layout = _wide(sheet, options, named, taken)
     roles = (*layout.item, *layout.raters, *layout.grades, *session, *by, *clusters)
@@ -251,6 +274,79 @@ def _refuse_comments(sheet: Sheet, raters: Sequence[int]) -> None:
     if n > _MANY_TEXTS and 2 * n > n_cells:
         if 2 * sum(re.search(r"\d", text) is None for text in texts) > n:
             raise sheet.refuse("comments", n=n, n_cells=n_cells)
+
+
+def _of_criteria(
+    sheet: Sheet, options: Reading, item: tuple[int, ...], taken: set[int]
+) -> Layout:
+    # a wide table whose columns are criteria by raters
+    header, raters = sheet.header, [r for of in options.raters for r in of.split(",")]
+    free = [k for k in range(len(header)) if k not in taken.union(item)]
+    ways = criteria_of([header[place] for place in free], raters)
+    if len(ways) > 1:
+        first, second = (few(list(of[next(iter(of))])) for of in ways)
+        raise sheet.refuse("who rates", first=first, second=second)
+    pair = {n: (c, r) for way in ways for c, of in way.items() for r, n in of.items()}
+    rest = [place for place in free if header[place] not in pair]
+    if not item and not options.no_item:
+        item = _usual(sheet, "item", {*free} - {*rest}) or tuple(rest[:1])
+    others = [header[place] for place in rest if place not in item]
+    if not pair or (others and not raters):
+        known = listed(list(dict.fromkeys(rater for _, rater in pair.values())))
+        facts = {"columns": listed(others), "names": few(others), "raters": known}
+        raise sheet.refuse("no criterion" if pair else "no criteria", **facts)
+    places = tuple(place for place in free if header[place] in pair)
+    criteria = tuple(pair[header[place]] for place in places)
+    return Layout(
+        kind="wide", item=item, raters=places, grades=places, criteria=criteria
+    )
+
+
+def criteria_of(names: Sequence[str], raters: Sequence[str] = ()) -> list[Criteria]:
+    """Return the columns of criteria by raters, as their names may be read.
+
+    One way, none, or two where either part of a name may be the rater.
+    """
+    grids = [grid for parts in _PARTS for grid in _grids(parts, names, {*raters})]
+    grid = max(grids, key=lambda of: sum(map(len, of.values())), default={})
+    if raters or not grid:
+        return [grid] * bool(grid)
+    one, other = list(grid), list(next(iter(grid.values())))
+    for kinds, numbers in ((one, other), (other, one)):  # raters of two kinds, numbered
+        if all(map(_KIND.fullmatch, kinds)) and all(map(_CODE.fullmatch, numbers)):
+            return []
+    turned = {name: {part: grid[part][name] for part in one} for name in other}
+    more = _like_raters(other, one) - _like_raters(one, other)
+    return [grid] * (more >= 0) + [turned] * (more <= 0)
+
+
+def _grids(
+    pattern: re.Pattern[str], names: Sequence[str], raters: set[str]
+) -> Iterator[Criteria]:
+    # names of two parts, each of which stands beside the same others
+    parts = {name: m.groups() for name in names if (m := pattern.fullmatch(name))}
+    firsts = {first for first, _ in parts.values()}
+    parts |= {n: (n, "") for n in names if n in firsts and n not in parts}
+    for side in (0, 1):
+        of_part: Criteria = {}
+        for name, pair in parts.items():
+            if not raters or pair[1 - side] in raters:
+                of_part.setdefault(pair[side], {})[pair[1 - side]] = name
+        blocks: dict[frozenset[str], Criteria] = {}
+        for part, of in of_part.items():
+            blocks.setdefault(frozenset(of), {})[part] = of
+        if raters:
+            is_all = raters <= {name for of in of_part.values() for name in of}
+            yield from [of_part] * is_all
+        else:
+            yield from (b for key, b in blocks.items() if min(len(b), len(key)) > 1)
+
+
+def _like_raters(parts: Sequence[str], others: Sequence[str]) -> int:
+    # how much parts of names are like names of raters: numbers are of anything
+    are_names = all(part[:1].isupper() and part.isalpha() for part in parts)
+    are_names &= not any(map(_CODE.fullmatch, (*parts, *others)))
+    return 2 if all(map(_PERSON.fullmatch, parts)) else int(are_names)
 
 
 def _refuse_spans(

@@ -409,17 +409,28 @@ def _rated(
         findings = findings + doubt_items(sheet, layout, len(item.texts), n_rows)
     else:
         names = [sheet.header[place] for place in layout.raters]
-        rater = Column(np.tile(np.arange(n_raters), n_rows), names)
+        pairs = layout.criteria or [("", name) for name in names]
+        of_column = Column.of(np.arange(n_raters), [name for _, name in pairs])
+        rater = Column(np.tile(of_column.codes, n_rows), of_column.texts)
         findings = findings + doubt_columns(
             sheet, layout, options, grades.codes, grades.scale, sheet.freq
         )
         row = np.repeat(row, n_raters)
     findings += doubt_names("raters", rater.texts) + doubt_item_names(sheet, item)
     part, names_of_parts = _parts(sheet, layout)
+    part = part[row]
+    if layout.criteria:
+        criterion = Column.of(np.arange(n_raters), [of for of, _ in layout.criteria])
+        part = part * len(criterion.texts) + np.tile(criterion.codes, n_rows)
+        names_of_parts = [
+            {**names, "group": text}
+            for names in names_of_parts
+            for text in criterion.texts
+        ]
     groups = sorted({names.get("group", "") for names in names_of_parts})
     findings += doubt_names("groups", groups)
     # part, item, rater, grade and row of each rating
-    ratings = [part[row], item.codes[row], rater.codes, codes, row]
+    ratings = [part, item.codes[row], rater.codes, codes, row]
     once, scale = _one_each(sheet, layout, options, ratings, item, rater, grades.scale)
     parts = []
     for k, of in enumerate(names_of_parts):
@@ -441,7 +452,7 @@ def _rated(
             )
         )
     n_repeated = len(row) - len(once[0])
-    facts: dict[str, Any] = {}
+    facts: dict[str, Any] = {"by": "criterion"} if layout.criteria else {}
     if layout.clusters is not None:
         facts["clusters"] = sheet.header[layout.clusters]
         facts["n_clusters"] = len({name for part in parts for name in part.clusters})

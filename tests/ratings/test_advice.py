@@ -110,6 +110,7 @@ DAYS = "item,rater,day,grade\n" + "".join(
 # Kim and Lee differ on three items, two one way. Of words, 5 / 6 agree by linear
 # weights, and 23 / 36 by chance.
 CHANGES = "item,Kim,Lee,Ann\na,1,1,1\nb,1,2,1\nc,1,2,1\nd,2,1,1\n"
+CRITERIA = "item,tone_Kim,tone_Lee,gait_Kim,gait_Lee\na,1,1,2,2\nb,1,2,1,1\n"
 WORDED = "item,Kim,Lee\na,mild,mild\nb,no,no\nc,severe,mild\n"
 # True of no file where nothing tells the ratings apart.
 TWICE = {"--by COL": None, "--session COL": None}
@@ -387,6 +388,43 @@ TABLE: dict[str, Asked] = {
         tries={
             "--table": "yes/yes yes/yes yes/no no/no",
             "--raters 'Kim yes,Kim no'": "21 01",
+        },
+    ),
+    "criteria": Asked(
+        code="criteria",
+        text=CRITERIA,
+        tries={
+            "--raters tone_Kim,tone_Lee": "11 12",
+            "--by-criterion": {"tone": "11 12", "gait": "22 11"},
+            "--raters tone_Kim,tone_Lee,gait_Kim,gait_Lee": "1122 1211",
+        },
+    ),
+    "criteria or raters": Asked(
+        code="criteria",
+        text=CRITERIA.replace("Kim", "a").replace("Lee", "b"),
+        tries={
+            "--raters tone_a,tone_b": "11 12",
+            "--raters tone_a,gait_a": "12 11",
+            "--raters tone_a,tone_b,gait_a,gait_b": "1122 1211",
+        },
+    ),
+    "who rates criteria": Asked(
+        code="who rates",
+        options="--by-criterion",
+        text=CRITERIA.replace("Kim", "a").replace("Lee", "b"),
+        tries={
+            "--raters a,b": {"tone": "11 12", "gait": "22 11"},
+            "--raters tone,gait": {"a": "12 11", "b": "12 21"},
+        },
+    ),
+    "beside criteria": Asked(
+        code="no criterion",
+        options="--by-criterion",
+        text="item,tone_Kim,tone_Lee,gait_Kim,gait_Lee,speed\n"
+        "p,1,1,2,2,1\nq,1,2,1,1,2\n",
+        tries={
+            "--ignore speed": {"tone": "11 12", "gait": "22 11"},
+            "--raters Kim,Lee": {"tone": "11 12", "gait": "22 11"},
         },
     ),
     "spans": Asked(

@@ -382,3 +382,143 @@ def test_sides_of_a_table_with_names_of_raters(
 )
 def test_numbered_items_and_raters_are_no_sides(tmp_path: Path, text: str) -> None:
     assert read(tmp_path, text).read["n_items"] == 2
+
+
+# ---- criteria beside each other ----
+
+BOTH = ["1,1,3,2", "2,2,1,1", "2,1,3,3", "3,3,2,1"]
+
+
+def criteria(names: str, rows: list[str] = BOTH) -> str:
+    lines = (f"e{k},{row}" for k, row in enumerate(rows))
+    return "\n".join([f"essay,{names}", *lines])
+
+
+OF_TONE = [["1", "1"], ["2", "2"], ["2", "1"], ["3", "3"]]
+OF_GAIT = [["3", "2"], ["1", "1"], ["3", "3"], ["2", "1"]]
+TURNED = "Ines.tone,Omar.tone,Ines.gait,Omar.gait"
+
+
+@pytest.mark.parametrize(
+    ("names", "options", "one"),
+    [
+        *(
+            (names, {}, one)
+            for names, one in (
+                ("tone_Ines,tone_Omar,gait_Ines,gait_Omar", "tone_Ines,tone_Omar"),
+                (TURNED, "Ines.tone,Omar.tone"),
+                ("tone: R1,tone: R2,gait: R1,gait: R2", "'tone: R1,tone: R2'"),
+                ("Q1_Ines,Q1_Omar,Q2_Ines,Q2_Omar", "Q1_Ines,Q1_Omar"),
+            )
+        ),
+        # either part may be the rater
+        *(
+            (names, {"raters": raters}, f"({one}) reads .* ({other}) reads")
+            for names, raters, one, other in (
+                *(
+                    ("tone_a,tone_o,gait_a,gait_o", "a,o", *both)
+                    for both in (("tone_a,tone_o", "tone_a,gait_a"),)
+                ),
+                ("Tone1,Tone2,Gait1,Gait2", "1,2", "Tone1,Tone2", "Tone1,Gait1"),
+            )
+        ),
+    ],
+)
+def test_criteria(
+    tmp_path: Path, names: str, options: dict[str, Any], one: str
+) -> None:
+    text = criteria(names)
+    with pytest.raises(RatingsError, match=f"--raters {one}"):
+        read(tmp_path, text)
+    if options:
+        with pytest.raises(RatingsError, match="needs --raters with those who rate"):
+            read(tmp_path, text, by_criterion=True)
+    file = read(tmp_path, text, by_criterion=True, **options)
+    assert [part.group for part in file.parts] == [
+        part for part in ("tone", "gait", "Tone", "Gait", "Q1", "Q2") if part in names
+    ]
+    grades = (*file.scale.grades, None)
+    assert [
+        [[grades[code] for code in row] for row in part.ratings.codes.tolist()]
+        for part in file.parts
+    ] == [OF_TONE, OF_GAIT]
+    assert file.read["by"] == "criterion"
+    assert file.read["item"] == ["essay"]
+    assert (file.read["n_items"], file.read["n_raters"]) == (4, 2)
+    assert not file.warnings
+    # all are raters if they are named so
+    assert read(tmp_path, text, raters=names).read["n_raters"] == 4
+
+
+@pytest.mark.parametrize(
+    ("names", "options", "raters"),
+    [
+        # who rates is named, and what is of others is left aside
+        ("tone_Ines,tone_Omar,gait_Ines,x", {"raters": "Ines,Omar"}, [2, 1]),
+        ("tone_Ines,tone_Omar,tone_Yun,gait_Ines", {"raters": "Ines,Yun"}, [2, 1]),
+        ("tone_Ines,x,gait_Ines,y", {"raters": "Ines", "ignore": "x,y"}, [1, 1]),
+    ],
+)
+def test_criteria_of_raters_who_are_named(
+    tmp_path: Path, names: str, options: dict[str, Any], raters: list[int]
+) -> None:
+    file = read(tmp_path, criteria(names), by_criterion=True, **options)
+    assert [len(part.raters) for part in file.parts] == raters
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        "R1_a,R2_b,R3_c,R4_d",
+        "rater_1,rater_2,rater_3,rater_4",
+        "expert_1,expert_2,novice_1,novice_2",
+        "nurse A,nurse B,doctor A,doctor B",
+        "R1,R2,S1,S2",
+        "Dr. Kim,Dr. Lee,Dr. Oh,Prof. Ann",
+        "site1_R1,site1_R2,site2_R3,site2_R4",
+    ],
+)
+def test_raters_whose_names_are_no_criteria(tmp_path: Path, names: str) -> None:
+    file = read(tmp_path, criteria(names))
+    assert file.read["raters"] == names.split(",")
+    with pytest.raises(RatingsError, match="--by-criterion: needs columns"):
+        read(tmp_path, criteria(names), by_criterion=True)
+
+
+@pytest.mark.parametrize(
+    ("names", "options", "words"),
+    [
+        ("tone_Ines,tone_Omar,gait_Ines,gait_Omar", {"by": "essay"}, "and not with"),
+        ("tone_Ines,tone_Omar,gait_Ines,gait_Omar", {"counts": True}, "and not with"),
+        ("tone_Ines,tone_Omar,gait_Ines,gait_Omar", {"raters": "Yun"}, "needs columns"),
+        ("tone_Ines,tone_Omar,gait_Ines,gait_Omar", {"stream": True}, "whole file"),
+    ],
+)
+def test_criteria_that_are_refused(
+    tmp_path: Path, names: str, options: dict[str, Any], words: str
+) -> None:
+    with pytest.raises((RatingsError, ParameterError), match=words):
+        read(tmp_path, criteria(names), by_criterion=True, **options)
+
+
+def test_criteria_of_other_grades_are_refused(tmp_path: Path) -> None:
+    text = criteria(TURNED, ["1,1,u,v", "1,2,v,v", "2,2,u,u"])
+    with pytest.raises(RatingsError, match="'tone' has no grade in common"):
+        read(tmp_path, text, by_criterion=True)
+
+
+def test_criteria_are_told_apart_from_timings(tmp_path: Path) -> None:
+    # columns of which most share no grade are no criteria
+    rows = ["1,2,0.1,x", "2,1,0.7,y", "1,1,2.2,z"]
+    with pytest.raises(RatingsError, match=r"in common.*--ignore"):
+        read(tmp_path, criteria("Q1_a,Q2_a,Q1_b,Q2_b", rows))
+
+
+def test_criteria_are_compared(tmp_path: Path, masrel: Caller) -> None:
+    path = tmp_path / "r.csv"
+    path.write_text(criteria(TURNED))
+    done = masrel("compare", path, "--by-criterion", "--json", "-")
+    (row, *_) = json.loads(done.out)["differences"]
+    assert (row["first"], row["second"], row["value"]) == ("tone", "gait", 0.25)
+    assert row["design"] == "dependent"
+    assert "--by: needs" in masrel("compare", path, "--raters", TURNED).err
