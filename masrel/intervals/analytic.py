@@ -227,7 +227,9 @@ def _with_error(
     if reason is not None:
         return estimate, problem.undefined(reason, method=method, unit=unit)
     notes = warn_small(n, 10, unit or "items", None if unit else n_items)
-    df = math.inf if distribution == "normal" else n - 1
+    # irrCAC's t counts items of one rating, too
+    counts_all = _ERRORS.get(convention or "", {}).get(problem.entry.name) is _irrcac
+    df = math.inf if distribution == "normal" else (n_items if counts_all else n) - 1
     return estimate, problem.by_t(
         error, df, lowest=lowest, method=method, unit=unit, notes=notes
     )

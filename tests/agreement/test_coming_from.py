@@ -131,6 +131,10 @@ def test_irrcac_error_with_a_single_rating_is_offered_by_name(name: str) -> None
     )
     half = 0.5 * (interval.high - interval.low)
     assert printed["se"] == pytest.approx(half / 0.2533471031357997, abs=1e-9)
+    options = {"target": "items", "convention": "irrcac"}
+    interval = quiet(analytic, ours.coefficient, GAPS, **options)
+    low, high = printed["confidence_interval"]
+    assert (interval.low, interval.high) == pytest.approx((low, high), abs=1e-9)
 
 
 def test_irrcac_error_of_alpha_is_that_of_fleiss_kappa() -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import t
 
 from masrel.agreement import fleiss_kappa, percent_agreement
 from masrel.errors import (
@@ -147,6 +148,9 @@ def test_irrcac_counts_a_single_rating_as_disagreement(
 ) -> None:
     found = half(quiet(name, ratings, **IRRCAC, level=0.2)) / 0.253347
     assert found == pytest.approx(error, rel=1e-4)
+    by_t = half(quiet(name, ratings, **{**IRRCAC, "distribution": "t"}, level=0.2))
+    # which counts such an item, too
+    assert by_t / t.ppf(0.6, len(ratings) - 1) == pytest.approx(error, rel=1e-4)
 
 
 def test_irrcacs_error_of_complete_ratings_is_ours_but_for_alpha() -> None:
