@@ -689,8 +689,8 @@ def refuse_measurements(ratings: CodedRatings | CountedRatings) -> None:
         raise RatingsError(
             f"ratings: {n_known} different numbers among {n_ratings} ratings are "
             "measurements, which hardly ever agree without weights: an intraclass "
-            'correlation (ICC) takes them as they are, and so do metric="interval" of '
-            'Krippendorff\'s alpha and weights such as "quadratic"'
+            "correlation, such as icc_a1, takes them as they are, and so do "
+            "Krippendorff's alpha with the metric interval and quadratic weights"
         )
 
 
