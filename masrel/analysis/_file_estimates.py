@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from masrel._input import refuse, split_names
-from masrel.errors import MasrelError, ParameterError
+from masrel.errors import MasrelError, ParameterError, RatingsError
 from masrel.estimates import (
     Estimate,
     Interval,
@@ -172,14 +172,13 @@ class Questions(Estimating):
                     f"--coefficients: needed coefficients, got {name!r}: {other} has "
                     "that table"
                 )
-        by_item = [name for name in _BY_ITEM if getattr(self, name)]
-        option = f"--{by_item[0].replace('_', '-')}" if by_item else None
+        tables = [of.replace("_", "-") for of in _BY_ITEM if getattr(self, of)]
         of_raters = self.target in ("raters", "both")
         refuse(
             (
-                clusters is not None and option is not None,
-                f"--clusters: {option} takes every item by itself, so needs one of "
-                "them, got both",
+                clusters is not None and tables,
+                f"--clusters: --{''.join(tables[:1])} takes every item by itself, so "
+                "needs one of them, got both",
             ),
             (
                 clusters is not None and of_raters,
@@ -388,9 +387,10 @@ def placed(start: str, place: str | None = "") -> Iterator[None]:
     """Say of a refusal which file or option it is of, and which part of the file."""
     try:
         yield
-    except MasrelError as error:
+    except RatingsError as error:
         where = f"{start}: {place}" if place else start
-        raise type(error)(f"{where}: {error}") from error
+        text = str(error).removeprefix("ratings: ")  # a parameter, and no option
+        raise RatingsError(f"{where}: {text}") from error
 
 
 # ---- estimates ----

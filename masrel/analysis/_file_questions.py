@@ -76,11 +76,11 @@ def answers(
     """Return the ratings without a reference, and the answers, agreement first."""
     sessions = list(dict.fromkeys(str(part.session) for part in file.parts))
     if len(sessions) > 1 and not questions.retest:
+        retest = ", --retest compares them" * (questions.command == "agree")
         raise RatingsError(
             f"{file.read['file']}: holds {len(sessions)} sessions "
             f"({', '.join(sessions)}), so that raters graded the same item more than "
-            f"once; --by {file.read['session']} estimates each, --retest compares "
-            "them"
+            f"once; --by {file.read['session']} estimates each{retest}"
         )
     if questions.weights != "identity" and not isinstance(questions.weights, Weights):
         check_order(file, f"--weights {questions.weights}")
@@ -142,10 +142,11 @@ def _categories(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
                 ratings = replace(ratings, codes=codes, categories=("this", "other"))
                 fleiss = coefficient("fleiss_kappa")
                 of = estimate_row(fleiss, ratings, row.keys, folded)
-                estimate = replace(row.estimate, interval=of.estimate.interval)
-                if of.convention is not None:
-                    error = of.estimate.standard_error
-                    estimate = replace(estimate, standard_error=error)
+                estimate = replace(
+                    row.estimate,
+                    standard_error=of.estimate.standard_error,
+                    interval=of.estimate.interval,
+                )
                 row = replace(of, title=row.title, estimate=estimate)
             rows.append(row)
     heads = heads_of(", ".join([*part_names(file, file.parts[0]), "category"]))

@@ -5,6 +5,7 @@ import shutil
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -36,8 +37,7 @@ if TYPE_CHECKING:
 
 Option = Callable[..., Any]
 
-# of notes where there is no terminal, and the largest in one
-_WIDTHS = (88, 100)
+_WIDTH, _WIDEST = 88, 100  # of notes where there is no terminal, and in one
 
 _DRAWERS = {
     "diagnosis_pairs": "masrel.plots._rater_pairs:rater_figure",
@@ -60,9 +60,8 @@ def _list_register(
         raters = str(fewest) if most == fewest else f"{fewest} or more"
         if entry.shape == "pairs":
             raters += ", each twice (--retest)"
-        weights = "any" if entry.weighted else "none"
-        aliases = ", ".join(entry.aliases)
-        lines.append((entry.name, entry.title, raters, weights, aliases))
+        more = ("any" if entry.weighted else "none", ", ".join(entry.aliases))
+        lines.append((entry.name, entry.title, raters, *more))
     click.echo("\n".join(aligned(lines, ["left"] * 5, rule=True)))
     context.exit()
 
@@ -235,25 +234,25 @@ def _show_answers(
     )
     notes = left_out(others, questions)
     warned = [f"warning: {text}" for text in reading_warnings(others, answered[0])]
-    sentences = ""
-    if is_sentence:
-        sentences = agreement_sentences(
-            answered[0], bands=questions.words, data=table.data, items=output.item_name
-        )
-    width, widest = _WIDTHS
-    if sys.stdout.isatty():
-        width = min(shutil.get_terminal_size((width, 24)).columns, widest)
+    sentences = partial(
+        agreement_sentences,
+        answered[0],
+        bands=questions.words,
+        data=table.data,
+        items=output.item_name,
+    )
+    columns = shutil.get_terminal_size((_WIDTH, 24)).columns
     write_output(
         output,
         document=lambda: _record(
             *(others, reading, questions, answered), [*warned, *notes]
         ),
-        text=lambda: sentences if is_sentence else table,
+        text=sentences if is_sentence else lambda: table,
         figure=lambda: _figure(answered, questions),
         stamp=SIMULATED if others.simulated else "",
         notes=(*table.read, *notes),
         more=more,
-        width=width,
+        width=min(columns, _WIDEST) if sys.stdout.isatty() else _WIDTH,
     )
     if is_sentence:
         echo_notes((*table.read, *table.notes))
@@ -302,10 +301,8 @@ def _figure(answers: Sequence[Answer], questions: Questions) -> "Content | Drawn
     for answer in answers:
         if answer.figure:
             return Drawn(_DRAWERS[answer.name], (answer.figure, answer.of))
-    first, *others = answers
-    rows = first.estimates
-    if first.name != "agreement":
-        rows += tuple(row for of in others for row in of.estimates)
+    shown = answers[:1] if answers[0].name == "agreement" else answers
+    rows = [row for answer in shown for row in answer.estimates]
     return agreement_forest(rows, questions.target or "items")
 
 

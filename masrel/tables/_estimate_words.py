@@ -100,18 +100,13 @@ def pair_words(estimate: Estimate) -> str:
     return "both ratings of a rater" if is_retest else "two ratings or more"
 
 
-def called(estimate: Estimate) -> str:
-    """Return what a coefficient is called in a sentence."""
-    entry = COEFFICIENTS[estimate.coefficient]
-    if entry.weighted and estimate.weights != "identity":
-        return f"{entry.title} ({estimate.weights} weights)"
-    return entry.title
-
-
 def sentence(estimate: Estimate, *, items: str = "items", word: str = "") -> str:
     """Return an estimate of items as a sentence for a paper, in the style of APA."""
     # items: what they are called; word: the one that it earns, and whose it is
-    entry, name = COEFFICIENTS[estimate.coefficient], called(estimate)
+    entry = COEFFICIENTS[estimate.coefficient]
+    name = entry.title
+    if entry.weighted and estimate.weights != "identity":
+        name = f"{name} ({estimate.weights} weights)"
     rated = counted(estimate.n_items, "item", items)
     if estimate.n_items_paired < estimate.n_items:
         rated += f" ({estimate.n_items_paired} with {pair_words(estimate)})"

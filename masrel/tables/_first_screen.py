@@ -10,8 +10,7 @@ from masrel.analysis._file_estimates import Answer, Questions, Row
 from masrel.estimates import _population
 from masrel.ratings import Finding, RatingsFile
 from masrel.tables._answer_tables import Detail, answer_table
-from masrel.tables._estimate_words import called
-from masrel.tables._tables import Table, counted, number, p_text, percent
+from masrel.tables._tables import Table, counted, number, p_text, percent, significant
 
 _SHOWN = 12  # raters that are named
 
@@ -214,7 +213,7 @@ def _agreement(answer: Answer, items: str) -> str:
     """Return how often raters agree, and the first kappa; of groups its ends."""
     rows = answer.estimates
     main = max(rows, key=lambda row: _allows_for_chance(row.estimate.coefficient))
-    estimate, name = main.estimate, called(main.estimate)
+    estimate, name = main.estimate, main.title + "," * (", " in main.title)
     in_units = COEFFICIENTS[estimate.coefficient].in_units
     value = partial(number, digits=3, in_units=in_units)
     same = [row for row in rows if row.title == main.title]
@@ -229,16 +228,16 @@ def _agreement(answer: Answer, items: str) -> str:
     by_name = {(of.estimate.coefficient, of.estimate.weights): of for of in rows}
     share = by_name.get(("percent_agreement", "identity"), main)
     if share is not main and share.estimate.reason is None:
-        of_two = share.estimate.n_raters == 2
-        who = "The two raters" if of_two else "Two raters picked at random"
-        how_often = f"{number(100.0 * share.estimate.value, 1)} % of the time"
+        others = share.estimate.n_raters > 2
+        who = "Two raters picked at random" if others else "The two raters"
+        how_often = f"{significant(100.0 * share.estimate.value, 3)} % of the time"
         allows = f"{name}, which allows for chance, is {value(estimate.value)}"
         text = f"{who} give the same grade {how_often}; {allows}"
     if (interval := estimate.interval) is not None and interval.reason is None:
         kind = f"{percent(interval.level)} % {interval.kind}"
-        what = f"interval from {value(interval.low)} to {value(interval.high)}"
-        if interval.is_one_sided:
-            what = f"lower bound of {value(interval.low)}"
+        low, high = value(interval.low), value(interval.high)
+        both = f"interval from {low} to {high}"
+        what = f"lower bound of {low}" if interval.is_one_sided else both
         to = _population(interval).replace("items", items)
         text += f", with a {kind} {what} for {to} like these"
     return f"{text}."
