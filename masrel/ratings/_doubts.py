@@ -52,7 +52,11 @@ _BESIDE = frozenset(
 )
 _SURE = frozenset("conf confidence confidences certainty".split())
 _FLAGS = frozenset("agree agreed agreement disagree disagreement match correct".split())
-_FREQUENCY = re.compile(r"(n|w|wt|(counts?|freqs?|frequenc(y|ies)|weights?)\W?)", re.I)
+_FREQUENCY = re.compile(
+    r"n|w|wt|(.*[\W_])?(counts?|freqs?|frequenc(y|ies)|weights?|cases|n?obs|anzahl|"
+    r"häufigkeit|effectifs?|frecuencia)([\W_].*)?",
+    re.IGNORECASE,
+)
 # Names of rows that summarize the others.
 _SUMMARY = re.compile(
     r"(grand )?(total|sum|mean|average|avg|median|sd|s\.d\.|std|min|max|n|count|all)s?"
@@ -80,6 +84,10 @@ def doubt_columns(
     findings = []
     if layout.frequency is None:
         findings = _frequencies(sheet, layout, options)
+    elif 2 * freq[-1] == freq.sum() and any(
+        _SUMMARY.fullmatch(column.texts[column.codes[-1]]) for column in sheet.columns
+    ):
+        raise sheet.refuse("sum row", where=sheet.where(len(freq) - 1))
     are_named = bool(options.raters or layout.criteria)
     if not are_named:
         _refuse_other_tables(sheet, layout, options, names, scale)
@@ -109,8 +117,7 @@ def _refuse_other_tables(
 ) -> None:
     # a contingency table, one without names of columns, or of items
     if len(layout.item) == 1 and len(names) == len(sheet.numbers) > 1:
-        sides = sides_of(sheet.columns[layout.item[0]].texts, names)
-        if sides is not None and _are_sides(sides, scale):
+        if _are_sides(sheet.columns[layout.item[0]].texts, names, scale):
             raise sheet.refuse("contingency", names=few(names))
     # a name of a column that the caller gives is no row
     is_named = options.item or options.ignore or options.by or options.frequency
@@ -120,14 +127,12 @@ def _refuse_other_tables(
         _refuse_first_column(sheet, layout.item[0], scale)
 
 
-def _are_sides(
-    sides: tuple[list[str], list[str], tuple[str, str]], scale: Scale
-) -> bool:
+def _are_sides(rows: Sequence[str], names: Sequence[str], scale: Scale) -> bool:
     # and not numbered items and raters, such as item 1 and rater 1
-    categories, _, raters = sides
-    are_counts = all(grade.isdecimal() for grade in scale.grades)
+    categories, _, raters = sides_of(rows, names) or ([], [], ("", ""))
     is_numbered = all(map(is_number, categories)) and ITEM_NAME.fullmatch(raters[0])
-    return not any(raters) or (are_counts and not is_numbered)
+    are_counts = all(grade.isdecimal() for grade in scale.grades)
+    return bool(categories) and (not any(raters) or (are_counts and not is_numbered))
 
 
 def _refuse_first_line(
@@ -182,11 +187,8 @@ def _refuse_first_column(sheet: Sheet, place: int, scale: Scale) -> None:
 def _frequencies(sheet: Sheet, layout: Layout, options: Reading) -> list[Finding]:
     # a column of how often each row is there, of rows that all differ otherwise
     item = [] if layout.is_item_guessed else [*layout.item]
-    others = [
-        place
-        for place in range(len(sheet.header))
-        if place not in item and not names_rows(sheet, place)
-    ]
+    places = [k for k in range(len(sheet.header)) if k not in item]
+    others = [place for place in places if not names_rows(sheet, place)]
     for place in others:
         name, column = sheet.header[place], sheet.columns[place]
         rows = [sheet.columns[other].codes for other in others if other != place]
@@ -255,51 +257,45 @@ def _refuse_criteria(sheet: Sheet, names: Sequence[str], alone: set[str]) -> Non
     columns = {column for way in ways for of in way.values() for column in of.values()}
     if 2 * len(columns & alone) >= len(columns):
         return
-    first = [next(iter(way.items())) for way in ways]
-    ones = [f"--raters{few([*of.values()])} reads {name!r}" for name, of in first]
-    is_sure = len(ways) == 1
+    firsts = [next(iter(way.items())) for way in ways]
+    if_so = "alone, --by-criterion all" if len(ways) == 1 else "if that is a criterion"
     raise sheet.refuse(
         "criteria",
         first=listed(list(ways[0]), _SHOWN),
-        second=listed(list(first[0][1]), _SHOWN),
-        advice=f"{ones[0]} alone, --by-criterion all"
-        if is_sure
-        else ", ".join(f"{one} if that is a criterion" for one in ones),
+        second=listed(list(firsts[0][1]), _SHOWN),
+        advice=", ".join(
+            f"--raters{few([*of.values()])} reads {name!r} {if_so}"
+            for name, of in firsts
+        ),
     )
 
 
 def _refuse_scales(sheet: Sheet, layout: Layout, codes: Codes) -> None:
     # criteria without a grade in common
-    met: dict[str, set[int]] = {}
-    for column, (criterion, _) in zip(codes.T, layout.criteria, strict=True):
-        met.setdefault(criterion, set()).update(column[column >= 0].tolist())
-    for criterion, grades in met.items():
-        others = set().union(*(of for name, of in met.items() if name != criterion))
-        if grades and others and not grades & others:
+    names = np.array([criterion for criterion, _ in layout.criteria])
+    for criterion in dict.fromkeys(names.tolist()):
+        met, others = codes[:, names == criterion], codes[:, names != criterion]
+        are_rated = met.max() >= 0 <= others.max(initial=-1)
+        if are_rated and np.intersect1d(met, others).max(initial=-1) < 0:
             raise sheet.refuse("other grades", criterion=criterion)
 
 
 def _advice(names: Sequence[str], wrong: set[int]) -> str:
     # how columns are left aside; a list that is long is no help
-    out = [names[k] for k in sorted(wrong)]
-    rest = [name for k, name in enumerate(names) if k not in wrong]
-    raters = f"--raters{few(rest) * (len(rest) > 1)} names those that rate"
-    is_short = bool(rest and few(out))
-    return f"--ignore{few(out)} leaves such columns aside, " * is_short + raters
+    out = few([names[k] for k in sorted(wrong)]) * (len(wrong) < len(names))
+    rest = few([name for k, name in enumerate(names) if k not in wrong])
+    raters = f"--raters{rest * (len(names) - len(wrong) > 1)} names those that rate"
+    return f"--ignore{out} leaves such columns aside, " * bool(out) + raters
 
 
 def _is_no_rater(sheet: Sheet, place: int) -> bool:
-    name = sheet.header[place]
+    name, cells = sheet.header[place], {*sheet.columns[place].texts}
     parts = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()
     words = set(re.findall(r"[^\W\d_]+|\d+", parts))
-    if words & _SURE or _OTHERS.fullmatch(name):
-        return True
-    if words & _FLAGS and len({*sheet.columns[place].texts} - {*USUAL_MISSING}) <= 2:
-        return True
-    key = words & _SUMS
-    return (
-        bool(key) and words <= key | _BESIDE and not _is_of_series(name, sheet.header)
-    )
+    is_flag = bool(words & _FLAGS) and len(cells - {*USUAL_MISSING}) <= 2
+    is_sum = bool(words & _SUMS) and words <= _SUMS | _BESIDE
+    is_sum &= not _is_of_series(name, sheet.header)
+    return bool(words & _SURE or _OTHERS.fullmatch(name)) or is_flag or is_sum
 
 
 def _alone(codes: Codes, scale: Scale, freq: Codes) -> tuple[set[int], set[int]]:

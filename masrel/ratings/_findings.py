@@ -282,8 +282,8 @@ class Finding(str):
 
     Examples
     --------
-    >>> Finding("named rater", column="age", name="age").code
-    'named rater'
+    >>> Finding("no grade of", rater="Kim").code
+    'no grade of'
     """
 
     __slots__ = ("code", "facts")

@@ -66,7 +66,7 @@ _SPAN = (
     r"((char|token|word|span|text|offset|pos)[\W_]*)?({})([\W_]*(char|token|word|"
     r"offset|pos|position|index|idx))?"
 )
-_BEGIN, _END = "start|begin|beginning|from|onset", "end|stop|to|offset"
+_ENDS = ("start|begin|beginning|from|onset", "end|stop|to|offset")
 # Names of columns that name items: a word of these, in any case.
 ITEM_NAME = re.compile(
     r"|#|(.*[^a-z])?(id|no|nr|num|key|code|name|participants?|[a-z]*(item|subject|patient|"
@@ -336,10 +336,10 @@ def _grids(
         for part, of in of_part.items():
             blocks.setdefault(frozenset(of), {})[part] = of
         if raters:
-            is_all = raters <= {name for of in of_part.values() for name in of}
-            yield from [of_part] * is_all
-        else:
-            yield from (b for key, b in blocks.items() if min(len(b), len(key)) > 1)
+            blocks = {frozenset().union(*blocks): of_part}
+        for others, block in blocks.items():
+            if raters <= others if raters else min(len(block), len(others)) > 1:
+                yield block
 
 
 def _like_raters(parts: Sequence[str], others: Sequence[str]) -> int:
@@ -355,33 +355,31 @@ def _refuse_spans(
     # columns of where a part begins and ends, unless every item is one such part
     pair = [
         place
-        for pattern in (_BEGIN, _END)
+        for pattern in _ENDS
         for place, name in enumerate(sheet.header)
         if re.fullmatch(_SPAN.format(pattern), name, re.IGNORECASE)
         if place not in named.get("ignore", ())
     ]
     if len(pair) != 2:
         return
-    columns = [sheet.columns[place] for place in pair]
-    parts = [texts for texts in together(columns)[1] if not {*texts} & {*USUAL_MISSING}]
-    are_spans = all(
-        is_number(begin) and is_number(end) and float(begin) <= float(end)
-        for begin, end in parts
+    texts, parts, items = (
+        together([sheet.columns[place] for place in places])[1] if places else []
+        for places in (pair, (*item, *pair), item)
     )
-    if item and not {*item} & {*pair}:
-        columns = [sheet.columns[place] for place in item]
-        both = [*columns, *(sheet.columns[place] for place in pair)]
-        are_spans &= len(together(columns)[1]) < len(together(both)[1])
-    if parts and are_spans:
+    texts = [ends for ends in texts if not {*ends} & {*USUAL_MISSING}]
+    are_spans = texts and all(
+        is_number(begin) and is_number(end) and float(begin) <= float(end)
+        for begin, end in texts
+    )
+    if are_spans and ({*item} & {*pair} or len(items) < len(parts)):
         begin, end = (sheet.header[place] for place in pair)
         raise sheet.refuse("span columns", begin=begin, end=end)
 
 
 def names_rows(sheet: Sheet, place: int) -> bool:
     """Return whether a column is called as names of items are, and all differ."""
-    n_rows, name = len(sheet.numbers), sheet.header[place]
-    is_name = ITEM_NAME.fullmatch(name) is not None
-    return not name or (is_name and len(sheet.columns[place].texts) == n_rows)
+    name, n_texts = sheet.header[place], len(sheet.columns[place].texts)
+    return not name or bool(ITEM_NAME.fullmatch(name) and n_texts == len(sheet.numbers))
 
 
 def sides_of(
@@ -414,10 +412,8 @@ def _without_names(texts: Sequence[str]) -> Iterator[tuple[str, list[str]]]:
 
 def numbers_rows(sheet: Sheet, place: int) -> bool:
     """Return whether a column counts the rows, from 0 or from 1."""
-    texts, n_rows = sheet.columns[place].texts, len(sheet.numbers)
-    return any(
-        texts == [str(k) for k in range(first, first + n_rows)] for first in (0, 1)
-    )
+    from_0 = list(map(str, range(len(sheet.numbers) + 1)))
+    return sheet.columns[place].texts in (from_0[:-1], from_0[1:])
 
 
 def named(sheet: Sheet, role: str, places: Sequence[int]) -> Column:

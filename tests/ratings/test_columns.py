@@ -89,6 +89,7 @@ def test_frequencies(
             for cell in ("2.5", "-1", "two", "", "1e13")
         ),
         ("A,B,Freq\n1,1,0\n1,2,0\n", {}, "--frequency.*none"),
+        (f"{PAIRS}Total,,8\n", {}, "line 6: is the sum"),
         (PAIRS, {"frequency": "count"}, "--frequency: there is no column 'count'"),
         (PAIRS, {"raters": ["Kim,Freq"]}, "--raters, --frequency|--frequency, --rat"),
         *(
