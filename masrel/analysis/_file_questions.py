@@ -66,6 +66,7 @@ if TYPE_CHECKING:
 
 _T = TypeVar("_T")
 
+_MOST_GRADES = 200  # that each have an interval in seconds
 _MANY = 8  # raters beyond which only the pairs that agree least are shown
 _SHOWN_PAIRS = 20  # of these pairs
 
@@ -124,6 +125,14 @@ def _without_reference(file: RatingsFile, reference: str) -> RatingsFile:
 
 def _categories(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
     """Give how well raters tell each category from all others."""
+    n_grades = len(file.scale.grades)
+    refuse(
+        (
+            n_grades > _MOST_GRADES,
+            f"--each-category: takes at most {_MOST_GRADES} different grades, got "
+            f"{n_grades}",
+        )
+    )
     rows = []
     folded = replace(questions, coefficients=["all"], weights="identity")
     for part, _, names in parts_of(file):

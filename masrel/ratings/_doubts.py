@@ -193,7 +193,8 @@ def _frequencies(sheet: Sheet, layout: Layout, options: Reading) -> list[Finding
         name, column = sheet.header[place], sheet.columns[place]
         rows = [sheet.columns[other].codes for other in others if other != place]
         if (
-            _FREQUENCY.fullmatch(name)
+            rows
+            and _FREQUENCY.fullmatch(name)
             and not _is_of_series(name, sheet.header)
             and not (options.raters and place in layout.raters)
             and all(

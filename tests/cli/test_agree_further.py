@@ -172,6 +172,14 @@ def test_the_kappa_of_each_diagnosis_is_the_published_one(
         assert other["standard_error"] == pytest.approx(one["standard_error"])
 
 
+def test_measurements_have_no_table_of_each(tmp_path: Path, masrel: Caller) -> None:
+    path = tmp_path / "measured.csv"
+    rows = (f"p{k},{k},{k}\n" for k in range(201))
+    path.write_text("item,Kim,Lee\n" + "".join(rows))
+    done = masrel("agree", path, "--each-category", "--target", "items")
+    assert (done.code, "at most 200" in done.err) == (2, True)
+
+
 def test_the_interval_of_a_category_is_that_of_the_folded_ratings(
     masrel: Caller, tmp_path: Path
 ) -> None:

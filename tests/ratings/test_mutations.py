@@ -74,6 +74,7 @@ BASES = [
     ),
     made("sides.csv", ",Lee u,Lee v\nKim u,5,1\nKim v,2,4\n", "--table"),
     made("long.csv", "item,rater,grade\na,Kim,1\na,Lee,2\nb,Kim,1\nb,Lee,1\n"),
+    made("one.csv", "item,n\na,1\nb,2\n"),
     made("items.json", json.dumps(ITEMS)),
     made(
         "list.json",
