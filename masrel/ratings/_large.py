@@ -100,7 +100,8 @@ def source_of(path: Path, options: Reading) -> Source:
     kind = path.suffix.lower()
     has_duckdb = options.stream or find_spec("duckdb")
     if path.is_file() and has_duckdb and not is_other:
-        if kind == ".parquet" and options.encoding is None and not options.no_header:
+        has_names = not (options.no_header or options.names_at)
+        if kind == ".parquet" and options.encoding is None and has_names:
             return _parquet(path, options)
         if kind in TEXT_FORMATS and options.encoding in (None, "utf-8"):
             return _text(path, options)
@@ -118,8 +119,12 @@ def _parquet(path: Path, options: Reading) -> Source:
     about = file.metadata
     if not options.stream and about.num_rows * about.num_columns < _LARGE_TABLE:
         raise NoStreamError("it fits the memory")
-    first = islice(file.iter_batches(_HEAD_ROWS), 1)
-    head = library(name, "pyarrow").Table.from_batches(first, file.schema_arrow)
+    first, table = (
+        islice(file.iter_batches(_HEAD_ROWS), 1),
+        library(name, "pyarrow").Table,
+    )
+    read = partial(table.from_batches, first, file.schema_arrow)
+    head = read_foreign(name, ".parquet", read)
     facts = {"format": "parquet"}
     sheet = sheet_of(name, partial(_sha256, path), table_frame(head), facts)
     # names of rows that pandas keeps come first

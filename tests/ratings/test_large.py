@@ -348,6 +348,20 @@ def test_what_needs_the_whole_file_is_no_stream(
         read_ratings(path, Reading(stream=True, **options))
 
 
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [({}, "is damaged, or no .parquet file"), ({"skip": 1}, "--stream: needed")],
+)
+def test_a_damaged_file_and_one_whose_names_are_in_no_line(
+    tmp_path: Path, options: dict[str, Any], words: str
+) -> None:
+    path = written(tmp_path / "long.parquet", long_columns(None, list(range(400))))
+    data = path.read_bytes()
+    path.write_bytes(data[:40] + bytes(40) + data[80:])
+    with pytest.raises(RatingsError, match=words):
+        read_ratings(path, Reading(stream=True, **options))
+
+
 def test_a_packed_file_is_no_stream(tmp_path: Path) -> None:
     path = tmp_path / "wide.csv.gz"
     path.write_bytes(gzip.compress(b"id,A,B\np1,1,2\n"))
