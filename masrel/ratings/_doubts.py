@@ -34,23 +34,28 @@ from masrel.scales import Scale
 _OTHERS = re.compile(
     r"(age|sex|gender|comments?|notes?|remarks?|id|index|date|day|time|timestamp|"
     r"duration|lead_time|height|bmi|group|site|cent(er|re)|diagnosis|side|text|email|"
-    r"unnamed: \d+|(final|true)[\W_]?(label|score|grade|rating|value|class|decision))",
+    r"unnamed: \d+)",
     re.IGNORECASE,
 )
 # Words of names of what is made of several ratings, and of what may stand beside, as in
 # "majority_vote"; words of any such name, and of one of a column of two values.
 _SUMS = frozenset(
-    "majority gold golden consensus adjudicated adjudication truth groundtruth gt "
-    "reference mode modal mean average avg median sd std stdev variance total sum "
-    "agree agreed agreement disagree disagreement match matched unanimous kappa "
+    "gold golden gt maj adj ref reference final true correct key mode modal mean "
+    "average avg median range sd std stdev variance total sum probability prob kappa "
+    "agree agreed agreement disagree disagreement match matches matched unanimous "
+    "same equal diff difference delta "
     "n count counts freq freqs frequency frequencies weight weights".split()
 )
 _BESIDE = frozenset(
     "label labels score scores rating ratings grade grades value values vote votes "
-    "voting voted standard class category decision answer annotation ground of all the "
-    "is are row rater raters annotator annotators percent num number overall".split()
+    "voting voted standard class category decision answer annotation ground expert y "
+    "of all the is are row rater raters annotator annotators exact percent num number "
+    "overall".split()
 )
-_SURE = frozenset("conf confidence confidences certainty".split())
+_SURE = frozenset(
+    "majority consensus adjudicated adjudication truth groundtruth conf confidence "
+    "confidences certainty".split()
+)
 _FLAGS = frozenset("agree agreed agreement disagree disagreement match correct".split())
 _FREQUENCY = re.compile(
     r"n|w|wt|(.*[\W_])?(counts?|freqs?|frequenc(y|ies)|weights?|cases|n?obs|anzahl|"
@@ -68,6 +73,7 @@ _MAX_COMPARED = 2000  # columns that are compared with all others
 _ENOUGH = 3  # ratings of a column that are some grade of another's, if both rate
 _ENOUGH_ROWS, _MANY_CATEGORIES = 4, 15  # of a table that is surely one of counts
 _SHOWN = 5
+_APART = "name or grades, of which none is in common with the others, as it is written"
 
 
 def doubt_columns(
@@ -243,13 +249,26 @@ def _no_raters(
             **{"first": first, "second": second},
         )
     facts = [
-        {"columns": listed([names[k] for k in sorted(of)], _SHOWN)}
-        | {"advice": _advice(names, of)}
+        {
+            "columns": listed([names[k] for k in sorted(of)], _SHOWN),
+            "why": "name" if of <= named else _APART,
+            "advice": _advice(names, of),
+        }
         for of in (wrong, alone - vouched)
     ]
     if wrong:
         raise sheet.refuse("no raters", **facts[0])
     return [Finding("apart", **facts[1])] if alone - vouched else []
+
+
+def refuse_named(sheet: Sheet, layout: Layout, options: Reading) -> None:
+    """Refuse columns of a wide table that are called as no raters are."""
+    places = [] if layout.kind != "wide" or options.raters else layout.raters
+    wrong = [sheet.header[place] for place in places if _is_no_rater(sheet, place)]
+    if wrong and wrong != [options.reference] and not layout.criteria:
+        advice = f"--ignore{few(wrong)} leaves such columns aside"
+        columns = listed(wrong, _SHOWN)
+        raise sheet.refuse("no raters", columns=columns, why="name", advice=advice)
 
 
 def _refuse_criteria(sheet: Sheet, names: Sequence[str], alone: set[str]) -> None:
@@ -265,7 +284,7 @@ def _refuse_criteria(sheet: Sheet, names: Sequence[str], alone: set[str]) -> Non
         first=listed(list(ways[0]), _SHOWN),
         second=listed(list(firsts[0][1]), _SHOWN),
         advice=", ".join(
-            f"--raters{few([*of.values()])} reads {name!r} {if_so}"
+            f"--raters{few([*of.values()])} reads {name or 'the first'!r} {if_so}"
             for name, of in firsts
         ),
     )
@@ -296,7 +315,10 @@ def _is_no_rater(sheet: Sheet, place: int) -> bool:
     is_flag = bool(words & _FLAGS) and len(cells - {*USUAL_MISSING}) <= 2
     is_sum = bool(words & _SUMS) and words <= _SUMS | _BESIDE
     is_sum &= not _is_of_series(name, sheet.header)
-    return bool(words & _SURE or _OTHERS.fullmatch(name)) or is_flag or is_sum
+    # Kim=Lee, mean of Kim and Lee
+    of_two = len(words & {other.lower() for other in sheet.header if other != name}) > 1
+    is_other = bool(words & _SURE or _OTHERS.fullmatch(name))
+    return is_other or is_flag or is_sum or of_two
 
 
 def _alone(codes: Codes, scale: Scale, freq: Codes) -> tuple[set[int], set[int]]:

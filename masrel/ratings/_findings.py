@@ -422,8 +422,7 @@ _TEXTS = {
     "contingency": "rows and columns have the same names, so that this looks like a "
     "contingency table of two raters: --table reads it as one, --raters{names} if a "
     "row is an item",
-    "no raters": "{columns}: no grade in common with the other columns, or the name of "
-    "something else: {advice}",
+    "no raters": "{columns}: no rater by {why}: {advice}",
     "criteria": "the columns look like criteria by raters, {first} by {second}: "
     "{advice}, --raters with all their names takes them for raters",
     "who rates": "--by-criterion: needs --raters with those who rate: --raters{first} "

@@ -326,7 +326,7 @@ def _grids(
     # names of two parts, each of which stands beside the same others
     parts = {name: m.groups() for name in names if (m := pattern.fullmatch(name))}
     firsts = {first for first, _ in parts.values()}
-    parts |= {n: (n, "") for n in names if n in firsts and n not in parts}
+    parts = {n: (n, "") for n in names if n in firsts and n not in parts} | parts
     for side in (0, 1):
         of_part: Criteria = {}
         for name, pair in parts.items():

@@ -31,6 +31,7 @@ from masrel.ratings._doubts import (
     doubt_item_names,
     doubt_items,
     doubt_names,
+    refuse_named,
 )
 from masrel.ratings._findings import (
     Finding,
@@ -395,6 +396,15 @@ def _file_of(
 # ---- ratings one by one ----
 
 
+def _graded(sheet: Sheet, layout: Layout, options: Reading) -> Grades:
+    # what is no rater by its name may hold anything
+    try:
+        return graded(sheet, layout.grades, options)
+    except RatingsError:
+        refuse_named(sheet, layout, options)
+        raise
+
+
 def _rated(
     sheet: Sheet, layout: Layout, options: Reading, findings: list[Finding]
 ) -> RatingsFile:
@@ -402,7 +412,7 @@ def _rated(
     n_rows, n_raters = len(sheet.numbers), len(layout.raters)
     row = np.arange(n_rows)
     item = named(sheet, "item", layout.item)
-    grades = graded(sheet, layout.grades, options)
+    grades = _graded(sheet, layout, options)
     codes = grades.codes.ravel()
     if layout.kind == "long":
         rater = named(sheet, "rater", layout.raters)
@@ -603,7 +613,7 @@ def _patterns(
 ) -> RatingsFile:
     # a wide table whose rows are patterns of ratings
     names = [sheet.header[place] for place in layout.raters]
-    grades, freq = graded(sheet, layout.grades, options), sheet.freq
+    grades, freq = _graded(sheet, layout, options), sheet.freq
     findings = findings + doubt_columns(
         sheet, layout, options, grades.codes, grades.scale, freq
     )

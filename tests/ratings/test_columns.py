@@ -218,6 +218,15 @@ def test_a_column_of_such_a_name_is_no_rater(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize(
+    "cells", [["n/a", "?", "", "x", "-"], ["True", "True", "False", "True", "False"]]
+)
+def test_a_name_comes_before_what_cells_are(tmp_path: Path, cells: list[str]) -> None:
+    for name in ("comment", "agree"):
+        with pytest.raises(RatingsError, match=f"--ignore {name} leaves"):
+            read(tmp_path, beside(name, cells))
+
+
+@pytest.mark.parametrize(
     ("text", "is_refused"),
     [
         *(
@@ -227,7 +236,7 @@ def test_a_column_of_such_a_name_is_no_rater(tmp_path: Path, name: str) -> None:
         (beside("n", SAME, "k,l,m"), False),
         *(
             (beside(name, cells), is_refused)
-            for name in ("Kim_Lee_match", "agree.Kim.Lee", "correct")
+            for name in ("match 1", "agreed all 3", "disagreement_12")
             for cells, is_refused in ((FLAGS, True), (SAME, False))
         ),
         # no grade in common with the others
@@ -246,7 +255,7 @@ def test_which_columns_are_no_raters(
     tmp_path: Path, text: str, is_refused: bool
 ) -> None:
     if is_refused:
-        with pytest.raises(RatingsError, match="in common"):
+        with pytest.raises(RatingsError, match=r"no rater by|in common"):
             read(tmp_path, text)
     raters = text.splitlines()[0].split(",")[1:]
     file = read(tmp_path, text, **({"raters": raters} if is_refused else {}))

@@ -241,7 +241,7 @@ def test_simulated_ratings_are_labelled(tmp_path: Path) -> None:
         ({"id": list("bbb"), "A": [1, 1, 2], "B": [1, 2, 2]}, "row 2 and row 3"),
         (
             {"id": range(40), **dict.fromkeys("AB", [1, 2] * 20), "C": [7, 8] * 20},
-            "'C': no grade in common",
+            "'C': no rater by",
         ),
         ({"id": ["p", "q", "#"], "A": [1, 1, 2], "B": [1, 2, 2]}, "row 4: '#' sums up"),
     ],
