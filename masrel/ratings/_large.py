@@ -71,8 +71,8 @@ _NAME = (
 # Names none of which a reader takes for another, or for a sum of others: without
 # capitals and blanks; or as long as they differ without these.
 _ARE_USUAL = (
-    "bool_and(regexp_full_match(name, '[a-z][!-@[-~]*[0-9]|[1-9][0-9]*'))",
-    "bool_and(regexp_full_match(name, '[A-Za-z][ -~]*[0-9]|[1-9][0-9]*')) AND "
+    "bool_and(regexp_full_match(name, '[a-z][!-@[-~]*[0-9]|[1-9][0-9]*|0'))",
+    "bool_and(regexp_full_match(name, '[A-Za-z][ -~]*[0-9]|[1-9][0-9]*|0')) AND "
     "count(DISTINCT hash(lower(replace(name, ' ', '')))) = count(*)",
 )
 
@@ -321,7 +321,7 @@ def groups_of(answer: Answer, source: Source, layout: Layout) -> Sheet:
         raise groups.refuse("unnamed", groups.where(row), only, role="item", got=got)
     # where no name has blanks around, they need not be looked for again
     is_plain = len(layout.item) == 1 and not np.any(met["is_unplain"])
-    item = f"{_cell(layout.item[0])} AS item" if is_plain else "item"
+    item = f'"{layout.item[0]}" AS item' if is_plain else "item"
     chosen = " WHERE NOT is_unnamed" if is_unnamed.any() else ""
     answer(f"CREATE VIEW rated AS SELECT {columns}, {item} FROM cells{chosen}")
     return groups.without(is_blank, "blank")
@@ -382,10 +382,10 @@ def patterns(
 def _group_items(answer: Answer, groups: Sheet, rows: str, ratings: str = "") -> None:
     # their names are kept if they are few
     are_few = groups.freq.sum() <= _MAX_NAMED
-    kind, item, name = ("TABLE", *["item"] * 2) if are_few else ("VIEW", _ITEM, "NULL")
+    kind, key, name = ("TABLE", *["item"] * 2) if are_few else ("VIEW", _ITEM, "NULL")
     answer(
-        f"CREATE {kind} items AS SELECT {ratings}count(*) AS n_rows, {name} AS name "
-        f"FROM {rows} GROUP BY {item}"
+        f"CREATE {kind} items AS SELECT {ratings}count(*) AS n_rows, "
+        f"CAST({name} AS VARCHAR) AS name FROM {rows} GROUP BY {key}"
     )
 
 
@@ -420,10 +420,10 @@ def doubt_names_met(answer: Answer, groups: Sheet, layout: Layout) -> list[Findi
             return []
         met = answer(
             "SELECT replace(min(item), chr(31), ' ') AS name, min(n) AS first FROM "
-            f"cells WHERE NOT is_unnamed GROUP BY {_ITEM} ORDER BY first "
-            f"LIMIT {_MAX_NAMES + 1}"
+            "cells WHERE NOT is_unnamed AND (SELECT count(*) FROM items) <= "
+            f"{_MAX_NAMES} GROUP BY {_ITEM} ORDER BY first"
         )
-        if (n_items := len(met["first"])) <= _MAX_NAMES:
+        if n_items := len(met["first"]):
             sheet = replace(groups, numbers=met["first"] + groups.has_header)
             names = Column(np.arange(n_items), met["name"].tolist())
             return doubt_item_names(sheet, names)
