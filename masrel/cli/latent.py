@@ -105,7 +105,6 @@ def latent(
         document=lambda: latent_document(result),
         text=lambda: latent_table(
             result,
-            caption=f"Latent-trait model of the ratings in {file}",
             read=read,
             data="simulated" if simulated else "foreign",
         ),

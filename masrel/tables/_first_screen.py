@@ -50,6 +50,7 @@ def first_screen(
     if is_text:
         at, text = _result(answered, items)
         tables[at] = replace(tables[at], notes=(text, *tables[at].notes))
+        tables[0] = replace(tables[0], caption="")
     first, *more = tables
     read, notes = what_was_read(ratings, items, detail), left_out(ratings, questions)
     return [replace(first, read=tuple(read), notes=(*first.notes, *notes)), *more]

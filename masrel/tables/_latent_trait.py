@@ -23,9 +23,7 @@ _COLUMNS = (
 _UNLIKELY = 0.01
 
 
-def latent_table(
-    result: "LatentTrait", *, caption: str, read: tuple[str, ...], data: str
-) -> Table:
+def latent_table(result: "LatentTrait", *, read: tuple[str, ...], data: str) -> Table:
     """Return the table of every quantity of the model with its interval."""
     rows = list(_rows(result))
     if result.other is not None:  # its intervals stand beside those under the first
@@ -35,7 +33,7 @@ def latent_table(
         ]
     return table_of(
         "latent_trait",
-        caption,
+        "",
         _COLUMNS if result.other is not None else _COLUMNS[:-2],
         rows,
         notes=tuple(_notes(result)),

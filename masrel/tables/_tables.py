@@ -246,11 +246,10 @@ def as_text(table: Table, *, width: int | None = None) -> str:
         )
         read = tuple(line for text in read for line in wrapper.wrap(text))
         notes = tuple(line for text in notes for line in wrapper.wrap(text))
-    if read:  # a screen of its own
-        tag = f"{table.tag} ".upper().lstrip()
-        below = ["", *notes] if notes else []
-        return "\n".join([f"{tag}{read[0]}", *read[1:], "", *lines, *below])
-    return "\n".join([table.labelled_caption, *lines, *notes])
+    head, gap = [table.labelled_caption, *read], list[str]()
+    if not table.caption:  # what was read stands for it
+        head, gap = [f"{head[0]} {read[0]}".strip(), *read[1:], ""], [""]
+    return "\n".join([*head, *lines, *(gap if notes else ()), *notes])
 
 
 def as_html(table: Table) -> str:
@@ -267,7 +266,7 @@ def as_html(table: Table) -> str:
         for tag, row in (("th", heading), *(("td", row) for row in body))
     ]
     above, below = (
-        "".join(f"<p>{escape(text)}</p>" for text in texts)
+        "".join(f"<p>{escape(text)}</p>" for text in texts if text)
         for texts in ((table.labelled_caption, *table.read), table.notes)
     )
     rows = "".join(f"<tr>{line}</tr>" for line in lines)
