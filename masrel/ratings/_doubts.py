@@ -26,6 +26,7 @@ from masrel.ratings._layout import (
     names_rows,
     numbers_rows,
     sides_of,
+    two_lines,
 )
 from masrel.ratings._sheet import Codes, Column, Sheet
 from masrel.scales import Scale
@@ -97,6 +98,8 @@ def doubt_columns(
     are_named = bool(options.raters or layout.criteria)
     if not are_named:
         _refuse_other_tables(sheet, layout, options, names, scale)
+    if not options.names_at:
+        findings += _second_header(sheet, codes, scale, freq)
     # an item that is there twice is refused below, and no column is one of raters
     is_long = any(
         len(sheet.columns[p].texts) < len(sheet.numbers) for p in layout.item[:1]
@@ -109,10 +112,8 @@ def doubt_columns(
     n_items = len(sheet.numbers)
     if layout.is_item_guessed and len(names) > 2 * n_items and not sheet.is_transposed:
         findings.append(Finding("many raters", n=len(names), n_items=n_items))
-    if not all(map(is_number, scale.grades)):
-        if sheet.has_header and freq.sum() > 3 and not options.names_at:
-            findings += _second_header(sheet, codes, scale)
-    elif not are_named and layout.frequency is None:
+    are_numbers = all(map(is_number, scale.grades))
+    if are_numbers and not are_named and layout.frequency is None:
         findings += _looks_counted(sheet, names, codes, scale, freq)
     unrated = np.flatnonzero((codes < 0).all(axis=0))[:_SHOWN]
     return findings + [Finding("no grade of", rater=names[k]) for k in unrated]
@@ -366,22 +367,23 @@ def _looks_counted(
     return [finding]
 
 
-def _second_header(sheet: Sheet, codes: Codes, scale: Scale) -> list[Finding]:
-    # a first row whose grades occur nowhere else, while those of the others do
+def _second_header(
+    sheet: Sheet, codes: Codes, scale: Scale, freq: Codes
+) -> list[Finding]:
+    # a first row whose grades occur nowhere else, while those of the others do, or are
+    # numbers, and these are none
     rest = np.bincount(codes[1:].ravel() + 1, minlength=len(scale.grades) + 1)[1:]
     n_met = np.count_nonzero(rest) + bool((codes[1:] < 0).any())
-    is_known = (rest[codes[0][codes[0] >= 0]] > 0).any()
-    if is_known or (codes[0] < 0).all() or n_met > codes[1:].size / 2:
+    first, is_text = codes[0][codes[0] >= 0], ~np.array([*map(is_number, scale.grades)])
+    are_words = is_text[first].all() and not is_text[rest > 0].any()
+    is_doubted = sheet.has_header and freq.sum() > 3 and is_text.any() and len(first)
+    are_rare = n_met <= codes[1:].size / 2 or are_words
+    if not (is_doubted and are_rare) or rest[first].any():
         return []
-    where, one = sheet.where(0), sheet.line_of(0)
-    if not sheet.facts.keys() & {"delimiter", "sheet"}:  # its names are in no line
-        return [
-            Finding("second header", where=where, advice="delete it if these are names")
-        ]
-    two = sheet.line_of(int(sheet.numbers[0]))
-    option = f"--header {one},{two}" if two == one + 1 else f"--skip {two - 1}"
-    advice = f"{option} if these are names, --header {one} if it is a row like others"
-    raise sheet.refuse("second header", where=where, advice=advice)
+    if facts := two_lines(sheet):
+        raise sheet.refuse("second header", **facts)
+    advice = "delete it if these are names"
+    return [Finding("second header", where=sheet.where(0), advice=advice)]
 
 
 def doubt_items(

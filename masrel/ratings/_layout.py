@@ -120,7 +120,7 @@ def find_layout(sheet: Sheet, options: Reading) -> Layout:
     is_wide = is_counted or "raters" in named or options.no_item or bool(often)
     is_wide |= options.by_criterion
     is_wide |= sheet.is_transposed and not {"rater", "grade"} & named.keys()
-    layout = None if is_wide else _long(sheet, named, taken)
+    layout = None if is_wide else _long(sheet, options, named, taken)
     if options.by_criterion:
         layout = _of_criteria(sheet, options, named.get("item", ()), taken)
     if layout is None:
@@ -201,7 +201,10 @@ def _usual(sheet: Sheet, role: str, taken: set[int]) -> tuple[int, ...]:
 
 
 def _long(
-    sheet: Sheet, named: dict[str, tuple[int, ...]], taken: set[int]
+    sheet: Sheet,
+    options: Reading,
+    named: dict[str, tuple[int, ...]],
+    taken: set[int],
 ) -> Layout | None:
     # None where the table is not long
     header = sheet.header
@@ -232,7 +235,30 @@ def _long(
             columns=f"but {listed(header, 12)}",
         )
     item, raters, grades = roles.values()
+    if len(sheet.numbers) > 4 and sheet.has_header and not options.names_at:
+        _refuse_second_header(sheet, (*item, *raters, *grades))
     return Layout(kind="long", item=item, raters=raters, grades=grades)
+
+
+def _refuse_second_header(sheet: Sheet, places: Sequence[int]) -> None:
+    # a first row of a long text whose item, rater and grade occur nowhere else
+    columns = [sheet.columns[place] for place in places]
+    are_rare = all((column.codes == column.codes[0]).sum() == 1 for column in columns)
+    # while other raters do, and it is no measurement
+    is_twice = len(columns[-2].texts) < len(sheet.numbers)
+    grade = columns[-1].texts[columns[-1].codes[0]]
+    if are_rare and is_twice and not is_number(grade) and two_lines(sheet):
+        raise sheet.refuse("second header", **two_lines(sheet))
+
+
+def two_lines(sheet: Sheet) -> dict[str, str]:
+    """Return how a first row of names is read as such; none if names are in no line."""
+    if not sheet.facts.keys() & {"delimiter", "sheet"}:
+        return {}
+    one, two = sheet.line_of(0), sheet.line_of(int(sheet.numbers[0]))
+    option = f"--header {one},{two}" if two == one + 1 else f"--skip {two - 1}"
+    advice = f"{option} if these are names, --header {one} if it is a row like others"
+    return {"where": sheet.where(0), "advice": advice}
 
 
 def _wide(

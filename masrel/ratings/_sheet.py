@@ -678,6 +678,8 @@ def _separator(
         return delimiter, heads[delimiter], max(n_titles[delimiter], 0)
     # as many cells in every record, or one more below a header without row names,
     # below the fewest titles; a decimal comma is in the rows alone
+    if n_titles.get("\t", -1) >= 0:  # tabs are blanks, too
+        n_titles.pop(" ", None)
     fewest = min((n for n in n_titles.values() if n >= 0), default=None)
     consistent = [mark for mark, n in n_titles.items() if n == fewest]
     marked = [mark for mark in consistent if mark != " "] or consistent

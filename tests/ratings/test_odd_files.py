@@ -426,10 +426,6 @@ WARNED: dict[str, Any] = {
         r"1\.000,5",
         {"decimal": ","},
     ),
-    "second line of names, one row a rating": (
-        "item,rater,grade\nwhich,who,what\nA,K,1\nA,L,1\nB,K,2\nB,L,1\n",
-        "line 2",
-    ),
     "items that number the rows": (
         "item,rater,grade\n1,K,1\n2,L,1\n3,K,2\n4,L,1\n",
         "--item",
@@ -462,6 +458,10 @@ REFUSED: dict[str, Any] = {
     "sd row": (BASE + "SD,2,1\n", "'SD'"),
     "row of numbers of ratings": (BASE + "N,4,4\n", "line 6: 'N'"),
     "commented row": (BASE.replace("\nC", "\n#C"), "line 4: '#C'"),
+    "second line of names, one row a rating": (
+        "item,rater,grade\nwhich,who,what\nA,K,1\nA,L,1\nB,K,2\nB,L,1\n",
+        "line 2.*--header 1,2 .*--header 1 ",
+    ),
     "first line of grades": ("A,1,2\nB,2,2\nC,3,1\n", "--no-header"),
     "first line of text grades": (
         "A,mild,severe\nB,mild,mild\nC,severe,severe\n",
