@@ -21,7 +21,7 @@ def summary_table(balances: Sequence[OrderBalance]) -> Table:
     site = (Column(key="site", heading="Site", align="left"),) if has_sites else ()
     return Table(
         name="orders",
-        caption=f"Orders of the drawn schedules. {_CONCEALED}",
+        caption="Orders of the drawn schedules",
         columns=(
             Column(key="session", heading="Session", align="left"),
             *site,
@@ -49,6 +49,7 @@ def summary_table(balances: Sequence[OrderBalance]) -> Table:
             )
             for balance in balances
         ),
+        read=(_CONCEALED,),
         notes=(
             "How often a model stands in one place of the session, and an ordered pair "
             "of two models side by side: fewest to most. Twice in a row: schedules in "
