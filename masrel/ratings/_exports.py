@@ -27,9 +27,9 @@ from masrel.errors import ParameterError, RatingsError
 from masrel.ratings._findings import (
     Finding,
     Reading,
+    few,
     library,
     listed,
-    quoted,
     refusal,
 )
 from masrel.ratings._layout import ITEM_NAME
@@ -470,8 +470,8 @@ def _two_levels(
     if not are_items and len(outer) <= len(inner):
         raters, items, table = outer, inner, zip(*table, strict=True)
     if len(raters) >= len(items) and not (options.raters or options.transpose):
-        few = quoted(map(str, raters)) if len(raters) < 6 else "with their names"
-        raise refusal(name, "levels", raters=few, others=listed([*map(str, items)], 5))
+        names, others = few([*map(str, raters)]), listed([*map(str, items)], 5)
+        raise refusal(name, "levels", raters=names, others=others)
     rows = [[item, *row] for item, row in zip(items, table, strict=True)]
     return pd.DataFrame(rows, columns=["item", *raters], dtype=object)
 

@@ -385,7 +385,7 @@ _TEXTS = {
     "sheets": "needs --sheet with one of its sheets, {sheets}",
     "nested cell": "column {column!r}, value {number}: needed text or numbers, got a "
     "{kind}; --from reads exports of annotation tools",
-    "levels": "has names in two levels, and may have its raters in either: --raters "
+    "levels": "has names in two levels, and may have its raters in either: --raters"
     "{raters} if these rate, --transpose if {others} do",
     "lists": "item {item!r}: needed an annotator of each annotation, got {raters} and "
     "{grades}",

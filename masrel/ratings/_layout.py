@@ -143,14 +143,17 @@ def _refuse_names(sheet: Sheet, used: set[int]) -> None:
         name = sheet.header[place]
         # the first may be R's or pandas' row names
         if (twice[name] > 1) if name else place:
-            facts: dict[str, str | int] = {"column": name or place + 1}
-            if not sheet.advice:
-                facts["hint"] = "; --raters names the columns that rate"
             cells = {text for place in used for text in sheet.columns[place].texts}
+            hint = "; --raters names the columns that rate" * (not sheet.advice)
             if cells & {sheet.header[k] for k in used} - {""}:
-                facts["hint"] = "; --no-header if this line is a row like the others"
-            code = "same name" if name else "no name"
-            raise sheet.refuse(code, where=sheet.at(0), **facts)
+                hint = "; --no-header if this line is a row like the others"
+            code, facts = (
+                "same name" if name else "no name",
+                {"hint": hint} if hint else {},
+            )
+            raise sheet.refuse(
+                code, where=sheet.at(0), column=name or place + 1, **facts
+            )
 
 
 def _columns_of(
@@ -242,13 +245,12 @@ def _long(
 
 def _refuse_second_header(sheet: Sheet, places: Sequence[int]) -> None:
     # a first row of a long text whose item, rater and grade occur nowhere else
-    columns = [sheet.columns[place] for place in places]
-    are_rare = all((column.codes == column.codes[0]).sum() == 1 for column in columns)
-    # while other raters do, and it is no measurement
-    is_twice = len(columns[-2].texts) < len(sheet.numbers)
-    grade = columns[-1].texts[columns[-1].codes[0]]
-    if are_rare and is_twice and not is_number(grade) and two_lines(sheet):
-        raise sheet.refuse("second header", **two_lines(sheet))
+    *_, rater, grade = columns = [sheet.columns[place] for place in places]
+    are_rare = all((column.codes == 0).sum() == 1 for column in columns)
+    # while another rater does, and it is no measurement
+    are_rare &= len(rater.texts) < len(sheet.numbers) and not is_number(grade.texts[0])
+    if are_rare and (facts := two_lines(sheet)):
+        raise sheet.refuse("second header", **facts)
 
 
 def two_lines(sheet: Sheet) -> dict[str, str]:

@@ -21,7 +21,7 @@ from dataclasses import dataclass, field, replace
 from datetime import date, datetime
 from decimal import Decimal
 from functools import partial
-from itertools import chain, count, islice
+from itertools import chain, count, islice, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -456,12 +456,13 @@ def read_text(
         ),
     )
     reader = reader_of(chain(io.StringIO(text, newline=""), [_END]), delimiter)
-    names: list[list[str]] = []
-    for start in upper:
-        above = reader_of(io.StringIO(head[start:], newline=""), delimiter)
-        names.append(next(above, []))
-    names.append(next(record for record in reader if not _is_blank(record)))
-    header = joined_names(names)
+    above = [io.StringIO(head[k:], newline="") for k in upper]
+    header = joined_names(
+        [
+            next((record for record in records if not _is_blank(record)), [])
+            for records in (*(reader_of(lines, delimiter) for lines in above), reader)
+        ]
+    )
     columns = _columns(sheet, reader, n_names + has_row_names)
     if has_row_names:
         is_last_empty = set(columns[-1].texts) <= {""}
@@ -500,26 +501,25 @@ def without_notes(
 def _below_comments(name: str, text: str, start: int, delimiter: str | None) -> int:
     # Where the lines at the head end that begin with "#": they are comments, unless the
     # last of them has as many cells as the line below, and may be the header.
-    comment, below, last = "", "", start
-    for line in io.StringIO(text[start:], newline=""):
-        if line.startswith("#"):
-            comment, last = line.rstrip("\r\n"), start
-        elif line.strip() or not comment:
-            below = line.rstrip("\r\n")
-            break
-        start += len(line)
+    lines = io.StringIO(text[start:], newline="")
+    head = [*takewhile(lambda line: line[0] == "#" or not line.strip(), lines)]
+    if not head or head[0][0] != "#":
+        return start
+    n_above = max(k for k, line in enumerate(head) if line[0] == "#")
+    last, end = (start + sum(map(len, part)) for part in (head[:n_above], head))
+    two_lines = (
+        head[n_above].rstrip("\r\n"),
+        next(io.StringIO(text[end:], newline=""), ""),
+    )
     for mark in [delimiter] if delimiter else [",", ";", "\t", "|"]:
-        if not comment or (mark == " " and comment.startswith("# ")):
-            continue
-        n_cells, n_below = (
-            len(next(reader_of([line], mark), ())) for line in (comment, below)
-        )
-        if 1 < n_cells == n_below:
-            if re.match(r"#\s+[^\s,;|]", comment) and mark != "\t":
+        n_cells, n_below = (len(next(reader_of([of], mark), ())) for of in two_lines)
+        is_meant = mark != " " or not two_lines[0].startswith("# ")
+        if is_meant and 1 < n_cells == n_below:
+            if re.match(r"#\s+[^\s,;|]", two_lines[0]) and mark != "\t":
                 line_number = _n_lines(text, last) + 1
                 raise refusal(name, "comment or header", line=line_number)
             return last
-    return start
+    return end
 
 
 # ---- where the names are ----
@@ -554,11 +554,9 @@ def names_option(
     # n_titles: how many rows at the head have fewer cells than the table
     is_known = options.no_header or len(options.names_at) > 1
     lines = [] if is_known else _lines_of_names(rows[n_titles:])
-    option, line = "", (lines or [rows[n_titles].line])[0]
-    if len(lines) > 1:
-        option = f"--header {','.join(map(str, lines))}"
-    elif line > rows[0].line:
-        option = f"--skip {line - 1}"
+    line, of_lines = (lines or [rows[n_titles].line])[0], ",".join(map(str, lines))
+    option = f"--skip {line - 1}" * (line > rows[0].line)
+    option = f"--header {of_lines}" if len(lines) > 1 else option
     is_title = option and rows[0].n_filled == bool(rows[0].cells[0])
     if n_titles or (is_title and len(rows[-1].cells) > 2):
         got = ", ".join(filter(None, rows[0].cells))[:60]
@@ -607,10 +605,11 @@ def notes_below(rows: Sequence[Sequence[str]]) -> tuple[int, str]:
     n = next((k for k, row in enumerate(reversed(filled)) if len(row) != 1), 0)
     above, notes = filled[: len(filled) - n], [*chain(*filled[len(filled) - n :])]
     # a lone rating is a number, or there above
-    are_texts = all(any(map(str.isalpha, note)) for note in notes)
-    are_notes = are_texts and not {*notes} & {*chain(*above)}
-    is_apart = 0 < n <= _MOST_NOTES and not above[-1]
-    return (len(rows) - len(above), notes[0]) if is_apart and are_notes else (0, "")
+    are_notes = all(any(map(str.isalpha, note)) for note in notes)
+    are_notes &= (
+        0 < n <= _MOST_NOTES and not above[-1] and not {*notes} & {*chain(*above)}
+    )
+    return (len(rows) - len(above), notes[0]) if are_notes else (0, "")
 
 
 # ---- records ----
