@@ -446,6 +446,8 @@ _TEXTS = {
     "raters",
     "counts": "rows sum to {total:g}, so that this may be a table of counts, items by "
     "categories: --counts reads it as one, --raters{names} as raters",
+    "rating as names": "{names} may be a rating: --no-header if this line is a row, "
+    "--header {line} if it has the names",
     "comments": "{n} different texts in {n_cells} cells are comments, no grades: "
     "--raters names the columns that rate",
     "summary row": "{item!r} sums up other rows, or is a comment: delete the line, or "

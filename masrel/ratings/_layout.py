@@ -238,17 +238,28 @@ def _long(
             columns=f"but {listed(header, 12)}",
         )
     item, raters, grades = roles.values()
-    if len(sheet.numbers) > 4 and sheet.has_header and not options.names_at:
-        _refuse_second_header(sheet, (*item, *raters, *grades))
+    if sheet.has_header and not options.names_at:
+        _refuse_rows_of_names(sheet, (*item, *raters, *grades))
     return Layout(kind="long", item=item, raters=raters, grades=grades)
 
 
-def _refuse_second_header(sheet: Sheet, places: Sequence[int]) -> None:
-    # a first row of a long text whose item, rater and grade occur nowhere else
+def _refuse_rows_of_names(sheet: Sheet, places: Sequence[int]) -> None:
+    # names of a long text that are an item and a rater of the rows
+    names, one = [sheet.header[place] for place in places], str(sheet.line_of(0))
     *_, rater, grade = columns = [sheet.columns[place] for place in places]
+    is_row = all(
+        name in of.texts for name, of in zip(names[:-1], columns, strict=False)
+    )
+    if is_row:
+        raise sheet.refuse(
+            "rating as names", sheet.at(0), names=listed(names), line=one
+        )
+    # and a first row whose item, rater and grade occur nowhere else
     are_rare = all((column.codes == 0).sum() == 1 for column in columns)
     # while another rater does, and it is no measurement
-    are_rare &= len(rater.texts) < len(sheet.numbers) and not is_number(grade.texts[0])
+    are_rare &= 4 < len(sheet.numbers) > len(rater.texts) and not is_number(
+        grade.texts[0]
+    )
     if are_rare and (facts := two_lines(sheet)):
         raise sheet.refuse("second header", **facts)
 

@@ -312,6 +312,15 @@ TABLE: dict[str, Asked] = {
             "--ignore n --raters Kim,Lee": "uu uv",
         },
     ),
+    "a rating as names": Asked(
+        code="rating as names",
+        text="a,Kim,1\na,Lee,2\nb,Kim,2\nb,Lee,2\n",
+        options="--item a --rater Kim --grade 1",
+        tries={
+            "--no-header": Asked(code="no column", tries={}),
+            "--header 1": ".2 22",
+        },
+    ),
     "comments": Asked(
         code="comments",
         text="item,Kim,Lee,why,more\n"
