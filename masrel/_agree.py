@@ -208,8 +208,10 @@ def agree(
     for name, kind in _CHOICES.items():
         if (value := getattr(what, name)) is not None:
             check_option(name, value, get_args(kind))
-    values = {of.name: getattr(what, of.name) for of in fields(Estimating)}
-    questions = Questions(**values, reference=how.reference)
+    questions = Questions(
+        **{of.name: getattr(what, of.name) for of in fields(Estimating)},
+        reference=how.reference,
+    )
     try:
         file = read_ratings(data, how)
         questions = questions.on_scale(file).checked(how.clusters)
@@ -224,13 +226,13 @@ def _joined(
     name: str, options: _Options | None, default: _Options, **short_cuts: Any
 ) -> _Options:
     """Return options with those that are arguments of their own."""
-    chosen = default if options is None else options
-    kind = type(default)
-    is_wrong = not isinstance(chosen, kind)
-    needed = f"{name}: needs masrel.{kind.__name__}(…), got {shown(options)}"
+    chosen, kind = default if options is None else options, type(default)
     changes = {key: value for key, value in short_cuts.items() if value is not None}
     refuse(
-        (is_wrong, needed),
+        (
+            not isinstance(chosen, kind),
+            f"{name}: needs masrel.{kind.__name__}(…), got {shown(options)}",
+        ),
         *(
             (
                 getattr(chosen, key, None) != getattr(default, key),
@@ -244,7 +246,7 @@ def _joined(
 
 def _say_in_python(error: MasrelError) -> None:
     """Add to an error what the options in its message are called here."""
-    options = dict.fromkeys(_OPTION.findall(str(error)))
+    options = _OPTION.findall(str(error))
     names = {of: _OTHER_WORDS.get(of, of.replace("-", "_")) for of in options}
     known = [f"--{of} is {_PLACES[n]}" for of, n in names.items() if n in _PLACES]
     if known:

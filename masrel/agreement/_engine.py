@@ -24,7 +24,7 @@ from masrel.agreement._weights import (
     declared_weights,
 )
 from masrel.errors import ParameterError, UndefinedStatisticWarning
-from masrel.estimates import Estimate, Interval
+from masrel.estimates import Estimate, Interval, Significance
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -273,6 +273,36 @@ def measured(
         n_categories=len(
             np.unique(values[rated]) if categories is None else categories
         ),
+        reason=reason,
+    )
+
+
+def tested(
+    name: str,
+    hypothesis: str,
+    distribution: str,
+    df: tuple[float, ...],
+    n_items: int,
+    statistic: float,
+    reason: str | None,
+) -> Significance:
+    """Return a test of a statistic, with its p-value unless there is a reason."""
+    from scipy.special import chdtrc, fdtrc, ndtr, stdtr  # loaded only for a p-value
+
+    p_of: dict[str, Callable[..., float]] = {
+        "normal": lambda z: 2.0 * ndtr(-abs(z)),
+        "t": lambda df, t: min(1.0, 2.0 * stdtr(df, -abs(t))),
+        "F": fdtrc,
+        "chi-squared": chdtrc,
+    }
+    return Significance(
+        name=name,
+        hypothesis=hypothesis,
+        statistic=statistic,
+        distribution=distribution,
+        df=df,
+        p_value=math.nan if reason else float(p_of[distribution](*df, statistic)),
+        n_items=n_items,
         reason=reason,
     )
 

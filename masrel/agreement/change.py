@@ -15,7 +15,7 @@ from masrel.agreement._codes import (
     side_by_side,
     two_raters,
 )
-from masrel.agreement._engine import undefined
+from masrel.agreement._engine import tested, undefined
 from masrel.agreement._labels import Label
 from masrel.agreement._weights import NO_CHANCE, NO_PAIR
 from masrel.estimates import Significance
@@ -211,9 +211,8 @@ def stuart_maxwell(table: ArrayLike) -> Significance:
     stuart_maxwell: 2.667, chi-squared(1), p = 0.102
     """
     cells = check_table(table)
-    statistic, df = _margin_statistic(cells)
-    n = int(cells.sum())
-    return _chi_squared("stuart_maxwell", _SAME_MARGINS, statistic, df, n)
+    margins = _margin_statistic(cells)
+    return _chi_squared("stuart_maxwell", _SAME_MARGINS, *margins, int(cells.sum()))
 
 
 def bhapkar(table: ArrayLike) -> Significance:
@@ -279,22 +278,11 @@ def _chi_squared(
     name: str, hypothesis: str, statistic: float, df: int, n_items: int
 ) -> Significance:
     """Refer a statistic of two ratings' changes to chi-squared."""
-    from scipy.special import chdtrc
-
-    reason, p = None, math.nan
+    reason = None
     if df == 0 or math.isnan(statistic):
         reason = undefined(name, "0/0: no item changed")
-    else:
-        p = float(chdtrc(df, statistic))
-    return Significance(
-        name=name,
-        hypothesis=hypothesis,
-        statistic=statistic,
-        distribution="chi-squared",
-        df=(float(df),),
-        p_value=p,
-        n_items=n_items,
-        reason=reason,
+    return tested(
+        name, hypothesis, "chi-squared", (float(df),), n_items, statistic, reason
     )
 
 

@@ -24,6 +24,7 @@ from masrel.agreement._engine import (
     check_level,
     deviations,
     measured,
+    tested,
     undefined,
 )
 from masrel.agreement._labels import Codes, Label
@@ -38,7 +39,7 @@ _Method = Literal["auto", "auto-2026.1", "auto-2026.2", "F"]
 
 _BY_F = ("F", "auto-2026.1")
 
-_NAMES: dict[IccForm, str] = {
+_ICC_NAMES: dict[IccForm, str] = {
     "ICC(1)": "icc_1",
     "ICC(1,k)": "icc_1k",
     "ICC(C,1)": "icc_c1",
@@ -48,7 +49,7 @@ _NAMES: dict[IccForm, str] = {
 }
 """Form, as McGraw and Wong call it, to its name in the register."""
 
-_ALIASES: dict[IccForm, tuple[str, ...]] = {
+_ICC_ALIASES: dict[IccForm, tuple[str, ...]] = {
     "ICC(1)": ("ICC(1,1)", "ICC1"),
     "ICC(1,k)": ("ICC(k)", "ICC1k"),
     "ICC(C,1)": ("ICC(3,1)", "ICC3"),
@@ -72,21 +73,21 @@ _Answer = tuple[float, Interval | None, str | None]
 """Value, interval and why there is none."""
 
 
-def _bare(name: object) -> str:
+def _bare_form(name: object) -> str:
     # ICC(2, k) and icc(2,k), icc_2k and ICC2k; not ICC(2), which is another elsewhere
     return re.sub(r"[\s_-]", "", str(name).lower())
 
 
-_FORM_OF: dict[str, IccForm] = {
-    _bare(name): form
-    for form, aliases in _ALIASES.items()
-    for name in (form, _NAMES[form], *aliases)
+_ICC_FORM_OF: dict[str, IccForm] = {
+    _bare_form(name): form
+    for form, aliases in _ICC_ALIASES.items()
+    for name in (form, _ICC_NAMES[form], *aliases)
 }
 
 
 def _form_of(name: str) -> IccForm:
     """Return the form that has a name."""
-    form = _FORM_OF.get(_bare(name), name)
+    form = _ICC_FORM_OF.get(_bare_form(name), name)
     check_option("form", form, get_args(IccForm))
     return cast(IccForm, form)
 
@@ -200,7 +201,7 @@ def icc(
     else:
         value, confidence, reason = _with_gaps(values, form, level)
     return measured(
-        _NAMES[form], values, categories, value, interval=confidence, reason=reason
+        _ICC_NAMES[form], values, categories, value, interval=confidence, reason=reason
     )
 
 
@@ -254,21 +255,14 @@ def icc_f_test(
     values = complete_values(ratings, categories)
     anova = _Anova.of(values)
     reason = _no_variance(values, anova, form)
-    statistic = p = math.nan
+    statistic = math.nan
     if reason is None:
-        from scipy.special import fdtrc
-
         error = anova.error(form)
         statistic = math.inf if error == 0.0 else anova.items / error
-        p = float(fdtrc(*anova.df(form), statistic))
-    return Significance(
-        name="icc_f_test",
-        hypothesis="the items do not differ",
-        statistic=statistic,
-        distribution="F",
-        df=anova.df(form),
-        p_value=p,
+    return tested(
+        *("icc_f_test", "the items do not differ", "F", anova.df(form)),
         n_items=len(values),
+        statistic=statistic,
         reason=reason,
     )
 
@@ -441,20 +435,11 @@ def kendall_w_test(
     values = complete_values(ratings, categories)
     n, m = values.shape
     w, _, reason = _w(values, ties=ties)
-    statistic = p = math.nan
-    if reason is None:
-        from scipy.special import chdtrc
-
-        statistic = m * (n - 1) * w
-        p = float(chdtrc(n - 1, statistic))
-    return Significance(
-        name="kendall_w_test",
-        hypothesis="the raters' orders are unrelated",
-        statistic=statistic,
-        distribution="chi-squared",
+    return tested(
+        *("kendall_w_test", "the raters' orders are unrelated", "chi-squared"),
         df=(float(max(n - 1, 0)),),
-        p_value=p,
         n_items=n,
+        statistic=m * (n - 1) * w,
         reason=reason,
     )
 
@@ -557,14 +542,14 @@ def _disagreements(
     return d_o, d_e, _Anova.of_sums(steps).value(form).imag * 1e30
 
 
-_FORMULAS = {
+_ICC_FORMULAS = {
     form: Formula(
         name=name,
         title=form,
         features=_features,
         disagreements=partial(_disagreements, form),
     )
-    for form, name in _NAMES.items()
+    for form, name in _ICC_NAMES.items()
 }
 """The coefficients of complete tables as functions of sums over items."""
 
@@ -607,7 +592,7 @@ def _without_gaps(
         level=level,
         kind="confidence",
         method="F distribution" if by_f else "profile likelihood",
-        target=_target_of(form),
+        target=_icc_target(form),
         notes=tuple(notes),
         reason=reason,
     )
@@ -699,13 +684,13 @@ def _with_gaps(values: NDArray[np.float64], form: IccForm, level: float) -> _Ans
         level=level,
         kind="confidence",
         method="REML, profile likelihood",
-        target=_target_of(form),
+        target=_icc_target(form),
         notes=tuple(notes),
     )
     return fit.items / (fit.items + error / k), interval, None
 
 
-def _target_of(form: IccForm) -> Target:
+def _icc_target(form: IccForm) -> Target:
     """Return what the interval generalises to."""
     # Consistency leaves out what raters differ by in level: their variance is in no
     # mean square of its interval. In the others raters are a sample, too.

@@ -34,6 +34,7 @@ from masrel.agreement._engine import (
     Resampled,
     divide,
     estimate,
+    tested,
     undefined,
 )
 from masrel.agreement._labels import Codes, Label
@@ -549,8 +550,13 @@ def scott_pi(
     >>> round(scott_pi(["a", "b", "a"], ["a", "b", "b"]).value, 3)
     0.333
     """
-    table = side_by_side(ratings, other)
-    return estimate(_SCOTT, table, categories, weights, population=population)
+    return estimate(
+        _SCOTT,
+        side_by_side(ratings, other),
+        categories,
+        weights,
+        population=population,
+    )
 
 
 def conger_kappa(
@@ -738,8 +744,7 @@ def fleiss_null(
     if category is not None:
         chosen = counts[:, _place(category, counted.categories)]
         counts = np.column_stack([chosen, n_raters - chosen])
-    statistic = p = math.nan
-    reason = None
+    statistic, reason = math.nan, None
     if n_raters < 2:
         reason = undefined("fleiss_null", "fewer than two raters")
     elif len(counts) == 0:
@@ -747,19 +752,12 @@ def fleiss_null(
     elif (counts.sum(axis=0) > 0).sum() < 2:
         reason = undefined("fleiss_null", "0/0: all ratings are in one category")
     else:
-        from scipy.special import ndtr
-
         value = fleiss_kappa(count_items(counts)).value
         statistic = value / _null_error(counts, n_raters)
-        p = 2.0 * float(ndtr(-abs(statistic)))
-    return Significance(
-        name="fleiss_null",
-        hypothesis="Fleiss' kappa is 0",
-        statistic=statistic,
-        distribution="normal",
-        df=(),
-        p_value=p,
+    return tested(
+        *("fleiss_null", "Fleiss' kappa is 0", "normal", ()),
         n_items=len(counts),
+        statistic=statistic,
         reason=reason,
     )
 

@@ -15,7 +15,6 @@ import numpy as np
 
 from masrel._input import check_option
 from masrel.agreement._codes import (
-    CountedRatings,
     code_pairs,
     complete_rows,
     count_ratings,
@@ -212,8 +211,13 @@ def cohen_kappa(
     >>> cohen_kappa(["a", "a", "b", "b"], ["a", "b", "b", "b"]).value
     0.5
     """
-    table = side_by_side(ratings, other)
-    return estimate(_COHEN, table, categories, weights, population=population)
+    return estimate(
+        _COHEN,
+        side_by_side(ratings, other),
+        categories,
+        weights,
+        population=population,
+    )
 
 
 def light_kappa(
@@ -365,9 +369,7 @@ def stratified_kappa(
     >>> round(stratified_kappa([first, second]).value, 3)
     0.4
     """
-    counted = count_ratings(code_pairs(pairs, categories))
-    n_raters = _raters_with_pairs(counted)
-    return estimate(_STRATIFIED, counted, None, weights, n_raters=n_raters)
+    return _of_sessions(_STRATIFIED, pairs, categories, weights)
 
 
 def pooled_kappa(
@@ -425,12 +427,18 @@ def pooled_kappa(
     >>> round(pooled_kappa([first, second]).value, 3)
     0.571
     """
+    return _of_sessions(_POOLED_PAIRS, pairs, categories, weights)
+
+
+def _of_sessions(
+    formula: Formula,
+    pairs: object,
+    categories: Sequence[Label] | None,
+    weights: "WeightsLike",
+) -> Estimate:
+    """Estimate a kappa of each rater's two gradings."""
     counted = count_ratings(code_pairs(pairs, categories))
-    n_raters = _raters_with_pairs(counted)
-    return estimate(_POOLED_PAIRS, counted, None, weights, n_raters=n_raters)
-
-
-def _raters_with_pairs(counted: CountedRatings) -> int:
-    # of any item; each rater has two columns
-    pairs = (counted.codes >= 0).reshape(len(counted.codes), -1, 2)
-    return int(pairs.all(axis=2).any(axis=0).sum())
+    # both of any item; each rater has two columns
+    rated = (counted.codes >= 0).reshape(len(counted.codes), -1, 2)
+    n_raters = int(rated.all(axis=2).any(axis=0).sum())
+    return estimate(formula, counted, None, weights, n_raters=n_raters)

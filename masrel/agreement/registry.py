@@ -19,13 +19,17 @@ from masrel.agreement._codes import (
 from masrel.agreement._engine import Formula, deviations
 from masrel.agreement._labels import Label
 from masrel.agreement._weights import Weights, WeightsLike, is_identity
-from masrel.agreement.icc import _ALIASES as ICC_ALIASES
-from masrel.agreement.icc import _FORM_OF as ICC_FORM_OF
-from masrel.agreement.icc import _FORMULAS as ICC_FORMULAS
-from masrel.agreement.icc import _NAMES as ICC_NAMES
-from masrel.agreement.icc import _bare as icc_bare
-from masrel.agreement.icc import _target_of as icc_target
-from masrel.agreement.icc import icc, kendall_w, robinson_a
+from masrel.agreement.icc import (
+    _ICC_ALIASES,
+    _ICC_FORM_OF,
+    _ICC_FORMULAS,
+    _ICC_NAMES,
+    _bare_form,
+    _icc_target,
+    icc,
+    kendall_w,
+    robinson_a,
+)
 from masrel.agreement.kappas import (
     _BRENNAN_PREDIGER,
     _CONGER,
@@ -373,16 +377,16 @@ _ALL = (
             title=form,
             function=partial(icc, form=form),
             references=("mcgraw1996",),
-            formula=ICC_FORMULAS[form],
-            aliases=ICC_ALIASES[form],
+            formula=_ICC_FORMULAS[form],
+            aliases=_ICC_ALIASES[form],
             takes_interval=True,
             properties=(_RANKS - {"items twice"}) | {"perfect agreement"},
             lowest=-math.inf,
             highest=math.inf if form == "ICC(A,k)" else 1.0,
             weighted=False,
-            interval_target=icc_target(form),
+            interval_target=_icc_target(form),
         )
-        for form, name in ICC_NAMES.items()
+        for form, name in _ICC_NAMES.items()
     ),
     Coefficient(
         name="lin_ccc",
@@ -419,7 +423,7 @@ COEFFICIENTS: dict[str, Coefficient] = {entry.name: entry for entry in _ALL}
 """Name to coefficient."""
 
 _BY_NAME = {name: entry for entry in _ALL for name in (entry.name, *entry.aliases)}
-_BY_ICC = {bare: COEFFICIENTS[ICC_NAMES[of]] for bare, of in ICC_FORM_OF.items()}
+_BY_ICC = {bare: COEFFICIENTS[_ICC_NAMES[of]] for bare, of in _ICC_FORM_OF.items()}
 
 
 def coefficient(name: str) -> Coefficient:
@@ -449,7 +453,7 @@ def coefficient(name: str) -> Coefficient:
     ('brennan_prediger', 'icc_a1')
     """
     is_text = isinstance(name, str)
-    if is_text and (entry := _BY_NAME.get(name) or _BY_ICC.get(icc_bare(name))):
+    if is_text and (entry := _BY_NAME.get(name) or _BY_ICC.get(_bare_form(name))):
         return entry
     meant = _meant_by(name) if is_text else None
     raise ParameterError(

@@ -473,8 +473,11 @@ def on_grades(ratings: _Ratings, entry: "Coefficient", file: "RatingsFile") -> _
         return ratings
     grades = file.scale.grades
     if isinstance(ratings, CountedRatings) and ratings.coded is not None:
-        source = replace(ratings.coded, categories=grades)
-        return replace(ratings, categories=grades, source=source)
+        return replace(
+            ratings,
+            categories=grades,
+            source=replace(ratings.coded, categories=grades),
+        )
     return replace(ratings, categories=grades)
 
 
@@ -489,8 +492,9 @@ def estimate_row(
     is_unweighted = questions.weights != questions.weights_of(entry)
     if is_unweighted and not questions.takes_all:
         by_metric = f"by its metric, without {questions.weights} weights"
-        unweighted = "unweighted, there are no weights for it"
-        notes.append(by_metric if entry.metric else unweighted)
+        notes.append(
+            by_metric if entry.metric else "unweighted, there are no weights for it"
+        )
     try:
         estimate = _estimate(entry, ratings, questions, questions.level)
     except MasrelError as error:

@@ -89,9 +89,8 @@ def answers(
     if questions.reference is not None:
         others = _without_reference(file, questions.reference)
     between = questions.between_raters(others)
-    with warnings.catch_warnings():
-        # Every note is in a result, and so below its table or in the JSON.
-        warnings.simplefilter("ignore", MasrelWarning)
+    # Every note is in a result, and so below its table or in the JSON.
+    with warnings.catch_warnings(action="ignore", category=MasrelWarning):
         # what does not fit these tables is said first: it says most
         further = [
             answer
@@ -149,8 +148,9 @@ def _categories(file: RatingsFile, questions: Questions) -> Iterator[Answer]:
                 ratings = counted.coded if counted.knows_raters else counted
                 codes = np.where(ratings.codes < 0, -1, ratings.codes != place)
                 ratings = replace(ratings, codes=codes, categories=("this", "other"))
-                fleiss = coefficient("fleiss_kappa")
-                of = estimate_row(fleiss, ratings, row.keys, folded)
+                of = estimate_row(
+                    coefficient("fleiss_kappa"), ratings, row.keys, folded
+                )
                 estimate = replace(
                     row.estimate,
                     standard_error=of.estimate.standard_error,
@@ -262,12 +262,11 @@ def _retest_rows(
         row = estimate_row(coefficient("cohen_kappa"), ratings, keys, alone)
         estimate = replace(row.estimate, n_raters=min(row.estimate.n_raters, 1))
         rows.append(replace(row, estimate=estimate))
-    of_all = ["stratified_kappa"]
-    if questions.takes_all or "pooled_kappa" in questions.names:
-        of_all.append("pooled_kappa")
+    is_pooled = questions.takes_all or "pooled_kappa" in questions.names
     everybody = {**names, "rater": None}
     return rows + [
-        estimate_row(coefficient(name), pairs, everybody, every) for name in of_all
+        estimate_row(coefficient(name), pairs, everybody, every)
+        for name in ("stratified_kappa", *["pooled_kappa"] * is_pooled)
     ]
 
 
@@ -329,9 +328,11 @@ def _symmetry_rows(part: RatingsPart) -> Iterator[tuple[Row, Row]]:
         "Bhapkar": bhapkar(table),
     }
     if len(table) == 2:
-        corrected = mcnemar(table, kind="corrected")
-        of_two = {"McNemar, exact": mcnemar(table), "McNemar, corrected": corrected}
-        tests = {**of_two, **tests}
+        tests = {
+            "McNemar, exact": mcnemar(table),
+            "McNemar, corrected": mcnemar(table, kind="corrected"),
+            **tests,
+        }
     for title, result in tests.items():
         name, _, kind = title.partition(", ")
         key = name.lower().replace("-", "_")
@@ -351,11 +352,9 @@ def _symmetry_rows(part: RatingsPart) -> Iterator[tuple[Row, Row]]:
 
 def _indices(file: RatingsFile, _: Questions) -> Iterator[Answer]:
     """Give what the margins of two raters and two categories do to kappa."""
-    answer = _table(
-        "indices", file, partial(_of_margins, file.scale.grades), "--indices"
-    )
+    rows_of = partial(_of_margins, file.scale.grades)
     notes = tuple(map(note, ("pabak", "on_category", "largest")))
-    yield replace(answer, notes=notes)
+    yield replace(_table("indices", file, rows_of, "--indices"), notes=notes)
 
 
 _OF_TABLE = {
@@ -402,8 +401,9 @@ def _of_margins(grades: Sequence[str], part: RatingsPart) -> Iterator[tuple[Row,
 
 def _with_reason(call: Callable[[], _T]) -> tuple[_T, str | None]:
     """Return a number, and the warning that says why it is undefined."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", UndefinedStatisticWarning)
+    with warnings.catch_warnings(
+        record=True, action="always", category=UndefinedStatisticWarning
+    ) as caught:
         value = call()
     return value, str(caught[0].message) if caught else None
 

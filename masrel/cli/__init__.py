@@ -103,8 +103,9 @@ class _Verbs(click.Group):
             hint = f" Did you mean '{near[0]}'?" if near else ""
             ctx.fail(f"No such command '{cmd_name}'.{hint}")
         package = "masrel.cli" if cmd_name in _STATISTICS else "masrel.lab.cli"
-        module = importlib.import_module(f"{package}.{cmd_name}")
-        command: click.Command = getattr(module, cmd_name)
+        command: click.Command = getattr(
+            importlib.import_module(f"{package}.{cmd_name}"), cmd_name
+        )
         return command
 
     def invoke(self, ctx: click.Context) -> Any:

@@ -302,8 +302,10 @@ def _figure(answers: Sequence[Answer], questions: Questions) -> "Content | Drawn
         if answer.figure:
             return Drawn(_DRAWERS[answer.name], (answer.figure, answer.of))
     shown = answers[:1] if answers[0].name == "agreement" else answers
-    rows = [row for answer in shown for row in answer.estimates]
-    return agreement_forest(rows, questions.target or "items")
+    return agreement_forest(
+        [row for answer in shown for row in answer.estimates],
+        questions.target or "items",
+    )
 
 
 def _offer_interval(command: str, items: str) -> None:

@@ -111,8 +111,8 @@ def output_options(
 ) -> Decorator:
     """Return the options with these helps, as one argument `output` of a command."""
     # makes_folder: whether the command makes a folder that JSON may go to
-    kind = OutputFile if makes_folder else FileInFolder
-    json_path = kind(path_type=Path, allow_dash=True)
+    json_kind = OutputFile if makes_folder else FileInFolder
+    json_path = json_kind(path_type=Path, allow_dash=True)
     raw_csv = raw_csv or (_RAW if csv is not None else None)
     figures = FileInFolder(path_type=Path, dir_okay=False)
     options = [
@@ -158,8 +158,7 @@ def write_output(
         from masrel.plots import draw
 
         form = _FORMS[output.figure.suffix.lower()]
-        files = draw(figure(), stamp=stamp, forms=(form,))
-        write_file(output.figure, files[form])
+        write_file(output.figure, draw(figure(), stamp=stamp, forms=(form,))[form])
         click.echo(f"figure: {output.figure}", err=True)
 
 

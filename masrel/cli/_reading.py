@@ -18,11 +18,11 @@ def read_file(file: Path, options: Reading) -> "RatingsFile":
     from masrel.ratings import read_ratings
 
     with progress("reading", "MB", is_quiet=False) as report:
-
-        def show(n_bytes: int, n_expected: int) -> None:
-            report(n_bytes >> 20, n_expected >> 20)
-
-        return read_ratings(file, options, progress=show)
+        return read_ratings(
+            file,
+            options,
+            progress=lambda n_bytes, n_all: report(n_bytes >> 20, n_all >> 20),
+        )
 
 
 def weights_of_option(text: str) -> "str | Path":

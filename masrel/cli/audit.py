@@ -6,17 +6,16 @@ from typing import TYPE_CHECKING
 
 import click
 
+from masrel._input import refuse
 from masrel.cli._options import (
     OutputOptions,
     output_options,
     write_output,
 )
 from masrel.cli._paths import note_inputs
-from masrel.errors import ParameterError
 
 if TYPE_CHECKING:
     from masrel.audit import Claim
-    from masrel.tables._tables import Table
 
 _Texts = Mapping[str, str | tuple[str, str]]
 
@@ -88,17 +87,16 @@ def audit(
     )
 
     audits = [audit_claim(claim) for claim in claims]
-
-    def text() -> "Table | str":
-        if output.sentence:
-            return "\n".join(f"{a.claim.name}: {a.sentence}." for a in audits)
-        return (readings_table if output.csv else claims_table)(audits)
-
+    table = readings_table if output.csv else claims_table
     is_table = not (output.csv or output.sentence)
     write_output(
         output,
         document=lambda: claims_document(audits),
-        text=text,
+        text=lambda: (
+            "\n".join(f"{a.claim.name}: {a.sentence}." for a in audits)
+            if output.sentence
+            else table(audits)
+        ),
         more=(readings_table(audits),) if is_table else (),
         width=_WIDTH,
     )
@@ -107,17 +105,15 @@ def audit(
 def _claims(source: Path, texts: _Texts) -> "tuple[Claim, ...]":
     from masrel.audit import read_claims
 
-    needed = "has claims of its own, so it needs no option that has one"
-    if texts:
-        raise ParameterError(f"{source}: {needed}")
+    has_own = f"{source}: has claims of its own, so it needs no option that has one"
+    refuse((texts, has_own))
     file = source
     if source.is_dir():
         from masrel.lab.protocol import StudyPaths
 
         file = StudyPaths(source).claims_file
         needed = "needs a file of claims, ratings/claims.csv, got none"
-        if not file.exists():
-            raise ParameterError(f"{source}: {needed}")
+        refuse((not file.exists(), f"{source}: {needed}"))
     note_inputs(file)
     return read_claims(file)
 
@@ -129,13 +125,19 @@ def _claim(texts: _Texts) -> "Claim":
     values = {name: text for name, text in texts.items() if isinstance(text, str)}
     ends = texts.get("interval", ())
     values |= dict(zip(("low", "high"), ends, strict=False))
-    for name in ("n_items", "n_categories"):
-        if name not in texts:
-            raise ParameterError(f"{name}: needed without a SOURCE, got none")
-    for name, other in _BESIDE.items():
-        alone = name in texts and other not in texts
-        if alone:
-            raise ParameterError(f"{name}: needs --{other} beside it, got none")
+    refuse(
+        *(
+            (name not in texts, f"{name}: needed without a SOURCE, got none")
+            for name in ("n_items", "n_categories")
+        ),
+        *(
+            (
+                name in texts and other not in texts,
+                f"{name}: needs --{other} beside it, got none",
+            )
+            for name, other in _BESIDE.items()
+        ),
+    )
     return claim_of(values)
 
 

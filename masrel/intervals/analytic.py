@@ -205,8 +205,8 @@ def _with_error(
     """Return an estimate with a standard error, and the interval that it makes."""
     if problem.entry.metric == "ordinal":
         problem = replace(problem, notes=(HELD,))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UndefinedStatisticWarning)  # given below
+    # it is given below
+    with warnings.catch_warnings(action="ignore", category=UndefinedStatisticWarning):
         estimate = problem.entry(problem.coded, weights=weights)
     unit: Unit | None = None
     method, error = "delta method", estimate.standard_error

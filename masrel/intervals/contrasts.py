@@ -19,7 +19,7 @@ import numpy as np
 from masrel._input import check_option
 from masrel.agreement import Label, Metric, Significance, WeightsLike, count_ratings
 from masrel.agreement._codes import item_counts
-from masrel.agreement._engine import Floats, undefined
+from masrel.agreement._engine import Floats, tested, undefined
 from masrel.agreement._labels import is_row
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate, Interval
@@ -571,8 +571,8 @@ def differences(
             )
     without, n_units = _without_units(problems, clusters)
     covariance = _covariance(without, n_units)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UndefinedStatisticWarning)  # given below
+    # it is given below
+    with warnings.catch_warnings(action="ignore", category=UndefinedStatisticWarning):
         estimates = tuple(
             problem.entry(problem.coded, weights=weights) for problem in problems
         )
@@ -940,24 +940,7 @@ def _tested(
     reason: str | None = None,
 ) -> Significance:
     """Return a statistic with its p-value, or warn why there is none."""
-    from scipy.special import chdtrc, fdtrc, stdtr  # loaded only for a p-value
-
     if reason is not None:
+        statistic = math.nan
         undefined(_TITLES[name], reason)
-        statistic = p = math.nan
-    elif distribution == "t":
-        p = min(1.0, 2.0 * float(stdtr(df[0], -abs(statistic))))
-    elif distribution == "F":
-        p = float(fdtrc(df[0], df[1], statistic))
-    else:
-        p = float(chdtrc(df[0], statistic))
-    return Significance(
-        name=name,
-        hypothesis=hypothesis,
-        statistic=statistic,
-        distribution=distribution,
-        df=df,
-        p_value=p,
-        n_items=n_items,
-        reason=reason,
-    )
+    return tested(name, hypothesis, distribution, df, n_items, statistic, reason)

@@ -256,8 +256,8 @@ def diagnose(
         else warn_small(estimate.n_items_paired, 10, "items", estimate.n_items)
     )
     codes, freq = distinct_rows(coded.codes, coded.n_categories)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", MasrelWarning)  # the arrays say it
+    # the arrays say it
+    with warnings.catch_warnings(action="ignore", category=MasrelWarning):
         arrays = {
             **_of_pairs(everybody, codes, freq, others, right, at),
             **_changes(problem, codes[:, others], freq, at),

@@ -226,8 +226,7 @@ def _chosen(design: Design, codes: Integers) -> tuple[float, float, float]:
         labels = np.array([*design.model.scale, None], dtype=object)[codes]
         ratings = labels.reshape(len(codes), -1, 2).transpose(1, 0, 2).tolist()
     method = design.study.interval
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", MasrelWarning)
+    with warnings.catch_warnings(action="ignore", category=MasrelWarning):
         interval = estimate(
             design.entry.name,
             ratings,

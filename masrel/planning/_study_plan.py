@@ -546,8 +546,8 @@ def pilot(
     (0.467, (0.375, 0.625), 0.0)
     """
     coded = code_ratings(ratings, categories)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UndefinedStatisticWarning)  # it is an error
+    # that it is undefined is an error
+    with warnings.catch_warnings(action="ignore", category=UndefinedStatisticWarning):
         result = estimate(
             coefficient, coded, target=target, weights=weights, level=level
         )

@@ -425,8 +425,7 @@ class Design:
         per_rater = 2 if self.entry.shape == "pairs" else 1
         n_columns = max(self.n_raters, 2 // per_rater) * per_rater
         codes = np.repeat(np.arange(len(self.model.scale))[:, None], n_columns, axis=1)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", MasrelWarning)
+        with warnings.catch_warnings(action="ignore", category=MasrelWarning):
             return pose_problem(
                 replace(self.entry, code=lambda ratings, _categories: ratings),
                 CodedRatings(codes=codes, categories=self.model.scale),

@@ -404,9 +404,8 @@ def _paired_note(rows: Sequence[AgreementRow], items: str) -> list[str]:
 
 
 def _interval_note(interval: Interval, detail: Detail) -> str:
-    kind = "CI"
-    if interval.kind == "credible":
-        kind = "credible bound" if interval.is_one_sided else "credible interval"
+    ends = "bound" if interval.is_one_sided else "interval"
+    kind = f"credible {ends}" if interval.kind == "credible" else "CI"
     name = f"{percent(interval.level)} % {kind}, {interval.method}"
     to = f": generalises to {_population(interval)} like these"
     if detail == "all":

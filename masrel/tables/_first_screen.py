@@ -78,43 +78,35 @@ def what_was_read(
         named += f" in {counted(read['n_clusters'], 'cluster')} by {read['clusters']!r}"
     if read.get("frequency"):
         named += f" counted by {read['frequency']!r}"
-    counts = f"{counted(read['n_items'], 'item', items)}{named}, "
-    counts += counted(read["n_raters"], "rater")
-    first = f"Read {Path(read['file']).name}{form}: {counts}"
+    rated = f"{counted(read['n_items'], 'item', items)}{named}"
+    by = counted(read["n_raters"], "rater")
+    first = f"Read {Path(read['file']).name}{form}: {rated}, {by}"
     parts = _of_grades(file)
     if detail != "brief" and file.scale.name in _SCALES:
         parts.append(_SCALES[file.scale.name].format(", ".join(file.scale.grades)))
-    grades = " ".join(parts)
-    return [first + (f" ({raters})." if raters else "."), grades]
+    return [first + (f" ({raters})." if raters else "."), " ".join(parts)]
 
 
 def _of_grades(file: RatingsFile) -> list[str]:
-    read, scale = file.read, file.scale
+    read, scale, repeated = file.read, file.scale, file.read["n_repeated"]
     grades = list(read["grades"].items())
     listed = ", ".join(f"{grade} ×{n}" for grade, n in grades[:_SHOWN])
     if len(grades) > _SHOWN:
         listed = f"{len(grades)} from {grades[0][0]} to {grades[-1][0]}"
     name = " (Modified Ashworth Scale)" if scale.name == "MAS" else ""
-    parts = [f"Grades{name}: {listed}."]
-    if read["n_missing"]:
-        codes = ", ".join(f"{n} {c or 'empty'}" for c, n in read["missing"].items())
-        parts.append(f"Missing: {codes or read['n_missing']}.")
-    if read["n_repeated"]:
-        parts.append(f"Repeated: {read['n_repeated']}, {read['repeated']} taken.")
-    if read["dropped"]:
-        rows = ", ".join(f"{n} {why}" for why, n in read["dropped"].items())
-        parts.append(f"Rows left out: {rows}.")
-    if "unit" in read:
-        parts.append(f"Unit, left off: {read['unit']}.")
-    if "thousands" in read:
-        parts.append(f"Thousands mark, left off: {read['thousands']!r}.")
-    merged = {g: s for g, s in read["merged"].items() if len(s) > 1}
-    if merged:
-        same = "; ".join(
-            f"{' = '.join(spellings)}" for spellings in list(merged.values())[:_SHOWN]
-        )
-        parts.append(f"The same grade: {same}.")
-    return parts
+    codes = ", ".join(f"{n} {c or 'empty'}" for c, n in read["missing"].items())
+    rows = ", ".join(f"{n} {why}" for why, n in read["dropped"].items())
+    same = [" = ".join(of) for of in read["merged"].values() if len(of) > 1]
+    texts = {
+        f"Grades{name}: {listed}.": True,
+        f"Missing: {codes or read['n_missing']}.": read["n_missing"],
+        f"Repeated: {repeated}, {read['repeated']} taken.": repeated,
+        f"Rows left out: {rows}.": rows,
+        f"Unit, left off: {read.get('unit')}.": "unit" in read,
+        f"Thousands mark, left off: {read.get('thousands')!r}.": "thousands" in read,
+        f"The same grade: {'; '.join(same[:_SHOWN])}.": same,
+    }
+    return [text for text, is_so in texts.items() if is_so]
 
 
 def left_out(ratings: RatingsFile, questions: Questions) -> list[str]:

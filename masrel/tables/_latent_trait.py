@@ -91,9 +91,8 @@ def _notes(result: "LatentTrait") -> Iterator[str]:
         for check in result.checks
         if not _UNLIKELY <= check.p_value <= 1.0 - _UNLIKELY
     ]
-    makes, which = "makes", ""
-    if unlikely:
-        makes, which = "does not make", f": {'; '.join(unlikely)}"
+    makes = "does not make" if unlikely else "makes"
+    which = f": {'; '.join(unlikely)}" if unlikely else ""
     yield f"The model {makes} ratings like these (predictive check){which}."
     yield (
         f"{result.n_chains} chains of {result.n_steps} steps; R-hat at most "

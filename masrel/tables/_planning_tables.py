@@ -245,8 +245,8 @@ def _toml_values(plan: Plan) -> Iterator[tuple[str, str]]:
 def planning_curves(plans: Sequence[Plan], aim: Mapping[str, float]) -> Drawn:
     """Return what plans aim at, else their half-width, over items or over raters."""
     has_power = not any(math.isnan(plan.power) for plan in plans)
-    of_power = "power" if has_power else "expected_half_width"
-    name = "assurance" if "assurance" in aim else of_power
+    other_aim = "power" if has_power else "expected_half_width"
+    name = "assurance" if "assurance" in aim else other_aim
     several = len({plan.value for plan in plans}) > 1
     over_items = len({plan.n_items for plan in plans}) > 1
     over, other = ("items", "raters") if over_items else ("raters", "items")
