@@ -219,18 +219,16 @@ def _plain_table(
         return np.asarray(ratings), scale
     if not hasattr(ratings, "to_numpy"):
         return ratings, scale
-    names = list(map(str, getattr(ratings, "columns", ())))
-    if not hasattr(ratings, "iloc"):  # not pandas, whose own types are told apart here
+    if hasattr(ratings, "iloc"):  # pandas, whose own types are told apart here
+        types = list(ratings.dtypes)
+        if scale is None and all(getattr(of, "ordered", False) for of in types):
+            scales = [check_categories(of.categories.tolist()) for of in types]
+            scale = scales[0] if len(set(scales)) == 1 else None
+        are_numbers = all(isinstance(of, np.dtype) and of.kind in "iuf" for of in types)
+        table = ratings.to_numpy(None if are_numbers else object)
+    else:
         table = np.asarray(ratings.to_numpy())
-        _refuse_columns(names, table)
-        return table, scale
-    types = list(ratings.dtypes)
-    if scale is None and all(getattr(of, "ordered", False) for of in types):
-        scales = [check_categories(of.categories.tolist()) for of in types]
-        scale = scales[0] if len(set(scales)) == 1 else None
-    are_numbers = all(isinstance(of, np.dtype) and of.kind in "iuf" for of in types)
-    table = ratings.to_numpy(None if are_numbers else object)
-    _refuse_columns(names, table)
+    _refuse_columns(list(map(str, getattr(ratings, "columns", ()))), table)
     return table, scale
 
 

@@ -314,8 +314,10 @@ def robinson_a(
     anova = _Anova.of(values)
     reason, value = None, math.nan
     if min(values.shape) < 2:
-        why = "fewer than two items or raters in the items that every rater rated"
-        reason = undefined("Robinson's A", why)
+        reason = undefined(
+            "Robinson's A",
+            "fewer than two items or raters in the items that every rater rated",
+        )
     elif (total := anova.items + (anova.k - 1) * anova.residual) == 0.0:
         reason = undefined("Robinson's A", "0/0: no variance but between raters")
     else:
@@ -577,8 +579,7 @@ def _without_gaps(
     anova = _Anova.of(values)
     reason = _no_variance(values, anova, form)
     if reason is None and anova.denominator(form) == 0.0:
-        why = "division by 0: the total variance is estimated as 0"
-        reason = undefined(form, why)
+        reason = undefined(form, "division by 0: the total variance is estimated as 0")
     if reason is not None:
         return math.nan, None, reason
     value, notes = anova.value(form), list[str]()

@@ -374,8 +374,9 @@ def limits_of_agreement(
     mean = sd = math.nan
     reason, widths = None, [math.nan] * 5
     if n < 2:
-        why = "fewer than two items are rated by both raters"
-        reason = undefined("the limits of agreement", why)
+        reason = undefined(
+            "the limits of agreement", "fewer than two items are rated by both raters"
+        )
     else:
         mean, sd = float(differences.mean()), float(differences.std(ddof=1))
         widths = _widths(n, share, level)

@@ -78,8 +78,7 @@ def _groups_of(name: str, parts: Sequence[RatingsPart]) -> _Groups:
     sets = []
     for ratings, names, rows in zip(coded, items, rated, strict=True):
         codes = np.full((len(row_of), ratings.codes.shape[1]), -1, ratings.codes.dtype)
-        to = [row_of[names, item] for item in rows]
-        codes[to] = ratings.codes[list(rows.values())]
+        codes[[row_of[names, of] for of in rows]] = ratings.codes[list(rows.values())]
         sets.append(replace(ratings, codes=codes))
     return _Groups(
         sets=tuple(sets),
@@ -127,8 +126,8 @@ def _difference_rows(
         if (of.formula is not None and not of.has_interval) or not questions.takes_all
     ]
     rows = [row for of in can for row in _differences(of, file, pairs, questions)]
-    is_clustered = any(of.clusters is not None for of in pairs.values())
-    unit = "clusters" if is_clustered else "items"
+    has_clusters = any(of.clusters is not None for of in pairs.values())
+    unit = "clusters" if has_clusters else "items"
     notes = [note(f"difference_of_{unit}", level=questions.level)]
     if len(pairs) > 1:
         notes.append(note("holm", n=len(pairs)))

@@ -424,9 +424,13 @@ def entries(
     from masrel.agreement import COEFFICIENTS, coefficient
 
     is_of_others = not questions.takes_all and _OF_METRIC not in questions.names
-    needed = f"--metric {questions.metric}: is of {_OF_METRIC}, which is not among "
-    if questions.metric and is_of_others:
-        raise ParameterError(f"{needed}--coefficients {','.join(questions.names)}")
+    refuse(
+        (
+            questions.metric and is_of_others,
+            f"--metric {questions.metric}: is of {_OF_METRIC}, which is not among "
+            f"--coefficients {','.join(questions.names)}",
+        )
+    )
     n_raters = max(len(part.raters) for part in parts) or file.read["n_raters"]
     chosen = (
         COEFFICIENTS.values()

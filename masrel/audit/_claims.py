@@ -177,14 +177,15 @@ class Claim:
         for key, (least, most) in _COUNTS.items():
             count = getattr(self, key)
             most = min(most, self.n_items - 1) if key == "n_unrated" else most
+            needed = f"needs a whole number from {least} to {most}, got {shown(count)}"
             is_in = _is_whole(count) and least <= count <= most
-            needed = f"needs a whole number from {least} to {most}"
-            if not is_in:
-                raise ParameterError(f"{key}: {needed}, got {shown(count)}")
-        if self.agreement is None and self.kappa is None:
-            raise ParameterError(
-                "agreement, kappa: needs at least one of them, got neither"
+            refuse((not is_in, f"{key}: {needed}"))
+        refuse(
+            (
+                self.agreement is None and self.kappa is None,
+                "agreement, kappa: needs at least one of them, got neither",
             )
+        )
         check_option("agreement_weights", self.agreement_weights, (*WEIGHTS, "any"))
         check_option("kappa_weights", self.kappa_weights, (*WEIGHTS, "any"))
         check_option("rounding", self.rounding, (*RULES, "either"))
@@ -315,8 +316,7 @@ def _claims_of(text: str) -> tuple[Claim, ...]:
         if line.strip(" ,;") and not line.startswith("#")
     }
     needed = f"needs a line of column names and a row a claim, got {len(lines)} lines"
-    if len(lines) < 2:
-        raise ParameterError(needed)
+    refuse((len(lines) < 2, needed))
     first = next(iter(lines.values()))
     separator = ";" if first.count(";") > first.count(",") else ","
     (_, head), *rows = [

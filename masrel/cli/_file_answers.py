@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
-from masrel._input import split_names
+from masrel._input import refuse, split_names
 from masrel.analysis._file_estimates import USUAL, Answer, Questions
 from masrel.cli._options import (
     OutputOptions,
@@ -27,7 +27,6 @@ from masrel.cli._reading import (
     table_options,
     weights_of_option,
 )
-from masrel.errors import ParameterError
 from masrel.estimates import IntervalMethod
 from masrel.ratings._findings import Reading
 
@@ -206,10 +205,12 @@ def _show_answers(
         questions.checked(reading.clusters), reference=reading.reference
     )
     has_figure = questions.target or questions.command in ("diagnose", "limits")
-    if output.figure is not None and not has_figure:
-        raise ParameterError(
-            "--figure: shows intervals, so it needs --target raters, items or both"
+    refuse(
+        (
+            output.figure is not None and not has_figure,
+            "--figure: shows intervals, so it needs --target raters, items or both",
         )
+    )
     ratings = read_file(file, reading)
     questions = questions.on_scale(ratings)
     from masrel.analysis._file_questions import answers

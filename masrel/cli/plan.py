@@ -17,7 +17,6 @@ from masrel.cli._options import (
 )
 from masrel.cli._paths import InputFile
 from masrel.cli._reading import weights_of_option
-from masrel.errors import ParameterError
 from masrel.estimates import IntervalMethod
 
 if TYPE_CHECKING:
@@ -254,9 +253,8 @@ def _with_pilot(arguments: dict[str, Any]) -> dict[str, Any]:
     from masrel.ratings import read_ratings
 
     parts = read_ratings(path).parts
-    needed = f"--pilot: needs the ratings of one group and session, {path} has "
-    if len(parts) != 1:
-        raise ParameterError(f"{needed}{len(parts)}")
+    needed = f"--pilot: needs the ratings of one group and session, {path} has"
+    refuse((len(parts) != 1, f"{needed} {len(parts)}"))
     names = ("coefficient", "target", "weights", "level")
     of_pilot = {name: arguments[name] for name in names if name in arguments}
     made = pilot(ratings=parts[0].ratings, **of_pilot)

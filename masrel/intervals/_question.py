@@ -183,8 +183,10 @@ class IntervalProblem:
     ) -> Interval:
         """Return a confidence interval, cut at the ends of the parameter space."""
         if low < self.min_value - ROUNDING or high > 1.0 + ROUNDING:
-            space = f"[{self.min_value:g}, 1]"
-            notes = (*notes, f"cut at the end of the parameter space {space}")
+            notes = (
+                *notes,
+                f"cut at the end of the parameter space [{self.min_value:g}, 1]",
+            )
         return Interval(
             # resamples of items and raters can leave both ends below the space
             low=min(max(low, self.min_value), 1.0),

@@ -190,8 +190,7 @@ def _by_convention(
         weights=weights,
         level=level,
     )
-    law = _PRINTED[convention]
-    estimate, interval = _with_error(problem, weights, law, convention)
+    estimate, interval = _with_error(problem, weights, _PRINTED[convention], convention)
     return replace(estimate, interval=interval)
 
 

@@ -431,9 +431,12 @@ def _other_items_and_raters(
     # fewer degrees of freedom of the two, in both, the answer is no surer than either.
     df = min(problem.n_paired_items, problem.n_paired_raters) - 1
     if df < 1:
-        reason = "one item with two ratings does not say how items differ"
-        method = "items and raters left out"
-        return problem.undefined(reason, method=method, unit="both"), "one item"
+        nothing = problem.undefined(
+            "one item with two ratings does not say how items differ",
+            method="items and raters left out",
+            unit="both",
+        )
+        return nothing, "one item"
     common = student_t(problem.level, df) ** 2 * _variance_of_cells(problem)
     parts = (replace(problem, target=of, max_df=df) for of in ("items", "raters"))
     items, raters = (_choose_interval(of, rule)[0] for of in parts)

@@ -148,8 +148,7 @@ def difference(
     notes = warn_small(compared.n_units, 10, unit, n_items)
     width = 1.0 - min(problem.min_value for problem in compared.problems)
     if value - half < -width or value + half > width:
-        space = f"[{-width:g}, {width:g}]"
-        notes += (f"cut at the ends of the parameter space {space}",)
+        notes += (f"cut at the ends of the parameter space [{-width:g}, {width:g}]",)
     interval = Interval(
         low=max(value - half, -width),
         high=min(value + half, width),
@@ -582,11 +581,14 @@ def differences(
     each = np.array([estimate.value for estimate in estimates])
     values, errors = each[:, None] - each, np.zeros((len(each),) * 2)
     for i, j in itertools.combinations(range(len(each)), 2):
-        variance = _variance_of(without[i] - without[j], n_units)
-        errors[i, j] = errors[j, i] = math.sqrt(variance)
+        errors[i, j] = errors[j, i] = math.sqrt(
+            _variance_of(without[i] - without[j], n_units)
+        )
     if reason is None and not errors.any():
-        left_out = unit.removesuffix("s")
-        reason = f"leaving out any {left_out} leaves all differences as they are"
+        reason = (
+            f"leaving out any {unit.removesuffix('s')} leaves all differences as they "
+            "are"
+        )
     elif reason is None and simultaneous == "scheffe":
         reason = _too_few(len(each), n_units)
     quantile, p_values = math.nan, np.full_like(errors, math.nan)
@@ -640,8 +642,10 @@ def _why_undefined(
         return f"needs at least 2 {unit} with ratings in every set"
     for name, values in zip(names, without, strict=True):
         if np.isnan(values).any():
-            left_out = unit.removesuffix("s")
-            return f"{name}: with one {left_out} left out the estimate is undefined"
+            return (
+                f"{name}: with one {unit.removesuffix('s')} left out the estimate is "
+                "undefined"
+            )
     return None
 
 

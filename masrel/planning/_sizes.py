@@ -76,9 +76,8 @@ def precision(study: Study, *, progress: Progress | None = None) -> Plan:
     >>> round(plan.expected_half_width, 4), round(plan.assurance, 3)
     (0.0995, 0.513)
     """
-    is_open = None in (study.n_items, study.n_raters)
-    if is_open:
-        raise ParameterError("n_items, n_raters: a study that is shown needs both")
+    needed = "n_items, n_raters: a study that is shown needs both"
+    refuse((None in (study.n_items, study.n_raters), needed))
     check_aim(study, is_solved=False)
     design = design_of(study)
     check_has_numbers(design)
@@ -132,11 +131,13 @@ def sample_size(study: Study, *, progress: Progress | None = None) -> Plan:
     """
     n_known = (study.n_items is not None) + (study.n_raters is not None)
     got = "both" if n_known else "none, and no prices by which to find the cheapest"
-    if n_known == 2 or (n_known == 0 and study.prices is None):
-        raise ParameterError(
+    refuse(
+        (
+            n_known == 2 or (n_known == 0 and study.prices is None),
             "n_items, n_raters: needs exactly one of them, since the other is solved "
-            f"for; got {got}"
+            f"for; got {got}",
         )
+    )
     check_aim(study, is_solved=True)
     design = design_of(study)
     if n_known == 0:
@@ -471,8 +472,7 @@ def _cheapest(design: Design, progress: Progress | None) -> Plan:
     smallest = _Search(design.of_size(n_raters=design.min_raters), progress)
     least = smallest.cost(smallest.lowest)
     needed = f"needs at least {least:g}, of the smallest study"
-    if limit < least:
-        raise ParameterError(f"max_cost: {needed}; got {limit:g}")
+    refuse((limit < least, f"max_cost: {needed}; got {limit:g}"))
     best = smallest.at(smallest.lowest)
     if math.isinf(limit):
         best = _first_that_reaches(design, most, progress)

@@ -615,7 +615,6 @@ def _table_at(design: Design, value: float) -> ItemModel:
     share = (value - at_chance) / (_true_value(design) - at_chance)
     other = chance + share * (table - chance)
     none = f"value: no table with these margins is as far from chance as {value:g}"
-    if other.min() < -1e-12:
-        raise ParameterError(none)
+    refuse((other.min() < -1e-12, none))
     rows = tuple(map(tuple, np.maximum(other, 0.0).tolist()))
     return replace(design.model, table=rows)

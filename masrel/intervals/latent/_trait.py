@@ -6,10 +6,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from masrel._input import refuse
 from masrel.agreement import Label, code_ratings
 from masrel.agreement._engine import Floats, check_level
 from masrel.agreement._labels import Codes
-from masrel.errors import ParameterError, RatingsError
+from masrel.errors import RatingsError
 from masrel.estimates import Distribution, Estimate, Interval, Target
 from masrel.intervals._question import recorded_generator
 from masrel.intervals.latent._implied import (
@@ -212,11 +213,9 @@ def latent_trait(
     ...     ratings, items="fixed", categories=[1, 2, 3, 4], rng=1
     ... )
     """
-    if items not in _TARGETS:
-        raise ParameterError(f'items: needs "fixed" or "random", got {items!r}')
+    refuse((items not in _TARGETS, f'items: needs "fixed" or "random", got {items!r}'))
     check_level(level)
-    if min(n_steps, max_steps) < 20:
-        raise ParameterError("n_steps, max_steps: need at least 20")
+    refuse((min(n_steps, max_steps) < 20, "n_steps, max_steps: need at least 20"))
     checked = _Ratings.of(ratings, categories)
     generator, seed = recorded_generator(rng)
     seeds = generator.integers(2**63, size=2).tolist()
@@ -253,13 +252,14 @@ class _Ratings:
     def of(cls, ratings: object, categories: Sequence[Label] | None) -> "_Ratings":
         """Check ratings, (n_items, n_raters)."""
         coded = code_ratings(ratings, categories)
-        if not coded.declared and isinstance(coded.categories[0], str):
-            raise ParameterError(
+        refuse(
+            (
+                not coded.declared and isinstance(coded.categories[0], str),
                 "categories: the model needs the declared scale in order, the ratings "
-                "are text"
-            )
-        if coded.n_categories < 2:
-            raise ParameterError("categories: the model needs two, got one")
+                "are text",
+            ),
+            (coded.n_categories < 2, "categories: the model needs two, got one"),
+        )
         rated = coded.codes >= 0
         if not (rated.sum(axis=1) >= 2).any():
             raise RatingsError("ratings: the model needs an item rated by two raters")
