@@ -98,7 +98,7 @@ def doubt_columns(
     are_named = bool(options.raters or layout.criteria)
     if not are_named:
         _refuse_other_tables(sheet, layout, options, names, scale)
-    if not options.names_at:
+    if not (options.names_at or sheet.is_transposed):
         findings += _second_header(sheet, codes, scale, freq)
     # an item that is there twice is refused below, and no column is one of raters
     is_long = any(
@@ -428,8 +428,12 @@ def doubt_counts(
     findings = []
     are_sums = (2 * table == table.sum(axis=1)[:, None]).all(axis=0)
     for name in [] if options.raters else itertools.compress(names, are_sums):
-        if len(names) > 2 or _SUMMARY.fullmatch(name):
-            raise sheet.refuse("sum column", column=name, name=quoted([name]))
+        finding = Finding("sum column", column=name, name=quoted([name]))
+        # a contingency table has as many rows, if no column is one of sums
+        is_odd = len(names) > 2 and (layout.kind == "counts" or len(names) > len(table))
+        if _SUMMARY.fullmatch(name) or (is_odd and len(table) >= _ENOUGH_ROWS):
+            raise sheet.refuse("sum column", **finding.facts)
+        findings += [finding] * is_odd
     if len(table) > 2 and (2 * table[-1] == table.sum(axis=0)).all():
         where = sheet.where(len(table) - 1)
         items = [sheet.columns[place] for place in layout.item]

@@ -308,6 +308,8 @@ def test_frequencies_that_are_not_said(
         ("item,A,B\nsum,1,1\nit,1,2\nrun,2,2\n", {}, "summary"),  # words
         ("item,A,B\nit,1,2\nrun,2,2\nsum,1,1\n", {}, None),
         ("item,A,B\np,a,1\nq,b,0\nr,a,1\n", {"ignore": "B"}, ""),
+        # a column of items is no second line of names
+        (",p,q,r,s\nA,x,a,a,a\nB,x,a,b,a\n", {"transpose": True}, ""),
     ],
 )
 def test_rows_and_names_that_are_none(
