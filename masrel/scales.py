@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
+from masrel._input import refuse
 from masrel.errors import ParameterError
 
 __all__ = [
@@ -49,18 +50,20 @@ class Scale:
     values: tuple[float, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if not self.grades:
-            raise ParameterError(f"scale {self.name!r}: needs at least one grade")
-        for grade in self.grades:
-            if not isinstance(grade, str) or not grade.strip():
-                raise ParameterError(
-                    f"scale {self.name!r}: grades must be text, got {grade!r}"
+        refuse(
+            (not self.grades, f"scale {self.name!r}: needs at least one grade"),
+            *(
+                (
+                    not isinstance(grade, str) or not grade.strip(),
+                    f"scale {self.name!r}: grades must be text, got {grade!r}",
                 )
-        if len(set(self.grades)) < len(self.grades):
-            repeated = sorted(g for g, n in Counter(self.grades).items() if n > 1)
-            raise ParameterError(
-                f"scale {self.name!r}: grades must differ, repeated: {repeated}"
-            )
+                for grade in self.grades
+            ),
+        )
+        repeated = sorted(g for g, n in Counter(self.grades).items() if n > 1)
+        refuse(
+            (repeated, f"scale {self.name!r}: grades must differ, repeated: {repeated}")
+        )
         ranks = tuple(float(rank) for rank in range(1, len(self.grades) + 1))
         try:
             numbers = tuple(float(grade) for grade in self.grades)

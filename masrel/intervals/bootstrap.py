@@ -242,11 +242,13 @@ def _resampled(
         n, others = int(freq.sum()), freq.size - 1
         # of more than 30 they are more than anybody takes, and not counted any further
         n_distinct *= math.comb(n + others, min(n, others, 30))
-    if exact is True and n_distinct > _MAX_ALL:
-        raise ParameterError(
+    refuse(
+        (
+            exact is True and n_distinct > _MAX_ALL,
             f"exact: there are more than {_MAX_ALL} distinct resamples, too many; draw "
-            "some of them instead"
+            "some of them instead",
         )
+    )
     if exact is False or n_distinct > _MAX_ALL:
         generator, seed = recorded_generator(rng)
         size = max(1, _AT_ONCE // units.width)

@@ -228,12 +228,14 @@ def diagnose(
         ),
     )
     coded = entry.code(ratings, categories)
-    if coded.n_categories > MANY:
-        raise ParameterError(
+    refuse(
+        (
+            coded.n_categories > MANY,
             f"ratings: a table of confusions needs at most {MANY} different grades, "
             f"got {coded.n_categories}; for measurements there are limits of agreement "
-            "and ICC"
+            "and ICC",
         )
+    )
     pose = partial(
         pose_problem,
         entry,
@@ -286,10 +288,12 @@ def _names(
         raise ParameterError(f"raters: needs a name for each, got {raters!r}")
     columns = raters if raters is not None else getattr(ratings, "columns", None)
     names = tuple(map(str, range(n_raters) if columns is None else columns))
-    if len(names) != n_raters:
-        raise ParameterError(
-            f"raters: needs a name for each of {n_raters}, got {len(names)}"
+    refuse(
+        (
+            len(names) != n_raters,
+            f"raters: needs a name for each of {n_raters}, got {len(names)}",
         )
+    )
     return names
 
 

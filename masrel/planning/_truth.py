@@ -144,10 +144,12 @@ def _scale(study: Study, q: int) -> tuple[Label, ...]:
     if study.categories is None or isinstance(study.categories, int):
         return tuple(range(q))
     n_different = len(set(study.categories))
-    if (len(study.categories), n_different) != (q, q):
-        raise ParameterError(
-            f"categories: needs {q} that differ, as the model has, got {n_different}"
+    refuse(
+        (
+            (len(study.categories), n_different) != (q, q),
+            f"categories: needs {q} that differ, as the model has, got {n_different}",
         )
+    )
     return tuple(study.categories)
 
 
@@ -553,10 +555,12 @@ def _with_value(design: Design) -> Design:
     study, value = design.study, design.study.value
     if isinstance(study.model, LatentModel) or study.model == "table":
         implied = _true_value(design)
-        if value is not None and abs(implied - value) > 5e-3:
-            raise ParameterError(
-                f"value: the model has {implied:.4f}, so it needs none, got {value}"
+        refuse(
+            (
+                value is not None and abs(implied - value) > 5e-3,
+                f"value: the model has {implied:.4f}, so it needs none, got {value}",
             )
+        )
         return Design.of(replace(study, value=implied), design.model)
     if value is None:
         raise ParameterError("value: needs the true coefficient, got none")
@@ -584,8 +588,12 @@ def at_value(design: Design, value: float) -> Design:
     def short_of(x: float) -> float:
         return _true_value(replace(design, model=model.with_parameter(x))) - value
 
-    if not model.prevalences:
-        raise ParameterError("model: a LatentModel has one value, and no null value")
+    refuse(
+        (
+            not model.prevalences,
+            "model: a LatentModel has one value, and no null value",
+        )
+    )
     low, high = map(short_of, ends)
     x = ends[abs(high) < 1e-12]
     if not min(abs(low), abs(high)) < 1e-12:

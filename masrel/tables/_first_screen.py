@@ -61,23 +61,22 @@ def what_was_read(
 ) -> list[str]:
     """Return the lines that say what was read, above a table."""
     read = file.read
-    form = ""
-    if detail != "brief":
-        parts = [read["format"], read.get("delimiter"), read.get("encoding")]
-        parts += [f"sheet {read['sheet']}"] if read.get("sheet") else []
-        form = f" ({', '.join(filter(None, parts))})"
+    sheet = f"sheet {read['sheet']}" if read.get("sheet") else None
+    ways = (read["format"], read.get("delimiter"), read.get("encoding"), sheet)
+    form = "" if detail == "brief" else f" ({', '.join(filter(None, ways))})"
     names = read["raters"]
     raters = ", ".join(names[:_SHOWN])
     if len(names) > _SHOWN:
         raters += f" and {len(names) - _SHOWN} more"
-    named = ""
-    if read["item"] and read["layout"] != "table":
-        columns = [repr(name) if name else "the first column" for name in read["item"]]
-        named = f" named by {' and '.join(columns)}"
-    if read.get("clusters"):
-        named += f" in {counted(read['n_clusters'], 'cluster')} by {read['clusters']!r}"
-    if read.get("frequency"):
-        named += f" counted by {read['frequency']!r}"
+    columns = [repr(name) if name else "the first column" for name in read["item"]]
+    clusters, frequency = read.get("clusters"), read.get("frequency")
+    in_clusters = f" in {counted(read.get('n_clusters', 0), 'cluster')} by {clusters!r}"
+    texts = {
+        f" named by {' and '.join(columns)}": columns and read["layout"] != "table",
+        in_clusters: clusters,
+        f" counted by {frequency!r}": frequency,
+    }
+    named = "".join(text for text, is_so in texts.items() if is_so)
     rated = f"{counted(read['n_items'], 'item', items)}{named}"
     by = counted(read["n_raters"], "rater")
     first = f"Read {Path(read['file']).name}{form}: {rated}, {by}"
