@@ -242,24 +242,33 @@ def _no_raters(
     if not named:
         _refuse_criteria(sheet, names, {names[k] for k in sure})
     if wrong and not named and len(names) == 2:
-        met = [np.unique(column[column >= 0]).tolist() for column in codes.T]
-        first, second = (listed([scale.grades[k] for k in of], _SHOWN) for of in met)
-        raise sheet.refuse(
-            *("nothing in common", "", None),
-            **{"one": names[0], "other": names[1], "names": quoted(names)},
-            **{"first": first, "second": second},
+        one, other = (
+            listed([scale.grades[k] for k in np.unique(column[column >= 0])], _SHOWN)
+            for column in codes.T
         )
-    facts = [
-        {
-            "columns": listed([names[k] for k in sorted(of)], _SHOWN),
-            "why": "name" if of <= named else _APART,
-            "advice": _advice(names, of),
-        }
-        for of in (wrong, alone - vouched)
-    ]
+        facts = {"one": one, "other": other, "names": quoted(names)}
+        raise sheet.refuse("nothing in common", **facts)
     if wrong:
-        raise sheet.refuse("no raters", **facts[0])
-    return [Finding("apart", **facts[1])] if alone - vouched else []
+        raise sheet.refuse("no raters", **_facts(names, wrong, named))
+    facts = _facts(names, alone - vouched, named)
+    return [Finding("apart", **facts)] if alone - vouched else []
+
+
+def _facts(names: Sequence[str], wrong: set[int], named: set[int]) -> dict[str, str]:
+    # how columns are left aside; a list that is long is no help
+    out, rest = (
+        [name for k, name in enumerate(names) if (k in wrong) is is_out]
+        for is_out in (True, False)
+    )
+    ignored = f"--ignore{few(out)} leaves such columns aside, " * bool(
+        rest and few(out)
+    )
+    return {
+        "columns": listed(out, _SHOWN),
+        "why": "name" if wrong <= named else _APART,
+        "advice": f"{ignored}--raters{few(rest) * (len(rest) > 1)} names those that "
+        "rate",
+    }
 
 
 def refuse_named(sheet: Sheet, layout: Layout, options: Reading) -> None:
@@ -299,14 +308,6 @@ def _refuse_scales(sheet: Sheet, layout: Layout, codes: Codes) -> None:
         are_rated = met.max() >= 0 <= others.max(initial=-1)
         if are_rated and np.intersect1d(met, others).max(initial=-1) < 0:
             raise sheet.refuse("other grades", criterion=criterion)
-
-
-def _advice(names: Sequence[str], wrong: set[int]) -> str:
-    # how columns are left aside; a list that is long is no help
-    out = few([names[k] for k in sorted(wrong)]) * (len(wrong) < len(names))
-    rest = few([name for k, name in enumerate(names) if k not in wrong])
-    raters = f"--raters{rest * (len(names) - len(wrong) > 1)} names those that rate"
-    return f"--ignore{out} leaves such columns aside, " * bool(out) + raters
 
 
 def _is_no_rater(sheet: Sheet, place: int) -> bool:

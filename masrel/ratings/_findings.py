@@ -433,9 +433,8 @@ _TEXTS = {
     "--ignore{names} leaves them aside, --raters names those who rate",
     "other grades": "criterion {criterion!r} has no grade in common with the others: "
     "it needs to be read by itself, without --by-criterion",
-    "nothing in common": "{one!r} has the grades {first}, {other!r} {second}, and none "
-    "in common: if they are the same grades, write them alike, if others, --raters "
-    "{names} counts them so",
+    "nothing in common": "{one} beside {other}: no grade in common: if they are the "
+    "same grades, write them alike, if others, --raters {names} counts them so",
     "frequency": "column {column!r} looks like how often each row is there: "
     "--frequency {name} counts it so; if a row is one item, --ignore {name} together "
     "with --raters says so",

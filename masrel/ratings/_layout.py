@@ -351,9 +351,11 @@ def criteria_of(names: Sequence[str], raters: Sequence[str] = ()) -> list[Criter
     if raters or not grid:
         return [grid] * bool(grid)
     one, other = list(grid), list(next(iter(grid.values())))
-    for kinds, numbers in ((one, other), (other, one)):  # raters of two kinds, numbered
-        if all(map(_KIND.fullmatch, kinds)) and all(map(_CODE.fullmatch, numbers)):
-            return []
+    if any(  # raters of two kinds, numbered
+        all(map(_KIND.fullmatch, kinds)) and all(map(_CODE.fullmatch, numbers))
+        for kinds, numbers in ((one, other), (other, one))
+    ):
+        return []
     turned = {name: {part: grid[part][name] for part in one} for name in other}
     more = _like_raters(other, one) - _like_raters(one, other)
     return [grid] * (more >= 0) + [turned] * (more <= 0)
