@@ -3,7 +3,6 @@
 import click
 
 from masrel.cli._file_answers import by_option, file_command
-from masrel.cli._options import split_commas
 
 diagnose = file_command(
     "diagnose",
@@ -24,7 +23,6 @@ diagnose = file_command(
         click.option(
             "--coefficients",
             metavar="NAME",
-            type=split_commas,
             show_default="fleiss_kappa",
             help="Name of the coefficient; masrel agree --coefficients list has all.",
         ),
