@@ -314,11 +314,12 @@ def _plan_of(design: Design, progress: Progress | None = None) -> Plan:
 
 def _shifted(plan: Plan, side: int) -> Plan:
     # with all numbers far enough within their error, worse (-1) or better (1)
-    numbers: dict[str, Any] = {}
-    for name, error in plan.errors.items():
-        of_side = -side if name in ("expected_half_width", "expected_high") else side
-        by = of_side * _SURE * max(error, 1.0 / plan.n_studies)
-        numbers[name] = getattr(plan, name) + by
+    falls = ("expected_half_width", "expected_high")
+    numbers: dict[str, Any] = {
+        name: getattr(plan, name)
+        + (-side if name in falls else side) * _SURE * max(error, 1.0 / plan.n_studies)
+        for name, error in plan.errors.items()
+    }
     return replace(plan, **numbers)
 
 

@@ -171,8 +171,8 @@ def places_of(model: ItemModel, codes: Integers) -> Integers:
     """Return where ratings, (…, n_raters), are among all ordered rows, (…)."""
     least = -int(model.p_missing > 0.0)
     shape = (len(model.scale) - least,) * codes.shape[-1]
-    digits = tuple(np.moveaxis(codes - least, -1, 0))
-    return np.asarray(np.ravel_multi_index(digits, shape), dtype=np.int64)
+    places = np.ravel_multi_index(tuple(np.moveaxis(codes - least, -1, 0)), shape)
+    return np.asarray(places, dtype=np.int64)
 
 
 def probabilities(model: ItemModel, rows: Integers, *, ordered: bool) -> Floats:

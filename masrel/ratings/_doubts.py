@@ -377,14 +377,16 @@ def _second_header(
     n_met = np.count_nonzero(rest) + bool((codes[1:] < 0).any())
     first, is_text = codes[0][codes[0] >= 0], ~np.array([*map(is_number, scale.grades)])
     are_words = is_text[first].all() and not is_text[rest > 0].any()
-    is_doubted = sheet.has_header and freq.sum() > 3 and is_text.any() and len(first)
+    is_doubted = sheet.has_header and freq.sum() > 3 and is_text[first].any()
     are_rare = n_met <= codes[1:].size / 2 or are_words
     if not (is_doubted and are_rare) or rest[first].any():
         return []
-    if facts := two_lines(sheet):
+    facts = two_lines(sheet)
+    # raters who agree on a grade that comes once are no names
+    if facts and (are_words or len(np.unique(first)) > 1):
         raise sheet.refuse("second header", **facts)
-    advice = "delete it if these are names"
-    return [Finding("second header", where=sheet.where(0), advice=advice)]
+    usual = {"where": sheet.where(0), "advice": "delete it if these are names"}
+    return [Finding("second header", **{**usual, **facts})]
 
 
 def doubt_items(

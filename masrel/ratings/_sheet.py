@@ -465,7 +465,9 @@ def read_text(
     )
     columns = _columns(sheet, reader, n_names + has_row_names)
     if has_row_names:
-        is_last_empty = set(columns[-1].texts) <= {""}
+        # or a separator at the end of every row, below names that begin with a rater's
+        is_rater = header[0] in ",".join(options.raters).split(",")
+        is_last_empty = set(columns[-1].texts) <= {""} and not is_rater
         header = [*header, ""] if is_last_empty else ["", *header]
     return replace(sheet, header=tuple(header), columns=columns)
 
@@ -552,6 +554,8 @@ def names_option(
 ) -> str:
     """Return the option that takes the names from below the first row, or none."""
     # n_titles: how many rows at the head have fewer cells than the table
+    if options.raters and {*",".join(options.raters).split(",")} <= {*rows[0].cells}:
+        return ""
     is_known = options.no_header or len(options.names_at) > 1
     lines = [] if is_known else _lines_of_names(rows[n_titles:])
     line, of_lines = (lines or [rows[n_titles].line])[0], ",".join(map(str, lines))
@@ -604,8 +608,9 @@ def notes_below(rows: Sequence[Sequence[str]]) -> tuple[int, str]:
         filled.pop()
     n = next((k for k, row in enumerate(reversed(filled)) if len(row) != 1), 0)
     above, notes = filled[: len(filled) - n], [*chain(*filled[len(filled) - n :])]
-    # a lone rating is a number, or there above
+    # a lone rating is a number, or there above, or right below the names
     are_notes = all(any(map(str.isalpha, note)) for note in notes)
+    are_notes &= sum(map(bool, above)) > 1
     are_notes &= (
         0 < n <= _MOST_NOTES and not above[-1] and not {*notes} & {*chain(*above)}
     )

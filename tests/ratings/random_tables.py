@@ -223,7 +223,7 @@ def counts(draw: st.DrawFn, table: Table, cells: list[list[str]]) -> Layout:
     are_plain = all(grade in row for row in table for grade in order)
     return Layout(
         rows=rows,
-        options=["--counts"],
+        options=["--counts", "--raters", ",".join(order)],
         needs_options=are_plain or any(None in row for row in table) or len(order) < 2,
     )
 
@@ -266,11 +266,14 @@ def written(draw: st.DrawFn, layout: Layout, options: list[str]) -> tuple[bytes,
         )
         for row in layout.rows
     ]
-    blank = draw(st.integers(0, 9))
-    if blank < len(lines):
-        lines.insert(blank + 1, "")
-    text = "\n".join(lines) + draw(st.sampled_from(["\n", "", "\n\n"]))
     head = draw(st.sampled_from([*HEADS, f"sep={delimiter}\n"]))
+    blank = draw(st.integers(0, 9))
+    # a lone cell below an empty line, at the end, is a note
+    if blank < len(lines) - (sum(map(bool, layout.rows[-1])) == 1):
+        lines.insert(blank + 1, "")
+    if layout.has_header:  # a line may be one of names, or a title
+        options += ["--header", str(head.count("\n") + 1)]
+    text = "\n".join(lines) + draw(st.sampled_from(["\n", "", "\n\n"]))
     text = (head + text).replace("\n", end)
     encoding = draw(st.sampled_from(ENCODINGS))
     if encoding == "latin-1":
