@@ -253,7 +253,7 @@ def _show_answers(
         stamp=SIMULATED if others.simulated else "",
         notes=(*table.read, *notes),
         more=more,
-        width=min(columns, _WIDEST) if sys.stdout.isatty() else _WIDTH,
+        width=min(columns, _WIDEST) if sys.stdout and sys.stdout.isatty() else _WIDTH,
     )
     if is_sentence:
         echo_notes((*table.read, *table.notes))

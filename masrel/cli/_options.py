@@ -230,7 +230,7 @@ def progress(description: str, unit: str, *, is_quiet: bool) -> Iterator[Report]
         left = _duration((now - start) * (1.0 / share - 1.0))
         click.echo(f"{description}: {100.0 * share:.0f} %, {left} left", err=True)
 
-    if is_quiet or not sys.stderr.isatty():
+    if is_quiet or not (sys.stderr and sys.stderr.isatty()):
         yield line
         return
     from tqdm import tqdm

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -104,3 +105,15 @@ def test_the_backend_of_a_notebook_stays_the_one_it_has() -> None:
         env={**os.environ, "MPLBACKEND": "pdf"},
     )
     assert done.stdout.split() == [b"pdf", b"pdf"]
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-"])
+def test_a_closed_stream_takes_nothing_and_stops_nothing(
+    closed: str, tmp_path: Path
+) -> None:
+    (tmp_path / "t.csv").write_text("item,Kim,Lee\nA,1,2\nB,1,1\nC,2,2\n")
+    call = f"{shlex.join(masrel_command('agree', tmp_path / 't.csv'))} {closed}"
+    done = subprocess.run(["sh", "-c", call], capture_output=True)
+    assert done.returncode == 0
+    assert b"Traceback" not in done.stderr
+    assert (b"0.667" in done.stdout) == (closed == "2>&-")
