@@ -27,7 +27,7 @@ FOLDER = ".masrel_cache"
 
 _MOST_BYTES = 256_000_000
 _FORMAT = b"masrel made 1 "
-_ROOT = os.path.dirname(os.path.abspath(__file__))
+_ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # of masrel
 _MACHINE = os.uname().machine if sys.platform != "win32" else sys.platform
 _PYTHON = f"{sys.implementation.name} {sys.version} {_MACHINE}"
 _TICK_NS = 3_000_000_000
@@ -200,7 +200,9 @@ def content_hash(*values: object) -> str:
 def _tokens(value: object) -> Iterator[bytes]:
     # Each says its kind and its length, so that no two values have the same ones.
     if value is None or isinstance(value, bool | int | float | str):
-        yield _token(type(value).__name__, repr(value).encode())
+        # a note that knows its kind is the text that it is when it is read again
+        kind = "str" if isinstance(value, str) else type(value).__name__
+        yield _token(kind, repr(value).encode())
     elif isinstance(value, bytes):
         yield _token("bytes", value)
     elif isinstance(value, os.PathLike):
