@@ -1,7 +1,6 @@
 """One call from ratings in any form to their agreement, as the command line has it."""
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, TypeVar, get_args
@@ -36,15 +35,11 @@ _CHOICES = {
 }
 _ASK = 'No interval; for other items like these: masrel.agree(…, target="items").'
 
-# options as messages name them, and what they are here
-_OPTION = re.compile(r"--([a-z][a-z-]*)")
-_OTHER_WORDS = {"missing": "missing_codes", "from": "source"}
-_PLACES = {
-    **{of.name: f"reading=Reading({of.name}=…)" for of in fields(Reading)},
-    **{of.name: f"estimating=Estimating({of.name}=…)" for of in fields(Estimating)},
-    **{name: f"{name}=…" for name in ("item", "rater", "grade", "raters", "target")},
-    "coefficients": "coefficients=…",
-}
+_NAMES = (
+    "In Python options are fields, --no-item is reading=Reading(no_item=True) and "
+    "--weights is estimating=Estimating(weights=…); --missing is missing_codes and "
+    "--from is source."
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -217,7 +212,7 @@ def agree(
         questions = questions.on_scale(file).checked(how.clusters)
         file, (answer,) = answers(file, questions)
     except MasrelError as error:
-        _say_in_python(error)
+        error.add_note(_NAMES)
         raise
     return Agreement(file=file, answer=answer, estimating=questions)
 
@@ -242,12 +237,3 @@ def _joined(
         ),
     )
     return replace(chosen, **changes)
-
-
-def _say_in_python(error: MasrelError) -> None:
-    """Add to an error what the options in its message are called here."""
-    options = _OPTION.findall(str(error))
-    names = {of: _OTHER_WORDS.get(of, of.replace("-", "_")) for of in options}
-    known = [f"--{of} is {_PLACES[n]}" for of, n in names.items() if n in _PLACES]
-    if known:
-        error.add_note(f"In Python, {'; '.join(known)}.")

@@ -318,8 +318,7 @@ def test_an_error_says_what_its_options_are_called_in_python() -> None:
     with pytest.raises(MasrelError) as refused:
         masrel.agree(FRAME.drop(columns="patient"))
     (note,) = refused.value.__notes__
-    assert "--no-item is reading=Reading(no_item=…)" in note
-    assert "--item is item=…" in note
+    assert "--no-item is reading=Reading(no_item=True)" in note
     frame = FRAME.drop(columns="patient")
     assert masrel.agree(frame, reading=masrel.Reading(no_item=True)).file.read["raters"]
 

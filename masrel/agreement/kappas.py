@@ -43,6 +43,7 @@ from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Significance
 
 _MAX_PAIRS = 1 << 20  # of ratings whose disagreement is looked up at once
+_MANY_RATERS = 1000
 
 _Chance = Callable[[Floats, Any], tuple[Floats, Floats]]
 """From p (..., q) and v to D_e (..., 1) and its gradient (..., q)."""
@@ -76,6 +77,11 @@ def _hard_items(p: Floats, v: Any) -> tuple[Floats, Floats]:
 
 def _item_features(codes: Codes, v: Any, repeats: Integers | None = None) -> Features:
     # d, s, and the shares of categories of each row
+    if repeats is None and codes.shape[1] > max(_MANY_RATERS, len(v)):
+        # pairs of so many raters are pairs of categories, counted
+        rated = [row[row >= 0] for row in codes]
+        repeats = np.array([np.bincount(row, minlength=len(v)) for row in rated])
+        codes = np.tile(np.arange(len(v)), (len(codes), 1))
     if repeats is None:
         # so that rows of the same ratings are equal, with what is missing behind
         codes = np.sort(codes, axis=1)[:, ::-1]

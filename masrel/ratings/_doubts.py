@@ -196,12 +196,12 @@ def _frequencies(sheet: Sheet, layout: Layout, options: Reading) -> list[Finding
     item = [] if layout.is_item_guessed else [*layout.item]
     places = [k for k in range(len(sheet.header)) if k not in item]
     others = [place for place in places if not names_rows(sheet, place)]
-    for place in others:
+    called = [place for place in others if _FREQUENCY.fullmatch(sheet.header[place])]
+    for place in called:
         name, column = sheet.header[place], sheet.columns[place]
         rows = [sheet.columns[other].codes for other in others if other != place]
         if (
             rows
-            and _FREQUENCY.fullmatch(name)
             and not _is_of_series(name, sheet.header)
             and not (options.raters and place in layout.raters)
             and all(
@@ -235,7 +235,7 @@ def _no_raters(
 ) -> list[Finding]:
     # columns with another name than a rater's, or without a grade of the others
     names = [sheet.header[place] for place in layout.raters]
-    named = {k for k, place in enumerate(layout.raters) if _is_no_rater(sheet, place)}
+    named = _called_otherwise(sheet, layout)
     alone, sure = _alone(codes, scale, freq)
     vouched = {k for k, name in enumerate(names) if name == options.reference}
     wrong = (named | sure) - vouched
@@ -273,12 +273,17 @@ def _facts(names: Sequence[str], wrong: set[int], named: set[int]) -> dict[str, 
 
 def refuse_named(sheet: Sheet, layout: Layout, options: Reading) -> None:
     """Refuse columns of a wide table that are called as no raters are."""
-    places = [] if layout.kind != "wide" or options.raters else layout.raters
-    wrong = [sheet.header[place] for place in places if _is_no_rater(sheet, place)]
-    if wrong and wrong != [options.reference] and not layout.criteria:
-        advice = f"--ignore{few(wrong)} leaves such columns aside"
-        columns = listed(wrong, _SHOWN)
-        raise sheet.refuse("no raters", columns=columns, why="name", advice=advice)
+    if layout.kind != "wide" or options.raters or layout.criteria:
+        return
+    called = sorted(_called_otherwise(sheet, layout))
+    names = [sheet.header[layout.raters[k]] for k in called]
+    if wrong := [name for name in names if name != options.reference]:
+        raise sheet.refuse(
+            "no raters",
+            columns=listed(wrong, _SHOWN),
+            why="name",
+            advice=f"--ignore{few(wrong)} leaves such columns aside",
+        )
 
 
 def _refuse_criteria(sheet: Sheet, names: Sequence[str], alone: set[str]) -> None:
@@ -310,7 +315,14 @@ def _refuse_scales(sheet: Sheet, layout: Layout, codes: Codes) -> None:
             raise sheet.refuse("other grades", criterion=criterion)
 
 
-def _is_no_rater(sheet: Sheet, place: int) -> bool:
+def _called_otherwise(sheet: Sheet, layout: Layout) -> set[int]:
+    # which of the raters' columns are called as no raters are
+    lower = {name.lower() for name in sheet.header}
+    return {k for k, p in enumerate(layout.raters) if _is_no_rater(sheet, p, lower)}
+
+
+def _is_no_rater(sheet: Sheet, place: int, lower: set[str]) -> bool:
+    # lower: the names of all columns in lower case
     name, cells = sheet.header[place], {*sheet.columns[place].texts}
     parts = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()
     words = set(re.findall(r"[^\W\d_]+|\d+", parts))
@@ -318,7 +330,7 @@ def _is_no_rater(sheet: Sheet, place: int) -> bool:
     is_sum = bool(words & _SUMS) and words <= _SUMS | _BESIDE
     is_sum &= not _is_of_series(name, sheet.header)
     # Kim=Lee, mean of Kim and Lee
-    of_two = len(words & {other.lower() for other in sheet.header if other != name}) > 1
+    of_two = len((words & lower) - {name.lower()}) > 1
     is_other = bool(words & _SURE or _OTHERS.fullmatch(name))
     return is_other or is_flag or is_sum or of_two
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from masrel.agreement import (
     COEFFICIENTS,
     cohen_kappa,
+    count_items,
     krippendorff_alpha,
 )
 from masrel.errors import (
@@ -185,3 +186,25 @@ def test_continuous_ratings_take_a_few_times_their_room() -> None:
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 20 * ratings.nbytes
+
+
+@pytest.mark.parametrize("weights", ["identity", "linear"])
+@pytest.mark.parametrize("name", [*POOLED, "krippendorff_alpha"])
+def test_thousands_of_raters_are_what_their_counts_are(name: str, weights: str) -> None:
+    rng = np.random.default_rng(3)
+    codes = rng.integers(0, 4, (12, 1500)).astype(float)
+    codes[rng.random(codes.shape) < 0.2] = np.nan
+    counts = np.array([[np.sum(row == k) for k in range(4)] for row in codes])
+    entry = COEFFICIENTS[name]
+    tracemalloc.start()
+    estimate = entry(codes, weights=weights)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    of_counts = entry(count_items(counts, categories=range(4)), weights=weights)
+    assert estimate.value == pytest.approx(of_counts.value, rel=1e-13)
+    assert estimate.standard_error == pytest.approx(of_counts.standard_error, rel=1e-12)
+    assert peak < 10e6  # a pair of raters in 8 bytes would be 18 MB, an item
+    if name == "percent_agreement" and weights == "identity":
+        n = counts.sum(axis=1)
+        share = (counts * (counts - 1)).sum(axis=1) / (n * (n - 1))
+        assert estimate.value == pytest.approx(share.mean(), rel=1e-13)

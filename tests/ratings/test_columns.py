@@ -217,6 +217,13 @@ def test_a_column_of_such_a_name_is_no_rater(tmp_path: Path, name: str) -> None:
         assert not file.warnings
 
 
+def test_a_reference_is_not_advised_away(tmp_path: Path) -> None:
+    text = "item,gold,Kim,Kim_conf\n1,a,a,50%\n2,b,b,60%\n3,a,b,70%\n4,b,b,80%\n"
+    with pytest.raises(RatingsError, match="--ignore Kim_conf leaves") as refused:
+        read(tmp_path, text, reference="gold")
+    assert "gold" not in str(refused.value)
+
+
 @pytest.mark.parametrize(
     "cells", [["n/a", "?", "", "x", "-"], ["True", "True", "False", "True", "False"]]
 )

@@ -77,6 +77,13 @@ QUESTIONS = (
         rival=READ,
         rival_name="pandas read_csv alone",
     ),
+    Question(
+        name="600 × 1 523 columns of a survey, two of them raters",
+        file="survey.csv",
+        options=("--item", "id", "--raters", "tone_A,tone_B"),
+        rival=READ,
+        rival_name="pandas read_csv alone",
+    ),
 )
 
 
@@ -104,6 +111,15 @@ def write_files(folder: Path, scale: int) -> None:
     columns = [f"r{k}" for k in range(100_000 // scale)]
     frame = pd.DataFrame(rng.integers(0, 4, (10, len(columns))), columns=columns)
     frame.rename_axis("item").to_csv(folder / "columns.csv")
+    n = 600 // scale
+    answers = rng.integers(0, 10**9, (n, 1_520)).astype(str).tolist()
+    grades = rng.integers(0, 4, (n, 2)).tolist()
+    names = ["id", *["Comment"] * 1_520, "tone_A", "tone_B"]
+    rows = [
+        [k, *(f"answer {text}" for text in texts), *of]
+        for k, (texts, of) in enumerate(zip(answers, grades, strict=True))
+    ]
+    pd.DataFrame(rows, columns=names).to_csv(folder / "survey.csv", index=False)
 
 
 def run(command: Sequence[str]) -> tuple[float, float]:

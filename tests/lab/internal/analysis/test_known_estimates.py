@@ -2,13 +2,18 @@
 
 import dataclasses
 import math
+import os
+import shutil
 import struct
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import masrel
 from masrel import intervals
 from masrel.agreement import fleiss_kappa
 from masrel.errors import UndefinedStatisticWarning
@@ -74,3 +79,23 @@ def test_a_warning_comes_back(tmp_path: Path) -> None:
 def test_without_a_cache_it_is_computed() -> None:
     estimate = known_estimate(lambda: fleiss_kappa(RATINGS), "any")
     assert bits(estimate) == bits(fleiss_kappa(RATINGS))
+
+
+def test_what_is_kept_is_of_the_code_of_the_statistics_too(tmp_path: Path) -> None:
+    package = tmp_path / "masrel"
+    ignored = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(Path(masrel.__file__).parent, package, ignore=ignored)
+    code = "from masrel.lab._cache import code_hash; print(code_hash())"
+
+    def hashed() -> bytes:
+        path = {**os.environ, "PYTHONPATH": str(tmp_path)}
+        call = [sys.executable, "-B", "-c", code]
+        return subprocess.run(
+            call, cwd=tmp_path, env=path, capture_output=True, check=True
+        ).stdout
+
+    before = hashed()
+    assert hashed() == before
+    with (package / "agreement" / "kappas.py").open("a", encoding="utf-8") as file:
+        file.write("# other code\n")
+    assert hashed() != before
