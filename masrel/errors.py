@@ -26,6 +26,7 @@ The tree::
     ├── UndefinedStatisticWarning  a statistic is 0/0; its value is nan, with a reason
     ├── SmallSampleWarning         an interval rests on too little to hold what it says
     ├── RatingsWarning             labels look as if they stood for missing ratings
+    ├── MissingLettersWarning      a figure has letters for which no font is there
     ├── RecordingWarning           part of a recording is not used, or is suspect
     └── OverrunWarning             the control loop missed deadlines
 """
@@ -43,6 +44,7 @@ __all__ = [
     "LimitExceededError",
     "MasrelError",
     "MasrelWarning",
+    "MissingLettersWarning",
     "OverrunWarning",
     "ParameterError",
     "ProtocolError",
@@ -206,6 +208,10 @@ class SmallSampleWarning(MasrelWarning):
 
 class RatingsWarning(MasrelWarning):
     """Labels of ratings look as if they stood for missing ones."""
+
+
+class MissingLettersWarning(MasrelWarning):
+    """A figure has letters for which no font is there; it says how to give one."""
 
 
 class RecordingWarning(MasrelWarning):

@@ -11,6 +11,7 @@ import importlib
 import io
 import sys
 import unicodedata
+import warnings
 from typing import Any, NoReturn
 
 import click
@@ -151,6 +152,8 @@ cli = click.version_option(masrel.__version__, prog_name="masrel")(
 def main() -> None:
     """Run the command line and exit with its code."""
     atexit.register(_leave)
+    # a sentence, without a line of our code
+    warnings.formatwarning = lambda message, *_, **__: f"warning: {message}\n"
     for stream in (sys.stdout, sys.stderr):
         # One that somebody has told what to do with letters it lacks goes on doing it
         if isinstance(stream, io.TextIOWrapper) and stream.errors in _USUAL_ERRORS:

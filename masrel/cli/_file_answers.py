@@ -39,8 +39,8 @@ Option = Callable[..., Any]
 _WIDTH, _WIDEST = 88, 100  # of notes where there is no terminal, and in one
 
 _DRAWERS = {
-    "diagnosis_pairs": "masrel.plots._rater_pairs:rater_figure",
-    "limits_of_agreement": "masrel.plots._limits_figure:limits_figure",
+    "diagnosis_pairs": "masrel.plots._rater_pairs:pairs_pictures",
+    "limits_of_agreement": "masrel.plots._limits_figure:limits_pictures",
 }
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from masrel.ratings import RatingsFile, RatingsPart
 
 
-_DRAWER = "masrel.plots._latent_scale:latent_figure"
+_DRAWER = "masrel.plots._latent_scale:latent_picture"
 
 
 @click.command("latent")

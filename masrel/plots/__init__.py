@@ -1,7 +1,7 @@
-"""Figures of agreement, and how every figure is drawn.
+"""Pictures of agreement, each a function of results or ratings and of axes.
 
-In: what to draw, as plain frozen values. Out: PNG, SVG or PDF, the same bytes for the
-same values.
+Every one takes `ax`, and draws on a new figure of pyplot without it. `draw` makes
+files of what they show, the same bytes for the same values.
 """
 
 import contextlib
@@ -9,10 +9,32 @@ import importlib
 import os
 import sys
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from masrel.plots._drawn_values import Content, Drawn, Form
 
-__all__ = ["draw"]
+if TYPE_CHECKING:
+    from masrel.plots._forest import forest
+    from masrel.plots._latent_scale import latent
+    from masrel.plots._limits_figure import bland_altman
+    from masrel.plots._rater_pairs import pairs
+
+__all__ = ["bland_altman", "draw", "forest", "latent", "pairs"]
+
+_HOMES = {
+    "bland_altman": "_limits_figure",
+    "forest": "_forest",
+    "latent": "_latent_scale",
+    "pairs": "_rater_pairs",
+}
+
+
+def __getattr__(name: str) -> object:
+    # one picture loads what no other needs
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    _load_matplotlib()
+    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
 
 
 def draw(
@@ -29,7 +51,7 @@ def draw(
         What is drawn.
     stamp : str
         The line that says where the data come from; none if empty.
-    forms : sequence of {"png", "svg", "pdf"}, optional
+    forms : sequence of {"png", "svg", "pdf", "inline"}, optional
         Which files to make.
 
     Returns
@@ -38,13 +60,18 @@ def draw(
         Each form's file.
     """
     _load_matplotlib()
-    from masrel.plots._style import finished, house_style
+    from masrel.plots._style import Picture, finished, house_style, stacked
 
     with house_style():
         module, _, function = content.drawer.partition(":")
         # one figure loads what no other needs
         drawer = getattr(importlib.import_module(module), function)
-        return finished(drawer(*content.arguments), stamp=stamp, forms=forms)
+        drawn = drawer(*content.arguments)
+        if isinstance(drawn, Picture):
+            drawn = stacked([("", drawn)])
+        elif isinstance(drawn, list):
+            drawn = stacked(drawn)
+        return finished(drawn, stamp=stamp, forms=forms)
 
 
 def _load_matplotlib() -> None:

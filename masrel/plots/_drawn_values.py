@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 if TYPE_CHECKING:
     from masrel.estimates import Interval
 
-Form = Literal["png", "svg", "pdf"]
-"""What a figure's file can be."""
+Form = Literal["png", "svg", "pdf", "inline"]
+"""What a figure's file can be; inline is the SVG of a page, in the page's colours."""
 
 
 class Content:
@@ -24,10 +24,13 @@ class Content:
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """A figure of results as they are: which function draws it, and of what."""
+    """A picture, or several below each other: what makes it, and of what."""
 
     drawer: str  # "module:function"
     arguments: tuple[object, ...]
+
+
+FOREST = "masrel.plots._forest:forest_picture"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,13 +46,3 @@ class ForestRow:
     text: str  # the numbers, or why there are none, as shown at the right
     has_zero: bool = True  # whether 0 is what chance gives, so that it is marked
     group: str = ""  # heading above the first row of those that share it
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Forest(Content):
-    """Estimates with their intervals, one below the other."""
-
-    drawer: ClassVar[str] = "masrel.plots._forest:forest_figure"
-
-    rows: tuple[ForestRow, ...]  # first on top
-    axis_label: str

@@ -14,15 +14,26 @@ from typing import Any, Literal
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.legend_handler import HandlerLine2D
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from masrel.estimates import Interval
-from masrel.plots._drawn_values import Forest, ForestRow
-from masrel.plots._style import BLACK, BLUE, DASHES, GREY, ORANGE
+from masrel._input import refuse
+from masrel.agreement import COEFFICIENTS
+from masrel.estimates import Estimate, Interval
+from masrel.plots._drawn_values import ForestRow
+from masrel.plots._style import (
+    BLACK,
+    BLUE,
+    DASHES,
+    GREY,
+    ORANGE,
+    Picture,
+    legend_below,
+    shown,
+)
+from masrel.tables._estimate_words import forest_row
 from masrel.tables._tables import percent
 
 # Heights in inches: of a line of text, of a line below it, of a ridge and a heading.
@@ -76,36 +87,98 @@ _FAINT = 0.01  # of the greatest height: what is below it needs no room
 _SAME = 1e-9  # values as near as this are one value, computed in another order
 
 
-def forest_figure(forest: Forest) -> Figure:
-    """Return a forest of estimates."""
-    rows = forest.rows
-    ridges = [_ridge(row.interval) for row in rows]
-    figure = Figure()
-    axes = figure.add_subplot()
-    values = [row.value for row in rows if row.value is not None]
-    ends = [row.interval.low for row in rows if row.interval is not None]
-    lowest = [_lowest(ridge) for ridge in ridges if ridge]
-    left = max(min([0.0, *values, *ends, *lowest]), _LEFT) - 0.05
-    axes.set_xlim(left, _RIGHT)
-    bottom = _draw_rows(axes, rows, ridges)
-    axes.set_ylim(bottom + 0.05, 0.0)
-    axes.set_yticks([])
-    axes.spines["left"].set_visible(False)
-    axes.grid(axis="x")
-    axes.set_xlabel(forest.axis_label)
-    handles = _legend_handles(rows, ridges)
-    figure.set_size_inches(7.2, bottom + 0.65 + 0.17 * len(handles))
-    # each kind of interval with two marks, and a dot with one
-    dots = [h for h in handles if isinstance(h, Line2D) and h.get_linestyle() == "None"]
-    figure.legend(
-        handles=handles,
-        loc="outside lower center",
-        fontsize=8,
-        borderaxespad=0.2,
-        numpoints=2,
-        handler_map={dot: HandlerLine2D(numpoints=1) for dot in dots},
+def forest(
+    estimates: Estimate | Sequence[Estimate],
+    labels: Sequence[str] | None = None,
+    *,
+    groups: Sequence[str] | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw estimates with their intervals, one below the other.
+
+    Parameters
+    ----------
+    estimates : Estimate or sequence of Estimate
+        What is drawn, first on top; an undefined one is said to be.
+    labels : sequence of str, optional
+        What each is called; the title of its coefficient unless given.
+    groups : sequence of str, optional
+        The heading that each stands under; equal ones follow each other.
+    ax : Axes, optional
+        Where it is drawn; on a new figure of pyplot unless given.
+
+    Returns
+    -------
+    Axes
+        Those that it is drawn on.
+
+    Raises
+    ------
+    ParameterError
+        If labels or groups are not as many as estimates.
+
+    Examples
+    --------
+    >>> from masrel.agreement import fleiss_kappa
+    >>> from matplotlib.figure import Figure
+    >>> ax = forest(fleiss_kappa([[1, 1], [2, 1], [2, 2]]), ax=Figure().add_subplot())
+    >>> ax.get_xlabel()
+    'agreement (1 is perfect)'
+    """
+    several = [estimates] if isinstance(estimates, Estimate) else list(estimates)
+    titles = [COEFFICIENTS[of.coefficient].title for of in several]
+    names, heads = list(labels or titles), list(groups or [""] * len(several))
+    needed = f"needs one for each of {len(several)} estimates, got"
+    refuse(
+        (len(names) != len(several), f"labels: {needed} {len(names)}"),
+        (len(heads) != len(several), f"groups: {needed} {len(heads)}"),
     )
-    return figure
+    rows = [
+        forest_row(name, of, group=head)
+        for name, of, head in zip(names, several, heads, strict=True)
+    ]
+    return shown(forest_picture(rows, "agreement (1 is perfect)"), ax)
+
+
+def forest_picture(rows: Sequence[ForestRow], axis_label: str) -> Picture:
+    """Return estimates with their intervals as a picture."""
+    ridges = [_ridge(row.interval) for row in rows]
+    handles = _legend_handles(rows, ridges)
+
+    def draw(axes: Axes) -> None:
+        values = [row.value for row in rows if row.value is not None]
+        ends = [row.interval.low for row in rows if row.interval is not None]
+        lowest = [_lowest(ridge) for ridge in ridges if ridge]
+        left = max(min([0.0, *values, *ends, *lowest]), _LEFT) - 0.05
+        axes.set_xlim(left, _RIGHT)
+        axes.set_ylim(_draw_rows(axes, rows, ridges) + 0.05, 0.0)
+        axes.set_yticks([])
+        axes.spines["left"].set_visible(False)
+        axes.grid(axis="x")
+        axes.set_xlabel(axis_label)
+        # each kind of interval with two marks, and a dot with one
+        lines = [handle for handle in handles if isinstance(handle, Line2D)]
+        dots = {
+            of: HandlerLine2D(numpoints=1)
+            for of in lines
+            if of.get_linestyle() == "None"
+        }
+        legend_below(axes, handles, numpoints=2, handler_map=dots)
+
+    height = sum(_heights(rows, ridges)) + 0.65 + 0.17 * len(handles)
+    return Picture(7.2, height, draw)
+
+
+def _heights(rows: Sequence[ForestRow], ridges: Sequence[_Ridge]) -> list[float]:
+    # inches of every row, with the heading above the first of a group
+    groups = ["", *(row.group for row in rows)]
+    return [
+        _LINE
+        + (_DETAIL if row.detail else 0.0)
+        + (_RIDGE if ridge else 0.0)
+        + (_GROUP if row.group and row.group != before else 0.0)
+        for row, ridge, before in zip(rows, ridges, groups, strict=False)
+    ]
 
 
 def _draw_rows(
@@ -114,14 +187,12 @@ def _draw_rows(
     # from the top down, in inches; how far they reach
     bottom, group = 0.0, ""
     spans = []
-    for row, ridge in zip(rows, ridges, strict=True):
-        top = bottom
+    for row, ridge, height in zip(rows, ridges, _heights(rows, ridges), strict=True):
+        top, bottom = bottom, bottom + height
         if row.group and row.group != group:
             _at_left(axes, top + 0.6 * _GROUP, row.group, weight="bold")
-            bottom += _GROUP
         group = row.group
         text = _LINE + (_DETAIL if row.detail else 0.0)
-        bottom += text + (_RIDGE if ridge else 0.0)
         _draw_row(axes, row, ridge, bottom - 0.5 * text)
         spans.append((row.has_zero, top, bottom))
     # where rows next to each other have a zero: one line for all of them

@@ -7,14 +7,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
-from matplotlib.figure import Figure
-from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
-from matplotlib.transforms import ScaledTranslation, blended_transform_factory
+from matplotlib.transforms import blended_transform_factory
 from numpy.typing import NDArray
 
-from masrel.plots._style import BLACK, BLUE, DASHES, GREY, short_name
+from masrel.agreement import COEFFICIENTS
+from masrel.plots._style import (
+    BLACK,
+    BLUE,
+    DASHES,
+    GREY,
+    ON_CELL,
+    PAGE,
+    Picture,
+    inches_from,
+    legend_below,
+    short_name,
+    shown,
+)
 from masrel.tables._tables import number, percent
 
 if TYPE_CHECKING:
@@ -25,66 +36,96 @@ _Floats = NDArray[np.float64]
 # from little to full agreement: lighter to darker in a grey print, too
 _COLOURS = LinearSegmentedColormap.from_list(
     "agreement", ["#F7FBFF", "#9ECAE1", "#4292C6", "#08519C", "#08306B"]
-).with_extremes(bad="#E8E8E8")
+).with_extremes(bad="#E8E8E8", under="#F6C89F")
 
 _CELLS = ((8, 0.42), (14, 0.33), (40, 0.2), (10_000, 0.13))  # raters, inches of a cell
 _MAX_NUMBERS = 14  # raters up to which numbers are written in the cells
 # inches: of the panel at the right, of what is below all, and of a letter of 9 points
 _PANEL, _BELOW, _LETTER = 2.3, 1.1, 0.07
+_GAP = 0.2  # inches between the heatmap and the panel
 
 _DOT: dict[str, Any] = {"marker": "o", "color": BLACK, "linestyle": "none"}
 _LINE: dict[str, Any] = {"color": BLUE, "linewidth": 1.8}
 
 
-def rater_figure(parts: "Sequence[tuple[str, Diagnosis]]", title: str) -> Figure:
-    """Return a heatmap of pairs a group, with the change without each rater beside."""
-    # parts: each with its name; title: the coefficient
-    sizes = [len(result.raters) for _, result in parts]
-    cell = next(inches for most, inches in _CELLS if max(sizes) <= most)
+def pairs(
+    diagnosis: "Diagnosis", *, title: str | None = None, ax: Axes | None = None
+) -> Axes:
+    """Draw the agreement of every two raters, and how it changes without each rater.
+
+    Raters who agree best with the others come first. Colours go from 0 to 1 whatever
+    the data, so that two pictures can be compared; what is below 0 has a colour of its
+    own.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        What `masrel.intervals.diagnose` returns.
+    title : str, optional
+        What the coefficient is called; its title unless given.
+    ax : Axes, optional
+        Where it is drawn; on a new figure of pyplot unless given.
+
+    Returns
+    -------
+    Axes
+        Those of the heatmap; the panel beside it is an inset of them.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> from masrel.intervals import diagnose
+    >>> found = diagnose([[1, 1, 2], [2, 2, 2], [3, 3, 1]], raters=["A", "B", "C"])
+    >>> ax = pairs(found, ax=Figure().add_subplot())
+    >>> [label.get_text() for label in ax.get_yticklabels()]
+    ['A', 'B', 'C']
+    """
+    name = title or COEFFICIENTS[diagnosis.estimate.coefficient].title
+    return shown(pairs_picture(diagnosis, name), ax)
+
+
+def pairs_picture(result: "Diagnosis", title: str) -> Picture:
+    """Return a heatmap of pairs, with the change without each rater beside it."""
+    n = len(result.raters)
+    cell = next(inches for most, inches in _CELLS if n <= most)
     letters = 9.0 if cell > 0.25 else 7.5 if cell > 0.15 else 6.0
-    names = [short_name(name) for _, result in parts for name in result.raters]
-    room = max(map(len, names)) * _LETTER * letters / 9.0 + 0.35
-    changes = np.concatenate([result.changes for _, result in parts])
-    widths = [cell * (max(sizes) + (parts[0][1].reference is not None))]
-    widths += [_PANEL] if np.isfinite(changes).any() else []
-    height = cell * sum(sizes) + room * len(parts) + _BELOW
-    figure = Figure(figsize=(sum(widths) + room, height))
-    grid = figure.subplots(
-        len(parts), len(widths), squeeze=False, width_ratios=widths, height_ratios=sizes
-    )
-    orders = [np.argsort(-result.mean_values, kind="stable") for _, result in parts]
-    values = [_pairs(part[1], order) for part, order in zip(parts, orders, strict=True)]
-    lowest = math.floor(10.0 * min(np.nanmin(of, initial=0.9) for of in values)) / 10.0
-    for (name, result), order, of_part, (axes, *panels) in zip(
-        parts, orders, values, grid, strict=True
-    ):
-        raters = [short_name(result.raters[place]) for place in order]
-        others = [] if result.reference is None else [short_name(result.reference)]
-        image = _heatmap(axes, of_part, raters, others, lowest)
+    order = np.argsort(-result.mean_values, kind="stable")
+    raters = [short_name(result.raters[place]) for place in order]
+    others = [] if result.reference is None else [short_name(result.reference)]
+    room = max(map(len, [*raters, *others])) * _LETTER * letters / 9.0 + 0.35
+    width = cell * (n + len(others))
+    has_changes = bool(np.isfinite(result.changes).any())
+
+    def draw(axes: Axes) -> None:
+        _heatmap(axes, _pairs(result, order), raters, others)
         axes.tick_params(length=0, labelsize=letters)
-        axes.set_ylabel(name)
-        for panel in panels:
+        # as wide as the map, and below it by inches
+        below = inches_from(axes, 0.0, 0.0)
+        place = blended_transform_factory(axes.transAxes, below)
+        bar = axes.inset_axes((0.0, -0.27, 1.0, 0.11), transform=place)
+        bar.figure.colorbar(
+            axes.images[0],
+            cax=bar,
+            orientation="horizontal",
+            label=f"{title} of pairs",
+            extend="min" if (_pairs(result, order) < 0.0).any() else "neither",
+        )
+        if has_changes:
+            right = inches_from(axes, 1.0, 0.0)
+            place = blended_transform_factory(right, axes.transAxes)
+            panel = axes.inset_axes((_GAP, 0.0, _PANEL, 1.0), transform=place)
             _influence(panel, result, order, cell)
-    # as wide as the last map, and below it by inches
-    below = figure.dpi_scale_trans + ScaledTranslation(0.0, 0.0, axes.transAxes)
-    place = blended_transform_factory(axes.transAxes, below)
-    bar = axes.inset_axes((0.0, -0.27, 1.0, 0.11), transform=place)
-    figure.colorbar(image, cax=bar, orientation="horizontal", label=f"{title} of pairs")
-    for panel in panels:
-        panel.set_xlabel(
-            "change without the rater\n(right of 0: the others agree better)"
-        )
-        level = percent(parts[0][1].level)
-        figure.legend(
-            handles=[
-                Line2D([], [], label="estimate", **_DOT),
-                Line2D([], [], label=f"{level} % confidence interval", **_LINE),
-            ][: 1 + bool(np.isfinite(result.change_low).any())],
-            loc="outside lower center",
-            ncols=2,
-            fontsize=8,
-        )
-    return figure
+
+    return Picture(
+        room + width + has_changes * (_PANEL + _GAP), room + cell * n + _BELOW, draw
+    )
+
+
+def pairs_pictures(
+    parts: "Sequence[tuple[str, Diagnosis]]", title: str
+) -> list[tuple[str, Picture]]:
+    """Return the pairs of every part, each as a picture."""
+    return [(name, pairs_picture(result, title)) for name, result in parts]
 
 
 def _pairs(result: "Diagnosis", order: NDArray[np.intp]) -> _Floats:
@@ -96,17 +137,13 @@ def _pairs(result: "Diagnosis", order: NDArray[np.intp]) -> _Floats:
 
 
 def _heatmap(
-    axes: Axes,
-    values: _Floats,
-    raters: Sequence[str],
-    others: Sequence[str],
-    lowest: float,
-) -> AxesImage:
+    axes: Axes, values: _Floats, raters: Sequence[str], others: Sequence[str]
+) -> None:
     n_rows, n_columns = values.shape
-    image = axes.imshow(
+    axes.imshow(
         values,
         cmap=_COLOURS,
-        vmin=lowest,
+        vmin=0.0,
         vmax=1.0,
         aspect="auto",
         interpolation="nearest",
@@ -115,17 +152,16 @@ def _heatmap(
     axes.set_yticks(range(n_rows), raters)
     axes.xaxis.tick_top()
     axes.spines[:].set_visible(False)
-    # white between the cells, so that each is seen by itself
+    # gaps between the cells, so that each is seen by itself
     width = 1.0 if n_rows <= _MAX_NUMBERS else 0.4
     edges = np.arange(0.5, n_columns - 1.0)
-    axes.hlines(edges[: n_rows - 1], -0.5, n_columns - 0.5, "w", linewidth=width)
-    axes.vlines(edges, -0.5, n_rows - 0.5, "w", linewidth=width)
+    axes.hlines(edges[: n_rows - 1], -0.5, n_columns - 0.5, PAGE, linewidth=width)
+    axes.vlines(edges, -0.5, n_rows - 0.5, PAGE, linewidth=width)
     if n_columns > n_rows:
-        axes.axvline(n_rows - 0.5, color="w", linewidth=6.0)
+        axes.axvline(n_rows - 0.5, color=PAGE, linewidth=6.0)
     if n_rows <= _MAX_NUMBERS:
         for (row, column), value in np.ndenumerate(values):
             if not math.isnan(value):
-                is_dark = value - lowest > 0.55 * (1.0 - lowest)
                 axes.text(
                     column,
                     row,
@@ -133,9 +169,8 @@ def _heatmap(
                     ha="center",
                     va="center",
                     fontsize=8,
-                    color="white" if is_dark else BLACK,
+                    color=ON_CELL[int(value > 0.55)],
                 )
-    return image
 
 
 def _influence(
@@ -152,3 +187,10 @@ def _influence(
     axes.xaxis.set_major_locator(MaxNLocator(5))
     axes.spines["left"].set_visible(False)
     axes.margins(x=0.08)
+    axes.set_xlabel("change without the rater\n(right of 0: the others agree better)")
+    marks = [
+        Line2D([], [], label="estimate", **_DOT),
+        Line2D([], [], label=f"{percent(result.level)} % confidence interval", **_LINE),
+    ]
+    has_ends = bool(np.isfinite(result.change_low).any())
+    legend_below(axes, marks[: 1 + has_ends])

@@ -4,17 +4,24 @@ Colours are Okabe and Ito's, which colour-blind readers tell apart; shapes, line
 styles and text repeat what the colours say, so that a grey print loses nothing.
 """
 
+import hashlib
 import io
+import re
 import textwrap
+import warnings
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
 
 import matplotlib as mpl
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.transforms import Affine2DBase, ScaledTranslation, Transform
 
 from masrel.plots._drawn_values import Form
+from masrel.plots._fonts import complete_fonts
 
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
@@ -25,6 +32,13 @@ BLUE = "#0072B2"
 ORANGE = "#E69F00"
 VERMILLION = "#D55E00"
 ALARM = "#A63C00"  # darker, so that letters in it can be read on white
+
+GRID = "#DDDDDD"
+PAGE = "#FFFFFF"
+"""What is left blank between marks."""
+
+ON_CELL = ("#111111", "#FEFEFE")
+"""Letters on a light cell and on a dark one, whatever the page is."""
 
 DASHES = (0, (4, 3))
 """Line style of what is a reference, not data."""
@@ -43,7 +57,7 @@ STYLE: "dict[RcKeyType, object]" = {
     "axes.spines.right": False,
     "axes.linewidth": 0.7,
     "axes.axisbelow": True,
-    "grid.color": "#DDDDDD",
+    "grid.color": GRID,
     "grid.linewidth": 0.6,
     "legend.frameon": False,
     "svg.hashsalt": "masrel",  # ids of an SVG are otherwise random
@@ -62,6 +76,13 @@ _NO_TIME: dict[Form, dict[str, None]] = {  # what no file is to hold
     "png": {"Software": None},
     "svg": {"Date": None},
     "pdf": {"CreationDate": None},
+    "inline": dict.fromkeys(("Date", "Creator", "Format", "Type")),
+}
+_OF_PAGE = {  # colours that follow the page into the dark
+    BLACK: "currentColor",
+    GREY: "var(--soft)",
+    PAGE: "var(--page)",
+    GRID: "var(--rule)",
 }
 
 _MAX_LETTERS = 22  # of a name
@@ -93,17 +114,104 @@ def house_style(*, parse_math: bool = False) -> Iterator[None]:
         yield
 
 
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """One picture before it is drawn: the inches it needs, and what draws it."""
+
+    width: float
+    height: float
+    draw: Callable[[Axes], None]
+
+
+def shown(picture: Picture, ax: Axes | None) -> Axes:
+    """Draw a picture on given axes, or on those of a new figure of pyplot."""
+    with house_style():
+        if ax is None:
+            import matplotlib.pyplot as plt  # whose figures notebooks show
+
+            ax = plt.figure(figsize=(picture.width, picture.height)).add_subplot()
+        picture.draw(ax)
+        complete_fonts(ax)
+    return ax
+
+
+def stacked(pictures: Sequence[tuple[str, Picture]]) -> Figure:
+    """Return a figure of pictures below each other, each under its title."""
+    heights = [picture.height for _, picture in pictures]
+    width = max(picture.width for _, picture in pictures)
+    figure = Figure(figsize=(width, sum(heights)))
+    rows = figure.subplots(len(pictures), squeeze=False, height_ratios=heights)
+    for ax, (title, picture) in zip(rows[:, 0], pictures, strict=True):
+        picture.draw(ax)
+        ax.set_title(title, loc="left")
+    return figure
+
+
+def inches_from(ax: Axes, x: float, y: float) -> Transform:
+    """Return the transform of inches from a point of the axes, given in shares."""
+    figure = cast(Figure, ax.get_figure(root=True))
+    return figure.dpi_scale_trans + ScaledTranslation(
+        x, y, cast(Affine2DBase, ax.transAxes)
+    )
+
+
+def legend_below(
+    ax: Axes, handles: Sequence[Any], *, ncols: int = 1, **how: Any
+) -> None:
+    """Explain marks below the axes, whatever stands there already."""
+    if not handles:
+        return
+    # texts are as high however large the axes become
+    outer = ax.get_tightbbox(for_layout_only=True)
+    below = 0.0 if outer is None else min(outer.y0 - ax.bbox.y0, 0.0) - 5.0
+    ax.legend(
+        handles=handles,
+        ncols=ncols,
+        fontsize=8,
+        loc="upper center",
+        bbox_to_anchor=(0.0, below / _POINTS),
+        bbox_transform=inches_from(ax, 0.5, 0.0),
+        borderaxespad=0.0,
+        **how,
+    )
+
+
 def finished(
     figure: Figure, *, stamp: str, forms: Sequence[Form] = ("png", "svg")
 ) -> dict[Form, bytes]:
     """Return the files of a figure of the house style, under its stamp."""
-    lay_out(figure, stamp)
+    complete_fonts(figure)
     files: dict[Form, bytes] = {}
-    for form in forms:
-        file = io.BytesIO()
-        figure.canvas.print_figure(file, format=form, dpi=_DPI, metadata=_NO_TIME[form])
-        files[form] = file.getvalue()
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph")  # which was said of all at once
+        lay_out(figure, stamp)
+        for form in forms:
+            file = io.BytesIO()
+            how: dict[str, Any] = {"dpi": _DPI, "metadata": _NO_TIME[form]}
+            if form == "inline":  # on the page's own ground, in letters of the reader
+                for axes in figure.findobj(Axes):
+                    axes.patch.set_visible(False)
+                with mpl.rc_context({"svg.fonttype": "none"}):
+                    figure.canvas.print_figure(
+                        file, format="svg", facecolor="none", **how
+                    )
+            else:
+                figure.canvas.print_figure(file, format=form, **how)
+            files[form] = file.getvalue()
+    if "inline" in files:
+        files["inline"] = _inlined(files["inline"].decode()).encode()
     return files
+
+
+def _inlined(svg: str) -> str:
+    """Return the element of an SVG, its colours those of the page around it."""
+    svg = svg[svg.index("<svg") :]
+    for colour, of_page in _OF_PAGE.items():
+        svg = svg.replace(colour.lower(), of_page)
+    # names of their own, as several stand in one page
+    key = hashlib.sha256(svg.encode()).hexdigest()[:8]
+    svg = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>f{key}-", svg)
+    return svg.replace("<svg ", '<svg fill="currentColor" ', 1)
 
 
 def lay_out(figure: Figure, stamp: str) -> None:

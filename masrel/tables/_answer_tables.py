@@ -28,7 +28,7 @@ from masrel.tables._estimate_words import (
 from masrel.tables._tables import SIMULATED, Column, Table, capital, percent, table_of
 
 if TYPE_CHECKING:
-    from masrel.plots._drawn_values import Forest
+    from masrel.plots._drawn_values import Drawn
 
 Detail = Literal["brief", "usual", "all"]
 """How much notes say: what must be known, how numbers were made, what they promise."""
@@ -462,9 +462,9 @@ def _why_null(estimate: Estimate) -> list[str]:
     ]
 
 
-def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> "Forest":
+def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> "Drawn":
     """Return what a figure shows: the estimates and their intervals."""
-    from masrel.plots._drawn_values import Forest
+    from masrel.plots._drawn_values import FOREST, Drawn
 
     # what is in the units of the ratings is on no axis of agreement
     rows = [row for row in rows if not _is_in_units(row)]
@@ -486,7 +486,5 @@ def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> "Forest":
         group = row.group if several else ""
         detail = ", ".join(details)
         drawn.append(forest_row(row.title, row.estimate, detail=detail, group=group))
-    return Forest(
-        rows=tuple(drawn),
-        axis_label=f"agreement (1 is perfect); intervals for other {population}",
-    )
+    label = f"agreement (1 is perfect); intervals for other {population}"
+    return Drawn(FOREST, (tuple(drawn), label))

@@ -63,13 +63,14 @@ def test_no_module_imports_in_a_circle() -> None:
     assert len(list(TopologicalSorter(graph).static_order())) == len(FILES)
 
 
-# Fewer is better: 60 and 85 are aimed at. A higher number needs a reason.
+# Fewer is better: 60 and 85 were aimed at before commands drew pictures of ratings and
+# wrote pages, which are modules of their own. A higher number needs a reason.
 @pytest.mark.parametrize(
     ("commands", "at_most"),
     [
-        (("agree",), 60),
+        (("agree",), 72),
         # one of them is masrel.agree, which stands beside the version
-        (("agree", "compare", "diagnose", "limits", "latent", "plan", "audit"), 85),
+        (("agree", "compare", "diagnose", "limits", "latent", "plan", "audit"), 97),
     ],
 )
 def test_a_command_reaches_few_modules(commands: tuple[str, ...], at_most: int) -> None:

@@ -23,7 +23,7 @@ from masrel.lab.report._sentences import (
     meaning,
 )
 from masrel.lab.report._stretches import at_ranks
-from masrel.plots._drawn_values import Forest, ForestRow
+from masrel.plots._drawn_values import FOREST, Drawn, ForestRow
 from masrel.tables._estimate_words import forest_row
 from masrel.tables._tables import Column, Table, Value, counted, interval_text, number
 
@@ -288,6 +288,6 @@ def _forest(
             "chance gives."
         ),
         alt=f"Forest plot. {texts}.",
-        content=Forest(rows=tuple(lines), axis_label="agreement (1 is perfect)"),
+        content=Drawn(FOREST, (tuple(lines), "agreement (1 is perfect)")),
         stamp=material.stamp,
     )

@@ -120,7 +120,7 @@ class Drawing:
     name: str  # name of its files, without extension
     caption: str  # what it shows, understood alone
     alt: str  # what a reader who cannot see it needs to know
-    content: figure.Content  # what is drawn
+    content: figure.Content | figure.Drawn  # what is drawn
     stamp: str  # the line that says where its data come from
 
 
