@@ -9,7 +9,7 @@ from masrel._files import write_file
 from masrel.errors import ParameterError
 from masrel.lab.checklist._items import Checklist, ChecklistItem, State
 from masrel.lab.report._docx import Heading, as_docx
-from masrel.lab.report._material import Paragraph
+from masrel.pages._sections import Paragraph
 from masrel.tables._tables import Column, Table
 
 _HEADINGS = ("Item", "Asks for", "State", "What the record says", "Files")
@@ -120,7 +120,7 @@ def _html(checklist: Checklist) -> str:
         undefined=StrictUndefined,
         keep_trailing_newline=True,
     )
-    style = files("masrel.lab.report").joinpath("templates/report.css")
+    style = files("masrel.pages").joinpath("templates/page.css")
     return environment.get_template("checklist.html").render(
         list=checklist,
         headings=_HEADINGS,

@@ -62,7 +62,8 @@ def analyze(
 def _show(data: "StudyData", analysis: "Analysis", *, csv: bool, raw: bool) -> None:
     from masrel.lab.report._document import SECTIONS
     from masrel.lab.report._grades import felt_sentences
-    from masrel.lab.report._material import Paragraph, gather
+    from masrel.lab.report._material import gather
+    from masrel.pages._sections import Paragraph
     from masrel.tables._tables import Table, as_csv, as_text
 
     material = gather(data.protocol, data.ratings, analysis, data.in_person)

@@ -14,7 +14,7 @@ from masrel.agreement import strength
 from masrel.estimates import Estimate, Interval
 from masrel.lab.analysis import PlannedEstimate
 from masrel.lab.report._figure_data import MANY_RATERS
-from masrel.lab.report._material import Drawing, Material, Paragraph, Section
+from masrel.lab.report._material import Material
 from masrel.lab.report._sentences import (
     NOT_THERE,
     TARGETS,
@@ -23,6 +23,7 @@ from masrel.lab.report._sentences import (
     meaning,
 )
 from masrel.lab.report._stretches import at_ranks
+from masrel.pages._sections import Drawing, Paragraph, Section
 from masrel.plots._drawn_values import FOREST, Drawn, ForestRow
 from masrel.tables._estimate_words import forest_row
 from masrel.tables._tables import Column, Table, Value, counted, interval_text, number

@@ -21,7 +21,8 @@ from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.protocol._rater_fields import field_heading
 from masrel.lab.ratings import Correction, corrections_of, study_remarks
 from masrel.lab.report._figure_data import FlowStep, RaterFlow
-from masrel.lab.report._material import Content, Drawing, Material, Paragraph, Section
+from masrel.lab.report._material import Material
+from masrel.pages._sections import Content, Drawing, Paragraph, Section
 from masrel.tables._tables import Column, Table, Value
 
 _WHO, _NOTES = "who", "notes"

@@ -9,8 +9,9 @@ from masrel.lab.protocol import Occasions, PresentationRules
 from masrel.lab.protocol._kinds import DEFAULT_KIND, all_values
 from masrel.lab.ratings import Rating
 from masrel.lab.report._figure_data import MANY_RATERS
-from masrel.lab.report._material import Material, Paragraph, Section
+from masrel.lab.report._material import Material
 from masrel.lab.schedule._orders import orders_in_words
+from masrel.pages._sections import Paragraph, Section
 from masrel.tables._tables import (
     Column,
     Table,

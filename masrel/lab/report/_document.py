@@ -18,7 +18,6 @@ from masrel.lab.analysis._analysis_json import analysis_text
 from masrel.lab.protocol import Protocol, report_sections
 from masrel.lab.ratings import InPerson, Ratings
 from masrel.lab.report._agreement import estimates_section
-from masrel.lab.report._blocks import Block, Chapter, Document
 from masrel.lab.report._conduct import CONDUCT_SECTIONS, StudyConduct, conduct_sections
 from masrel.lab.report._design import design_section
 from masrel.lab.report._grade_tables import categories_section, confusion_section
@@ -27,7 +26,7 @@ from masrel.lab.report._grades import (
     in_person_section,
     intended_section,
 )
-from masrel.lab.report._material import Drawing, Material, Section, gather
+from masrel.lab.report._material import Material, gather
 from masrel.lab.report._methods import methods_section
 from masrel.lab.report._order_section import order_section
 from masrel.lab.report._pages import WRITERS, Writer
@@ -45,6 +44,7 @@ from masrel.lab.report._sample_size import sample_size_section
 from masrel.lab.report._stretches import speeds_section
 from masrel.lab.report._trace_section import traces_section
 from masrel.lab.verification import Anchor
+from masrel.pages._sections import Block, Chapter, Document, Drawing, Section
 from masrel.tables._tables import Table, as_csv, tag_of
 
 Progress = Callable[[str], object]

@@ -10,7 +10,6 @@ from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
 from masrel.errors import ParameterError
-from masrel.lab.report._blocks import Block, Document
 from masrel.lab.report._docx_table import (
     MARGIN,
     PAGE,
@@ -21,7 +20,7 @@ from masrel.lab.report._docx_table import (
     laid_out,
     write,
 )
-from masrel.lab.report._material import Drawing, Listing, Paragraph
+from masrel.pages._sections import Block, Document, Drawing, Listing, Paragraph
 from masrel.tables._tables import Table
 
 if TYPE_CHECKING:

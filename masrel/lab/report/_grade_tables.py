@@ -4,14 +4,9 @@ from masrel.lab.analysis._category_agreement import category_agreement
 from masrel.lab.analysis._exclusions import analysed_ratings
 from masrel.lab.analysis._given_grades import GivenGrades, given_grades
 from masrel.lab.report._figure_data import GradesByAim
-from masrel.lab.report._material import (
-    Drawing,
-    Material,
-    Paragraph,
-    Section,
-    absent_section,
-)
+from masrel.lab.report._material import Material
 from masrel.lab.report._result import main_estimate
+from masrel.pages._sections import Drawing, Paragraph, Section, absent_section
 from masrel.tables._tables import Column, Table, Value, counted, percent
 
 _CATEGORIES = "Agreement on each grade"

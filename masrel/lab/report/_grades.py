@@ -5,13 +5,8 @@ from collections.abc import Iterator
 from operator import attrgetter
 
 from masrel.lab.report._figure_data import MANY_RATERS, GradeCounts, GradeGrid
-from masrel.lab.report._material import (
-    Drawing,
-    Material,
-    Paragraph,
-    Section,
-    absent_section,
-)
+from masrel.lab.report._material import Material
+from masrel.pages._sections import Drawing, Paragraph, Section, absent_section
 from masrel.tables._tables import Column, Table, Value, counted, number
 
 

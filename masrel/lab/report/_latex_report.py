@@ -3,8 +3,7 @@ r"""A whole report as a LaTeX file that pdflatex and lualatex compile."""
 import textwrap
 from collections.abc import Iterator
 
-from masrel.lab.report._blocks import Block, Document
-from masrel.lab.report._material import Drawing, Listing
+from masrel.pages._sections import Block, Document, Drawing, Listing
 from masrel.tables._latex import lacking_letters, latex_table, latex_text
 from masrel.tables._tables import Table
 

@@ -7,8 +7,7 @@ from masrel.audit import Claim
 from masrel.lab.analysis import Analysis
 from masrel.lab.protocol import Protocol
 from masrel.lab.ratings import InPerson, Ratings
-from masrel.plots import _drawn_values as figure
-from masrel.tables._tables import SIMULATED, SIMULATED_DEVICE, Table
+from masrel.tables._tables import SIMULATED, SIMULATED_DEVICE
 
 SIMULATED_GRADES = (
     "SIMULATED DATA – no person gave these grades",
@@ -103,49 +102,3 @@ def _on_simulated_device(how_many: str) -> tuple[str, str]:
         "the simulated device nobody felt a model, and the speeds are those of a "
         "simulated hand. Such grades say nothing about the models.",
     )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Paragraph:
-    """One paragraph of plain text."""
-
-    text: str
-    absent: bool = False  # whether it says that something planned is not in the data
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Drawing:
-    """A figure that is drawn when the document is written, and not before."""
-
-    name: str  # name of its files, without extension
-    caption: str  # what it shows, understood alone
-    alt: str  # what a reader who cannot see it needs to know
-    content: figure.Content | figure.Drawn  # what is drawn
-    stamp: str  # the line that says where its data come from
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Listing:
-    """Text that is shown letter by letter, to be copied."""
-
-    title: str
-    text: str
-
-
-Content = Paragraph | Table | Drawing | Listing
-"""What a section is made of."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Section:
-    """One section of the report."""
-
-    name: str  # its name in the protocol's ``report.sections``
-    title: str  # its heading
-    blocks: tuple[Content, ...]  # in order
-
-
-def absent_section(name: str, title: str, reason: str | None) -> Section:
-    """Return a section whose data are not there, and why."""
-    text = f"Not in these data: {reason or 'this was not computed'}."
-    return Section(name=name, title=title, blocks=(Paragraph(text=text, absent=True),))

@@ -10,7 +10,8 @@ import numpy as np
 
 from masrel.lab.recording import MEASURED_TORQUE, Recording, read_recording, stretches
 from masrel.lab.report._figure_data import MeasuredPanel, MeasuredTorque
-from masrel.lab.report._material import Drawing, Material, Paragraph
+from masrel.lab.report._material import Material
+from masrel.pages._sections import Drawing, Paragraph
 from masrel.tables._tables import SIMULATED, number
 
 _PANELS_PER_FIGURE = 4

@@ -10,18 +10,19 @@ from masrel.lab.protocol import report_sections, scale_of
 from masrel.lab.protocol._kinds import DEFAULT_KIND
 from masrel.lab.report._design import beside_presentations, stretches_asked_for
 from masrel.lab.report._grade_tables import shows_confusion
-from masrel.lab.report._material import Content, Listing, Material, Paragraph, Section
+from masrel.lab.report._material import Material
 from masrel.lab.report._order_section import shows_order
-from masrel.lab.report._references import (
+from masrel.lab.report._result import excluded_text, main_estimate, name_within
+from masrel.lab.report._sentences import sentence
+from masrel.lab.schedule._orders import orders_in_words
+from masrel.pages._references import (
     bibtex,
     cited,
     coefficient_references,
     interval_references,
     scale_references,
 )
-from masrel.lab.report._result import excluded_text, main_estimate, name_within
-from masrel.lab.report._sentences import sentence
-from masrel.lab.schedule._orders import orders_in_words
+from masrel.pages._sections import Content, Listing, Paragraph, Section
 from masrel.scales import published_scale
 from masrel.tables._tables import counted, percent
 

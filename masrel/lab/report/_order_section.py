@@ -10,15 +10,9 @@ from masrel.lab.analysis._order_effects import (
 )
 from masrel.lab.ratings import Ratings
 from masrel.lab.report._figure_data import OrderDifferences, PlaceDots
-from masrel.lab.report._material import (
-    Content,
-    Drawing,
-    Material,
-    Paragraph,
-    Section,
-    absent_section,
-)
+from masrel.lab.report._material import Material
 from masrel.lab.report._sentences import sentence
+from masrel.pages._sections import Content, Drawing, Paragraph, Section, absent_section
 from masrel.tables._tables import Column, Table, interval_text, number, percent
 
 _TITLE = "Effects of order"

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from masrel.audit import Claim, audit_claim, read_claims
 from masrel.lab._bounded_files import MAX_TABLE, read_regular
 from masrel.lab.protocol import Protocol, StudyPaths, report_sections
-from masrel.lab.report._material import Material, Section, absent_section
+from masrel.lab.report._material import Material
+from masrel.pages._sections import Section, absent_section
 from masrel.tables._claims_table import claims_table, readings_table
 
 _TITLE = "Published numbers"

@@ -8,13 +8,8 @@ from masrel.lab.analysis import QuestionSummary
 from masrel.lab.analysis._question_summaries import FEWEST_RATERS
 from masrel.lab.protocol import Protocol
 from masrel.lab.report._figure_data import AnswerBars, AnswerPanel
-from masrel.lab.report._material import (
-    Drawing,
-    Material,
-    Paragraph,
-    Section,
-    absent_section,
-)
+from masrel.lab.report._material import Material
+from masrel.pages._sections import Drawing, Paragraph, Section, absent_section
 from masrel.tables._tables import Column, Table, Value
 
 _TITLE = "Questionnaires"

@@ -5,14 +5,9 @@ from typing import TYPE_CHECKING
 
 from masrel.lab.analysis import PlannedEstimate
 from masrel.lab.protocol import Protocol, SampleSize
-from masrel.lab.report._material import (
-    Content,
-    Material,
-    Paragraph,
-    Section,
-    absent_section,
-)
+from masrel.lab.report._material import Material
 from masrel.lab.report._sentences import sentence
+from masrel.pages._sections import Content, Paragraph, Section, absent_section
 from masrel.tables._tables import Column, Table, Value, counted, number
 
 if TYPE_CHECKING:

@@ -5,13 +5,8 @@ from collections.abc import Sequence
 
 from masrel.lab.analysis import Speed, Speeds, SpeedSummary
 from masrel.lab.report._figure_data import MANY_RATERS, SpeedColumn, SpeedDots
-from masrel.lab.report._material import (
-    Drawing,
-    Material,
-    Paragraph,
-    Section,
-    absent_section,
-)
+from masrel.lab.report._material import Material
+from masrel.pages._sections import Drawing, Paragraph, Section, absent_section
 from masrel.tables._tables import Column, Table, Value, number
 
 

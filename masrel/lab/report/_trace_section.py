@@ -28,15 +28,10 @@ from masrel.lab.report._figure_data import (
     TraceColumns,
     TracePanel,
 )
-from masrel.lab.report._material import (
-    Drawing,
-    Material,
-    Paragraph,
-    Section,
-    absent_section,
-)
+from masrel.lab.report._material import Material
 from masrel.lab.report._measured_torque import measured_blocks
 from masrel.lab.report._stretches import at_ranks, has_many, whole_or_tenths
+from masrel.pages._sections import Drawing, Paragraph, Section, absent_section
 from masrel.tables._tables import Column, Table, Value, as_entered, number
 
 _PANELS_PER_FIGURE, _SMALL_PANELS_PER_FIGURE = 4, 24

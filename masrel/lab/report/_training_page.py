@@ -2,8 +2,7 @@
 
 from masrel import __version__
 from masrel.lab.protocol import Protocol, protocol_hash
-from masrel.lab.report._blocks import Block, Chapter, Document
-from masrel.lab.report._material import SIMULATED_GRADES, Drawing, Paragraph
+from masrel.lab.report._material import SIMULATED_GRADES
 from masrel.lab.report._pages import WRITERS
 from masrel.lab.report._training_tables import (
     NOT_RATINGS,
@@ -13,6 +12,7 @@ from masrel.lab.report._training_tables import (
     training_tables,
 )
 from masrel.lab.training._lessons import TrainingRecord
+from masrel.pages._sections import Block, Chapter, Document, Drawing, Paragraph
 from masrel.plots import draw
 from masrel.tables._tables import tag_of
 

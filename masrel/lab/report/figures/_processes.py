@@ -16,7 +16,7 @@ from masrel.plots import draw
 from masrel.plots._drawn_values import Form
 
 if TYPE_CHECKING:
-    from masrel.lab.report._material import Drawing
+    from masrel.pages._sections import Drawing
 
 _Drawn = dict[int, dict[Form, bytes]]
 

@@ -15,8 +15,9 @@ from masrel.lab.report._agreement import (
     estimate_table,
     estimates_section,
 )
-from masrel.lab.report._material import Drawing, Paragraph, gather
+from masrel.lab.report._material import gather
 from masrel.lab.report._sentences import coefficient_name, interval_name
+from masrel.pages._sections import Drawing, Paragraph
 from masrel.plots._drawn_values import Forest
 from masrel.tables._estimate_words import forest_row
 from masrel.tables._tables import Table, as_csv, as_text, page_cells

@@ -9,7 +9,8 @@ import pytest
 from masrel.lab.analysis import analyze
 from masrel.lab.ratings import Ratings
 from masrel.lab.report import write_report
-from masrel.lab.report._material import Material, Paragraph, gather
+from masrel.lab.report._material import Material, gather
+from masrel.pages._sections import Paragraph
 from tests.lab.analysis.studies import of_session, protocol_with, ratings, table_v
 from tests.lab.internal.report.made import build_sections
 

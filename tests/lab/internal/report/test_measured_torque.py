@@ -8,8 +8,9 @@ import pytest
 from masrel.errors import RecordingError
 from masrel.lab.analysis import analyze
 from masrel.lab.recording import MEASURED_TORQUE, RECORDING_COLUMNS, Recording
-from masrel.lab.report._material import Drawing, Paragraph, gather
+from masrel.lab.report._material import gather
 from masrel.lab.report._measured_torque import measured_blocks, measured_panel
+from masrel.pages._sections import Drawing, Paragraph
 from tests.lab.report.pages import simulated_ratings
 from tests.lab.report.test_measured_torque import recorded, with_sensor
 

@@ -12,8 +12,8 @@ from PIL import Image
 from tqdm import tqdm
 
 from masrel.lab.report._figure_data import GradeCounts
-from masrel.lab.report._material import Drawing
 from masrel.lab.report.figures import _processes, draw_all
+from masrel.pages._sections import Drawing
 
 
 @pytest.fixture(autouse=True)

@@ -12,7 +12,8 @@ from masrel.lab.protocol import elbow_parameters
 from masrel.lab.ratings import Ratings
 from masrel.lab.report._document import SECTIONS
 from masrel.lab.report._figure_data import SpeedDots, TraceColumns
-from masrel.lab.report._material import Drawing, Material, Paragraph, gather
+from masrel.lab.report._material import Material, gather
+from masrel.pages._sections import Drawing, Paragraph
 from masrel.plots import draw
 from masrel.plots._style import STYLE
 from masrel.tables._tables import Table, as_text

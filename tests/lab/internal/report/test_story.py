@@ -16,19 +16,20 @@ from masrel.lab.analysis._given_grades import GivenGrades, given_grades
 from masrel.lab.protocol import Protocol, scale_of
 from masrel.lab.ratings import Ratings, rating_matrix, ratings_from_rows
 from masrel.lab.report._document import SECTIONS
-from masrel.lab.report._material import Listing, Paragraph, Section, gather
-from masrel.lab.report._references import (
+from masrel.lab.report._material import gather
+from masrel.pages._references import (
     bibtex,
     cited,
     coefficient_references,
     scale_references,
 )
+from masrel.pages._sections import Listing, Paragraph, Section
 from masrel.plots._style import ALARM, GREY
 from masrel.scales import PUBLISHED_SCALES
 from masrel.tables._tables import Table
 from tests.lab.analysis.studies import of_session, plan, protocol_with, ratings, table_v
 
-BIB = Path(masrel.__file__).parent / "lab/report/templates/references.bib"
+BIB = Path(masrel.__file__).parent / "pages/templates/references.bib"
 AUTHOR = re.compile(r"\((?:[^()]*, \d{4}(?:; )?)+\)")
 
 

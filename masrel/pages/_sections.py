@@ -1,0 +1,138 @@
+"""A document of sections, as a page that needs nothing beside itself.
+
+In: sections of paragraphs, tables, pictures and listings. Out: HTML.
+"""
+
+import base64
+import html
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from masrel.plots import _drawn_values as drawn
+from masrel.tables._tables import SYMBOL, Table, page_cells
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Paragraph:
+    """One paragraph of plain text."""
+
+    text: str
+    absent: bool = False  # whether it says that something planned is not in the data
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drawing:
+    """A figure that is drawn when the document is written, and not before."""
+
+    name: str  # name of its files, without extension
+    caption: str  # what it shows, understood alone
+    alt: str  # what a reader who cannot see it needs to know
+    content: drawn.Content | drawn.Drawn  # what is drawn
+    stamp: str  # the line that says where its data come from
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Listing:
+    """Text that is shown letter by letter, to be copied."""
+
+    title: str
+    text: str
+
+
+Content = Paragraph | Table | Drawing | Listing
+"""What a section is made of."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """One section of the report."""
+
+    name: str  # its name in the protocol's ``report.sections``
+    title: str  # its heading
+    blocks: tuple[Content, ...]  # in order
+
+
+def absent_section(name: str, title: str, reason: str | None) -> Section:
+    """Return a section whose data are not there, and why."""
+    text = f"Not in these data: {reason or 'this was not computed'}."
+    return Section(name=name, title=title, blocks=(Paragraph(text=text, absent=True),))
+
+
+_KINDS = {
+    Paragraph: "paragraph",
+    Table: "table",
+    Drawing: "figure",
+    Listing: "listing",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Block:
+    """A part of a section, with its number among those of its kind."""
+
+    number: int
+    content: Content
+    # of a figure: its bytes, and its file from the report's folder, by form (png, svg)
+    pictures: Mapping[str, bytes] = field(default_factory=dict)
+    files: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def kind(self) -> str:
+        """What it is: paragraph, table, figure or listing."""
+        return _KINDS[type(self.content)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chapter:
+    """A section of the report as it is shown."""
+
+    name: str  # its name in the protocol's ``report.sections``
+    title: str
+    blocks: tuple[Block, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Document:
+    """All that a page of a report says."""
+
+    title: str
+    tag: str  # what stands before a caption where data are simulated
+    banner: str  # what the page says in large letters, if anything
+    provenance: str  # the sentence at its head
+    result: str  # the first paragraph: what the study came to
+    sections: tuple[Chapter, ...]
+    inputs: tuple[tuple[str, str], ...]  # what it was made from, and the hash of that
+    version: str  # of masrel
+
+
+TEMPLATES = Path(__file__).with_name("templates")
+
+
+def html_page(document: Document) -> str:
+    """Return a document as one HTML page."""
+    # Imported here: who wants tables loads no templates.
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        keep_trailing_newline=True,
+    )
+    environment.filters |= {"symbols": _symbols, "cells": page_cells, "uri": _uri}
+    style = (TEMPLATES / "page.css").read_text(encoding="utf-8")
+    template = environment.get_template("page.html")
+    return template.render(document=document, style=style)
+
+
+def _uri(picture: bytes) -> str:
+    # An image of its own, not inline: ids inside two SVGs would collide.
+    encoded = base64.b64encode(picture).decode("ascii")
+    return f"data:image/svg+xml;base64,{encoded}"
+
+
+def _symbols(text: str) -> str:
+    # Escaped first; what is added after that is ours, and so safe in a template.
+    text = SYMBOL.sub(r"\1<sub>\2</sub>", html.escape(text))
+    return text.replace(" %", "&nbsp;%")  # no line begins with the sign
