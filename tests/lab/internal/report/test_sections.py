@@ -15,7 +15,6 @@ from masrel.lab.report._figure_data import SpeedDots, TraceColumns
 from masrel.lab.report._material import Material, gather
 from masrel.pages._sections import Drawing, Paragraph
 from masrel.plots import draw
-from masrel.plots._style import STYLE
 from masrel.tables._tables import Table, as_text
 from tests.lab.analysis.studies import (
     hess2012,
@@ -292,10 +291,7 @@ def test_stretches_are_counted_and_the_one_a_grade_rests_on_is_marked() -> None:
     assert counted.text.startswith(f"{said} In 1 of 1 presentation the arm came loose")
 
 
-def test_the_forest_shows_the_posterior_behind_an_interval(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setitem(STYLE, "svg.fonttype", "none")
+def test_the_forest_shows_the_posterior_behind_an_interval() -> None:
     line = plan(id="kappa", interval="posterior", target="items")
     protocol, rows = protocol_with(line, sections=("agreement",)), table_v()
     analysis = analyze(protocol, rows)

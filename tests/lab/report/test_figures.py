@@ -1,0 +1,296 @@
+"""Figures of a report: all of their data are in them, and nothing is cut off."""
+
+import dataclasses
+import io
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from PIL import Image
+
+from masrel.lab.analysis import analyze
+from masrel.lab.protocol import read_protocol
+from masrel.lab.ratings import read_study_ratings
+from masrel.lab.report import write_report
+from masrel.lab.report._figure_data import (
+    GradeCounts,
+    GradeGrid,
+    GradesByAim,
+    OrderDifferences,
+    PlaceDots,
+    SpeedColumn,
+    SpeedDots,
+    TraceBand,
+    TraceColumns,
+    TracePanel,
+)
+from masrel.lab.report.figures._order_differences import difference_figure
+from masrel.lab.report.figures._study_figures import aim_figure, speed_figure
+from masrel.lab.report.figures._trace_figures import trace_figure
+from masrel.plots import draw
+from masrel.plots._drawn_values import Content
+from tests.benchmarks.many_ratings import many_ratings
+from tests.plots.made import LONG
+
+ROOT = Path(__file__).parents[3]
+WIDEST_IN = 9.5  # inches of a page of a report
+
+
+def speeds(n_raters: int) -> SpeedDots:
+    numbers = np.random.default_rng(1).normal(85.0, 10.0, (4, n_raters, 5))
+    columns = tuple(
+        SpeedColumn(
+            model=f"HM{model}",
+            session="test",
+            speeds=tuple(map(tuple, of_model.tolist())),
+            mean=85.0,
+        )
+        for model, of_model in enumerate(numbers)
+    )
+    raters = tuple(f"R{number}" for number in range(n_raters))
+    return SpeedDots(columns=columns, raters=raters, slowest=60.0)
+
+
+def panel(n_stretches: int, *, has_band: bool) -> TracePanel:
+    time = np.linspace(0.0, 1.0, 50)
+    phase = np.repeat([0, 1, 2], [20, 20, 10])
+    stretch = (time, 30 + 100 * time, 5 * time, phase)
+    ends = np.outer(np.arange(1.0, 5.0), time)
+    band = TraceBand(
+        time=time, angle=ends, torque=ends, shares=(0.05, 0.25, 0.75, 0.95)
+    )
+    return TracePanel(
+        title="HM1\n50 to 90 deg/s",
+        stretches=(stretch,) * n_stretches,
+        names=("R1",) * n_stretches if has_band else (),
+        band=band if has_band else None,
+    )
+
+
+def differences(*, has_places: bool) -> OrderDifferences:
+    nan = float("nan")
+    return OrderDifferences(
+        parts=(
+            PlaceDots(session="a", places=("1–2", "3–4"), steps=(0.1, -0.1)),
+            PlaceDots(session="b", places=("1", "2"), steps=(nan, 0.9)),
+        )
+        if has_places
+        else (),
+        effects=(("one", 0.2, -2.0, 2.4), ("other", -0.1, nan, nan)),
+    )
+
+
+CONTENTS: dict[str, Content] = {
+    "grades": GradeGrid(
+        models=(LONG, "HM2"),
+        raters=(LONG, f"Dr. {LONG}"),
+        intended=("1", None),
+        grades=((("1",), ("0",)), ((), ("2", "1"))),
+        scale=("0", "1", "2"),
+    ),
+    "counts": GradeCounts(
+        models=(LONG, "HM2"),
+        intended=("1", None),
+        scale=("0", "1", "2"),
+        counts=((0, 190, 10), (0, 0, 0)),
+    ),
+    "counts of many grades": GradeCounts(
+        models=("HM1",),
+        intended=(None,),
+        scale=tuple(map(str, range(101))),
+        counts=(tuple(range(101)),),
+    ),
+    "speeds": speeds(2),
+    "speeds of many": speeds(200),
+    "traces": TraceColumns(panels=(panel(2, has_band=False),)),
+    "bands": TraceColumns(panels=(panel(3, has_band=True),) * 2),
+    "small panels": TraceColumns(panels=(panel(3, has_band=True),) * 5,
+                                 has_angle=False),
+    "order": differences(has_places=True),
+}  # fmt: skip
+
+
+def texts_of(svg: bytes) -> list[str]:
+    """The texts of a figure, whose letters are paths."""
+    return re.findall(r"<!-- (.*?) -->", svg.decode("utf-8"), re.DOTALL)
+
+
+@pytest.mark.parametrize("name", CONTENTS)
+def test_the_same_data_give_the_same_bytes_whatever_a_reader_has_set(name: str) -> None:
+    first = draw(CONTENTS[name], stamp="SIMULATED DATA")
+    with mpl.rc_context({"font.size": 20.0, "svg.hashsalt": "other"}):
+        assert draw(CONTENTS[name], stamp="SIMULATED DATA") == first
+    assert texts_of(first["svg"]).count("SIMULATED DATA") == 1
+    assert b"<dc:date>" not in first["svg"]
+    assert b"Software" not in first["png"]
+
+
+@pytest.mark.parametrize("name", CONTENTS)
+def test_a_figure_fits_its_page_and_its_page_fits_it(name: str) -> None:
+    files = draw(CONTENTS[name], stamp="SIMULATED DATA")
+    image = Image.open(io.BytesIO(files["png"]))
+    shown = np.asarray(image)
+    edges = (shown[:2], shown[-2:], shown[:, :2], shown[:, -2:])
+    assert all((edge == 255).all() for edge in edges)  # nothing is cut off
+    size = re.search(rb'width="([\d.]+)pt" height="([\d.]+)pt"|$', files["svg"])
+    assert size is not None
+    inches = np.array([float(length) / 72.0 for length in size.groups()])
+    assert inches[0] <= WIDEST_IN
+    expected = np.array(image.size) / np.array(image.info["dpi"])
+    np.testing.assert_allclose(inches, expected, atol=0.005)
+
+
+def test_a_grade_is_written_in_its_cell_and_a_missing_one_is_a_dash() -> None:
+    texts = texts_of(draw(CONTENTS["grades"], stamp="", forms=("svg",))["svg"])
+    assert texts.count("1") == 3  # intended, by one rater, and of two by another
+    assert texts.count("2") == 1
+    assert texts.count("–") == 2  # a missing grade, no intended one
+
+
+def test_above_thirty_raters_a_figure_no_longer_grows_with_them() -> None:
+    few, many, more = (
+        len(draw(speeds(n), stamp="", forms=("svg",))["svg"]) for n in (30, 31, 200)
+    )
+    assert few > 2 * many
+    assert more < 1.05 * many
+
+
+def test_a_small_grid_of_panels_names_what_it_shades() -> None:
+    texts = texts_of(draw(CONTENTS["small panels"], stamp="", forms=("svg",))["svg"])
+    assert texts.count("R1") == 3 * 5
+    assert "middle 90 %" in texts
+
+
+def test_a_stretch_that_a_grade_rests_on_is_ringed_and_drawn_thicker() -> None:
+    column = SpeedColumn(
+        model="HM1",
+        session="first",
+        speeds=((80.0, 95.0),),
+        mean=85.0,
+        graded=((95.0,),),
+    )
+    (axes,) = speed_figure(
+        SpeedDots(columns=(column,), raters=("R1",), slowest=60.0)
+    ).axes
+    ringed = [line for line in axes.lines if line.get_fillstyle() == "none"]
+    assert [list(line.get_ydata()) for line in ringed] == [[95.0]]
+    widths = []
+    for graded in (False, True):
+        one = dataclasses.replace(panel(1, has_band=False), graded=(graded,))
+        top = trace_figure(TraceColumns(panels=(one,))).axes[0]
+        widths.append(top.lines[0].get_linewidth())
+    assert widths[1] > 2.0 * widths[0]
+
+
+def test_the_part_as_intended_stands_beside_its_row() -> None:
+    content = GradesByAim(
+        intended=("1", "2"),
+        scale=("0", "1", "2"),
+        counts=((1, 3, 0), (0, 0, 2)),
+        shares=((0.75, 0.2, 0.99), (1.0, 0.16, 1.0)),
+    )
+    left, right = aim_figure(content).axes
+    assert [text.get_text() for text in left.texts] == ["1", "3", "2"]
+    frames = [patch.get_x() + 0.46 for patch in left.patches]
+    assert frames == pytest.approx([1, 2])  # the columns of 1 and of 2
+    lines = [np.asarray(line.get_xydata()).tolist() for line in right.lines]
+    assert lines == [
+        [[20.0, 0.0], [99.0, 0.0]],
+        [[75.0, 0.0]],
+        [[16.0, 1.0], [100.0, 1.0]],
+        [[100.0, 1.0]],
+    ]
+
+
+@pytest.mark.parametrize("has_places", [True, False])
+def test_effects_of_order_reach_as_far_as_they_are(has_places: bool) -> None:
+    left: list[Axes]
+    *left, right = difference_figure(differences(has_places=has_places)).axes
+    low, high = right.get_xlim()
+    assert low == -high
+    assert high >= 2.4
+    assert len(right.lines) == 4  # zero, an interval and its dot, a dot without one
+    assert len(left) == has_places
+    for axes in left:
+        assert axes.get_ylim()[1] >= 0.9
+        # sessions of unlike places have parts in common, not places
+        assert [tick.get_text() for tick in axes.get_xticklabels()] == ["1", "2"]
+
+
+@pytest.mark.slow
+def test_a_figure_is_the_same_in_any_environment(tmp_path: Path) -> None:
+    code = (
+        "import hashlib\n"
+        "from masrel.plots import draw\n"
+        "from tests.lab.report.test_figures import CONTENTS\n"
+        "for form, data in draw(CONTENTS['bands'], stamp='from: é').items():\n"
+        "    print(form, hashlib.sha256(data).hexdigest())\n"
+    )
+    settings = tmp_path / "matplotlibrc"
+    settings.write_text("font.size: 20\nsavefig.dpi: 50\naxes.grid: True\n")
+    home = tmp_path / "home"
+    home.mkdir(mode=0o500)
+    plain = {"PATH": os.environ["PATH"], "PYTHONPATH": str(ROOT)}
+    strange = plain | {
+        "HOME": str(home),
+        "LANG": "tr_TR.UTF-8",
+        "LC_ALL": "de_DE.UTF-8",
+        "MATPLOTLIBRC": str(settings),
+        "MPLBACKEND": "module://not.there",
+        "SOURCE_DATE_EPOCH": "1",
+        "TZ": "Pacific/Kiritimati",
+    }
+    first, second = (
+        subprocess.run(
+            [sys.executable, "-c", code], env=env, cwd=tmp_path, text=True,
+            check=True, stdout=subprocess.PIPE,
+        ).stdout
+        for env in (plain | {"HOME": os.environ.get("HOME", "/")}, strange)
+    )  # fmt: skip
+    assert first.startswith("png ")
+    assert first == second
+
+
+def report_of(root: Path, n_raters: int, n_models: int, n_repeats: int) -> Path:
+    many_ratings(root, n_raters, n_models, n_repeats)
+    protocol = read_protocol(root / "protocol.toml")
+    file = root / "ratings" / "ratings.csv"
+    ratings = read_study_ratings(file, protocol.scale)
+    return write_report(
+        protocol, ratings, analyze(protocol, ratings), root / "report"
+    ).html
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::masrel.errors.SmallSampleWarning")
+def test_the_page_of_many_raters_shows_a_few_and_the_files_have_all(
+    tmp_path: Path,
+) -> None:
+    page = report_of(tmp_path / "study", 32, 2, 1).read_text(encoding="utf-8")
+    folder = tmp_path / "study" / "report" / "tables"
+    for name, n_rows, n_columns in (
+        ("speeds_by_rater", 32 + 7, 8),
+        ("peak_torque", 2, 4 + 32 + 1),
+        ("grades_test", 2, 2 + 32 + 1),
+    ):
+        (file,) = folder.glob(f"{name}-*.csv")
+        head, *rows = file.read_text(encoding="utf-8").splitlines()
+        assert len(rows) == n_rows
+        assert head.count(",") + 1 == n_columns
+    (sessions,) = folder.glob("sessions-*.csv")
+    assert "R031, R032" in sessions.read_text(encoding="utf-8")
+    assert "R001, R002, …, R032<" in page
+    assert "(lower quartile)" in page
+    assert ">R017<" not in page
+
+
+@pytest.mark.slow
+def test_a_report_of_ten_thousand_ratings_stays_small(tmp_path: Path) -> None:
+    page = report_of(tmp_path / "study", 200, 10, 5)
+    assert page.stat().st_size <= 5e6

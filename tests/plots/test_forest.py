@@ -1,0 +1,206 @@
+"""The forest: every estimate, its interval, and how it is distributed, are in it."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.patches import StepPatch
+from numpy.typing import NDArray
+
+from masrel.errors import ParameterError
+from masrel.estimates import Estimate, Interval
+from masrel.plots import forest
+from tests.plots.made import LONG, blank, estimate, interval, overlaps, spread, texts_of
+
+BELL = np.linspace(0.2, 0.8, 61)
+DENSITY = np.exp(-50.0 * (BELL - 0.6) ** 2)
+
+
+def one(interval: Interval) -> Axes:
+    return forest(estimate(interval), ax=blank())
+
+
+@pytest.fixture(autouse=True)
+def _closed() -> Iterator[None]:
+    yield
+    plt.close("all")
+
+
+def lines(axes: Axes) -> list[tuple[str, list[list[float]]]]:
+    """Marker, and points, of every line but the one at zero."""
+    return [
+        (str(line.get_marker()), np.asarray(line.get_xydata()).tolist())
+        for line in axes.lines
+        if line.get_zorder() >= 1.0
+    ]
+
+
+def test_every_estimate_has_its_dot_its_interval_and_its_numbers() -> None:
+    several = [estimate(interval(low=0.1 * n), value=0.5 + 0.1 * n) for n in range(3)]
+    axes = forest(several, ["a", "b", "c"], ax=blank())
+    dots = [points[0][0] for marker, points in lines(axes) if marker == "o"]
+    ends = [[x for x, _ in points] for marker, points in lines(axes) if marker == "|"]
+    assert dots == pytest.approx([0.5, 0.6, 0.7])
+    assert ends == [pytest.approx([0.1 * n, 0.7]) for n in range(3)]
+    assert {"a", "b", "c", "0.600 [0.100, 0.700]"} <= set(texts_of(axes))
+
+
+def test_an_undefined_estimate_is_said_to_be_and_has_no_mark() -> None:
+    axes = forest(estimate(value=math.nan, reason="one category"), ax=blank())
+    assert "undefined" in texts_of(axes)
+    assert lines(axes) == []
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "markers"),
+    [(0.5, -0.9, {"|", "o"}), (0.5, -7.0, {"|", "o", "<"}), (-9.0, -20.0, {"|", "<"})],
+)
+def test_what_leaves_the_axis_is_an_arrow_at_its_end(
+    value: float, low: float, markers: set[str]
+) -> None:
+    axes = forest(estimate(interval(low=low), value=value), ax=blank())
+    left = axes.get_xlim()[0]
+    assert left >= -1.05
+    assert {marker for marker, _ in lines(axes)} == markers
+    assert min(x for _, points in lines(axes) for x, _ in points) >= left
+
+
+def test_zero_is_marked_where_chance_gives_it_alone() -> None:
+    share = estimate(coefficient="percent_agreement")
+    several = [share, estimate(), estimate(), share, estimate()]
+    at_zero = [
+        np.asarray(line.get_xydata())[:, 1].tolist()
+        for line in forest(several, ax=blank()).lines
+        if set(line.get_xdata()) == {0.0}
+    ]
+    assert len(at_zero) == 2  # of two rows that are neighbours, and of the last
+    (top, bottom), (again, end) = at_zero
+    assert bottom - top == pytest.approx(2.0 * (end - again))
+
+
+def test_a_heading_stands_once_above_its_rows() -> None:
+    groups = ["test", "test", "retest"]
+    texts = texts_of(forest([estimate()] * 3, groups=groups, ax=blank()))
+    assert (texts.count("test"), texts.count("retest")) == (1, 1)
+
+
+@pytest.mark.parametrize("names", [{"labels": ["a"]}, {"groups": ["a"] * 3}])
+def test_names_of_others_are_refused(names: dict[str, list[str]]) -> None:
+    with pytest.raises(ParameterError, match="needs one for each of 2 estimates, got"):
+        forest([estimate()] * 2, **names, ax=blank())
+
+
+@pytest.mark.parametrize(
+    ("shown", "words"),
+    [
+        (estimate(), {"estimate"}),
+        (estimate(interval()), {"estimate", "95 % confidence interval"}),
+        (estimate(interval(level=0.9)), {"estimate", "90 % confidence interval"}),
+        (
+            estimate(spread(BELL, DENSITY, continuous=True)),
+            {
+                "estimate",
+                "95 % credible interval",
+                "posterior density, each to its own height",
+            },
+        ),
+        (
+            estimate(spread([0.2, 0.5], [0.4, 0.6])),
+            {
+                "estimate",
+                "95 % confidence interval",
+                "resamples of one value, each row to its own height",
+            },
+        ),
+    ],
+)
+def test_the_legend_names_what_is_drawn_and_nothing_else(
+    shown: Estimate, words: set[str]
+) -> None:
+    legend = forest(shown, ax=blank()).get_legend()
+    assert legend is not None
+    assert {text.get_text() for text in legend.get_texts()} == words
+
+
+@pytest.mark.parametrize("n", [1, 12])
+def test_no_text_lies_on_another_or_is_cut_off(n: int) -> None:
+    several = [estimate(spread(BELL, DENSITY, continuous=True))] * n
+    axes = forest(several, [LONG] * n, groups=["first"] + ["second"] * (n - 1))
+    assert overlaps(axes) == []
+
+
+# What a ridge shows of a distribution.
+
+
+def shares(heights: NDArray[np.float64], places: NDArray[np.float64]) -> dict:
+    return dict(zip(places.tolist(), (heights / heights.max()).tolist(), strict=True))
+
+
+def stems(axes: Axes) -> dict[float, float]:
+    """Place of every stem, and its height, that of the highest being 1."""
+    (found,) = (of for of in axes.collections if isinstance(of, LineCollection))
+    ends = np.array(found.get_segments())
+    return shares(ends[:, 0, 1] - ends[:, 1, 1], ends[:, 0, 0])
+
+
+def bars(axes: Axes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Edges of the bars, and how high each is."""
+    outline = [patch for patch in axes.patches if isinstance(patch, StepPatch)][-1]
+    data = outline.get_data()
+    return data.edges, data.baseline - data.values
+
+
+def test_few_values_are_stems_as_high_as_their_shares() -> None:
+    axes = one(spread([-0.2, 0.5, 1.0], [0.2, 0.5, 0.3]))
+    assert stems(axes) == pytest.approx({-0.2: 0.4, 0.5: 1.0, 1.0: 0.6})
+
+
+def test_values_that_differ_by_rounding_are_one_and_infinite_ones_are_none() -> None:
+    split = one(spread([0.2, 0.5, 0.5 + 1e-13], [0.5, 0.25, 0.25]))
+    assert stems(split) == pytest.approx({0.2: 1.0, 0.5: 1.0})
+    odd = one(spread([-np.inf, 0.2, 0.4, np.inf], [0.1, 0.4, 0.4, 0.1]))
+    assert stems(odd) == pytest.approx({0.2: 1.0, 0.4: 1.0})
+
+
+def test_a_point_mass_among_many_values_stays_a_line_where_it_is() -> None:
+    others = np.linspace(0.001, 0.9, 200)
+    axes = one(spread([*others, 1.0], [0.5 / 200] * 200 + [0.5]))
+    assert stems(axes) == {1.0: 1.0}
+    # the bars hold the other half, in the unit of the stem, which is a half high
+    (line,) = (of for of in axes.collections if isinstance(of, LineCollection))
+    (low, high) = line.get_segments()[0][:, 1]
+    assert bars(axes)[1].sum() == pytest.approx(low - high)
+
+
+@pytest.mark.parametrize(
+    ("spread_of", "width"), [(0.1, 0.02), (0.02, 0.005), (1e-5, 1e-3)]
+)
+def test_bars_hold_every_resample_and_are_narrow_where_it_is_narrow(
+    spread_of: float, width: float
+) -> None:
+    values = np.sort(np.random.default_rng(6).normal(0.8, spread_of, 4000))
+    edges, heights = bars(one(spread(values, [1 / 4000] * 4000)))
+    assert edges[0] < values[0]
+    assert values[-1] <= edges[-1]
+    np.testing.assert_allclose(np.diff(edges), width)
+    expected = np.histogram(values, edges)[0]
+    np.testing.assert_allclose(heights / heights.max(), expected / expected.max())
+
+
+def test_no_bar_goes_beyond_perfect_agreement() -> None:
+    edges, _ = bars(one(spread(np.linspace(0.5, 1.0, 101), [1 / 101] * 101)))
+    assert edges[-1] == pytest.approx(1.0)
+
+
+def test_a_density_keeps_its_shape_and_a_faint_tail_needs_no_room() -> None:
+    at = np.linspace(-0.9, 0.9, 181)
+    density = np.exp(-200.0 * (at - 0.5) ** 2)
+    axes = one(spread(at, density, continuous=True))
+    (points,) = (np.array(of) for _, of in lines(axes) if len(of) == at.size)
+    heights = points[:, 1].max() - points[:, 1]
+    np.testing.assert_allclose(heights / heights.max(), density, atol=1e-12)
+    assert axes.get_xlim()[0] == pytest.approx(-0.05)

@@ -1,0 +1,55 @@
+"""Agreement of pairs: every pair has its cell, every rater his or her change."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from matplotlib import pyplot as plt
+
+from masrel.plots import pairs
+from tests.plots.made import LONG, blank, diagnosis, overlaps, texts_of
+
+
+@pytest.fixture(autouse=True)
+def _closed() -> Iterator[None]:
+    yield
+    plt.close("all")
+
+
+def test_values_stand_in_their_cells_on_colours_from_0_to_1() -> None:
+    found = diagnosis(3)
+    axes = pairs(found, ax=blank())
+    shown = np.asarray(axes.images[0].get_array())
+    order = [int(name.get_text()[1]) for name in axes.get_yticklabels()]
+    np.testing.assert_array_equal(shown, found.pair_values[np.ix_(order, order)])
+    assert axes.images[0].get_clim() == (0.0, 1.0)
+    first = f"{found.pair_values[0, 1]:.2f}".removeprefix("0")
+    assert texts_of(axes).count(first) >= 2
+    assert "95 % confidence interval" in texts_of(axes)
+
+
+def test_what_changes_without_each_rater_stands_in_the_raters_row() -> None:
+    found = diagnosis(4)
+    axes = pairs(found, ax=blank())
+    order = [int(name.get_text()[1]) for name in axes.get_yticklabels()]
+    (panel,) = (of for of in axes.child_axes if "change" in of.get_xlabel())
+    (dots,) = (of for of in panel.lines if of.get_marker() == "o")
+    assert dots.get_ydata().tolist() == [0, 1, 2, 3]
+    np.testing.assert_array_equal(dots.get_xdata(), found.changes[order])
+
+
+def test_two_raters_have_no_panel_as_none_can_go() -> None:
+    axes = pairs(diagnosis(2), ax=blank())
+    assert not any("change" in of.get_xlabel() for of in axes.child_axes)
+
+
+@pytest.mark.parametrize(
+    ("n_raters", "reference"), [(2, None), (8, LONG), (16, LONG), (30, None)]
+)
+def test_no_text_lies_on_another_or_is_cut_off(
+    n_raters: int, reference: str | None
+) -> None:
+    axes = pairs(diagnosis(n_raters, reference))
+    assert overlaps(axes) == []
+    numbers = [text for text in texts_of(axes) if text.startswith(".")]
+    assert bool(numbers) == (n_raters <= 14)
