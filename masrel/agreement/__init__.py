@@ -45,11 +45,13 @@ from masrel.agreement.change import (
 )
 from masrel.agreement.icc import (
     IccForm,
+    VarianceComponents,
     icc,
     icc_f_test,
     kendall_w,
     kendall_w_test,
     robinson_a,
+    variance_components,
 )
 from masrel.agreement.kappas import (
     brennan_prediger,
@@ -58,6 +60,7 @@ from masrel.agreement.kappas import (
     fleiss_kappa,
     fleiss_null,
     gwet_ac,
+    item_disagreement,
     percent_agreement,
     scott_pi,
 )
@@ -97,6 +100,7 @@ __all__ = [
     "Metric",
     "Property",
     "Significance",
+    "VarianceComponents",
     "WeightName",
     "Weights",
     "WeightsLike",
@@ -124,6 +128,7 @@ __all__ = [
     "holm",
     "icc",
     "icc_f_test",
+    "item_disagreement",
     "kappa_max",
     "kendall_w",
     "kendall_w_test",
@@ -144,4 +149,5 @@ __all__ = [
     "stratified_kappa",
     "strength",
     "stuart_maxwell",
+    "variance_components",
 ]

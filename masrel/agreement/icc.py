@@ -8,7 +8,7 @@ gaps has none: there the likelihood gives the variances, too.
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal, cast, get_args
 
@@ -202,6 +202,95 @@ def icc(
         value, confidence, reason = _with_gaps(values, form, level)
     return measured(
         _ICC_NAMES[form], values, categories, value, interval=confidence, reason=reason
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VarianceComponents:
+    """What the variance of a rating is made of, and how that was estimated.
+
+    Attributes
+    ----------
+    items, raters, residual : float
+        Variances in the unit of the ratings, squared; ``nan`` when undefined.
+    method : {"ANOVA", "REML"}
+        From mean squares, or, where ratings are missing, of highest restricted
+        likelihood.
+    negative : tuple of str
+        Which of them mean squares estimate as less than 0, and are 0 here.
+    reason : str or None
+        Why they are undefined, or None.
+    """
+
+    items: float = math.nan
+    raters: float = math.nan
+    residual: float = math.nan
+    method: Literal["ANOVA", "REML"] = "ANOVA"
+    negative: tuple[str, ...] = ()
+    reason: str | None = None
+
+
+def variance_components(
+    ratings: object, *, categories: Sequence[Label] | None = None
+) -> VarianceComponents:
+    """Estimate the variances of items, raters and residual, as ICC(A,1) has them.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Numbers, or labels of a declared scale; None and ``nan`` are missing.
+    categories : sequence of str, int or float, optional
+        The declared scale in order: numbers count by value, text by rank. Needed for
+        text.
+
+    Returns
+    -------
+    VarianceComponents
+        The three variances. That of items over their sum is ICC(A,1), unless mean
+        squares estimate one as less than 0.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table, or text without categories.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If there are fewer than two items or raters, or too few ratings to tell the
+        variances from each other.
+
+    References
+    ----------
+    .. [1] McGraw, K. O., Wong, S. P. (1996), Table 3; see `icc`.
+
+    Examples
+    --------
+    >>> found = variance_components([[1, 2], [3, 3], [5, 7]])
+    >>> round(found.items, 3), round(found.raters, 3), round(found.residual, 3)
+    (5.0, 0.333, 0.5)
+    """
+    values = rated_part(rating_values(ratings, categories))
+    method: Literal["ANOVA", "REML"] = "ANOVA"
+    fit: Any
+    if np.isnan(values).any():
+        from masrel.agreement._mixed import components
+
+        method, fit = "REML", components(values, has_raters=True)
+    else:
+        fit = _too_few(values) or _Anova.of(values).components()
+    if isinstance(fit, str):
+        reason = undefined("the variances of ratings", fit)
+        return VarianceComponents(method=method, reason=reason)
+    parts = {
+        name: getattr(fit, name) * fit.unit**2
+        for name in ("items", "raters", "residual")
+    }
+    none = -_ROUNDING * sum(map(abs, parts.values()))
+    return VarianceComponents(
+        **{name: max(part, 0.0) for name, part in parts.items()},
+        method=method,
+        negative=tuple(name for name, part in parts.items() if part < none),
     )
 
 
@@ -495,6 +584,12 @@ class _Anova:
         return cls(
             n, k, rows / (n - 1), columns / (k - 1), rest, within / (n * (k - 1))
         )
+
+    def components(self) -> "_Anova":
+        # variances in the place of mean squares, of which they are in expectation
+        n, k, rest = self.n, self.k, self.residual
+        items, raters = (self.items - rest) / k, (self.raters - rest) / n
+        return replace(self, items=items, raters=raters)
 
     def error(self, form: str) -> Any:
         return self.within if form.startswith("ICC(1") else self.residual

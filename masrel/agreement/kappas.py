@@ -38,7 +38,7 @@ from masrel.agreement._engine import (
     undefined,
 )
 from masrel.agreement._labels import Codes, Label
-from masrel.agreement._weights import WeightsLike
+from masrel.agreement._weights import WeightsLike, declared_weights
 from masrel.errors import ParameterError
 from masrel.estimates import Estimate, Significance
 
@@ -695,6 +695,55 @@ def _place(category: Label, scale: Sequence[Label]) -> int:
             f"{shown(category)}"
         )
     return scale.index(category)
+
+
+def item_disagreement(
+    ratings: object,
+    *,
+    categories: Sequence[Label] | None = None,
+    weights: "WeightsLike" = "identity",
+) -> Floats:
+    """Return how much the raters of each item disagree.
+
+    Parameters
+    ----------
+    ratings : nested sequence, array_like or DataFrame, shape (n_items, n_raters)
+        Labels or numbers; None and ``nan`` are missing. Counted ratings will do.
+    categories : sequence of str, int or float, optional
+        The declared scale in order; the labels met when not given.
+    weights : str or array_like, shape (n_categories, n_categories), optional
+        How much two categories agree; see `declared_weights`.
+
+    Returns
+    -------
+    ndarray, shape (n_items,)
+        The mean of 1 - w over the pairs of an item's ratings: 0 where all are alike;
+        ``nan`` of fewer than two ratings. Without missing ratings 1 less its mean is
+        percent agreement.
+
+    Raises
+    ------
+    RatingsError
+        If the ratings are not such a table.
+    ParameterError
+        If the weights are unknown, or do not fit the categories.
+
+    Warns
+    -----
+    UndefinedStatisticWarning
+        If the scale has no such weights; all are then ``nan``.
+
+    Examples
+    --------
+    >>> item_disagreement([[1, 1, 1], [1, 1, 3], [2, None, None]]).round(3)
+    array([0.   , 0.667,   nan])
+    """
+    counted = count_ratings(ratings, categories)
+    made = declared_weights(weights, counted.categories, declared=counted.declared)
+    if made.reason is not None:
+        undefined("disagreement on items", made.reason)
+    d, has_pair = _item_features(counted.coded.codes, made.v).dense
+    return np.where(has_pair > 0.0, d / WHOLE, math.nan)
 
 
 def fleiss_null(

@@ -14,16 +14,34 @@ from typing import TYPE_CHECKING
 from masrel.plots._drawn_values import Content, Drawn, Form
 
 if TYPE_CHECKING:
+    from masrel.plots._components import components
     from masrel.plots._forest import forest
+    from masrel.plots._grades import categories, confusion, grades, items
     from masrel.plots._latent_scale import latent
     from masrel.plots._limits_figure import bland_altman
     from masrel.plots._rater_pairs import pairs
 
-__all__ = ["bland_altman", "draw", "forest", "latent", "pairs"]
+__all__ = [
+    "bland_altman",
+    "categories",
+    "components",
+    "confusion",
+    "draw",
+    "forest",
+    "grades",
+    "items",
+    "latent",
+    "pairs",
+]
 
 _HOMES = {
     "bland_altman": "_limits_figure",
+    "categories": "_grades",
+    "components": "_components",
+    "confusion": "_grades",
     "forest": "_forest",
+    "grades": "_grades",
+    "items": "_grades",
     "latent": "_latent_scale",
     "pairs": "_rater_pairs",
 }

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogFormatter
 from numpy.typing import NDArray
@@ -22,6 +21,7 @@ from masrel.plots._style import (
     DASHES,
     GREY,
     ORANGE,
+    SEQUENTIAL,
     Picture,
     legend_below,
     short_name,
@@ -40,7 +40,6 @@ _MAX_IN_A_LINE = 24  # letters of both raters
 _DOT: dict[str, Any] = {"color": BLUE, "alpha": 0.6}
 _SMALLEST, _LARGEST = 14.0, 160.0  # areas of dots, points²
 _LIMIT: dict[str, Any] = {"color": ORANGE, "linestyle": (0, (6, 2))}
-_SHADES = LinearSegmentedColormap.from_list("items", ["#D6E6F2", "#5BA3D0", "#003A5D"])
 
 
 def bland_altman(
@@ -147,7 +146,7 @@ def _draw_hexagons(axes: Axes, panel: "LimitsOfAgreement") -> None:
         gridsize=45,
         mincnt=1,
         bins="log",
-        cmap=_SHADES,
+        cmap=SEQUENTIAL,
         linewidths=0.1,
         zorder=1.5,
     )

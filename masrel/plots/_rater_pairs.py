@@ -21,6 +21,7 @@ from masrel.plots._style import (
     ON_CELL,
     PAGE,
     Picture,
+    colour_bar,
     inches_from,
     legend_below,
     short_name,
@@ -99,17 +100,8 @@ def pairs_picture(result: "Diagnosis", title: str) -> Picture:
     def draw(axes: Axes) -> None:
         _heatmap(axes, _pairs(result, order), raters, others)
         axes.tick_params(length=0, labelsize=letters)
-        # as wide as the map, and below it by inches
-        below = inches_from(axes, 0.0, 0.0)
-        place = blended_transform_factory(axes.transAxes, below)
-        bar = axes.inset_axes((0.0, -0.27, 1.0, 0.11), transform=place)
-        bar.figure.colorbar(
-            axes.images[0],
-            cax=bar,
-            orientation="horizontal",
-            label=f"{title} of pairs",
-            extend="min" if (_pairs(result, order) < 0.0).any() else "neither",
-        )
+        extend = "min" if (_pairs(result, order) < 0.0).any() else "neither"
+        colour_bar(axes, axes.images[0], f"{title} of pairs", extend=extend)
         if has_changes:
             right = inches_from(axes, 1.0, 0.0)
             place = blended_transform_factory(right, axes.transAxes)

@@ -16,9 +16,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colorbar import Colorbar
+from matplotlib.colors import LinearSegmentedColormap, to_rgb
 from matplotlib.figure import Figure
-from matplotlib.transforms import Affine2DBase, ScaledTranslation, Transform
+from matplotlib.transforms import (
+    Affine2DBase,
+    ScaledTranslation,
+    Transform,
+    blended_transform_factory,
+)
 
 from masrel.plots._drawn_values import Form
 from masrel.plots._fonts import complete_fonts
@@ -39,6 +47,11 @@ PAGE = "#FFFFFF"
 
 ON_CELL = ("#111111", "#FEFEFE")
 """Letters on a light cell and on a dark one, whatever the page is."""
+
+SEQUENTIAL = LinearSegmentedColormap.from_list(
+    "sequential", ["#D6E6F2", "#5BA3D0", "#003A5D"]
+)
+"""From little to much, lighter to darker: in a grey print, too."""
 
 DASHES = (0, (4, 3))
 """Line style of what is a reference, not data."""
@@ -152,6 +165,23 @@ def inches_from(ax: Axes, x: float, y: float) -> Transform:
     figure = cast(Figure, ax.get_figure(root=True))
     return figure.dpi_scale_trans + ScaledTranslation(
         x, y, cast(Affine2DBase, ax.transAxes)
+    )
+
+
+def letters_on(cell: Any) -> str:
+    """Return the colour of letters that can be read on a cell of a colour."""
+    # by relative luminance, as WCAG 2 has it: above some 0.18 dark ones stand out more
+    parts = ((np.array(to_rgb(cell)) + 0.055) / 1.055) ** 2.4
+    return ON_CELL[int(parts @ (0.2126, 0.7152, 0.0722) < 0.18)]
+
+
+def colour_bar(axes: Axes, drawn: Any, label: str, **how: Any) -> Colorbar:
+    """Explain the colours of a map below it, as wide as the axes."""
+    below = inches_from(axes, 0.0, 0.0)
+    place = blended_transform_factory(axes.transAxes, below)
+    bar = axes.inset_axes((0.0, -0.27, 1.0, 0.11), transform=place)
+    return bar.figure.colorbar(
+        drawn, cax=bar, orientation="horizontal", label=label, **how
     )
 
 

@@ -61,7 +61,7 @@ def analyze(
 
 def _show(data: "StudyData", analysis: "Analysis", *, csv: bool, raw: bool) -> None:
     from masrel.lab.report._document import SECTIONS
-    from masrel.lab.report._grades import felt_sentences
+    from masrel.lab.report._grade_sections import felt_sentences
     from masrel.lab.report._material import gather
     from masrel.pages._sections import Paragraph
     from masrel.tables._tables import Table, as_csv, as_text

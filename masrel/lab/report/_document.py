@@ -20,12 +20,12 @@ from masrel.lab.ratings import InPerson, Ratings
 from masrel.lab.report._agreement import estimates_section
 from masrel.lab.report._conduct import CONDUCT_SECTIONS, StudyConduct, conduct_sections
 from masrel.lab.report._design import design_section
-from masrel.lab.report._grade_tables import categories_section, confusion_section
-from masrel.lab.report._grades import (
+from masrel.lab.report._grade_sections import (
     grades_section,
     in_person_section,
     intended_section,
 )
+from masrel.lab.report._grade_tables import categories_section, confusion_section
 from masrel.lab.report._material import Material, gather
 from masrel.lab.report._methods import methods_section
 from masrel.lab.report._order_section import order_section
