@@ -263,7 +263,9 @@ def lay_out(figure: Figure, stamp: str) -> None:
             weight="bold" if is_loud else "normal",
         )
     figure.draw_without_rendering()
-    figure.set_layout_engine("none")  # the same for every form
+    # the same for every form; "none" would leave one, for which all is drawn once more
+    with mpl.rc_context({"figure.constrained_layout.use": False}):
+        figure.set_layout_engine(None)
 
 
 def _enlarge(figure: Figure) -> None:

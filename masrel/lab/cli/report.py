@@ -249,11 +249,7 @@ class _Making:
                 excluded=data.excluded,
             )
 
-        # The bar's thread would keep figures from being drawn by several processes.
-        class Bar(tqdm):  # type: ignore[type-arg]
-            monitor_interval = 0
-
-        with Bar(
+        with tqdm(
             desc="report", unit=" parts", disable=self.output.quiet or None
         ) as bar:
 

@@ -45,6 +45,7 @@ from masrel.lab.report._stretches import speeds_section
 from masrel.lab.report._trace_section import traces_section
 from masrel.lab.verification import Anchor
 from masrel.pages._sections import Block, Chapter, Document, Drawing, Section
+from masrel.plots import draw
 from masrel.tables._tables import Table, as_csv, tag_of
 
 Progress = Callable[[str], object]
@@ -259,9 +260,6 @@ def _make_sections(
     raw_csv: bool,
 ) -> tuple[Chapter, ...]:
     # as they are shown; the files of their tables and figures go to the assets
-    contents = [content for section in sections for content in section.blocks]
-    drawings = [content for content in contents if isinstance(content, Drawing)]
-    drawn = iter(_pictures(drawings, cache))
     made = []
     numbers: Counter[type] = Counter()
     for section in sections:
@@ -270,7 +268,8 @@ def _make_sections(
             numbers[type(content)] += 1
             number = numbers[type(content)]
             if isinstance(content, Drawing):
-                blocks.append(_figure(content, number, next(drawn), assets))
+                pictures = _pictures(content, cache)
+                blocks.append(_figure(content, number, pictures, assets))
                 if progress is not None:
                     progress(content.name)
                 continue
@@ -284,26 +283,15 @@ def _make_sections(
     return tuple(made)
 
 
-def _pictures(drawings: Sequence[Drawing], cache: Cache) -> list[Mapping[str, bytes]]:
-    # of each drawing its files by form: those that were kept, and the others drawn
-    keys = [
-        cache.key("figure", each.content, each.stamp, libraries=_DRAWING)
-        for each in drawings
-    ]
-    pictures: dict[int, Mapping[str, bytes]] = {}
-    for place, key in enumerate(keys):
-        if (stored := cache.read(key)) is not None:
-            pictures[place] = stored
-    lacking = [place for place in range(len(drawings)) if place not in pictures]
-    if lacking:
-        # Imported here: a report without new figures loads nothing that draws.
-        from masrel.lab.report.figures import draw_all
-
-        drawn = draw_all([drawings[place] for place in lacking])
-        for place, files in zip(lacking, drawn, strict=True):
-            pictures[place] = {str(form): data for form, data in files.items()}
-            cache.write(keys[place], pictures[place])
-    return [pictures[place] for place in range(len(drawings))]
+def _pictures(drawing: Drawing, cache: Cache) -> Mapping[str, bytes]:
+    # its files by form: those that were kept, or else drawn
+    key = cache.key("figure", drawing.content, drawing.stamp, libraries=_DRAWING)
+    stored = cache.read(key)
+    if stored is None:
+        files = draw(drawing.content, stamp=drawing.stamp)
+        stored = {str(form): data for form, data in files.items()}
+        cache.write(key, stored)
+    return stored
 
 
 _DRAWING = ("matplotlib", "numpy", "pillow", "scipy")

@@ -4,21 +4,22 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import masrel
-import masrel.lab.report.figures
 from masrel import intervals
 from masrel.cli import cli
 from masrel.estimates import Estimate
 from masrel.lab import _cache
 from masrel.lab.cli import report as verb
 from masrel.lab.protocol import copy_template
-from masrel.lab.report import figures
+from masrel.lab.report import _document
+from masrel.plots import draw
+from masrel.plots._drawn_values import Drawn
 from tests.architecture.test_imports import HEAVY, loaded_after
 from tests.cli.process import Caller
 
@@ -85,15 +86,14 @@ def edit(file: Path, old: str, new: str) -> None:
 
 @pytest.fixture
 def drawn(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The names of figures that are drawn, as they are."""
+    """What draws each figure that is drawn, as it is."""
     names: list[str] = []
-    draw_all = figures.draw_all
 
-    def counted(drawings: Sequence[object], **options: object) -> object:
-        names.extend(drawing.name for drawing in drawings)
-        return draw_all(drawings, **options)
+    def counted(content: Drawn, **options: Any) -> object:
+        names.append(content.drawer.rpartition(":")[2])
+        return draw(content, **options)
 
-    monkeypatch.setattr(masrel.lab.report.figures, "draw_all", counted)
+    monkeypatch.setattr(_document, "draw", counted)
     return names
 
 
@@ -197,7 +197,7 @@ def test_another_version_of_what_draws_is_seen(
     masrel("report", study)
     monkeypatch.undo()
     _cache.installed.cache_clear()
-    assert drawn == ["agreement", "grades_test"]
+    assert drawn == ["forest_picture", "grade_figure"]
 
 
 @pytest.mark.slow
@@ -224,11 +224,11 @@ def test_one_grade_draws_what_it_reaches(
 ) -> None:
     edit(study / "protocol.toml", '"grades"]', '"grades", "speeds"]')
     masrel("report", study)
-    assert drawn == ["speeds"]
+    assert drawn == ["speed_figure"]
     drawn.clear()
     edit(study / "ratings/published.csv", "1+", "1")
     masrel("report", study)
-    assert drawn == ["agreement", "grades_test"]  # and not the speeds
+    assert drawn == ["forest_picture", "grade_figure"]  # and not the speeds
 
 
 @pytest.mark.slow
@@ -256,7 +256,7 @@ def test_one_grade_is_estimated_where_it_counts(
     edit(table, "\nretest,R1,HM1,1", "\nretest,R1,HM1,2")
     done = masrel("report", study)
     assert computed == [*of_both, of_both[-1]]
-    assert drawn == ["agreement", "grades_retest"]
+    assert drawn == ["forest_picture", "grade_figure"]
     assert (done.out, done.err) == (first.out, first.err)
 
 
