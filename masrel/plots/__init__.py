@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from masrel.plots._latent_scale import latent
     from masrel.plots._limits_figure import bland_altman
     from masrel.plots._rater_pairs import pairs
+    from masrel.plots._traces import traces
 
 __all__ = [
     "bland_altman",
@@ -32,6 +33,7 @@ __all__ = [
     "items",
     "latent",
     "pairs",
+    "traces",
 ]
 
 _HOMES = {
@@ -44,6 +46,7 @@ _HOMES = {
     "items": "_grades",
     "latent": "_latent_scale",
     "pairs": "_rater_pairs",
+    "traces": "_traces",
 }
 
 

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from masrel.lab.elbow import Outline, Trace
     from masrel.lab.elbow.identification import ElbowFit, FrictionFit
 
     Floats = NDArray[np.float64]
@@ -87,11 +88,10 @@ class SpeedDots(Content):
 class TraceBand:
     """Where most of many stretches are at each time, while half of them go on."""
 
-    # (n_points,): s; (n_ends, n_points): deg and N·m, from the lowest to the highest
+    # (n_points,): s; (4, n_points): deg and N·m, from the lowest to the highest
     time: "Floats" = field(compare=False, repr=False)
     angle: "Floats" = field(compare=False, repr=False)
     torque: "Floats" = field(compare=False, repr=False)
-    shares: tuple[float, ...]  # of the stretches below each of them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,10 +99,9 @@ class TracePanel:
     """All stretches of one model, or a few of many and where most are."""
 
     title: str  # the model, its intended grade, and the range of speeds
-    # per rater: time (s), angle (deg), torque (N·m), code of the phase
-    stretches: "tuple[tuple[NDArray[np.generic], ...], ...]"
-    graded: tuple[bool, ...] = ()  # by stretch, whether a grade is said to rest on it
-    names: tuple[str, ...] = ()  # by stretch, whose it is, if that is written at it
+    traces: "tuple[Outline | Trace, ...]"
+    graded: tuple[bool, ...]  # by trace, whether a grade is said to rest on it
+    names: tuple[str, ...] = ()  # by trace, whose it is, if that is written at it
     band: TraceBand | None = None
 
 

@@ -196,7 +196,6 @@ def _band(lines: Sequence[_Line]) -> TraceBand:
         time=time,
         angle=ends_of([np.degrees(line.angle) for line in lines]),
         torque=ends_of([line.torque for line in lines]),
-        shares=_BAND_SHARES,
     )
 
 
@@ -217,10 +216,7 @@ def _trace_drawing(
         panels.append(
             TracePanel(
                 title=f"{model.id}{grade}\n{slowest} to {fastest} deg/s",
-                stretches=tuple(
-                    (t.time, np.degrees(t.angle), t.torque, t.phase)
-                    for t in model.lines
-                ),
+                traces=model.lines,
                 graded=tuple(stretch.speed.is_graded for stretch in model.shown),
                 names=() if model.band is None else tuple(names),
                 band=model.band,
@@ -250,19 +246,27 @@ def _trace_caption(models: Sequence[_Model], listed: str, *, has_angle: bool) ->
     made_of = [stretch.speed for model in models for stretch in model.stretches]
     whose = "every stretch's" if has_many(made_of) else "every rater's"
     what = "torque (top) and angle (bottom)" if has_angle else "torque"
-    looks = (
-        "Thin grey: before the catch; thick: catch; dashed: after the catch; a dot "
-        "marks where a phase begins."
-    )
+    met = np.unique(np.concatenate([line.phase for m in models for line in m.lines]))
+    words = "; ".join(_PHASE_LOOKS[code] for code in met)
+    # one phase has nothing to be told from
+    looks = f"{words}; a dot marks where a phase begins." if len(met) > 1 else ""
     n_most = max((len(m.stretches) for m in models if m.band is not None), default=0)
     if not n_most:
-        return f"Reconstructed {what} of {listed} at {whose} mean speed. {looks}"
+        text = f"Reconstructed {what} of {listed} at {whose} mean speed. {looks}"
+        return text.rstrip()
     return (
         f"Reconstructed {what} of {listed} at the mean speeds of up to {n_most} "
         "stretches. Shaded: the middle 50 % and 90 % at each time, while half of the "
         "stretches go on. Lines: the slowest, the median and the fastest, each with "
-        f"its rater. {looks}"
+        f"its rater. {looks}".rstrip()
     )
+
+
+_PHASE_LOOKS = (
+    "Thin grey: before the catch",
+    "thick: catch",
+    "dashed: after the catch",
+)
 
 
 def _of_other_kinds(material: Material) -> set[str]:

@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from PIL import Image
 
 from masrel.lab.analysis import analyze
+from masrel.lab.elbow import STANDARD_MODELS, ConstantSpeed, outline
 from masrel.lab.protocol import read_protocol
 from masrel.lab.ratings import read_study_ratings
 from masrel.lab.report import write_report
@@ -58,16 +59,14 @@ def speeds(n_raters: int) -> SpeedDots:
 
 
 def panel(n_stretches: int, *, has_band: bool) -> TracePanel:
-    time = np.linspace(0.0, 1.0, 50)
-    phase = np.repeat([0, 1, 2], [20, 20, 10])
-    stretch = (time, 30 + 100 * time, 5 * time, phase)
-    ends = np.outer(np.arange(1.0, 5.0), time)
-    band = TraceBand(
-        time=time, angle=ends, torque=ends, shares=(0.05, 0.25, 0.75, 0.95)
-    )
+    motion = ConstantSpeed(start=0.5, end=2.5, speed=2.0)
+    stretch = outline(STANDARD_MODELS["HM1"], motion, n_points=50)
+    ends = np.outer(np.arange(1.0, 5.0), stretch.time)
+    band = TraceBand(time=stretch.time, angle=ends, torque=ends)
     return TracePanel(
         title="HM1\n50 to 90 deg/s",
-        stretches=(stretch,) * n_stretches,
+        traces=(stretch,) * n_stretches,
+        graded=(False,) * n_stretches,
         names=("R1",) * n_stretches if has_band else (),
         band=band if has_band else None,
     )
