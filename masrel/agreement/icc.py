@@ -271,14 +271,20 @@ def variance_components(
     (5.0, 0.333, 0.5)
     """
     values = rated_part(rating_values(ratings, categories))
-    method: Literal["ANOVA", "REML"] = "ANOVA"
-    fit: Any
-    if np.isnan(values).any():
+    fit: Any = _too_few(values)
+    has_gaps = bool(np.isnan(values).any())
+    method: Literal["ANOVA", "REML"] = "REML" if has_gaps else "ANOVA"
+    if has_gaps:
         from masrel.agreement._mixed import components
 
-        method, fit = "REML", components(values, has_raters=True)
-    else:
-        fit = _too_few(values) or _Anova.of(values).components()
+        fit = components(values, has_raters=True)
+    elif fit is None:  # from mean squares to what they are made of
+        of = _Anova.of(values)
+        items, raters = (
+            (of.items - of.residual) / of.k,
+            (of.raters - of.residual) / of.n,
+        )
+        fit = replace(of, items=items, raters=raters)
     if isinstance(fit, str):
         reason = undefined("the variances of ratings", fit)
         return VarianceComponents(method=method, reason=reason)
@@ -584,12 +590,6 @@ class _Anova:
         return cls(
             n, k, rows / (n - 1), columns / (k - 1), rest, within / (n * (k - 1))
         )
-
-    def components(self) -> "_Anova":
-        # variances in the place of mean squares, of which they are in expectation
-        n, k, rest = self.n, self.k, self.residual
-        items, raters = (self.items - rest) / k, (self.raters - rest) / n
-        return replace(self, items=items, raters=raters)
 
     def error(self, form: str) -> Any:
         return self.within if form.startswith("ICC(1") else self.residual

@@ -326,7 +326,7 @@ def _of_pairs(
         from masrel.intervals.choose import _choose_interval
     for one, other in itertools.combinations(range(r), 2):
         # ratings of the one by those of the other; the first of either is missing
-        places = (codes[:, one] + 1) * size + codes[:, other] + 1
+        places = (codes[:, one].astype(np.int64) + 1) * size + codes[:, other] + 1
         table = np.bincount(places, freq, minlength=size * size).reshape(size, size)
         items[one, other] = items[other, one] = table[1:, 1:].sum()
         table[0, 0] = 0.0  # rated by neither

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 
 from masrel.agreement import Label, VarianceComponents, variance_components
-from masrel.plots._style import BLUE, GREY, ORANGE, Picture, shown
-from masrel.tables._tables import fixed_or_significant, number
+from masrel.plots._cells import rows_of_shares
+from masrel.plots._style import BLUE, ORANGE, Picture, shown
+from masrel.tables._tables import number
 
 _COLOURS = {"items": BLUE, "raters": ORANGE, "residual": "#999999"}
-_NONE_LESS = "taken as 0: mean squares estimate less for {}"
 
 
 def components(
@@ -53,37 +53,25 @@ def components(
 
 def components_picture(parts: VarianceComponents) -> Picture:
     """Return the variances as shares of their sum, with standard deviations."""
-    total = parts.items + parts.raters + parts.residual
-    label = f"share of the variance of a rating, by {parts.method}"
-    if parts.reason is not None:
-        label += f"\nundefined: {parts.reason}"
-    elif total == 0.0:
-        label += "\nundefined: all ratings are alike"
+    total = parts.items + parts.raters + parts.residual or math.nan
+    note = "the share of items is ICC(A,1)"
+    if math.isnan(total):
+        note = f"undefined: {parts.reason or 'all ratings are alike'}"
     elif parts.negative:
-        label += f"\n{_NONE_LESS.format(' and '.join(parts.negative))}"
-    else:
-        label += "; that of items is ICC(A,1)"
+        note = (
+            f"{' and '.join(parts.negative)}: less than 0 by mean squares, taken as 0"
+        )
+
+    shares = {name: getattr(parts, name) / total for name in _COLOURS}
+    texts = [
+        f"{number(share, 2)}, SD {number((share * total) ** 0.5, 2, in_units=True)}"
+        for share in shares.values()
+    ]
+    label = f"share of the variance of a rating, by {parts.method}\n{note}"
 
     def draw(axes: Axes) -> None:
-        for place, (name, colour) in enumerate(_COLOURS.items()):
-            variance = getattr(parts, name)
-            share = variance / total if total > 0.0 else math.nan
-            axes.barh(place, share, height=0.62, color=colour)
-            sd = fixed_or_significant(math.sqrt(variance), 2)
-            axes.annotate(
-                f"{number(share, 2)}   SD {number(math.nan, 2) if sd == 'nan' else sd}",
-                (1.0, place),
-                xycoords=("axes fraction", "data"),
-                xytext=(6, 0),
-                textcoords="offset points",
-                va="center",
-            )
-        axes.set_yticks(range(len(_COLOURS)), list(_COLOURS))
-        axes.set_ylim(len(_COLOURS) - 0.5, -0.5)
-        axes.set_xlim(0.0, 1.0)
-        axes.tick_params(axis="y", length=0)
-        axes.spines["left"].set_color(GREY)
+        axes.barh(range(3), list(shares.values()), 0.62, color=list(_COLOURS.values()))
         axes.grid(axis="x")
-        axes.set_xlabel(label)
+        rows_of_shares(axes, list(shares), texts, 0.3, label)
 
-    return Picture(5.6, 1.8, draw)
+    return Picture(5.6, 1.75, draw)

@@ -4,17 +4,17 @@ Ordered grades are lighter to darker, others have colours that colour-blind read
 tell apart; the grade itself is written wherever there is room.
 """
 
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize, to_rgba
+from matplotlib.colors import Normalize, to_rgba_array
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from masrel._input import refuse
@@ -22,10 +22,19 @@ from masrel.agreement import CodedRatings, Label, code_ratings, item_disagreemen
 from masrel.agreement._codes import item_counts, pair_table
 from masrel.agreement._weights import category_values
 from masrel.intervals.diagnosis import _names, _place
+from masrel.plots._cells import (
+    LINE,
+    cells,
+    inches_of,
+    letters_on,
+    name_columns,
+    name_rows,
+    room_of,
+    rows_of_shares,
+)
 from masrel.plots._style import (
     BLACK,
     BLUE,
-    GREY,
     ORANGE,
     PAGE,
     SEQUENTIAL,
@@ -33,7 +42,6 @@ from masrel.plots._style import (
     Picture,
     colour_bar,
     legend_below,
-    letters_on,
     short_name,
     shown,
 )
@@ -45,18 +53,24 @@ if TYPE_CHECKING:
 _Floats = NDArray[np.float64]
 _Integers = NDArray[np.signedinteger[Any]]
 
-# seven of Okabe and Ito's, neighbours far apart; black is what a page writes in
-_HUES = (BLUE, ORANGE, "#009E73", "#CC79A7", "#56B4E9", VERMILLION, "#F0E442")
-_OTHER = "#B3B3B3"  # the eighth grade, or all but the seven most common
+# seven of Okabe and Ito's, neighbours far apart, and grey for one more, or all others;
+# black is what a page writes in
+_HUES = (
+    BLUE,
+    ORANGE,
+    "#009E73",
+    "#CC79A7",
+    "#56B4E9",
+    VERMILLION,
+    "#F0E442",
+    "#B3B3B3",
+)
 
 _MAX_SHADES = 12  # ordered grades that have a shade each
-_MAX_LETTERS = 6  # of a grade, in a cell or above a column
-_MAX_NUMBERED = 24  # grades up to which numbers may stand for long names
+_MAX_LETTERS = 6  # of a grade in a cell
 _MAX_COUNTED = 20  # grades up to which counts are written in a table of two raters
-_MAX_ROWS = 60  # grades that agreement is drawn of
 _INTENDED = -1.3  # where intended grades stand; raters are at 0, 1, 2, ...
 _ACROSS, _DOWN = 7.0, 9.0  # inches of many columns, and of many rows
-_LETTER, _LINE = 0.075, 0.15  # inches of a letter of 9 points, and of a line
 
 
 def confusion(
@@ -111,18 +125,18 @@ def confusion(
     ('Kim', 'Lee', ['1', '1', '2', '2', '2', '1', '3', '4'])
     """
     coded, names, labels, is_ordered = _read(ratings, raters, categories, ordered)
+    n = len(names)
     refuse(
         (
-            reference is None and len(names) != 2,
-            "ratings: needs two raters, or a reference that the others are held "
-            f"against, got {len(names)} raters",
+            n < 2 or (reference is None and n > 2),
+            "ratings: needs two raters, or a reference that several others are held "
+            f"against, got {counted(n, 'rater')}",
         )
     )
     row = 0 if reference is None else _place(reference, names)
-    others = [place for place in range(len(names)) if place != row]
-    counts = np.zeros((len(labels), len(labels)), dtype=np.int64)
-    for place in others:
-        counts += pair_table(coded.codes[:, [row, place]], len(labels))
+    others = [place for place in range(n) if place != row]
+    pairs = (coded.codes[:, [row, place]] for place in others)
+    counts = np.sum([pair_table(of, len(labels)) for of in pairs], axis=0)
     column = names[others[0]] if len(others) == 1 else f"{len(others)} other raters"
     pair = names[row], column
     return shown(confusion_picture(counts, labels, pair, is_ordered), ax)
@@ -154,37 +168,27 @@ def confusion_picture(
     if len(grades) > _MAX_SHADES and 0 < len(used) < len(grades):
         counts, grades = counts[np.ix_(used, used)], [grades[k] for k in used]
         label += "\ngrades never met are left out"
-    q, labels = len(grades), _labels(grades)
+    q = len(grades)
     n = q + (q <= _MAX_COUNTED)  # with totals, where counts are written
-    heads, cell = [*labels, "all"][:n], min(0.42, _ACROSS / n)
-    across = max(cell * n, 2.8)
-    shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
-    table = np.pad(counts, (0, 1))
-    table[-1] = table.sum(axis=0)
-    table[:, -1] = table.sum(axis=1)
-    legend = _Legend.of(across, labels, grades)
+    heads, cell = [*grades, "all"][:n], min(0.42, _ACROSS / n)
+    across, of_row = max(cell * n, 2.8), counts.sum(axis=1, keepdims=True)
+    of_column = counts.sum(axis=0, keepdims=True)
+    table = np.block([[counts, of_row], [of_column, counts.sum(keepdims=True)]])
+    letters = np.where(table > 0, table.astype(str), "")[: n if n > q else 0]
+    look: dict[str, Any] = {"cmap": SEQUENTIAL, "vmin": 0.0, "vmax": 1.0}
 
     def draw(axes: Axes) -> None:
-        _cells(axes, SEQUENTIAL(shares), q)
-        for (row, column), freq in np.ndenumerate(table if n > q else table[:0]):
-            is_cell = max(row, column) < q
-            colour = letters_on(SEQUENTIAL(shares[row, column])) if is_cell else GREY
-            if freq:
-                _write(axes, column, row, str(freq), colour)
-        for k in range(q):
-            _frame(axes, k - 0.5, k, 1.0, BLACK, 1.2 if n > q else 0.5)
+        shares = counts / np.maximum(of_row, 1)
+        drawn = cells(axes, shares, letters, framed=np.eye(q), **look)
         axes.set(xlim=(-0.5, n - 0.5), ylim=(n - 0.5, -0.5))
-        _name_columns(axes, range(n), heads, across / n)
-        _name_rows(axes, heads, cell)
-        axes.set_ylabel(short_name(names[0]))
-        axes.set_xlabel(short_name(names[1]))
+        axes.set(ylabel=short_name(names[0]), xlabel=short_name(names[1]))
+        name_rows(axes, heads, cell)
+        name_columns(axes, heads, across / n, range(n))
         axes.xaxis.set_label_position("top")
-        colour_bar(axes, ScalarMappable(Normalize(0.0, 1.0), SEQUENTIAL), label)
-        legend.draw(axes)
+        colour_bar(axes, drawn, label)
 
-    room = 0.4 + _LETTER * max(map(len, heads))
-    height = 1.3 + _head(heads, across / n) + cell * n + legend.height
-    return Picture(room + across, height, draw)
+    room = room_of(heads)
+    return Picture(0.2 + room + across, 1.2 + room + cell * n, draw)
 
 
 def _part(counts: _Integers, *steps: int) -> str:
@@ -243,36 +247,29 @@ def grades_picture(
     counts: _Integers, raters: Sequence[str], grades: Sequence[str], is_ordered: bool
 ) -> Picture:
     """Return each rater's use of grades as a bar of shares."""
-    counts, grades, labels = _merged(counts, grades, is_ordered)
-    sizes = counts.sum(axis=1)
-    colours = _colours(len(grades), is_ordered, counts.sum(axis=0))
-    n, across = len(raters), 4.6
-    cell = min(0.27, _DOWN / n)
-    shares = counts / np.maximum(sizes, 1)[:, None]
+    group, labels, texts, colours = _grouped(counts.sum(axis=0), grades, is_ordered)
+    n, across, cell = len(raters), 4.6, min(0.27, _DOWN / len(raters))
+    counts = counts @ np.eye(len(texts), dtype=np.int64)[group]
+    sizes = [counted(size, "rating") for size in counts.sum(axis=1).tolist()]
+    shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
     starts = np.cumsum(shares, axis=1) - shares
-    legend = _Legend.of(across, labels, grades, colours)
+    height, explain = _legend(texts, colours, across)
 
     def draw(axes: Axes) -> None:
-        for k, label in enumerate(labels):
-            rows = np.flatnonzero(counts[:, k]).tolist()
-            axes.barh(
-                *(rows, shares[rows, k], 0.78, starts[rows, k]),
-                **{"color": colours[k], "edgecolor": PAGE, "linewidth": 0.6},
-            )
-            for row in rows if cell > _LINE else ():
-                if across * shares[row, k] > _LETTER * len(label) + 0.05:
-                    middle = starts[row, k] + 0.5 * shares[row, k]
-                    _write(axes, middle, row, label, letters_on(colours[k]))
-        axes.set(xlim=(0.0, 1.0), ylim=(n - 0.5, -0.5))
-        axes.set_xlabel("share of the rater's ratings")
-        axes.spines["left"].set_visible(False)
-        _name_rows(axes, [short_name(name) for name in raters], cell)
-        for place, size in enumerate(sizes if cell >= _LINE else ()):
-            _beside(axes, place, counted(int(size), "rating"))
-        legend.draw(axes)
+        for k, colour in enumerate(colours):
+            rows = np.flatnonzero(counts[:, k])
+            look: dict[str, Any] = {"color": colour, "edgecolor": PAGE}
+            axes.barh(rows, shares[rows, k], 0.78, starts[rows, k], **look)
+        for (row, k), share in np.ndenumerate(shares):
+            if cell > LINE and inches_of(labels[k]) + 0.05 < across * share:
+                look = {"color": letters_on(colours[k]), "ha": "center", "va": "center"}
+                axes.text(
+                    starts[row, k] + share / 2, row, labels[k], fontsize=8, **look
+                )
+        rows_of_shares(axes, raters, sizes, cell, "share of the rater's ratings")
+        explain(axes)
 
-    height = 0.6 + cell * n + legend.height
-    return Picture(_room(raters) + across + 0.9, height, draw)
+    return Picture(room_of(raters) + across + 0.9, 0.6 + cell * n + height, draw)
 
 
 def categories(
@@ -311,20 +308,15 @@ def categories(
     >>> [text.get_text() for text in ax.texts]
     ['0.67 of 3 ratings', '0.67 of 3 ratings']
     """
-    scale = [number(of, None) for of in diagnosis.categories]
-    labels = scale if names is None else list(names)
-    refuse(
-        (
-            len(labels) != len(scale),
-            f"names: needs one for each of {len(scale)} grades, got {len(labels)}",
-        )
+    n, ends = (
+        len(diagnosis.categories),
+        (diagnosis.category_low, diagnosis.category_high),
     )
-    ends = diagnosis.category_low, diagnosis.category_high
-    picture = categories_picture(
-        *(diagnosis.category_values, *ends, diagnosis.category_counts),
-        *(labels, diagnosis.level),
-    )
-    return shown(picture, ax)
+    labels = [number(of, None) for of in diagnosis.categories if names is None]
+    labels += names or ()
+    refuse((len(labels) != n, f"names: needs one for each of {n}, got {len(labels)}"))
+    of = diagnosis.category_values, *ends, diagnosis.category_counts
+    return shown(categories_picture(*of, labels, diagnosis.level), ax)
 
 
 def categories_picture(
@@ -336,35 +328,27 @@ def categories_picture(
     level: float,
 ) -> Picture:
     """Return the agreement on each grade as a dot with its interval."""
-    label = "of a grade's ratings, the share that meets the same of another rater"
-    rows = list(range(len(grades)))
-    if len(grades) > _MAX_ROWS:
-        rows = sorted(np.argsort(-counts, kind="stable")[:_MAX_ROWS].tolist())
-        label += f"\n(the {_MAX_ROWS} most used of {len(grades)} grades)"
-    names = [short_name(grades[row]) for row in rows]
-    n, cell = len(rows), min(0.3, _DOWN / len(rows))
-    has_ends = bool(np.isfinite(low[rows]).any())
+    n, cell = len(grades), min(0.3, _DOWN / len(grades))
+    texts = [
+        f"{number(value, 2)} of {counted(size, 'rating')}"
+        for value, size in zip(values.tolist(), counts.tolist(), strict=True)
+    ]
     dot: dict[str, Any] = {"marker": "o", "color": BLACK, "linestyle": "none"}
     line: dict[str, Any] = {"color": BLUE, "linewidth": 2.0}
+    marks = [
+        Line2D([], [], label="estimate", **dot),
+        Line2D([], [], label=f"{percent(level)} % confidence interval", **line),
+    ]
+    label = "share of a grade's ratings that meet\nthe same of another rater"
 
     def draw(axes: Axes) -> None:
-        axes.hlines(range(n), low[rows], high[rows], **line)
-        axes.plot(values[rows], range(n), markersize=4.5, **dot, clip_on=False)
-        axes.set(xlim=(0.0, 1.0), ylim=(n - 0.5, -0.5))
-        axes.set_xlabel(label)
-        axes.spines["left"].set_visible(False)
+        axes.hlines(range(n), low, high, **line)
+        axes.plot(values, range(n), markersize=4.5, **dot, clip_on=False)
         axes.grid(axis="x")
-        _name_rows(axes, names, cell)
-        for place, row in enumerate(rows):
-            size = counted(int(counts[row]), "rating")
-            _beside(axes, place, f"{number(float(values[row]), 2)} of {size}")
-        marks = [
-            Line2D([], [], label="estimate", **dot),
-            Line2D([], [], label=f"{percent(level)} % confidence interval", **line),
-        ]
-        legend_below(axes, marks if has_ends else (), ncols=2)
+        rows_of_shares(axes, grades, texts, cell, label)
+        legend_below(axes, marks if np.isfinite(low).any() else (), ncols=2)
 
-    return Picture(_room(names) + 5.2, 0.9 + cell * n, draw)
+    return Picture(room_of(grades) + 5.2, 1.1 + cell * n, draw)
 
 
 def items(
@@ -417,9 +401,8 @@ def items(
     """
     coded, columns, labels, is_ordered = _read(ratings, raters, categories, ordered)
     n = len(coded.codes)
-    index = (
-        getattr(ratings, "index", range(n)) if hasattr(ratings, "iloc") else range(n)
-    )
+    is_frame = items is None and hasattr(ratings, "iloc")
+    index = getattr(ratings, "index", ()) if is_frame else range(n)
     rows = list(map(str, index if items is None else items))
     refuse(
         (len(rows) != n, f"items: needs a name for each of {n}, got {len(rows)}"),
@@ -448,225 +431,103 @@ def items_picture(
     """Return ratings as a grid of coloured cells, with the grades in them."""
     # codes (n, k), or (n, k, r) of r ratings each, -1 without; values of the grades;
     # intended (n,): codes that have a column, and what differs from them a frame
-    (n, k), q = codes.shape[:2], len(grades)
-    blocks = [(0.0, codes.reshape(n, k, -1))]  # from where on, and codes (n, ., r)
-    aims = np.full(n, -1) if intended is None else np.array(intended)
-    if intended is not None:
-        blocks.append((_INTENDED, aims.reshape(n, 1, 1)))
-    parts, is_line = blocks[0][1].shape[2], is_ordered and q > _MAX_SHADES
-    labels = list(grades) if is_line else _labels(grades)
-    longest = max(map(len, labels))
-    cell = max(0.34, _LETTER * min(longest, _MAX_LETTERS) + 0.1) * parts
-    cell, height = min(cell, _ACROSS / k), min(0.26, _DOWN / n)
-    has_room = 0.066 * longest + 0.03 < cell / parts and height >= _LINE
-    colours = _colours(q, is_ordered, np.bincount(codes[codes >= 0], minlength=q))
-    if is_line:  # by value
-        values = values if np.isfinite(values).all() else np.arange(float(q))
-        line = ScalarMappable(Normalize(values.min(), values.max()), SEQUENTIAL)
-        colours = line.to_rgba(values)
-    paint = np.vstack([colours, np.zeros(4)])  # nothing at -1
-    places = [*([] if intended is None else [_INTENDED]), *range(k)]
-    heads = ["intended"] * (len(places) - k) + [*map(short_name, raters)]
-    across = max(cell * (k - min(places)), 2.0)
-    legend = _Legend.of(across, labels, grades, colours)
-    if is_line:
-        legend = _Legend((), across)
+    n, k = codes.shape[:2]
+    codes, has_aims = codes.reshape(n, k, -1), intended is not None
+    aims = np.array(intended if has_aims else [-1] * n).reshape(n, 1, 1)
+    freq = np.bincount(codes[codes >= 0], minlength=len(grades))
+    group, labels, texts, colours = _grouped(freq, grades, is_ordered)
+    is_short = max(map(len, grades)) <= _MAX_LETTERS
+    written = list(grades) if is_short else [labels[place] for place in group]
+    inches = max(map(inches_of, written)) + 0.03
+    cell = min(max(0.34, inches) * codes.shape[2], _ACROSS / k)
+    height = min(0.26, _DOWN / n)
+    if inches > cell / codes.shape[2] or height < LINE:
+        written = [""] * len(grades)
+    paint, across = colours[group], max(cell * (k - _INTENDED * has_aims), 2.0)
+    below, explain = _legend(texts, colours, across)
+    if is_ordered and len(grades) > _MAX_SHADES:  # by value
+        (paint, explain), below = _on_line(values, grades), 0.5
+    # nothing at -1
+    paint, letters = np.vstack([paint, np.zeros(4)]), np.array([*written, ""])
+    places = [_INTENDED] * has_aims + [*range(k)]
 
     def draw(axes: Axes) -> None:
-        for start, block in blocks:
-            _cells(axes, paint[block.reshape(n, -1)], block.shape[1], start - 0.5)
-            for (row, column, part), code in np.ndenumerate(block):
-                left, width = start + column - 0.5, 1.0 / block.shape[2]
-                left += part * width
-                if code >= 0 and has_room:
-                    colour = letters_on(colours[code])
-                    _write(axes, left + 0.5 * width, row, labels[code], colour)
-                if code != aims[row] and -1 not in (code, aims[row]):
-                    _frame(axes, left, row, width, VERMILLION, 2.0)
+        for block, left in ((codes, -0.5), (aims, _INTENDED - 0.5))[: 1 + has_aims]:
+            flat, differs = block.reshape(n, -1), (block != aims) & (block >= 0)
+            cells(
+                *(axes, paint[flat], letters[flat]),
+                framed=(differs & (aims >= 0)).reshape(n, -1),
+                n_columns=block.shape[1],
+                left=left,
+            )
         axes.set(xlim=(places[0] - 0.5, k - 0.5), ylim=(n - 0.5, -0.5))
-        _name_columns(axes, places, heads, cell)
-        _name_rows(axes, [short_name(name) for name in items], height)
-        if is_line:
-            ends = [int(values.argmin()), int(values.argmax())]
-            bar = colour_bar(axes, line, "")
-            bar.set_ticks(values[ends].tolist(), labels=[grades[end] for end in ends])
-        legend.draw(axes)
+        name_rows(axes, items, height)
+        name_columns(axes, ["intended"] * has_aims + [*raters], cell, places)
+        explain(axes)
 
-    below = 0.5 if is_line else legend.height
-    size = _room(items) + across, 0.2 + _head(heads, cell) + height * n + below
-    return Picture(*size, draw)
+    high = 0.1 + room_of(raters) + height * n + below
+    return Picture(room_of(items) + across, high, draw)
 
 
 # -- what they share -------------------------------------------------------------------
 
 
-def _labels(grades: Sequence[str]) -> list[str]:
-    """Return what is written of grades: numbers in the place of long names."""
-    if max(map(len, grades)) <= _MAX_LETTERS:
-        return list(grades)
-    if len(grades) <= _MAX_NUMBERED:
-        return [str(1 + k) for k in range(len(grades))]
-    return [short_name(grade) for grade in grades]
+def _on_line(
+    values: _Floats, grades: Sequence[str]
+) -> tuple[_Floats, Callable[[Axes], None]]:
+    """Return colours of grades by value, (q, 4), and what draws the bar of them."""
+    ends = [int(values.argmin()), int(values.argmax())]
+    line = ScalarMappable(Normalize(*values[ends]), SEQUENTIAL)
+
+    def explain(axes: Axes) -> None:
+        bar = colour_bar(axes, line, "")
+        bar.set_ticks(values[ends].tolist(), labels=[grades[end] for end in ends])
+
+    return line.to_rgba(values), explain
 
 
-def _colours(q: int, is_ordered: bool, freq: _Integers) -> _Floats:
-    """Return the colour of each grade, (q, 4); freq is how often it is met."""
-    if is_ordered:
-        return np.asarray(SEQUENTIAL(np.linspace(0.0, 1.0, q)))
-    colours = np.tile(to_rgba(_OTHER), (q, 1))
-    for place, hue in zip(_usual(freq), _HUES, strict=False):
-        colours[place] = to_rgba(hue)
-    return colours
+def _grouped(
+    freq: _Integers, grades: Sequence[str], is_ordered: bool
+) -> tuple[NDArray[np.intp], list[str], list[str], _Floats]:
+    """Put grades together whose colours could not be told apart, being too many."""
+    # freq (q,): how often each is met -> group of each, (q,); by group, what is written
+    # in cells, what a legend says, and colours, (m, 4); numbers stand for long names
+    q, n = len(grades), _MAX_SHADES if is_ordered else len(_HUES)
+    group = np.arange(q)
+    if q > n and is_ordered:
+        group = group * n // q
+    elif q > n:
+        usual = np.sort(np.argsort(-freq, kind="stable")[: n - 1])
+        group[:] = n - 1
+        group[usual] = range(n - 1)
+    is_short, labels, texts = max(map(len, grades)) <= _MAX_LETTERS, [], []
+    for place in range(min(q, n)):
+        names = [grades[k] for k in np.flatnonzero(group == place).tolist()]
+        labels.append(
+            "" if len(names) > 1 else names[0] if is_short else f"{place + 1}"
+        )
+        if len(names) == 1:
+            name = short_name(names[0])
+            texts.append(name if is_short else f"{place + 1} = {name}")
+        else:
+            together = f"{names[0]} to {names[-1]}" if is_ordered else ""
+            texts.append(together or f"other {len(names)} grades")
+    shades = np.linspace(0.0, 1.0, len(texts))
+    hues = SEQUENTIAL(shades) if is_ordered else _HUES[: len(texts)]
+    return group, labels, texts, to_rgba_array(hues)
 
 
-def _usual(freq: _Integers) -> list[int]:
-    # grades that have a hue: all of eight but the last, else the most common
-    n = len(_HUES)
-    if len(freq) <= n + 1:
-        return list(range(len(freq)))[:n]
-    return sorted(np.argsort(-freq, kind="stable")[:n].tolist())
-
-
-def _merged(
-    counts: _Integers, grades: Sequence[str], is_ordered: bool
-) -> tuple[_Integers, Sequence[str], list[str]]:
-    """Put grades together that are too many to tell their colours apart."""
-    # -> counts, names, and what is written of them: nothing of several together
-    q = len(grades)
-    if is_ordered and q > _MAX_SHADES:
-        starts = np.linspace(0, q, _MAX_SHADES, endpoint=False).astype(int).tolist()
-        ends = [end - 1 for end in [*starts[1:], q]]
-        bands = [(grades[a], grades[b]) for a, b in zip(starts, ends, strict=True)]
-        names = [a if a == b else f"{a} to {b}" for a, b in bands]
-        return np.add.reduceat(counts, starts, axis=1), names, [""] * _MAX_SHADES
-    usual = _usual(counts.sum(axis=0))
-    if is_ordered or q <= len(usual) + 1:
-        return counts, grades, _labels(grades)
-    rest = counts.sum(axis=1) - counts[:, usual].sum(axis=1)
-    names = [grades[k] for k in usual]
-    labels = [*_labels(names), ""]
-    names.append(f"other {q - len(usual)} grades")
-    return np.column_stack([counts[:, usual], rest]), names, labels
-
-
-@dataclass(frozen=True, slots=True)
-class _Legend:
-    """What is said below of grades: their colours, and the names of numbers."""
-
-    entries: Sequence[tuple[str, Any]]  # texts, each with its colour, or None
-    across: float  # inches
-
-    @classmethod
-    def of(
-        cls,
-        across: float,
-        labels: Sequence[str],
-        grades: Sequence[str],
-        colours: _Floats | None = None,
-    ) -> "_Legend":
-        names = [short_name(grade) for grade in grades]
-        texts = [
-            name if label in (name, grade, "") else f"{label} = {name}"
-            for label, name, grade in zip(labels, names, grades, strict=True)
-        ]
-        if colours is not None:
-            entries = list(zip(texts, map(tuple, colours.tolist()), strict=True))
-            rest = [of for of in entries if of[1] == to_rgba(_OTHER)]
-            if len(entries) > _MAX_NUMBERED and len(rest) > 1:
-                entries = [of for of in entries if of not in rest]
-                entries.append((f"other {len(rest)} grades", to_rgba(_OTHER)))
-            return cls(entries, across)
-        return cls([] if texts == names else [(text, None) for text in texts], across)
-
-    @property
-    def _columns(self) -> int:
-        longest = max((len(text) for text, _ in self.entries), default=0)
-        return max(1, int(self.across / (0.45 + _LETTER * longest)))
-
-    @property
-    def height(self) -> float:
-        return 0.05 + 0.175 * -(-len(self.entries) // self._columns)
-
-    def draw(self, axes: Axes) -> None:
-        handles = [
-            Patch(label=text, **{"color": of} if of else {"alpha": 0.0})
-            for text, of in self.entries
-        ]
-        has_colours = any(of for _, of in self.entries)
-        how = {"handlelength": 1.2 if has_colours else 0.0, "columnspacing": 1.2}
-        legend_below(axes, handles, ncols=self._columns, handleheight=1.0, **how)
-
-
-def _cells(axes: Axes, paint: _Floats, n_columns: int, left: float = -0.5) -> None:
-    """Draw a grid of cells, with gaps between the columns and the rows."""
-    # paint (n, n_columns or a multiple of it, 4)
-    n, right = len(paint), left + n_columns
-    axes.imshow(
-        paint,
-        extent=(left, right, n - 0.5, -0.5),
-        aspect="auto",
-        interpolation="nearest",
-    )
-    width = 1.2 if max(n, n_columns) <= _MAX_COUNTED else 0.5
-    axes.hlines(np.arange(0.5, n - 1.0), left, right, PAGE, linewidth=width)
-    edges = np.arange(left + 1.0, right - 0.5)
-    axes.vlines(edges, -0.5, n - 0.5, PAGE, linewidth=width)
-    axes.spines[:].set_visible(False)
-
-
-def _frame(
-    axes: Axes, left: float, row: float, width: float, colour: str, line: float
-) -> None:
-    corner = left, row - 0.5
-    look: dict[str, Any] = {"edgecolor": colour, "linewidth": line, "zorder": 3.0}
-    axes.add_patch(Rectangle(corner, width, 1.0, facecolor="none", **look))
-
-
-def _write(axes: Axes, x: float, y: float, text: str, colour: str) -> None:
-    axes.text(x, y, text, ha="center", va="center", fontsize=8, color=colour)
-
-
-def _beside(axes: Axes, row: int, text: str) -> None:
-    """Write at the right of a row."""
-    axes.annotate(
-        text,
-        (1.0, row),
-        xycoords=("axes fraction", "data"),
-        xytext=(6, 0),
-        textcoords="offset points",
-        va="center",
-        fontsize=8,
-        color=GREY,
-    )
-
-
-def _room(names: Sequence[str]) -> float:
-    """Return the inches of names at the left."""
-    return 0.3 + _LETTER * max(len(short_name(name)) for name in names)
-
-
-def _name_rows(axes: Axes, names: Sequence[str], cell: float) -> None:
-    """Name rows so many inches apart, as many as have room."""
-    every = math.ceil(_LINE / cell)
-    axes.set_yticks(range(len(names))[::every], names[::every])
-    axes.tick_params(axis="y", length=0)
-
-
-def _is_upright(names: Sequence[str], cell: float) -> bool:
-    return _LETTER * max(map(len, names)) + 0.06 > cell
-
-
-def _head(names: Sequence[str], cell: float) -> float:
-    """Return the inches of names above columns."""
-    return _room(names) if _is_upright(names, cell) else 0.3
-
-
-def _name_columns(
-    axes: Axes, places: Sequence[float], names: Sequence[str], cell: float
-) -> None:
-    """Name columns so many inches apart above them, upright where they are narrow."""
-    is_upright = _is_upright(names, cell)
-    every = math.ceil(_LINE / cell) if is_upright else 1
-    axes.set_xticks(places[::every], names[::every], rotation=90 * is_upright)
-    axes.tick_params(axis="x", length=0)
-    axes.xaxis.tick_top()
+def _legend(
+    texts: Sequence[str], colours: _Floats, across: float
+) -> tuple[float, Callable[[Axes], None]]:
+    """Return the inches of what explains colours, and what draws it."""
+    ncols = max(1, int(across / (0.45 + max(map(inches_of, texts)))))
+    pairs = zip(texts, colours, strict=True)
+    marks = [Patch(color=colour, label=text) for text, colour in pairs]
+    how: dict[str, Any] = {
+        "handlelength": 1.2,
+        "handleheight": 1.0,
+        "columnspacing": 1.2,
+    }
+    height = 0.05 + 0.175 * -(-len(texts) // ncols)
+    return height, partial(legend_below, handles=marks, ncols=ncols, **how)

@@ -13,12 +13,12 @@ from matplotlib.transforms import blended_transform_factory
 from numpy.typing import NDArray
 
 from masrel.agreement import COEFFICIENTS
+from masrel.plots._cells import cells
 from masrel.plots._style import (
     BLACK,
     BLUE,
     DASHES,
     GREY,
-    ON_CELL,
     PAGE,
     Picture,
     colour_bar,
@@ -132,37 +132,19 @@ def _heatmap(
     axes: Axes, values: _Floats, raters: Sequence[str], others: Sequence[str]
 ) -> None:
     n_rows, n_columns = values.shape
-    axes.imshow(
-        values,
-        cmap=_COLOURS,
-        vmin=0.0,
-        vmax=1.0,
-        aspect="auto",
-        interpolation="nearest",
-    )
+    letters = [[_short(value) for value in row] for row in values.tolist()]
+    shown = np.array(letters if n_rows <= _MAX_NUMBERS else [[]])
+    cells(axes, values, shown, cmap=_COLOURS, vmin=0.0, vmax=1.0)
     axes.set_xticks(range(n_columns), [*raters, *others], rotation=90)
     axes.set_yticks(range(n_rows), raters)
     axes.xaxis.tick_top()
-    axes.spines[:].set_visible(False)
-    # gaps between the cells, so that each is seen by itself
-    width = 1.0 if n_rows <= _MAX_NUMBERS else 0.4
-    edges = np.arange(0.5, n_columns - 1.0)
-    axes.hlines(edges[: n_rows - 1], -0.5, n_columns - 0.5, PAGE, linewidth=width)
-    axes.vlines(edges, -0.5, n_rows - 0.5, PAGE, linewidth=width)
     if n_columns > n_rows:
         axes.axvline(n_rows - 0.5, color=PAGE, linewidth=6.0)
-    if n_rows <= _MAX_NUMBERS:
-        for (row, column), value in np.ndenumerate(values):
-            if not math.isnan(value):
-                axes.text(
-                    column,
-                    row,
-                    number(float(value), 2).replace("0.", ".", 1),
-                    ha="center",
-                    va="center",
-                    fontsize=8,
-                    color=ON_CELL[int(value > 0.55)],
-                )
+
+
+def _short(value: float) -> str:
+    text = number(value, 2).replace("0.", ".", 1)
+    return "" if math.isnan(value) else text
 
 
 def _influence(

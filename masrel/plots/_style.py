@@ -16,10 +16,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
 import matplotlib as mpl
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colorbar import Colorbar
-from matplotlib.colors import LinearSegmentedColormap, to_rgb
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.transforms import (
     Affine2DBase,
@@ -166,13 +165,6 @@ def inches_from(ax: Axes, x: float, y: float) -> Transform:
     return figure.dpi_scale_trans + ScaledTranslation(
         x, y, cast(Affine2DBase, ax.transAxes)
     )
-
-
-def letters_on(cell: Any) -> str:
-    """Return the colour of letters that can be read on a cell of a colour."""
-    # by relative luminance, as WCAG 2 has it: above some 0.18 dark ones stand out more
-    parts = ((np.array(to_rgb(cell)) + 0.055) / 1.055) ** 2.4
-    return ON_CELL[int(parts @ (0.2126, 0.7152, 0.0722) < 0.18)]
 
 
 def colour_bar(axes: Axes, drawn: Any, label: str, **how: Any) -> Colorbar:

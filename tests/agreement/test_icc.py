@@ -9,7 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from masrel.agreement import COEFFICIENTS, IccForm, icc, icc_f_test
+from masrel.agreement import (
+    COEFFICIENTS,
+    IccForm,
+    icc,
+    icc_f_test,
+    variance_components,
+)
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 
 FORMS = get_args(IccForm)
@@ -47,6 +53,23 @@ def test_shrout_and_fleiss_worked_in_whole_numbers() -> None:
         assert (found.n_items, found.n_raters) == (6, 4)
         assert found.weights == "identity"
         assert COEFFICIENTS[found.coefficient].title == form
+
+
+def test_variances_of_shrout_and_fleiss_by_hand() -> None:
+    rows, columns, residual = 1349 / 24 / 5, 2339 / 24 / 3, 367 / 24 / 15
+    result = variance_components(1000 * np.array(TABLE_2) + 7)
+    by_hand = [(rows - residual) / 4, (columns - residual) / 6, residual]
+    parts = [result.items, result.raters, result.residual]
+    assert parts == pytest.approx([1e6 * part for part in by_hand], rel=1e-14)
+    assert (result.method, result.negative, result.reason) == ("ANOVA", (), None)
+
+
+def test_a_variance_below_0_is_0_and_named() -> None:
+    # means 3/2 of every item: mean squares 0 and, of the residual, 2/3
+    result = variance_components([[1, 2], [2, 1], [1, 2]])
+    assert (result.items, result.raters) == (0.0, 0.0)
+    assert result.residual == pytest.approx(2 / 3)
+    assert result.negative == ("items", "raters")
 
 
 def test_intervals_from_the_quantiles_of_f() -> None:

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
-from masrel.agreement import IccForm, icc
+from masrel.agreement import IccForm, icc, variance_components
 from masrel.errors import UndefinedStatisticWarning
 
 Floats = NDArray[np.float64]
@@ -79,6 +79,33 @@ def test_values_are_those_of_lme4(name: str) -> None:
         assert result.interval.low <= result.value <= result.interval.high
         assert result.interval.method == "REML, profile likelihood"
         assert "ratings are missing" in result.interval.notes[0]
+
+
+@pytest.mark.parametrize("name", WITH_GAPS)
+def test_variances_are_those_of_lme4(name: str) -> None:
+    result, two_way = variance_components(table(name)), SETTINGS[name]["reml_two_way"]
+    assert result.method == "REML"
+    parts = [result.items, result.raters, result.residual]
+    keys = ("items", "raters", "residual")
+    expected = [two_way[f"variance_{key}"] for key in keys]
+    assert parts == pytest.approx(expected, rel=1e-3, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("ratings", "why"),
+    [
+        ([[1, 2]], "fewer than two items"),
+        ([[1], [2]], "fewer than two raters"),
+        ([[1, None], [None, 2]], "no item has two ratings"),
+    ],
+)
+def test_variances_that_ratings_do_not_tell_have_a_reason(
+    ratings: list[list[int | None]], why: str
+) -> None:
+    with pytest.warns(UndefinedStatisticWarning, match=why):
+        result = variance_components(ratings)
+    assert math.isnan(result.items + result.raters + result.residual)
+    assert why in str(result.reason)
 
 
 @pytest.mark.parametrize("name", ["icc_missing-02", "icc_missing-06"])

@@ -2,12 +2,11 @@
 
 import math
 
+import numpy as np
 import pytest
 
-from masrel.agreement import (
-    percent_agreement,
-)
-from masrel.errors import ParameterError
+from masrel.agreement import count_items, item_disagreement, percent_agreement
+from masrel.errors import ParameterError, UndefinedStatisticWarning
 from tests.strategies import Table
 
 # Krippendorff (2011), four observers of twelve units; the last has a single rating.
@@ -69,3 +68,30 @@ def test_a_population_holds_the_items_rated() -> None:
 def test_is_not_corrected_for_chance_even_of_one_category() -> None:
     found = percent_agreement([["a", "a"], ["a", "a"]])
     assert (found.value, found.chance, found.reason) == (1.0, 0.0, None)
+
+
+def test_the_disagreement_on_each_item_by_hand() -> None:
+    # pairs that differ: none of 3, two of 3 and none there is
+    np.testing.assert_array_equal(item_disagreement(SINGLE), [0, 2 / 3, math.nan])
+    # 1 and 2 of a scale of 1 to 3 are half a scale apart
+    linear = item_disagreement([[1, 2], [1, 3], [2, 2]], weights="linear")
+    assert linear.tolist() == [0.5, 1.0, 0.0]
+    assert item_disagreement(count_items([[3, 0], [2, 1]])).tolist() == [0.0, 2 / 3]
+
+
+@pytest.mark.parametrize("weights", ["identity", "linear"])
+@pytest.mark.parametrize("n_grades", [5, 3000])
+def test_agreement_is_what_items_leave_of_disagreement(
+    weights: str, n_grades: int
+) -> None:
+    ratings = np.random.default_rng(8).integers(0, n_grades, (2000, 4))
+    mean = item_disagreement(ratings, weights=weights).mean()
+    agreement = percent_agreement(ratings, categories=None, weights=weights)
+    assert 1.0 - mean == pytest.approx(agreement.value)
+
+
+def test_weights_that_a_scale_does_not_have_are_said_and_leave_nothing() -> None:
+    with pytest.warns(UndefinedStatisticWarning, match="disagreement on items"):
+        assert np.isnan(item_disagreement([[1, 1]], weights="linear")).all()
+    with pytest.raises(ParameterError, match="weights: needs one of"):
+        item_disagreement([[1, 1]], weights="none")  # type: ignore[arg-type]

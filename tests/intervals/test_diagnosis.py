@@ -65,6 +65,19 @@ def test_pairs_are_those_of_the_two_raters_alone(name: str) -> None:
     assert found.mean_values[0] == pytest.approx(pairs.mean(), rel=1e-14)
 
 
+@pytest.mark.parametrize("n_grades", [12, 60, 200])
+def test_many_raters_of_many_grades_have_the_pairs_of_the_two_alone(
+    n_grades: int,
+) -> None:
+    ratings = np.random.default_rng(6).integers(0, n_grades, (40, 30)).astype(float)
+    ratings[:, 1] = np.where(ratings[:, 2] % 2, ratings[:, 0], ratings[:, 1])
+    scale = list(map(float, range(n_grades)))
+    found = diagnose(ratings, categories=scale)
+    alone = estimate("fleiss_kappa", ratings[:, :2], target="items", categories=scale)
+    assert found.pair_values[0, 1] == pytest.approx(alone.value, rel=1e-12)
+    assert found.pair_items[0, 1] == 40
+
+
 @pytest.mark.parametrize("name", KINDS)
 def test_changes_are_differences_without_the_rater(name: str) -> None:
     ratings = drawn()

@@ -196,7 +196,7 @@ def test_the_part_as_intended_stands_beside_its_row() -> None:
     )
     left, right = aim_figure(content).axes
     assert [text.get_text() for text in left.texts] == ["1", "3", "2"]
-    frames = [patch.get_x() + 0.46 for patch in left.patches]
+    frames = [patch.get_x() + patch.get_width() / 2 for patch in left.patches]
     assert frames == pytest.approx([1, 2])  # the columns of 1 and of 2
     lines = [np.asarray(line.get_xydata()).tolist() for line in right.lines]
     assert lines == [

@@ -5,12 +5,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PatchCollection
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
-from numpy.typing import NDArray
 
 from masrel.lab.report._figure_data import (
     MANY_RATERS,
@@ -20,12 +18,14 @@ from masrel.lab.report._figure_data import (
     SpeedColumn,
     SpeedDots,
 )
+from masrel.plots._cells import cells, name_columns
 from masrel.plots._style import (
     BLACK,
     BLUE,
     DASHES,
     GREY,
     ORANGE,
+    SEQUENTIAL,
     VERMILLION,
     short_name,
 )
@@ -37,7 +37,6 @@ _SHADES = LinearSegmentedColormap.from_list("grades", ["#F2F6FA", "#7FB6DA", "#0
 _UPRIGHT_LETTERS = 7  # of a rater's name, or a grade's, that fits above a column
 
 _MOST_NUMBERS = 20  # grades up to which counts are written in the cells
-_DARK = 0.6  # share from which on a cell is so dark that letters are white
 
 _MODELS_IN_A_ROW = 8  # more go into further rows: a page is no wider
 _SPREADS = ((0.9, 1.4), (0.5, 6.0))  # share of the speeds, width of its line
@@ -122,9 +121,9 @@ def count_figure(content: GradeCounts) -> Figure:
 def aim_figure(content: GradesByAim) -> Figure:
     """Return grades by intended ones, and beside each row the part as intended."""
     n_rows, n_columns = len(content.intended), len(content.scale)
-    cells = min(5.4, 0.6 * n_columns)
-    figure = Figure(figsize=(1.2 + cells + 2.4, 0.95 + 0.36 * n_rows))
-    left, right = figure.subplots(1, 2, sharey=True, width_ratios=(cells, 2.2))
+    across = min(5.4, 0.6 * n_columns)
+    figure = Figure(figsize=(1.2 + across + 2.4, 0.95 + 0.36 * n_rows))
+    left, right = figure.subplots(1, 2, sharey=True, width_ratios=(across, 2.2))
     _draw_counts(left, content.counts, content.intended, content.scale)
     left.set_yticks(range(n_rows), content.intended)
     left.set_ylabel("intended grade")
@@ -152,48 +151,13 @@ def _draw_counts(
     n_rows, n_columns = len(rows), len(scale)
     counts = np.array(rows, dtype=np.int64).reshape(n_rows, n_columns)
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
-    places = [(x - 0.5, y - 0.5) for y in range(n_rows) for x in range(n_columns)]
-    axes.add_collection(
-        PatchCollection(
-            [Rectangle(corner, 1.0, 1.0) for corner in places],
-            facecolors=_SHADES(shares.ravel()), edgecolors="white", linewidth=2.0,
-        )
-    )  # fmt: skip
-    axes.set_xlim(-0.5, n_columns - 0.5)
-    axes.set_ylim(n_rows - 0.5, -0.5)
-    for row, aim in enumerate(intended):
-        for column, grade in enumerate(scale):
-            if n_columns <= _MOST_NUMBERS and counts[row, column]:
-                _write_count(axes, row, column, counts, shares)
-            if grade == aim:
-                frame: dict[str, Any] = {"edgecolor": VERMILLION, "linewidth": 1.8}
-                corner = (column - 0.46, row - 0.42)
-                axes.add_patch(Rectangle(corner, 0.92, 0.84, facecolor="none", **frame))
-    every = 1 if n_columns <= _MOST_NUMBERS else -(-n_columns // 10)
-    axes.set_xticks(range(0, n_columns, every), scale[::every])
-    axes.tick_params(length=0)
-    axes.xaxis.tick_top()
-    if max(map(len, scale)) > _UPRIGHT_LETTERS:
-        axes.tick_params(axis="x", rotation=90)
-    axes.spines[:].set_visible(False)
-
-
-def _write_count(
-    axes: Axes,
-    row: int,
-    column: int,
-    counts: NDArray[np.int64],
-    shares: NDArray[np.float64],
-) -> None:
-    axes.text(
-        column,
-        row,
-        str(counts[row, column]),
-        ha="center",
-        va="center",
-        fontsize=8,
-        color="white" if shares[row, column] > _DARK else BLACK,
-    )
+    is_few = n_columns <= _MOST_NUMBERS
+    letters = np.where(is_few & (counts > 0), counts.astype(str), "")
+    framed = np.array([[grade == aim for grade in scale] for aim in intended])
+    look: dict[str, Any] = {"cmap": SEQUENTIAL, "vmin": 0.0, "vmax": 1.0}
+    cells(axes, shares, letters, framed=framed, **look)
+    name_columns(axes, scale, min(0.6, 7.0 / n_columns), range(n_columns))
+    axes.tick_params(axis="y", length=0)
 
 
 def speed_figure(dots: SpeedDots) -> Figure:

@@ -1,0 +1,257 @@
+"""Ratings by grade: each is counted, coloured and named as it was given."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+
+from masrel.errors import ParameterError
+from masrel.intervals import diagnose
+from masrel.plots import categories, confusion, grades, items
+from masrel.plots._cells import letters_on
+from masrel.plots._grades import items_picture
+from tests.plots.made import LONG, blank, diagnosis, overlaps, texts_of
+
+# Kim gives a to the first two items and b to the others; Ann has no last item.
+THREE = pd.DataFrame(
+    {
+        "Kim": ["a", "a", "b", "b", "b"],
+        "Lee": ["a", "b", "b", "b", "c"],
+        "Ann": ["a", "a", "b", "c", None],
+    },
+    index=["P1", "P2", "P3", "P4", "P5"],
+)
+TWO = THREE[["Kim", "Lee"]]
+
+
+@pytest.fixture(autouse=True)
+def _closed() -> Iterator[None]:
+    yield
+    plt.close("all")
+
+
+def drawn(n_items: int, n_raters: int, q: int, *, words: bool) -> list[list[Any]]:
+    """Ratings of q grades, each given at least once, and some of them missing."""
+    rng = np.random.default_rng(4)
+    codes = np.arange(n_items)[:, None] + rng.integers(0, 2, (n_items, n_raters))
+    grade = (lambda k: f"the grade {k} of many") if words else int
+    table = [[grade(k % q) for k in row] for row in codes]
+    for row, column in rng.integers(0, (n_items, n_raters), (n_items // 4, 2)):
+        table[row][column] = None
+    return table
+
+
+def written(axes: Axes) -> dict[tuple[float, float], str]:
+    """Text of every cell, by column and row."""
+    return {of.get_position(): of.get_text() for of in axes.texts if of.get_text()}
+
+
+def legend_of(axes: Axes) -> dict[str, tuple[float, ...]]:
+    legend = axes.get_legend()
+    colours = [patch.get_facecolor() for patch in legend.get_patches()]
+    names = [text.get_text() for text in legend.get_texts()]
+    return dict(zip(names, colours, strict=True))
+
+
+def luminance(colour: Any) -> float:
+    parts = ((np.array(to_rgb(colour)) + 0.055) / 1.055) ** 2.4
+    return float(parts @ (0.2126, 0.7152, 0.0722))
+
+
+def frames(axes: Axes) -> set[tuple[float, float]]:
+    """Left end and row of every frame."""
+    return {(of.get_x(), of.get_y() + 0.5) for of in axes.patches}
+
+
+def test_a_table_of_two_raters_has_the_counts_and_the_shares_of_rows() -> None:
+    axes = confusion(TWO, ax=blank())
+    cells = {(0, 0): "1", (1, 0): "1", (1, 1): "2", (2, 1): "1"}
+    of_rows, of_columns = {(3, 0): "2", (3, 1): "3"}, {(0, 3): "1", (1, 3): "3"}
+    assert written(axes) == cells | of_rows | of_columns | {(2, 3): "1", (3, 3): "5"}
+    (image,) = axes.images
+    shares = [[1 / 2, 1 / 2, 0], [0, 2 / 3, 1 / 3], [0, 0, 0]]
+    np.testing.assert_allclose(np.asarray(image.get_array()), shares)
+    assert image.get_clim() == (0.0, 1.0)
+    assert frames(axes) == {(-0.5, 0.0), (0.5, 1.0), (1.5, 2.0)}
+    assert (axes.get_ylabel(), axes.get_xlabel()) == ("Kim", "Lee")
+    assert any("same grade: 3 of 5 (60 %)" in text for text in texts_of(axes))
+
+
+def test_all_others_are_held_against_a_reference_together() -> None:
+    axes = confusion(THREE, reference="Kim", ax=blank())
+    assert written(axes)[0, 0] == "3"  # a of Lee once, of Ann twice
+    assert written(axes)[3, 3] == "9"  # one of ten pairs is without a rating
+    assert (axes.get_ylabel(), axes.get_xlabel()) == ("Kim", "2 other raters")
+
+
+@pytest.mark.parametrize(
+    ("options", "is_ordered"),
+    [({}, False), ({"categories": ["a", "b", "c"]}, True), ({"ordered": True}, True)],
+)
+def test_neighbours_are_counted_where_grades_have_an_order(
+    options: dict[str, Any], is_ordered: bool
+) -> None:
+    (text,) = (of for of in texts_of(confusion(TWO, **options)) if "same grade" in of)
+    assert ("same or next grade: 5 of 5 (100 %)" in text) == is_ordered
+
+
+def test_grades_never_met_are_left_out_of_many() -> None:
+    axes = confusion([[3, 3], [3, 17]], categories=list(range(20)), ax=blank())
+    names = [name.get_text() for name in axes.get_yticklabels()]
+    assert names == ["3", "17", "all"]
+    assert any("never met are left out" in text for text in texts_of(axes))
+
+
+def test_the_use_of_grades_is_a_bar_of_shares() -> None:
+    axes = grades(THREE, ax=blank())
+    bars = {
+        (bar.get_y() + bar.get_height() / 2, bar.get_x()): bar.get_width()
+        for bar in axes.patches
+    }
+    kim, lee = {(0, 0): 0.4, (0, 0.4): 0.6}, {(1, 0): 0.2, (1, 0.2): 0.6, (1, 0.8): 0.2}
+    ann = {(2, 0): 0.5, (2, 0.5): 0.25, (2, 0.75): 0.25}
+    assert sorted(bars.items()) == [
+        (pytest.approx(place), pytest.approx(share))
+        for place, share in sorted((kim | lee | ann).items())
+    ]
+    assert axes.get_xlim() == (0.0, 1.0)
+    assert texts_of(axes).count("5 ratings") == 2
+    assert {"Kim", "4 ratings", "a", "b", "c"} <= set(texts_of(axes))
+
+
+def test_ordered_grades_are_lighter_to_darker_and_others_differ_in_colour() -> None:
+    eight = drawn(40, 3, 8, words=False)
+    shades = list(map(luminance, legend_of(grades(eight, ax=blank())).values()))
+    assert shades == sorted(shades, reverse=True)
+    hues = list(legend_of(grades(eight, ordered=False, ax=blank())).values())
+    assert len(set(hues)) == 8
+    assert list(map(luminance, hues)) != sorted(map(luminance, hues), reverse=True)
+
+
+def test_what_is_too_many_to_tell_apart_stands_together() -> None:
+    many = [*drawn(60, 3, 30, words=False), *[[30, 29, 28]] * 9]
+    axes = grades(many, ordered=False, ax=blank())
+    assert {"28", "29", "30", "other 24 grades"} <= set(legend_of(axes))
+    of_rater = [bar for bar in axes.patches if round(bar.get_y() + 0.39) == 0]
+    assert sum(bar.get_width() for bar in of_rater) == pytest.approx(1.0)
+    bands = list(legend_of(grades(many, ax=blank())))
+    assert len(bands) == 12
+    assert (bands[0], bands[-1]) == ("0 to 2", "29 to 30")
+
+
+def test_numbers_stand_for_long_names_and_are_explained() -> None:
+    scale = ["none", "slight", "very severe"]
+    for draw in (grades, items):
+        axes = draw([["none", "very severe"]], categories=scale, ax=blank())
+        assert list(legend_of(axes)) == ["1 = none", "2 = slight", "3 = very severe"]
+        letters = {of.get_text() for of in axes.texts}
+        assert {"1", "3"} <= letters
+        assert not letters & set(scale)
+
+
+def test_agreement_on_each_grade_has_its_dot_and_its_interval() -> None:
+    result = diagnosis(4)
+    axes = categories(result, names=["low", "middle", "high"], ax=blank())
+    (dots,) = axes.lines
+    np.testing.assert_array_equal(dots.get_xdata(), result.category_values)
+    ends = np.array([path[:, 0] for path in axes.collections[0].get_segments()])
+    np.testing.assert_array_equal(ends[:, 0], result.category_low)
+    np.testing.assert_array_equal(ends[:, 1], result.category_high)
+    assert axes.get_xlim() == (0.0, 1.0)
+    first = f"{result.category_values[0]:.2f} of {result.category_counts[0]} ratings"
+    assert {"low", "middle", "high", first, "95 % confidence interval"} <= set(
+        texts_of(axes)
+    )
+
+
+def test_without_intervals_none_are_explained_and_the_undefined_is_said_to_be() -> None:
+    result = diagnose(TWO, categories=["a", "b", "c", "d"])
+    axes = categories(result, ax=blank())
+    assert "undefined of 0 ratings" in texts_of(axes)
+    assert axes.get_legend() is None
+
+
+def test_items_come_by_disagreement_and_missing_ratings_are_blank() -> None:
+    axes = items(THREE, n_shown=4, categories=["a", "b", "c"], ax=blank())
+    names = [name.get_text() for name in axes.get_yticklabels()]
+    # half a scale apart: both ratings of P5, and two pairs of three of P2 and P4
+    assert names == ["P5", "P2", "P4", "P1"]
+    rows = [written(axes).get((column, 0)) for column in range(3)]
+    assert rows == ["b", "c", None]
+    colours = np.asarray(axes.images[0].get_array())
+    assert colours[0, 2, 3] == 0.0
+    assert tuple(colours[3, 0]) == pytest.approx(legend_of(axes)["a"])
+
+
+def test_measurements_are_coloured_by_value_between_ends_that_are_written() -> None:
+    values = np.append(np.arange(14.0), 40.0).reshape(5, 3) / 4
+    axes = items(values, items=["a", "b", "c", "d", "e"], ax=blank())
+    (bar,) = axes.child_axes
+    assert [name.get_text() for name in bar.get_xticklabels()] == ["0", "10"]
+    # the item of 3, 3.25 and 10 is first
+    assert axes.get_yticklabels()[0].get_text() == "e"
+    shades = [luminance(colour) for colour in np.asarray(axes.images[0].get_array())[0]]
+    assert shades[0] - shades[1] < 0.2 * (shades[1] - shades[2])
+
+
+def test_intended_grades_have_a_column_and_what_differs_is_framed() -> None:
+    codes = np.array([[[0, 1], [1, -1]], [[2, 2], [0, 2]], [[0, 0], [1, 1]]])
+    names, scale = (["x", "y", "z"], ["R1", "R2"]), ["0", "1", "2"]
+    picture = items_picture(codes, *names, scale, True, np.arange(3.0), [1, 2, -1])
+    axes = blank()
+    picture.draw(axes)
+    heads = [name.get_text() for name in axes.get_xticklabels()]
+    assert heads == ["intended", "R1", "R2"]
+    assert [written(axes)[-1.3, row] for row in (0, 1)] == ["1", "2"]
+    assert frames(axes) == {(-0.5, 0.0), (0.5, 1.0)}
+    assert written(axes)[-0.25, 0] == "0"
+    assert (0.75 + 0.5, 0) not in written(axes)
+
+
+@pytest.mark.parametrize("ordered", [True, False])
+def test_letters_can_be_read_on_every_cell(ordered: bool) -> None:
+    axes = grades(drawn(40, 3, 8, words=False), ordered=ordered, ax=blank())
+    for colour in legend_of(axes).values():
+        light, dark = sorted(
+            (luminance(colour), luminance(letters_on(colour))), reverse=True
+        )
+        assert (light + 0.05) / (dark + 0.05) > 4.0
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: confusion(THREE), "needs two raters, or a reference .* got 3 raters"),
+        (lambda: confusion(THREE[["Kim"]], reference="Kim"), "got 1 rater$"),
+        (lambda: confusion(TWO, reference="Bob"), "needs one of Kim, Lee, got 'Bob'"),
+        (lambda: grades([[None, None]]), "needs at least one, got none"),
+        (lambda: grades(TWO, raters=["Kim"]), "a name for each of 2, got 1"),
+        (lambda: items(TWO, items=["P1"]), "a name for each of 5, got 1"),
+        (lambda: items(TWO, n_shown=0), "at least 1 item, got 0"),
+        (lambda: categories(diagnosis(3), names=["a"]), "one for each of 3, got 1"),
+    ],
+)
+def test_what_does_not_fit_is_refused(call: Callable[[], Axes], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        call()
+    assert plt.get_fignums() == []
+
+
+@pytest.mark.parametrize("n_raters", [2, 8, 30, 50])
+@pytest.mark.parametrize(
+    ("q", "words"), [(2, False), (5, True), (12, False), (60, False)]
+)
+def test_no_text_lies_on_another_or_is_cut_off(
+    n_raters: int, q: int, words: bool
+) -> None:
+    table = drawn(60, n_raters, q, words=words)
+    names = [LONG, *(f"R{k}" for k in range(1, n_raters))]
+    for draw in (grades, items):
+        assert overlaps(draw(table, raters=names)) == []
+    assert overlaps(confusion(table, raters=names, reference=LONG)) == []
+    assert overlaps(categories(diagnose(table))) == []
