@@ -19,8 +19,7 @@ from tqdm import tqdm
 
 from masrel.lab.elbow import STANDARD_MODELS, fit, fit_friction
 from masrel.lab.elbow.identification._quantities import QUANTITIES
-from masrel.lab.report._figure_data import FrictionView, JointFitView
-from masrel.plots import draw
+from masrel.lab.report._fits import fit_figures
 from tests.lab.elbow.identification.synthesis import Scatter, recording, study
 from tests.lab.elbow.identification.test_friction import backdriven
 from tests.lab.elbow.identification.test_lack_of_fit import (
@@ -53,17 +52,9 @@ CASES = (
 def figures() -> None:
     """Draw the page's figures."""
     fitted = fit(study(STANDARD_MODELS["HM3"], seed=5, n_slow=4, scatter=HALF))
-    stamp = "SIMULATED DATA"
-    views: dict[str, JointFitView | FrictionView] = {
-        "fit_slow": JointFitView(fit=fitted, view="slow"),
-        "fit_catches": JointFitView(fit=fitted, view="catches"),
-        "fit_trials": JointFitView(fit=fitted, view="fast"),
-        "fit_residuals": JointFitView(fit=fitted, view="residuals"),
-        "fit_friction": FrictionView(fit=fit_friction([backdriven(1)])),
-    }
-    for name, view in views.items():
-        files = draw(view, stamp=stamp, forms=("png",))
-        (FIGURES / f"{name}.png").write_bytes(files["png"])
+    for made in (fitted, fit_friction([backdriven(1)])):
+        for name, files in fit_figures(made).items():
+            (FIGURES / f"{name}.png").write_bytes(files["png"])
 
 
 def coverage(n_studies: int) -> None:

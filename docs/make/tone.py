@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from docs.make.tone_figures import ToneLine, ToneView, draw
 from masrel.lab.elbow import Hold, Joined, MinimumJerk, Reversed
 from masrel.lab.elbow.tone import (
     ClaspKnife,
@@ -21,8 +22,6 @@ from masrel.lab.elbow.tone import (
     ToneModel,
 )
 from masrel.lab.hess import Rendering, render
-from masrel.lab.report._figure_data import ToneLine, ToneView
-from masrel.plots import draw
 
 FIGURES = Path(__file__).parents[1] / "figures"
 START = math.radians(30.0)
@@ -161,8 +160,7 @@ def view(scene: Scene) -> ToneView:
 def figures() -> None:
     """Draw the figure of every law."""
     for name, scene in SCENES.items():
-        files = draw(view(scene), stamp="SIMULATED DATA", forms=("png",))
-        (FIGURES / f"{name}.png").write_bytes(files["png"])
+        (FIGURES / f"{name}.png").write_bytes(draw(view(scene)))
 
 
 if __name__ == "__main__":

@@ -31,7 +31,7 @@ from masrel.estimates import IntervalMethod
 from masrel.ratings._findings import Reading
 
 if TYPE_CHECKING:
-    from masrel.plots._drawn_values import Content, Drawn
+    from masrel.plots._drawn_values import Drawn
     from masrel.ratings import RatingsFile
 
 Option = Callable[..., Any]
@@ -294,7 +294,7 @@ def _record(
     }
 
 
-def _figure(answers: Sequence[Answer], questions: Questions) -> "Content | Drawn":
+def _figure(answers: Sequence[Answer], questions: Questions) -> "Drawn":
     """Return what is drawn: the figure of an answer, else of the estimates."""
     from masrel.plots._drawn_values import Drawn
     from masrel.tables._answer_tables import agreement_forest

@@ -17,7 +17,7 @@ from masrel._input import refuse
 from masrel.cli._paths import FileInFolder, OutputFile
 
 if TYPE_CHECKING:
-    from masrel.plots._drawn_values import Content, Drawn, Form
+    from masrel.plots._drawn_values import Drawn, Form
     from masrel.tables._tables import Table
 
 Command = Callable[..., None]
@@ -133,7 +133,7 @@ def write_output(
     *,
     document: Callable[[], dict[str, object]],
     text: "Callable[[], Table | str]",
-    figure: "Callable[[], Content | Drawn] | None" = None,
+    figure: "Callable[[], Drawn] | None" = None,
     stamp: str = "",
     notes: tuple[str, ...] = (),
     more: "Sequence[Table]" = (),

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from masrel.plots import _drawn_values as drawn
+from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import SYMBOL, Table, page_cells
 
 
@@ -28,7 +28,7 @@ class Drawing:
     name: str  # name of its files, without extension
     caption: str  # what it shows, understood alone
     alt: str  # what a reader who cannot see it needs to know
-    content: drawn.Content | drawn.Drawn  # what is drawn
+    content: Drawn  # what is drawn
     stamp: str  # the line that says where its data come from
 
 

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from masrel.plots._drawn_values import Content, Drawn, Form
+from masrel.plots._drawn_values import Drawn, Form
 
 if TYPE_CHECKING:
     from masrel.plots._components import components
@@ -59,7 +59,7 @@ def __getattr__(name: str) -> object:
 
 
 def draw(
-    content: Content | Drawn,
+    content: Drawn,
     *,
     stamp: str,
     forms: Sequence[Form] = ("png", "svg"),
@@ -68,7 +68,7 @@ def draw(
 
     Parameters
     ----------
-    content : Content or Drawn
+    content : Drawn
         What is drawn.
     stamp : str
         The line that says where the data come from; none if empty.

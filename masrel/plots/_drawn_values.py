@@ -1,25 +1,13 @@
 """What figures show, as plain values: they load nothing that draws."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     from masrel.estimates import Interval
 
 Form = Literal["png", "svg", "pdf", "inline"]
 """What a figure's file can be; inline is the SVG of a page, in the page's colours."""
-
-
-class Content:
-    """What a figure shows; its class names the function that draws it."""
-
-    __slots__ = ()
-    drawer: ClassVar[str]  # "module:function"
-
-    @property
-    def arguments(self) -> tuple[object, ...]:
-        """What that function takes."""
-        return (self,)
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,9 +22,10 @@ from masrel.lab.hess import (
     run_presentation,
 )
 from masrel.lab.recording import MEASURED_TORQUE, Recording
-from masrel.lab.report._figure_data import MeasuredTorque
+from masrel.lab.report._figure_data import FIGURES
 from masrel.lab.report._measured_torque import measured_panel
 from masrel.plots import draw
+from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import SIMULATED
 from tests.lab.hess.measured import NOTHING, measured, stretch, to_and_fro
 
@@ -149,7 +150,8 @@ def draw_measured(path: Path) -> None:
         measured_panel(measured(joint, stretch(60.0)), model)
         for model, joint in STANDARD_MODELS.items()
     )
-    files = draw(MeasuredTorque(panels=panels), stamp=SIMULATED, forms=("png",))
+    shown = Drawn(FIGURES + "_trace_figures:measured_figure", (panels,))
+    files = draw(shown, stamp=SIMULATED, forms=("png",))
     path.write_bytes(files["png"])
 
 

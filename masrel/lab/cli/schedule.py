@@ -74,20 +74,21 @@ def _check_options(
 def _show(
     study: StudyPaths, protocol: Protocol, site: str | None, output: OutputOptions
 ) -> None:
+    from masrel.lab.report._figure_data import FIGURES
     from masrel.lab.report._order_tables import (
         count_tables,
         order_document,
-        order_figure_content,
         summary_table,
     )
     from masrel.lab.schedule._balance import order_balance
+    from masrel.plots._drawn_values import Drawn
 
     balances = order_balance(protocol, study, site)
     write_output(
         output,
         document=lambda: order_document(balances),
         text=lambda: summary_table(balances),
-        figure=lambda: order_figure_content(balances),
+        figure=lambda: Drawn(FIGURES + "_order_figure:order_figure", (balances,)),
         stamp="not for raters",
         more=[table for balance in balances for table in count_tables(balance)],
     )

@@ -20,9 +20,10 @@ from masrel.lab.progress import (
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.protocol._rater_fields import field_heading
 from masrel.lab.ratings import Correction, corrections_of, study_remarks
-from masrel.lab.report._figure_data import FlowStep, RaterFlow
+from masrel.lab.report._figure_data import FIGURES, FlowStep
 from masrel.lab.report._material import Material
 from masrel.pages._sections import Content, Drawing, Paragraph, Section
+from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import Column, Table, Value
 
 _WHO, _NOTES = "who", "notes"
@@ -246,7 +247,7 @@ def _flow_figure(material: Material, conduct: StudyConduct) -> Drawing:
         name="rater_flow",
         caption="Flow of the raters. Who began and did not complete is analysed, too.",
         alt=f"Flow of the raters. {shown}.",
-        content=RaterFlow(steps=steps),
+        content=Drawn(FIGURES + "_rater_flow:flow_figure", (steps,)),
         stamp=material.stamp,
     )
 

@@ -12,8 +12,8 @@ from masrel.lab.elbow.identification import (
 )
 from masrel.lab.elbow.identification._catches import Trial
 from masrel.lab.elbow.identification._quantities import ALL_QUANTITIES, Quantity
-from masrel.lab.report._figure_data import FrictionView, JointFitView
-from masrel.plots._drawn_values import Content, Form
+from masrel.lab.report._figure_data import FIGURES
+from masrel.plots._drawn_values import Drawn, Form
 from masrel.tables._tables import (
     ABSENT,
     SIMULATED,
@@ -361,14 +361,17 @@ def fit_figures(fit: ElbowFit | FrictionFit) -> dict[str, dict[Form, bytes]]:
     # Imported here: a table loads nothing that draws.
     from masrel.plots import draw
 
-    views: dict[str, Content] = {}
+    views = {}
     if isinstance(fit, FrictionFit):
-        views["fit_friction"] = FrictionView(fit=fit)
+        views["fit_friction"] = "friction"
     else:
-        views["fit_slow"] = JointFitView(fit=fit, view="slow")
-        views["fit_residuals"] = JointFitView(fit=fit, view="residuals")
+        views["fit_slow"] = "slow"
+        views["fit_residuals"] = "residuals"
         if any(trial.after is not None for trial in fit.trials):
-            views["fit_trials"] = JointFitView(fit=fit, view="fast")
-            views["fit_catches"] = JointFitView(fit=fit, view="catches")
+            views["fit_trials"] = "fast"
+            views["fit_catches"] = "catches"
     stamp = SIMULATED if fit.simulated else ""
-    return {name: draw(view, stamp=stamp) for name, view in views.items()}
+    return {
+        name: draw(Drawn(f"{FIGURES}_fit_figures:{view}_figure", (fit,)), stamp=stamp)
+        for name, view in views.items()
+    }

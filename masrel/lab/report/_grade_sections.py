@@ -4,9 +4,10 @@ from collections import Counter
 from collections.abc import Iterator
 from operator import attrgetter
 
-from masrel.lab.report._figure_data import MANY_RATERS, GradeCounts, GradeGrid
+from masrel.lab.report._figure_data import FIGURES, MANY_RATERS, GradeCounts, GradeGrid
 from masrel.lab.report._material import Material
 from masrel.pages._sections import Drawing, Paragraph, Section, absent_section
+from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import Column, Table, Value, counted, number
 
 
@@ -110,7 +111,7 @@ def _grid_blocks(
         name=f"grades_{session}",
         caption=f"{caption}.",
         alt=f"Grid of grades. {'; '.join(_grades_by_model(grid))}.",
-        content=grid,
+        content=Drawn(FIGURES + "_study_figures:grade_figure", (grid,)),
         stamp=material.stamp,
     )
     return table, drawing
@@ -166,8 +167,16 @@ def _counted_blocks(
         name=f"grades_{session}",
         caption=f"{caption}.",
         alt=f"Counts of grades. {'; '.join(texts)}.",
-        content=GradeCounts(
-            models=grid.models, intended=grid.intended, scale=grid.scale, counts=counts
+        content=Drawn(
+            FIGURES + "_study_figures:count_figure",
+            (
+                GradeCounts(
+                    models=grid.models,
+                    intended=grid.intended,
+                    scale=grid.scale,
+                    counts=counts,
+                ),
+            ),
         ),
         stamp=material.stamp,
     )

@@ -3,10 +3,11 @@
 from masrel.lab.analysis._category_agreement import category_agreement
 from masrel.lab.analysis._exclusions import analysed_ratings
 from masrel.lab.analysis._given_grades import GivenGrades, given_grades
-from masrel.lab.report._figure_data import GradesByAim
+from masrel.lab.report._figure_data import FIGURES, GradesByAim
 from masrel.lab.report._material import Material
 from masrel.lab.report._result import main_estimate
 from masrel.pages._sections import Drawing, Paragraph, Section, absent_section
+from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import Column, Table, Value, counted, percent
 
 _CATEGORIES = "Agreement on each grade"
@@ -146,11 +147,16 @@ def _confusion_drawing(
             f"with its {level} % confidence interval for other raters like these."
         ),
         alt=f"Counts of grades given. {'; '.join(texts)}.",
-        content=GradesByAim(
-            intended=tuple(row.intended for row in rows),
-            scale=grades,
-            counts=tuple(row.counts for row in rows),
-            shares=tuple((row.share, row.low, row.high) for row in rows),
+        content=Drawn(
+            FIGURES + "_study_figures:aim_figure",
+            (
+                GradesByAim(
+                    intended=tuple(row.intended for row in rows),
+                    scale=grades,
+                    counts=tuple(row.counts for row in rows),
+                    shares=tuple((row.share, row.low, row.high) for row in rows),
+                ),
+            ),
         ),
         stamp=material.stamp,
     )

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from masrel.lab.recording import MEASURED_TORQUE, Recording, read_recording, stretches
-from masrel.lab.report._figure_data import MeasuredPanel, MeasuredTorque
+from masrel.lab.report._figure_data import FIGURES, MeasuredPanel
 from masrel.lab.report._material import Material
 from masrel.pages._sections import Drawing, Paragraph
+from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import SIMULATED, number
 
 _PANELS_PER_FIGURE = 4
@@ -99,6 +100,6 @@ def _drawing(material: Material, recordings: list[Recording], nth: int) -> Drawi
             f"Measured and sent torque against time for {listed}; the largest "
             f"measured torque is {number(largest, 1)} N·m."
         ),
-        content=MeasuredTorque(panels=panels),
+        content=Drawn(FIGURES + "_trace_figures:measured_figure", (panels,)),
         stamp=SIMULATED if simulated else material.stamp,
     )

@@ -9,10 +9,11 @@ from masrel.lab.analysis._order_effects import (
     place_summaries,
 )
 from masrel.lab.ratings import Ratings
-from masrel.lab.report._figure_data import OrderDifferences, PlaceDots
+from masrel.lab.report._figure_data import FIGURES, PlaceDots
 from masrel.lab.report._material import Material
 from masrel.lab.report._sentences import sentence
 from masrel.pages._sections import Content, Drawing, Paragraph, Section, absent_section
+from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import Column, Table, interval_text, number, percent
 
 _TITLE = "Effects of order"
@@ -58,22 +59,21 @@ def _drawing(
         f"{interval_text(effect.low, effect.high, 2)}"
         for effect in effects
     ]
+    parts = tuple(
+        PlaceDots(
+            session=session,
+            places=tuple(_places(part) for part in of_session),
+            steps=tuple(part.deviation for part in of_session),
+        )
+        for session in dict.fromkeys(part.session for part in places)
+        for of_session in [[p for p in places if p.session == session]]
+    )
+    shown = tuple((_question(e), e.mean, e.low, e.high) for e in effects)
     return Drawing(
         name="order_effects",
         caption=f"Effects of order, in steps of the scale. {left}{right}.",
         alt=f"Forest plot of differences in steps. {'; '.join(texts)}.",
-        content=OrderDifferences(
-            parts=tuple(
-                PlaceDots(
-                    session=session,
-                    places=tuple(_places(part) for part in of_session),
-                    steps=tuple(part.deviation for part in of_session),
-                )
-                for session in dict.fromkeys(part.session for part in places)
-                for of_session in [[p for p in places if p.session == session]]
-            ),
-            effects=tuple((_question(e), e.mean, e.low, e.high) for e in effects),
-        ),
+        content=Drawn(FIGURES + "_order_differences:difference_figure", (parts, shown)),
         stamp=material.stamp,
     )
 

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import pairwise
 
-from masrel.lab.report._figure_data import OrderPanel, OrderPanels
 from masrel.lab.schedule._balance import OrderBalance
 from masrel.tables._tables import Column, Table
 
@@ -120,19 +119,3 @@ def _part(first: int, end: int) -> str:
 def order_document(balances: Sequence[OrderBalance]) -> dict[str, object]:
     """Return every count as plain values."""
     return {"note": _CONCEALED, "sessions": [asdict(balance) for balance in balances]}
-
-
-def order_figure_content(balances: Sequence[OrderBalance]) -> OrderPanels:
-    """Return what the figure shows: a row of two heatmaps each session (and site)."""
-    return OrderPanels(
-        panels=tuple(
-            OrderPanel(
-                title=", ".join(filter(None, (balance.session, balance.site))),
-                n_schedules=balance.n_schedules,
-                models=balance.models,
-                places=balance.places,
-                pairs=balance.pairs,
-            )
-            for balance in balances
-        )
-    )

@@ -7,9 +7,10 @@ from decimal import ROUND_HALF_UP, Decimal
 from masrel.lab.analysis import QuestionSummary
 from masrel.lab.analysis._question_summaries import FEWEST_RATERS
 from masrel.lab.protocol import Protocol
-from masrel.lab.report._figure_data import AnswerBars, AnswerPanel
+from masrel.lab.report._figure_data import FIGURES, AnswerPanel
 from masrel.lab.report._material import Material
 from masrel.pages._sections import Drawing, Paragraph, Section, absent_section
+from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import Column, Table, Value
 
 _TITLE = "Questionnaires"
@@ -140,7 +141,7 @@ def _drawing(
         name="questionnaires",
         caption=f"{caption} {_RECONSTRUCTED}" if is_made_up else caption,
         alt=f"Bar chart of answers. {words}.",
-        content=AnswerBars(panels=panels),
+        content=Drawn(FIGURES + "_answer_bars:answer_figure", (panels,)),
         stamp=_RECONSTRUCTED if is_made_up else material.stamp,
     )
 

@@ -4,9 +4,10 @@ import math
 from collections.abc import Sequence
 
 from masrel.lab.analysis import Speed, Speeds, SpeedSummary
-from masrel.lab.report._figure_data import MANY_RATERS, SpeedColumn, SpeedDots
+from masrel.lab.report._figure_data import FIGURES, MANY_RATERS, SpeedColumn
 from masrel.lab.report._material import Material
 from masrel.pages._sections import Drawing, Paragraph, Section, absent_section
+from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import Column, Table, Value, number
 
 
@@ -117,14 +118,14 @@ def _speed_drawing(material: Material, speeds: Speeds) -> Drawing:
         f"{number(s.least, 0)} to {number(s.most, 0)} deg/s"
         for s in speeds.by_model
     )
+    slowest = material.protocol.elbow.slowest_mean_speed_deg_s
     return Drawing(
         name="speeds",
         caption=_speed_caption(len(material.raters), speeds.values),
         alt=f"Dot plot of speeds. {text}.",
-        content=SpeedDots(
-            columns=_speed_columns(material, speeds),
-            raters=material.raters,
-            slowest=material.protocol.elbow.slowest_mean_speed_deg_s,
+        content=Drawn(
+            FIGURES + "_study_figures:speed_figure",
+            (_speed_columns(material, speeds), material.raters, slowest),
         ),
         stamp=material.stamp,
     )

@@ -21,17 +21,18 @@ from masrel.lab.elbow import (
 from masrel.lab.protocol import Protocol, joint_model
 from masrel.lab.protocol._kinds import DEFAULT_KIND
 from masrel.lab.report._figure_data import (
+    FIGURES,
     MANY_MODELS,
     MANY_RATERS,
     MANY_STRETCHES,
     TraceBand,
-    TraceColumns,
     TracePanel,
 )
 from masrel.lab.report._material import Material
 from masrel.lab.report._measured_torque import measured_blocks
 from masrel.lab.report._stretches import at_ranks, has_many, whole_or_tenths
 from masrel.pages._sections import Drawing, Paragraph, Section, absent_section
+from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import Column, Table, Value, as_entered, number
 
 _PANELS_PER_FIGURE, _SMALL_PANELS_PER_FIGURE = 4, 24
@@ -237,7 +238,9 @@ def _trace_drawing(
             f"{what} against time for {listed}. {shape} "
             "peaks are in the table of peak torques."
         ),
-        content=TraceColumns(panels=tuple(panels), has_angle=has_angle),
+        content=Drawn(
+            FIGURES + "_trace_figures:trace_figure", (tuple(panels), has_angle)
+        ),
         stamp=material.trace_stamp,
     )
 

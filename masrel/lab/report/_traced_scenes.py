@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from masrel.errors import ParameterError
 from masrel.lab.report._figure_data import (
+    FIGURES,
     CatchCurve,
-    CatchCurves,
     CatchSchematic,
-    Stretches,
     StretchLine,
     StretchPanel,
 )
 from masrel.lab.report._tone_scenes import tone_document, tone_line, torque_rows
-from masrel.plots._drawn_values import Content
+from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import aligned, fixed_or_significant, significant
 
 if TYPE_CHECKING:
@@ -251,16 +250,18 @@ def _n_caught(scenes: Sequence[Scene]) -> int:
     return int(np.isfinite(outputs.column("catch")).sum())
 
 
-def scenes_content(scenes: Sequence[Scene], view: str) -> Content:
+def scenes_content(scenes: Sequence[Scene], view: str) -> Drawn:
     """Return what a figure of scenes shows."""
     models = _by_model(scenes).items()
     if view == "catch":
-        return CatchCurves(curves=tuple(_curve(*of_model) for of_model in models))
+        curves = tuple(_curve(*of_model) for of_model in models)
+        return Drawn(FIGURES + "_scene_figures:catch_figure", (curves,))
     if view == "schematic":
-        return _schematic(scenes[0])
+        shown = _schematic(scenes[0])
+        return Drawn(FIGURES + "_scene_figures:schematic_figure", (shown,))
     against: Literal["angle", "time"] = "angle" if view == "angle" else "time"
     panels = tuple(_panel(*of_model) for of_model in models)
-    return Stretches(panels=panels, against=against)
+    return Drawn(FIGURES + "_scene_figures:stretch_figure", (panels, against))
 
 
 def _by_model(scenes: Sequence[Scene]) -> dict[str, list[Scene]]:

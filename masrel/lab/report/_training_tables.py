@@ -7,9 +7,10 @@ import math
 from collections import Counter
 
 from masrel.estimates import Interval
-from masrel.lab.report._figure_data import LearningView
+from masrel.lab.report._figure_data import FIGURES, LearningView
 from masrel.lab.training._learning_curve import CURVE_SETS, CurvePoint, learning_curve
 from masrel.lab.training._lessons import TrainingRecord
+from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import (
     SIMULATED,
     Column,
@@ -182,12 +183,12 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def learning_view(record: TrainingRecord, *, level: float) -> LearningView:
+def learning_view(record: TrainingRecord, *, level: float) -> Drawn:
     """Return what the figure of a training shows."""
     points = learning_curve(record, level=level)
     criterion = record.criterion
     code = {grade: at for at, grade in enumerate(criterion.grades)}
-    return LearningView(
+    shown = LearningView(
         title=f"Training of {record.rater}: {outcome(record)}",
         positions=tuple(point.position for point in points),
         kappas=tuple((p.kappa.value, *_ends(p.kappa.interval)) for p in points),
@@ -197,3 +198,4 @@ def learning_view(record: TrainingRecord, *, level: float) -> LearningView:
             code[one.grade] - code[one.intended] for one in record.lessons
         ),
     )
+    return Drawn(FIGURES + "_learning_figure:learning_figure", (shown,))

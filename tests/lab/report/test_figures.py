@@ -20,22 +20,20 @@ from masrel.lab.protocol import read_protocol
 from masrel.lab.ratings import read_study_ratings
 from masrel.lab.report import write_report
 from masrel.lab.report._figure_data import (
+    FIGURES,
     GradeCounts,
     GradeGrid,
     GradesByAim,
-    OrderDifferences,
     PlaceDots,
     SpeedColumn,
-    SpeedDots,
     TraceBand,
-    TraceColumns,
     TracePanel,
 )
 from masrel.lab.report.figures._order_differences import difference_figure
 from masrel.lab.report.figures._study_figures import aim_figure, speed_figure
 from masrel.lab.report.figures._trace_figures import trace_figure
 from masrel.plots import draw
-from masrel.plots._drawn_values import Content
+from masrel.plots._drawn_values import Drawn
 from tests.benchmarks.many_ratings import many_ratings
 from tests.plots.made import LONG
 
@@ -43,7 +41,11 @@ ROOT = Path(__file__).parents[3]
 WIDEST_IN = 9.5  # inches of a page of a report
 
 
-def speeds(n_raters: int) -> SpeedDots:
+def figure(name: str, *arguments: object) -> Drawn:
+    return Drawn(FIGURES + name, arguments)
+
+
+def speeds(n_raters: int) -> Drawn:
     numbers = np.random.default_rng(1).normal(85.0, 10.0, (4, n_raters, 5))
     columns = tuple(
         SpeedColumn(
@@ -55,7 +57,7 @@ def speeds(n_raters: int) -> SpeedDots:
         for model, of_model in enumerate(numbers)
     )
     raters = tuple(f"R{number}" for number in range(n_raters))
-    return SpeedDots(columns=columns, raters=raters, slowest=60.0)
+    return figure("_study_figures:speed_figure", columns, raters, 60.0)
 
 
 def panel(n_stretches: int, *, has_band: bool) -> TracePanel:
@@ -72,47 +74,53 @@ def panel(n_stretches: int, *, has_band: bool) -> TracePanel:
     )
 
 
-def differences(*, has_places: bool) -> OrderDifferences:
-    nan = float("nan")
-    return OrderDifferences(
-        parts=(
-            PlaceDots(session="a", places=("1–2", "3–4"), steps=(0.1, -0.1)),
-            PlaceDots(session="b", places=("1", "2"), steps=(nan, 0.9)),
-        )
-        if has_places
-        else (),
-        effects=(("one", 0.2, -2.0, 2.4), ("other", -0.1, nan, nan)),
-    )
+def traces(*panels: TracePanel, has_angle: bool = True) -> Drawn:
+    return figure("_trace_figures:trace_figure", panels, has_angle)
 
 
-CONTENTS: dict[str, Content] = {
-    "grades": GradeGrid(
-        models=(LONG, "HM2"),
-        raters=(LONG, f"Dr. {LONG}"),
-        intended=("1", None),
-        grades=((("1",), ("0",)), ((), ("2", "1"))),
-        scale=("0", "1", "2"),
+NAN = float("nan")
+PLACES = (
+    PlaceDots(session="a", places=("1–2", "3–4"), steps=(0.1, -0.1)),
+    PlaceDots(session="b", places=("1", "2"), steps=(NAN, 0.9)),
+)
+EFFECTS = (("one", 0.2, -2.0, 2.4), ("other", -0.1, NAN, NAN))
+
+CONTENTS: dict[str, Drawn] = {
+    "grades": figure(
+        "_study_figures:grade_figure",
+        GradeGrid(
+            models=(LONG, "HM2"),
+            raters=(LONG, f"Dr. {LONG}"),
+            intended=("1", None),
+            grades=((("1",), ("0",)), ((), ("2", "1"))),
+            scale=("0", "1", "2"),
+        ),
     ),
-    "counts": GradeCounts(
-        models=(LONG, "HM2"),
-        intended=("1", None),
-        scale=("0", "1", "2"),
-        counts=((0, 190, 10), (0, 0, 0)),
+    "counts": figure(
+        "_study_figures:count_figure",
+        GradeCounts(
+            models=(LONG, "HM2"),
+            intended=("1", None),
+            scale=("0", "1", "2"),
+            counts=((0, 190, 10), (0, 0, 0)),
+        ),
     ),
-    "counts of many grades": GradeCounts(
-        models=("HM1",),
-        intended=(None,),
-        scale=tuple(map(str, range(101))),
-        counts=(tuple(range(101)),),
+    "counts of many grades": figure(
+        "_study_figures:count_figure",
+        GradeCounts(
+            models=("HM1",),
+            intended=(None,),
+            scale=tuple(map(str, range(101))),
+            counts=(tuple(range(101)),),
+        ),
     ),
     "speeds": speeds(2),
     "speeds of many": speeds(200),
-    "traces": TraceColumns(panels=(panel(2, has_band=False),)),
-    "bands": TraceColumns(panels=(panel(3, has_band=True),) * 2),
-    "small panels": TraceColumns(panels=(panel(3, has_band=True),) * 5,
-                                 has_angle=False),
-    "order": differences(has_places=True),
-}  # fmt: skip
+    "traces": traces(panel(2, has_band=False)),
+    "bands": traces(*(panel(3, has_band=True),) * 2),
+    "small panels": traces(*(panel(3, has_band=True),) * 5, has_angle=False),
+    "order": figure("_order_differences:difference_figure", PLACES, EFFECTS),
+}
 
 
 def texts_of(svg: bytes) -> list[str]:
@@ -174,15 +182,13 @@ def test_a_stretch_that_a_grade_rests_on_is_ringed_and_drawn_thicker() -> None:
         mean=85.0,
         graded=((95.0,),),
     )
-    (axes,) = speed_figure(
-        SpeedDots(columns=(column,), raters=("R1",), slowest=60.0)
-    ).axes
+    (axes,) = speed_figure((column,), ("R1",), 60.0).axes
     ringed = [line for line in axes.lines if line.get_fillstyle() == "none"]
     assert [list(line.get_ydata()) for line in ringed] == [[95.0]]
     widths = []
     for graded in (False, True):
         one = dataclasses.replace(panel(1, has_band=False), graded=(graded,))
-        top = trace_figure(TraceColumns(panels=(one,))).axes[0]
+        top = trace_figure((one,), True).axes[0]
         widths.append(top.lines[0].get_linewidth())
     assert widths[1] > 2.0 * widths[0]
 
@@ -210,7 +216,7 @@ def test_the_part_as_intended_stands_beside_its_row() -> None:
 @pytest.mark.parametrize("has_places", [True, False])
 def test_effects_of_order_reach_as_far_as_they_are(has_places: bool) -> None:
     left: list[Axes]
-    *left, right = difference_figure(differences(has_places=has_places)).axes
+    *left, right = difference_figure(PLACES if has_places else (), EFFECTS).axes
     low, high = right.get_xlim()
     assert low == -high
     assert high >= 2.4

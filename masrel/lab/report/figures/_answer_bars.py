@@ -1,26 +1,27 @@
 """How often each answer was given, a panel a question."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from masrel.lab.report._figure_data import AnswerBars, AnswerPanel
+from masrel.lab.report._figure_data import AnswerPanel
 from masrel.plots._style import BLUE
 
 _IN_A_ROW = 2
 _LONG = 4  # letters of a label that is not slanted
 
 
-def answer_figure(content: AnswerBars) -> Figure:
+def answer_figure(panels: Sequence[AnswerPanel]) -> Figure:
     """Return bars of counts, one panel a question and session."""
-    n_panels = len(content.panels)
+    n_panels = len(panels)
     n_columns = min(_IN_A_ROW, n_panels)
     n_rows = -(-n_panels // n_columns)
     figure = Figure(figsize=(0.4 + 3.6 * n_columns, 0.5 + 2.4 * n_rows))
     all_axes = figure.subplots(n_rows, n_columns, squeeze=False).ravel()
-    for axes, panel in zip(all_axes, content.panels, strict=False):
+    for axes, panel in zip(all_axes, panels, strict=False):
         _draw(axes, panel)
     for axes in all_axes[n_panels:]:
         axes.set_visible(False)

@@ -18,7 +18,6 @@ from masrel.lab.analysis import _fit_residuals as residuals
 from masrel.lab.elbow.identification import ElbowFit, FrictionFit
 from masrel.lab.elbow.identification._catches import Catch, Trial
 from masrel.lab.elbow.identification._quantities import QUANTITIES
-from masrel.lab.report._figure_data import FrictionView, JointFitView
 from masrel.lab.report._fits import FRICTION
 from masrel.plots._style import BLACK, BLUE, GREY, ORANGE
 from masrel.tables._tables import interval_text, number
@@ -46,21 +45,8 @@ _OPEN: dict[str, Any] = {
 _Floats = NDArray[np.float64]
 
 
-def fit_figure(content: JointFitView | FrictionView) -> Figure:
-    """Return a figure of a fit."""
-    if isinstance(content, FrictionView):
-        return _friction(content.fit)
-    views = {
-        "slow": _slow_trials,
-        "fast": _fast_trials,
-        "catches": _catches,
-        "residuals": _residuals,
-    }
-    return views[content.view](content.fit)
-
-
-def _slow_trials(fit: ElbowFit) -> Figure:
-    # measured torque and (1) against time, one column a trial: the longest ones
+def slow_figure(fit: ElbowFit) -> Figure:
+    """Return measured torque and (1) against time, one column a trial: the longest."""
     slow = [i for i, trial in enumerate(fit.trials) if trial.pace == "slow"]
     sizes = {i: fit.trials[i].pre_catch.time.size for i in slow}
     shown = sorted(sorted(slow, key=lambda i: -sizes[i])[:_MAX_SLOW_COLUMNS])
@@ -107,8 +93,8 @@ def _slow_law(fit: ElbowFit) -> str:
     return f"{' + '.join(terms)}{' with a lag' if 'lag' in there else ''}, fitted"
 
 
-def _fast_trials(fit: ElbowFit) -> Figure:
-    # torque, angle and speed of the slowest, the middle and the fastest
+def fast_figure(fit: ElbowFit) -> Figure:
+    """Return torque, angle and speed of the slowest, the middle and the fastest."""
     fast = [
         (trial.catch.mean_speed, i)
         for i, trial in enumerate(fit.trials)
@@ -199,8 +185,8 @@ def _shade(axes: Axes, trial: Trial, catch: Catch, last: float) -> None:
     axes.axvline(begin, color=GREY, linewidth=0.7)
 
 
-def _catches(fit: ElbowFit) -> Figure:
-    # what all catches say of L and α, D, H and Q
+def catches_figure(fit: ElbowFit) -> Figure:
+    """Return what all catches say of L and α, D, H and Q."""
     catches, readings = residuals.catches(fit), residuals.catch_readings(fit)
     peaks = np.array([levels.peak for _, levels in readings])
     levels = np.array([levels.residual for _, levels in readings])
@@ -303,8 +289,8 @@ def _through_zero(
     axes.set_title(_parameter_text(fit, name, 3))
 
 
-def _residuals(fit: ElbowFit) -> Figure:
-    # residual torque against angle and time, and residual catch angles
+def residuals_figure(fit: ElbowFit) -> Figure:
+    """Return residual torque against angle and time, and residual catch angles."""
     has_fast = any(trial.after is not None for trial in fit.trials)
     has_line = not math.isnan(fit["catch_slope"].value)
     n_panels = 1 + has_fast + has_line
@@ -358,8 +344,8 @@ def _angle_residuals(axes: Axes, fit: ElbowFit) -> None:
     axes.set_ylabel("measured − fitted (deg)")
 
 
-def _friction(fit: FrictionFit) -> Figure:
-    # backdriving torque beside (7), against time and against speed
+def friction_figure(fit: FrictionFit) -> Figure:
+    """Return backdriving torque beside (7), against time and against speed."""
     figure = Figure(figsize=(6.7, 2.9))
     left, right = figure.subplots(1, 2, width_ratios=(1.3, 1.0), sharey=True)
     first = fit.strokes[0]

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from masrel.lab.report._figure_data import OrderDifferences, PlaceDots
+from masrel.lab.report._figure_data import PlaceDots
 from masrel.plots._style import (
     BLACK,
     BLUE,
@@ -26,21 +26,23 @@ _LETTERS = 30  # of a line of what is compared
 _LEAST_STEPS = 0.5  # to both sides of 0, so that little looks little
 
 
-def difference_figure(content: OrderDifferences) -> Figure:
+def difference_figure(
+    parts: Sequence[PlaceDots], effects: Sequence[tuple[str, float, float, float]]
+) -> Figure:
     """Return parts of sessions at the left if any, and effects at the right."""
-    n_axes = 1 + bool(content.parts)
-    high = max(1.0 + 0.42 * len(content.effects), 2.3)
+    n_axes = 1 + bool(parts)
+    high = max(1.0 + 0.42 * len(effects), 2.3)
     figure = Figure(figsize=(4.6 if n_axes == 1 else 7.6, high))
     *left, right = figure.subplots(1, n_axes, squeeze=False)[0]
     if left:
-        _draw_parts(left[0], content.parts)
-        if len(content.parts) > 1:
+        _draw_parts(left[0], parts)
+        if len(parts) > 1:
             figure.legend(
                 *left[0].get_legend_handles_labels(),
                 loc="outside lower center",
                 ncols=4,
             )
-    _draw_effects(right, content.effects)
+    _draw_effects(right, effects)
     return figure
 
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from masrel.lab.report._figure_data import OrderPanel, OrderPanels
+from masrel.lab.schedule._balance import OrderBalance
 from masrel.tables._tables import counted
 
 # from never to often: lighter to darker in a grey print, too
@@ -20,25 +20,24 @@ _MAX_NUMBERS = 16  # columns up to which numbers are written in the cells
 _MAX_NAMES = 30  # models whose names are written
 
 
-def order_figure(content: OrderPanels) -> Figure:
+def order_figure(panels: Sequence[OrderBalance]) -> Figure:
     """Return two heatmaps a session, one below the other."""
-    n_models = max(len(panel.models) for panel in content.panels)
-    n_places = max(len(panel.places[0]) for panel in content.panels)
+    n_models = max(len(panel.models) for panel in panels)
+    n_places = max(len(panel.places[0]) for panel in panels)
     high = 0.9 + min(6.0, max(1.6, 0.2 * n_models))
     wide = 2.2 + min(9.0, 0.2 * n_places + 0.2 * n_models + 2.0)
-    figure = Figure(figsize=(max(6.5, wide), high * len(content.panels) + 0.3))
+    figure = Figure(figsize=(max(6.5, wide), high * len(panels) + 0.3))
     rows = figure.subplots(
-        len(content.panels),
+        len(panels),
         2,
         squeeze=False,
         width_ratios=(min(max(n_places, n_models), 2 * n_models), n_models),
     )
-    for (left, right), panel in zip(rows, content.panels, strict=True):
+    for (left, right), panel in zip(rows, panels, strict=True):
         _draw(figure, left, panel, panel.places, None)
         _draw(figure, right, panel, panel.pairs, panel.models)
-        left.set_title(
-            f"{panel.title}: {counted(panel.n_schedules, 'schedule')}", loc="left"
-        )
+        of = ", ".join(filter(None, (panel.session, panel.site)))
+        left.set_title(f"{of}: {counted(panel.n_schedules, 'schedule')}", loc="left")
         left.set_xlabel("place in the session")
         left.set_ylabel("model")
         right.set_xlabel("the model right after it")
@@ -48,7 +47,7 @@ def order_figure(content: OrderPanels) -> Figure:
 def _draw(
     figure: Figure,
     axes: Axes,
-    panel: OrderPanel,
+    panel: OrderBalance,
     counts: Sequence[Sequence[int]],
     columns: Sequence[str] | None,
 ) -> None:

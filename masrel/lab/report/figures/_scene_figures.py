@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 
 from masrel.lab.report._figure_data import (
     CatchCurve,
-    CatchCurves,
     CatchSchematic,
-    Stretches,
     StretchLine,
     StretchPanel,
 )
@@ -42,18 +40,10 @@ _MARKERS = ((BLUE, "o"), (VERMILLION, "s"), (BLACK, "^"), (ORANGE, "D"), (GREY, 
 _NUMERALS = ("i", "ii", "iii", "iv")
 
 
-def scene_figure(content: Stretches | CatchCurves | CatchSchematic) -> Figure:
-    """Return a figure of stretches."""
-    if isinstance(content, Stretches):
-        return _stretches(content)
-    return (
-        _catches(content) if isinstance(content, CatchCurves) else _one_catch(content)
-    )
-
-
-def _stretches(stretches: Stretches) -> Figure:
-    # torque against angle, or torque and angle against time
-    panels, against = stretches.panels, stretches.against
+def stretch_figure(
+    panels: Sequence[StretchPanel], against: Literal["angle", "time"]
+) -> Figure:
+    """Return torque against angle, or torque and angle against time."""
     n_rows = 1 if against == "angle" else 2
     figure = Figure(figsize=(max(4.4, 0.6 + 2.1 * len(panels)), 2.2 + 1.3 * n_rows))
     grid = figure.subplots(
@@ -145,11 +135,11 @@ def _stretch_legend(
     )
 
 
-def _catches(catches: CatchCurves) -> Figure:
-    # catch angle, duration, and duration times speed, against mean speed
+def catch_figure(curves: Sequence[CatchCurve]) -> Figure:
+    """Return angle, duration, and duration times speed, against mean speed."""
     figure = Figure(figsize=(7.2, 3.1))
     angle, duration, travel = figure.subplots(1, 3)
-    for i, curve in enumerate(catches.curves):
+    for i, curve in enumerate(curves):
         look = _MARKERS[i % len(_MARKERS)]
         _catch_angles(angle, curve, look)
         _marks(duration, curve.catch_speed, curve.duration, curve.label, look)
@@ -207,8 +197,8 @@ def _marks(
     )
 
 
-def _one_catch(stretch: CatchSchematic) -> Figure:
-    # the torque of a stretch against time, with the parts of its catch named
+def schematic_figure(stretch: CatchSchematic) -> Figure:
+    """Return the torque of a stretch against time, the parts of its catch named."""
     figure = Figure(figsize=(5.4, 3.5))
     axes = figure.subplots()
     highest = max(float(stretch.torque.max()), stretch.peak)

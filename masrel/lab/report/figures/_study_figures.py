@@ -16,7 +16,6 @@ from masrel.lab.report._figure_data import (
     GradeGrid,
     GradesByAim,
     SpeedColumn,
-    SpeedDots,
 )
 from masrel.plots._cells import cells, name_columns
 from masrel.plots._style import (
@@ -160,25 +159,31 @@ def _draw_counts(
     axes.tick_params(axis="y", length=0)
 
 
-def speed_figure(dots: SpeedDots) -> Figure:
+def speed_figure(
+    columns: Sequence[SpeedColumn], raters: Sequence[str], slowest: float
+) -> Figure:
     """Return every rater's mean speed, one column a model."""
-    models = list(dict.fromkeys(column.model for column in dots.columns))
-    sessions = list(dict.fromkeys(column.session for column in dots.columns))
+    # columns by session and model; slowest: below it the catch angle stays the same
+    models = list(dict.fromkeys(column.model for column in columns))
+    sessions = list(dict.fromkeys(column.session for column in columns))
+    is_many = len(raters) > MANY_RATERS
     in_a_row = -(-len(models) // -(-len(models) // _MODELS_IN_A_ROW))  # even rows
     starts = range(0, len(models), in_a_row)
     width = min(8.8, max(4.6, 1.4 + 1.25 * in_a_row))
     figure = Figure(figsize=(width, 0.6 + 2.6 * len(starts)))
     rows = figure.subplots(len(starts), 1, sharey=True, squeeze=False)[:, 0]
     for axes, start in zip(rows, starts, strict=True):
-        _speed_row(axes, dots, models[start : start + in_a_row], sessions)
+        shown = models[start : start + in_a_row]
+        _speed_row(axes, columns, shown, sessions, is_many=is_many)
+        _mark_slowest(axes, slowest)
     rows[0].set_ylim(bottom=0)
     label = "haptic model"
-    if 1 < len(dots.raters) <= MANY_RATERS:
-        label += f"; in each, raters {dots.raters[0]} to {dots.raters[-1]} from left"
+    if len(raters) > 1 and not is_many:
+        label += f"; in each, raters {raters[0]} to {raters[-1]} from left"
     rows[-1].set_xlabel(label)
     for axes in rows:
         axes.set_ylabel("mean speed before\nthe catch (deg/s)")
-    marks = _speed_marks(sessions, has_many=len(dots.raters) > MANY_RATERS)
+    marks = _speed_marks(sessions, has_many=is_many)
     figure.legend(handles=marks, ncols=5, loc="outside lower center")
     return figure
 
@@ -202,10 +207,15 @@ def _speed_marks(sessions: Sequence[str], *, has_many: bool) -> list[Line2D]:
 
 
 def _speed_row(
-    axes: Axes, dots: SpeedDots, models: Sequence[str], sessions: Sequence[str]
+    axes: Axes,
+    columns: Sequence[SpeedColumn],
+    models: Sequence[str],
+    sessions: Sequence[str],
+    *,
+    is_many: bool,
 ) -> None:
     width = 0.76 / len(sessions)
-    for column in dots.columns:
+    for column in columns:
         if column.model not in models:
             continue
         session = sessions.index(column.session)
@@ -213,7 +223,7 @@ def _speed_row(
         marker, colour = _SESSION_LOOKS[session % len(_SESSION_LOOKS)]
         ends = [middle - 0.45 * width, middle + 0.45 * width]
         axes.plot(ends, [column.mean] * 2, color=BLACK, linewidth=1.6, zorder=2.5)
-        if len(dots.raters) > MANY_RATERS:
+        if is_many:
             _draw_spread(axes, column, middle, colour)
             continue
         axes.plot(
@@ -225,12 +235,21 @@ def _speed_row(
                 *_strip(column.graded, middle, width), "o", color=BLACK, markersize=8,
                 fillstyle="none",
             )  # fmt: skip
-    axes.axhline(dots.slowest, color=GREY, linewidth=0.8, linestyle=DASHES)
+    names = [short_name(model) for model in models]
+    is_long = max(map(len, names)) > _UPRIGHT_LETTERS
+    slanted: dict[str, Any] = {"rotation": 30, "ha": "right", "rotation_mode": "anchor"}
+    axes.set_xticks(range(len(models)), names, **slanted if is_long else {})
+    axes.set_xlim(-0.55, len(models) - 0.45)
+    axes.grid(axis="y")
+
+
+def _mark_slowest(axes: Axes, slowest: float) -> None:
+    axes.axhline(slowest, color=GREY, linewidth=0.8, linestyle=DASHES)
     # ν_L as two texts: to parse it as mathematics takes as long as to draw the rest
     for letter, size, offset in (("ν", 9.0, (3.0, 0.0)), ("L", 6.5, (8.5, -3.0))):
         axes.annotate(
             letter,
-            (1.0, dots.slowest),
+            (1.0, slowest),
             xycoords=("axes fraction", "data"),
             xytext=offset,
             textcoords="offset points",
@@ -239,12 +258,6 @@ def _speed_row(
             fontsize=size,
             style="italic",
         )
-    names = [short_name(model) for model in models]
-    is_long = max(map(len, names)) > _UPRIGHT_LETTERS
-    slanted: dict[str, Any] = {"rotation": 30, "ha": "right", "rotation_mode": "anchor"}
-    axes.set_xticks(range(len(models)), names, **slanted if is_long else {})
-    axes.set_xlim(-0.55, len(models) - 0.45)
-    axes.grid(axis="y")
 
 
 def _draw_spread(axes: Axes, column: SpeedColumn, middle: float, colour: str) -> None:

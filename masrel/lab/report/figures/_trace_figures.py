@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from masrel.lab.report._figure_data import MeasuredTorque, TraceColumns, TracePanel
+from masrel.lab.report._figure_data import MeasuredPanel, TracePanel
 from masrel.plots._style import BLACK, BLUE, GREY
 from masrel.plots._traces import (
     Quantity,
@@ -25,10 +25,9 @@ _GRADED = 2.2  # times as wide is a line of a stretch that a grade rests on
 _BAND = {"middle 90 %": "#E9EFF5", "middle 50 %": "#C9D9E8"}
 
 
-def trace_figure(columns: TraceColumns) -> Figure:
+def trace_figure(panels: Sequence[TracePanel], has_angle: bool) -> Figure:
     """Return torque and angle against time, one column a model, or torque alone."""
-    panels = columns.panels
-    if columns.has_angle:
+    if has_angle:
         figure, grid = _torque_above_angle(len(panels))
         for (top, bottom), panel in zip(grid.T, panels, strict=True):
             _draw_panel(top, panel, "torque")
@@ -81,12 +80,12 @@ def _small_panels(panels: Sequence[TracePanel]) -> tuple[Figure, NDArray[Any]]:
     return figure, grid
 
 
-def measured_figure(content: MeasuredTorque) -> Figure:
+def measured_figure(panels: Sequence[MeasuredPanel]) -> Figure:
     """Return the torque that was sent and that was measured, above the angle."""
-    figure, grid = _torque_above_angle(len(content.panels))
+    figure, grid = _torque_above_angle(len(panels))
     measured: dict[str, Any] = {"color": BLUE, "linewidth": 0.8}
     sent: dict[str, Any] = {"color": BLACK, "linewidth": 1.0, "dashes": (3, 1.5)}
-    for (top, bottom), panel in zip(grid.T, content.panels, strict=True):
+    for (top, bottom), panel in zip(grid.T, panels, strict=True):
         top.plot(panel.time, panel.measured, **measured)
         top.plot(panel.time, panel.sent, **sent)
         bottom.plot(panel.time, panel.angle, color=GREY, linewidth=1.0)

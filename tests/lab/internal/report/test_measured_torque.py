@@ -34,7 +34,8 @@ def test_the_first_session_and_rater_that_have_a_model_are_drawn(
     for place in ("retest_R1", "test_R2", "test_R1"):
         recorded(tmp_path / place / "A1.npz", "HM1")
     (drawing,) = blocks(tmp_path)
-    assert [panel.title for panel in drawing.content.panels] == ["HM1\nR1, test"]
+    (panels,) = drawing.content.arguments
+    assert [panel.title for panel in panels] == ["HM1\nR1, test"]
 
 
 def test_of_many_stretches_the_first_that_could_catch_is_drawn() -> None:

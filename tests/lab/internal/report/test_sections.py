@@ -11,7 +11,6 @@ from masrel.lab.elbow import ConstantSpeed, peak_torque
 from masrel.lab.protocol import elbow_parameters
 from masrel.lab.ratings import Ratings
 from masrel.lab.report._document import SECTIONS
-from masrel.lab.report._figure_data import SpeedDots, TraceColumns
 from masrel.lab.report._material import Material, gather
 from masrel.pages._sections import Drawing, Paragraph
 from masrel.plots import draw
@@ -272,8 +271,7 @@ def test_stretches_are_counted_and_the_one_a_grade_rests_on_is_marked() -> None:
     assert isinstance(summary, Table)
     assert summary.rows[0][:4] == ("HM1", "test", 2, 100.0)
     assert isinstance(dots, Drawing)
-    assert isinstance(dots.content, SpeedDots)
-    (column,) = dots.content.columns
+    ((column,), *_) = dots.content.arguments
     assert (column.speeds, column.graded) == (((120.0, 80.0),), ((80.0,),))
     assert "Ringed: the stretch" in dots.caption
     about, drawing, peaks = traces.blocks
@@ -281,8 +279,8 @@ def test_stretches_are_counted_and_the_one_a_grade_rests_on_is_marked() -> None:
     assert "one line a stretch" in about.text
     assert "A thicker line is the stretch" in about.text
     assert isinstance(drawing, Drawing)
-    assert isinstance(drawing.content, TraceColumns)
-    assert drawing.content.panels[0].graded == (False, True)
+    ((panel,), _) = drawing.content.arguments
+    assert panel.graded == (False, True)
     assert isinstance(peaks, Table)
     assert peaks.notes[-1] == "Of several stretches the largest peak is given."
     (counted, *_) = grades.blocks

@@ -1,5 +1,6 @@
 """The figure of a law of tone: torque against angle, and torque and angle in time."""
 
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -7,17 +8,54 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
+from numpy.typing import NDArray
 
-from masrel.lab.report._figure_data import ToneView
-from masrel.plots._style import BLACK, BLUE, GREY, ORANGE, SHADES, VERMILLION
+from masrel.plots._style import (
+    BLACK,
+    BLUE,
+    GREY,
+    ORANGE,
+    SHADES,
+    VERMILLION,
+    finished,
+    house_style,
+)
 
 _COLOURS = (BLUE, VERMILLION, ORANGE, GREY)
 _BACK = (0, (4, 1.6))  # line style of the way back
 _LETTERS = "abcdefgh"
 
 
-def tone_figure(view: ToneView) -> Figure:
-    """Return the figure of one law."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToneLine:
+    """One joint along a motion."""
+
+    label: str  # what tells it from the others, such as its grade
+    # (n_points,): s, deg, N·m; where the torque jumps, two points are near
+    time: NDArray[np.float64] = field(compare=False, repr=False)
+    angle: NDArray[np.float64] = field(compare=False, repr=False)
+    torque: NDArray[np.float64] = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToneView:
+    """A law of tone along one motion: torque against angle, and both against time."""
+
+    lines: tuple[ToneLine, ...]  # at most four, of one motion
+    shown: int  # which of them has its events marked
+    parts: tuple[tuple[str, float, float], ...]  # name, first and last time, s
+    events: tuple[tuple[str, float], ...]  # name, time, s
+    rendered: ToneLine  # that line as a device made it, its angle the arm's
+
+
+def draw(view: ToneView) -> bytes:
+    """Return the figure of one law as a PNG."""
+    with house_style():
+        files = finished(_figure(view), stamp="SIMULATED DATA", forms=("png",))
+    return files["png"]
+
+
+def _figure(view: ToneView) -> Figure:
     figure = Figure(figsize=(7.2, 4.0))
     grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.15), height_ratios=(1.9, 1.0))
     across, torque = figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[0, 1])
