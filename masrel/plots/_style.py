@@ -155,7 +155,9 @@ def stacked(pictures: Sequence[tuple[str, Picture]]) -> Figure:
     rows = figure.subplots(len(pictures), squeeze=False, height_ratios=heights)
     for ax, (title, picture) in zip(rows[:, 0], pictures, strict=True):
         picture.draw(ax)
-        ax.set_title(title, loc="left")
+        outer = ax.get_tightbbox(for_layout_only=True) if title else None
+        above = 0.0 if outer is None else outer.y1 - ax.bbox.y1  # names of columns
+        ax.set_title(title, loc="left", pad=6.0 + above)
     return figure
 
 

@@ -14,7 +14,8 @@ from masrel.errors import ParameterError
 from masrel.intervals import diagnose
 from masrel.plots import categories, confusion, grades, items
 from masrel.plots._cells import letters_on
-from masrel.plots._grades import items_picture
+from masrel.plots._grades import confusion_picture, items_picture
+from masrel.plots._style import house_style, stacked
 from tests.plots.made import LONG, blank, diagnosis, overlaps, texts_of
 
 # Kim gives a to the first two items and b to the others; Ann has no last item.
@@ -242,9 +243,9 @@ def test_what_does_not_fit_is_refused(call: Callable[[], Axes], message: str) ->
     assert plt.get_fignums() == []
 
 
-@pytest.mark.parametrize("n_raters", [2, 8, 30, 50])
 @pytest.mark.parametrize(
-    ("q", "words"), [(2, False), (5, True), (12, False), (60, False)]
+    ("n_raters", "q", "words"),
+    [(2, 2, False), (8, 5, True), (30, 12, False), (30, 5, True), (50, 60, False)],
 )
 def test_no_text_lies_on_another_or_is_cut_off(
     n_raters: int, q: int, words: bool
@@ -255,3 +256,12 @@ def test_no_text_lies_on_another_or_is_cut_off(
         assert overlaps(draw(table, raters=names)) == []
     assert overlaps(confusion(table, raters=names, reference=LONG)) == []
     assert overlaps(categories(diagnose(table))) == []
+
+
+def test_a_title_stands_above_the_names_of_columns() -> None:
+    counts, heads = np.eye(2, dtype=int), (["a grade", "another grade"], ("A", "B"))
+    with house_style():
+        figure = stacked(
+            [("the first of two", confusion_picture(counts, *heads, True))]
+        )
+        assert overlaps(figure.axes[0]) == []
