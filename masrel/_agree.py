@@ -22,6 +22,7 @@ from masrel.tables._tables import Table, as_html, as_text
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
 
 _Options = TypeVar("_Options", Reading, Estimating)
 
@@ -116,6 +117,49 @@ class Agreement:
         return agreement_sentences(
             self.answer, bands=self.estimating.words, data=self._screen("usual").data
         )
+
+    def to_html(self) -> str:
+        """Return one page with results, pictures, items to discuss and methods.
+
+        It needs no other file, and is what ``masrel agree FILE --html`` writes.
+        """
+        from masrel.pages._answer_page import answer_page
+
+        return answer_page(self.file, self.estimating, [self.answer])
+
+    def plot(
+        self, picture: str = "forest", *, group: str = "", ax: "Axes | None" = None
+    ) -> "Axes":
+        """Draw a picture of the ratings or their estimates, and return its axes.
+
+        Parameters
+        ----------
+        picture : str, optional
+            forest, pairs, confusion, bland_altman, grades, categories, items or
+            components.
+        group : str, optional
+            Of which group, where groups or sessions are told apart; the first unless
+            given.
+        ax : Axes, optional
+            Where it is drawn; on a new figure of pyplot unless given.
+
+        Returns
+        -------
+        Axes
+            Those that it is drawn on.
+
+        Raises
+        ------
+        ParameterError
+            If these ratings have no such picture, or no such group.
+        """
+        from masrel.pages._pictures import picture_of
+        from masrel.plots import _on_axes
+
+        drawn = picture_of(
+            picture, self.file, self.estimating, [self.answer], group=group
+        )
+        return _on_axes(drawn, ax)
 
     def __str__(self) -> str:
         return as_text(self._screen("brief"), width=_WIDTH)

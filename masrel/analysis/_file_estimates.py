@@ -412,7 +412,7 @@ def agreement(file: "RatingsFile", questions: Questions) -> Answer:
     return Answer(
         name="agreement",
         heads=heads,
-        of=file.read["file"],
+        of=Path(file.read["file"]).name,
         estimates=tuple(estimates),
     )
 

@@ -15,6 +15,7 @@ from masrel._input import refuse, split_names
 from masrel.analysis._file_estimates import USUAL, Answer, Questions
 from masrel.cli._options import (
     OutputOptions,
+    call_text,
     echo_notes,
     grouped,
     output_options,
@@ -187,6 +188,8 @@ def file_command(
             json="Write a record of all here; - prints it, and nothing else, on "
             "stdout.",
             figure=figure,
+            html="Write a page here: results, pictures, methods to paste; it needs "
+            "no other file.",
             csv="Print every digit as CSV.",
             latex="Print a LaTeX table.",
             sentence=sentence,
@@ -214,6 +217,7 @@ def _show_answers(
     ratings = read_file(file, reading)
     questions = questions.on_scale(ratings)
     from masrel.analysis._file_questions import answers
+    from masrel.pages._answer_page import answer_page
     from masrel.tables._answer_tables import agreement_sentences
     from masrel.tables._first_screen import (
         first_screen,
@@ -250,6 +254,9 @@ def _show_answers(
         ),
         text=sentences if is_sentence else lambda: table,
         figure=lambda: _figure(answered, questions),
+        html=lambda: answer_page(
+            others, questions, answered, call=call_text(), items=output.item_name
+        ),
         stamp=SIMULATED if others.simulated else "",
         notes=(*table.read, *notes),
         more=more,

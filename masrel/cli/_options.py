@@ -1,6 +1,7 @@
 """Options that several verbs have, as one argument each, and what verbs print."""
 
 import json
+import shlex
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -59,6 +60,7 @@ class OutputOptions:
 
     json_file: Path | None = None  # where JSON goes; "-" is the screen
     figure: Path | None = None  # where a figure goes
+    html: Path | None = None  # where a page goes
     # csv, latex: in which form the table is printed; as text when neither
     csv: bool | None = None  # None where a command has no such table
     raw_csv: bool = False  # whether cells of CSV are as they are
@@ -102,6 +104,7 @@ def output_options(
     *,
     json: str | None = None,
     figure: str | None = None,
+    html: str | None = None,
     csv: str | None = None,
     raw_csv: str | None = None,
     latex: str | None = None,
@@ -118,6 +121,7 @@ def output_options(
     options = [
         (json, click.option("--json", "json_file", type=json_path, help=json)),
         (figure, click.option("--figure", type=figures, help=figure)),
+        (html, click.option("--html", type=figures, help=html)),
         (csv, click.option("--csv", is_flag=True, help=csv)),
         (raw_csv, click.option("--raw-csv", is_flag=True, help=raw_csv)),
         (latex, click.option("--latex", is_flag=True, help=latex)),
@@ -134,6 +138,7 @@ def write_output(
     document: Callable[[], dict[str, object]],
     text: "Callable[[], Table | str]",
     figure: "Callable[[], Drawn] | None" = None,
+    html: Callable[[], str] | None = None,
     stamp: str = "",
     notes: tuple[str, ...] = (),
     more: "Sequence[Table]" = (),
@@ -160,6 +165,9 @@ def write_output(
         form = _FORMS[output.figure.suffix.lower()]
         write_file(output.figure, draw(figure(), stamp=stamp, forms=(form,))[form])
         click.echo(f"figure: {output.figure}", err=True)
+    if html is not None and output.html is not None:
+        write_file(output.html, html())
+        click.echo(f"page: {output.html}", err=True)
 
 
 def _shown(part: "Table | str", output: OutputOptions, width: int | None) -> str:
@@ -191,6 +199,11 @@ def write_json(document: dict[str, object], file: Path) -> None:
     except UnicodeEncodeError:  # escapes of JSON for letters that it cannot show
         text = json.dumps(document, indent=1)
     click.echo(text)
+
+
+def call_text() -> str:
+    """Return this call as it is typed in a shell."""
+    return shlex.join(["masrel", *sys.argv[1:]])
 
 
 _NOTES = "masrel.notes"

@@ -8,6 +8,7 @@ import click
 
 from masrel.cli._options import (
     OutputOptions,
+    call_text,
     echo_notes,
     grouped,
     output_options,
@@ -46,6 +47,7 @@ _DRAWER = "masrel.plots._latent_scale:latent_picture"
 @output_options(
     json="Write the result here; - prints it, and nothing else, on stdout.",
     figure="Draw the scale into this .png, .svg or .pdf.",
+    html="Write a page here that needs no other file.",
     csv="Print every digit as CSV.",
     quiet="No progress.",
 )
@@ -81,6 +83,7 @@ def latent(
 
     from masrel.agreement import code_ratings
     from masrel.intervals import latent_trait
+    from masrel.pages._answer_page import latent_page
     from masrel.plots._drawn_values import Drawn
     from masrel.tables._latent_trait import latent_document, latent_table
     from masrel.tables._tables import SIMULATED
@@ -100,15 +103,15 @@ def latent(
             progress=report,
             rng=seed,
         )
+    shown = latent_table(
+        result, read=read, data="simulated" if simulated else "foreign"
+    )
     write_output(
         output,
         document=lambda: latent_document(result),
-        text=lambda: latent_table(
-            result,
-            read=read,
-            data="simulated" if simulated else "foreign",
-        ),
+        text=lambda: shown,
         figure=lambda: Drawn(_DRAWER, (result, grades)),
+        html=lambda: latent_page(ratings, result, shown, call=call_text()),
         stamp=SIMULATED if simulated else "",
         notes=read,
     )

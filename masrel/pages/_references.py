@@ -74,3 +74,20 @@ def _author_year(key: str) -> str:
     if len(surnames) > 2 or surnames[-1] == "others":
         return f"{surnames[0]} et al., {year[1]}"
     return f"{' & '.join(surnames)}, {year[1]}"
+
+
+def reference_texts(keys: Iterable[str]) -> list[str]:
+    """Return references as a paper lists them."""
+    return sorted(map(_reference_text, set(keys)))
+
+
+def _reference_text(key: str) -> str:
+    fields = dict(re.findall(r"^  (\w+) = \{(.*)\},?$", _entries()[key], re.M))
+    fields = {name: re.sub("[{}]", "", text) for name, text in fields.items()}
+    authors = ", ".join(fields["author"].split(" and ")).replace(", others", " et al.")
+    where = fields.get("journal") or fields.get("booktitle") or fields["publisher"]
+    number = f"({fields['number']})" if "number" in fields else ""
+    parts = (where, f"{fields.get('volume', '')}{number}", fields.get("pages", ""))
+    listed = ", ".join(filter(None, parts)).replace("--", "–")
+    doi = f" https://doi.org/{fields['doi']}" if "doi" in fields else ""
+    return f"{authors} ({fields['year']}). {fields['title']}. {listed}.{doi}"

@@ -5,7 +5,8 @@ In: sections of paragraphs, tables, pictures and listings. Out: HTML.
 
 import base64
 import html
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -106,6 +107,29 @@ class Document:
     version: str  # of masrel
 
 
+def chapters(sections: Sequence[Section], *, stamp: str) -> tuple[Chapter, ...]:
+    """Return sections with their blocks numbered and their pictures drawn."""
+    # Imported here: a page without pictures loads nothing that draws.
+    from masrel.plots import draw
+
+    numbers: Counter[type] = Counter()
+    made = []
+    for section in sections:
+        blocks = []
+        for content in section.blocks:
+            numbers[type(content)] += 1
+            pictures: dict[str, bytes] = {}
+            if isinstance(content, Drawing):
+                inline = draw(content.content, stamp=stamp, forms=("inline",))
+                pictures = {str(form): data for form, data in inline.items()}
+            number = numbers[type(content)]
+            blocks.append(Block(number=number, content=content, pictures=pictures))
+        made.append(
+            Chapter(name=section.name, title=section.title, blocks=tuple(blocks))
+        )
+    return tuple(made)
+
+
 TEMPLATES = Path(__file__).with_name("templates")
 
 
@@ -120,7 +144,12 @@ def html_page(document: Document) -> str:
         undefined=StrictUndefined,
         keep_trailing_newline=True,
     )
-    environment.filters |= {"symbols": _symbols, "cells": page_cells, "uri": _uri}
+    environment.filters |= {
+        "symbols": _symbols,
+        "cells": page_cells,
+        "uri": _uri,
+        "svg": _svg,
+    }
     style = (TEMPLATES / "page.css").read_text(encoding="utf-8")
     template = environment.get_template("page.html")
     return template.render(document=document, style=style)
@@ -130,6 +159,19 @@ def _uri(picture: bytes) -> str:
     # An image of its own, not inline: ids inside two SVGs would collide.
     encoded = base64.b64encode(picture).decode("ascii")
     return f"data:image/svg+xml;base64,{encoded}"
+
+
+def _svg(picture: bytes, alt: str) -> str:
+    # an element of the page, in its colours, which a reader hears as an image; on a
+    # narrow screen it shrinks as far as its letters can be read
+    svg = picture.decode()
+    width = float(svg.split('width="', 1)[1].split("pt", 1)[0])
+    names = f'<svg role="img" aria-label="{html.escape(alt)}" '
+    least = f'style="min-width: {_READABLE * width:.0f}pt" '
+    return svg.replace("<svg ", names + least, 1)
+
+
+_READABLE = 0.7  # of its size
 
 
 def _symbols(text: str) -> str:

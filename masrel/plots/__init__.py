@@ -9,11 +9,13 @@ import importlib
 import os
 import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from masrel.plots._drawn_values import Drawn, Form
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from masrel.plots._components import components
     from masrel.plots._forest import forest
     from masrel.plots._grades import categories, confusion, grades, items
@@ -84,15 +86,27 @@ def draw(
     from masrel.plots._style import Picture, finished, house_style, stacked
 
     with house_style():
-        module, _, function = content.drawer.partition(":")
-        # one figure loads what no other needs
-        drawer = getattr(importlib.import_module(module), function)
-        drawn = drawer(*content.arguments)
+        drawn = _drawn(content)
         if isinstance(drawn, Picture):
             drawn = stacked([("", drawn)])
         elif isinstance(drawn, list):
             drawn = stacked(drawn)
         return finished(drawn, stamp=stamp, forms=forms)
+
+
+def _on_axes(content: Drawn, ax: "Axes | None") -> "Axes":
+    """Draw the first picture on axes, or on those of a new figure of pyplot."""
+    _load_matplotlib()
+    from masrel.plots._style import shown
+
+    drawn = _drawn(content)
+    return shown(drawn[0][1] if isinstance(drawn, list) else drawn, ax)
+
+
+def _drawn(content: Drawn) -> Any:
+    # what its function gives; one figure loads what no other needs
+    module, _, function = content.drawer.partition(":")
+    return getattr(importlib.import_module(module), function)(*content.arguments)
 
 
 def _load_matplotlib() -> None:

@@ -204,7 +204,8 @@ def finished(
     figure: Figure, *, stamp: str, forms: Sequence[Form] = ("png", "svg")
 ) -> dict[Form, bytes]:
     """Return the files of a figure of the house style, under its stamp."""
-    complete_fonts(figure)
+    if set(forms) - {"inline"}:  # whose letters are the reader's
+        complete_fonts(figure)
     files: dict[Form, bytes] = {}
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph")  # which was said of all at once

@@ -147,7 +147,7 @@ _OF_ESTIMATES = (
     Column(key="n_raters", heading="Raters"),
 )
 
-_CONVENTIONS = {
+CONVENTIONS = {
     "irrcac": "SE and interval: as irrCAC prints them.",
     "spss": "SE and interval: as SPSS prints them; the SE of Fleiss' κ holds only if κ "
     "is 0, and its interval may cover far less than it says.",
@@ -204,7 +204,7 @@ def answer_table(
         columns,
         shown,
         hide_empty=answer.name.startswith("diagnosis") and not answer.grades,
-        in_units=tuple(at for at, row in enumerate(estimates) if _is_in_units(row)),
+        in_units=tuple(at for at, row in enumerate(estimates) if is_in_units(row)),
         notes=(*notes, *_row_notes(named, by, detail), *after),
         data=data,
     )
@@ -302,7 +302,8 @@ def answer_documents(
     ]
 
 
-def _is_in_units(row: AgreementRow) -> bool:
+def is_in_units(row: AgreementRow) -> bool:
+    """Return whether an estimate is in the units of the ratings."""
     entry = COEFFICIENTS.get(row.estimate.coefficient)  # none of kappa of a category
     return entry is not None and entry.in_units
 
@@ -377,7 +378,7 @@ def _errors_note(rows: Sequence[AgreementRow], in_sentences: bool) -> list[str]:
     are_clustered = {unit == "clusters" for unit in units}
     samples = {True: "clusters", False: "items"}
     conventions = {row.convention for row in rows}
-    notes = [text for name, text in _CONVENTIONS.items() if name in conventions]
+    notes = [text for name, text in CONVENTIONS.items() if name in conventions]
     return notes + [
         Explanation(f"SE: delta method, {sample} as the sample.")
         for is_clustered, sample in samples.items()
@@ -467,7 +468,7 @@ def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> "Drawn":
     from masrel.plots._drawn_values import FOREST, Drawn
 
     # what is in the units of the ratings is on no axis of agreement
-    rows = [row for row in rows if not _is_in_units(row)]
+    rows = [row for row in rows if not is_in_units(row)]
     if not rows:
         raise ParameterError(
             "--figure: shows coefficients of agreement, got only estimates in the "
@@ -475,7 +476,7 @@ def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> "Drawn":
         )
     population = _POPULATIONS[target]
     several = len({row.group for row in rows}) > 1
-    drawn = []
+    drawn, label = [], "agreement (1 is perfect)"
     for row in rows:
         # what neither the axis nor the legend says of the interval
         details = []
@@ -486,5 +487,7 @@ def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> "Drawn":
         group = row.group if several else ""
         detail = ", ".join(details)
         drawn.append(forest_row(row.title, row.estimate, detail=detail, group=group))
-    label = f"agreement (1 is perfect); intervals for other {population}"
+    intervals = (row.estimate.interval for row in rows)
+    if any(of is not None and of.reason is None for of in intervals):
+        label += f"; intervals for other {population}"
     return Drawn(FOREST, (tuple(drawn), label))

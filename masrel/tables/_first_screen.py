@@ -48,7 +48,7 @@ def first_screen(
         for answer in answered
     ]
     if is_text:
-        at, text = _result(answered, items)
+        at, text = result_sentence(answered, items)
         tables[at] = replace(tables[at], notes=(text, *tables[at].notes))
         tables[0] = replace(tables[0], caption="")
     first, *more = tables
@@ -172,7 +172,7 @@ _RESULTS = {
 """Answers to a number that must be there, and what is said of its row."""
 
 
-def _result(answered: Sequence[Answer], items: str) -> tuple[int, str]:
+def result_sentence(answered: Sequence[Answer], items: str) -> tuple[int, str]:
     """Return the place of the answer that says most, and what it says."""
     for at in reversed(range(len(answered))):
         name, rows, of = answered[at].name, answered[at].shown or (), answered[at].of

@@ -174,11 +174,14 @@ def percent(share: float) -> str:
     return f"{(Decimal(repr(float(share))) * 100).normalize():f}"
 
 
-def interval_text(low: float, high: float, digits: int = 3) -> str:
+def interval_text(
+    low: float, high: float, digits: int = 3, *, in_units: bool = False
+) -> str:
     """Return the ends of an interval in brackets."""
     if math.isnan(low) or math.isnan(high):
         return f"[{UNDEFINED}]"
-    return f"[{number(low, digits)}, {number(high, digits)}]"
+    ends = (number(end, digits, in_units=in_units) for end in (low, high))
+    return f"[{', '.join(ends)}]"
 
 
 def p_text(p: Value) -> str:

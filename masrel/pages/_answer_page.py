@@ -1,0 +1,295 @@
+"""The page of what was asked of a file of ratings.
+
+In: the ratings, the questions and their answers. Out: one HTML page with the result,
+its tables and pictures, items to discuss, methods to paste, and what repeats it.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from masrel.analysis._file_estimates import Answer, Questions
+from masrel.pages._methods_text import latent_methods, methods
+from masrel.pages._pictures import PICTURES, PartSeen, forest_drawing, parts_seen
+from masrel.pages._references import reference_texts
+from masrel.pages._sections import (
+    Content,
+    Document,
+    Drawing,
+    Paragraph,
+    Section,
+    chapters,
+    html_page,
+)
+from masrel.plots._drawn_values import Drawn
+from masrel.ratings import RatingsFile
+from masrel.tables._first_screen import (
+    first_screen,
+    lacks_interval,
+    reading_warnings,
+    result_sentence,
+    what_was_read,
+)
+from masrel.tables._tables import (
+    SIMULATED,
+    Column,
+    Table,
+    counted,
+    interval_text,
+    number,
+    percent,
+    table_of,
+    tag_of,
+)
+
+if TYPE_CHECKING:
+    from masrel.intervals import LatentTrait
+
+_MOST_PARTS = 4  # whose pictures are all shown
+_MOST_LISTED = 12  # items
+_MOST_NAMED = 8  # raters whose grades have a column each
+_TITLES = {
+    "compare": "Agreement of groups in",
+    "diagnose": "Raters, pairs and grades in",
+    "limits": "Limits of agreement of the raters in",
+}
+"""Commands to what their page is called; it begins with their own tables."""
+
+_PICTURED = {
+    "raters": "Raters",
+    "grades": "Grades",
+    "items": "Items to discuss",
+    "variance": "Where the variance lies",
+}
+"""Sections of pictures in the order of a page."""
+
+_NO_INTERVAL = (
+    'No interval was asked for. --target items (in Python target="items") gives one '
+    "for other items like these, raters or both for other raters."
+)
+
+
+def answer_page(
+    file: RatingsFile,
+    questions: Questions,
+    answers: Sequence[Answer],
+    *,
+    call: str = "",
+    items: str = "items",
+) -> str:
+    """Return the page of answers; call: the command that repeats it."""
+    sections = [
+        _result_section(file, questions, answers, items),
+        *_picture_sections(file, questions, answers),
+    ]
+    blocks = [block for section in sections for block in section.blocks]
+    drawn = [block.name for block in blocks if isinstance(block, Drawing)]
+    sections.append(_methods_section(file, answers, drawn, items))
+    _, sentence = result_sentence(answers, items)
+    options = {
+        name: value
+        for name, value in questions.record().items()
+        if value is not None and not isinstance(value, list)
+    }
+    listed = ", ".join(f"{name} {value}" for name, value in options.items())
+    of = f"coefficients {', '.join(questions.names)}, {listed}"
+    title = _TITLES.get(questions.command, "Agreement of the raters in")
+    title += f" {Path(file.read['file']).name}"
+    how = {"Command": call} if call else {"Options": of}
+    return _page(file, title, sentence, sections, how)
+
+
+def _page(
+    file: RatingsFile,
+    title: str,
+    result: str,
+    sections: Sequence[Section],
+    inputs: Mapping[str, str],
+) -> str:
+    stamp = SIMULATED if file.simulated else ""
+    # what repeats it: the command or else the options, and what it was made of
+    digest = f"SHA-256 of {Path(file.read['file']).name}"
+    known = {**inputs, digest: file.sha256()}
+    return html_page(
+        Document(
+            title=title,
+            tag=tag_of("simulated" if file.simulated else "foreign"),
+            banner=f"{stamp} – no person gave these grades" if stamp else "",
+            provenance=" ".join(what_was_read(file)),
+            result=result,
+            sections=chapters(sections, stamp=stamp),
+            inputs=tuple((name, value) for name, value in known.items() if value),
+            version=version("masrel"),
+        )
+    )
+
+
+def _result_section(
+    file: RatingsFile, questions: Questions, answers: Sequence[Answer], items: str
+) -> Section:
+    first, *more = (
+        _with_interval(table, questions.level)
+        for table in first_screen(
+            file, questions, answers, detail="all", items=items, is_text=False
+        )
+    )
+    notes = [f"Warning: {text}." for text in reading_warnings(file, answers[0])]
+    if questions.target is None and lacks_interval(answers[0]):
+        notes.append(_NO_INTERVAL)
+    forest = forest_drawing(answers, questions)
+    blocks: list[Content] = [
+        first,
+        *([] if forest is None else [forest]),
+        *(Paragraph(text=text, absent=True) for text in notes),
+    ]
+    if questions.command in _TITLES:  # which have an answer of their own
+        blocks = [*more, *blocks]
+    else:
+        blocks += more
+    return Section(name="result", title="Result", blocks=tuple(blocks))
+
+
+def _with_interval(table: Table, level: float) -> Table:
+    """Return a table whose interval is one column, right after what it is of."""
+    keys = [column.key for column in table.columns]
+    if not {"low", "high"} <= set(keys):
+        return table
+    low, high = keys.index("low"), keys.index("high")
+    has_any = any(row[low] is not None for row in table.rows)
+    beside = ("standard_error", "median")
+    of = max(at for at in range(low) if keys[at] not in beside)
+    order = [at for at in range(len(keys)) if at not in (low, high)]
+    place = order.index(of) + 1
+    column = Column(
+        key="interval",
+        heading=f"{percent(level)} % interval",
+        align="center",
+        where="everywhere" if has_any else "csv",
+    )
+    columns = [table.columns[at] for at in order]
+    columns.insert(place, column)
+    rows = []
+    for at, row in enumerate(table.rows):
+        cells = [row[at] for at in order]
+        ends, text = (row[low], row[high]), None
+        if isinstance(ends[0], float) and isinstance(ends[1], float):
+            text = interval_text(ends[0], ends[1], in_units=at in table.in_units)
+        cells.insert(place, text)
+        rows.append(tuple(cells))
+    return replace(table, columns=tuple(columns), rows=tuple(rows))
+
+
+def _picture_sections(
+    file: RatingsFile, questions: Questions, answers: Sequence[Answer]
+) -> Iterator[Section]:
+    every = parts_seen(file, questions, answers)
+    parts = every[:_MOST_PARTS]
+    for name, title in _PICTURED.items():
+        blocks: list[Content] = [
+            drawing
+            for section, make in PICTURES.values()
+            if section == name
+            for part in parts
+            if (drawing := make(part)) is not None
+        ]
+        if name == "items":
+            blocks[:0] = [
+                table for part in parts if (table := _items_table(part)) is not None
+            ]
+        if blocks and len(every) > _MOST_PARTS:
+            text = f"Of the first {_MOST_PARTS} of {len(every)} groups."
+            blocks.insert(0, Paragraph(text=text, absent=True))
+        if blocks:
+            yield Section(name=name, title=title, blocks=tuple(blocks))
+
+
+def _items_table(seen: PartSeen) -> Table | None:
+    """Return the items that raters disagree on most, with what each rater gave."""
+    places = seen.disputed[:_MOST_LISTED]
+    if seen.coded is None or places.size == 0:
+        return None
+    grades, codes = seen.file.scale.grades, seen.coded.codes[places]
+    raters = seen.raters if len(seen.raters) <= _MOST_NAMED else []
+    columns = [
+        Column(key="item", heading="Item", align="left"),
+        Column(key="disagreement", heading="Disagreement", digits=3),
+        *(Column(key=f"rater {at}", heading=of) for at, of in enumerate(raters)),
+        Column(key="grades", heading="Grades", align="left"),
+    ]
+    rows = []
+    for place, row in zip(places, codes.tolist(), strict=True):
+        counts = [(row.count(code), of) for code, of in enumerate(grades)]
+        rows.append(
+            {
+                "item": seen.items[place],
+                "disagreement": float(seen.disagreement[place]),
+                **{
+                    f"rater {at}": grades[code] if code >= 0 else None
+                    for at, code in enumerate(row[: len(raters)])
+                },
+                "grades": None
+                if raters
+                else ", ".join(f"{of} ×{n}" for n, of in counts if n),
+            }
+        )
+    of_part = f"{seen.group}: " if seen.group else ""
+    return table_of(
+        "items_to_discuss",
+        f"{of_part}{counted(len(rows), 'item')} that raters disagree on most",
+        columns,
+        rows,
+        hide_empty=True,
+        notes=(
+            "Disagreement: of the pairs of ratings of an item, "
+            + (
+                "the share that differs."
+                if seen.distance == "identity"
+                else f"how far they differ on average ({seen.distance} weights)."
+            ),
+        ),
+        data="simulated" if seen.file.simulated else "foreign",
+    )
+
+
+def _methods_section(
+    file: RatingsFile, answers: Sequence[Answer], pictures: Sequence[str], items: str
+) -> Section:
+    text, keys = methods(file, answers, pictures, items)
+    blocks = [Paragraph(text=text) for text in (text, *reference_texts(keys))]
+    return Section(name="methods", title="Methods, to paste", blocks=tuple(blocks))
+
+
+def latent_page(
+    file: RatingsFile, result: "LatentTrait", table: Table, *, call: str = ""
+) -> str:
+    """Return the page of a latent-trait model of ratings, whose table is given."""
+    kappa, grades = result.kappa, file.scale.grades
+    low, high = (getattr(kappa.interval, end, math.nan) for end in ("low", "high"))
+    level = getattr(kappa.interval, "level", 0.95)
+    alt = "; ".join(f"{of.name} {number(of.value, 2)}" for of in result.thresholds)
+    drawing = Drawing(
+        name="latent",
+        caption="Items, thresholds between grades and raters on one scale: posterior "
+        f"medians (dots) with {percent(level)} % credible intervals, and each rater's "
+        "noise (shaded).",
+        alt=f"The latent scale. Thresholds: {alt}.",
+        content=Drawn("masrel.plots._latent_scale:latent_picture", (result, grades)),
+        stamp="",
+    )
+    blocks = (_with_interval(replace(table, read=()), level), drawing)
+    text, keys = latent_methods(file, result)
+    paper = [Paragraph(text=text) for text in (text, *reference_texts(keys))]
+    return _page(
+        file,
+        f"Latent trait of the ratings in {Path(file.read['file']).name}",
+        f"Two new raters agree with κ {number(kappa.value, 3)} "
+        f"({percent(level)} % credible interval {interval_text(low, high)}).",
+        [
+            Section(name="result", title="Result", blocks=blocks),
+            Section(name="methods", title="Methods, to paste", blocks=tuple(paper)),
+        ],
+        {"Command": call, "Seed": str(result.seed)},
+    )

@@ -1,0 +1,374 @@
+"""The pictures that ratings have, each a row: when it can be drawn, and of what.
+
+In: the ratings of a part of a file, and what was answered of them. Out: drawings with
+captions, for a page or for axes.
+"""
+
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from masrel._input import check_option
+from masrel.agreement import (
+    COEFFICIENTS,
+    CodedRatings,
+    Coefficient,
+    code_ratings,
+    coefficient,
+    contingency_table,
+    item_disagreement,
+    limits_of_agreement,
+    variance_components,
+)
+from masrel.analysis._file_estimates import Answer, Questions, on_grades, parts_of
+from masrel.errors import MasrelError, MasrelWarning, ParameterError
+from masrel.pages._sections import Drawing
+from masrel.plots._drawn_values import Drawn
+from masrel.ratings import RatingsFile, RatingsPart
+from masrel.tables._answer_tables import agreement_forest, is_in_units
+from masrel.tables._tables import counted, number, percent
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from masrel.intervals import Diagnosis
+
+_MOST_GRADES = 20  # of which each has a place in a picture
+_MOST_RATERS = 60
+_MOST_RATINGS = 5_000_000  # that are laid out item by item
+_SHOWN = 30  # items that raters disagree on most
+
+_GRADES = "masrel.plots._grades"
+
+
+@dataclass(kw_only=True)
+class PartSeen:
+    """The ratings of a part of a file, and what pictures show of them."""
+
+    file: RatingsFile
+    part: RatingsPart
+    group: str  # what the part is called; nothing where it is all
+    questions: Questions
+    answers: Sequence[Answer]
+
+    @cached_property
+    def coded(self) -> CodedRatings | None:
+        """The ratings item by item; None where it is unknown who gave which."""
+        rows = self.part.counted
+        n_ratings = int(rows.freq.sum()) * rows.codes.shape[1]
+        if not rows.knows_raters or not 0 < n_ratings <= _MOST_RATINGS:
+            return None
+        return code_ratings(self.part.ratings)
+
+    @property
+    def raters(self) -> list[str]:
+        """Their names, or else their places."""
+        n_raters = 0 if self.coded is None else self.coded.codes.shape[1]
+        return list(self.part.raters or map(str, range(1, n_raters + 1)))
+
+    @property
+    def has_few_grades(self) -> bool:
+        """Whether each grade has room in a picture, and is no measurement."""
+        measured = any(of.code == "measurements" for of in self.file.warnings)
+        return 2 <= len(self.file.scale.grades) <= _MOST_GRADES and not measured
+
+    @property
+    def entry(self) -> Coefficient:
+        """The first coefficient that allows for chance and is made of sums."""
+        names = [
+            row.estimate.coefficient for of in self.answers for row in of.estimates
+        ]
+        of_all = [COEFFICIENTS[name] for name in names if name in COEFFICIENTS]
+        fitting = (of for of in of_all if of.chance_corrected and of.formula)
+        chosen = next(fitting, coefficient("fleiss_kappa"))
+        is_alpha = chosen.name == "krippendorff_alpha"
+        return chosen.by_metric(self.questions.metric) if is_alpha else chosen
+
+    @cached_property
+    def diagnosis(self) -> "Diagnosis | None":
+        """Which raters, pairs and grades agree; None where nothing tells."""
+        from masrel.intervals import diagnose
+
+        for answer in self.answers:
+            if answer.name == "diagnosis_pairs":
+                return cast("Diagnosis", dict(answer.figure)[self.group])
+        if self.coded is None or len(self.raters) > _MOST_RATERS:
+            return None
+        try:
+            with warnings.catch_warnings(action="ignore", category=MasrelWarning):
+                return diagnose(
+                    on_grades(self.coded, self.entry, self.file),
+                    coefficient=self.entry,
+                    target=None if self.questions.target is None else "items",
+                    raters=self.raters,
+                    weights=self.questions.weights_of(self.entry),
+                    level=self.questions.level,
+                )
+        except MasrelError:  # these ratings have none, of one item say
+            return None
+
+    @property
+    def distance(self) -> Any:
+        """The weights by which ratings of an item are apart: linear, if ordered."""
+        if self.questions.weights == "identity" and self.file.is_ordered:
+            return "linear"
+        return self.questions.weights
+
+    @cached_property
+    def disagreement(self) -> "NDArray[np.float64]":
+        """How far the ratings of each item are apart, (n_items,)."""
+        # items of counts are none that one could discuss
+        if self.coded is None or not (
+            self.part.items or self.coded is self.part.ratings
+        ):
+            return np.zeros(0)
+        return item_disagreement(self.coded, weights=self.distance)
+
+    @property
+    def disputed(self) -> "NDArray[np.intp]":
+        """Items that raters disagree on, most first."""
+        order = np.argsort(-np.nan_to_num(self.disagreement), kind="stable")[:_SHOWN]
+        return order[self.disagreement[order] > 0.0]
+
+    @property
+    def items(self) -> list[str]:
+        """What the items are called, or else their places."""
+        return list(self.part.items or map(str, range(1, self.disagreement.size + 1)))
+
+    def drawing(
+        self, name: str, builder: str, arguments: tuple[object, ...], caption: str,
+        alt: str = "",
+    ) -> Drawing:  # fmt: skip
+        """Return a drawing that says of which part it is."""
+        of_part = f"{self.group}: " if self.group else ""
+        return Drawing(
+            name=name,
+            caption=of_part + caption,
+            alt=of_part + (alt or caption),
+            content=Drawn(builder, arguments),
+            stamp="",
+        )
+
+
+def forest_drawing(answers: Sequence[Answer], questions: Questions) -> Drawing | None:
+    """Return the estimates and their intervals; None where none is on that axis."""
+    rows = [row for answer in answers for row in answer.estimates]
+    rows = [row for row in rows if not is_in_units(row)]
+    if not rows:
+        return None
+    intervals = (row.estimate.interval for row in rows)
+    ends = [of for of in intervals if of is not None and of.reason is None]
+    dots = f"Estimates (dots){' and their intervals' if ends else ''}."
+    texts = "; ".join(
+        f"{row.title}{f' ({row.group})' if row.group else ''}: "
+        f"{number(row.estimate.value, 3)}"
+        for row in rows
+    )
+    return Drawing(
+        name="forest",
+        caption=dots,
+        alt=f"{dots} {texts}.",
+        content=agreement_forest(rows, questions.target or "items"),
+        stamp="",
+    )
+
+
+def _pairs(seen: PartSeen) -> Drawing | None:
+    of = seen.diagnosis
+    if of is None or len(of.raters) < 3 or not np.isfinite(of.pair_values).any():
+        return None
+    title = seen.questions.title(seen.entry)
+    i, j = np.unravel_index(np.nanargmin(of.pair_values), of.pair_values.shape)
+    least = number(float(of.pair_values[i, j]), 3)
+    panel = (
+        "; beside it the change without each rater"
+        if np.isfinite(of.changes).any()
+        else ""
+    )
+    ends = (
+        f", with {percent(of.level)} % confidence intervals"
+        if np.isfinite(of.change_low).any()
+        else ""
+    )
+    return seen.drawing(
+        "pairs",
+        "masrel.plots._rater_pairs:pairs_picture",
+        (of, title),
+        f"{title} of every two raters{panel}{ends}.",
+        f"{title} of every two of {counted(len(of.raters), 'rater')}: from {least} "
+        f"({of.raters[i]} and {of.raters[j]}) to "
+        f"{number(float(np.nanmax(of.pair_values)), 3)}.",
+    )
+
+
+def _confusion(seen: PartSeen) -> Drawing | None:
+    reference, raters = seen.questions.reference, seen.raters
+    if seen.coded is None or not seen.has_few_grades:
+        return None
+    if reference is not None and seen.diagnosis is not None:
+        table = seen.diagnosis.confusion.sum(axis=0)
+        names = reference, raters[0] if len(raters) == 1 else "the other raters"
+    elif len(raters) == 2:
+        table, names = contingency_table(seen.coded), (raters[0], raters[1])
+    else:
+        return None
+    grades = seen.file.scale.grades
+    same, n = int(np.trace(table)), int(table.sum())
+    title = f"Grades of {names[1]} by those of {names[0]}"
+    return seen.drawing(
+        "confusion",
+        f"{_GRADES}:confusion_picture",
+        (table, grades, names, seen.file.is_ordered),
+        f"{title}: how often each pair was given, shaded by its share of the row; "
+        "framed: the same grade.",
+        f"{title}: {same} of {n} pairs are the same.",
+    )
+
+
+def _grades(seen: PartSeen) -> Drawing | None:
+    if seen.coded is None or not seen.has_few_grades or len(seen.raters) > _MOST_RATERS:
+        return None
+    grades = seen.file.scale.grades
+    codes = seen.coded.codes
+    counts = np.array(
+        [np.bincount(of[of >= 0], minlength=len(grades)) for of in codes.T]
+    )
+    return seen.drawing(
+        "grades",
+        f"{_GRADES}:grades_picture",
+        (counts, seen.raters, grades, seen.file.is_ordered),
+        "Use of each grade: its share of the ratings of each rater.",
+    )
+
+
+def _categories(seen: PartSeen) -> Drawing | None:
+    of, grades = seen.diagnosis, seen.file.scale.grades
+    if of is None or not seen.has_few_grades or len(of.category_values) != len(grades):
+        return None
+    ends = (of.category_low, of.category_high)
+    level = f" ({percent(of.level)} % confidence interval)"
+    return seen.drawing(
+        "categories",
+        f"{_GRADES}:categories_picture",
+        (of.category_values, *ends, of.category_counts, grades, of.level),
+        "Agreement on each grade: of the ratings in it, the share that meets the same "
+        f"of another rater of the item{level if np.isfinite(ends[0]).any() else ''}.",
+    )
+
+
+def _bland_altman(seen: PartSeen) -> Drawing | None:
+    for answer in seen.answers:
+        if answer.name == "limits_of_agreement":
+            raters, result = dict(answer.figure)[seen.group]
+            break
+    else:
+        if seen.coded is None or seen.has_few_grades or len(seen.raters) != 2:
+            return None
+        if not seen.file.is_ordered:
+            return None
+        raters = seen.raters
+        result = limits_of_agreement(seen.coded, level=seen.questions.level)
+    return seen.drawing(
+        "bland-altman",
+        "masrel.plots._limits_figure:limits_pictures",
+        ([("", (raters, result))], seen.questions.unit or ""),
+        f"Difference of {raters[0]} and {raters[1]} over their mean, with the mean "
+        "difference and the limits between which 95 % of differences are expected.",
+    )
+
+
+def _components(seen: PartSeen) -> Drawing | None:
+    names = [row.estimate.coefficient for of in seen.answers for row in of.estimates]
+    if seen.coded is None or not any(name.startswith("icc") for name in names):
+        return None
+    parts = variance_components(seen.coded)
+    return seen.drawing(
+        "components",
+        "masrel.plots._components:components_picture",
+        (parts,),
+        "Variance of a rating: between items, between raters, and the rest, as shares.",
+    )
+
+
+def _items(seen: PartSeen) -> Drawing | None:
+    if seen.coded is None or seen.disputed.size == 0 or len(seen.raters) > _MOST_RATERS:
+        return None
+    shown, scale = seen.disputed, seen.file.scale
+    names = [seen.items[place] for place in shown]
+    return seen.drawing(
+        "items",
+        f"{_GRADES}:items_picture",
+        (
+            seen.coded.codes[shown],
+            names,
+            seen.raters,
+            scale.grades,
+            seen.file.is_ordered,
+            np.array(scale.values, dtype=np.float64),
+        ),
+        f"Ratings of the {counted(len(shown), 'item')} that raters disagree on most, "
+        "the most on top.",
+    )
+
+
+PICTURES: dict[str, tuple[str, Callable[[PartSeen], Drawing | None]]] = {
+    "pairs": ("raters", _pairs),
+    "confusion": ("raters", _confusion),
+    "bland_altman": ("raters", _bland_altman),
+    "grades": ("grades", _grades),
+    "categories": ("grades", _categories),
+    "items": ("items", _items),
+    "components": ("variance", _components),
+}
+"""Pictures by name: the section of a page that has them, and what makes them."""
+
+
+def parts_seen(
+    file: RatingsFile, questions: Questions, answers: Sequence[Answer]
+) -> list[PartSeen]:
+    """Return every part of the ratings, as pictures see it."""
+    return [
+        PartSeen(
+            file=file, part=part, group=group, questions=questions, answers=answers
+        )
+        for part, group, _ in parts_of(file)
+    ]
+
+
+def picture_of(
+    name: str,
+    file: RatingsFile,
+    questions: Questions,
+    answers: Sequence[Answer],
+    *,
+    group: str = "",
+) -> Drawn:
+    """Return a picture by its name, or refuse one that these ratings have not."""
+    check_option("picture", name, ("forest", *PICTURES))
+    if name == "forest":
+        drawing = forest_drawing(answers, questions)
+    else:
+        parts = {seen.group: seen for seen in parts_seen(file, questions, answers)}
+        if group:
+            check_option("group", group, parts)
+        drawing = PICTURES[name][1](parts[group or next(iter(parts))])
+    if drawing is None:
+        raise ParameterError(f"picture: these ratings have no {name}; {_NEEDS[name]}")
+    return drawing.content
+
+
+_NEEDS = {
+    "forest": "it shows coefficients of agreement",
+    "pairs": "it needs three raters or more",
+    "confusion": "it needs two raters, or Reading(reference=…), and 2 to 20 grades",
+    "bland_altman": "it needs two raters who measured",
+    "grades": "it needs to know who rated what, and 2 to 20 grades",
+    "categories": "it needs to know who rated what, and 2 to 20 grades",
+    "items": "it needs items that raters disagree on",
+    "components": "it needs coefficients with an ICC, and to know who rated what",
+}
+"""What the ratings of each picture must have."""
