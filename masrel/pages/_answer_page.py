@@ -87,7 +87,7 @@ def answer_page(
     ]
     blocks = [block for section in sections for block in section.blocks]
     drawn = [block.name for block in blocks if isinstance(block, Drawing)]
-    sections.append(_methods_section(file, answers, drawn, items))
+    sections.append(_methods_section(file, questions, answers, drawn, items))
     _, sentence = result_sentence(answers, items)
     options = {
         name: value
@@ -159,7 +159,7 @@ def _with_interval(table: Table, level: float) -> Table:
         return table
     low, high = keys.index("low"), keys.index("high")
     has_any = any(row[low] is not None for row in table.rows)
-    beside = ("standard_error", "median")
+    beside = ("standard_error", "median" if "value" in keys else "")
     of = max(at for at in range(low) if keys[at] not in beside)
     order = [at for at in range(len(keys)) if at not in (low, high)]
     place = order.index(of) + 1
@@ -255,9 +255,13 @@ def _items_table(seen: PartSeen) -> Table | None:
 
 
 def _methods_section(
-    file: RatingsFile, answers: Sequence[Answer], pictures: Sequence[str], items: str
+    file: RatingsFile,
+    questions: Questions,
+    answers: Sequence[Answer],
+    pictures: Sequence[str],
+    items: str,
 ) -> Section:
-    text, keys = methods(file, answers, pictures, items)
+    text, keys = methods(file, questions, answers, pictures, items)
     blocks = [Paragraph(text=text) for text in (text, *reference_texts(keys))]
     return Section(name="methods", title="Methods, to paste", blocks=tuple(blocks))
 
@@ -279,7 +283,8 @@ def latent_page(
         content=Drawn("masrel.plots._latent_scale:latent_picture", (result, grades)),
         stamp="",
     )
-    blocks = (_with_interval(replace(table, read=()), level), drawing)
+    table = replace(table, caption="Every quantity of the model", read=())
+    blocks = (drawing, _with_interval(table, level))
     text, keys = latent_methods(file, result)
     paper = [Paragraph(text=text) for text in (text, *reference_texts(keys))]
     return _page(

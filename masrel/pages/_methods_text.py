@@ -9,6 +9,7 @@ from masrel.agreement import COEFFICIENTS
 from masrel.analysis._file_estimates import (
     AgreementRow,
     Answer,
+    Questions,
 )
 from masrel.estimates import Interval, _population
 from masrel.pages._references import (
@@ -17,7 +18,6 @@ from masrel.pages._references import (
     interval_references,
 )
 from masrel.ratings import RatingsFile
-from masrel.tables._answer_tables import CONVENTIONS
 from masrel.tables._tables import counted, number, percent
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ _MOST_LISTED = 12  # grades that are named
 
 def methods(
     file: RatingsFile,
+    questions: Questions,
     answers: Sequence[Answer],
     pictures: Iterable[str],
     items: str,
@@ -36,13 +37,18 @@ def methods(
     rows = [row for answer in answers for row in answer.estimates]
     used: list[str] = []
     by_name = {answer.name: answer for answer in answers}
-    also = (name for name in (*by_name, *pictures) if name in _TEXTS)
+    has_ends = questions.target is not None and not file.read.get("clusters")
+    names = {*by_name, *pictures}
+    also = [
+        name
+        for name, (_, _, is_of_ends) in _TEXTS.items()
+        if name.split(":")[0] in names and (has_ends or not is_of_ends)
+    ]
     units = "clusters" if file.read.get("clusters") else "items"
     texts = (
         _of_data(file, items),
         _of_coefficients(rows, used),
         *_of_intervals(rows, used, items),
-        *(CONVENTIONS[of] for of in {row.convention: None for row in rows} if of),
         *_of_tables(also, by_name, used, units),
         _SOFTWARE.format(*map(version, ("masrel", "numpy", "scipy"))),
     )
@@ -55,44 +61,61 @@ _SPECIFIC = (
     "Agreement on a grade is specific agreement, the share of the ratings in it that "
     "meets the same of another rater{}.",
     ("cicchetti1990",),
+    False,
+)
+_CLOPPER = (
+    "Its intervals are Clopper and Pearson's at the effective number of items{}.",
+    ("korn1998",),
+    True,
 )
 _WITHOUT = (
-    "What each rater adds is how the coefficient changes without the rater, with a "
-    "jackknife over items{}.",
+    "What each rater adds is how the coefficient changes without the rater; its "
+    "interval is by a jackknife over items{}.",
     ("efron1981",),
+    True,
 )
-_TEXTS: dict[str, tuple[str, tuple[str, ...]]] = {
+_TEXTS: dict[str, tuple[str, tuple[str, ...], bool]] = {
     "symmetry": (
-        "Whether changes from one rater to the other balance was tested by McNemar's, "
-        "Bowker's, Stuart and Maxwell's, and Bhapkar's tests{}.",
-        ("mcnemar1947", "bowker1948", "maxwell1970", "bhapkar1966"),
+        "Whether changes from one rater to the other balance was tested: {tests}{}.",
+        (),
+        False,
     ),
     "indices": (
         "Prevalence and bias are told by their indices, PABAK, the largest κ that the "
         "margins allow, and agreement on each grade{}.",
         ("byrt1993", "cicchetti1990"),
+        False,
     ),
     "limits_of_agreement": (
         "Limits of agreement are the mean difference ± 1.96 standard deviations of "
         "differences; their intervals are exact for normal differences{}.",
         ("bland1999", "carkeet2015"),
+        False,
     ),
     "differences": (
         "Differences between groups have intervals and tests by a jackknife over "
         "{units}, with Student's t{}.",
         ("gwet2016", "efron1981"),
+        False,
     ),
-    "equality": ("{tests} tests whether all groups agree as well{}.", ()),
+    "equality": ("{tests} tests whether all groups agree as well{}.", (), False),
     "diagnosis_raters": _WITHOUT,
-    "diagnosis_categories": _SPECIFIC,
     "pairs": _WITHOUT,
+    "diagnosis_categories": _SPECIFIC,
+    "diagnosis_categories:ends": _CLOPPER,
     "categories": _SPECIFIC,
+    "categories:ends": _CLOPPER,
 }
-"""Answers and pictures by name to how they were made, and what that is cited for."""
+"""Answers and pictures by name to how they were made, what that is cited for, and
+whether it is of intervals that are there with a target alone."""
 
 _HOLM = "The p-values of all pairs of groups are adjusted by Holm's method{}."
 
 _TESTS = {
+    "McNemar, exact": "mcnemar1947",
+    "Bowker": "bowker1948",
+    "Stuart-Maxwell": "maxwell1970",
+    "Bhapkar": "bhapkar1966",
     "Hotelling's T² as F": "vanbelle2017",
     "Fleiss' weighted χ²": "fleiss1981",
 }
@@ -103,7 +126,7 @@ def _of_tables(
 ) -> Iterator[str]:
     made: dict[str, None] = {}
     for name in names:
-        text, keys = _TEXTS[name]
+        text, keys, _ = _TEXTS[name]
         rows = answers[name].shown or [] if name in answers else []
         tests = list(dict.fromkeys(row["test"] for row in rows if "test" in row))
         keys += tuple(_TESTS[test] for test in tests if test in _TESTS)

@@ -77,11 +77,14 @@ class PartSeen:
         return 2 <= len(self.file.scale.grades) <= _MOST_GRADES and not measured
 
     @property
+    def has_intervals(self) -> bool:
+        """Whether items by themselves are what was sampled."""
+        return self.questions.target is not None and not self.part.clusters
+
+    @property
     def entry(self) -> Coefficient:
         """The first coefficient that allows for chance and is made of sums."""
-        names = [
-            row.estimate.coefficient for of in self.answers for row in of.estimates
-        ]
+        names = [row.estimate.coefficient for row in self.answers[0].estimates]
         of_all = [COEFFICIENTS[name] for name in names if name in COEFFICIENTS]
         fitting = (of for of in of_all if of.chance_corrected and of.formula)
         chosen = next(fitting, coefficient("fleiss_kappa"))
@@ -103,7 +106,7 @@ class PartSeen:
                 return diagnose(
                     on_grades(self.coded, self.entry, self.file),
                     coefficient=self.entry,
-                    target=None if self.questions.target is None else "items",
+                    target="items" if self.has_intervals else None,
                     raters=self.raters,
                     weights=self.questions.weights_of(self.entry),
                     level=self.questions.level,
@@ -206,12 +209,12 @@ def _pairs(seen: PartSeen) -> Drawing | None:
 
 
 def _confusion(seen: PartSeen) -> Drawing | None:
-    reference, raters = seen.questions.reference, seen.raters
+    raters, of = seen.raters, seen.diagnosis
     if seen.coded is None or not seen.has_few_grades:
         return None
-    if reference is not None and seen.diagnosis is not None:
-        table = seen.diagnosis.confusion.sum(axis=0)
-        names = reference, raters[0] if len(raters) == 1 else "the other raters"
+    if of is not None and of.reference is not None:
+        table = of.confusion.sum(axis=0)
+        names = of.reference, raters[0] if len(raters) == 1 else "the other raters"
     elif len(raters) == 2:
         table, names = contingency_table(seen.coded), (raters[0], raters[1])
     else:

@@ -30,8 +30,10 @@ _SCALES = {
 
 def coefficient_references(coefficient: str, weights: str) -> tuple[str, ...]:
     """Return the keys of what a coefficient is cited for."""
-    is_of_kappa = weights != "identity" and coefficient != "krippendorff_alpha"
-    keys = COEFFICIENTS[coefficient].references
+    entry = COEFFICIENTS[coefficient]
+    is_of_kappa = entry.weighted and coefficient != "krippendorff_alpha"
+    is_of_kappa = is_of_kappa and weights != "identity"
+    keys = entry.references
     return (*keys, "cohen1968") if is_of_kappa else keys
 
 

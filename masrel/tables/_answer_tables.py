@@ -147,7 +147,7 @@ _OF_ESTIMATES = (
     Column(key="n_raters", heading="Raters"),
 )
 
-CONVENTIONS = {
+_CONVENTIONS = {
     "irrcac": "SE and interval: as irrCAC prints them.",
     "spss": "SE and interval: as SPSS prints them; the SE of Fleiss' κ holds only if κ "
     "is 0, and its interval may cover far less than it says.",
@@ -378,7 +378,7 @@ def _errors_note(rows: Sequence[AgreementRow], in_sentences: bool) -> list[str]:
     are_clustered = {unit == "clusters" for unit in units}
     samples = {True: "clusters", False: "items"}
     conventions = {row.convention for row in rows}
-    notes = [text for name, text in CONVENTIONS.items() if name in conventions]
+    notes = [text for name, text in _CONVENTIONS.items() if name in conventions]
     return notes + [
         Explanation(f"SE: delta method, {sample} as the sample.")
         for is_clustered, sample in samples.items()

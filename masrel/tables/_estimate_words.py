@@ -46,7 +46,8 @@ def forest_row(
         interval=interval,
         text=text,
         # 0 is what chance gives of an ICC and a κ; not of a share, nor of an order
-        has_zero=COEFFICIENTS[estimate.coefficient].chance_corrected,
+        has_zero=estimate.coefficient not in COEFFICIENTS  # of a category
+        or COEFFICIENTS[estimate.coefficient].chance_corrected,
         group=group,
     )
 

@@ -127,11 +127,6 @@ def test_pictures_are_those_that_the_ratings_have(
     assert all(map(str.startswith, pictures, captions))
 
 
-def test_a_reference_is_held_against_the_others() -> None:
-    page = page_of(ratings(3), reading=Reading(reference="C"))
-    assert any(of.startswith("Grades of the other raters by") for of in page.pictures)
-
-
 def test_items_to_discuss_begin_with_those_furthest_apart() -> None:
     page = page_of(ratings(4))
     table = next(at for at in range(5) if page.heads(at)[0] == "Item")
@@ -200,7 +195,11 @@ GROUPS = "site,patient,Kim,Lee\n" + "".join(
     ("command", "first", "methods"),
     [
         (("compare", "--by", "site"), "Differences of agreement", "(Holm, 1979)"),
-        (("diagnose", "--ignore", "site"), "What each rater adds", "(Efron & Stein"),
+        (
+            ("diagnose", "--ignore", "site", "--target", "items"),
+            "What each rater adds",
+            "(Korn & Graubard, 1998)",
+        ),
         (("limits", "--ignore", "site"), "Limits of agreement", "Carkeet, 2015)"),
     ],
 )
@@ -219,6 +218,27 @@ def test_other_commands_have_pages_that_begin_with_their_tables(
     words = Page(written.read_text("utf-8")).words
     assert words[words.index("Table 1.") + 9 :].startswith(first)
     assert methods in words[words.rindex("Methods, to paste") :]
+
+
+def test_a_reference_is_held_against_the_others(
+    tmp_path: Path, masrel_command: Caller
+) -> None:
+    file, written = tmp_path / "gold.csv", tmp_path / "page.html"
+    file.write_text("item,Kim,Lee,gold\n1,a,a,a\n2,b,a,b\n3,b,b,b\n4,a,b,a\n")
+    masrel_command("diagnose", file, "--reference", "gold", "--html", written)
+    page = Page(written.read_text("utf-8"))
+    assert "Grades of the other raters by those of gold: 6 of 8 pairs" in page.text
+    # without a command to hold them against it, they are left out
+    result = masrel.agree(file, reading=Reading(reference="gold"))
+    assert "by those of gold" not in result.to_html()
+
+
+def test_clusters_leave_intervals_of_single_items_out() -> None:
+    frame = ratings(3).assign(patient=[f"p{row // 3}" for row in range(12)])
+    reading = Reading(clusters="patient")
+    pictures = page_of(frame, reading=reading).pictures
+    assert not any("with 95 % confidence intervals" in text for text in pictures)
+    assert any("with 95 %" in of for of in page_of(ratings(3), target="items").pictures)
 
 
 def test_simulated_ratings_are_labelled_everywhere() -> None:
