@@ -129,7 +129,8 @@ class PartSeen:
             self.part.items or self.coded is self.part.ratings
         ):
             return np.zeros(0)
-        return item_disagreement(self.coded, weights=self.distance)
+        with warnings.catch_warnings(action="ignore", category=MasrelWarning):
+            return item_disagreement(self.coded, weights=self.distance)
 
     @property
     def disputed(self) -> "NDArray[np.intp]":

@@ -147,6 +147,11 @@ def test_items_to_discuss_begin_with_those_furthest_apart() -> None:
             [],
         ),
         ({"target": "items"}, ["The 95 % confidence intervals", "Stein, 1981"], []),
+        (
+            {"coefficients": "kendall_w,icc_a1"},
+            ["Kendall's W (Kendall & Babington Smith, 1939)"],
+            ["Cohen"],
+        ),
         ({"coefficients": "gwet_ac"}, ["(Gwet, 2008)"], ["Fleiss, 1971"]),
     ],
 )
@@ -201,6 +206,11 @@ GROUPS = "site,patient,Kim,Lee\n" + "".join(
             "(Korn & Graubard, 1998)",
         ),
         (("limits", "--ignore", "site"), "Limits of agreement", "Carkeet, 2015)"),
+        (
+            ("agree", "--ignore", "site", "--symmetry"),
+            "Agreement of the raters",
+            "tested: Bowker, Stuart-Maxwell and Bhapkar (Bowker, 1948; Maxwell, 1970;",
+        ),
     ],
 )
 def test_other_commands_have_pages_that_begin_with_their_tables(
