@@ -35,6 +35,7 @@ def cells(
     framed: NDArray[Any] | None = None,
     n_columns: int | None = None,
     left: float = -0.5,
+    frame: str = VERMILLION,
     **how: Any,
 ) -> AxesImage:
     """Draw a grid of cells; letters beyond them are grey."""
@@ -62,7 +63,7 @@ def cells(
             axes.text(x, row, text, ha="center", va="center", fontsize=8, color=colour)
     for row, column in np.argwhere(np.zeros((n, m)) if framed is None else framed):
         corner = left + column * step, row - 0.5
-        look: dict[str, Any] = {"edgecolor": VERMILLION, "linewidth": 1.2 * width}
+        look: dict[str, Any] = {"edgecolor": frame, "linewidth": 1.2 * width}
         axes.add_patch(Rectangle(corner, step, 1.0, fill=False, zorder=3.0, **look))
     return drawn
 

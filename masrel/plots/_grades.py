@@ -168,27 +168,41 @@ def confusion_picture(
     if len(grades) > _MAX_SHADES and 0 < len(used) < len(grades):
         counts, grades = counts[np.ix_(used, used)], [grades[k] for k in used]
         label += "\ngrades never met are left out"
-    q = len(grades)
-    n = q + (q <= _MAX_COUNTED)  # with totals, where counts are written
-    heads, cell = [*grades, "all"][:n], min(0.42, _ACROSS / n)
-    across, of_row = max(cell * n, 2.8), counts.sum(axis=1, keepdims=True)
-    of_column = counts.sum(axis=0, keepdims=True)
-    table = np.block([[counts, of_row], [of_column, counts.sum(keepdims=True)]])
-    letters = np.where(table > 0, table.astype(str), "")[: n if n > q else 0]
+    return counts_picture(counts, grades, grades, np.eye(len(grades)), names, label)
+
+
+def counts_picture(
+    counts: _Integers,
+    rows: Sequence[str],
+    grades: Sequence[str],
+    framed: NDArray[Any],
+    names: tuple[str, str],
+    label: str = "share of the row",
+) -> Picture:
+    """Return how often each grade comes in each row, shaded by shares of the rows."""
+    # counts, framed (n_rows, q); names of the rows together, and of the columns
+    more = int(len(grades) <= _MAX_COUNTED)  # totals, where counts are written
+    m, n = len(rows) + more, len(grades) + more
+    heads, totals = [*grades, "all"][:n], [*rows, "all"][:m]
+    cell = min(0.42, _ACROSS / n)
+    across, height = max(cell * n, 2.8), min(cell, _DOWN / m)
+    of_row, of_column = counts.sum(axis=1, keepdims=True), counts.sum(axis=0)
+    table = np.block([[counts, of_row], [of_column, counts.sum()]])
+    letters = np.where(table > 0, table.astype(str), "")[: m * more]
     look: dict[str, Any] = {"cmap": SEQUENTIAL, "vmin": 0.0, "vmax": 1.0}
 
     def draw(axes: Axes) -> None:
         shares = counts / np.maximum(of_row, 1)
-        drawn = cells(axes, shares, letters, framed=np.eye(q), **look)
-        axes.set(xlim=(-0.5, n - 0.5), ylim=(n - 0.5, -0.5))
+        drawn = cells(axes, shares, letters, framed=framed, **look)
+        axes.set(xlim=(-0.5, n - 0.5), ylim=(m - 0.5, -0.5))
         axes.set(ylabel=short_name(names[0]), xlabel=short_name(names[1]))
-        name_rows(axes, heads, cell)
+        name_rows(axes, totals, height)
         name_columns(axes, heads, across / n, range(n))
         axes.xaxis.set_label_position("top")
         colour_bar(axes, drawn, label)
 
-    room = room_of(heads)
-    return Picture(0.2 + room + across, 1.2 + room + cell * n, draw)
+    room = room_of(totals) + across, room_of(heads) + height * m
+    return Picture(0.2 + room[0], 1.2 + room[1], draw)
 
 
 def _part(counts: _Integers, *steps: int) -> str:
@@ -326,6 +340,7 @@ def categories_picture(
     counts: _Integers,
     grades: Sequence[str],
     level: float,
+    label: str = "share of a grade's ratings that meet\nthe same of another rater",
 ) -> Picture:
     """Return the agreement on each grade as a dot with its interval."""
     n, cell = len(grades), min(0.3, _DOWN / len(grades))
@@ -339,7 +354,6 @@ def categories_picture(
         Line2D([], [], label="estimate", **dot),
         Line2D([], [], label=f"{percent(level)} % confidence interval", **line),
     ]
-    label = "share of a grade's ratings that meet\nthe same of another rater"
 
     def draw(axes: Axes) -> None:
         axes.hlines(range(n), low, high, **line)
@@ -459,6 +473,7 @@ def items_picture(
                 framed=(differs & (aims >= 0)).reshape(n, -1),
                 n_columns=block.shape[1],
                 left=left,
+                frame=VERMILLION if is_ordered else BLACK,  # which is no hue
             )
         axes.set(xlim=(places[0] - 0.5, k - 0.5), ylim=(n - 0.5, -0.5))
         name_rows(axes, items, height)
@@ -523,7 +538,9 @@ def _legend(
     """Return the inches of what explains colours, and what draws it."""
     ncols = max(1, int(across / (0.45 + max(map(inches_of, texts)))))
     pairs = zip(texts, colours, strict=True)
-    marks = [Patch(color=colour, label=text) for text, colour in pairs]
+    patches = [Patch(color=colour, label=text) for text, colour in pairs]
+    # row by row, where a legend goes down its columns
+    marks = [patch for place in range(ncols) for patch in patches[place::ncols]]
     how: dict[str, Any] = {
         "handlelength": 1.2,
         "handleheight": 1.0,

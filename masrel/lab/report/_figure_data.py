@@ -21,40 +21,6 @@ MANY_MODELS = 12  # and panels are smaller
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GradeGrid:
-    """Grades of one session, one row a model and one column a rater."""
-
-    # models, raters: names of the rows and columns
-    models: tuple[str, ...]
-    raters: tuple[str, ...]
-    intended: tuple[str | None, ...]  # by model
-    # by model and rater, the grades of every presentation in order; no None
-    grades: tuple[tuple[tuple[str, ...], ...], ...]
-    scale: tuple[str, ...]  # every grade of the scale, mildest first
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GradeCounts:
-    """How often each model was given each grade in one session."""
-
-    models: tuple[str, ...]
-    intended: tuple[str | None, ...]  # by model
-    scale: tuple[str, ...]  # every grade of the scale, mildest first
-    counts: tuple[tuple[int, ...], ...]  # by model and grade
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GradesByAim:
-    """How often models of each intended grade were given each grade."""
-
-    intended: tuple[str, ...]
-    scale: tuple[str, ...]  # every grade of the scale, mildest first
-    counts: tuple[tuple[int, ...], ...]  # by intended grade and grade
-    # by intended grade: the part that has it, and the ends of its interval
-    shares: tuple[tuple[float, float, float], ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedColumn:
     """Mean speeds of one model in one session, deg/s."""
 

@@ -2,12 +2,17 @@
 
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass
 from operator import attrgetter
 
-from masrel.lab.report._figure_data import FIGURES, MANY_RATERS, GradeCounts, GradeGrid
-from masrel.lab.report._material import Material
+import numpy as np
+from numpy.typing import NDArray
+
+from masrel.lab.report._figure_data import MANY_RATERS
+from masrel.lab.report._material import Material, has_order
 from masrel.pages._sections import Drawing, Paragraph, Section, absent_section
 from masrel.plots._drawn_values import Drawn
+from masrel.scales import Scale
 from masrel.tables._tables import Column, Table, Value, counted, number
 
 
@@ -52,7 +57,23 @@ def felt_sentences(material: Material) -> str:
     return " ".join(sentences)
 
 
-def _grid(material: Material, session: str) -> GradeGrid:
+@dataclass(frozen=True, slots=True)
+class _Grid:
+    """Grades of one session, one row a model and one column a rater."""
+
+    raters: tuple[str, ...]
+    models: tuple[str, ...]
+    intended: tuple[str | None, ...]  # by model
+    # by model and rater, the grades of every presentation in order; no None
+    grades: tuple[tuple[tuple[str, ...], ...], ...]
+
+    @property
+    def has_aims(self) -> bool:
+        """Whether a model has an intended grade."""
+        return any(intended is not None for intended in self.intended)
+
+
+def _grid(material: Material, session: str) -> _Grid:
     rows = [row for row in material.ratings.rows if row.session == session]
     grades: dict[tuple[str, str], tuple[str, ...]] = {}
     for row in sorted(rows, key=attrgetter("repeat")):
@@ -62,7 +83,7 @@ def _grid(material: Material, session: str) -> GradeGrid:
     with_rows, with_columns = {row.model for row in rows}, {row.rater for row in rows}
     models = [model for model in material.protocol.models if model.id in with_rows]
     raters = [r.id for r in material.protocol.raters if r.id in with_columns]
-    return GradeGrid(
+    return _Grid(
         raters=tuple(raters),
         models=tuple(model.id for model in models),
         intended=tuple(model.intended_grade for model in models),
@@ -70,12 +91,11 @@ def _grid(material: Material, session: str) -> GradeGrid:
             tuple(grades.get((model.id, rater), ()) for rater in raters)
             for model in models
         ),
-        scale=material.ratings.scale.grades,
     )
 
 
 def _grid_blocks(
-    material: Material, session: str, grid: GradeGrid
+    material: Material, session: str, grid: _Grid
 ) -> tuple[Table, Drawing]:
     table_rows: list[tuple[Value, ...]] = [
         (model, intended, *(", ".join(grades) or None for grades in cells))
@@ -104,20 +124,43 @@ def _grid_blocks(
         notes=tuple(notes),
         data=material.data,
     )
-    caption = f"Grades of session {session}. Darker is a higher grade"
-    if any(intended is not None for intended in grid.intended):
-        caption += "; a frame marks a grade other than the intended one"
+    is_ordered = has_order(material)
+    caption = [
+        f"Grades of session {session}.",
+        *["Darker: a higher grade."] * is_ordered,
+        *["Framed: a grade other than the intended one."] * grid.has_aims,
+        *["Blank: no rating."] * bool(n_missing),
+    ]
+    scale = material.ratings.scale
+    pictured = (
+        *(_codes(grid, scale), grid.models, grid.raters, scale.grades, is_ordered),
+        *(np.array(scale.values), _aims(grid, scale) if grid.has_aims else None),
+    )
     drawing = Drawing(
         name=f"grades_{session}",
-        caption=f"{caption}.",
+        caption=" ".join(caption),
         alt=f"Grid of grades. {'; '.join(_grades_by_model(grid))}.",
-        content=Drawn(FIGURES + "_study_figures:grade_figure", (grid,)),
+        content=Drawn("masrel.plots._grades:items_picture", pictured),
         stamp=material.stamp,
     )
     return table, drawing
 
 
-def _grades_by_model(grid: GradeGrid) -> Iterator[str]:
+def _codes(grid: _Grid, scale: Scale) -> NDArray[np.intp]:
+    # (n_models, n_raters, most presentations), -1 where there is no grade
+    most = max(len(grades) for cells in grid.grades for grades in cells)
+    codes = np.full((len(grid.models), len(grid.raters), max(most, 1)), -1)
+    for row, cells in enumerate(grid.grades):
+        for column, grades in enumerate(cells):
+            codes[row, column, : len(grades)] = list(map(scale.grades.index, grades))
+    return codes
+
+
+def _aims(grid: _Grid, scale: Scale) -> list[int]:
+    return [-1 if aim is None else scale.grades.index(aim) for aim in grid.intended]
+
+
+def _grades_by_model(grid: _Grid) -> Iterator[str]:
     by_model = zip(grid.models, grid.intended, grid.grades, strict=True)
     for model, intended, cells in by_model:
         counts = Counter(grade for grades in cells for grade in grades)
@@ -129,18 +172,18 @@ def _grades_by_model(grid: GradeGrid) -> Iterator[str]:
 def _counted_blocks(
     material: Material,
     session: str,
-    grid: GradeGrid,
+    grid: _Grid,
     rows: list[tuple[Value, ...]],
     notes: list[str],
 ) -> tuple[Table, Drawing]:
     # of many raters: how often each grade was given; the CSV has who gave it
-    counts = tuple(
-        tuple(map(Counter(g for cell in cells for g in cell).__getitem__, grid.scale))
-        for cells in grid.grades
-    )
+    scale = material.ratings.scale
+    codes = _codes(grid, scale).reshape(len(grid.models), -1)
+    every = np.arange(len(scale.grades))
+    counts = (codes[:, :, None] == every).sum(axis=1)
     n_raters = counted(len(grid.raters), "rater")
     by_rater = [Column(key=name, heading=name, where="csv") for name in grid.raters]
-    by_grade = [Column(key=f"n_{g}", heading=g, where="page") for g in grid.scale]
+    by_grade = [Column(key=f"n_{g}", heading=g, where="page") for g in scale.grades]
     table = Table(
         name=f"grades_{session}",
         caption=f"How often {n_raters} gave each grade in session {session}",
@@ -150,33 +193,25 @@ def _counted_blocks(
             *by_rater,
             *by_grade,
         ),
-        rows=tuple((*row, *of_row) for row, of_row in zip(rows, counts, strict=True)),
+        rows=tuple(
+            (*row, *of_row) for row, of_row in zip(rows, counts.tolist(), strict=True)
+        ),
         notes=(*notes, "The file has the grades of every rater."),
         data=material.data,
     )
-    texts = [
-        f"{model}: {', '.join(f'{n} of {g}' for g, n in pairs if n) or 'no grades'}"
-        for model, of_model in zip(grid.models, counts, strict=True)
-        for pairs in [list(zip(grid.scale, of_model, strict=True))]
-    ]
     caption = f"How often {n_raters} gave each grade in session {session}. Darker is"
     caption += " more often, of the grades of the model"
-    if any(intended is not None for intended in grid.intended):
+    if grid.has_aims:
         caption += "; the intended grade is framed"
+    framed = np.array(_aims(grid, scale))[:, None] == every
+    names = "model", "grade given"
     drawing = Drawing(
         name=f"grades_{session}",
         caption=f"{caption}.",
-        alt=f"Counts of grades. {'; '.join(texts)}.",
+        alt=f"Counts of grades. {'; '.join(_grades_by_model(grid))}.",
         content=Drawn(
-            FIGURES + "_study_figures:count_figure",
-            (
-                GradeCounts(
-                    models=grid.models,
-                    intended=grid.intended,
-                    scale=grid.scale,
-                    counts=counts,
-                ),
-            ),
+            "masrel.plots._grades:counts_picture",
+            (counts, grid.models, scale.grades, framed, names),
         ),
         stamp=material.stamp,
     )

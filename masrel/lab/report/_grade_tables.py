@@ -3,7 +3,7 @@
 from masrel.lab.analysis._category_agreement import category_agreement
 from masrel.lab.analysis._exclusions import analysed_ratings
 from masrel.lab.analysis._given_grades import GivenGrades, given_grades
-from masrel.lab.report._figure_data import FIGURES, GradesByAim
+from masrel.lab.report._figure_data import FIGURES
 from masrel.lab.report._material import Material
 from masrel.lab.report._result import main_estimate
 from masrel.pages._sections import Drawing, Paragraph, Section, absent_section
@@ -132,8 +132,7 @@ def _confusion_table(
 def _confusion_drawing(
     material: Material, session: str, rows: tuple[GivenGrades, ...]
 ) -> Drawing:
-    grades = material.ratings.scale.grades
-    level = percent(material.analysis.level)
+    grades, level = material.ratings.scale.grades, material.analysis.level
     texts = [
         f"intended {row.intended}: "
         + ", ".join(f"{n} of {g}" for g, n in zip(grades, row.counts, strict=True) if n)
@@ -142,21 +141,12 @@ def _confusion_drawing(
     return Drawing(
         name="confusion",
         caption=(
-            f"{_CONFUSION}, session {session}. Left: how often; darker is a larger "
-            "part of the row. Right: the percentage as intended, "
-            f"with its {level} % confidence interval for other raters like these."
+            f"{_CONFUSION}, session {session}. Above: how often; darker is a larger "
+            "part of the row, and the intended grade is framed. Below: the part as "
+            f"intended, with its {percent(level)} % confidence interval for other "
+            "raters like these."
         ),
         alt=f"Counts of grades given. {'; '.join(texts)}.",
-        content=Drawn(
-            FIGURES + "_study_figures:aim_figure",
-            (
-                GradesByAim(
-                    intended=tuple(row.intended for row in rows),
-                    scale=grades,
-                    counts=tuple(row.counts for row in rows),
-                    shares=tuple((row.share, row.low, row.high) for row in rows),
-                ),
-            ),
-        ),
+        content=Drawn(FIGURES + "_study_figures:aim_pictures", (rows, grades, level)),
         stamp=material.stamp,
     )

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from masrel.audit import Claim
 from masrel.lab.analysis import Analysis
-from masrel.lab.protocol import Protocol
+from masrel.lab.protocol import Protocol, report_sections
 from masrel.lab.ratings import InPerson, Ratings
 from masrel.tables._tables import SIMULATED, SIMULATED_DEVICE
 
@@ -91,6 +91,16 @@ def gather(
         raters=tuple(r.id for r in protocol.raters if r.id in raters),
         recordings=recordings,
         claims=claims,
+    )
+
+
+def has_order(material: Material) -> bool:
+    """Say whether the grades have an order, as far as a protocol tells."""
+    protocol = material.protocol
+    return (
+        "order" in report_sections(protocol)
+        or any(line.weights != "identity" for line in protocol.analysis.estimates)
+        or any(grade[0].isdecimal() for grade in material.ratings.scale.grades)
     )
 
 

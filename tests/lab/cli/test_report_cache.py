@@ -197,7 +197,7 @@ def test_another_version_of_what_draws_is_seen(
     masrel("report", study)
     monkeypatch.undo()
     _cache.installed.cache_clear()
-    assert drawn == ["forest_picture", "grade_figure"]
+    assert drawn == ["forest_picture", "items_picture"]
 
 
 @pytest.mark.slow
@@ -228,7 +228,7 @@ def test_one_grade_draws_what_it_reaches(
     drawn.clear()
     edit(study / "ratings/published.csv", "1+", "1")
     masrel("report", study)
-    assert drawn == ["forest_picture", "grade_figure"]  # and not the speeds
+    assert drawn == ["forest_picture", "items_picture"]  # and not the speeds
 
 
 @pytest.mark.slow
@@ -256,7 +256,7 @@ def test_one_grade_is_estimated_where_it_counts(
     edit(table, "\nretest,R1,HM1,1", "\nretest,R1,HM1,2")
     done = masrel("report", study)
     assert computed == [*of_both, of_both[-1]]
-    assert drawn == ["forest_picture", "grade_figure"]
+    assert drawn == ["forest_picture", "items_picture"]
     assert (done.out, done.err) == (first.out, first.err)
 
 

@@ -16,26 +16,22 @@ from PIL import Image
 
 from masrel.lab.analysis import analyze
 from masrel.lab.elbow import STANDARD_MODELS, ConstantSpeed, outline
-from masrel.lab.protocol import read_protocol
+from masrel.lab.protocol import read_protocol, scale_of
 from masrel.lab.ratings import read_study_ratings
 from masrel.lab.report import write_report
 from masrel.lab.report._figure_data import (
     FIGURES,
-    GradeCounts,
-    GradeGrid,
-    GradesByAim,
     PlaceDots,
     SpeedColumn,
     TraceBand,
     TracePanel,
 )
 from masrel.lab.report.figures._order_differences import difference_figure
-from masrel.lab.report.figures._study_figures import aim_figure, speed_figure
+from masrel.lab.report.figures._study_figures import speed_figure
 from masrel.lab.report.figures._trace_figures import trace_figure
 from masrel.plots import draw
 from masrel.plots._drawn_values import Drawn
 from tests.benchmarks.many_ratings import many_ratings
-from tests.plots.made import LONG
 
 ROOT = Path(__file__).parents[3]
 WIDEST_IN = 9.5  # inches of a page of a report
@@ -86,34 +82,6 @@ PLACES = (
 EFFECTS = (("one", 0.2, -2.0, 2.4), ("other", -0.1, NAN, NAN))
 
 CONTENTS: dict[str, Drawn] = {
-    "grades": figure(
-        "_study_figures:grade_figure",
-        GradeGrid(
-            models=(LONG, "HM2"),
-            raters=(LONG, f"Dr. {LONG}"),
-            intended=("1", None),
-            grades=((("1",), ("0",)), ((), ("2", "1"))),
-            scale=("0", "1", "2"),
-        ),
-    ),
-    "counts": figure(
-        "_study_figures:count_figure",
-        GradeCounts(
-            models=(LONG, "HM2"),
-            intended=("1", None),
-            scale=("0", "1", "2"),
-            counts=((0, 190, 10), (0, 0, 0)),
-        ),
-    ),
-    "counts of many grades": figure(
-        "_study_figures:count_figure",
-        GradeCounts(
-            models=("HM1",),
-            intended=(None,),
-            scale=tuple(map(str, range(101))),
-            counts=(tuple(range(101)),),
-        ),
-    ),
     "speeds": speeds(2),
     "speeds of many": speeds(200),
     "traces": traces(panel(2, has_band=False)),
@@ -153,13 +121,6 @@ def test_a_figure_fits_its_page_and_its_page_fits_it(name: str) -> None:
     np.testing.assert_allclose(inches, expected, atol=0.005)
 
 
-def test_a_grade_is_written_in_its_cell_and_a_missing_one_is_a_dash() -> None:
-    texts = texts_of(draw(CONTENTS["grades"], stamp="", forms=("svg",))["svg"])
-    assert texts.count("1") == 3  # intended, by one rater, and of two by another
-    assert texts.count("2") == 1
-    assert texts.count("–") == 2  # a missing grade, no intended one
-
-
 def test_above_thirty_raters_a_figure_no_longer_grows_with_them() -> None:
     few, many, more = (
         len(draw(speeds(n), stamp="", forms=("svg",))["svg"]) for n in (30, 31, 200)
@@ -191,26 +152,6 @@ def test_a_stretch_that_a_grade_rests_on_is_ringed_and_drawn_thicker() -> None:
         top = trace_figure((one,), True).axes[0]
         widths.append(top.lines[0].get_linewidth())
     assert widths[1] > 2.0 * widths[0]
-
-
-def test_the_part_as_intended_stands_beside_its_row() -> None:
-    content = GradesByAim(
-        intended=("1", "2"),
-        scale=("0", "1", "2"),
-        counts=((1, 3, 0), (0, 0, 2)),
-        shares=((0.75, 0.2, 0.99), (1.0, 0.16, 1.0)),
-    )
-    left, right = aim_figure(content).axes
-    assert [text.get_text() for text in left.texts] == ["1", "3", "2"]
-    frames = [patch.get_x() + patch.get_width() / 2 for patch in left.patches]
-    assert frames == pytest.approx([1, 2])  # the columns of 1 and of 2
-    lines = [np.asarray(line.get_xydata()).tolist() for line in right.lines]
-    assert lines == [
-        [[20.0, 0.0], [99.0, 0.0]],
-        [[75.0, 0.0]],
-        [[16.0, 1.0], [100.0, 1.0]],
-        [[100.0, 1.0]],
-    ]
 
 
 @pytest.mark.parametrize("has_places", [True, False])
@@ -266,7 +207,7 @@ def report_of(root: Path, n_raters: int, n_models: int, n_repeats: int) -> Path:
     many_ratings(root, n_raters, n_models, n_repeats)
     protocol = read_protocol(root / "protocol.toml")
     file = root / "ratings" / "ratings.csv"
-    ratings = read_study_ratings(file, protocol.scale)
+    ratings = read_study_ratings(file, scale_of(protocol))
     return write_report(
         protocol, ratings, analyze(protocol, ratings), root / "report"
     ).html

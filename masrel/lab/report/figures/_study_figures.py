@@ -5,158 +5,46 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Rectangle
 
-from masrel.lab.report._figure_data import (
-    MANY_RATERS,
-    GradeCounts,
-    GradeGrid,
-    GradesByAim,
-    SpeedColumn,
-)
-from masrel.plots._cells import cells, name_columns
+from masrel.lab.analysis._given_grades import GivenGrades
+from masrel.lab.report._figure_data import MANY_RATERS, SpeedColumn
+from masrel.plots._grades import categories_picture, counts_picture
 from masrel.plots._style import (
     BLACK,
     BLUE,
     DASHES,
     GREY,
     ORANGE,
-    SEQUENTIAL,
     VERMILLION,
+    Picture,
     short_name,
 )
 from masrel.tables._tables import percent
 
-_INTENDED_X = -1.3  # where intended grades stand; raters are at 0, 1, 2, ...
-_SHADES = LinearSegmentedColormap.from_list("grades", ["#F2F6FA", "#7FB6DA", "#003A5D"])
-
-_UPRIGHT_LETTERS = 7  # of a rater's name, or a grade's, that fits above a column
-
-_MOST_NUMBERS = 20  # grades up to which counts are written in the cells
+_UPRIGHT_LETTERS = 7  # of a model's name that fits below a column
 
 _MODELS_IN_A_ROW = 8  # more go into further rows: a page is no wider
 _SPREADS = ((0.9, 1.4), (0.5, 6.0))  # share of the speeds, width of its line
 _SESSION_LOOKS = (("o", BLUE), ("s", ORANGE), ("^", VERMILLION), ("v", GREY))
 
 
-def grade_figure(grid: GradeGrid) -> Figure:
-    """Return grades as shaded cells, with the grade written in each."""
-    n_rows, n_columns = len(grid.models), len(grid.raters)
-    size = (1.3 + 0.56 * (n_columns + 1.3), 1.15 + 0.34 * n_rows)
-    figure = Figure(figsize=size)
-    axes = figure.add_subplot()
-    for row, aim in enumerate(grid.intended):
-        _cell(axes, _INTENDED_X, row, () if aim is None else (aim,), grid.scale, None)
-        for column, grades in enumerate(grid.grades[row]):
-            _cell(axes, column, row, grades, grid.scale, aim)
-    axes.set_xlim(_INTENDED_X - 0.55, n_columns - 0.45)
-    axes.set_ylim(n_rows - 0.4, -0.6)
-    raters = [short_name(rater) for rater in grid.raters]
-    axes.set_xticks([_INTENDED_X, *range(n_columns)], ["intended", *raters])
-    axes.set_yticks(range(n_rows), [short_name(model) for model in grid.models])
-    axes.tick_params(length=0)
-    axes.xaxis.tick_top()
-    if n_columns > 12 or max(map(len, raters)) > _UPRIGHT_LETTERS:
-        axes.tick_params(axis="x", rotation=90)
-    for spine in axes.spines.values():
-        spine.set_visible(False)
-    has_aim = any(intended is not None for intended in grid.intended)
-    axes.set_xlabel("framed: not the intended grade" if has_aim else "rater")
-    return figure
-
-
-def _cell(
-    axes: Axes,
-    x: float,
-    y: float,
-    grades: tuple[str, ...],
-    scale: tuple[str, ...],
-    intended: str | None,
-) -> None:
-    # Repeated presentations share the cell, each a part of its width.
-    if not grades:
-        axes.text(x, y, "–", ha="center", va="center", color=GREY)
-        return
-    width = 0.88 / len(grades)
-    for part, grade in enumerate(grades):
-        left = x - 0.44 + part * width
-        shade = _SHADES(scale.index(grade) / max(len(scale) - 1, 1))
-        differs = intended is not None and grade != intended
-        corner = (left, y - 0.42)
-        axes.add_patch(
-            Rectangle(corner, width, 0.84, facecolor=shade, edgecolor="none")
-        )
-        if differs:
-            frame: dict[str, Any] = {"edgecolor": VERMILLION, "linewidth": 2.2}
-            axes.add_patch(Rectangle(corner, width, 0.84, facecolor="none", **frame))
-        # relative luminance (ITU-R BT.709) decides black or white letters
-        luminance = float(np.dot(shade[:3], (0.2126, 0.7152, 0.0722)))
-        axes.text(
-            left + width / 2,
-            y,
-            grade,
-            ha="center",
-            va="center",
-            color=BLACK if luminance > 0.45 else "white",
-            weight="bold" if differs else "normal",
-        )
-
-
-def count_figure(content: GradeCounts) -> Figure:
-    """Return how often each model was given each grade, as shaded cells."""
-    n_rows, n_columns = len(content.models), len(content.scale)
-    size = (1.3 + min(7.4, 0.62 * n_columns), 0.9 + 0.3 * n_rows)
-    figure = Figure(figsize=size)
-    axes = figure.add_subplot()
-    _draw_counts(axes, content.counts, content.intended, content.scale)
-    axes.set_yticks(range(n_rows), [short_name(model) for model in content.models])
-    axes.set_xlabel("grade given; framed: the intended grade")
-    return figure
-
-
-def aim_figure(content: GradesByAim) -> Figure:
-    """Return grades by intended ones, and beside each row the part as intended."""
-    n_rows, n_columns = len(content.intended), len(content.scale)
-    across = min(5.4, 0.6 * n_columns)
-    figure = Figure(figsize=(1.2 + across + 2.4, 0.95 + 0.36 * n_rows))
-    left, right = figure.subplots(1, 2, sharey=True, width_ratios=(across, 2.2))
-    _draw_counts(left, content.counts, content.intended, content.scale)
-    left.set_yticks(range(n_rows), content.intended)
-    left.set_ylabel("intended grade")
-    left.set_xlabel("grade given; framed: as intended")
-    for row, share in enumerate(content.shares):
-        value, *ends = (100.0 * part for part in share)
-        right.plot(ends, [row, row], color=BLUE, linewidth=1.8, marker="|")
-        right.plot([value], [row], "o", color=BLACK, markersize=5)
-    right.set_xlim(-3.0, 103.0)
-    right.set_xticks([0, 25, 50, 75, 100])
-    right.set_xlabel("as intended (%)")
-    right.tick_params(axis="y", length=0, labelleft=False)
-    right.spines["left"].set_visible(False)
-    right.grid(axis="x")
-    return figure
-
-
-def _draw_counts(
-    axes: Axes,
-    rows: Sequence[Sequence[int]],
-    intended: Sequence[str | None],
-    scale: Sequence[str],
-) -> None:
-    # rows: how often each grade of the scale was given
-    n_rows, n_columns = len(rows), len(scale)
-    counts = np.array(rows, dtype=np.int64).reshape(n_rows, n_columns)
-    shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
-    is_few = n_columns <= _MOST_NUMBERS
-    letters = np.where(is_few & (counts > 0), counts.astype(str), "")
-    framed = np.array([[grade == aim for grade in scale] for aim in intended])
-    look: dict[str, Any] = {"cmap": SEQUENTIAL, "vmin": 0.0, "vmax": 1.0}
-    cells(axes, shares, letters, framed=framed, **look)
-    name_columns(axes, scale, min(0.6, 7.0 / n_columns), range(n_columns))
-    axes.tick_params(axis="y", length=0)
+def aim_pictures(
+    rows: Sequence[GivenGrades], grades: Sequence[str], level: float
+) -> list[tuple[str, Picture]]:
+    """Return grades by intended ones, and below them the part as intended."""
+    aims = [row.intended for row in rows]
+    counts = np.array([row.counts for row in rows])
+    framed = np.array([[grade == aim for grade in grades] for aim in aims])
+    names = "intended grade", "grade given"
+    value, low, high = np.array([(row.share, row.low, row.high) for row in rows]).T
+    shares = value, low, high, counts.sum(axis=1), aims, level
+    label = "part of the grades that is the intended one"
+    return [
+        ("", counts_picture(counts, aims, grades, framed, names)),
+        ("", categories_picture(*shares, label)),
+    ]
 
 
 def speed_figure(

@@ -1,6 +1,7 @@
 """Sections: what they say, and that they say it when there is nothing."""
 
 import dataclasses
+import re
 from math import radians
 
 import msgspec
@@ -8,12 +9,13 @@ import pytest
 
 from masrel.lab.analysis import analyze
 from masrel.lab.elbow import ConstantSpeed, peak_torque
-from masrel.lab.protocol import elbow_parameters
-from masrel.lab.ratings import Ratings
+from masrel.lab.protocol import EstimatePlan, elbow_parameters
+from masrel.lab.ratings import Ratings, ratings_from_rows
 from masrel.lab.report._document import SECTIONS
 from masrel.lab.report._material import Material, gather
 from masrel.pages._sections import Drawing, Paragraph
 from masrel.plots import draw
+from masrel.scales import Scale
 from masrel.tables._tables import Table, as_text
 from tests.lab.analysis.studies import (
     hess2012,
@@ -110,7 +112,54 @@ def test_repeated_presentations_are_all_shown_in_their_order() -> None:
     assert isinstance(shown, Table)
     assert shown.rows == (("HM1", "1", "1+, 1"), ("HM2", "1+", "2"))
     assert isinstance(drawing, Drawing)
-    assert draw(drawing.content, stamp="")["png"]  # two grades share a cell
+    svg = draw(drawing.content, stamp="", forms=("svg",))["svg"].decode()
+    # intended, the first of HM1, and what colours mean; HM2's only one is not intended
+    texts = re.findall(r"<!-- (.*?) -->", svg)
+    assert [texts.count(grade) for grade in ("1", "1+", "2")] == [3, 3, 2]
+    assert "Blank" not in drawing.caption
+
+
+@pytest.mark.parametrize(
+    ("sections", "line", "has_order"),
+    [
+        (("grades",), plan(), False),
+        (("grades", "order"), plan(), True),
+        (("grades",), plan(weights="linear"), True),
+    ],
+)
+def test_names_without_an_order_are_not_higher_or_lower(
+    sections: tuple[str, ...], line: EstimatePlan, has_order: bool
+) -> None:
+    names = {"session": "test", "model": "D01"}
+    grades = [{**names, "rater": f"R{n}", "grade": g} for n, g in ((1, "clonus"),)]
+    grades.append({**names, "rater": "R2", "grade": None})
+    rows = ratings_from_rows(grades, Scale(name="sign", grades=("normal", "clonus")))
+    protocol = protocol_with(line, sections=sections)
+    made = gather(protocol, rows, analyze(protocol, rows))
+    (drawing,) = (
+        of for of in SECTIONS["grades"](made).blocks if isinstance(of, Drawing)
+    )
+    order = "Darker: a higher grade. " if has_order else ""
+    assert drawing.caption == f"Grades of session test. {order}Blank: no rating."
+
+
+def test_grades_of_many_raters_are_counted() -> None:
+    given = {f"R{n}": ("1", "2" if n < 10 else "1+") for n in range(31)}
+    protocol, rows = protocol_with(plan()), ratings(*of_session("test", **given))
+    raters = [msgspec.structs.replace(protocol.raters[0], id=name) for name in given]
+    protocol = msgspec.structs.replace(protocol, raters=tuple(raters))
+    made = gather(protocol, rows, analyze(protocol, rows))
+    shown, drawing = SECTIONS["grades"](made).blocks
+    assert isinstance(shown, Table)
+    assert [row[-6:] for row in shown.rows] == [
+        (0, 31, 0, 0, 0, 0),
+        (0, 0, 21, 10, 0, 0),
+    ]
+    assert isinstance(drawing, Drawing)
+    svg = draw(drawing.content, stamp="", forms=("svg",))["svg"].decode()
+    texts = re.findall(r"<!-- (.*?) -->", svg)
+    assert [texts.count(n) for n in ("31", "21", "10")] == [4, 2, 2]  # with totals
+    assert "the intended grade is framed" in drawing.caption
 
 
 def test_missing_grades_are_counted_below_the_grid() -> None:
