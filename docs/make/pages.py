@@ -145,11 +145,15 @@ def renewed(text: str, page: str = "page") -> str:
     """Run a page; return it with what it prints now."""
     lines = text.splitlines()
     blocks = read(text, page)
-    with _new_folder():
-        texts = list(_run(blocks))
-    for block, new in reversed(list(zip(blocks, texts, strict=True))):
+    for block, new in reversed(list(zip(blocks, run(blocks), strict=True))):
         lines[block.number : block.number + len(block.lines)] = new
     return "\n".join(lines) + "\n"
+
+
+def run(blocks: Sequence[Block]) -> Iterator[list[str]]:
+    """Run blocks in a new folder; yield the lines of each as they should be."""
+    with _new_folder():
+        yield from _run(blocks)
 
 
 @contextlib.contextmanager
@@ -161,11 +165,15 @@ def _new_folder() -> Iterator[None]:
     ):
         warnings.simplefilter("error")
         shutil.copytree(ROOT / "studies", "studies")
-        yield
+        try:
+            yield
+        finally:
+            if pyplot := sys.modules.get("matplotlib.pyplot"):  # it keeps every figure
+                pyplot.close("all")
 
 
 def _run(blocks: Sequence[Block]) -> Iterator[list[str]]:
-    """Yield the lines of each block as they should be."""
+    # in the folder that it is called in
     namespace: dict[str, object] = {"__name__": "__main__"}
     printed: list[str] = []
     for block, follower in pairwise([*blocks, None]):

@@ -90,8 +90,8 @@ def latent_picture(scale: "LatentTrait", grades: Sequence[str]) -> Picture:
         axes.vlines([0.0], starts[2] + 0.5, n_rows - 0.4, **_THRESHOLD, zorder=0.5)
         _name_grades(axes, grades, [left, *places, right])
         axes.set_xlabel(
-            "latent scale, in standard deviations of a rating (0: mean of these "
-            "items,\nor no bias)"
+            "latent scale, in standard deviations of a rating\n"
+            "(0: mean of these items, or no bias)"
         )
         level = percent(scale.items[0].interval.level)
         credible = f"{level} % credible interval"

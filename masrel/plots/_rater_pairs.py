@@ -43,7 +43,7 @@ _CELLS = ((8, 0.42), (14, 0.33), (40, 0.2), (10_000, 0.13))  # raters, inches of
 _MAX_NUMBERS = 14  # raters up to which numbers are written in the cells
 # inches: of the panel at the right, of what is below all, and of a letter of 9 points
 _PANEL, _BELOW, _LETTER = 2.3, 1.1, 0.07
-_GAP = 0.2  # inches between the heatmap and the panel
+_GAP = 0.35  # inches between the heatmap and the panel
 
 _DOT: dict[str, Any] = {"marker": "o", "color": BLACK, "linestyle": "none"}
 _LINE: dict[str, Any] = {"color": BLUE, "linewidth": 1.8}

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from docs.make.pages import ROOT, pages
+from masrel import plots
 
 PAGES = {str(page.relative_to(ROOT)): page for page in pages()}
 
@@ -42,3 +43,9 @@ def test_links_are_seen() -> None:
     names = {file for file, _ in links(PAGES["README.md"])}
     assert {"docs/tutorial.md", "docs/figures/traces.png", "LICENSE"} <= names
     assert ("agreement.md", "which-coefficient") in links(PAGES["docs/tutorial.md"])
+
+
+def test_every_picture_is_in_the_gallery() -> None:
+    files = {file for file, _ in links(PAGES["docs/gallery.md"])}
+    names = {f"figures/gallery_{name}.png" for name in plots.__all__}
+    assert names - files == {"figures/gallery_draw.png"}

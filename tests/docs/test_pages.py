@@ -48,6 +48,7 @@ NOT_RUN = [
     ("docs/ci.md", "tests/docs/test_ci.py runs it"),
     ("docs/ci.md", "tests/docs/test_ci.py runs it"),
     ("docs/coverage.md", "takes half an hour"),
+    ("docs/gallery.md", "takes some seconds"),
     ("docs/hardware.md", "needs a CAN bus"),
     ("docs/hardware.md", "needs a CAN bus"),
     ("docs/hardware.md", "needs a CAN bus"),
