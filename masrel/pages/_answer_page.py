@@ -7,6 +7,7 @@ its tables and pictures, items to discuss, methods to paste, and what repeats it
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +17,7 @@ from masrel.pages._methods_text import latent_methods, methods
 from masrel.pages._pictures import PICTURES, PartSeen, forest_drawing, parts_seen
 from masrel.pages._references import reference_texts
 from masrel.pages._sections import (
+    Block,
     Content,
     Document,
     Drawing,
@@ -120,11 +122,21 @@ def _page(
             banner=f"{stamp} – no person gave these grades" if stamp else "",
             provenance=" ".join(what_was_read(file)),
             result=result,
-            sections=chapters(sections, stamp=stamp),
+            sections=chapters(sections, partial(_block, stamp)),
             inputs=tuple((name, value) for name, value in known.items() if value),
             version=version("masrel"),
         )
     )
+
+
+def _block(stamp: str, number: int, content: Content) -> Block:
+    pictures: dict[str, bytes] = {}
+    if isinstance(content, Drawing):
+        from masrel.plots import draw  # a page without pictures loads nothing of it
+
+        inline = draw(content.content, stamp=stamp, forms=("inline",))["inline"]
+        pictures = {"inline": inline}
+    return Block(number=number, content=content, pictures=pictures)
 
 
 def _result_section(

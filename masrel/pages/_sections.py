@@ -6,7 +6,7 @@ In: sections of paragraphs, tables, pictures and listings. Out: HTML.
 import base64
 import html
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -107,27 +107,24 @@ class Document:
     version: str  # of masrel
 
 
-def chapters(sections: Sequence[Section], *, stamp: str) -> tuple[Chapter, ...]:
-    """Return sections with their blocks numbered and their pictures drawn."""
-    # Imported here: a page without pictures loads nothing that draws.
-    from masrel.plots import draw
-
+def chapters(
+    sections: Sequence[Section], block_of: Callable[[int, Content], Block]
+) -> tuple[Chapter, ...]:
+    """Return sections of blocks, made of contents numbered by their kinds."""
     numbers: Counter[type] = Counter()
-    made = []
-    for section in sections:
-        blocks = []
-        for content in section.blocks:
-            numbers[type(content)] += 1
-            pictures: dict[str, bytes] = {}
-            if isinstance(content, Drawing):
-                inline = draw(content.content, stamp=stamp, forms=("inline",))
-                pictures = {str(form): data for form, data in inline.items()}
-            number = numbers[type(content)]
-            blocks.append(Block(number=number, content=content, pictures=pictures))
-        made.append(
-            Chapter(name=section.name, title=section.title, blocks=tuple(blocks))
+
+    def numbered(content: Content) -> Block:
+        numbers[type(content)] += 1
+        return block_of(numbers[type(content)], content)
+
+    return tuple(
+        Chapter(
+            name=section.name,
+            title=section.title,
+            blocks=tuple(map(numbered, section.blocks)),
         )
-    return tuple(made)
+        for section in sections
+    )
 
 
 TEMPLATES = Path(__file__).with_name("templates")

@@ -258,13 +258,18 @@ def grades(
 
 
 def grades_picture(
-    counts: _Integers, raters: Sequence[str], grades: Sequence[str], is_ordered: bool
+    counts: _Integers,
+    raters: Sequence[str],
+    grades: Sequence[str],
+    is_ordered: bool,
+    *,
+    noun: str = "rating",
 ) -> Picture:
     """Return each rater's use of grades as a bar of shares."""
     group, labels, texts, colours = _grouped(counts.sum(axis=0), grades, is_ordered)
     n, across, cell = len(raters), 4.6, min(0.27, _DOWN / len(raters))
     counts = counts @ np.eye(len(texts), dtype=np.int64)[group]
-    sizes = [counted(size, "rating") for size in counts.sum(axis=1).tolist()]
+    sizes = [counted(size, noun) for size in counts.sum(axis=1).tolist()]
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
     starts = np.cumsum(shares, axis=1) - shares
     height, explain = _legend(texts, colours, across)
@@ -280,10 +285,23 @@ def grades_picture(
                 axes.text(
                     starts[row, k] + share / 2, row, labels[k], fontsize=8, **look
                 )
-        rows_of_shares(axes, raters, sizes, cell, "share of the rater's ratings")
+        rows_of_shares(axes, raters, sizes, cell, f"share of the {noun}s")
         explain(axes)
 
     return Picture(room_of(raters) + across + 0.9, 0.6 + cell * n + height, draw)
+
+
+def answer_pictures(
+    questions: Sequence[tuple[str, Sequence[str], Sequence[int]]],
+) -> list[tuple[str, Picture]]:
+    """Return how often each answer was given, a bar a question, under its title."""
+    return [
+        (
+            title,
+            grades_picture(np.array([counts]), ["all"], answers, True, noun="answer"),
+        )
+        for title, answers, counts in questions
+    ]
 
 
 def categories(

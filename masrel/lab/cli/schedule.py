@@ -88,7 +88,7 @@ def _show(
         output,
         document=lambda: order_document(balances),
         text=lambda: summary_table(balances),
-        figure=lambda: Drawn(FIGURES + "_order_figure:order_figure", (balances,)),
+        figure=lambda: Drawn(FIGURES + "_order_figure:order_pictures", (balances,)),
         stamp="not for raters",
         more=[table for balance in balances for table in count_tables(balance)],
     )

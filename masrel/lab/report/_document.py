@@ -6,7 +6,6 @@ in ``manifest.json``. The same inputs give the same bytes; there is no time of d
 any of them.
 """
 
-from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -44,7 +43,7 @@ from masrel.lab.report._sample_size import sample_size_section
 from masrel.lab.report._stretches import speeds_section
 from masrel.lab.report._trace_section import traces_section
 from masrel.lab.verification import Anchor
-from masrel.pages._sections import Block, Chapter, Document, Drawing, Section
+from masrel.pages._sections import Block, Content, Document, Drawing, Section, chapters
 from masrel.plots import draw
 from masrel.tables._tables import Table, as_csv, tag_of
 
@@ -230,7 +229,7 @@ def make_report(
         banner=material.banner,
         provenance=material.provenance,
         result=result_text(analysis),
-        sections=_make_sections(sections, assets, progress, cache, raw_csv=raw_csv),
+        sections=chapters(sections, _blocks(assets, progress, cache, raw_csv=raw_csv)),
         inputs=_inputs(inputs, anchors),
         version=analysis.masrel_version,
     )
@@ -251,36 +250,27 @@ def section_names(protocol: Protocol) -> tuple[str, ...]:
     return (*report_sections(protocol), *CONDUCT_SECTIONS)
 
 
-def _make_sections(
-    sections: Sequence[Section],
-    assets: Assets,
-    progress: Progress | None,
-    cache: Cache,
-    *,
-    raw_csv: bool,
-) -> tuple[Chapter, ...]:
-    # as they are shown; the files of their tables and figures go to the assets
-    made = []
-    numbers: Counter[type] = Counter()
-    for section in sections:
-        blocks = []
-        for content in section.blocks:
-            numbers[type(content)] += 1
-            number = numbers[type(content)]
-            if isinstance(content, Drawing):
-                pictures = _pictures(content, cache)
-                blocks.append(_figure(content, number, pictures, assets))
-                if progress is not None:
-                    progress(content.name)
-                continue
-            if isinstance(content, Table):
-                file = as_csv(content, raw=raw_csv).encode()
-                assets.add("tables", content.name, "csv", file)
-            blocks.append(Block(number=number, content=content))
-        made.append(
-            Chapter(name=section.name, title=section.title, blocks=tuple(blocks))
-        )
-    return tuple(made)
+def _blocks(
+    assets: Assets, progress: Progress | None, cache: Cache, *, raw_csv: bool
+) -> Callable[[int, Content], Block]:
+    # what makes blocks as they are shown; files of tables and figures go to the assets
+    def block(number: int, content: Content) -> Block:
+        pictures: Mapping[str, bytes] = {}
+        if isinstance(content, Table):
+            file = as_csv(content, raw=raw_csv).encode()
+            assets.add("tables", content.name, "csv", file)
+        elif isinstance(content, Drawing):
+            pictures = _pictures(content, cache)
+            if progress is not None:
+                progress(content.name)
+        files = {
+            form: assets.add("figures", content.name, form, picture)
+            for form, picture in pictures.items()
+            if isinstance(content, Drawing)
+        }
+        return Block(number=number, content=content, pictures=pictures, files=files)
+
+    return block
 
 
 def _pictures(drawing: Drawing, cache: Cache) -> Mapping[str, bytes]:
@@ -296,16 +286,6 @@ def _pictures(drawing: Drawing, cache: Cache) -> Mapping[str, bytes]:
 
 _DRAWING = ("matplotlib", "numpy", "pillow", "scipy")
 _PAGE = "page"
-
-
-def _figure(
-    drawing: Drawing, number: int, pictures: Mapping[str, bytes], assets: Assets
-) -> Block:
-    files = {
-        form: assets.add("figures", drawing.name, form, picture)
-        for form, picture in pictures.items()
-    }
-    return Block(number=number, content=drawing, pictures=pictures, files=files)
 
 
 def _page(writer: Writer, document: Document, cache: Cache) -> bytes:

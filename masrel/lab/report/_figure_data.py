@@ -135,27 +135,9 @@ class LearningView:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlaceDots:
-    """How far the grades of each part of a session are from those of their models."""
-
-    session: str
-    places: tuple[str, ...]  # of the parts, from the first
-    steps: tuple[float, ...]  # mean of each part, of the scale; not finite without one
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class FlowStep:
     """How many raters came so far, and what became of the others."""
 
     label: str
     n: int
     others: tuple[str, ...] = ()  # a line each
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AnswerPanel:
-    """How often each answer to one question was given."""
-
-    title: str  # the question, and the session
-    labels: tuple[str, ...]  # the answers, or ranges of them
-    counts: tuple[int, ...]

@@ -9,12 +9,10 @@ from masrel.lab.analysis._order_effects import (
     place_summaries,
 )
 from masrel.lab.ratings import Ratings
-from masrel.lab.report._figure_data import FIGURES, PlaceDots
 from masrel.lab.report._material import Material
 from masrel.lab.report._sentences import sentence
-from masrel.pages._sections import Content, Drawing, Paragraph, Section, absent_section
-from masrel.plots._drawn_values import Drawn
-from masrel.tables._tables import Column, Table, interval_text, number, percent
+from masrel.pages._sections import Content, Paragraph, Section, absent_section
+from masrel.tables._tables import Column, Table, percent
 
 _TITLE = "Effects of order"
 
@@ -33,7 +31,6 @@ def order_section(material: Material) -> Section:
     if not effects:
         return absent_section("order", _TITLE, sentence("order", "nothing"))
     blocks: list[Content] = [Paragraph(text=sentence("order", "steps"))]
-    blocks.append(_drawing(material, places, effects))
     if places:
         blocks.append(_places_table(material, places))
     else:
@@ -44,38 +41,6 @@ def order_section(material: Material) -> Section:
 
 def _analysed(material: Material) -> Ratings:
     return analysed_ratings(material.ratings, material.analysis.excluded)
-
-
-def _drawing(
-    material: Material,
-    places: tuple[PlaceSummary, ...],
-    effects: tuple[OrderEffect, ...],
-) -> Drawing:
-    level = percent(material.analysis.level)
-    left = "Left: means of each part of a session. Right: " if places else "Here: "
-    right = f"mean differences, with {level} % confidence intervals for other raters"
-    texts = [
-        f"{_question(effect)}: {number(effect.mean, 2)} "
-        f"{interval_text(effect.low, effect.high, 2)}"
-        for effect in effects
-    ]
-    parts = tuple(
-        PlaceDots(
-            session=session,
-            places=tuple(_places(part) for part in of_session),
-            steps=tuple(part.deviation for part in of_session),
-        )
-        for session in dict.fromkeys(part.session for part in places)
-        for of_session in [[p for p in places if p.session == session]]
-    )
-    shown = tuple((_question(e), e.mean, e.low, e.high) for e in effects)
-    return Drawing(
-        name="order_effects",
-        caption=f"Effects of order, in steps of the scale. {left}{right}.",
-        alt=f"Forest plot of differences in steps. {'; '.join(texts)}.",
-        content=Drawn(FIGURES + "_order_differences:difference_figure", (parts, shown)),
-        stamp=material.stamp,
-    )
 
 
 def _places(part: PlaceSummary) -> str:

@@ -7,11 +7,13 @@ from decimal import ROUND_HALF_UP, Decimal
 from masrel.lab.analysis import QuestionSummary
 from masrel.lab.analysis._question_summaries import FEWEST_RATERS
 from masrel.lab.protocol import Protocol
-from masrel.lab.report._figure_data import FIGURES, AnswerPanel
 from masrel.lab.report._material import Material
 from masrel.pages._sections import Drawing, Paragraph, Section, absent_section
 from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import Column, Table, Value
+
+# the question and session; the answers, or ranges of them; how often each was given
+_Panel = tuple[str, tuple[str, ...], tuple[int, ...]]
 
 _TITLE = "Questionnaires"
 
@@ -108,7 +110,7 @@ def _row(summary: QuestionSummary) -> tuple[Value, ...]:
     )
 
 
-def _panels(summaries: tuple[QuestionSummary, ...]) -> tuple[AnswerPanel, ...]:
+def _panels(summaries: tuple[QuestionSummary, ...]) -> tuple[_Panel, ...]:
     # one for each question in each session, over all models
     counts: dict[str, Counter[str]] = {}
     for summary in summaries:
@@ -118,30 +120,26 @@ def _panels(summaries: tuple[QuestionSummary, ...]) -> tuple[AnswerPanel, ...]:
         )
         bars.update({count.label: count.n for count in summary.counts})
     return tuple(
-        AnswerPanel(title=title, labels=tuple(bars), counts=tuple(bars.values()))
+        (title, tuple(bars), tuple(bars.values()))
         for title, bars in counts.items()
         if bars.total()
     )
 
 
 def _drawing(
-    material: Material, panels: tuple[AnswerPanel, ...], *, is_made_up: bool
+    material: Material, panels: tuple[_Panel, ...], *, is_made_up: bool
 ) -> Drawing:
     words = "; ".join(
-        f"{panel.title}: "
-        + ", ".join(
-            f"{n} × {label}"
-            for label, n in zip(panel.labels, panel.counts, strict=True)
-            if n
-        )
-        for panel in panels
+        f"{title}: "
+        + ", ".join(f"{n} × {label}" for label, n in zip(*of, strict=True) if n)
+        for title, *of in panels
     )
-    caption = "How often each answer was given, over all raters."
+    caption = "The share of each answer, over all raters."
     return Drawing(
         name="questionnaires",
         caption=f"{caption} {_RECONSTRUCTED}" if is_made_up else caption,
-        alt=f"Bar chart of answers. {words}.",
-        content=Drawn(FIGURES + "_answer_bars:answer_figure", (panels,)),
+        alt=f"Bars of answers. {words}.",
+        content=Drawn("masrel.plots._grades:answer_pictures", (panels,)),
         stamp=_RECONSTRUCTED if is_made_up else material.stamp,
     )
 

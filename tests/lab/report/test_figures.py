@@ -11,7 +11,6 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import pytest
-from matplotlib.axes import Axes
 from PIL import Image
 
 from masrel.lab.analysis import analyze
@@ -21,12 +20,10 @@ from masrel.lab.ratings import read_study_ratings
 from masrel.lab.report import write_report
 from masrel.lab.report._figure_data import (
     FIGURES,
-    PlaceDots,
     SpeedColumn,
     TraceBand,
     TracePanel,
 )
-from masrel.lab.report.figures._order_differences import difference_figure
 from masrel.lab.report.figures._study_figures import speed_figure
 from masrel.lab.report.figures._trace_figures import trace_figure
 from masrel.plots import draw
@@ -75,19 +72,12 @@ def traces(*panels: TracePanel, has_angle: bool = True) -> Drawn:
 
 
 NAN = float("nan")
-PLACES = (
-    PlaceDots(session="a", places=("1–2", "3–4"), steps=(0.1, -0.1)),
-    PlaceDots(session="b", places=("1", "2"), steps=(NAN, 0.9)),
-)
-EFFECTS = (("one", 0.2, -2.0, 2.4), ("other", -0.1, NAN, NAN))
-
 CONTENTS: dict[str, Drawn] = {
     "speeds": speeds(2),
     "speeds of many": speeds(200),
     "traces": traces(panel(2, has_band=False)),
     "bands": traces(*(panel(3, has_band=True),) * 2),
     "small panels": traces(*(panel(3, has_band=True),) * 5, has_angle=False),
-    "order": figure("_order_differences:difference_figure", PLACES, EFFECTS),
 }
 
 
@@ -152,21 +142,6 @@ def test_a_stretch_that_a_grade_rests_on_is_ringed_and_drawn_thicker() -> None:
         top = trace_figure((one,), True).axes[0]
         widths.append(top.lines[0].get_linewidth())
     assert widths[1] > 2.0 * widths[0]
-
-
-@pytest.mark.parametrize("has_places", [True, False])
-def test_effects_of_order_reach_as_far_as_they_are(has_places: bool) -> None:
-    left: list[Axes]
-    *left, right = difference_figure(PLACES if has_places else (), EFFECTS).axes
-    low, high = right.get_xlim()
-    assert low == -high
-    assert high >= 2.4
-    assert len(right.lines) == 4  # zero, an interval and its dot, a dot without one
-    assert len(left) == has_places
-    for axes in left:
-        assert axes.get_ylim()[1] >= 0.9
-        # sessions of unlike places have parts in common, not places
-        assert [tick.get_text() for tick in axes.get_xticklabels()] == ["1", "2"]
 
 
 @pytest.mark.slow
