@@ -32,17 +32,11 @@ from masrel.estimates import IntervalMethod
 from masrel.ratings._findings import Reading
 
 if TYPE_CHECKING:
-    from masrel.plots._drawn_values import Drawn
     from masrel.ratings import RatingsFile
 
 Option = Callable[..., Any]
 
 _WIDTH, _WIDEST = 88, 100  # of notes where there is no terminal, and in one
-
-_DRAWERS = {
-    "diagnosis_pairs": "masrel.plots._rater_pairs:pairs_pictures",
-    "limits_of_agreement": "masrel.plots._limits_figure:limits_pictures",
-}
 
 
 def _list_register(
@@ -218,6 +212,7 @@ def _show_answers(
     questions = questions.on_scale(ratings)
     from masrel.analysis._file_questions import answers
     from masrel.pages._answer_page import answer_page
+    from masrel.pages._pictures import main_picture
     from masrel.tables._answer_tables import agreement_sentences
     from masrel.tables._first_screen import (
         first_screen,
@@ -253,7 +248,7 @@ def _show_answers(
             *(others, reading, questions, answered), [*warned, *notes]
         ),
         text=sentences if is_sentence else lambda: table,
-        figure=lambda: _figure(answered, questions),
+        figure=lambda: main_picture(answered, questions),
         html=lambda: answer_page(
             others, questions, answered, call=call_text(), items=output.item_name
         ),
@@ -299,21 +294,6 @@ def _record(
         "estimates": documents.pop("agreement", []),
         **documents,
     }
-
-
-def _figure(answers: Sequence[Answer], questions: Questions) -> "Drawn":
-    """Return what is drawn: the figure of an answer, else of the estimates."""
-    from masrel.plots._drawn_values import Drawn
-    from masrel.tables._answer_tables import agreement_forest
-
-    for answer in answers:
-        if answer.figure:
-            return Drawn(_DRAWERS[answer.name], (answer.figure, answer.of))
-    shown = answers[:1] if answers[0].name == "agreement" else answers
-    return agreement_forest(
-        [row for answer in shown for row in answer.estimates],
-        questions.target or "items",
-    )
 
 
 def _offer_interval(command: str, items: str) -> None:

@@ -52,7 +52,6 @@ if TYPE_CHECKING:
 
 _MOST_PARTS = 4  # whose pictures are all shown
 _MOST_LISTED = 12  # items
-_MOST_NAMED = 8  # raters whose grades have a column each
 _TITLES = {
     "compare": "Agreement of groups in",
     "diagnose": "Raters, pairs and grades in",
@@ -218,42 +217,35 @@ def _picture_sections(
             yield Section(name=name, title=title, blocks=tuple(blocks))
 
 
+_OF_ITEMS = (
+    Column(key="item", heading="Item", align="left"),
+    Column(key="disagreement", heading="Disagreement", digits=3),
+    Column(key="grades", heading="Grades", align="left"),
+)
+
+
 def _items_table(seen: PartSeen) -> Table | None:
     """Return the items that raters disagree on most, with what each rater gave."""
     places = seen.disputed[:_MOST_LISTED]
     if seen.coded is None or places.size == 0:
         return None
-    grades, codes = seen.file.scale.grades, seen.coded.codes[places]
-    raters = seen.raters if len(seen.raters) <= _MOST_NAMED else []
-    columns = [
-        Column(key="item", heading="Item", align="left"),
-        Column(key="disagreement", heading="Disagreement", digits=3),
-        *(Column(key=f"rater {at}", heading=of) for at, of in enumerate(raters)),
-        Column(key="grades", heading="Grades", align="left"),
-    ]
-    rows = []
-    for place, row in zip(places, codes.tolist(), strict=True):
-        counts = [(row.count(code), of) for code, of in enumerate(grades)]
+    grades, rows = seen.file.scale.grades, []
+    for place in places:
+        codes = seen.coded.codes[place].tolist()
+        counts = [(codes.count(code), grade) for code, grade in enumerate(grades)]
         rows.append(
             {
                 "item": seen.items[place],
                 "disagreement": float(seen.disagreement[place]),
-                **{
-                    f"rater {at}": grades[code] if code >= 0 else None
-                    for at, code in enumerate(row[: len(raters)])
-                },
-                "grades": None
-                if raters
-                else ", ".join(f"{of} ×{n}" for n, of in counts if n),
+                "grades": ", ".join(f"{grade} ×{n}" for n, grade in counts if n),
             }
         )
     of_part = f"{seen.group}: " if seen.group else ""
     return table_of(
         "items_to_discuss",
         f"{of_part}{counted(len(rows), 'item')} that raters disagree on most",
-        columns,
+        _OF_ITEMS,
         rows,
-        hide_empty=True,
         notes=(
             "Disagreement: of the pairs of ratings of an item, "
             + (

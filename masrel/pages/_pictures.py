@@ -158,6 +158,22 @@ class PartSeen:
         )
 
 
+_DRAWERS = {
+    "diagnosis_pairs": "masrel.plots._rater_pairs:pairs_pictures",
+    "limits_of_agreement": "masrel.plots._limits_figure:limits_pictures",
+}
+
+
+def main_picture(answers: Sequence[Answer], questions: Questions) -> Drawn:
+    """Return the picture of an answer, of every part, else of the estimates."""
+    for answer in answers:
+        if answer.figure:
+            return Drawn(_DRAWERS[answer.name], (answer.figure, answer.of))
+    shown = answers[:1] if answers[0].name == "agreement" else answers
+    rows = [row for answer in shown for row in answer.estimates]
+    return agreement_forest(rows, questions.target or "items")
+
+
 def forest_drawing(answers: Sequence[Answer], questions: Questions) -> Drawing | None:
     """Return the estimates and their intervals; None where none is on that axis."""
     rows = [row for answer in answers for row in answer.estimates]
