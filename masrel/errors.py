@@ -31,6 +31,8 @@ The tree::
     └── OverrunWarning             the control loop missed deadlines
 """
 
+from collections.abc import Iterable
+
 __all__ = [
     "BusError",
     "ControllerError",
@@ -211,7 +213,26 @@ class RatingsWarning(MasrelWarning):
 
 
 class MissingLettersWarning(MasrelWarning):
-    """A figure has letters for which no font is there; it says how to give one."""
+    """Figures have letters for which no font is there; it says how to give one.
+
+    Parameters
+    ----------
+    letters : iterable of str
+        The letters.
+    """
+
+    def __init__(self, letters: Iterable[str]) -> None:
+        self.letters = frozenset(letters)
+        listed = sorted(self.letters)
+        more = " …" if len(listed) > _MAX_LETTERS else ""
+        super().__init__(
+            f"no font here has {' '.join(listed[:_MAX_LETTERS])}{more}: such letters "
+            "are drawn as boxes; set MASREL_FONT to the file or the name of a font "
+            "that has them"
+        )
+
+
+_MAX_LETTERS = 40
 
 
 class RecordingWarning(MasrelWarning):

@@ -92,6 +92,11 @@ class Chapter:
     title: str
     blocks: tuple[Block, ...]
 
+    @property
+    def is_absent(self) -> bool:
+        """Whether it only says that something planned is not in the data."""
+        return all(getattr(block.content, "absent", False) for block in self.blocks)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Document:

@@ -14,7 +14,6 @@ from matplotlib.text import Text
 from masrel.errors import MissingLettersWarning
 
 _OWN = "DejaVu Sans"  # ships with matplotlib
-_VARIABLE = "MASREL_FONT"
 
 
 def complete_fonts(artist: Artist) -> None:
@@ -31,23 +30,14 @@ def complete_fonts(artist: Artist) -> None:
     if families != [_OWN]:
         for text in texts:
             text.set_fontfamily([_OWN, *families[1:]])
-    if new := sorted(map(chr, lacking - _warned_of)):
-        _warned_of.update(lacking)
-        warnings.warn(
-            f"no font here has {' '.join(new)}: such letters are drawn as boxes; set "
-            f"{_VARIABLE} to the file or the name of a font that has them",
-            MissingLettersWarning,
-            stacklevel=4,
-        )
-
-
-_warned_of: set[int] = set()  # letters that were said to be missing: once a process
+    if lacking:
+        warnings.warn(MissingLettersWarning(map(chr, lacking)), stacklevel=4)
 
 
 def _fonts() -> Iterator[tuple[str, str]]:
     # names and files: our own, the one that the user gives, and those of the system
     yield _OWN, font_manager.findfont(_OWN)
-    if chosen := os.environ.get(_VARIABLE):
+    if chosen := os.environ.get("MASREL_FONT"):
         if Path(chosen).is_file():
             font_manager.fontManager.addfont(chosen)
             chosen = get_font(chosen).family_name

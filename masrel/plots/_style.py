@@ -122,7 +122,9 @@ def house_style(*, parse_math: bool = False) -> Iterator[None]:
     """Draw in the house style alone: a reader's own matplotlibrc changes nothing."""
     # parse_math: as powers of ten need it; a title or a name may have any letters in it
     # not mpl.rcdefaults, which reads every style that matplotlib has
-    with mpl.rc_context({**_DEFAULTS, **STYLE, "text.parse_math": parse_math}):
+    look = {**_DEFAULTS, **STYLE, "text.parse_math": parse_math}
+    with mpl.rc_context(look), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph")  # which is said of all at once
         yield
 
 
@@ -207,22 +209,18 @@ def finished(
     if set(forms) - {"inline"}:  # whose letters are the reader's
         complete_fonts(figure)
     files: dict[Form, bytes] = {}
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph")  # which was said of all at once
-        lay_out(figure, stamp)
-        for form in forms:
-            file = io.BytesIO()
-            how: dict[str, Any] = {"dpi": _DPI, "metadata": _NO_TIME[form]}
-            if form == "inline":  # on the page's own ground, in letters of the reader
-                for axes in figure.findobj(Axes):
-                    axes.patch.set_visible(False)
-                with mpl.rc_context({"svg.fonttype": "none"}):
-                    figure.canvas.print_figure(
-                        file, format="svg", facecolor="none", **how
-                    )
-            else:
-                figure.canvas.print_figure(file, format=form, **how)
-            files[form] = file.getvalue()
+    lay_out(figure, stamp)
+    for form in forms:
+        file = io.BytesIO()
+        how: dict[str, Any] = {"dpi": _DPI, "metadata": _NO_TIME[form]}
+        if form == "inline":  # on the page's own ground, in letters of the reader
+            for axes in figure.findobj(Axes):
+                axes.patch.set_visible(False)
+            with mpl.rc_context({"svg.fonttype": "none"}):
+                figure.canvas.print_figure(file, format="svg", facecolor="none", **how)
+        else:
+            figure.canvas.print_figure(file, format=form, **how)
+        files[form] = file.getvalue()
     if "inline" in files:
         files["inline"] = _inlined(files["inline"].decode()).encode()
     return files

@@ -249,14 +249,13 @@ class _Making:
                 excluded=data.excluded,
             )
 
-        with tqdm(
-            desc="report", unit=" parts", disable=self.output.quiet or None
-        ) as bar:
+        bar = tqdm(desc="report", unit=" parts", disable=self.output.quiet or None)
 
-            def progress(part: str) -> None:
-                bar.set_postfix_str(part, refresh=False)
-                bar.update()
+        def progress(part: str) -> None:
+            bar.set_postfix_str(part, refresh=False)
+            bar.update()
 
+        with warnings_as_notes(), bar:
             return analysis, make_report(
                 data.protocol,
                 data.ratings,

@@ -5,7 +5,7 @@ Their table is narrow on a page, and has every field in the CSV.
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from operator import attrgetter
@@ -27,11 +27,6 @@ from masrel.pages._sections import Drawing, Paragraph, Section
 from masrel.plots._drawn_values import FOREST, Drawn, ForestRow
 from masrel.tables._estimate_words import forest_row
 from masrel.tables._tables import Column, Table, Value, counted, interval_text, number
-
-_LOOKS = (
-    "confidence as lines with ends, credible as broad bars, with the posterior density "
-    "or the resamples above where there are any"
-)
 
 _AGREEMENTS = (
     "p_o: observed agreement; p_e: agreement expected by chance, 0 where the "
@@ -284,11 +279,25 @@ def _forest(
     texts = "; ".join(f"{line.label}: {line.text}" for line in lines)
     return Drawing(
         name=name,
-        caption=(
-            f"{caption}: estimates (dots) and their intervals, {_LOOKS}. Dashed: what "
-            "chance gives."
-        ),
+        caption=" ".join(_looks(lines, caption)),
         alt=f"Forest plot. {texts}.",
         content=Drawn(FOREST, (tuple(lines), "agreement (1 is perfect)")),
         stamp=material.stamp,
     )
+
+
+def _looks(lines: Sequence[ForestRow], caption: str) -> Iterator[str]:
+    # what is drawn of them, and nothing else
+    intervals = [line.interval for line in lines if line.interval is not None]
+    kinds = {interval.kind for interval in intervals}
+    shapes = [of.distribution.continuous for of in intervals if of.distribution]
+    looks = {"confidence": "lines with ends", "credible": "broad bars"}
+    marks = [f"{kind} intervals ({looks[kind]})" for kind in sorted(kinds)]
+    marks.insert(0, "estimates (dots)")
+    yield f"{caption}: {', '.join(marks)}."
+    if True in shapes:
+        yield "Filled curves: posterior densities, each to its own height."
+    if False in shapes:
+        yield "Blue, above: resamples, each row to its own height."
+    if any(line.has_zero for line in lines):
+        yield "Dashed: what chance gives."

@@ -87,7 +87,8 @@ class Build:
         # Paths as they were typed, too: they are in what is said.
         places = [self.study, self.folder]
         at = [os.path.abspath(place) for place in places]
-        call = ([str(p) for p in places], at, sorted(self.options.items()))
+        font = os.environ.get("MASREL_FONT")
+        call = ([str(p) for p in places], at, sorted(self.options.items()), font)
         return content_hash("build", call)
 
     def _made_from(self) -> str:

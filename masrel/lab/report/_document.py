@@ -6,11 +6,13 @@ in ``manifest.json``. The same inputs give the same bytes; there is no time of d
 any of them.
 """
 
+import warnings
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from masrel.errors import MissingLettersWarning
 from masrel.lab._cache import Cache, installed
 from masrel.lab.analysis import Analysis
 from masrel.lab.analysis._analysis_json import analysis_text
@@ -222,17 +224,21 @@ def make_report(
         place = 1 + next((i for i, s in enumerate(sections) if s.name == "design"), -1)
         of_conduct = conduct_sections(material, conduct)
         sections[place:place] = [s for s in of_conduct if not only or s.name in only]
-    assets = Assets()
+    assets, lacking = Assets(), set[str]()
     document = Document(
         title=protocol.report.title or protocol.study.title,
         tag=tag_of(material.data),
         banner=material.banner,
         provenance=material.provenance,
         result=result_text(analysis),
-        sections=chapters(sections, _blocks(assets, progress, cache, raw_csv=raw_csv)),
+        sections=chapters(
+            sections, _blocks(assets, progress, cache, lacking, raw_csv=raw_csv)
+        ),
         inputs=_inputs(inputs, anchors),
         version=analysis.masrel_version,
     )
+    if lacking:  # of all figures at once
+        warnings.warn(MissingLettersWarning(lacking), stacklevel=2)
     pages = {
         writer.file: _page(writer, document, cache)
         for name, writer in WRITERS.items()
@@ -251,7 +257,12 @@ def section_names(protocol: Protocol) -> tuple[str, ...]:
 
 
 def _blocks(
-    assets: Assets, progress: Progress | None, cache: Cache, *, raw_csv: bool
+    assets: Assets,
+    progress: Progress | None,
+    cache: Cache,
+    lacking: set[str],
+    *,
+    raw_csv: bool,
 ) -> Callable[[int, Content], Block]:
     # what makes blocks as they are shown; files of tables and figures go to the assets
     def block(number: int, content: Content) -> Block:
@@ -260,7 +271,7 @@ def _blocks(
             file = as_csv(content, raw=raw_csv).encode()
             assets.add("tables", content.name, "csv", file)
         elif isinstance(content, Drawing):
-            pictures = _pictures(content, cache)
+            pictures = _pictures(content, cache, lacking)
             if progress is not None:
                 progress(content.name)
         files = {
@@ -273,14 +284,23 @@ def _blocks(
     return block
 
 
-def _pictures(drawing: Drawing, cache: Cache) -> Mapping[str, bytes]:
-    # its files by form: those that were kept, or else drawn
+def _pictures(drawing: Drawing, cache: Cache, lacking: set[str]) -> Mapping[str, bytes]:
+    # its files by form: those that were kept, or else drawn; lacking: letters that
+    # figures so far have no font for
     key = cache.key("figure", drawing.content, drawing.stamp, libraries=_DRAWING)
     stored = cache.read(key)
     if stored is None:
-        files = draw(drawing.content, stamp=drawing.stamp)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            files = draw(drawing.content, stamp=drawing.stamp)
         stored = {str(form): data for form, data in files.items()}
-        cache.write(key, stored)
+        if not caught:  # a font with the letters that are missing may come
+            cache.write(key, stored)
+        for warning in caught:
+            if isinstance(warning.message, MissingLettersWarning):
+                lacking |= warning.message.letters
+            else:
+                warnings.warn(warning.message, stacklevel=2)
     return stored
 
 

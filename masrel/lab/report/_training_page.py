@@ -22,7 +22,8 @@ def training_page(record: TrainingRecord, protocol: Protocol, *, level: float) -
     curve, confusion = training_tables(record, level=level)
     drawing = Drawing(
         name="training",
-        caption="Weighted kappa with the intended grades, as presentations went on",
+        caption="Weighted kappa with the intended grades, as presentations went on; "
+        "below, by how many grades each was too high",
         alt="Learning curve with its interval; the numbers are in the table below.",
         content=learning_view(record, level=level),
         stamp=training_stamp(record, protocol.study.id),

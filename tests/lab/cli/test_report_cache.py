@@ -133,6 +133,23 @@ def test_what_must_be_known_of_the_numbers_is_said_again(
     assert masrel("report", study) == first
 
 
+def test_letters_without_a_font_are_said_in_one_note_until_there_is_one(
+    masrel: Caller, study: Path, monkeypatch: pytest.MonkeyPatch, drawn: list[str]
+) -> None:
+    for file in (study / "protocol.toml", *study.glob("ratings/*.csv")):
+        text = file.read_text(encoding="utf-8").replace("1+", "경")
+        file.write_text(text, encoding="utf-8")
+    first = masrel("report", study)
+    (note, read, *_) = first.err.splitlines()
+    assert note.startswith("note: no font here has 경: such letters are drawn as boxes")
+    assert read.startswith("read: ")
+    assert masrel("report", study) == first
+    assert drawn == ["items_picture"]
+    monkeypatch.setenv("MASREL_FONT", "DejaVu Sans")
+    assert masrel("report", study) == first
+    assert drawn == ["items_picture"] * 2
+
+
 def test_nothing_changed_loads_nothing_heavy(study: Path) -> None:
     call = f"from masrel.cli import cli\ncli(['report', {str(study)!r}])"
     built = loaded_after(call)

@@ -95,6 +95,14 @@ def test_the_embedded_pictures_are_the_figures_and_need_nothing_either(
         assert all(link.startswith(held) for link in links)
 
 
+def test_the_contents_leave_out_what_is_not_in_the_data(published: ReportFiles) -> None:
+    text = published.html.read_text(encoding="utf-8")
+    nav = text.partition("<nav")[2].partition("</nav>")[0]
+    assert 'href="#agreement"' in nav
+    assert 'href="#test-retest"' not in nav
+    assert 'id="test-retest"' in text  # where it says why
+
+
 def test_every_picture_is_told_in_words(published: ReportFiles) -> None:
     for image in page_of(published).images:
         assert len(image["alt"]) > 30

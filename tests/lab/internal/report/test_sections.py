@@ -338,12 +338,46 @@ def test_stretches_are_counted_and_the_one_a_grade_rests_on_is_marked() -> None:
     assert counted.text.startswith(f"{said} In 1 of 1 presentation the arm came loose")
 
 
+@pytest.mark.filterwarnings("ignore::masrel.errors.SmallSampleWarning")
+@pytest.mark.parametrize(
+    ("interval", "looks"),
+    [
+        ("none", ""),
+        ("jackknife", ", confidence intervals (lines with ends)"),
+        (
+            "posterior",
+            ", credible intervals (broad bars). Filled curves: posterior densities, "
+            "each to its own height",
+        ),
+        (
+            "bootstrap",
+            ", confidence intervals (lines with ends). Blue, above: resamples, each "
+            "row to its own height",
+        ),
+    ],
+)
+def test_the_caption_of_a_forest_has_the_marks_there_are(
+    interval: str, looks: str
+) -> None:
+    line = plan(id="kappa", interval=interval, target="items")
+    (section,) = build_sections(material_of(line))
+    (forest,) = [block for block in section.blocks if isinstance(block, Drawing)]
+    assert forest.caption == (
+        f"Agreement between raters: estimates (dots){looks}. Dashed: what chance gives."
+    )
+    (share,) = build_sections(material_of(plan(coefficient="percent_agreement")))
+    (forest,) = [block for block in share.blocks if isinstance(block, Drawing)]
+    assert "Dashed" not in forest.caption
+
+
+def material_of(line: EstimatePlan) -> Material:
+    protocol, rows = protocol_with(line, sections=("agreement",)), table_v()
+    return gather(protocol, rows, analyze(protocol, rows))
+
+
 def test_the_forest_shows_the_posterior_behind_an_interval() -> None:
     line = plan(id="kappa", interval="posterior", target="items")
-    protocol, rows = protocol_with(line, sections=("agreement",)), table_v()
-    analysis = analyze(protocol, rows)
-    made = gather(protocol, rows, analysis)
-    (section,) = build_sections(made)
+    (section,) = build_sections(material_of(line))
     (forest,) = [block for block in section.blocks if isinstance(block, Drawing)]
     first, second = (draw(forest.content, stamp="")["svg"] for _ in range(2))
     assert b"posterior density" in first

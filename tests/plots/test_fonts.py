@@ -1,0 +1,59 @@
+"""Letters of any script find a font, or it is said which have none."""
+
+import warnings
+
+import pytest
+from matplotlib import font_manager
+from matplotlib.font_manager import get_font
+
+from masrel.errors import MissingLettersWarning
+from masrel.plots import draw, forest
+from masrel.plots._drawn_values import Drawn
+from masrel.tables._estimate_words import forest_row
+from tests.plots.made import blank, estimate
+
+
+def letter_of_another_font() -> str:
+    """A letter that DejaVu Sans has not, and that a font which is here has."""
+    own = get_font(font_manager.findfont("DejaVu Sans")).get_charmap()
+    fonts = [of.fname for of in font_manager.fontManager.ttflist if "STIX" in of.name]
+    charmaps = [get_font(file).get_charmap() for file in fonts]
+    return next(
+        chr(code)
+        for code in sorted({code for charmap in charmaps for code in charmap} - {*own})
+        if chr(code).isalpha()
+    )
+
+
+def test_letters_without_a_font_are_said_in_one_sentence_with_the_way_out() -> None:
+    with pytest.warns(MissingLettersWarning) as caught:
+        forest([estimate()] * 2, ["경미", "경"], ax=blank())
+    (warning,) = caught
+    assert str(warning.message) == (
+        "no font here has 경 미: such letters are drawn as boxes; set MASREL_FONT to "
+        "the file or the name of a font that has them"
+    )
+    assert warning.filename == __file__
+
+
+def test_letters_that_another_font_has_are_drawn_with_it() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        forest(estimate(), [f"DejaVu has no {letter_of_another_font()}"], ax=blank())
+
+
+@pytest.mark.parametrize(("form", "is_said"), [("png", True), ("inline", False)])
+def test_a_page_has_the_letters_of_its_reader(form: str, is_said: bool) -> None:
+    rows = (forest_row("경미", estimate()),)
+    shown = Drawn("masrel.plots._forest:forest_picture", (rows, "agreement"))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        draw(shown, stamp="", forms=(form,))
+    assert [of.category for of in caught] == [MissingLettersWarning] * is_said
+
+
+def test_the_file_of_a_font_gives_its_letters(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MASREL_FONT", font_manager.findfont("STIXGeneral"))
+    axes = forest(estimate(), [letter_of_another_font()], ax=blank())
+    (name,) = (of for of in axes.texts if of.get_text() == letter_of_another_font())
+    assert name.get_fontfamily() == ["DejaVu Sans", "STIXGeneral"]
