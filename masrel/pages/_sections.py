@@ -7,7 +7,7 @@ import base64
 import html
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from masrel.plots._drawn_values import Drawn
@@ -110,6 +110,40 @@ class Document:
     sections: tuple[Chapter, ...]
     inputs: tuple[tuple[str, str], ...]  # what it was made from, and the hash of that
     version: str  # of masrel
+
+
+_LETTERS = 112  # of a line of a table on paper
+
+
+def narrow(table: Table) -> list[Table]:
+    """Return a table in parts for which paper is wide enough, each with its names."""
+    columns, rows = page_cells(table)
+    widths = [
+        2 + max(map(len, (*column.heading.split(), *(row[at] for row in rows))))
+        for at, column in enumerate(columns)
+    ]
+    n_names = next((at for at, of in enumerate(columns) if of.align != "left"), 1) or 1
+    room = used = max(_LETTERS - sum(widths[:n_names]), _LETTERS // 2)
+    parts: list[set[str]] = []
+    for column, width in zip(columns[n_names:], widths[n_names:], strict=True):
+        if (used := used + width) > room:
+            parts.append({of.key for of in columns[:n_names]})
+            used = width
+        parts[-1].add(column.key)
+    if len(parts) < 2:
+        return [table]
+    return [
+        replace(
+            table,
+            caption=f"{table.caption} (part {at} of {len(parts)})",
+            columns=tuple(
+                of if of.key in part else replace(of, where="csv")
+                for of in table.columns
+            ),
+            notes=table.notes if at == len(parts) else (),
+        )
+        for at, part in enumerate(parts, 1)
+    ]
 
 
 def chapters(

@@ -243,6 +243,22 @@ def test_a_reference_is_held_against_the_others(
     assert "by those of gold" not in result.to_html()
 
 
+def test_a_table_too_wide_for_paper_is_in_parts_with_its_names(
+    tmp_path: Path, masrel_command: Caller
+) -> None:
+    grades = [f"category {letter}" for letter in "abcdefghijklmnopqr"]
+    rows = [f"{row},{grades[row % 18]},{grades[(row * row) % 18]}" for row in range(90)]
+    file, written = tmp_path / "many.csv", tmp_path / "page.html"
+    file.write_text("\n".join(["item,Kim,Lee", *rows]))
+    masrel_command("diagnose", file, "--html", written)
+    page = Page(written.read_text("utf-8"))
+    heads = [page.heads(table) for table in range(page.text.count("<thead>"))]
+    parts = [of for of in heads if "Another rater said" in of]
+    assert len(parts) > 1
+    assert all(of[:2] == ["Rater", "Another rater said"] for of in parts)
+    assert [name for of in parts for name in of if name in grades] == grades
+
+
 def test_clusters_leave_intervals_of_single_items_out() -> None:
     frame = ratings(3).assign(patient=[f"p{row // 3}" for row in range(12)])
     reading = Reading(clusters="patient")
