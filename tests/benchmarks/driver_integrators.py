@@ -25,7 +25,7 @@ from masrel.lab.hess import (
     open_device,
     run_presentation,
 )
-from masrel.lab.hess._plant import Plant, PlantParameters
+from masrel.lab.hess._simulated import Plant, PlantParameters
 
 START, END = radians(30.0), radians(146.0)
 ARM = PlantParameters()
@@ -64,7 +64,7 @@ def chosen(torques: list[float], step_ns: int) -> Values:
     """The plant of the package -> what the hand feels at each tick, N·m."""
     parameters = PlantParameters(step_ns=step_ns)
     moved, plant = hand(), None
-    plant = Plant(moved, parameters, start_ns=0)
+    plant = Plant(moved, parameters)
     out = np.empty(len(torques))
     for tick, torque in enumerate(torques):
         plant.advance(tick * 1_000_000)

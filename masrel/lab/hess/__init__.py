@@ -6,7 +6,7 @@ from masrel.lab.hess._simulated import SimulatedOptions, TorqueSensor
 from masrel.lab.hess._stop import EmergencyStop
 from masrel.lab.hess.backends import device_names, open_device
 from masrel.lab.hess.clock import Clock, RealClock, SimulatedClock
-from masrel.lab.hess.controller import Controller
+from masrel.lab.hess.controller import Controller, Friction, FrictionCompensation
 from masrel.lab.hess.device import (
     BackendOptions,
     Device,
@@ -14,7 +14,6 @@ from masrel.lab.hess.device import (
     IdleCommand,
     Reading,
 )
-from masrel.lab.hess.friction import Friction, FrictionCompensation
 from masrel.lab.hess.hand import Hand, SimulatedHand, YieldingHand
 from masrel.lab.hess.human_hand import HandDistribution, HandTraits, HumanHand
 from masrel.lab.hess.limits import DeviceLimits

@@ -3,7 +3,7 @@
 import math
 
 from masrel.errors import LimitExceededError
-from masrel.lab.hess._velocity import speed_margin
+from masrel.lab.hess._signals import speed_margin
 from masrel.lab.hess.limits import DeviceLimits
 from masrel.lab.hess.stretching import PresentationStatus, StretchRules
 from masrel.lab.recording import PHASES

@@ -3,12 +3,12 @@
 import copy
 import math
 from dataclasses import dataclass
-from typing import ClassVar, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
 from masrel.errors import DeviceError
-from masrel.lab.hess._velocity import VelocityEstimate
+from masrel.lab.hess._signals import VelocityEstimate
 from masrel.lab.hess.clock import Clock
 from masrel.lab.hess.device import BackendOptions, Device, DeviceSetup, Reading
 from masrel.lab.recording import Recording
@@ -39,8 +39,8 @@ class ReplayDevice(Device):
     # machine makes of it. Of a gap in the recording all ticks but one are missed again.
     # After a fault the recording holds no readings any more, and so it ends there.
 
-    name: ClassVar[str] = "replay"
-    simulated: ClassVar[bool] = True
+    name = "replay"
+    simulated = True
 
     def __init__(self, recording: Recording, *, clock: Clock) -> None:
         columns = recording.columns

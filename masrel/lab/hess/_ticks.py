@@ -10,10 +10,9 @@ from masrel.errors import (
 )
 from masrel.lab.hess._course import Course
 from masrel.lab.hess._guard import ActiveGuard, Guard, Overruns, SoftStops
-from masrel.lab.hess._soft_end import raised_cosine
+from masrel.lab.hess._signals import VelocityEstimate, raised_cosine
 from masrel.lab.hess._spool import Samples
 from masrel.lab.hess._stop import EmergencyStop
-from masrel.lab.hess._velocity import VelocityEstimate
 from masrel.lab.hess._watchdog import Watching
 from masrel.lab.hess.clock import Clock
 from masrel.lab.hess.controller import Controller

@@ -72,7 +72,7 @@ class Device(ABC):
     """
 
     name: ClassVar[str]
-    simulated: ClassVar[bool]
+    simulated: bool
     channels: tuple[Channel, ...] = ()
 
     _state: _State = "new"  # on the class, so that `__del__` always finds one

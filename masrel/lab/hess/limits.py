@@ -8,8 +8,8 @@ from masrel.errors import ParameterError
 # No elbow is outside, rad; 5 deg because an end stop gives way a little.
 _LOWEST_ANGLE, _HIGHEST_ANGLE = math.radians(-5.0), math.radians(185.0)
 
-_MAX_RAMP_S = 0.1  # a fault's torque is zero after this at the latest
-_MAX_END_RAMP_S = 1.0  # and that of any other end after this
+# At the latest the torque of a fault is zero after this, and of any other end
+_LONGEST_S = {"ramp_time": 0.1, "end_ramp_time": 1.0}
 
 _POSITIVE = (
     "torque",
@@ -38,6 +38,20 @@ _NOT_NEGATIVE = (
     "arrival_angle",
     "encoder_noise",
 )
+
+
+def _check_positive(**values: float) -> None:
+    """Refuse the first value that is not above 0, and finite."""
+    for name, value in values.items():
+        if not 0.0 < value < math.inf:
+            raise ParameterError(f"{name}: needs more than 0, got {value}")
+
+
+def _check_not_negative(**values: float) -> None:
+    """Refuse the first value that is not 0 or more, and finite."""
+    for name, value in values.items():
+        if not 0.0 <= value < math.inf:
+            raise ParameterError(f"{name}: needs 0 or more, got {value}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,12 +163,8 @@ class DeviceLimits:
             value = getattr(self, name)
             if not 0.0 < value < math.inf:
                 raise ParameterError(f"{name}: needs a finite limit > 0, got {value}")
-        for name in _NOT_NEGATIVE:
-            value = getattr(self, name)
-            if not 0 <= value < math.inf:
-                raise ParameterError(f"{name}: needs 0 or more, got {value}")
-        longest = {"ramp_time": _MAX_RAMP_S, "end_ramp_time": _MAX_END_RAMP_S}
-        for name, most in longest.items():
+        _check_not_negative(**{name: getattr(self, name) for name in _NOT_NEGATIVE})
+        for name, most in _LONGEST_S.items():
             value = getattr(self, name)
             if not 0.0 <= value <= most:
                 raise ParameterError(f"{name}: needs 0 to {most:g} s, got {value}")

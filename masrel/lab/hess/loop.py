@@ -17,10 +17,10 @@ from masrel.lab.hess._course import Course
 from masrel.lab.hess._presented import Presented, as_presented
 from masrel.lab.hess._realtime import scheduled
 from masrel.lab.hess._shutdown import run_to_the_end
+from masrel.lab.hess._signals import speed_margin
 from masrel.lab.hess._spool import Samples, Spool, n_samples
 from masrel.lab.hess._stop import EmergencyStop
 from masrel.lab.hess._ticks import Ticks
-from masrel.lab.hess._velocity import speed_margin
 from masrel.lab.hess._watchdog import NoWatchdog, Watching
 from masrel.lab.hess.clock import Clock
 from masrel.lab.hess.controller import Controller

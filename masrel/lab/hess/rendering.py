@@ -16,7 +16,7 @@ from masrel.lab.elbow._motion import Motion
 from masrel.lab.elbow.joint_model import JointModel
 from masrel.lab.elbow.trace import _stepped
 from masrel.lab.hess._presented import Presented
-from masrel.lab.hess._velocity import passive_damping
+from masrel.lab.hess._signals import passive_damping
 from masrel.lab.hess.backends import open_device
 from masrel.lab.hess.clock import SimulatedClock
 from masrel.lab.hess.controller import Controller

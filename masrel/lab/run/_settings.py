@@ -17,7 +17,7 @@ from masrel.lab.hess import (
     device_names,
 )
 from masrel.lab.hess._guard import HELD_TIMES
-from masrel.lab.hess._velocity import passive_damping
+from masrel.lab.hess._signals import passive_damping
 from masrel.lab.protocol import DeviceSettings, Model, Protocol, joint_model
 from masrel.lab.protocol._kinds import DEFAULT_KIND
 

@@ -67,6 +67,10 @@ class InProcessPeer(Protocol):
         """Take in what was sent and do what is due by now."""
         ...
 
+    def close(self) -> None:
+        """Leave the bus, after the host."""
+        ...
+
 
 class Link:
     """One end of a bus, as `connected` opens it; a context manager that leaves it.
@@ -79,7 +83,7 @@ class Link:
         The clock of deadlines.
     peer : InProcessPeer or None, optional
         An emulator in the same thread, which is served whenever this end sends or
-        waits, so that a bus works on a simulated clock too.
+        waits, so that a bus works on a simulated clock too, and closed with it.
     """
 
     __slots__ = ("_bus", "_clock", "_peer")
@@ -184,6 +188,9 @@ class Link:
             self._bus.shutdown()
         except (can.CanError, OSError) as error:
             raise BusError(f"puck: the bus cannot be left ({error})") from error
+        finally:
+            if self._peer is not None:
+                self._peer.close()
 
     def _next_frame(self, timeout_s: float) -> Frame | None:
         # A timeout of 0 does not wait.

@@ -6,28 +6,19 @@ In: where the puck is, as `PuckOptions`. Out: reports to print.
 import math
 import statistics
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 from masrel.errors import DeviceError, DeviceTimeoutError
 from masrel.lab.hess.clock import Clock
 from masrel.lab.hess.hand import Hand
 from masrel.lab.hess.limits import DeviceLimits
-from masrel.lab.hess.puck._bring_up import (
-    AwakePuck,
-    activate,
-    identify,
-    motor_table,
-    set_position,
-    wake_and_configure,
-)
-from masrel.lab.hess.puck._bus import Link, open_link
-from masrel.lab.hess.puck._codec import MAX_NODE, reply_identifiers
-from masrel.lab.hess.puck._emulator import emulate
-from masrel.lab.hess.puck._node import PuckNode
+from masrel.lab.hess.puck._bus import Link
+from masrel.lab.hess.puck._codec import MAX_NODE
+from masrel.lab.hess.puck._emulator import join
+from masrel.lab.hess.puck._node import AwakePuck, PuckNode, identify
 from masrel.lab.hess.puck._properties import ASLEEP, READY, STATUS, PropertyTable
 from masrel.lab.hess.puck._puck_options import PuckOptions
-from masrel.lab.hess.puck._release import release
 
 _PROBE_PATIENCE_S = 0.01  # public drivers wait 1 and 100 ms
 _REPORTED = ("MODE", "CTS", "IPNM", "MT", "GRPA", "GRPB", "GRPC", "TEMP", "VBUS")
@@ -81,20 +72,11 @@ def connected(
     DeviceError
         If the bus cannot be opened, or left without an error before that.
     """
-    with ExitStack() as stack:
-        emulator = None
-        if hand is not None:
-            emulator = emulate(options, clock=clock, hand=hand, range_end=range_end)
-            stack.enter_context(emulator.link)
-        yield stack.enter_context(
-            open_link(
-                options.interface,
-                options.channel,
-                clock=clock,
-                accepted=None if all_nodes else reply_identifiers(options.puck),
-                peer=emulator,
-            )
-        )
+    link, _ = join(
+        options, clock=clock, hand=hand, range_end=range_end, all_nodes=all_nodes
+    )
+    with link:
+        yield link
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -168,38 +150,29 @@ def _node_report(node: PuckNode, properties: PropertyTable | None) -> NodeReport
     try:
         status = node.get(STATUS, patience_s=_PROBE_PATIENCE_S)
         if status not in (ASLEEP, READY):
-            return _report_of_error(node.puck, status)
+            return NodeReport(
+                puck=node.puck,
+                kind=f"in error, STAT {status}",
+                is_awake=False,
+                firmware=None,
+                is_supported=False,
+                properties={},
+            )
         identity = identify(node, patience_s=_PROBE_PATIENCE_S)
     except DeviceTimeoutError:
         return None
-    table: PropertyTable | None = None
     try:
-        table = motor_table(identity, properties)
+        numbers = identity.table(properties).numbers
     except DeviceError:
-        pass  # the report says that it is not supported
-    values: dict[str, int] = {}
-    if identity.is_awake and table is not None:
-        for name in _REPORTED:
-            if name in table.numbers:
-                values[name] = node.get(table.number(name))
+        numbers = {}  # the report says that it is not supported
+    reported = [name for name in _REPORTED if identity.is_awake and name in numbers]
     return NodeReport(
         puck=node.puck,
         kind=_KINDS.get(identity.kind, f"unknown, ROLE {identity.role}"),
         is_awake=identity.is_awake,
         firmware=identity.firmware,
-        is_supported=table is not None,
-        properties=values,
-    )
-
-
-def _report_of_error(puck: int, status: int) -> NodeReport:
-    return NodeReport(
-        puck=puck,
-        kind=f"in error, STAT {status}",
-        is_awake=False,
-        firmware=None,
-        is_supported=False,
-        properties={},
+        is_supported=bool(numbers),
+        properties={name: node.get(numbers[name]) for name in reported},
     )
 
 
@@ -207,8 +180,7 @@ def awake(link: Link, clock: Clock, options: PuckOptions) -> AwakePuck:
     """Wake a puck if it sleeps, idle it, and set what the driver needs set."""
     node = PuckNode(link, clock, options.puck)
     identity = identify(node)
-    table = motor_table(identity, options.properties)
-    return wake_and_configure(node, identity, table, options)
+    return AwakePuck(node, identity, identity.table(options.properties), options)
 
 
 def zero(link: Link, clock: Clock, options: PuckOptions, *, angle: float) -> int:
@@ -237,7 +209,7 @@ def zero(link: Link, clock: Clock, options: PuckOptions, *, angle: float) -> int
     DeviceError
         If the puck does not answer, is not supported, or does not take a setting.
     """
-    return set_position(awake(link, clock, options), angle)
+    return awake(link, clock, options).set_position(angle)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -292,27 +264,27 @@ def check_awake(puck: AwakePuck, options: PuckOptions) -> tuple[Check, ...]:
     """See whether a puck that is awake and configured can be driven."""
     node, transmission = puck.node, puck.transmission
     counts, took_s, n_lost = _request_positions(puck, options.patience_s)
-    units = f"CTS {transmission.counts_per_turn}, IPNM {transmission.units_per_nm}"
-    steps = (
-        f"{units}: {math.degrees(transmission.angle_step):.6f} deg and "
-        f"{transmission.torque_step:.5f} N·m a step"
-    )
     checks = [
-        Check(name="units", holds=True, result=steps),
+        Check(
+            name="units",
+            holds=True,
+            result=(
+                f"CTS {transmission.counts_per_turn}, IPNM {transmission.units_per_nm}"
+                f": {math.degrees(transmission.angle_step):.6f} deg and "
+                f"{transmission.torque_step:.5f} N·m a step"
+            ),
+        ),
         _check_replies(took_s, n_lost),
     ]
     if counts:
         checks += _check_position(counts, puck)
     checks.append(_check_torque_mode(puck, options))
-    receiver = node.receiver
-    checks.append(
-        Check(
-            name="error frames",
-            holds=receiver.n_errors == 0,
-            result=f"{receiver.n_errors}, and {receiver.n_foreign} frames of others",
-        )
+    errors = Check(
+        name="error frames",
+        holds=node.n_errors == 0,
+        result=f"{node.n_errors}, and {node.n_foreign} frames of others",
     )
-    return tuple(checks)
+    return (*checks, errors)
 
 
 def _request_positions(
@@ -320,17 +292,14 @@ def _request_positions(
 ) -> tuple[list[int], list[float], int]:
     # -> counts, how long each took s, how many stayed without an answer
     node, number = puck.node, puck.table.number("P")
-    counts, took_s, n_lost = [], [], 0
+    counts, took_s = [], []
     for _ in range(_N_REQUESTS):
         request_ns = node.now_ns()
-        try:
+        with suppress(DeviceTimeoutError):
             counts.append(node.position(number, patience_s=patience_s)[1])
-        except DeviceTimeoutError:
-            n_lost += 1
-        else:
             took_s.append((node.now_ns() - request_ns) * 1e-9)
         node.wait(max(0.0, 0.001 - (node.now_ns() - request_ns) * 1e-9))
-    return counts, took_s, n_lost
+    return counts, took_s, _N_REQUESTS - len(counts)
 
 
 def _check_replies(took_s: list[float], n_lost: int) -> Check:
@@ -367,14 +336,12 @@ def _check_position(counts: list[int], puck: AwakePuck) -> list[Check]:
 
 
 def _check_torque_mode(puck: AwakePuck, options: PuckOptions) -> Check:
-    table = puck.table
-    try:
-        activate(puck, checks_torque=options.checks_torque)
-    except DeviceError as error:
-        return Check(name="torque mode", holds=False, result=str(error))
-    finally:
-        release(puck.node, torque_id=table.number("T"), mode_id=table.number("MODE"))
     torque = "T reads back" if options.checks_torque else "T not asked for"
-    return Check(
-        name="torque mode", holds=True, result=f"in and out of it; {torque}; idle now"
-    )
+    holds, result = True, f"in and out of it; {torque}; idle now"
+    try:
+        puck.activate(checks_torque=options.checks_torque)
+    except DeviceError as error:
+        holds, result = False, str(error)
+    finally:
+        puck.release()
+    return Check(name="torque mode", holds=holds, result=result)

@@ -1,16 +1,21 @@
-"""Numbers of a Puck's properties, which depend on its firmware.
+"""What a Puck's numbers mean: its properties by firmware, its counts and its units.
 
 The same number means another property on another firmware, and setting the wrong one
-may move an arm: a firmware whose numbers are not known is refused. In: the version of
-a firmware, or a TOML file. Out: a `PropertyTable`.
+may move an arm: a firmware whose numbers are not known is refused.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from masrel.errors import DeviceError, ParameterError
 from masrel.lab._bounded_files import MAX_SMALL, parse_toml, read_regular
+from masrel.lab.hess.limits import _check_positive
+
+GEAR_RATIO = 18.8
+"""Turns of the motor for one of the elbow (Park, Kim and Damiano 2012, Table II)."""
 
 # The same for every type and firmware
 VERSION, ROLE, SERIAL_NUMBER, ID, ERROR, STATUS = 0, 1, 2, 3, 4, 5
@@ -30,6 +35,8 @@ MEMORY_WRITERS = frozenset({"SAVE", "LOAD", "DEF", "LOCK"})
 _WIDE = ("P", "CTS")  # 32 bits, which take the next number too
 
 _OLDEST, _MOVED, _UNMOVED, _SWAPPED = 65, 114, 119, 132
+
+_LOWEST, _HIGHEST = 8, 126  # 0 to 7 are the same for every firmware
 
 # From 65 on; V has another number from 114 to 118, and two change places at 132.
 _MODERN = {
@@ -90,9 +97,9 @@ class PropertyTable:
             raise ParameterError(f"properties: need {', '.join(absent)} too")
         taken: dict[int, str] = {}
         for name, number in self.numbers.items():
-            if not 8 <= number <= 126:
+            if not _LOWEST <= number <= _HIGHEST:
                 raise ParameterError(
-                    f"properties.{name}: needs 8 to 126, got {number}; "
+                    f"properties.{name}: needs {_LOWEST} to {_HIGHEST}, got {number}; "
                     "0 to 7 are the same for every firmware"
                 )
             for used in (number, number + 1) if name in _WIDE else (number,):
@@ -121,12 +128,9 @@ class PropertyTable:
         DeviceError
             If this firmware's table does not have it.
         """
-        try:
-            return self.numbers[name]
-        except KeyError:
-            raise DeviceError(
-                f"puck: property {name} is not in this firmware's table"
-            ) from None
+        if name not in self.numbers:
+            raise DeviceError(f"puck: property {name} is not in this firmware's table")
+        return self.numbers[name]
 
     def settable(self, name: str) -> int:
         """Return the number of a property that is to be set.
@@ -184,9 +188,8 @@ def property_table(firmware: int) -> PropertyTable:
             f"puck: needs firmware {_OLDEST} to {_MOVED - 1}, or {_UNMOVED} or later, "
             f"got {firmware}"
         )
-    swapped = firmware >= _SWAPPED
-    later = {"EN": 94, "HOLD": 77} if swapped else {"EN": 77, "HOLD": 94}
-    return PropertyTable(numbers={**_MODERN, **later})
+    enable, hold = (94, 77) if firmware >= _SWAPPED else (77, 94)
+    return PropertyTable(numbers={**_MODERN, "EN": enable, "HOLD": hold})
 
 
 def read_property_table(path: Path) -> PropertyTable:
@@ -225,3 +228,57 @@ def read_property_table(path: Path) -> PropertyTable:
         return PropertyTable(numbers=numbers)
     except ParameterError as error:
         raise ParameterError(f"{path}: {error}") from error
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Transmission:
+    """What lies between the elbow and the numbers on the bus."""
+
+    # Values are rounded to the nearest, not down: rounding down would add half a step
+    # to every angle and torque.
+
+    counts_per_turn: int  # counts of the encoder per turn of the motor; the puck's CTS
+    units_per_nm: int  # current units per N·m at the motor; the puck's IPNM
+    gear_ratio: float = GEAR_RATIO  # turns of the motor for one of the elbow
+    direction: Literal[1, -1] = 1  # whether counts grow with extension
+
+    def __post_init__(self) -> None:
+        _check_positive(
+            counts_per_turn=self.counts_per_turn,
+            units_per_nm=self.units_per_nm,
+            gear_ratio=self.gear_ratio,
+        )
+        check_direction(self.direction)
+
+    @property
+    def angle_step(self) -> float:
+        """What one count is at the elbow, rad."""
+        return math.tau / (self.counts_per_turn * self.gear_ratio)
+
+    @property
+    def torque_step(self) -> float:
+        """What one current unit is at the elbow, N·m."""
+        return self.gear_ratio / self.units_per_nm
+
+    def counts(self, angle: float) -> int:
+        """Return the count of an angle."""
+        return self.direction * round(angle / self.angle_step)
+
+    def angle(self, counts: int) -> float:
+        """Return the angle of a count."""
+        return self.direction * counts * self.angle_step
+
+    def units(self, torque_nm: float) -> int:
+        """Return the current units of a torque."""
+        return -self.direction * round(torque_nm / self.torque_step)
+
+    def torque(self, units: int) -> float:
+        """Return the torque of current units."""
+        # Torque at the elbow, N·m; positive resists extension.
+        return -self.direction * units * self.torque_step
+
+
+def check_direction(direction: int) -> None:
+    """Refuse a direction that is neither with nor against extension."""
+    if direction not in (1, -1):
+        raise ParameterError(f"direction: needs 1 or -1, got {direction}")

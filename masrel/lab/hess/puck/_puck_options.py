@@ -6,8 +6,8 @@ from typing import Literal, Self, get_args
 
 from masrel.errors import ParameterError
 from masrel.lab.hess.device import BackendOptions
-from masrel.lab.hess.puck._properties import PropertyTable
-from masrel.lab.hess.puck._transmission import GEAR_RATIO
+from masrel.lab.hess.limits import _check_not_negative, _check_positive
+from masrel.lab.hess.puck._properties import GEAR_RATIO, PropertyTable, check_direction
 
 _MAX_MOTOR_NODE = 7  # 8 to 31 are hands, sensors and the safety module
 
@@ -146,11 +146,7 @@ class EmulatorOptions:
     faults: tuple[InjectedFault, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("wake_s", "braking"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise ParameterError(
-                    f"{name}: needs 0 or more, got {getattr(self, name)}"
-                )
+        _check_not_negative(wake_s=self.wake_s, braking=self.braking)
         if self.reply_bytes not in (4, 6):
             raise ParameterError(f"reply_bytes: needs 4 or 6, got {self.reply_bytes}")
 
@@ -212,12 +208,12 @@ class PuckOptions(BackendOptions):
             raise ParameterError(
                 f"puck: needs a motor's node, 1 to {_MAX_MOTOR_NODE}, got {self.puck}"
             )
-        for name in ("gear_ratio", "largest_torque", "patience_s"):
-            value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise ParameterError(f"{name}: needs more than 0, got {value}")
-        if self.direction not in (1, -1):
-            raise ParameterError(f"direction: needs 1 or -1, got {self.direction}")
+        _check_positive(
+            gear_ratio=self.gear_ratio,
+            largest_torque=self.largest_torque,
+            patience_s=self.patience_s,
+        )
+        check_direction(self.direction)
         if self.poll_ticks < 1:
             raise ParameterError(f"poll_ticks: needs 1 or more, got {self.poll_ticks}")
         angle = self.angle_after_reset

@@ -12,8 +12,8 @@ import numpy as np
 
 from masrel.errors import DeviceError, DeviceTimeoutError, ParameterError
 from masrel.lab.hess._guard import Guard, check_silence
+from masrel.lab.hess._signals import VelocityEstimate
 from masrel.lab.hess._stop import EmergencyStop
-from masrel.lab.hess._velocity import VelocityEstimate
 from masrel.lab.hess._watchdog import NoWatchdog, Watching
 from masrel.lab.hess.clock import Clock
 from masrel.lab.hess.device import Device

@@ -23,9 +23,9 @@ from masrel.lab.hess.puck import EmulatorOptions, InjectedFault, Link, PuckOptio
 from masrel.lab.hess.puck._bus import open_link
 from masrel.lab.hess.puck._emulator import PuckEmulator
 from masrel.lab.hess.puck._node import PuckNode
-from masrel.lab.hess.puck._puck_device import EmulatedPuckDevice, emulated_options
+from masrel.lab.hess.puck._properties import Transmission
+from masrel.lab.hess.puck._puck_device import PuckDevice
 from masrel.lab.hess.puck._puck_options import FaultKind
-from masrel.lab.hess.puck._transmission import Transmission
 
 START, END = radians(30.0), radians(146.0)
 LIMITS = DeviceLimits(torque=20.0, speed=radians(400.0), missed_ticks=20)
@@ -80,18 +80,17 @@ def bench(*, hand: Hand | None = None, puck: int = 1, **options) -> Bench:
 
 
 def puck_options(hand: Hand, *, emulator: dict | None = None, **changes) -> PuckOptions:
-    options = replace(
-        emulated_options(hand), emulator=EmulatorOptions(**(emulator or {}))
-    )
-    return replace(options, **changes)
+    options = PuckOptions(interface="virtual", channel=f"bench-{next(_channels)}")
+    told = {"emulator": EmulatorOptions(**(emulator or {})), **changes}
+    return replace(options.emulated(hand.start), **told)
 
 
 def opened(
     clock: SimulatedClock, hand: Hand, *, emulator: dict | None = None, **changes
-) -> EmulatedPuckDevice:
+) -> PuckDevice:
     options = puck_options(hand, emulator=emulator, **changes)
     device = open_device("puck", clock=clock, hand=hand, options=options)
-    assert isinstance(device, EmulatedPuckDevice)
+    assert isinstance(device, PuckDevice)
     return device
 
 
@@ -101,7 +100,7 @@ def presented(
     speed_deg_s: float = 92.0,
     n_stretches: int = 1,
     **changes,
-) -> tuple[Presented, EmulatedPuckDevice, SimulatedClock]:
+) -> tuple[Presented, PuckDevice, SimulatedClock]:
     """One presentation on an emulated puck; the device is closed afterwards."""
     clock, hand = SimulatedClock(), stretching(speed_deg_s, n_stretches)
     controller = Controller(STANDARD_MODELS[model], start_angle=START)
@@ -117,7 +116,7 @@ def presented(
     return done, device, clock
 
 
-def told(device: EmulatedPuckDevice) -> list[tuple[str, int]]:
+def told(device: PuckDevice) -> list[tuple[str, int]]:
     """What an emulated puck was set to, in order."""
     return [(setting.name, setting.value) for setting in device.emulator.settings]
 

@@ -253,7 +253,7 @@ def test_a_presentation_runs_on_every_kind_of_puck(traits: dict) -> None:
     done, device, _ = presented(**traits)
     assert done.fault is None
     assert done.recording.facts["ended"] == "arrived"
-    assert device.emulator.registers.n_memory_writes == 0
+    assert device.emulator.n_memory_writes == 0
 
 
 # A presentation
@@ -292,7 +292,7 @@ def test_closing_zeroes_idles_and_waits_for_the_word() -> None:
         ("MODE", 0),
         ("MODE", 0),
     ]
-    assert device.emulator.registers.mode == 0
+    assert device.emulator.mode == 0
 
 
 def test_a_puck_that_does_not_confirm_is_called_out() -> None:
@@ -304,7 +304,7 @@ def test_a_puck_that_does_not_confirm_is_called_out() -> None:
     with pytest.raises(DeviceError, match=r"not idle after 100 ms .* ITS SUPPLY OFF"):
         device.close()
     assert 0.1 <= (clock.now_ns() - begun_ns) * 1e-9 < 0.112
-    assert device.emulator.registers.torque == -287  # it holds it for ever
+    assert device.emulator.torque == -287  # it holds it for ever
 
 
 def test_an_opening_that_fails_leaves_the_bus_to_others() -> None:
@@ -326,7 +326,7 @@ def test_a_puck_that_was_reset_is_not_told_to_idle() -> None:
     device.command(2.0)
     clock.sleep_until_ns(clock.now_ns() + 20_000_000)
     device.close()
-    assert device.emulator.registers.n_memory_writes == 0
+    assert device.emulator.n_memory_writes == 0
 
 
 def test_a_torque_that_does_not_read_back_can_be_gone_without() -> None:
@@ -348,4 +348,4 @@ def test_a_bus_that_comes_back_while_closing_is_used() -> None:
     device.command(2.0)
     clock.sleep_until_ns(clock.now_ns() + 15_000_000)
     device.close()
-    assert device.emulator.registers.mode == 0
+    assert device.emulator.mode == 0

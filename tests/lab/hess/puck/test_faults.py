@@ -24,8 +24,8 @@ from masrel.lab.run import _present as presenting
 from tests.lab.hess.injected import N_STRETCHES, later_s, small_study
 from tests.lab.hess.puck.rig import (
     PUCK,
-    EmulatedPuckDevice,
     FaultKind,
+    PuckDevice,
     fault,
     presented,
     puck_options,
@@ -48,7 +48,7 @@ class Outcome:
     words: str | None = None
 
 
-def held(device: EmulatedPuckDevice) -> list[tuple[int, float]]:
+def held(device: PuckDevice) -> list[tuple[int, float]]:
     """When the puck's torque changed, ns, and to what, N·m; idle it holds none."""
     steps, driven, torque = [], False, 0.0
     for time_ns, name, value in device.emulator.settings:
@@ -93,7 +93,7 @@ def outcome(injected: InjectedFault, n_stretches: int = 1) -> Outcome:
     )
 
 
-def presentation_began(device: EmulatedPuckDevice) -> int:
+def presentation_began(device: PuckDevice) -> int:
     """When the loop began, ns: 0.26 ms before its first torque takes effect."""
     torques = [s.time_ns for s in device.emulator.settings if s.name == "T"]
     # T = 0 to wake, T = 0, 1, 0 to activate: the fifth is the loop's first, sent
@@ -319,8 +319,8 @@ def assert_invariants(faults: tuple[InjectedFault, ...]) -> None:
     if "SWITCH ITS SUPPLY OFF" in str(facts["fault"]):
         return  # one after the other they left no way to the puck: that is said
     assert held(device)[-1][1] == 0.0
-    assert device.emulator.registers.mode == 0
-    assert device.emulator.registers.n_memory_writes == 0
+    assert device.emulator.mode == 0
+    assert device.emulator.n_memory_writes == 0
 
 
 few = settings(deadline=None, max_examples=8)

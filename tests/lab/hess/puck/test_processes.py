@@ -114,7 +114,7 @@ def end(loop: subprocess.Popen[str]) -> None:
 def idle_after_s(emulator: PuckEmulator, patience_s: float) -> float | None:
     begun = time.monotonic()
     while time.monotonic() - begun < patience_s:
-        if emulator.registers.mode == 0:
+        if emulator.mode == 0:
             return time.monotonic() - begun
         time.sleep(0.001)
     return None
@@ -127,7 +127,7 @@ def idled_after_s(
     interface, channel, emulator = bus
     loop = started(interface, channel, "watched")
     try:
-        assert emulator.registers.torque == -144  # 1 N·m
+        assert emulator.torque == -144  # 1 N·m
         os.kill(loop.pid, blow)
         return idle_after_s(emulator, LONGEST_S)
     finally:
@@ -140,7 +140,7 @@ def test_a_watchdog_idles_the_puck_of_a_loop_that_is_killed_or_hangs(
 ) -> None:
     assert idled_after_s(bus, blow) is not None
     _, _, emulator = bus
-    assert emulator.registers.torque == 0
+    assert emulator.torque == 0
 
 
 def test_without_a_watchdog_the_puck_holds_its_torque(
@@ -150,8 +150,8 @@ def test_without_a_watchdog_the_puck_holds_its_torque(
     loop = started(interface, channel, "alone")
     end(loop)
     assert idle_after_s(emulator, 0.5) is None
-    assert emulator.registers.torque == -144
-    assert emulator.registers.mode == 2
+    assert emulator.torque == -144
+    assert emulator.mode == 2
 
 
 def test_the_next_driver_begins_with_zero_torque(
@@ -161,10 +161,10 @@ def test_the_next_driver_begins_with_zero_torque(
     end(started(interface, channel, "alone"))
     options = PuckOptions(interface=interface, channel=channel, patience_s=1.0)
     with open_device("puck", clock=RealClock(), options=options) as device:
-        assert emulator.registers.torque == 0
+        assert emulator.torque == 0
         assert device.simulated
         assert device.read().angle == pytest.approx(radians(60.0), abs=radians(60.0))
-    assert emulator.registers.mode == 0
+    assert emulator.mode == 0
 
 
 def test_a_bus_inside_the_process_has_no_watchdog() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from masrel.lab.hess import Device, open_device
 from tests.lab.hess.injected import CATCH, injections, outcome
-from tests.lab.hess.puck.rig import EmulatedPuckDevice, FaultKind, fault
+from tests.lab.hess.puck.rig import FaultKind, PuckDevice, fault
 from tests.lab.hess.puck.test_faults import session
 
 
@@ -62,8 +62,8 @@ def test_a_fault_does_on_a_puck_what_it_does_on_the_simulated_device(
     _, named, noticed, held, *_ = on_the_simulated_device(name)
     assert (made.kind or "let pass") == named
     for device in pucks:
-        assert isinstance(device, EmulatedPuckDevice)
-        assert device.emulator.registers.mode == 0  # idle
+        assert isinstance(device, PuckDevice)
+        assert device.emulator.mode == 0  # idle
     if not noticed:
         return
     # A count is 0.0047 deg and not 0.005, a position 0.075 ms old

@@ -36,7 +36,7 @@ def test_a_free_arm_says_its_friction_from_wherever_it_starts(start_deg: float) 
     two = (radians(40.0), radians(80.0))
     with opened(clock, loose(start_deg)) as device:
         estimate = fit_friction(steady_runs(device, clock, speeds=two))
-    assert device.emulator.registers.mode == 0
+    assert device.emulator.mode == 0
     assert estimate.viscous == pytest.approx(0.168, rel=0.03)
     assert estimate.coulomb == pytest.approx(0.189, rel=0.03)
 
@@ -154,8 +154,8 @@ def test_a_fault_while_the_arm_turns_by_itself_ends_it(kind, words: str) -> None
             steady_runs(device, clock, speeds=(radians(60.0), radians(80.0)))
         motor, now_ns = device.emulator.motor, clock.now_ns()
         assert radians(35.0) < motor.angle(now_ns) < radians(120.0)
-        assert abs(motor.velocity) < radians(150.0)
-    assert device.emulator.registers.mode == 0
+        assert abs(motor.plant.velocity) < radians(150.0)
+    assert device.emulator.mode == 0
 
 
 def test_an_arm_that_is_caught_while_it_turns_is_let_go_soon() -> None:

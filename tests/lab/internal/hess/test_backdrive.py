@@ -6,9 +6,8 @@ from math import radians
 import pytest
 
 from masrel.lab.hess import Friction, FrictionCompensation, SimulatedClock
-from masrel.lab.hess._plant import PlantParameters
-from masrel.lab.hess._simulated import SimulatedDevice
-from masrel.lab.hess._velocity import VelocityEstimate
+from masrel.lab.hess._signals import VelocityEstimate
+from masrel.lab.hess._simulated import PlantParameters, SimulatedDevice
 
 TRAVEL = radians(100.0)
 DURATION = 1.7  # one way, s; the source prints no speed: within those of Table V

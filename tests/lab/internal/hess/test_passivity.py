@@ -21,8 +21,8 @@ from masrel.lab.hess import (
     SimulatedHand,
     run_presentation,
 )
+from masrel.lab.hess._signals import VelocityEstimate, passive_damping
 from masrel.lab.hess._simulated import SimulatedDevice
-from masrel.lab.hess._velocity import VelocityEstimate, passive_damping
 
 PAGE = (Path(__file__).parents[4] / "docs" / "driver.md").read_text(encoding="utf-8")
 PERIOD = 0.001

@@ -20,8 +20,12 @@ from masrel.lab.hess import (
     YieldingHand,
     run_presentation,
 )
-from masrel.lab.hess._plant import Plant, PlantParameters, propagator
-from masrel.lab.hess._simulated import SimulatedDevice
+from masrel.lab.hess._simulated import (
+    Plant,
+    PlantParameters,
+    SimulatedDevice,
+    propagator,
+)
 from tests.benchmarks.driver_integrators import by_solve_ivp, chosen, commands
 from tests.lab.hess.rig import END, START
 
@@ -32,7 +36,7 @@ QUANTUM = 18.8 / 2700.0
 def loose(**parameters: object) -> Plant:
     # An arm that no hand holds
     hand = SimulatedHand(start=1.0, end=2.5, mean_speed=1.5, slip_time=0.0)
-    return Plant(hand, PlantParameters(**parameters), start_ns=0)
+    return Plant(hand, PlantParameters(**parameters))
 
 
 # Against other solutions
@@ -97,7 +101,7 @@ def test_a_step_is_the_matrix_exponential(inertia, damping, stiffness, step) -> 
     largest = max(1.0, np.abs(right).max())
     assert np.abs(np.array(made[:5]) - right[0]).max() < 1e-11 * largest
     assert np.abs(np.array(made[5:10]) - right[1]).max() < 1e-11 * largest
-    assert made.lag == pytest.approx(math.exp(-step / lag_time), rel=1e-12)
+    assert made[10] == pytest.approx(math.exp(-step / lag_time), rel=1e-12)
 
 
 # The motor
@@ -176,7 +180,7 @@ def test_without_friction_a_spring_swings_at_its_own_frequency() -> None:
 
     hand = Spring(start=1.0, end=2.5, mean_speed=1.5, stiffness=6.0, damping=1e-300)
     friction = Friction(inertia=0.01, viscous=0.0, coulomb=0.0)
-    plant = Plant(hand, PlantParameters(friction=friction), start_ns=0)
+    plant = Plant(hand, PlantParameters(friction=friction))
     for tick in range(1, 2000):
         plant.advance(tick * 1_000_000)
         swing = 0.1 * math.cos(math.sqrt(6.0 / 0.06) * tick * 1e-3)

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from masrel.lab.hess._replay import recorded_angles
-from masrel.lab.hess._velocity import VelocityEstimate
+from masrel.lab.hess._signals import VelocityEstimate
 
 
 @given(

@@ -11,8 +11,7 @@ from masrel.lab.hess import (
     SimulatedClock,
     SimulatedHand,
 )
-from masrel.lab.hess._plant import PlantParameters
-from masrel.lab.hess._simulated import SimulatedDevice
+from masrel.lab.hess._simulated import PlantParameters, SimulatedDevice
 
 # An amplifier that gives any torque at once
 INSTANT = {"torque_step": 0.0, "lag_time": 0.0, "delay": 0.0}

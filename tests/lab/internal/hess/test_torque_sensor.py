@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from masrel.lab.hess import Friction, SimulatedClock, SimulatedHand, TorqueSensor
-from masrel.lab.hess._plant import PlantParameters
-from masrel.lab.hess._simulated import SensingDevice
+from masrel.lab.hess._simulated import PlantParameters, SimulatedDevice
 
 FRICTIONLESS = Friction(inertia=0.01, viscous=0.0, coulomb=0.0)
 INSTANT = {"torque_step": 0.0, "lag_time": 0.0, "delay": 0.0}
@@ -16,18 +15,20 @@ EXACT = TorqueSensor(noise=0.0, lag_time=0.0, step=0.0)
 
 def bench(
     sensor: TorqueSensor, *, slip_time: float | None = 0.0, **parameters: object
-) -> tuple[SimulatedClock, SensingDevice]:
+) -> tuple[SimulatedClock, SimulatedDevice]:
     # Without a hand unless told otherwise: it slips at once
     clock = SimulatedClock()
     hand = SimulatedHand(start=1.0, end=2.5, mean_speed=1.5, slip_time=slip_time)
     plant = PlantParameters(**parameters)
-    device = SensingDevice(clock=clock, hand=hand, sensor=sensor, parameters=plant)
+    device = SimulatedDevice(clock=clock, hand=hand, sensor=sensor, parameters=plant)
     device.open()
     device.read()
     return clock, device
 
 
-def sensed(clock: SimulatedClock, device: SensingDevice, until_s: float) -> list[float]:
+def sensed(
+    clock: SimulatedClock, device: SimulatedDevice, until_s: float
+) -> list[float]:
     torques = []
     while clock.now_ns() < round(until_s * 1e9):
         clock.sleep_until_ns(clock.now_ns() + 1_000_000)

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from masrel.lab.hess._velocity import VelocityEstimate
+from masrel.lab.hess._signals import VelocityEstimate
 
 
 def test_a_step_of_speed_is_followed_as_a_first_order_system() -> None:

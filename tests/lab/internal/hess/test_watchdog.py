@@ -160,7 +160,7 @@ def test_a_watchdog_that_does_not_end_is_ended(tmp_path: Path, monkeypatch) -> N
 def test_the_process_says_in_one_line_why_it_cannot() -> None:
     command = (sys.executable, "-m", "masrel.lab.hess._watchdog_process", "0.05")
     done = subprocess.run(
-        (*command, "masrel.lab.hess.puck._release", "none", "x", "1", "42", "8"),
+        (*command, "masrel.lab.hess.puck._node", "none", "x", "1", "42", "8"),
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,

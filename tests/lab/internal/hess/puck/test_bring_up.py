@@ -10,9 +10,9 @@ import pytest
 from masrel.errors import DeviceError, ParameterError
 from masrel.lab.hess import RealClock
 from masrel.lab.hess.puck import Frame, Link, PuckOptions, connected
-from masrel.lab.hess.puck._bring_up import AwakePuck, set_position
-from masrel.lab.hess.puck._codec import encode_position, encode_reply
+from masrel.lab.hess.puck._codec import encode_position, encode_value
 from masrel.lab.hess.puck._commissioning import awake
+from masrel.lab.hess.puck._node import AwakePuck
 from tests.lab.hess.puck.rig import bench
 
 STAT, MODE, CTS, IPNM, GRPA = 5, 8, 68, 86, 26
@@ -32,7 +32,7 @@ class Altered(Link):
             return frame._replace(data=encode_position(self.counts))
         number = frame.data[0] & 0x7F
         if frame.identifier == 0x426 and number in self.values:
-            return frame._replace(data=encode_reply(number, self.values[number]))
+            return frame._replace(data=encode_value(number, self.values[number]))
         return frame
 
 
@@ -71,7 +71,7 @@ def test_a_puck_under_torque_is_not_zeroed() -> None:
         puck.node.set(MODE, 2)
         puck.node.wait(0.001)
         with pytest.raises(DeviceError, match="needs MODE 0 to be zeroed, is 2"):
-            set_position(puck, radians(90.0))
+            puck.set_position(radians(90.0))
 
 
 @pytest.mark.parametrize(("off", "is_refused"), [(2, False), (-3, True)])
@@ -82,9 +82,9 @@ def test_a_position_that_does_not_read_back_is_refused(
         if is_refused:
             words = "needs a position of 19251 counts after zeroing, got 19248"
             with pytest.raises(DeviceError, match=words):
-                set_position(puck, radians(90.0))
+                puck.set_position(radians(90.0))
         else:
-            assert set_position(puck, radians(90.0)) == 19253
+            assert puck.set_position(radians(90.0)) == 19253
 
 
 @pytest.mark.parametrize("angle_deg", [-0.1, 180.1, float("nan")])
@@ -93,7 +93,7 @@ def test_no_arm_is_beyond_its_ends(angle_deg: float) -> None:
         woken() as puck,
         pytest.raises(ParameterError, match="angle: needs 0 to 180 degrees"),
     ):
-        set_position(puck, radians(angle_deg))
+        puck.set_position(radians(angle_deg))
 
 
 @pytest.mark.parametrize("all_nodes", [False, True])

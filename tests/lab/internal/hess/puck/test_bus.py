@@ -114,6 +114,9 @@ class Metronome:
             self.bus.send(can.Message(arbitration_id=number, is_extended_id=False))
             self.next_ns += 2_000_000
 
+    def close(self) -> None:
+        self.next_ns = 0
+
 
 def test_a_neighbour_acts_while_this_end_waits_on_a_simulated_clock() -> None:
     clock = SimulatedClock()

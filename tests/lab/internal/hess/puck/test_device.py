@@ -1,4 +1,4 @@
-"""The puck's device from inside: which class, the law through the codec, the bus."""
+"""The puck's device from inside: hardware or not, the codec under the law, the bus."""
 
 from math import radians
 
@@ -14,12 +14,10 @@ from masrel.lab.hess.puck._codec import (
     decode_position,
     decode_request,
     encode_position,
-    encode_set,
+    encode_value,
 )
 from masrel.lab.hess.puck._puck_device import (
-    EmulatedPuckDevice,
     PuckDevice,
-    UnwiredPuckDevice,
     build,
 )
 from masrel.lab.hess.puck._puck_options import FaultKind
@@ -51,7 +49,6 @@ def test_it_says_whether_hardware_may_move(
     options = PuckOptions(interface=interface, channel=channel)
     device = build(DeviceSetup(clock=RealClock(), options=options))
     assert device.simulated is simulated
-    assert type(device) is (UnwiredPuckDevice if simulated else PuckDevice)
 
 
 def test_a_driver_that_was_killed_leaves_no_torque_to_the_next() -> None:
@@ -61,7 +58,7 @@ def test_a_driver_that_was_killed_leaves_no_torque_to_the_next() -> None:
         held = device.emulator
         device._bring_up()  # what the next driver does on the same puck
         assert ("T", 0) in told(device)[-13:]
-        assert held.registers.torque == 0
+        assert held.torque == 0
 
 
 @pytest.mark.parametrize("kind", ["bus-off", "dropped-replies", "dropped-torques"])
@@ -73,9 +70,9 @@ def test_a_puck_that_fails_while_it_is_activated_is_idled(kind: FaultKind) -> No
     device = build(setup)
     with pytest.raises(DeviceError):
         device.open()
-    assert isinstance(device, EmulatedPuckDevice)
+    assert isinstance(device, PuckDevice)
     assert not device.is_open
-    assert device.emulator.registers.mode == 0
+    assert device.emulator.mode == 0
 
 
 @pytest.mark.parametrize(
@@ -122,11 +119,11 @@ def test_the_codec_changes_the_law_by_its_quantum(
     for number, (time_s, angle, speed) in enumerate(
         zip(exact.time, exact.angle, exact.velocity, strict=True)
     ):
-        counts = decode_position(encode_position(PUCK.counts(float(angle)))).counts
+        counts = decode_position(encode_position(PUCK.counts(float(angle))))
         torque = controller.step(float(time_s), PUCK.angle(counts), float(speed))
-        request = decode_request(encode_set(42, PUCK.units(torque)))
-        assert request.value is not None
-        sent[number] = PUCK.torque(request.value)
+        _, units = decode_request(encode_value(42, PUCK.units(torque)))
+        assert units is not None
+        sent[number] = PUCK.torque(units)
         phases[number] = controller.phase
     same = phases == exact.phase
     assert np.sum(~same) <= 2  # a catch may begin or end one sample aside

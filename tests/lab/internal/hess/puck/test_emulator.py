@@ -6,7 +6,7 @@ import pytest
 
 from masrel.errors import BusError, DeviceTimeoutError, FrameError, ParameterError
 from masrel.lab.hess.puck import EmulatorOptions, Frame, InjectedFault
-from masrel.lab.hess.puck._codec import encode_get, to_group, to_puck
+from masrel.lab.hess.puck._codec import HOST, encode_get, from_node
 from tests.lab.hess.puck.rig import Bench, bench, fault, loose, packed_torques
 
 VERS, ROLE, STAT = 0, 1, 5
@@ -37,7 +37,7 @@ def frames_after(one: Bench, *sent: Frame, wait_s: float = 0.001) -> list[Frame]
 
 
 def silent(one: Bench, number: int) -> bool:
-    return frames_after(one, Frame(to_puck(1), encode_get(number))) == []
+    return frames_after(one, Frame(1, encode_get(number))) == []
 
 
 def driving(one: Bench, units: int = 0) -> Bench:
@@ -67,7 +67,7 @@ def test_asleep_8_is_not_its_mode(on) -> None:
     one.node.wait(0.001)
     one.node.receive_waiting()
     assert one.emulator.settings[-1].name == "LOCK"
-    assert one.emulator.registers.mode == 0
+    assert one.emulator.mode == 0
 
 
 @pytest.mark.parametrize("wake_s", [0.01, 1.0])
@@ -103,7 +103,7 @@ def test_an_answer_takes_150_microseconds_and_the_encoder_is_read_after_75(on) -
 @pytest.mark.parametrize("size", [4, 6])
 def test_answers_of_four_and_of_six_bytes_say_the_same(on, size: int) -> None:
     one = on(awake=True, reply_bytes=size)
-    (frame,) = frames_after(one, Frame(to_puck(1), encode_get(IPNM)))
+    (frame,) = frames_after(one, Frame(1, encode_get(IPNM)))
     assert len(frame.data) == size
     assert one.node.get(IPNM) == 2700
 
@@ -117,7 +117,7 @@ def test_a_position_comes_with_and_without_its_top_bit(
     on, flagged: bool, first: int
 ) -> None:
     one = on(awake=True, is_flagged=flagged)
-    (frame,) = frames_after(one, Frame(to_puck(1), encode_get(P)))
+    (frame,) = frames_after(one, Frame(1, encode_get(P)))
     assert frame.identifier == 0x423
     assert frame.data[0] & 0xC0 == first
     assert one.node.position(P, patience_s=0.001)[1] == 19251
@@ -125,7 +125,7 @@ def test_a_position_comes_with_and_without_its_top_bit(
 
 def test_a_position_comes_with_that_of_a_second_encoder(on) -> None:
     one = on(awake=True, has_secondary=True)
-    (frame,) = frames_after(one, Frame(to_puck(1), encode_get(P)))
+    (frame,) = frames_after(one, Frame(1, encode_get(P)))
     assert len(frame.data) == 6
     assert one.node.position(P, patience_s=0.001)[1] == 19251
 
@@ -142,8 +142,8 @@ def test_positions_wrap_at_22_bits(on) -> None:
 
 def test_a_group_is_answered_by_its_members(on) -> None:
     one = on(awake=True)
-    group_2 = Frame(to_group(2), encode_get(P))  # factory: 0, 2, 5
-    group_1 = Frame(to_group(1), encode_get(P))
+    group_2 = Frame(from_node(HOST, 2), encode_get(P))  # factory: 0, 2, 5
+    group_1 = Frame(from_node(HOST, 1), encode_get(P))
     assert len(frames_after(one, group_2)) == 1
     assert frames_after(one, group_1) == []
     one.node.set(GRPA, 1)
@@ -154,11 +154,11 @@ def test_a_group_is_answered_by_its_members(on) -> None:
 @pytest.mark.parametrize(
     "frame",
     [
-        Frame(to_puck(2), encode_get(P)),  # another puck's
-        Frame(to_puck(1), b""),
-        Frame(to_puck(1), b"\xaa\x00\x01"),
+        Frame(2, encode_get(P)),  # another puck's
+        Frame(1, b""),
+        Frame(1, b"\xaa\x00\x01"),
         Frame(0x426, encode_get(P)),  # from itself
-        Frame(to_puck(1), encode_get(127)),
+        Frame(1, encode_get(127)),
     ],
 )
 def test_what_is_not_for_it_or_means_nothing_stays_unanswered(on, frame: Frame) -> None:
@@ -169,10 +169,9 @@ def test_noise_of_others_does_not_hide_its_answer(on) -> None:
     one = on(awake=True, is_noisy=True)
     for _ in range(3):
         assert one.node.position(P, patience_s=0.001)[1] == 19251
-    assert one.node.receiver.n_foreign == 12
+    assert one.node.n_foreign == 12
     assert 0x540 in {
-        frame.identifier
-        for frame in frames_after(one, Frame(to_puck(1), encode_get(P)))
+        frame.identifier for frame in frames_after(one, Frame(1, encode_get(P)))
     }
 
 
@@ -190,10 +189,14 @@ def test_it_holds_its_last_torque_for_ever(on) -> None:
     one = driving(on(awake=True), 144)
     one.node.wait(0.05)
     one.node.receive_waiting()
-    assert one.emulator.motor.torque_nm == pytest.approx(-144 * 18.8 / 2700, abs=1e-9)
+    assert one.emulator.motor.plant.motor_torque == pytest.approx(
+        -144 * 18.8 / 2700, abs=1e-9
+    )
     one.node.wait(60.0)  # nobody says anything for a minute
     one.node.receive_waiting()
-    assert one.emulator.motor.torque_nm == pytest.approx(-144 * 18.8 / 2700, abs=1e-9)
+    assert one.emulator.motor.plant.motor_torque == pytest.approx(
+        -144 * 18.8 / 2700, abs=1e-9
+    )
     assert degrees(one.emulator.motor.angle(one.clock.now_ns())) > 145.9
 
 
@@ -230,7 +233,7 @@ def test_it_obeys_its_place_in_a_packed_frame(on, slot: int) -> None:
     one.node.set(GRPA, 1)
     one.node.set(PIDX, slot)
     driving(one)
-    one.link.send(Frame(to_group(1), packed_torques(10, 20, 30, 40)))
+    one.link.send(Frame(from_node(HOST, 1), packed_torques(10, 20, 30, 40)))
     one.node.wait(0.001)
     assert one.node.get(T) == 10 * slot
 
@@ -241,7 +244,7 @@ def test_writing_its_memory_is_counted(on) -> None:
         one.node.set(number, -1)
     one.node.wait(0.001)
     one.node.receive_waiting()
-    assert one.emulator.registers.n_memory_writes == 3
+    assert one.emulator.n_memory_writes == 3
 
 
 # Faults; they begin when it is first put into torque mode
@@ -297,12 +300,12 @@ def test_a_late_answer_is_not_taken_for_the_next_one(on) -> None:
         else:
             if previous[0]:  # the speed between readings is that of the arm
                 speed = (counts - previous[1]) / (sampled_ns - previous[0]) * 1e9
-                true = one.emulator.motor.velocity / radians(360 / 77004.8)
+                true = one.emulator.motor.plant.velocity / radians(360 / 77004.8)
                 assert speed == pytest.approx(true, rel=0.06)
             previous = sampled_ns, counts
         one.clock.sleep_until_ns(next_ns)
     assert n_lost == 2
-    assert one.node.receiver.n_late == 2
+    assert one.node.n_late == 2
 
 
 def test_a_second_answer_is_thrown_away(on) -> None:
@@ -310,7 +313,7 @@ def test_a_second_answer_is_thrown_away(on) -> None:
     for _ in range(5):
         one.node.position(P, patience_s=0.001)
         one.node.wait(0.001)
-    assert one.node.receiver.n_late == 4  # the last has not been listened to
+    assert one.node.n_late == 4  # the last has not been listened to
 
 
 def test_a_short_answer_is_refused(on) -> None:
@@ -323,7 +326,7 @@ def test_error_frames_are_counted_and_too_many_refused(on) -> None:
     one = failing(on, "error-frames")
     for _ in range(10):
         one.node.position(P, patience_s=0.001)
-    assert one.node.receiver.n_errors == 10
+    assert one.node.n_errors == 10
     with pytest.raises(BusError, match="at most 10 error frames") as caught:
         one.node.position(P, patience_s=0.001)
     assert caught.value.kind == "error-frames"
@@ -370,7 +373,7 @@ def test_a_reset_puts_it_to_sleep(on) -> None:
     one = driving(on(awake=True, faults=(fault("reset", 0.01),)), 100)
     one.node.wait(0.02)
     assert one.node.get(STAT) == 0
-    assert one.emulator.motor.torque_nm == pytest.approx(0.0, abs=0.05)
+    assert one.emulator.motor.plant.motor_torque == pytest.approx(0.0, abs=0.05)
 
 
 def test_the_babbling_of_others_is_bounded(on) -> None:

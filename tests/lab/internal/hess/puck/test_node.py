@@ -8,8 +8,7 @@ from masrel.errors import BusError, DeviceError, DeviceTimeoutError
 from masrel.lab.hess import SimulatedClock
 from masrel.lab.hess.puck import Frame, Link
 from masrel.lab.hess.puck._bus import open_link
-from masrel.lab.hess.puck._node import PuckNode
-from masrel.lab.hess.puck._release import release
+from masrel.lab.hess.puck._node import PuckNode, release
 from tests.lab.hess.puck.rig import bench
 
 T, MODE = 42, 8
@@ -76,5 +75,5 @@ def test_a_puck_that_cannot_be_heard_is_idled_all_the_same() -> None:
     with pytest.raises(DeviceError, match=r"cannot be read .* SWITCH ITS SUPPLY OFF"):
         release(node, torque_id=T, mode_id=MODE)
     assert one.clock.now_ns() - begun_ns <= 110_000_000
-    assert (one.emulator.registers.mode, one.emulator.registers.torque) == (0, 0)
+    assert (one.emulator.mode, one.emulator.torque) == (0, 0)
     one.close()

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from masrel.errors import ParameterError
-from masrel.lab.hess.puck._transmission import Transmission
+from masrel.lab.hess.puck._properties import Transmission
 
 PUCK = Transmission(counts_per_turn=4096, units_per_nm=2700)
 BACKWARDS = Transmission(counts_per_turn=4096, units_per_nm=2700, direction=-1)

@@ -1,4 +1,4 @@
-"""The speed of the arm, estimated from an encoder that counts in steps."""
+"""The speed of the arm from an encoder that counts in steps; a torque's soft end."""
 
 import math
 
@@ -58,3 +58,15 @@ def passive_damping(stiffness: float, damping: float, rate_hz: float) -> float:
     # low-pass that is largest at the Nyquist rate; without the motor's own delay.
     gain = -math.expm1(-CUTOFF_RAD_S / rate_hz)
     return 0.5 * stiffness / rate_hz + damping * gain / (2.0 - gain)
+
+
+def raised_cosine(duration_s: float, rate_hz: float) -> tuple[float, ...]:
+    """Return which share of a torque is left in each tick of its end, 0 in the last.
+
+    The steepest fall from one tick to the next is π/2 over the number of ticks.
+    """
+    n_ticks = math.ceil(duration_s * rate_hz - 1e-9)
+    return tuple(
+        0.5 * (1.0 + math.cos(math.pi * tick / n_ticks))
+        for tick in range(1, n_ticks + 1)
+    )
