@@ -267,6 +267,11 @@ def test_clusters_leave_intervals_of_single_items_out() -> None:
     assert any("with 95 %" in of for of in page_of(ratings(3), target="items").pictures)
 
 
+def test_letters_that_no_font_has_are_text_on_a_page() -> None:
+    page = page_of(ratings(3).rename(columns={"A": "김민지"}))
+    assert len(re.findall(">김민지<", page.text)) > 2
+
+
 def test_simulated_ratings_are_labelled_everywhere() -> None:
     frame = ratings(3).reset_index().melt("item", var_name="rater", value_name="grade")
     page = page_of(frame.assign(source="simulated"))
