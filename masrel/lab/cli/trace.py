@@ -40,6 +40,7 @@ from masrel.lab.report._traced_scenes import (
 
 if TYPE_CHECKING:
     from masrel.lab.elbow import JointModel, Motion
+    from masrel.lab.elbow.motions import Interpolation
 
 _KINDS = ("constant", "minimum-jerk", "trapezoid", "recording")
 _PATH = click.Path(path_type=Path)
@@ -462,12 +463,19 @@ def _motion_of(
 def _recorded(
     file: Path, interpolation: str | None, speed_deg_s: float | None
 ) -> "Motion":
-    from masrel.lab.elbow.motions.file import read_motion
+    from masrel.lab.elbow import Recorded
+    from masrel.lab.elbow.identification._reading import read_angles
 
     if speed_deg_s is not None:
         raise ParameterError("--speed-deg-s: a recording has its own speed")
-    is_linear = interpolation == "linear"
-    return read_motion(file, interpolation="linear" if is_linear else "pchip")
+    if file.suffix.lower() == ".json":  # beside the columns
+        file = file.with_suffix(".npz")
+    time, angle = read_angles(file)
+    between: Interpolation = "linear" if interpolation == "linear" else "pchip"
+    try:
+        return Recorded(time=time, angle=angle, interpolation=between)
+    except ParameterError as error:
+        raise ParameterError(f"{file}: {error}") from error
 
 
 def _stopped_and_repeated(stretch: _MotionOptions, once: "Motion") -> "Motion":

@@ -31,11 +31,10 @@ from masrel.lab.elbow.motions import (
     Trapezoid,
     interrupted,
 )
-from masrel.lab.elbow.outline import Outline, outline
 from masrel.lab.elbow.parameters import STANDARD_MODELS, ElbowParameters
 from masrel.lab.elbow.sampled import SampledJoint
 from masrel.lab.elbow.tardieu import Tardieu, tardieu
-from masrel.lab.elbow.trace import Trace, trace
+from masrel.lab.elbow.trace import Outline, Trace, outline, trace
 
 if TYPE_CHECKING:
     from masrel.lab.elbow.identification import (

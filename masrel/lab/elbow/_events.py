@@ -5,21 +5,30 @@ https://doi.org/10.1109/TNSRE.2012.2195330, equations (2), (4), (6) and Fig. 7.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from itertools import pairwise
-from typing import NamedTuple
+from math import nan
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from masrel.errors import ParameterError
 from masrel.lab.elbow import _law
-from masrel.lab.elbow._law import TorqueLaw
 from masrel.lab.elbow._motion import Motion
 from masrel.lab.elbow._polynomials import (
     NOTHING,
     TIE,
+    Flag,
+    Number,
     Polynomial,
     derivative,
     first_above,
+    greatest,
+    least,
+    pick,
     shifted,
+    some,
     split_at_roots,
     value,
 )
@@ -28,7 +37,7 @@ from masrel.lab.recording import PHASES, Phase
 
 __all__ = ["Events", "PhaseSpan", "StretchEvents", "events"]
 
-_PRE_CATCH, CATCH, _POST_CATCH, _OVER = range(4)  # positions in PHASES, but the last
+PRE_CATCH, CATCH, POST_CATCH = range(3)  # positions in PHASES
 
 
 class PhaseSpan(NamedTuple):
@@ -159,134 +168,145 @@ def events(parameters: ElbowParameters, motion: Motion) -> Events:
     >>> [span.name for span in result.phases]
     ['pre-catch', 'catch', 'post-catch']
     """
-    line = timeline(parameters, motion)
-    origin = motion.origin
+    line = Timeline(parameters, motion)
+    marks = phase_marks(line)
     phases = [
         PhaseSpan(
-            PHASES[begun.phase],
-            begun.time,
-            ended.time,
-            origin + begun.angle,
-            origin + ended.angle,
+            PHASES[phase], time, end, line.origin + angle, line.origin + end_angle
         )
-        for begun, ended in pairwise([*line.changes, line.end])
-        if ended.time > begun.time  # one of no length is left out
+        for (phase, time, angle), (_, end, end_angle) in pairwise(marks)
+        if end > time  # one of no length is left out
     ]
-    reached = [{n: getattr(stretch, n) for n in _REACHED} for stretch in line.stretches]
-    first = {} if line.first is None else reached[line.stretches.index(line.first)]
+    first, *others = [
+        {n: _reached(getattr(stretch, n)) for n in _REACHED}
+        for stretch in (line.first, *line.stretches)
+    ]
     return Events(
         **first,
-        stretches=tuple([StretchEvents(**names) for names in reached]),
-        end=line.end.time,
+        stretches=tuple([StretchEvents(**names) for names in others]),
+        end=line.end,
         phases=tuple(phases),
     )
 
 
+def _reached(number: float) -> Any:
+    return None if math.isnan(number) else number
+
+
+def phase_marks(line: "Timeline") -> list[tuple[int, float, float]]:
+    """Return where phases begin: position in PHASES, s, rad; last the end of all."""
+    marks = [(PRE_CATCH, 0.0, line.pieces[0].angle[0])]
+    for s in line.stretches:
+        marks += [
+            (CATCH, s.catch, s.caught_angle),
+            (POST_CATCH, s.catch_end, s.left_angle),
+            (PRE_CATCH, s.over, s.over_angle),
+        ]
+    marks = [mark for mark in marks if mark[1] == mark[1]]  # what has come
+    return [*marks, (-1, line.end, line.end_angle)]
+
+
 @dataclass(slots=True, eq=False)
 class Stretch:
-    """A movement in extension that reached ν_th, as far as it has got."""
+    """A movement in extension that reached ν_th; nan is what has not come.
 
-    onset_angle: float  # rad from the motion's origin
-    onset: float  # this and the next as of `StretchEvents`
-    catch: float | None = None
-    catch_angle: float | None = None
-    catch_speed: float | None = None
-    mean_speed: float | None = None
-    peak_end: float | None = None
-    catch_end: float | None = None
-    post_catch_end: float | None = None
-    pre_end: float = 0.0  # τ_pre_end of (3)
-    rise: float = 0.0  # H·v_c of (3)
+    Of one scene each stretch has its own, numbers; of a column of scenes, all of single
+    stretches, there is one, and its fields are columns.
+    """
 
-
-class Change(NamedTuple):
-    """The beginning of a phase, or the end of the last."""
-
-    phase: int  # position in PHASES
-    time: float  # s
-    angle: float  # rad from the motion's origin
-    stretch: Stretch | None = None  # whose catch or post-catch it is
-
-
-class Timeline(NamedTuple):
-    """What happens in a motion."""
-
-    law: TorqueLaw  # of pre-catch
-    changes: list[Change]  # in order
-    stretches: list[Stretch]
-    first: Stretch | None  # that catches, or the first of all if none does
-    end: Change  # of the motion, or of the range of motion
+    onset: Number = nan  # this and those to `post_catch_end` as of `StretchEvents`
+    catch: Number = nan
+    catch_angle: Number = nan
+    catch_speed: Number = nan
+    mean_speed: Number = nan
+    peak_end: Number = nan
+    catch_end: Number = nan
+    post_catch_end: Number = nan
+    onset_angle: Number = nan  # these four: rad from the motion's origin
+    caught_angle: Number = nan
+    left_angle: Number = nan
+    over_angle: Number = nan
+    over: Number = nan  # s: pre-catch again, at once where a catch is ended by flexing
+    pre_end: Number = nan  # τ_pre_end of (3)
+    rise: Number = nan  # H·v_c of (3)
 
 
-def timeline(p: ElbowParameters, motion: Motion) -> Timeline:
-    """Find out what happens in a motion, piece by piece."""
-    if motion.start >= p.range_end:
-        raise ParameterError(
-            "start: needs less than the end of range, "
-            f"{math.degrees(p.range_end):g} degrees, got "
-            f"{math.degrees(motion.start):g} degrees"
-        )
-    machine, limit = _PhaseMachine(p, motion), p.range_end - motion.origin
-    near = limit + NOTHING * abs(limit)
-    for start, length, angle, slowest, fastest in motion.pieces():
-        if not machine.changes:
-            machine.changes.append(Change(_PRE_CATCH, 0.0, angle[0]))
-        highest = angle[0] + fastest * length if slowest < 0.0 else value(angle, length)
-        beyond = None
-        if highest > near:
-            beyond = first_above(angle, 0.0, length, level=limit)
-        until = length if beyond is None else beyond
-        if until > 0.0:
-            machine.piece(start, angle, until, slowest, fastest)
-        if beyond is not None:
-            end = Change(_OVER, start + beyond, limit)
-            break
-    else:
-        end = Change(_OVER, motion.duration, motion.end - motion.origin)
-    stretches = machine.stretches
-    for stretch in stretches:
-        if stretch.peak_end is not None:  # the catch may end before
-            left = end.time if stretch.catch_end is None else stretch.catch_end
-            stretch.peak_end = min(stretch.peak_end, left)
-    caught = [stretch for stretch in stretches if stretch.catch is not None]
-    first = next(iter(caught or stretches), None)
-    return Timeline(machine.law, machine.changes, stretches, first, end)
+class Timeline:
+    """What happens in a motion: the state machine of Fig. 7, led from piece to piece.
 
-
-class _PhaseMachine:
-    """The state machine of Fig. 7, led from piece to piece instead of sampled."""
+    `p` and `motion` may have columns in their fields, a row a scene, if the motion is a
+    single stretch. Then whatever happens does so in some rows.
+    """
 
     def __init__(self, p: ElbowParameters, motion: Motion) -> None:
+        check_starts(motion.start, p.range_end)
         self.p, self.origin = p, motion.origin
-        rest = motion.start if p.rest_angle is None else p.rest_angle
-        self.law = _law.pre_catch(p, rest - self.origin)
+        self.pieces = motion.pieces()
+        rest: Number = motion.start
+        if p.rest_angle is not None:
+            rest = pick(p.rest_angle == p.rest_angle, p.rest_angle, rest)
+        self.law = _law.pre_catch(p, rest - self.origin)  # of pre-catch
         self.constant = p.catch_angle_constant - self.origin  # L
         smallest, largest = _law.catch_bounds(p, self.origin)
         # θ_catch jumps at ν_H where ν_L is above that
         self.jumps = smallest > largest
-        self.lowest, self.highest = sorted((smallest, largest))
-        self.goal = math.inf  # angle at which the catch ends, rad from the origin
-        self.is_armed = True
-        self.since: float | None = None  # time since onset, of a movement in pre-catch
-        self.changes: list[Change] = []  # the last is the phase it is in
+        self.lowest, self.highest = (
+            least(smallest, largest),
+            greatest(smallest, largest),
+        )
+        self.phase: Number = PRE_CATCH
+        self.is_armed: Flag = True
+        self.since: Number = nan  # time since onset, of a movement in pre-catch
+        self.goal: Number = math.inf  # where the catch ends, rad from the origin
         self.stretches: list[Stretch] = []
+        self.end: Number = nan  # of the motion, or of the range of motion, s
+        self.end_angle: Number = motion.end - self.origin
+        limit = p.range_end - self.origin
+        near = limit + NOTHING * abs(limit)
+        for start, length, angle, slowest, fastest in self.pieces:
+            highest = value(angle, length)
+            if not isinstance(highest, np.ndarray) and slowest < 0.0:
+                highest = angle[0] + fastest * length
+            until, is_left = length, self.end != self.end
+            if some(cut := is_left & (highest > near)):
+                beyond = first_above(angle, 0.0, length, level=limit, among=cut)
+                cut = beyond == beyond
+                until = pick(cut, beyond, length)
+                self.end = pick(cut, start + beyond, self.end)
+                self.end_angle = pick(cut, limit, self.end_angle)
+            until = pick(is_left, until, 0.0)
+            if some(until > 0.0):
+                self._piece(start, angle, until, slowest, fastest)
+            if not some(self.end != self.end):
+                break
+        self.end = pick(self.end == self.end, self.end, motion.duration)
+        for stretch in self.stretches:  # the catch may end before its peak
+            left = pick(
+                stretch.catch_end == stretch.catch_end, stretch.catch_end, self.end
+            )
+            stretch.peak_end = least(left, stretch.catch + p.peak_duration)
+        caught = [s for s in self.stretches if some(s.catch == s.catch)]
+        # that catches first, or the first of all if none does
+        self.first = next(iter(caught or self.stretches), Stretch())
 
-    def piece(
+    def _piece(
         self,
-        start: float,
+        start: Number,
         angle: Polynomial,
-        length: float,
-        slowest: float,
-        fastest: float,
+        length: Number,
+        slowest: Number,
+        fastest: Number,
     ) -> None:
-        """Go through a piece, cut where its speed passes ν_th either way."""
+        # cut where the speed passes ν_th either way
         threshold = self.p.speed_threshold
-        if slowest > threshold:
-            self.fast(start, angle, length, may_catch=True)
+        if isinstance(length, np.ndarray):
+            self._piece_of_rows(start, angle, length, fastest)
+        elif slowest > threshold:
+            self._fast(start, angle, length, may_catch=True)
         elif fastest <= -threshold:
-            self.flexed(start, angle[0])
+            self._flexed(start, angle[0])
         elif -threshold < slowest and fastest < threshold:
-            self.slow(start, angle, 0.0, length, fastest)
+            self._slow(start, angle, 0.0, length, fastest)
         else:
             speed = derivative(angle)
             cuts = split_at_roots(speed, length, (threshold, -threshold))
@@ -295,110 +315,221 @@ class _PhaseMachine:
                 if len(speed) > 1:  # no more than touched
                     middle *= 1.0 - NOTHING
                 if middle <= -threshold:
-                    self.flexed(start + low, value(angle, low))
+                    self._flexed(start + low, value(angle, low))
                 elif middle < threshold:
-                    self.slow(start, angle, low, high, fastest)
+                    self._slow(start, angle, low, high, fastest)
                 else:
-                    part = shifted(angle, low) if low else angle
-                    may_catch = middle > threshold
-                    self.fast(start + low, part, high - low, may_catch=may_catch)
+                    part, is_more = shifted(angle, low), middle > threshold
+                    self._fast(start + low, part, high - low, may_catch=is_more)
 
-    def flexed(self, time: float, angle: float) -> None:
+    def _piece_of_rows(
+        self, start: Number, angle: Polynomial, length: Number, fastest: Number
+    ) -> None:
+        # the speed is constant, only rises, or only falls
+        threshold, speed, lasts = (
+            self.p.speed_threshold,
+            derivative(angle),
+            length > 0.0,
+        )
+        if len(speed) == 1:
+            slow, fast = lasts & (speed[0] < threshold), lasts & (speed[0] >= threshold)
+            self._slow(start, angle, 0.0, pick(slow, length, 0.0), fastest)
+            may = speed[0] > threshold
+            self._fast(start, angle, pick(fast, length, 0.0), may_catch=may)
+            return
+        falls = some(speed[0] > value(speed, length))
+        sign = -1.0 if falls else 1.0
+        passed = first_above(
+            [sign * c for c in speed], 0.0, length, level=sign * threshold, among=lasts
+        )
+        passed = pick(passed == passed, passed, length)
+        if falls:
+            self._fast(start, angle, passed, may_catch=True)
+            self._slow(start, angle, passed, length, fastest)
+        else:
+            self._slow(start, angle, 0.0, passed, fastest)
+            part = shifted(angle, passed)
+            self._fast(start + passed, part, length - passed, may_catch=True)
+
+    def _flexed(self, time: float, angle: float) -> None:
         # the stretch is over, and the next may catch
-        phase, _, _, stretch = self.changes[-1]
-        if stretch is not None:
-            if phase == CATCH:
-                stretch.catch_end = time
+        if self.phase != PRE_CATCH:
+            stretch = self.stretches[-1]
+            stretch.over, stretch.over_angle = time, angle
+            if self.phase == CATCH:
+                stretch.catch_end, stretch.left_angle = time, angle
             else:
                 stretch.post_catch_end = time
-            self.changes.append(Change(_PRE_CATCH, time, angle))
-        self.is_armed, self.since = True, None
+        self.phase, self.is_armed, self.since = PRE_CATCH, True, nan
 
-    def slow(
-        self, start: float, angle: Polynomial, low: float, high: float, fastest: float
+    def _slow(
+        self,
+        start: Number,
+        angle: Polynomial,
+        low: Number,
+        high: Number,
+        fastest: Number,
     ) -> None:
-        if (
-            self.changes[-1].phase == CATCH
-            and value(angle, low) + fastest * (high - low) > self.goal
-        ):
-            low = self.leave_catch(start, angle, low, high, grows=False)
-        if self.changes[-1].phase == _POST_CATCH:  # ends below ν_th, Fig. 7
-            self.stretches[-1].post_catch_end = start + low
-            self.changes.append(Change(_PRE_CATCH, start + low, value(angle, low)))
-        self.since = None
+        lasts = high > low
+        leaves = lasts & (self.phase == CATCH)
+        if some(leaves):
+            leaves = leaves & (value(angle, low) + fastest * (high - low) > self.goal)
+            if some(leaves):
+                low = self._leave_catch(leaves, start, angle, low, high, grows=False)
+        ends = lasts & (self.phase == POST_CATCH)  # below ν_th, Fig. 7
+        if some(ends):
+            stretch = self.stretches[-1]
+            time = pick(ends, start + low, stretch.post_catch_end)
+            stretch.over = stretch.post_catch_end = time
+            stretch.over_angle = pick(ends, value(angle, low), stretch.over_angle)
+            self.phase = pick(ends, PRE_CATCH, self.phase)
+        self.since = pick(lasts, nan, self.since)
 
-    def fast(
-        self, start: float, angle: Polynomial, length: float, *, may_catch: bool
+    def _fast(
+        self, start: Number, angle: Polynomial, length: Number, *, may_catch: Flag
     ) -> None:
-        at = 0.0
-        if self.changes[-1].phase == _PRE_CATCH:
-            if self.since is None:
-                self.since = 0.0
-                self.stretches.append(Stretch(angle[0], start))
-            place = None
-            if may_catch and self.is_armed:
-                place = self.catch_place(angle, length)
-            if place is None:
-                self.since += length
-                return
-            self.catch(start, angle, place)
-            at = place
-        if self.changes[-1].phase == CATCH:
-            self.leave_catch(start, angle, at, length, grows=True)
+        lasts = length > 0.0
+        pre, at = lasts & (self.phase == PRE_CATCH), 0.0
+        if some(pre):
+            if some(begins := pre & (self.since != self.since)):
+                self._begin(begins, start, angle[0])
+            end = value(angle, length)
+            ready = pre & self.is_armed & may_catch & (end > self.lowest)
+            later = pick(pre, self.since + length, self.since)
+            if some(ready):
+                at = self._try_catch(ready, start, angle, length, end)
+            self.since = pick(self.phase == PRE_CATCH, later, nan)
+        leaves = lasts & (self.phase == CATCH)
+        if some(leaves):
+            leaves = leaves & (value(angle, length) > self.goal)
+            if some(leaves):
+                self._leave_catch(leaves, start, angle, at, length, grows=True)
 
-    def catch_place(self, angle: Polynomial, length: float) -> float | None:
-        """Where a piece of a movement first passes the catch angle; θ only grows."""
-        end = value(angle, length)
-        if end <= self.lowest:
-            return None
-        p, onset = self.p, self.stretches[-1].onset_angle
-        way, since = angle[1:], [1.0]  # both over the time, in the piece of the onset
-        if self.since:
-            top = end + p.catch_slope * (end - onset) / self.since
-            if not self.jumps and end <= self.highest and top <= self.constant:
-                return None  # even at its end, with the mean speed too large
-            way, since = [angle[0] - onset, *angle[1:]], [self.since, 1.0]
-        if self.jumps:
-            line = _law.slow_line(p, way, since)
-        else:
-            line = _law.catch_line(p, self.constant, angle, way, since)
-        place = first_above(line, 0.0, length)
-        if place is not None and value(angle, place) < self.lowest:
-            place = first_above(angle, place, length, level=self.lowest, grows=True)
-            if place is not None:
-                place = first_above(line, place, length)
-        if end > self.highest and (place is None or value(angle, place) > self.highest):
-            place = first_above(angle, 0.0, length, level=self.highest, grows=True)
-        is_tie = place is not None and length - place <= TIE * length
-        return None if is_tie else place
+    def _begin(self, which: Flag, start: Number, angle: Number) -> None:
+        if not self.stretches or not isinstance(which, np.ndarray):
+            self.stretches.append(Stretch())
+        stretch = self.stretches[-1]
+        stretch.onset = pick(which, start, stretch.onset)
+        stretch.onset_angle = pick(which, angle, stretch.onset_angle)
+        self.since = pick(which, 0.0, self.since)
 
-    def catch(self, start: float, angle: Polynomial, at: float) -> None:
+    def _try_catch(
+        self, ready: Flag, start: Number, angle: Polynomial, length: Number, end: Number
+    ) -> Number:
+        # v̄ is way over since; both are over the time, in the piece of the onset
+        at: Number = 0.0
+        if some(new := ready & (self.since == 0.0)):
+            at = self._catch(new, start, angle, length, end, angle[1:], [1.0])
+        if some(ready := ready & (self.since > 0.0)):
+            travelled = end - self.stretches[-1].onset_angle
+            top = end + self.p.catch_slope * travelled / self.since
+            # else not even at its end, with the mean speed too large
+            ready = ready & (self.jumps | (end > self.highest) | (top > self.constant))
+        if some(ready):
+            way = [angle[0] - self.stretches[-1].onset_angle, *angle[1:]]
+            since = [self.since, 1.0]
+            late = self._catch(ready, start, angle, length, end, way, since)
+            at = pick(ready, late, at)
+        return at
+
+    def _catch(
+        self,
+        ready: Flag,
+        start: Number,
+        angle: Polynomial,
+        length: Number,
+        end: Number,
+        way: Polynomial,
+        since: Polynomial,
+    ) -> Number:
+        # where it catches, else 0
         p, stretch = self.p, self.stretches[-1]
+        at = self._catch_place(ready, angle, length, end, way, since)
+        caught = at == at
+        if not some(caught):
+            return 0.0
         speeds = derivative(angle)
-        time, there, speed = start + at, value(angle, at), value(speeds, at)
-        if self.since:
-            stretch.mean_speed = (there - stretch.onset_angle) / (self.since + at)
+        there, speed = value(angle, at), value(speeds, at)
+        if len(since) == 1:
+            mean_speed = value(way, at)
         else:
-            stretch.mean_speed = value(angle[1:], at)
-        stretch.catch, stretch.catch_speed = time, speed
-        stretch.catch_angle = self.origin + there
-        stretch.pre_end = self.law.commanded(there, speed)
-        if p.inertia:
-            stretch.pre_end += p.inertia * value(derivative(speeds), at)
-        stretch.rise = p.catch_torque_constant * speed
-        stretch.peak_end = time + p.peak_duration
-        self.goal = there + p.catch_travel
-        self.is_armed, self.since = False, None
-        self.changes.append(Change(CATCH, time, there, stretch))
+            mean_speed = (there - stretch.onset_angle) / (since[0] + at)
+        pre_end = self.law.commanded(there, speed)
+        if some(p.inertia != 0.0):
+            pre_end = pre_end + p.inertia * value(derivative(speeds), at)
+        for name, number in (
+            ("catch", start + at),
+            ("catch_angle", self.origin + there),
+            ("catch_speed", speed),
+            ("mean_speed", mean_speed),
+            ("caught_angle", there),
+            ("pre_end", pre_end),
+            ("rise", p.catch_torque_constant * speed),
+        ):
+            setattr(stretch, name, pick(caught, number, getattr(stretch, name)))
+        self.goal = pick(caught, there + p.catch_travel, self.goal)
+        self.is_armed = pick(caught, False, self.is_armed)
+        self.phase = pick(caught, CATCH, self.phase)
+        return pick(caught, at, 0.0)
 
-    def leave_catch(
-        self, start: float, angle: Polynomial, low: float, high: float, *, grows: bool
-    ) -> float:
+    def _catch_place(
+        self,
+        ready: Flag,
+        angle: Polynomial,
+        length: Number,
+        end: Number,
+        way: Polynomial,
+        since: Polynomial,
+    ) -> Number:
+        # where a movement first passes the catch angle; θ only grows
+        line = _law.catch_line(self.p, self.constant, angle, way, since)
+        if some(self.jumps):
+            slow = [*_law.slow_line(self.p, way, since), *[0.0] * len(line)]
+            line = [pick(self.jumps, s, c) for s, c in zip(slow, line, strict=False)]
+        place = first_above(line, 0.0, length, among=ready)
+        if some(low := value(angle, place) < self.lowest):
+            begin = first_above(
+                angle, place, length, level=self.lowest, grows=True, among=low
+            )
+            place = pick(low, first_above(line, begin, length, among=low), place)
+        top = ready & (end > self.highest)
+        if some(top) and some(top := top & ~(value(angle, place) <= self.highest)):
+            late = first_above(
+                angle, 0.0, length, level=self.highest, grows=True, among=top
+            )
+            place = pick(top, late, place)
+        return pick(length - place <= TIE * length, nan, place)
+
+    def _leave_catch(
+        self,
+        which: Flag,
+        start: Number,
+        angle: Polynomial,
+        low: Number,
+        high: Number,
+        *,
+        grows: bool,
+    ) -> Number:
         # (4): the catch ends when the angle travelled exceeds D
-        place = first_above(angle, low, high, level=self.goal, grows=grows)
-        if place is None or high - place <= TIE * high:
+        place = first_above(angle, low, high, level=self.goal, grows=grows, among=which)
+        leaves = high - place > TIE * high
+        if not some(leaves):
             return low
-        time, stretch = start + place, self.stretches[-1]
-        stretch.catch_end = time
-        self.changes.append(Change(_POST_CATCH, time, value(angle, place), stretch))
-        return place
+        stretch = self.stretches[-1]
+        stretch.catch_end = pick(leaves, start + place, stretch.catch_end)
+        stretch.left_angle = pick(leaves, value(angle, place), stretch.left_angle)
+        self.phase = pick(leaves, POST_CATCH, self.phase)
+        return pick(leaves, place, low)
+
+
+def check_starts(start: Number, limit: Number, rows: Sequence[int] = ()) -> None:
+    """Refuse a motion, or rows of them, that start at or beyond the end of range."""
+    if not some(late := start >= limit):
+        return
+    i = int(np.argmax(late))
+    start, limit = (np.broadcast_to(x, np.shape(late)).flat[i] for x in (start, limit))
+    name = f"motions[{rows[i]}].start" if len(rows) else "start"
+    raise ParameterError(
+        f"{name}: needs less than the end of range, {math.degrees(limit):g} degrees, "
+        f"got {math.degrees(start):g} degrees"
+    )

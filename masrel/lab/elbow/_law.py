@@ -16,6 +16,7 @@ from masrel.lab.elbow._polynomials import (
     Polynomial,
     derivative,
     product,
+    some,
 )
 
 Parameters = Any  # ElbowParameters, or columns under the same names
@@ -49,20 +50,16 @@ class TorqueLaw(NamedTuple):
             square, last = product(y, y), [3.0 - 2.0 * y[0], -2.0 * y[1]]
             first, *later = product(square, last)  # `onset_share`
             return [self.level + rise * first, *[rise * c for c in later]]
-        terms = (self.stiffness, self.damping, self.inertia)
-        if all(isinstance(term, float) and term == 0.0 for term in terms):
+        k, b, m = self.stiffness, self.damping, self.inertia
+        if all(isinstance(term, float) and term == 0.0 for term in (k, b, m)):
             return [self.level]
         speed = [*derivative(angle), 0.0]
-        acceleration = [*derivative(speed), 0.0]
-        start = self.commanded(angle[0], speed[0]) + self.inertia * acceleration[0]
-        columns = zip(angle[1:], speed[1:], acceleration[1:], strict=False)
-        return [
-            start,
-            *[
-                self.stiffness * x + self.damping * v + self.inertia * a
-                for x, v, a in columns
-            ],
-        ]
+        torque = [k * x + b * v for x, v in zip(angle, speed, strict=False)]
+        torque[0] = self.commanded(angle[0], speed[0])
+        if some(m != 0.0):
+            for i, acceleration in enumerate(derivative(speed)):
+                torque[i] = torque[i] + m * acceleration
+        return torque
 
 
 def pre_catch(p: Parameters, rest: Number) -> TorqueLaw:

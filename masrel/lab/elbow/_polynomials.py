@@ -1,7 +1,7 @@
 """Polynomials of low degree: coefficients, constant first, numbers or columns of them.
 
-What only adds and multiplies takes columns too, one row a polynomial; what looks for
-places takes numbers, and `refined_columns` is its last step for columns.
+A number is a float, or a column of them with a row a scene or a row a piece; what is
+said of a polynomial holds of every row. A place that there is not is nan.
 
 Two places of an interval nearer than `TIE` of its length are one place, and Bernstein
 coefficients within `NOTHING` of the largest count as 0: floats tell no more.
@@ -9,19 +9,54 @@ coefficients within `NOTHING` of the largest count as 0: floats tell no more.
 
 from collections.abc import Sequence
 from itertools import pairwise
-from math import comb, sqrt
+from math import comb, inf, isfinite, nan, sqrt
 from operator import ne
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 TIE = 1e-13
 NOTHING = 1e-14
 
 Number = Any  # float, or an ndarray of them
+Flag = Any  # bool, or an ndarray of them
 Polynomial = Sequence[Number]
 
 _SHARES = [[1.0 / comb(n, j) for j in range(n + 1)] for n in range(12)]
+
+
+def some(flag: Flag) -> bool:
+    """Whether it holds, in any row."""
+    return bool(flag.any()) if isinstance(flag, np.ndarray) else bool(flag)
+
+
+def pick(flag: Flag, one: Any, other: Any) -> Any:
+    """Return one thing where a flag holds, the other elsewhere."""
+    if isinstance(flag, np.ndarray):
+        return np.where(flag, one, other)
+    return one if flag else other
+
+
+def least(a: Number, b: Number) -> Number:
+    """Return the smaller number; b if either is nan."""
+    is_first = a < b
+    if isinstance(is_first, np.ndarray):
+        return np.where(is_first, a, b)
+    return a if is_first else b
+
+
+def greatest(a: Number, b: Number) -> Number:
+    """Return the larger number; b if either is nan."""
+    is_first = a > b
+    if isinstance(is_first, np.ndarray):
+        return np.where(is_first, a, b)
+    return a if is_first else b
+
+
+def rows_of(columns: Sequence[Number], which: Any) -> list[Number]:
+    """Return some rows of columns; one value for all stays one."""
+    return [c[which] if isinstance(c, np.ndarray) else c for c in columns]
 
 
 def value(p: Polynomial, x: Number) -> Number:
@@ -54,6 +89,8 @@ def product(p: Polynomial, q: Polynomial) -> Polynomial:
 
 def shifted(p: Polynomial, x: Number) -> Polynomial:
     """Return the polynomial in the distance from x."""
+    if isinstance(x, float) and x == 0.0:
+        return p
     q, n = list(p), len(p) - 1
     for i in range(n):
         for j in range(n - 1, i - 1, -1):
@@ -80,64 +117,106 @@ def bernstein(p: Polynomial, width: Number) -> list[Number]:
 
 
 def first_above(
-    p: Polynomial, low: float, high: float, *, level: float = 0.0, grows: bool = False
-) -> float | None:
-    """Return where a polynomial is first above a level between two places; None if not.
+    p: Polynomial,
+    low: Number,
+    high: Number,
+    *,
+    level: Number = 0.0,
+    grows: bool = False,
+    among: Flag = True,
+) -> Number:
+    """Return where a polynomial is first above a level between two places.
 
-    A place nearer to high than a tie is none. One that only grows is searched faster.
+    A place nearer to high than a tie is none. A number that only grows is searched
+    faster. Of columns only rows `among` are looked at; the others are nan.
     """
-    width = high - low
-    if width <= 0.0 or (grows and value(p, high) <= level):
-        return None
-    if level:
-        p = [p[0] - level, *p[1:]]
-    x: float | None
+    p = [p[0] - level, *p[1:]]
+    if isinstance(among, np.ndarray):
+        return _first_above_in_rows(p, low, high, among)
+    width, end = high - low, value(p, high)
+    if not width > 0.0 or (grows and end <= 0.0):
+        return nan
     if len(p) == 2 and p[1] > 0.0:
         x = max(-p[0] / p[1], low)
     elif grows:
-        x = _only_rise(p, low, high)
+        left = -value(p, low)
+        guess = low + left / (left + end) * width
+        x = _refined(p, low, high, guess=guess) if left > 0.0 else low
     else:
-        b = bernstein(shifted(p, low) if low else p, width)
+        b = bernstein(shifted(p, low), width)
         if (most := max(b)) <= 0.0:
-            return None
+            return nan
         x = _first_rise(p, b, low, high, NOTHING * max(most, -min(b)), TIE * width)
-    return None if x is None or x > high - TIE * width else x
-
-
-def _only_rise(p: Polynomial, low: float, high: float) -> float:
-    # the end is above 0
-    left = -value(p, low)
-    if left <= 0.0:
-        return low
-    share = left / (left + value(p, high))
-    return _refined(p, low, high, guess=low + share * (high - low))
+    return x if x <= high - TIE * width else nan
 
 
 def _first_rise(
-    p: Polynomial, b: list[float], low: float, high: float, least: float, tie: float
-) -> float | None:
-    signs = [c > 0.0 for c in b if not -least <= c <= least]
+    p: Polynomial, b: list[float], low: float, high: float, nothing: float, tie: float
+) -> float:
+    signs = [c > 0.0 for c in b if not -nothing <= c <= nothing]
     if True not in signs:
-        return None
+        return nan
     if signs[0]:
         return low
     if False not in signs[signs.index(True) :]:  # below, then above
         return _refined(p, low, high, guess=_guess(b, low, high))
     if high - low <= tie:
-        return None  # touches 0, or is above it for less than a tie
+        return nan  # touches 0, or is above it for less than a tie
     middle, (one, other) = 0.5 * (low + high), _halves(b)
-    x = _first_rise(p, one, low, middle, least, tie)
-    return _first_rise(p, other, middle, high, least, tie) if x is None else x
+    x = _first_rise(p, one, low, middle, nothing, tie)
+    return x if x == x else _first_rise(p, other, middle, high, nothing, tie)
 
 
-def _halves(b: list[float]) -> tuple[list[float], list[float]]:
+def _halves(b: Sequence[Number]) -> tuple[list[Number], list[Number]]:
     # de Casteljau in the middle
     row, one, other = b, [], []
-    while row:
+    while len(row):
         one.append(row[0])
         other.append(row[-1])
         row = [0.5 * (u + v) for u, v in pairwise(row)]
     return one, other[::-1]
+
+
+def _first_above_in_rows(
+    p: Polynomial, low: Number, high: Number, among: NDArray[np.bool_]
+) -> Number:
+    place = np.full(among.shape, nan)
+    rows = slice(None) if among.all() else np.flatnonzero(among)
+    low, high, *p = rows_of([low, high, *p], rows)
+    if len(p) == 2 and np.all(p[1] > 0.0):
+        x = np.maximum(-p[0] / p[1], low)
+    else:
+        x = _first_rises(p, low, high, place[rows])
+    place[rows] = np.where(x <= high - TIE * (high - low), x, nan)
+    return place
+
+
+def _first_rises(p: Polynomial, low: Number, high: Number, first: Number) -> Number:
+    # `_first_rise` of rows, whose halves are rows in their turn; `first` is all nan
+    b = np.stack(
+        np.broadcast_arrays(*bernstein(shifted(p, low), high - low), first)[:-1]
+    )
+    nothing, tie = NOTHING * np.abs(b).max(axis=0), TIE * (high - low)
+    which, n = np.arange(first.size), len(b)
+    begin, end = (np.broadcast_to(x, first.shape) for x in (low, high))
+    place = np.arange(n)[:, np.newaxis]
+    while which.size:
+        small = nothing[which]
+        rises = np.where(b > small, place, n).min(axis=0)  # the first above, if any
+        below = b < -small
+        is_above = (rises < n) & (end > begin)
+        at_once = is_above & ~(below & (place < rises)).any(axis=0)
+        again = is_above & ~at_once & (below & (place > rises)).any(axis=0)
+        once = is_above & ~at_once & ~again
+        np.fmin.at(first, which[at_once], begin[at_once])
+        if (i := np.flatnonzero(once)).size:
+            root = _refined_in_rows(rows_of(p, which[i]), begin[i], end[i])
+            np.fmin.at(first, which[i], root)
+        i = np.flatnonzero(again & (end - begin > tie[which]))
+        middle, (one, other) = 0.5 * (begin[i] + end[i]), _halves(list(b[:, i]))
+        which, b = np.tile(which[i], 2), np.hstack([one, other])
+        begin, end = np.append(begin[i], middle), np.append(middle, end[i])
+    return first
 
 
 def split_at_roots(
@@ -145,14 +224,14 @@ def split_at_roots(
 ) -> list[float]:
     """Return 0, the places where a polynomial passes a level, and length."""
     tie, b = TIE * length, bernstein(p, length)
-    most, least = max(b), min(b)
+    top, bottom = max(b), min(b)
     inner: list[float] = []
     for level in levels:
-        if most > level > least:
+        if top > level > bottom:
             from_level = [c - level for c in b]
-            small = NOTHING * max(most, -least, abs(level))
+            nothing = NOTHING * max(top, -bottom, abs(level))
             above = [p[0] - level, *p[1:]]
-            inner += _sign_changes(above, from_level, 0.0, length, small, tie)
+            inner += _sign_changes(above, from_level, 0.0, length, nothing, tie)
     places = [0.0]
     for x in sorted(inner):
         if x - places[-1] > tie and length - x > tie:
@@ -161,9 +240,9 @@ def split_at_roots(
 
 
 def _sign_changes(
-    p: Polynomial, b: list[float], low: float, high: float, least: float, tie: float
+    p: Polynomial, b: list[float], low: float, high: float, nothing: float, tie: float
 ) -> list[float]:
-    signs = [c > 0.0 for c in b if not -least <= c <= least]
+    signs = [c > 0.0 for c in b if not -nothing <= c <= nothing]
     n_changes = sum(map(ne, signs, signs[1:]))
     if n_changes == 0:
         return []
@@ -174,10 +253,40 @@ def _sign_changes(
         return []  # touches 0
     middle, (one, other) = 0.5 * (low + high), _halves(b)
     return [
-        *_sign_changes(p, one, low, middle, least, tie),
-        *([middle] if -least <= one[-1] <= least else []),
-        *_sign_changes(p, other, middle, high, least, tie),
+        *_sign_changes(p, one, low, middle, nothing, tie),
+        *([middle] if -nothing <= one[-1] <= nothing else []),
+        *_sign_changes(p, other, middle, high, nothing, tie),
     ]
+
+
+def largest(p: Polynomial, length: Number, known: Number = -inf) -> Number:
+    """Return the largest value on 0 to length, or what is known to be, if more."""
+    if isinstance(length, np.ndarray):
+        return _largest_in_rows(p, length, known)
+    if not isfinite(sum(map(abs, p))):
+        return inf  # more than a float can hold
+    peak = max(p[0], value(p, length), known)
+    if len(p) > 2 and max(bernstein(p, length)) > peak:
+        turns = split_at_roots(derivative(p), length)[1:-1]
+        peak = max([peak, *[value(p, x) for x in turns]])
+    return float(peak)
+
+
+def _largest_in_rows(p: Polynomial, length: Number, known: Number) -> Number:
+    # rows are halved as long as their Bernstein coefficients leave more to be found
+    b = np.stack(np.broadcast_arrays(*bernstein(p, length), length)[:-1])
+    best = np.where(length > 0.0, np.maximum(np.maximum(b[0], b[-1]), known), known)
+    nothing = NOTHING * np.abs(b).max(axis=0)
+    which = np.flatnonzero(length > 0.0)
+    b = b[:, which]
+    while True:
+        more = b.max(axis=0) > best[which] + nothing[which]
+        which, b = which[more], b[:, more]
+        if not which.size:
+            return best
+        one, other = _halves(list(b))
+        np.maximum.at(best, which, other[0])
+        which, b = np.tile(which, 2), np.hstack([one, other])
 
 
 def _guess(b: list[float], low: float, high: float) -> float:
@@ -240,8 +349,8 @@ def _of_square(p: Polynomial, *, rises: bool) -> float:
     return -2.0 * c / (b + root) if (b > 0.0) == rises else (root - b) / (2.0 * a)
 
 
-def refined_columns(p: Polynomial, low: Number, high: Number) -> Number:
-    """Return the places, one a row, where polynomials rise through 0; as `_refined`."""
+def _refined_in_rows(p: Polynomial, low: Number, high: Number) -> Number:
+    # the places, one a row, where polynomials rise through 0; as `_refined`
     if len(p) == 2:
         return np.minimum(np.maximum(-p[0] / p[1], low), high)
     x, slopes, near = 0.5 * (low + high), derivative(p), 1e-7 * (high - low)

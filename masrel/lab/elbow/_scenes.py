@@ -1,11 +1,10 @@
 """Thousands of scenes at once: one array, a column an output.
 
 In: joints and motions, as objects or as columns. Out: the outputs asked for, of every
-scene. Single stretches go through together, by the formulas of one scene over columns;
-what floats leave in doubt there, and every other motion, goes through piece by piece.
+scene. Single stretches of a kind go through together, as one joint and one motion whose
+fields are columns; every other motion goes through by itself.
 """
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from operator import attrgetter
@@ -13,14 +12,13 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from masrel.errors import ParameterError
-from masrel.lab.elbow._events import timeline
+from masrel.lab.elbow._events import Timeline, check_starts
 from masrel.lab.elbow._motion import Floats, Motion
 from masrel.lab.elbow._polynomials import Number
-from masrel.lab.elbow._single_stretches import PIECES, SingleStretches, Which
-from masrel.lab.elbow._torque import loads
+from masrel.lab.elbow._torque import load
 from masrel.lab.elbow.motions import ConstantSpeed, MinimumJerk, Trapezoid
 from masrel.lab.elbow.parameters import READINGS, ElbowParameters
 
@@ -85,7 +83,7 @@ class Columns:
     __slots__ = ("_n", "columns", "kind")
 
     def __init__(self, kind: type, **columns: ArrayLike) -> None:
-        if kind is not ElbowParameters and kind not in PIECES:
+        if kind not in _FIELDS:
             raise ParameterError(
                 "kind: needs ElbowParameters, ConstantSpeed, MinimumJerk or Trapezoid, "
                 f"got {kind.__name__}"
@@ -164,8 +162,8 @@ class SceneTable:
     values : ndarray, shape (n_scenes, n_outputs)
         SI units; ``nan`` for what a scene does not reach. Read-only.
     n_alone : int
-        How many scenes were led through piece by piece, because their motion is not a
-        single stretch or something in them is nearly a tie.
+        How many scenes went through by themselves, because their motion is not a
+        single stretch, or they are the only one.
     """
 
     outputs: tuple[str, ...]
@@ -252,45 +250,8 @@ def evaluate(
         )
     if chunk < 1:
         raise ParameterError(f"chunk: needs 1 or more, got {chunk}")
-    if isinstance(parameters, ElbowParameters) and isinstance(motions, Motion):
-        values, n_alone = np.array([_alone(parameters, motions, names)]), 1
-    else:
-        joints = _listed(parameters, ElbowParameters)
-        moves = _listed(motions, Motion)
-        values, n_alone = _evaluated(joints, moves, names, chunk)
-    values.setflags(write=False)
-    return SceneTable(outputs=names, values=values, n_alone=n_alone)
-
-
-_OUTPUTS = EVENTS + LOADS
-
-
-def _alone(
-    joint: ElbowParameters, motion: Motion, outputs: tuple[str, ...]
-) -> list[float]:
-    line = timeline(joint, motion)
-    row = []
-    for name in outputs:
-        if name in LOADS:
-            row.append(loads(joint, motion, line, name))
-        elif name == "end":
-            row.append(line.end.time)
-        else:
-            number = None if line.first is None else getattr(line.first, name)
-            row.append(math.nan if number is None else number)
-    return row
-
-
-def _listed(items: Any, kind: type) -> Any:
-    return [items] if isinstance(items, kind) else items
-
-
-def _evaluated(
-    joints: Sequence[ElbowParameters] | Columns,
-    moves: Sequence[Motion] | Columns,
-    outputs: tuple[str, ...],
-    chunk: int,
-) -> tuple[Floats, int]:
+    joints = _listed(parameters, ElbowParameters)
+    moves = _listed(motions, Motion)
     n = max(len(joints), len(moves)) if len(joints) and len(moves) else 0
     if len(joints) not in (1, n) or len(moves) not in (1, n) or n == 0:
         raise ParameterError(
@@ -299,34 +260,38 @@ def _evaluated(
         )
     if n > 1000:  # once so much has been given back, the allocator keeps its pages
         np.empty(128 * min(n, chunk))
-    values, n_alone = np.empty((len(outputs), n)).T, 0
-    for kind, rows in _groups(moves, n, chunk):
-        alone = np.arange(n)[rows]
-        if kind in PIECES:
-            motion = _motion_columns(moves, kind, rows, alone.size)
-            p = _joint_columns(joints, rows)
-            _check_starts(motion.start, p.range_end, alone)
-            with np.errstate(all="ignore"):  # what is in doubt may be anything
-                scenes = SingleStretches(p, motion.start, PIECES[kind](motion))
-                for i, name in enumerate(outputs):
-                    values[rows, i] = scenes.output(name)
-            alone = alone[scenes.is_doubtful]
-        for i in alone.tolist():
-            joint, motion = _row(joints, i), _row(moves, i)
-            _check_starts(np.array([motion.start]), joint.range_end, np.array([i]))
-            values[i] = _alone(joint, motion, outputs)
-        n_alone += alone.size
-    return values, n_alone
+    values, n_alone = np.empty((len(names), n)).T, 0
+    for rows, p, motion, is_alone in _batches(joints, moves, n, chunk):
+        n_alone += is_alone
+        if n > 1:
+            check_starts(motion.start, p.range_end, rows)
+        if is_alone:
+            values[rows[0]] = _found(p, motion, names)
+            continue
+        with np.errstate(all="ignore"):  # rows that a formula does not mean
+            for i, column in enumerate(_found(p, motion, names)):
+                values[_slice(rows), i] = column
+    values.setflags(write=False)
+    return SceneTable(outputs=names, values=values, n_alone=n_alone)
 
 
-def _check_starts(start: Floats, limit: Number, rows: NDArray[np.intp]) -> None:
-    if (late := start >= limit).any():
-        i = int(late.argmax())
-        raise ParameterError(
-            f"motions[{rows[i]}].start: needs less than the end of range, "
-            f"{np.degrees(np.broadcast_to(limit, start.shape)[i]):g} degrees, got "
-            f"{np.degrees(start[i]):g} degrees"
-        )
+Rows = Any
+_OUTPUTS = EVENTS + LOADS
+
+
+def _found(p: ElbowParameters, motion: Motion, names: Sequence[str]) -> list[Number]:
+    # what is asked for of one scene, numbers, or of many, columns
+    line = Timeline(p, motion)
+    return [
+        load(line, motion, name)
+        if name in LOADS
+        else getattr(line if name == "end" else line.first, name)
+        for name in names
+    ]
+
+
+def _listed(items: Any, kind: type) -> Any:
+    return [items] if isinstance(items, kind) else items
 
 
 def _row(items: Any, i: int) -> Any:
@@ -334,22 +299,45 @@ def _row(items: Any, i: int) -> Any:
     return items.row(i) if isinstance(items, Columns) else items[i]
 
 
-def _groups(
-    moves: Sequence[Motion] | Columns, n: int, chunk: int
-) -> Iterator[tuple[type, Which]]:
-    # rows of motions of one kind, not too many at a time
+def _batches(
+    joints: Sequence[ElbowParameters] | Columns,
+    moves: Sequence[Motion] | Columns,
+    n: int,
+    chunk: int,
+) -> Iterator[tuple[Rows, ElbowParameters, Motion, bool]]:
+    # rows that go through together, and their joint and motion with columns in them
+    places: dict[type, Rows] = {}
     kinds = {moves.kind} if isinstance(moves, Columns) else set(map(type, moves))
     if len(kinds) == 1:
-        kind = kinds.pop()
-        for first in range(0, n, chunk):
-            yield kind, slice(first, first + chunk)
-        return
-    places: dict[type, list[int]] = {}
-    for i in range(n):
-        places.setdefault(type(_row(moves, i)), []).append(i)
+        places[kinds.pop()] = range(n)
+    else:
+        of_each = np.array([id(type(_row(moves, i))) for i in range(n)])
+        places = {kind: np.flatnonzero(of_each == id(kind)) for kind in kinds}
     for kind, of_kind in places.items():
+        if kind not in _FIELDS or n == 1:
+            for i in of_kind:
+                yield [i], _row(joints, i), _row(moves, i), True
+            continue
         for first in range(0, len(of_kind), chunk):
-            yield kind, np.array(of_kind[first : first + chunk])
+            rows = of_kind[first : first + chunk]
+            motion = _columns_of(moves, kind, rows)
+            for name, column in motion.items():
+                motion[name] = np.broadcast_to(column, len(rows))
+            joint = _columns_of(joints, ElbowParameters, rows)
+            joint, motion = _unchecked(ElbowParameters, joint), _unchecked(kind, motion)
+            yield rows, joint, motion, False
+
+
+def _unchecked(kind: type, values: dict[str, Any]) -> Any:
+    # a joint or motion with columns in its fields: its formulas take them as numbers
+    made: Any = object.__new__(kind)
+    for name, column in values.items():
+        object.__setattr__(made, name, column)
+    return made
+
+
+def _slice(rows: Rows) -> Any:
+    return slice(rows.start, rows.stop) if isinstance(rows, range) else rows
 
 
 _FIELDS: dict[type, tuple[str, ...]] = {
@@ -376,57 +364,32 @@ _MARGINS: dict[type, Callable[[SimpleNamespace], list[Any]]] = {
 }
 
 
-def _joint_columns(
-    joints: Sequence[ElbowParameters] | Columns, rows: Which
-) -> SimpleNamespace:
-    # parameters by name, each a column or one value for all
-    if isinstance(joints, Columns):
-        p = SimpleNamespace(**_taken(joints, rows))
+def _columns_of(items: Any, kind: type, rows: Rows) -> dict[str, Any]:
+    # fields by name, each a column or one value for all
+    which = _slice(rows) if len(items) > 1 else slice(None)
+    if isinstance(items, Columns):
+        given = {
+            name: column[which] if isinstance(column, np.ndarray) else column
+            for name, column in items.columns.items()
+        }
+        return _DEFAULTS[kind] | given
+    if isinstance(which, np.ndarray):
+        chosen = [items[i] for i in which.tolist()]
     else:
-        packed = b"".join(map(attrgetter("_packed"), _chosen_of(joints, rows)))
-        names = _FIELDS[ElbowParameters]
-        p = SimpleNamespace(**_unpacked(np.frombuffer(packed), names))
-    p.rest_angle = math.nan if p.rest_angle is None else p.rest_angle
-    return p
-
-
-def _unpacked(numbers: Floats, names: tuple[str, ...]) -> dict[str, Any]:
-    # fields by name: a column each, or the one value that all have
-    table = numbers.reshape(-1, len(names))
+        chosen = items[which]
+    if kind is not ElbowParameters:
+        return {
+            name: np.fromiter(map(attrgetter(name), chosen), float, len(chosen))
+            for name in _FIELDS[kind]
+        }
+    # all numbers of a joint at once, a sixth of the time that attributes take
+    packed = np.frombuffer(b"".join(map(attrgetter("_packed"), chosen)))
+    table = packed.reshape(-1, len(_FIELDS[kind]))
     is_same = (table == table[0]).all(axis=0).tolist()
     columns: dict[str, Any] = {}
-    for name, column, same in zip(names, table.T, is_same, strict=True):
+    for name, column, same in zip(_FIELDS[kind], table.T, is_same, strict=True):
         values: Any = column[0].item() if same else column.copy()
         if name in READINGS:
             values = np.array(READINGS[name])[np.asarray(values, dtype=int)]
         columns[name] = values
     return columns
-
-
-def _motion_columns(
-    moves: Sequence[Motion] | Columns, kind: type, rows: Which, n: int
-) -> SimpleNamespace:
-    # the fields of motions of one kind by name, as columns
-    if isinstance(moves, Columns):
-        taken = _taken(moves, rows)
-    else:
-        chosen = _chosen_of(moves, rows)
-        taken = {
-            name: np.fromiter(map(attrgetter(name), chosen), float, len(chosen))
-            for name in _FIELDS[kind]
-        }
-    return SimpleNamespace(**{k: np.broadcast_to(c, n) for k, c in taken.items()})
-
-
-def _taken(items: Columns, rows: Which) -> dict[str, Any]:
-    which = rows if len(items) > 1 else 0
-    return _DEFAULTS[items.kind] | {
-        name: column[which] if isinstance(column, np.ndarray) else column
-        for name, column in items.columns.items()
-    }
-
-
-def _chosen_of(items: Sequence[Any], rows: Which) -> Sequence[Any]:
-    if len(items) == 1:
-        return items
-    return items[rows] if isinstance(rows, slice) else [items[i] for i in rows.tolist()]

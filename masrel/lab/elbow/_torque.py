@@ -6,18 +6,16 @@ Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
 https://doi.org/10.1109/TNSRE.2012.2195330, equations (1), (3) and (5).
 """
 
-import functools
 import math
 from collections.abc import Iterator
-from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from masrel.errors import ParameterError
 from masrel.lab.elbow import _law
-from masrel.lab.elbow._events import CATCH, Timeline, timeline
+from masrel.lab.elbow._events import Timeline
 from masrel.lab.elbow._law import TorqueLaw
 from masrel.lab.elbow._motion import Floats, Motion
 from masrel.lab.elbow._polynomials import (
@@ -26,10 +24,15 @@ from masrel.lab.elbow._polynomials import (
     bernstein,
     derivative,
     first_above,
+    greatest,
     integral,
+    largest,
+    least,
+    pick,
     product,
+    rows_of,
     shifted,
-    split_at_roots,
+    some,
     value,
 )
 from masrel.lab.elbow.parameters import ElbowParameters
@@ -84,14 +87,14 @@ def torque(parameters: ElbowParameters, motion: Motion, times: ArrayLike) -> Flo
     4.5522
     """
     at = np.atleast_1d(np.asarray(times, dtype=np.float64))
-    line = timeline(parameters, motion)
-    end = line.end.time
+    line = Timeline(parameters, motion)
+    end = line.end
     if (outside := at[~((at >= 0.0) & (at <= end))]).size:
         raise ParameterError(
             f"times: need 0 to {end:g} s, the end of the stretch, got {outside[0]:g} s"
         )
     values = np.empty(at.shape)
-    laid = segments(parameters, line)
+    laid = segments(line)
     which = np.searchsorted([segment.start for segment in laid], at, side="right") - 1
     for i, segment in enumerate(laid):
         mine = which == i
@@ -138,7 +141,7 @@ def torque_at(parameters: ElbowParameters, motion: Motion, angles: ArrayLike) ->
             f"angles: need {math.degrees(parameters.range_end):g} degrees, the end of "
             "range, or less"
         )
-    end = timeline(parameters, motion).end.time
+    end = Timeline(parameters, motion).end
     return torque(parameters, motion, np.minimum(times, end))
 
 
@@ -180,8 +183,8 @@ def _first_time(motion: Motion, goal: float) -> float:
             return 0.0
         left = (goal - motion.origin) - angle[0]
         place = first_above([-sign * left, *[sign * c for c in angle[1:]]], 0.0, length)
-        if place is not None:
-            return start + place
+        if place == place:
+            return float(start + place)
         if abs(value(angle, length) - angle[0] - left) < _SAME_ANGLE:
             return min(start + length, motion.duration)
     raise ParameterError(
@@ -218,8 +221,7 @@ def peak_torque(parameters: ElbowParameters, motion: Motion) -> float:
     >>> round(peak_torque(STANDARD_MODELS["HM3"], stretch), 3)
     10.984
     """
-    laid = segments(parameters, timeline(parameters, motion))
-    return max(map(section_peak, sections(laid, motion)))
+    return float(load(Timeline(parameters, motion), motion, "peak_torque"))
 
 
 def residual_torque(parameters: ElbowParameters, motion: Motion) -> float:
@@ -251,7 +253,7 @@ def residual_torque(parameters: ElbowParameters, motion: Motion) -> float:
     >>> round(residual_torque(STANDARD_MODELS["HM3"], stretch), 3)
     7.624
     """
-    return loads(parameters, motion, timeline(parameters, motion), "residual_torque")
+    return float(load(Timeline(parameters, motion), motion, "residual_torque"))
 
 
 def work(parameters: ElbowParameters, motion: Motion) -> float:
@@ -284,7 +286,7 @@ def work(parameters: ElbowParameters, motion: Motion) -> float:
     >>> round(work(STANDARD_MODELS["HM3"], stretch), 12)
     1.827
     """
-    return loads(parameters, motion, timeline(parameters, motion), "work")
+    return float(load(Timeline(parameters, motion), motion, "work"))
 
 
 def impulse(parameters: ElbowParameters, motion: Motion) -> float:
@@ -316,11 +318,11 @@ def impulse(parameters: ElbowParameters, motion: Motion) -> float:
     >>> round(impulse(STANDARD_MODELS["HM3"], stretch), 12)
     9.135
     """
-    return loads(parameters, motion, timeline(parameters, motion), "impulse")
+    return float(load(Timeline(parameters, motion), motion, "impulse"))
 
 
 class TorqueSegment(NamedTuple):
-    """A time in which one law of torque holds."""
+    """A time in which one law of torque holds; of no length in some rows of columns."""
 
     # start, end: s
     start: Number
@@ -328,28 +330,41 @@ class TorqueSegment(NamedTuple):
     law: TorqueLaw  # angles count from the motion's origin
 
 
-def segments(p: ElbowParameters, line: Timeline) -> list[TorqueSegment]:
+def segments(line: Timeline) -> list[TorqueSegment]:
     """Return the laws of a motion in order, without those that hold for no time."""
-    laid = []
-    for (phase, start, angle, stretch), ended in pairwise([*line.changes, line.end]):
-        end = ended.time
-        if stretch is None:
-            laid.append(TorqueSegment(start, end, line.law))
-        elif phase == CATCH:
-            peak, residual = _law.catch(p, stretch.pre_end, stretch.rise)
-            risen = min(start + p.catch_rise, end)
-            fallen = min(start + p.peak_duration, end)
-            onset = TorqueLaw(stretch.pre_end, onset=(stretch.rise, p.catch_rise))
-            laid += [
-                TorqueSegment(start, risen, onset),
-                TorqueSegment(risen, fallen, peak),
-                TorqueSegment(fallen, end, residual),
-            ]
-        else:
-            level, rest = residual.level, line.law.origin
-            law = _law.post_catch(p, level, stretch.pre_end, angle, rest)
-            laid.append(TorqueSegment(start, end, law))
-    return [segment for segment in laid if segment.end > segment.start]
+    p, begun, laid = line.p, 0.0, []
+    for stretch in line.stretches:
+        if not some(stretch.catch == stretch.catch):
+            continue
+        # what does not come has no length at the end
+        catch, peak_end, left, over = (
+            pick(time == time, time, line.end)
+            for time in (
+                stretch.catch,
+                stretch.peak_end,
+                stretch.catch_end,
+                stretch.over,
+            )
+        )
+        pre_end, rise, angle = (
+            pick(number == number, number, 0.0)
+            for number in (stretch.pre_end, stretch.rise, stretch.left_angle)
+        )
+        peak, residual = _law.catch(p, pre_end, rise)
+        post = _law.post_catch(p, residual.level, pre_end, angle, line.law.origin)
+        risen = least(catch + p.catch_rise, left)
+        fallen = greatest(peak_end, risen)
+        onset = rise, pick(p.catch_rise > 0.0, p.catch_rise, 1.0)
+        laid += [
+            TorqueSegment(begun, catch, line.law),
+            TorqueSegment(catch, risen, TorqueLaw(pre_end, onset=onset)),
+            TorqueSegment(risen, fallen, peak),
+            TorqueSegment(fallen, left, residual),
+            TorqueSegment(left, over, post),
+        ]
+        begun = over
+    laid.append(TorqueSegment(begun, line.end, line.law))
+    return [segment for segment in laid if some(segment.end > segment.start)]
 
 
 def segment_torque(segment: TorqueSegment, motion: Motion, at: Floats) -> Floats:
@@ -366,86 +381,63 @@ def segment_torque(segment: TorqueSegment, motion: Motion, at: Floats) -> Floats
 
 
 class Section(NamedTuple):
-    """What a law and a piece of the motion, or a column of pieces, have in common."""
+    """What a law and a piece of the motion, or a column of either, have in common."""
 
-    length: Number  # s
+    length: Number  # s; 0 or less where nothing
     angle: Polynomial  # rad, over s since the section began
     torque: Polynomial  # N·m
 
 
-def sections(laid: list[TorqueSegment], motion: Motion) -> Iterator[Section]:
-    """Cut a motion where its law or its polynomial changes."""
-    if len(pieces := motion.pieces()) > _MANY:
-        yield from _column_sections(laid, motion)
-        return
-    for segment in laid:
-        for start, length, angle, _, _ in pieces:
-            low = max(segment.start - start, 0.0)
-            high = min(segment.end - start, length)
-            if low < high:
-                part = shifted(angle, low) if low else angle
-                since = start + low - segment.start
-                yield Section(high - low, part, segment.law.along(part, since))
+def sections(line: Timeline, motion: Motion) -> Iterator[Section]:
+    """Cut a motion where its law or its polynomial changes, the last first."""
+    pieces: list[Any] = [piece[:3] for piece in line.pieces]
+    for begun, ended, law in reversed(segments(line)):
+        if len(line.pieces) > _MANY:
+            pieces = _column_of_pieces(motion, begun, ended)
+        for start, length, angle in pieces:
+            low, high = greatest(begun - start, 0.0), least(ended - start, length)
+            if some(high > low):
+                part = shifted(angle, low)
+                yield Section(high - low, part, law.along(part, start + low - begun))
 
 
-def _column_sections(laid: list[TorqueSegment], motion: Motion) -> Iterator[Section]:
-    # the same for many pieces: a segment's sections are columns
+def _column_of_pieces(
+    motion: Motion, begun: float, ended: float
+) -> list[tuple[Floats, Floats, Polynomial]]:
+    # those of a long motion that are between two times, a row each
     start, angle = motion.rows()
     stop = np.append(start[1:], motion.duration)
-    for segment in laid:
-        first = np.searchsorted(stop, segment.start, side="right")
-        rows = slice(int(first), int(np.searchsorted(start, segment.end)))
-        low = np.maximum(segment.start - start[rows], 0.0)
-        high = np.minimum(segment.end, stop[rows]) - start[rows]
-        part = shifted(list(angle[:, rows]), low)
-        since = start[rows] + low - segment.start
-        yield Section(high - low, part, segment.law.along(part, since))
+    first = np.searchsorted(stop, begun, side="right")
+    rows = slice(int(first), int(np.searchsorted(start, ended)))
+    return [(start[rows], (stop - start)[rows], list(angle[:, rows]))]
 
 
-def loads(p: ElbowParameters, motion: Motion, line: Timeline, name: str) -> float:
-    """Return one of the loads, by the name of its function."""
+def load(line: Timeline, motion: Motion, name: str) -> Number:
+    """Return one of the loads, by the name of its function; of columns, of each row."""
     if name == "residual_torque":
         first = line.first
-        if first is None or first.catch is None:
-            return math.nan
-        return float(_law.catch(p, first.pre_end, first.rise)[1].level)
-    parts = sections(segments(p, line), motion)
+        return _law.catch(line.p, first.pre_end, first.rise)[1].level
+    is_one = not isinstance(line.end, np.ndarray)
+    best: Number = -math.inf
+    amounts: list[Number] = []
+    for length, angle, along in sections(line, motion):
+        if name == "peak_torque":
+            if is_one and isinstance(length, np.ndarray):
+                best = _largest_of_pieces(along, length, best)
+            else:
+                best = largest(along, length, best)
+            continue
+        rate = along if name == "impulse" else product(along, derivative(angle))
+        amounts.append(value(integral(rate), greatest(length, 0.0)))
     if name == "peak_torque":
-        return max(map(section_peak, parts))
-    of_section = section_work if name == "work" else section_impulse
-    return math.fsum(float(np.sum(of_section(part))) for part in parts)
+        return best
+    return math.fsum(map(np.sum, amounts)) if is_one else sum(amounts)
 
 
-def section_peak(section: Section) -> float:
-    """Return the largest torque, N·m: at an end, or where it turns."""
-    length, _, torque = section
-    if isinstance(length, np.ndarray):
-        return _column_peak(length, torque)
-    if not math.isfinite(sum(map(abs, torque))):
-        return math.inf  # more than a float can hold
-    peak = float(max(torque[0], value(torque, length)))
-    if len(torque) < 3:
-        return peak
-    turns = split_at_roots(derivative(torque), length)[1:-1]
-    return float(max([peak, *[value(torque, x) for x in turns]]))
-
-
-def _column_peak(length: Floats, torque: Polynomial) -> float:
-    # the largest of all, where it turns only in rows that may be the largest
-    best = float(np.max(np.maximum(torque[0], value(torque, length))))
-    bounds = functools.reduce(np.maximum, bernstein(torque, length), 0.0 * length)
+def _largest_of_pieces(along: Polynomial, length: Floats, best: float) -> float:
+    # one piece after another, of those whose bound is above what the ends have
+    best = max(best, float(np.max(greatest(along[0], value(along, length)))))
+    bounds = np.max(np.broadcast_arrays(*bernstein(along, length), length)[:-1], axis=0)
     for i in np.flatnonzero(~(bounds <= best)).tolist():
-        one = [float(c[i] if np.ndim(c) else c) for c in torque]
-        best = max(best, section_peak(Section(float(length[i]), [0.0], one)))
+        best = largest(list(map(float, rows_of(along, i))), float(length[i]), best)
     return best
-
-
-def section_work(section: Section) -> Number:
-    """Return ∫ τ θ̇ dt, J."""
-    power = product(section.torque, derivative(section.angle))
-    return value(integral(power), section.length)
-
-
-def section_impulse(section: Section) -> Number:
-    """Return ∫ τ dt, N·m·s."""
-    return value(integral(section.torque), section.length)

@@ -1,18 +1,20 @@
-"""The trace of a motion: what the controller would command, sample by sample."""
+"""A motion as columns: what the controller would command, or a line to draw."""
 
 import math
+from bisect import bisect_right
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from masrel.errors import ParameterError
-from masrel.lab.elbow._events import timeline
+from masrel.lab.elbow._events import Events, Timeline, events, phase_marks
 from masrel.lab.elbow._motion import Floats, Motion
+from masrel.lab.elbow._torque import segment_torque, segments
 from masrel.lab.elbow.joint_model import JointModel
 from masrel.lab.elbow.parameters import ElbowParameters
 
-__all__ = ["Trace", "trace"]
+__all__ = ["Outline", "Trace", "outline", "trace"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,7 +81,7 @@ def trace(parameters: JointModel, motion: Motion, *, rate_hz: float = 1000.0) ->
         raise ParameterError(f"rate_hz: needs more than 0, got {rate_hz}")
     end = motion.duration
     if isinstance(parameters, ElbowParameters):
-        end = timeline(parameters, motion).end.time
+        end = Timeline(parameters, motion).end
     time = np.arange(math.floor(end * rate_hz) + 1) / rate_hz
     angle, velocity = motion.angle(time), motion.velocity(time)
     torque, phase = _stepped(parameters, motion.start, time, angle, velocity)
@@ -107,3 +109,88 @@ def _stepped(
         torque[i] = joint.step(*sample)
         phase[i] = joint.phase
     return torque, phase
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outline:
+    """Points of a line; where the torque jumps, two have the same time.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n_points,)
+        s.
+    angle : ndarray, shape (n_points,)
+        rad.
+    torque : ndarray, shape (n_points,)
+        Torque that resists extension, N·m.
+    phase : ndarray of int8, shape (n_points,)
+        Position in `masrel.lab.recording.PHASES`.
+    events : Events
+        The events of the motion.
+    """
+
+    time: Floats = field(compare=False, repr=False)
+    angle: Floats = field(compare=False, repr=False)
+    torque: Floats = field(compare=False, repr=False)
+    phase: NDArray[np.int8] = field(compare=False, repr=False)
+    events: Events
+
+
+def outline(
+    parameters: ElbowParameters, motion: Motion, *, n_points: int = 800
+) -> Outline:
+    """Lay points along the torque of a motion, as many as a figure has pixels.
+
+    Parameters
+    ----------
+    parameters : ElbowParameters
+        The joint.
+    motion : Motion
+        The motion, SI units; it is cut at the end of range.
+    n_points : int, optional
+        Points, to which two are added for every law that holds in it.
+
+    Returns
+    -------
+    Outline
+        The points, in order of time. However long the motion, they are no more.
+
+    Raises
+    ------
+    ParameterError
+        If `n_points` is less than 2, or the motion starts at or beyond the end of
+        range.
+
+    Examples
+    --------
+    Three phases and the two levels of the catch, of 11.6 s:
+
+    >>> from math import radians
+    >>> from masrel.lab.elbow import STANDARD_MODELS, ConstantSpeed
+    >>> stretch = ConstantSpeed(start=radians(30), end=radians(146), speed=radians(92))
+    >>> made = outline(STANDARD_MODELS["HM3"], stretch, n_points=100)
+    >>> 100 <= made.time.size <= 108
+    True
+    """
+    if n_points < 2:
+        raise ParameterError(f"n_points: needs 2 or more, got {n_points}")
+    line = Timeline(parameters, motion)
+    marks = phase_marks(line)
+    begun = [time for _, time, _ in marks]
+    times, torques, codes = [], [], []
+    for segment in segments(line):
+        low, high = segment.start, segment.end
+        n = max(2, math.ceil(n_points * (high - low) / line.end) + 1)
+        at = np.linspace(low, high, n)
+        times.append(at)
+        torques.append(segment_torque(segment, motion, at))
+        code = marks[bisect_right(begun, low) - 1][0]
+        codes.append(np.full(n, code, dtype=np.int8))
+    time = np.concatenate(times)
+    return Outline(
+        time=time,
+        angle=motion.angle(time),
+        torque=np.concatenate(torques),
+        phase=np.concatenate(codes),
+        events=events(parameters, motion),
+    )

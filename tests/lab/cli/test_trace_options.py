@@ -6,6 +6,7 @@ import re
 from math import radians
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
@@ -22,6 +23,7 @@ from masrel.lab.elbow import (
     work,
 )
 from masrel.lab.elbow.identification import as_toml, model_document
+from masrel.lab.recording import RECORDING_COLUMNS, Recording, write_recording
 from tests.lab.elbow.stretches import constant, minimum_jerk
 
 HM3 = STANDARD_MODELS["HM3"]
@@ -74,6 +76,41 @@ def test_a_recording_is_traced_from_its_own_samples(tmp_path: Path) -> None:
     assert "HM3, recording\n" in run(
         "--model", "HM3", "--motion", "recording", "--recording", samples
     ).stdout  # fmt: skip
+
+
+def test_a_recording_of_the_loop_is_traced_by_either_of_its_files(
+    tmp_path: Path,
+) -> None:
+    columns = {name: np.zeros(5) for name in RECORDING_COLUMNS}
+    columns["time_s"] = np.arange(5) / 10.0
+    columns["angle_deg"] = np.linspace(30.0, 70.0, 5)
+    write_recording(Recording(columns=columns, facts={}), tmp_path / "one.npz")
+    motion = ("--model", "HM3", "--motion", "recording", "--recording")
+    for name in ("one.npz", "one.json"):
+        made = scene(*motion, tmp_path / name, "--interpolation", "linear")
+        (phase,) = made["phases"]
+        assert (phase["end_s"], phase["end_deg"]) == (0.4, pytest.approx(70.0))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "motion.csv: needs a line of column names, got none"),
+        ("time_s,angle\n0,30\n", "column angle has no unit: name it angle_deg or"),
+        ("# a\ntime_s,angle_deg\n0,30\n1,x\n", "line 4, column angle_deg"),
+        ("time_s,angle_deg\n0,30\n", "motion.csv: time, angle: need two or more"),
+        ("time_s,angle_deg\n0,30\n0,31\n", "motion.csv: time: needs to grow"),
+        ("time_s,angle_deg\n0,30\n1,\n", "finite numbers, got nan in sample 2"),
+    ],
+)
+def test_a_file_that_is_no_motion_is_refused_with_its_name(
+    tmp_path: Path, text: str, said: str
+) -> None:
+    path = tmp_path / "motion.csv"
+    path.write_text(text, encoding="utf-8")
+    done = run("--model", "HM3", "--motion", "recording", "--recording", path)
+    assert isinstance(done.exception, MasrelError)
+    assert said in str(done.exception)
 
 
 def test_a_stopped_stretch_goes_on_in_its_catch() -> None:

@@ -1,6 +1,6 @@
 """Places of polynomials: products of known factors, touching roots, ties."""
 
-from math import prod
+from math import isnan, nan, prod
 
 import numpy as np
 import pytest
@@ -11,8 +11,8 @@ from masrel.lab.elbow._polynomials import (
     bernstein,
     first_above,
     integral,
+    largest,
     product,
-    refined_columns,
     reversed_from,
     shifted,
     split_at_roots,
@@ -48,10 +48,27 @@ def test_the_first_place_above_0_is_a_root_or_the_beginning(
     signs = [-prod(at - root for root in roots) for at in grid.tolist()]
     above = [at for at, sign in zip(grid.tolist(), signs, strict=True) if sign > 1e-9]
     if above:
-        assert x is not None
         assert x <= above[0] + 1e-6
-    if x is not None:
+    if not isnan(x):
         assert value(p, min(x + 1e-5, 1.0)) > -1e-9
+
+
+@given(
+    rows=st.lists(st.lists(places, min_size=1, max_size=4), min_size=1, max_size=5),
+    low=st.floats(0.0, 0.9),
+)
+def test_a_row_of_columns_is_what_its_numbers_are(
+    rows: list[list[list[float]]], low: float
+) -> None:
+    several = [with_roots(*(roots + [2.0] * 5)[:5]) for (roots, *_) in rows]
+    columns = [np.array(c) for c in zip(*several, strict=True)]
+    n = len(several)
+    places_of_rows = first_above(columns, low, np.ones(n), among=np.ones(n, bool))
+    alone = [first_above(p, low, 1.0) for p in several]
+    # five factors a hundredth apart magnify rounding 1e8 times at most
+    assert places_of_rows == pytest.approx(alone, abs=1e-7, nan_ok=True)
+    tops = largest(columns, np.ones(n))
+    assert tops == pytest.approx([largest(p, 1.0) for p in several], abs=1e-13)
 
 
 def test_between_cuts_where_0_is_touched_there_is_nothing_but_rounding() -> None:
@@ -59,24 +76,23 @@ def test_between_cuts_where_0_is_touched_there_is_nothing_but_rounding() -> None
     for place in split_at_roots(touching, 1.0)[1:-1]:
         assert value(touching, place) == pytest.approx(0.0, abs=1e-14)
     x = first_above([-c for c in touching], 0.0, 1.0)
-    assert x is None or value(touching, x) == pytest.approx(0.0, abs=1e-14)
+    assert isnan(x) or value(touching, x) == pytest.approx(0.0, abs=1e-14)
 
 
 def test_a_place_nearer_to_the_end_than_a_tie_is_none() -> None:
-    assert first_above([-1.0 + 1e-14, 1.0], 0.0, 1.0) is None
+    assert isnan(first_above([-1.0 + 1e-14, 1.0], 0.0, 1.0))
     assert first_above([-1.0 + 1e-12, 1.0], 0.0, 1.0) == pytest.approx(1.0)
     cubic = with_roots(1.0 - 1e-15, 3.0, 4.0)
-    assert first_above(cubic, 0.0, 1.0) is None
+    assert isnan(first_above(cubic, 0.0, 1.0))
 
 
 @pytest.mark.parametrize("p", [[-1.0, 4.0], [-1.0, 2.0, 8.0], [-1.0, 0.0, 0.0, 8.0]])
 def test_closed_forms_and_newton_find_the_same_kind_of_place(p: list[float]) -> None:
     x = first_above(p, 0.0, 1.0)
-    assert x is not None
     assert value(p, x) == pytest.approx(0.0, abs=1e-15)
     columns = [np.array([c, c]) for c in p]
-    at = refined_columns(columns, np.zeros(2), np.ones(2))
-    assert at == pytest.approx([x, x], rel=1e-15)
+    at = first_above(columns, np.zeros(2), np.ones(2), among=np.array([True, False]))
+    assert at == pytest.approx([x, nan], rel=1e-15, nan_ok=True)
 
 
 @given(p=st.lists(st.floats(-3.0, 3.0), min_size=1, max_size=6), x=st.floats(0.0, 2.0))

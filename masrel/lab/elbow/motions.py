@@ -1,0 +1,498 @@
+"""Kinds of movements: given by a formula, and made of others; `_recorded` has samples.
+
+The formulas of single stretches take columns in place of their numbers too.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from operator import attrgetter
+
+import numpy as np
+
+from masrel.errors import ParameterError
+from masrel.lab.elbow._motion import Motion, Piece, Rows, piece_of, rows_of
+from masrel.lab.elbow._polynomials import reversed_from, shifted, some
+from masrel.lab.elbow._recorded import Interpolation, Recorded
+
+__all__ = [
+    "ConstantSpeed",
+    "Hold",
+    "Interpolation",
+    "Joined",
+    "MinimumJerk",
+    "Part",
+    "Recorded",
+    "Reversed",
+    "Trapezoid",
+    "interrupted",
+]
+
+_SAME_ANGLE = 1e-9
+# rad: nearer angles are the same but for rounding, and movements join there
+
+_UNITS = {"speed": "deg/s", "mean_speed": "deg/s", "acceleration_rate": "deg/s²"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Stretch(Motion):
+    """From one angle to a larger one, at speeds that move the arm."""
+
+    start: float
+    end: float
+
+    def __post_init__(self) -> None:
+        start, end = self.start, self.end
+        if not 0.0 <= start < end <= math.pi:
+            raise ParameterError(
+                "start, end: need 0 <= start < end <= 180 degrees, got "
+                f"{math.degrees(start):g} and {math.degrees(end):g} degrees"
+            )
+        for name in self.__slots__:  # those that a kind adds
+            rate, unit = getattr(self, name), _UNITS[name]
+            if not 0.0 < rate < math.inf:
+                raise ParameterError(
+                    f"{name}: needs more than 0 and finite, got {math.degrees(rate):g} "
+                    f"{unit}"
+                )
+            if not 1e-30 <= rate <= 1e30:  # whose tenth powers a float holds
+                raise ParameterError(
+                    f"{name}: needs a rate that some motion has, 1e-28 to 1e31 {unit}, "
+                    f"got {math.degrees(rate):g} {unit}"
+                )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConstantSpeed(_Stretch):
+    """A stretch at one speed from the first instant to the last, a `Motion`.
+
+    Attributes
+    ----------
+    start, end : float
+        Angles, rad.
+    speed : float
+        Angular speed, rad/s.
+
+    Raises
+    ------
+    ParameterError
+        If the angles are not in order within 0 to 180 degrees, or the speed is not
+        more than 0, or beyond 1e-30 to 1e30 rad/s.
+
+    Examples
+    --------
+    >>> ConstantSpeed(start=0.5, end=2.5, speed=1.0).duration
+    2.0
+    """
+
+    speed: float
+
+    @property
+    def duration(self) -> float:
+        """How long it takes, s."""
+        return (self.end - self.start) / self.speed
+
+    def pieces(self) -> list[Piece]:
+        """Return the one piece, a line."""
+        length = (self.end - self.start) / self.speed
+        return [Piece(0.0, length, (0.0, self.speed), self.speed, self.speed)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MinimumJerk(_Stretch):
+    """A stretch from rest to rest with the least squared jerk, a `Motion`.
+
+    Attributes
+    ----------
+    start, end : float
+        Angles, rad.
+    mean_speed : float
+        Travel over duration, rad/s; the peak speed is 1.875 times that.
+
+    Raises
+    ------
+    ParameterError
+        As of `ConstantSpeed`.
+
+    References
+    ----------
+    .. [1] Flash, T., Hogan, N. (1985). The coordination of arm movements. Journal
+       of Neuroscience, 5(7), 1688-1703.
+       https://doi.org/10.1523/JNEUROSCI.05-07-01688.1985
+
+    Examples
+    --------
+    >>> motion = MinimumJerk(start=0.5, end=2.5, mean_speed=1.0)
+    >>> float(motion.velocity(1.0))
+    1.875
+    """
+
+    mean_speed: float
+
+    @property
+    def duration(self) -> float:
+        """How long it takes, s."""
+        return (self.end - self.start) / self.mean_speed
+
+    def pieces(self) -> list[Piece]:
+        """Return the two halves of the quintic of [1].
+
+        Its 10 s³ - 15 s⁴ + 6 s⁵, s the share of the time, is 1/2 + 15/8 x - 5 x³ + 6 x⁵
+        with x = s - 1/2, which keeps its digits to the end.
+        """
+        way, fastest = self.end - self.start, 1.875 * self.mean_speed
+        length = way / self.mean_speed
+        third = way / length / length / length
+        fifth, half = third / length / length, 0.5 * length
+        first = (0.0, 0.0, 0.0, 10.0 * third, -15.0 * third / length, 6.0 * fifth)
+        second = (0.5 * way, fastest, 0.0, -5.0 * third, 0.0, 6.0 * fifth)
+        return [
+            Piece(0.0, half, first, 0.0, fastest),
+            Piece(half, half, second, 0.0, fastest),
+        ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trapezoid(_Stretch):
+    """A stretch from rest to rest with a trapezoidal speed, a `Motion`.
+
+    Attributes
+    ----------
+    start, end : float
+        Angles, rad.
+    speed : float
+        Angular speed between the ramps, rad/s.
+    acceleration_rate : float
+        How fast the speed grows at the start and falls at the end, rad/s².
+
+    Raises
+    ------
+    ParameterError
+        As of `ConstantSpeed`, or if the way is too short to reach the speed: both
+        ramps together take speed²/acceleration_rate.
+
+    Examples
+    --------
+    Ramps of 0.5 s and 0.25 rad each, and 1.5 rad between them:
+
+    >>> Trapezoid(start=0.5, end=2.5, speed=1.0, acceleration_rate=2.0).duration
+    2.5
+    """
+
+    speed: float
+    acceleration_rate: float
+
+    def __post_init__(self) -> None:
+        _Stretch.__post_init__(self)
+        way = self.end - self.start
+        if self.speed**2 > way * self.acceleration_rate * (1.0 + 1e-15):
+            min_rate = np.degrees(self.speed**2 / way)
+            raise ParameterError(
+                f"acceleration_rate: needs {min_rate:g} deg/s² or more to reach "
+                f"{np.degrees(self.speed):g} deg/s on the way, got "
+                f"{np.degrees(self.acceleration_rate):g} deg/s²"
+            )
+
+    @property
+    def duration(self) -> float:
+        """How long it takes, s."""
+        ramp = self.speed / self.acceleration_rate
+        return (self.end - self.start) / self.speed + ramp
+
+    def pieces(self) -> list[Piece]:
+        """Return the ramp up, the line, if there is one, and the ramp down."""
+        way, speed, rate = self.end - self.start, self.speed, self.acceleration_rate
+        ramp = speed / rate
+        rise, level = 0.5 * speed * ramp, way / speed - ramp
+        pieces = [
+            Piece(0.0, ramp, (0.0, 0.0, 0.5 * rate), 0.0, speed),
+            Piece(ramp, level, (rise, speed), speed, speed),
+            Piece(ramp + level, ramp, (way - rise, speed, -0.5 * rate), 0.0, speed),
+        ]
+        return [piece for piece in pieces if some(piece.length > 0.0)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hold(Motion):
+    """An arm held still, a `Motion`.
+
+    Attributes
+    ----------
+    start : float
+        Where, rad.
+    duration : float
+        How long, s.
+
+    Raises
+    ------
+    ParameterError
+        If the angle is outside 0 to 180 degrees, or the duration is not more than 0.
+
+    Examples
+    --------
+    >>> float(Hold(start=0.5, duration=2.0).velocity(1.0))
+    0.0
+    """
+
+    start: float
+    duration: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.start <= math.pi:
+            raise ParameterError(
+                f"start: needs 0 to 180 degrees, got {math.degrees(self.start):g}"
+            )
+        if not 0.0 < self.duration < math.inf:
+            raise ParameterError(
+                f"duration: needs more than 0 s and finite, got {self.duration:g}"
+            )
+
+    @property
+    def end(self) -> float:
+        """Where, rad."""
+        return self.start
+
+    def pieces(self) -> list[Piece]:
+        """Return the one piece, a constant."""
+        return [Piece(0.0, self.duration, (0.0,), 0.0, 0.0)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Part(Motion):
+    """What a movement does from one time to another, a `Motion`.
+
+    Attributes
+    ----------
+    motion : Motion
+        The whole.
+    begin, finish : float
+        Times of the whole, s.
+
+    Raises
+    ------
+    ParameterError
+        If the times are not in order within the movement.
+
+    Examples
+    --------
+    A stretch stopped halfway:
+
+    >>> from masrel.lab.elbow import ConstantSpeed
+    >>> whole = ConstantSpeed(start=0.5, end=2.5, speed=1.0)
+    >>> Part(motion=whole, begin=0.0, finish=1.0).end
+    1.5
+    """
+
+    motion: Motion
+    begin: float
+    finish: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.begin < self.finish <= self.motion.duration:
+            raise ParameterError(
+                "begin, finish: need 0 <= begin < finish <= "
+                f"{self.motion.duration:g} s, the duration, got {self.begin:g} and "
+                f"{self.finish:g} s"
+            )
+
+    origin = property(attrgetter("motion.origin"), doc=Motion.origin.__doc__)
+
+    @property
+    def start(self) -> float:
+        """Angle where it starts, rad."""
+        return float(self.motion.angle(self.begin))
+
+    @property
+    def end(self) -> float:
+        """Angle where it ends, rad."""
+        return float(self.motion.angle(self.finish))
+
+    @property
+    def duration(self) -> float:
+        """How long it takes, s."""
+        return self.finish - self.begin
+
+    def pieces(self) -> list[Piece]:
+        """Return the pieces of the whole between the times, the outer ones cut."""
+        cut = []
+        for piece in self.motion.pieces():
+            low = max(self.begin - piece.start, 0.0)
+            high = min(self.finish - piece.start, piece.length)
+            start = max(piece.start - self.begin, 0.0)
+            if low == 0.0 and high == piece.length:
+                cut.append(piece._replace(start=start))
+            elif low < high:
+                cut.append(piece_of(start, high - low, shifted(piece.angle, low)))
+        return cut
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reversed(Motion):
+    """A movement the other way, a `Motion`: from its end to its start.
+
+    Attributes
+    ----------
+    motion : Motion
+        The movement forwards.
+
+    Examples
+    --------
+    Flexion from 2.5 to 0.5 rad:
+
+    >>> from masrel.lab.elbow import ConstantSpeed
+    >>> back = Reversed(motion=ConstantSpeed(start=0.5, end=2.5, speed=1.0))
+    >>> back.start, float(back.angle(0.5)), float(back.velocity(0.5))
+    (2.5, 2.0, -1.0)
+    """
+
+    motion: Motion
+
+    origin = property(attrgetter("motion.origin"), doc=Motion.origin.__doc__)
+
+    @property
+    def start(self) -> float:
+        """Angle where it starts, rad."""
+        return self.motion.end
+
+    @property
+    def end(self) -> float:
+        """Angle where it ends, rad."""
+        return self.motion.start
+
+    @property
+    def duration(self) -> float:
+        """How long it takes, s."""
+        return self.motion.duration
+
+    def pieces(self) -> list[Piece]:
+        """Return the pieces from the last to the first, each backwards."""
+        start, back = 0.0, []
+        for piece in reversed(self.motion.pieces()):
+            angle = reversed_from(piece.angle, piece.length)
+            back.append(
+                Piece(start, piece.length, angle, -piece.fastest, -piece.slowest)
+            )
+            start = max(self.motion.duration - piece.start, start)
+        return back
+
+
+class Joined(Motion):
+    """Movements one after another, a `Motion`.
+
+    Parameters
+    ----------
+    motions : sequence of Motion
+        The movements; each starts where the one before ends.
+
+    Attributes
+    ----------
+    motions : tuple of Motion
+        The movements.
+
+    Raises
+    ------
+    ParameterError
+        If there is none, or one starts elsewhere; the message says which.
+
+    Examples
+    --------
+    There and back:
+
+    >>> from masrel.lab.elbow import ConstantSpeed, Reversed
+    >>> there = ConstantSpeed(start=0.5, end=2.5, speed=1.0)
+    >>> both = Joined([there, Reversed(motion=there)])
+    >>> both.duration, float(both.angle(3.0)), float(both.velocity(3.0))
+    (4.0, 1.5, -1.0)
+    """
+
+    __slots__ = ("_duration", "_pieces", "_rows", "motions")
+
+    def __init__(self, motions: Sequence[Motion]) -> None:
+        self.motions = tuple(motions)
+        if not self.motions:
+            raise ParameterError("motions: needs one or more, got none")
+        for i, (one, other) in enumerate(pairwise(self.motions)):
+            if abs(one.end - other.start) > _SAME_ANGLE:
+                raise ParameterError(
+                    f"motions[{i + 1}]: needs to start at {math.degrees(one.end):g} "
+                    "degrees, where the one before ends, got "
+                    f"{math.degrees(other.start):g} degrees"
+                )
+        self._duration = 0.0
+        self._pieces: list[Piece] = []
+        for motion in self.motions:
+            offset = motion.origin - self.origin
+            self._pieces += [
+                piece._replace(
+                    start=self._duration + piece.start,
+                    angle=(piece.angle[0] + offset, *piece.angle[1:]),
+                )
+                for piece in motion.pieces()
+            ]
+            self._duration += motion.duration
+        self._rows = rows_of(self._pieces)
+
+    @property
+    def origin(self) -> float:
+        """Angle the pieces count from, rad."""
+        return float(self.motions[0].origin)
+
+    @property
+    def start(self) -> float:
+        """Angle where the first starts, rad."""
+        return self.motions[0].start
+
+    @property
+    def end(self) -> float:
+        """Angle where the last ends, rad."""
+        return self.motions[-1].end
+
+    @property
+    def duration(self) -> float:
+        """How long they take together, s."""
+        return self._duration
+
+    def pieces(self) -> list[Piece]:
+        """Return the pieces of every movement in turn."""
+        return self._pieces
+
+    def rows(self) -> Rows:
+        """Return the pieces as arrays."""
+        return self._rows
+
+
+def interrupted(motion: Motion, *, at: float, pause: float) -> Joined:
+    """Stop a movement at once, hold the arm, and go on as if nothing had been.
+
+    Parameters
+    ----------
+    motion : Motion
+        The movement.
+    at : float
+        When it is stopped, s; within its duration.
+    pause : float
+        How long the arm is held, s.
+
+    Returns
+    -------
+    Joined
+        The movement with its rest.
+
+    Raises
+    ------
+    ParameterError
+        If `at` is not within the movement, or `pause` is not more than 0.
+
+    Examples
+    --------
+    >>> from masrel.lab.elbow import ConstantSpeed
+    >>> stretch = ConstantSpeed(start=0.5, end=2.5, speed=1.0)
+    >>> stopped = interrupted(stretch, at=0.5, pause=3.0)
+    >>> stopped.duration, float(stopped.angle(2.0)), float(stopped.angle(4.0))
+    (5.0, 1.0, 1.5)
+    """
+    first = Part(motion=motion, begin=0.0, finish=at)
+    rest = Hold(start=first.end, duration=pause)
+    last = Part(motion=motion, begin=at, finish=motion.duration)
+    return Joined([first, rest, last])
