@@ -13,7 +13,7 @@ WRITERS = {
     "lab/_durable_files.py",  # bit by bit
     "lab/_event_log.py",  # lines are added to a log
     "lab/cli/_gating.py",  # a summary that a CI system gives is added to
-    "lab/hess/_spool.py",  # samples while they are taken
+    "lab/hess/_recorder.py",  # samples while they are taken
     "ratings/_exports.py",  # a temporary file for a library that reads no bytes
 }
 

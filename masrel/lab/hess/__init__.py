@@ -1,10 +1,10 @@
 """The driver of the simulator: devices, the controller of Fig. 7, the 1 kHz loop."""
 
-from masrel.lab.hess._presented import Fault, Presented, cut_off
+from masrel.lab.hess._course import PresentationStatus, StretchRules
+from masrel.lab.hess._recorder import Fault, Presented, cut_off
 from masrel.lab.hess._replay import ReplayOptions
 from masrel.lab.hess._simulated import SimulatedOptions, TorqueSensor
 from masrel.lab.hess._stop import EmergencyStop
-from masrel.lab.hess.backends import device_names, open_device
 from masrel.lab.hess.clock import Clock, RealClock, SimulatedClock
 from masrel.lab.hess.controller import Controller, Friction, FrictionCompensation
 from masrel.lab.hess.device import (
@@ -13,13 +13,20 @@ from masrel.lab.hess.device import (
     DeviceSetup,
     IdleCommand,
     Reading,
+    device_names,
+    open_device,
 )
-from masrel.lab.hess.hand import Hand, SimulatedHand, YieldingHand
-from masrel.lab.hess.human_hand import HandDistribution, HandTraits, HumanHand
+from masrel.lab.hess.hand import (
+    Hand,
+    HandDistribution,
+    HandTraits,
+    HumanHand,
+    SimulatedHand,
+    YieldingHand,
+)
 from masrel.lab.hess.limits import DeviceLimits
 from masrel.lab.hess.loop import run_presentation
 from masrel.lab.hess.rendering import MotionHand, Rendering, render
-from masrel.lab.hess.stretching import PresentationStatus, StretchRules
 
 __all__ = [
     "BackendOptions",

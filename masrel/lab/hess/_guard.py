@@ -56,7 +56,7 @@ _BACK = math.radians(3.0)
 
 
 class Guard:
-    """Check readings and torques against limits that look at more than one tick."""
+    """Check readings, torques and ticks against limits that look at more than one."""
 
     __slots__ = (
         "_angle",
@@ -64,18 +64,26 @@ class Guard:
         "_drift",
         "_held_time",
         "_limits",
+        "_lower",
+        "_missed",
         "_moved_at",
+        "_n_in_a_row",
         "_period",
         "_raw_speed",
         "_sent",
         "_sent_at",
         "_settled_at",
         "_settled_from",
+        "_slope",
         "_slow_from",
         "_speed",
         "_stopped_dead",
         "_time",
-        "dropouts",
+        "_upper",
+        "_window_s",
+        "_without",
+        "n_missed_ticks",
+        "n_without_reading",
     )
 
     def __init__(
@@ -98,7 +106,18 @@ class Guard:
         self._sent = 0.0  # the last torque, N·m
         self._sent_at = math.inf  # nothing yet: the device holds zero
         self._drift: Drift | None = None  # while the arm may be one that creeps
-        self.dropouts = Dropouts(limits, period_s)
+        # Ticks without a new reading: the first and the last of 100 are 99 periods
+        # apart; half of one more is for a loop that comes late.
+        self.n_without_reading = self._n_in_a_row = 0
+        self._window_s = (_WINDOW_TICKS - 0.5) * period_s
+        self._without: deque[float] = deque(maxlen=limits.missed_replies_per_100 + 1)
+        # Ticks that were missed
+        self.n_missed_ticks = 0
+        self._missed: deque[int] = deque(maxlen=limits.missed_ticks + 1)
+        # A spring over the last bit of the range at each of its ends
+        self._slope = limits.soft_stop_torque / limits.soft_stop_width
+        self._upper = limits.highest_angle - limits.soft_stop_width
+        self._lower = limits.lowest_angle + limits.soft_stop_width
 
     def is_new(self, time_s: float) -> bool:
         """Return whether a reading is newer than the last one."""
@@ -120,7 +139,7 @@ class Guard:
                 f"{math.degrees(angle):.1f} deg",
                 "range",
             )
-        self.dropouts.n_in_a_row = 0
+        self._n_in_a_row = 0
         if self._time == -math.inf:
             self._moved_at = self._settled_at = time_s
             self._settled_from = angle
@@ -246,6 +265,59 @@ class Guard:
                 "start",
             )
 
+    def soft_stop(self, angle: float) -> float:
+        """Return the torque of the springs at the ends of the range, N·m."""
+        # positive near the highest angle, negative near the lowest, 0 between
+        if angle > self._upper:
+            return self._slope * (angle - self._upper)
+        return self._slope * (angle - self._lower) if angle < self._lower else 0.0
+
+    def no_reading(self, time_s: float, reason: str) -> None:
+        """Count a tick without a new reading; many in a row or in 100 are a fault."""
+        limits = self._limits
+        self.n_without_reading += 1
+        self._n_in_a_row += 1
+        if self._n_in_a_row > limits.missed_replies:
+            raise LimitExceededError(
+                f"missed replies: needs a new reading after at most "
+                f"{limits.missed_replies} ticks without, got {self._n_in_a_row} "
+                f"in a row ({reason})",
+                "missed-replies",
+            )
+        times = self._without
+        times.append(time_s)
+        if len(times) == times.maxlen and time_s - times[0] < self._window_s:
+            raise LimitExceededError(
+                f"missed replies: needs at most {limits.missed_replies_per_100} of "
+                f"{_WINDOW_TICKS} ticks without a new reading, got {len(times)} "
+                f"within {(time_s - times[0]) * 1e3:.1f} ms ({reason})",
+                "missed-replies",
+            )
+
+    def missed(self, first: int, after: int, gap_s: float) -> None:
+        """Count the ticks from one to before another, after so long a silence."""
+        self.n_missed_ticks += after - first
+        self.silence(gap_s)
+        missed = self._missed
+        missed.extend(range(first, after))
+        if len(missed) == missed.maxlen and missed[-1] - missed[0] < _STRETCH_TICKS:
+            raise LimitExceededError(
+                f"missed ticks: needs at most {self._limits.missed_ticks} of any "
+                f"{_STRETCH_TICKS}, the loop missed {len(missed)} of "
+                f"{missed[-1] - missed[0] + 1}",
+                "overrun",
+            )
+
+    def silence(self, gap_s: float) -> None:
+        """Check how long no command has been sent."""
+        limits = self._limits
+        if gap_s >= limits.watchdog_time:
+            raise LimitExceededError(
+                f"silence: needs a command every {limits.watchdog_time * 1e3:g} ms, "
+                f"the loop sent none for {gap_s * 1e3:.1f} ms",
+                "overrun",
+            )
+
 
 class Drift:
     """Tell whether an arm that leaves its rest starts, or its encoder drifts."""
@@ -291,43 +363,6 @@ class Drift:
         return False
 
 
-class Dropouts:
-    """Count ticks without a new reading; too many in a row or in 100 are a fault."""
-
-    __slots__ = ("_limits", "_times", "_window_s", "n_in_a_row", "n_missed")
-
-    def __init__(self, limits: DeviceLimits, period_s: float) -> None:
-        self._limits = limits
-        # The first and the last of 100 ticks are 99 periods apart; half of one more
-        # is for a loop that comes late.
-        self._window_s = (_WINDOW_TICKS - 0.5) * period_s
-        self._times: deque[float] = deque(maxlen=limits.missed_replies_per_100 + 1)
-        self.n_missed = 0
-        self.n_in_a_row = 0
-
-    def count(self, time_s: float, reason: str) -> None:
-        """Count one tick without a new reading."""
-        limits = self._limits
-        self.n_missed += 1
-        self.n_in_a_row += 1
-        if self.n_in_a_row > limits.missed_replies:
-            raise LimitExceededError(
-                f"missed replies: needs a new reading after at most "
-                f"{limits.missed_replies} ticks without, got {self.n_in_a_row} "
-                f"in a row ({reason})",
-                "missed-replies",
-            )
-        times = self._times
-        times.append(time_s)
-        if len(times) == times.maxlen and time_s - times[0] < self._window_s:
-            raise LimitExceededError(
-                f"missed replies: needs at most {limits.missed_replies_per_100} of "
-                f"{_WINDOW_TICKS} ticks without a new reading, got {len(times)} "
-                f"within {(time_s - times[0]) * 1e3:.1f} ms ({reason})",
-                "missed-replies",
-            )
-
-
 class ActiveGuard:
     """Check torque, energy and speed of a model that is not passive."""
 
@@ -342,16 +377,12 @@ class ActiveGuard:
         "_first_angle",
         "_forgiven_at",
         "_held",
-        "_max_energy",
-        "_max_speed",
-        "_max_torque",
+        "_limits",
         "energy_given",
     )
 
     def __init__(self, limits: DeviceLimits) -> None:
-        self._max_torque = limits.active_torque
-        self._max_energy = limits.active_energy
-        self._max_speed = limits.active_speed
+        self._limits = limits
         self._first_angle = math.nan  # where the first stretch began, rad
         self._forgiven_at = 0.0  # when the last stretch from there began, s
         self._angle = self._held = 0.0  # of the last tick: rad, N·m
@@ -369,79 +400,27 @@ class ActiveGuard:
 
     def check(self, angle: float, velocity: float, torque: float) -> None:
         """Check what a model asks for before it is sent."""
+        limits = self._limits
         self.energy_given -= self._held * (angle - self._angle)
-        if self.energy_given > self._max_energy:
+        if self.energy_given > limits.active_energy:
             raise LimitExceededError(
                 f"energy: needs a model that has given the arm at most "
-                f"{self._max_energy:g} J more than it took, got "
+                f"{limits.active_energy:g} J more than it took, got "
                 f"{self.energy_given:.3f} J",
                 "energy",
             )
-        if not -self._max_torque <= torque <= self._max_torque:
+        if not -limits.active_torque <= torque <= limits.active_torque:
             raise LimitExceededError(
-                f"active torque: needs at most {self._max_torque:g} N·m of a model "
+                f"active torque: needs at most {limits.active_torque:g} N·m of a model "
                 f"that is not passive, got {torque:.3f} N·m",
                 "active-torque",
             )
-        if torque * velocity < 0.0 and abs(velocity) > self._max_speed:
+        if torque * velocity < 0.0 and abs(velocity) > limits.active_speed:
             raise LimitExceededError(
                 f"slip: needs an arm that moves at most "
-                f"{math.degrees(self._max_speed):.0f} deg/s the way a model pushes it "
-                f"that is not passive, got {math.degrees(velocity):.0f} deg/s",
+                f"{math.degrees(limits.active_speed):.0f} deg/s the way a model pushes "
+                f"it that is not passive, got {math.degrees(velocity):.0f} deg/s",
                 "slip",
             )
         self._angle = angle
         self._held = torque
-
-
-def check_silence(limits: DeviceLimits, gap_s: float) -> None:
-    """Check how long no command has been sent."""
-    if gap_s >= limits.watchdog_time:
-        raise LimitExceededError(
-            f"silence: needs a command every {limits.watchdog_time * 1e3:g} ms, "
-            f"the loop sent none for {gap_s * 1e3:.1f} ms",
-            "overrun",
-        )
-
-
-class Overruns:
-    """Count ticks that were missed; too many at once or in a stretch are a fault."""
-
-    __slots__ = ("_limits", "_missed", "n_missed")
-
-    def __init__(self, limits: DeviceLimits) -> None:
-        self._limits = limits
-        self._missed: deque[int] = deque(maxlen=limits.missed_ticks + 1)
-        self.n_missed = 0
-
-    def count(self, first: int, after: int, gap_s: float) -> None:
-        """Count the ticks from one to before another, after so long a silence."""
-        self.n_missed += after - first
-        check_silence(self._limits, gap_s)
-        missed = self._missed
-        missed.extend(range(first, after))
-        if len(missed) == missed.maxlen and missed[-1] - missed[0] < _STRETCH_TICKS:
-            raise LimitExceededError(
-                f"missed ticks: needs at most {self._limits.missed_ticks} of any "
-                f"{_STRETCH_TICKS}, the loop missed {len(missed)} of "
-                f"{missed[-1] - missed[0] + 1}",
-                "overrun",
-            )
-
-
-class SoftStops:
-    """A spring over the last bit of the range at each of its ends."""
-
-    __slots__ = ("_lower", "_slope", "_upper")
-
-    def __init__(self, limits: DeviceLimits) -> None:
-        self._slope = limits.soft_stop_torque / limits.soft_stop_width
-        self._upper = limits.highest_angle - limits.soft_stop_width
-        self._lower = limits.lowest_angle + limits.soft_stop_width
-
-    def torque(self, angle: float) -> float:
-        """Return the torque to add to the command, N·m."""
-        # positive near the highest angle, negative near the lowest, 0 between
-        if angle > self._upper:
-            return self._slope * (angle - self._upper)
-        return self._slope * (angle - self._lower) if angle < self._lower else 0.0

@@ -2,8 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing
 from pathlib import Path
 
 from masrel._collector import collector_off
@@ -13,12 +12,10 @@ from masrel.errors import (
     ParameterError,
     RecordingWarning,
 )
-from masrel.lab.hess._course import Course
-from masrel.lab.hess._presented import Presented, as_presented
+from masrel.lab.hess._course import Course, PresentationStatus, StretchRules
 from masrel.lab.hess._realtime import scheduled
-from masrel.lab.hess._shutdown import run_to_the_end
+from masrel.lab.hess._recorder import Presented, Samples, as_presented
 from masrel.lab.hess._signals import speed_margin
-from masrel.lab.hess._spool import Samples, Spool, n_samples
 from masrel.lab.hess._stop import EmergencyStop
 from masrel.lab.hess._ticks import Ticks
 from masrel.lab.hess._watchdog import NoWatchdog, Watching
@@ -26,8 +23,7 @@ from masrel.lab.hess.clock import Clock
 from masrel.lab.hess.controller import Controller
 from masrel.lab.hess.device import Device
 from masrel.lab.hess.limits import DeviceLimits
-from masrel.lab.hess.stretching import PresentationStatus, StretchRules
-from masrel.lab.recording import Channel, _Fact
+from masrel.lab.recording import _Fact
 
 _MAX_DURATION_S = 10.0  # of one stretch
 
@@ -141,10 +137,9 @@ def run_presentation(
     """
     rules = stretches or StretchRules()
     if max_duration_s is None:
-        max_duration_s = _longest_s(rules)
+        many_s = 2.0 * rules.time_limit + rules.stretch_limit
+        max_duration_s = _MAX_DURATION_S if rules.n == 1 else many_s
     _check(device, controller, limits, rate_hz, max_duration_s, end_angle)
-    n_ticks = math.ceil(max_duration_s * rate_hz)
-    capacity = n_samples(n_ticks, rate_hz, limits)
     controller.speed_margin = speed_margin(limits.encoder_noise, rate_hz)
     facts: dict[str, _Fact] = {
         "simulated": device.simulated,
@@ -160,14 +155,15 @@ def run_presentation(
         end_angle=end_angle,
         speed_threshold=controller.speed_threshold,
     )
-    with _samples(spool, capacity, facts, device.channels) as samples:
+    n_ticks = math.ceil(max_duration_s * rate_hz)
+    n_of_ramps = math.ceil((limits.end_ramp_time + limits.ramp_time) * rate_hz) + 4
+    samples = Samples(n_ticks + n_of_ramps, device.channels, file=spool, facts=facts)
+    with closing(samples):
         ticks = Ticks(
             device,
             controller,
             clock,
             limits,
-            rate_hz,
-            n_ticks,
             course,
             samples,
             stop or EmergencyStop(),
@@ -175,7 +171,7 @@ def run_presentation(
         )
         # a collection could take longer than a tick
         with scheduled(clock) as facts["scheduling"], collector_off():
-            ended, fault = run_to_the_end(ticks)
+            ended, fault = ticks.run_to_the_end(n_ticks)
         columns = samples.columns()
     presented = as_presented(
         columns,
@@ -184,8 +180,8 @@ def run_presentation(
         ended=ended,
         fault=fault,
         grip_lost=controller.grip_lost,
-        n_missed_ticks=ticks.overruns.n_missed,
-        n_missed_replies=ticks.guard.dropouts.n_missed,
+        n_missed_ticks=ticks.guard.n_missed_ticks,
+        n_missed_replies=ticks.guard.n_without_reading,
     )
     _warn(device.name, presented)
     return presented
@@ -202,12 +198,6 @@ def _warn(device: str, presented: Presented) -> None:
     silent = presented.recording.facts.get("channel_faults")
     if silent is not None:
         warnings.warn(f"{device}: {silent}", RecordingWarning, stacklevel=3)
-
-
-def _longest_s(rules: StretchRules) -> float:
-    if rules.n == 1:
-        return _MAX_DURATION_S
-    return 2.0 * rules.time_limit + rules.stretch_limit
 
 
 def _check(
@@ -238,23 +228,3 @@ def _check(
         raise ParameterError("controller: needs a new one for every presentation")
     if not device.is_open:
         raise DeviceError(f"{device.name}: needs an open device to present on")
-
-
-@contextmanager
-def _samples(
-    spool: Path | None,
-    capacity: int,
-    facts: dict[str, _Fact],
-    channels: tuple[Channel, ...],
-) -> Iterator[Samples]:
-    # In memory, or in a file that outlives this process
-    file = None
-    if spool is not None:
-        file = Spool(spool, capacity, facts, channels)
-    samples = Samples(capacity, file, channels)
-    try:
-        yield samples
-    finally:
-        samples.close()
-        if file is not None:
-            file.close()

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from masrel.lab._bounded_files import parse_json
-from masrel.lab.hess._spool import _HEADER, _WORD
+from masrel.lab.hess._recorder import _HEADER, _WORD
 from masrel.lab.recording import RECORDING_COLUMNS
 
 

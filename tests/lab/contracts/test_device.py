@@ -32,11 +32,11 @@ from masrel.lab.hess import (
     SimulatedOptions,
     StretchRules,
     TorqueSensor,
-    backends,
     device_names,
     open_device,
     run_presentation,
 )
+from masrel.lab.hess.device import _BACKENDS
 from masrel.lab.recording import MEASURED_TORQUE, Channel, Recording, stretches
 from tests.lab.hess.rig import ScriptedDevice
 
@@ -164,7 +164,7 @@ def test_every_backend_that_is_written_is_registered() -> None:
         for module in pkgutil.walk_packages(hess.__path__, "masrel.lab.hess.")
         if "\ndef build(setup: DeviceSetup)" in _source(module.name)
     }
-    assert written == set(backends._BACKENDS.values())
+    assert written == set(_BACKENDS.values())
 
 
 def _source(module: str) -> str:

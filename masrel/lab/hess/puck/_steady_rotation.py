@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from masrel.errors import DeviceError, DeviceTimeoutError, ParameterError
-from masrel.lab.hess._guard import Guard, check_silence
+from masrel.lab.hess._guard import Guard
 from masrel.lab.hess._signals import VelocityEstimate
 from masrel.lab.hess._stop import EmergencyStop
 from masrel.lab.hess._watchdog import NoWatchdog, Watching
@@ -269,15 +269,15 @@ class _TurningArm:
         self._due_ns = max(self._due_ns, now_ns - _PERIOD_NS) + _PERIOD_NS
         self._stop.check()
         guard = self._guard
-        check_silence(LIMITS, (now_ns - self._sent_ns) * 1e-9)
+        guard.silence((now_ns - self._sent_ns) * 1e-9)
         try:
             time_ns, angle, _ = self._device.read()
         except DeviceTimeoutError as error:
-            guard.dropouts.count(self._since_start_s(now_ns), str(error))
+            guard.no_reading(self._since_start_s(now_ns), str(error))
             return  # the device holds its torque
         time_s = self._since_start_s(time_ns)
         if not guard.is_new(time_s):
-            guard.dropouts.count(
+            guard.no_reading(
                 self._since_start_s(now_ns), f"one of {time_s:.6f} s again"
             )
             return

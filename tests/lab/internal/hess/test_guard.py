@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from masrel.errors import LimitExceededError
 from masrel.lab.elbow import STANDARD_MODELS, MinimumJerk, trace
 from masrel.lab.hess import DeviceLimits
-from masrel.lab.hess._guard import Dropouts, Guard, Overruns, SoftStops, check_silence
+from masrel.lab.hess._guard import Guard
 
 PERIOD = 0.001
 STEP = radians(0.005)  # of the encoder
@@ -116,7 +116,7 @@ def test_the_law_itself_passes_the_defaults(model: str, speed: float) -> None:
         watching.reading(time_s, round(angle / STEP) * STEP, 0.0)
         watching.speed(velocity)
         watching.torque(time_s, torque)
-    assert watching.dropouts.n_missed == 0
+    assert watching.n_without_reading == 0
 
 
 # Angle and speed
@@ -143,7 +143,7 @@ def test_what_lies_on_the_limits_passes() -> None:
     made.torque(PERIOD, -20.0)
     made.reading(0.0, radians(-5.0), 0.005)
     guard().reading(0.0, radians(185.0), -0.001)
-    assert made.dropouts.n_missed == 0
+    assert made.n_without_reading == 0
 
 
 # The encoder
@@ -252,14 +252,14 @@ def test_an_arm_that_trembles_by_one_step_may_be_held_for_long() -> None:
 def test_replies_may_be_missed_twice_in_a_row() -> None:
     made = guard()
     for tick in range(0, 9, 3):
-        made.dropouts.count(tick * PERIOD, "no answer")
-        made.dropouts.count((tick + 1) * PERIOD, "no answer")
+        made.no_reading(tick * PERIOD, "no answer")
+        made.no_reading((tick + 1) * PERIOD, "no answer")
         made.reading((tick + 2) * PERIOD, 1.0, 0.0)
-    assert made.dropouts.n_missed == 6
-    made.dropouts.count(0.009, "no answer")
-    made.dropouts.count(0.010, "no answer")
+    assert made.n_without_reading == 6
+    made.no_reading(0.009, "no answer")
+    made.no_reading(0.010, "no answer")
     with raises_limit("missed-replies", r"at most 2 ticks .* 3 in a row \(no answer\)"):
-        made.dropouts.count(0.011, "no answer")
+        made.no_reading(0.011, "no answer")
 
 
 def missing(made: Guard, lost: Callable[[int], bool], n_ticks: int) -> int | None:
@@ -269,7 +269,7 @@ def missing(made: Guard, lost: Callable[[int], bool], n_ticks: int) -> int | Non
             made.reading(tick * PERIOD, 1.0, 0.0)
             continue
         try:
-            made.dropouts.count(tick * PERIOD, "no answer")
+            made.no_reading(tick * PERIOD, "no answer")
         except LimitExceededError as error:
             return tick if error.kind == "missed-replies" else None
     return None
@@ -297,16 +297,16 @@ def test_the_share_is_that_of_any_hundred_ticks(
         return len([one for one in lost if tick - 99 <= one <= tick]) > limit
 
     limits = DeviceLimits(missed_replies=1000, missed_replies_per_100=limit)
-    dropouts = Dropouts(limits, period)
+    watching = Guard(limits, period)
     for tick in sorted(lost):
         if too_many(tick):
             with raises_limit(
                 "missed-replies", rf"at most {limit} of 100 ticks without"
             ):
-                dropouts.count(tick * period, "no answer")
+                watching.no_reading(tick * period, "no answer")
             return
-        dropouts.count(tick * period, "no answer")
-    assert dropouts.n_missed == len(lost)
+        watching.no_reading(tick * period, "no answer")
+    assert watching.n_without_reading == len(lost)
 
 
 def test_every_refusal_says_degrees_where_it_speaks_of_angles() -> None:
@@ -318,21 +318,21 @@ def test_every_refusal_says_degrees_where_it_speaks_of_angles() -> None:
 
 
 def test_one_missed_tick_too_many_is_named() -> None:
-    overruns = Overruns(DeviceLimits(missed_ticks=3))
+    watching = guard(missed_ticks=3)
     for first, after in ((5, 8), (2007, 2008), (2100, 2102)):
-        overruns.count(first, after, 0.005)
+        watching.missed(first, after, 0.005)
     words = r"at most 3 of any 2000, the loop missed 4 of 1994"
     with pytest.raises(LimitExceededError, match=words) as caught:
-        overruns.count(4000, 4001, 0.005)
-    assert (caught.value.kind, overruns.n_missed) == ("overrun", 7)
+        watching.missed(4000, 4001, 0.005)
+    assert (caught.value.kind, watching.n_missed_ticks) == ("overrun", 7)
 
 
 def test_a_gap_as_long_as_the_watchdog_waits_is_named() -> None:
-    limits = DeviceLimits()
-    check_silence(limits, 0.0499)
+    watching = guard()
+    watching.silence(0.0499)
     words = r"silence: needs a command every 50 ms.* for 50\.0 ms"
     with pytest.raises(LimitExceededError, match=words) as caught:
-        check_silence(limits, 0.05)
+        watching.silence(0.05)
     assert caught.value.kind == "overrun"
 
 
@@ -340,14 +340,14 @@ def test_a_gap_as_long_as_the_watchdog_waits_is_named() -> None:
 
 
 def test_they_push_back_from_five_degrees_before_the_ends() -> None:
-    stops = SoftStops(DeviceLimits())
-    assert stops.torque(radians(-5.0)) == pytest.approx(-10.0)
-    assert stops.torque(radians(182.5)) == pytest.approx(5.0)  # resists extension
-    assert stops.torque(radians(-1.0)) == pytest.approx(-2.0)
+    watching = guard()
+    assert watching.soft_stop(radians(-5.0)) == pytest.approx(-10.0)
+    assert watching.soft_stop(radians(182.5)) == pytest.approx(5.0)  # resists extension
+    assert watching.soft_stop(radians(-1.0)) == pytest.approx(-2.0)
     for angle in (0.0, 90.0, 180.0):
-        assert stops.torque(radians(angle)) == 0.0
+        assert watching.soft_stop(radians(angle)) == 0.0
 
 
 def test_there_may_be_none() -> None:
-    stops = SoftStops(DeviceLimits(soft_stop_torque=0.0))
-    assert stops.torque(radians(184.0)) == 0.0
+    watching = guard(soft_stop_torque=0.0)
+    assert watching.soft_stop(radians(184.0)) == 0.0

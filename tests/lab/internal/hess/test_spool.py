@@ -20,7 +20,7 @@ from masrel.lab.hess import (
     open_device,
     run_presentation,
 )
-from masrel.lab.hess._spool import Samples, Spool, read_spool
+from masrel.lab.hess._recorder import Samples, read_spool
 from masrel.lab.recording import RECORDING_COLUMNS
 from tests.lab.hess.rig import END, START
 
@@ -28,12 +28,10 @@ FACTS = {"device": "none", "rate_hz": 2000, "speed_threshold_deg_s": 17.0}
 
 
 def written(path: Path, n: int, capacity: int = 10) -> None:
-    spool = Spool(path, capacity, FACTS)
-    samples = Samples(capacity, spool)
+    samples = Samples(capacity, file=path, facts=FACTS)
     for tick in range(n):
-        samples.add(tick * 1e-3, 0.5 + tick, 1.0, 2.0, 3.0 + tick, 1, 1)
+        samples.add((tick * 1e-3, 0.5 + tick, 1.0, 2.0, 3.0 + tick, 1, 0, 1))
     samples.close()
-    spool.close()
 
 
 def presented(spool: Path | None):
@@ -60,11 +58,11 @@ def test_what_was_added_is_in_the_file(tmp_path: Path) -> None:
 
 def test_the_whole_file_is_there_before_the_first_sample(tmp_path: Path) -> None:
     path = tmp_path / "a.partial"
-    spool = Spool(path, 1000, FACTS)
+    samples = Samples(1000, file=path, facts=FACTS)
     size = path.stat().st_size
     assert size == 4096 + 8 * (1 + 8 * 1000)
     assert path.stat().st_blocks * 512 >= size  # not sparse: the disk has given it
-    spool.close()
+    samples.close()
     assert read_spool(path) is None  # and nothing was sampled
 
 
@@ -108,12 +106,10 @@ def test_what_was_cut_off_says_where(tmp_path: Path) -> None:
 
 def test_a_ramp_between_two_ticks_is_no_tick_that_was_missed(tmp_path: Path) -> None:
     path = tmp_path / "a.partial"
-    spool = Spool(path, 10, {**FACTS, "rate_hz": 1000})
-    samples = Samples(10, spool)
+    samples = Samples(10, file=path, facts={**FACTS, "rate_hz": 1000})
     for time_s in (0.0, 0.001, 0.0013, 0.0016, 0.002):  # two rows between two ticks
-        samples.add(time_s, 0.5, 1.0, 2.0, 3.0, 1, 1)
+        samples.add((time_s, 0.5, 1.0, 2.0, 3.0, 1, 0, 1))
     samples.close()
-    spool.close()
     left = cut_off(path)
     assert left is not None
     assert left.n_missed_ticks == 0
@@ -128,7 +124,7 @@ def test_a_disk_that_fills_while_it_is_laid_down_leaves_no_file(
     path = tmp_path / "a.partial"
     monkeypatch.setattr(mmap, "mmap", full)  # the last thing that asks the disk
     with pytest.raises(OSError, match="No space left") as caught:
-        Spool(path, 10, FACTS)
+        Samples(10, file=path, facts=FACTS)
     assert caught.value.filename == str(path)
     assert not path.exists()
 
@@ -138,7 +134,7 @@ def test_a_link_in_its_place_is_not_followed(tmp_path: Path) -> None:
     other.write_text("of somebody else")
     link.symlink_to(other)
     with pytest.raises(OSError, match="is a link"):
-        Spool(link, 10, FACTS)
+        Samples(10, file=link, facts=FACTS)
     assert other.read_text() == "of somebody else"
 
 
@@ -183,8 +179,8 @@ def test_anything_else_is_refused_with_a_way_out(tmp_path, content: bytes) -> No
 def test_the_columns_have_the_units_in_their_names() -> None:
     samples = Samples(3)
     assert samples.last_time_s == -np.inf
-    samples.add(0.0, 0.5, 1.0, 2.0, 3.0, 0, 0)
-    samples.add(0.1, 0.6, 1.1, 2.1, 3.1, 1, 1)
+    samples.add((0.0, 0.5, 1.0, 2.0, 3.0, 0, 0, 0))
+    samples.add((0.1, 0.6, 1.1, 2.1, 3.1, 1, 0, 1))
     assert samples.last_time_s == 0.1
     written = samples.columns()
     assert set(written) == set(RECORDING_COLUMNS)
