@@ -263,7 +263,7 @@ def evaluate(
     values, n_alone = np.empty((len(names), n)).T, 0
     for rows, p, motion, is_alone in _batches(joints, moves, n, chunk):
         n_alone += is_alone
-        if n > 1:
+        if not isinstance(parameters, ElbowParameters) or moves is motions:
             check_starts(motion.start, p.range_end, rows)
         if is_alone:
             values[rows[0]] = _found(p, motion, names)

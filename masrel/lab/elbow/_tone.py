@@ -1,15 +1,24 @@
-"""What the models of tone share: how their parameters are declared and checked."""
+"""What the models of tone share: parameters, steppers, and roots along a motion."""
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields
+from itertools import pairwise
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from masrel.errors import ParameterError
 from masrel.lab.elbow._motion import Floats, Motion
+from masrel.lab.elbow._polynomials import (
+    Number,
+    Polynomial,
+    derivative,
+    shifted,
+    split_at_roots,
+    value,
+)
 from masrel.lab.elbow.joint_model import JointModel
 
 Needs = Literal["positive", "not negative", "share", "angle", "frequency"]
@@ -22,8 +31,8 @@ _RANGES: dict[Needs, tuple[str, Callable[[float], bool]]] = {
     "frequency": ("more than 0, at most 100", lambda value: 0.0 < value <= 100.0),
 }
 
-
-_AT_THE_END = 1e-12  # s: nearer to the end of a motion is its end, but for rounding
+_SAME_TIME = 1e-12  # s: nearer times are the same but for rounding
+_SLACK = 1e-12  # rad, rad/s: by so little less than 0 is 0 but for rounding
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,6 +81,38 @@ class ToneEvent:
     angle: float
 
 
+class ToneStepper:
+    """A law that sees one sample at a time; one with a memory adds it."""
+
+    __slots__ = ("is_given_up", "model", "phase", "rest")
+
+    def __init__(self, model: Any, start_angle: float) -> None:
+        self.model, self.rest = model, model.rest_from(start_angle)
+        self.is_given_up = False
+        self.phase = 0
+        self.begin()
+
+    def begin(self) -> None:
+        """Have seen nothing yet."""
+
+    def release(self) -> None:
+        """Give up at once what has been triggered; a law says until when."""
+        self.is_given_up = True
+        self.phase = 0
+
+    def remember(
+        self, _time_s: float, _angle: float, _velocity: float, /
+    ) -> tuple[float, ...]:
+        """Take a sample in -> what the law's torque depends on besides."""
+        return ()
+
+    def step(self, time_s: float, angle: float, velocity: float) -> float:
+        """Decide the torque of one sample, N·m."""
+        memory = self.remember(time_s, angle, velocity)
+        torque: float = self.model._law(angle, velocity, self.rest, *memory)
+        return torque
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ToneModel(JointModel, ABC):
     """A law of tone: what every model in `masrel.lab.elbow.tone` is.
@@ -98,6 +139,7 @@ class ToneModel(JointModel, ABC):
     kind: ClassVar[str]
     is_passive: ClassVar[bool] = False
     catch_event: ClassVar[str | None] = None
+    _stepper: ClassVar[type[ToneStepper]] = ToneStepper
 
     range_end: float = quantity(math.radians(146.0), "rad", "angle", is_choice=False)
     speed_threshold: float = quantity(
@@ -131,6 +173,15 @@ class ToneModel(JointModel, ABC):
     @classmethod
     def _may_be_none(cls) -> frozenset[str]:
         return frozenset(entry.name for entry in fields(cls) if entry.default is None)
+
+    def stepper(self, start_angle: float) -> ToneStepper:
+        """Return the joint as a state machine that has not seen a sample yet."""
+        return self._stepper(self, start_angle)
+
+    def rest_from(self, start_angle: float) -> float:
+        """Return where the spring has no torque, rad: where it starts unless set."""
+        rest: float | None = getattr(self, "rest_angle", None)
+        return start_angle if rest is None else rest
 
     @abstractmethod
     def events(self, motion: Motion) -> tuple[ToneEvent, ...]:
@@ -172,13 +223,20 @@ class ToneModel(JointModel, ABC):
             raise ParameterError("times: needs 0 s or later, got an earlier one or nan")
         moments = np.minimum(moments, motion.duration)
         angle, velocity = motion.angle(moments), motion.velocity(moments)
-        return self._torque(motion, moments, angle, velocity)
+        columns = (angle, velocity, *self._memory(motion, moments))
+        rest = self.rest_from(motion.start)
+        rows = zip(*columns, strict=True)
+        return np.array([self._law(a, v, rest, *memory) for a, v, *memory in rows])
 
     @abstractmethod
-    def _torque(
-        self, motion: Motion, times: Floats, angle: Floats, velocity: Floats
-    ) -> Floats:
-        """Return the torque at times (n,), where angle and velocity are these."""
+    def _law(
+        self, angle: float, velocity: float, rest: float, /, *memory: float
+    ) -> float:
+        """Return the torque, N·m."""
+
+    def _memory(self, _motion: Motion, _times: Floats, /) -> list[Floats]:
+        """Return what `_law` depends on besides, at times of a motion (n,) each."""
+        return []
 
 
 def events_at(
@@ -188,7 +246,7 @@ def events_at(
 
     What would begin at the very end of the motion, or later, is none.
     """
-    last = motion.duration - _AT_THE_END
+    last = motion.duration - _SAME_TIME
     inside = sorted((e for e in times if e[1] < last), key=lambda event: event[1])
     angles = motion.angle(np.array([time for _, time in inside])).tolist()
     return tuple(
@@ -206,3 +264,94 @@ def grade_of(table: dict[str, Any], grade: object, name: str) -> Any:
             f"{name}: needs {', '.join(others)} or {last}, got {grade!r}"
         )
     return row
+
+
+@dataclass(frozen=True, slots=True)
+class OneWay:
+    """A part of a motion in which the arm extends (1), flexes (-1) or rests (0)."""
+
+    start: float  # s
+    length: float  # s
+    angle: Polynomial  # rad, over s since its start
+    direction: int
+
+    @property
+    def end(self) -> float:
+        """When it ends, s."""
+        return self.start + self.length
+
+    def angle_at(self, time: Number) -> Number:
+        """Return the angle at one or many times of the part, rad."""
+        return value(self.angle, time - self.start)
+
+    def beyond(self, angle: float, lead: float = 0.0) -> Polynomial:
+        """Return θ + lead·ω less an angle, rad."""
+        over = [self.angle[0] - angle, *self.angle[1:]]
+        for i, speed in enumerate(derivative(self.angle) if lead else ()):
+            over[i] += lead * speed
+        return over
+
+    def faster(self, speed: float, way: int) -> Polynomial:
+        """Return ω one way less a speed, rad/s."""
+        over = [way * c for c in derivative(self.angle)]
+        over[0] -= speed
+        return over
+
+    def reached(self, *levels: Polynomial, after: float = -math.inf) -> float | None:
+        """Return when all polynomials are first 0 or more; None if never.
+
+        Not before the time `after`, which counts itself.
+        """
+        first = max(0.0, after - self.start)
+        places = {
+            place for level in levels for place in split_at_roots(level, self.length)
+        }
+        for place in sorted({first, *places}):
+            if place >= first and all(_is_met(level, place) for level in levels):
+                return self.start + place
+        return None
+
+
+def one_way(motion: Motion) -> Iterator[OneWay]:
+    """Give the parts of a motion that go one way, in order."""
+    for piece in motion.pieces():
+        angle = [motion.origin + piece.angle[0], *piece.angle[1:]]
+        for low, high in pairwise(split_at_roots(derivative(angle), piece.length)):
+            part = shifted(angle, low) if low else angle
+            travel = value(part, high - low) - part[0]
+            direction = 0 if abs(travel) < _SLACK else (1 if travel > 0.0 else -1)
+            yield OneWay(piece.start + low, high - low, part, direction)
+
+
+def spans(
+    motion: Motion, level: Callable[[OneWay], Polynomial]
+) -> list[tuple[float, float]]:
+    """Return between which times a polynomial of each part is 0 or more, s."""
+    result: list[tuple[float, float]] = []
+    for part in one_way(motion):
+        values = level(part)
+        for low, high in pairwise(split_at_roots(values, part.length)):
+            if not _is_met(values, 0.5 * (low + high)):
+                continue
+            begun, until = part.start + low, part.start + high
+            if result and begun - result[-1][1] < _SAME_TIME:
+                result[-1] = (result[-1][0], until)
+            else:
+                result.append((begun, until))
+    return result
+
+
+def movements(motion: Motion, speed: float) -> list[tuple[float, float]]:
+    """Return between which times the arm goes one way at least so fast, s."""
+    extends = spans(motion, lambda part: part.faster(speed, 1))
+    return sorted(extends + spans(motion, lambda part: part.faster(speed, -1)))
+
+
+def negative(level: Sequence[Number]) -> Polynomial:
+    """Return what is 0 or more where a polynomial is 0 or less."""
+    return [-c for c in level]
+
+
+def _is_met(level: Polynomial, place: float) -> bool:
+    # 0 or more, but for rounding
+    return bool(value(level, place) >= -_SLACK)
