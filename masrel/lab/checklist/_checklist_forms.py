@@ -1,16 +1,14 @@
 """A checklist as a page, as Markdown, or as a document of a word processor."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
 
 from masrel._files import write_file
 from masrel.errors import ParameterError
 from masrel.lab.checklist._items import Checklist, ChecklistItem, State
-from masrel.lab.report._docx import Heading, as_docx
-from masrel.pages._sections import Paragraph
-from masrel.tables._tables import Column, Table
+from masrel.lab.report._pandoc import converted
 
 _HEADINGS = ("Item", "Asks for", "State", "What the record says", "Files")
 
@@ -35,7 +33,7 @@ def write_checklist(checklist: Checklist, path: Path) -> None:
     Raises
     ------
     ParameterError
-        If the ending is another, the file is a study's primary record, or python-docx
+        If the ending is another, the file is a study's primary record, or pandoc
         is needed and is not installed.
     OSError
         If the file cannot be written.
@@ -131,35 +129,7 @@ def _html(checklist: Checklist) -> str:
 
 
 def _docx(checklist: Checklist) -> bytes:
-    items = [
-        (
-            item.number,
-            item.topic,
-            item.state,
-            "\n".join(filter(None, (*item.facts, item.to_add))),
-            _numbers(checklist, item),
-        )
-        for item in checklist.items
-    ]
-    named = [
-        (str(number), file, digest)
-        for number, (file, digest) in enumerate(checklist.files.items(), start=1)
-    ]
-    blocks: list[Heading | Paragraph | Table] = [
-        Heading(text=checklist.study),
-        *(Paragraph(text=text) for text in _introduction(checklist)),
-        _texts("checklist", checklist.title, _HEADINGS, items),
-        _texts("files", "Files", ("No.", "File", "SHA-256"), named),
-        Paragraph(text=f"Made by masrel {checklist.masrel_version}."),
-    ]
-    return as_docx(blocks, landscape=True)
-
-
-def _texts(
-    name: str, caption: str, headings: Sequence[str], rows: Sequence[tuple[str, ...]]
-) -> Table:
-    columns = tuple(Column(key=text, heading=text, align="left") for text in headings)
-    return Table(name=name, caption=caption, columns=columns, rows=tuple(rows), data="")
+    return converted(checklist_markdown(checklist), "docx", pictures={})
 
 
 _FORMS: dict[str, Callable[[Checklist], str | bytes]] = {

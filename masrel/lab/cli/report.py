@@ -69,8 +69,8 @@ _OTHER_OPTIONS = (
     "formats",
     multiple=True,
     type=click.Choice(FORMATS),
-    help="Write this format, too, beside those of the protocol; docx needs the extra "
-    "masrel[docx]. Repeatable.",
+    help="Write this format, too, beside those of the protocol; latex and docx need "
+    "pandoc, which the extra masrel[docx] brings. Repeatable.",
 )
 @click.option(
     "--check",
@@ -208,11 +208,11 @@ class _Making:
         with read_once(), collector_off():
             data = read_study(self.build.study, self.ratings_file)
             _check_sections(self.only, data.protocol)
-            if "docx" in (*data.protocol.report.formats, *self.formats):
+            if {"latex", "docx"} & {*data.protocol.report.formats, *self.formats}:
                 # Imported here: who has a report that is current needs none of it.
-                from masrel.lab.report._docx import check_docx
+                from masrel.lab.report._pandoc import pandoc_version
 
-                check_docx()
+                pandoc_version()
             gates = self.gating.gates(data.protocol)
             analysis, files = self._files(data)
         return files, {

@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 
 from masrel.errors import MissingLettersWarning
-from masrel.lab._cache import Cache, installed
+from masrel.lab._cache import Cache
 from masrel.lab.analysis import Analysis
 from masrel.lab.analysis._analysis_json import analysis_text
 from masrel.lab.protocol import Protocol, report_sections
@@ -31,6 +31,7 @@ from masrel.lab.report._material import Material, gather
 from masrel.lab.report._methods import methods_section
 from masrel.lab.report._order_section import order_section
 from masrel.lab.report._pages import WRITERS, Writer
+from masrel.lab.report._pandoc import pandoc_version
 from masrel.lab.report._published_numbers import PublishedClaims, claims_section
 from masrel.lab.report._question_tables import questionnaires_section
 from masrel.lab.report._report_folder import (
@@ -166,7 +167,7 @@ def write_report(
     ------
     ParameterError
         If the folder is one of a study's primary records, or a link in it leads out;
-        if the protocol asks for DOCX and python-docx is not installed.
+        if the protocol asks for LaTeX or DOCX and pandoc is not installed.
     OSError
         If a file cannot be written; the pages that were there are then there still.
     """
@@ -239,16 +240,19 @@ def make_report(
     )
     if lacking:  # of all figures at once
         warnings.warn(MissingLettersWarning(lacking), stacklevel=2)
-    pages = {
-        writer.file: _page(writer, document, cache)
+    writers = [
+        writer
         for name, writer in WRITERS.items()
         if name in protocol.report.formats or name in formats
-    }
+    ]
+    pages = {writer.file: _page(writer, document, cache) for writer in writers}
     pages[NUMBERS] = analysis_text(analysis).encode()
     if progress is not None:
         progress("pages")
     made_from = {**inputs, **({} if conduct is None else conduct.inputs)}
-    return report_files(assets, pages, made_from)
+    converted = any(writer.is_converted for writer in writers)
+    with_pandoc = pandoc_version() if converted else None
+    return report_files(assets, pages, made_from, pandoc=with_pandoc)
 
 
 def section_names(protocol: Protocol) -> tuple[str, ...]:
@@ -309,8 +313,8 @@ _PAGE = "page"
 
 
 def _page(writer: Writer, document: Document, cache: Cache) -> bytes:
-    docx = installed().get("python-docx")
-    key = cache.key("page", writer.file, document, docx, libraries=("jinja2",))
+    pandoc = pandoc_version() if writer.is_converted else None
+    key = cache.key("page", writer.file, document, pandoc, libraries=("jinja2",))
     stored = cache.read(key)
     if stored is not None:
         return stored[_PAGE]

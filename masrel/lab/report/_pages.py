@@ -6,7 +6,10 @@ In: sections whose figures are drawn. Out: the bytes of a page, in every format 
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Literal
 
+from masrel.lab.report._pandoc import converted
 from masrel.pages._sections import Document, html_page
 from masrel.tables._tables import page_cells
 
@@ -17,6 +20,7 @@ class Writer:
 
     file: str  # name of the page, in the report's folder
     write: Callable[[Document], bytes]
+    is_converted: bool = False  # whether pandoc makes it
 
 
 def _as_html(document: Document) -> bytes:
@@ -24,6 +28,11 @@ def _as_html(document: Document) -> bytes:
 
 
 def _as_markdown(document: Document) -> bytes:
+    return _markdown(document, for_pandoc=False).encode()
+
+
+def _markdown(document: Document, *, for_pandoc: bool) -> str:
+    # for_pandoc: with captions as it has them
     # Imported here: a section's tables alone load no templates.
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -34,27 +43,28 @@ def _as_markdown(document: Document) -> bytes:
         keep_trailing_newline=True,
     )
     environment.filters |= {"md": as_markdown, "cells": page_cells}
-    return environment.get_template("report.md").render(document=document).encode()
+    template = environment.get_template("report.md")
+    return template.render(document=document, for_pandoc=for_pandoc)
 
 
-def _as_latex(document: Document) -> bytes:
-    # Imported here, as below: who wants a page loads no other format.
-    from masrel.lab.report._latex_report import report_latex
-
-    return report_latex(document).encode()
-
-
-def _as_docx(document: Document) -> bytes:
-    from masrel.lab.report._docx import report_docx
-
-    return report_docx(document)
+def _as_document(form: Literal["latex", "docx"], document: Document) -> bytes:
+    blocks = [block for section in document.sections for block in section.blocks]
+    pictures = {
+        block.files["png"]: block.pictures["png"] for block in blocks if block.files
+    }
+    markdown = _markdown(document, for_pandoc=True)
+    return converted(markdown, form, pictures=pictures)
 
 
 WRITERS: dict[str, Writer] = {
     "html": Writer(file="report.html", write=_as_html),
     "markdown": Writer(file="report.md", write=_as_markdown),
-    "latex": Writer(file="report.tex", write=_as_latex),
-    "docx": Writer(file="report.docx", write=_as_docx),
+    "latex": Writer(
+        file="report.tex", write=partial(_as_document, "latex"), is_converted=True
+    ),
+    "docx": Writer(
+        file="report.docx", write=partial(_as_document, "docx"), is_converted=True
+    ),
 }
 """The formats of pages by name, in the order in which they are written."""
 

@@ -46,9 +46,14 @@ class Assets:
 
 
 def report_files(
-    assets: Assets, pages: Mapping[str, bytes], inputs: Mapping[str, str]
+    assets: Assets,
+    pages: Mapping[str, bytes],
+    inputs: Mapping[str, str],
+    *,
+    pandoc: str | None = None,
 ) -> dict[str, bytes]:
     """Return every file of a report in the order in which they are written."""
+    # pandoc: its version, where it made a page
     # Imported here: whether a report is current is known without it.
     from masrel.lab.verification._outputs import REPORT_FORMAT
 
@@ -57,6 +62,7 @@ def report_files(
         "format": REPORT_FORMAT,
         "inputs": dict(inputs),
         "files": {place: _hash(data) for place, data in written.items()},
+        **({} if pandoc is None else {"pandoc": pandoc}),
     }
     manifest = json.dumps(document, indent=1, ensure_ascii=False) + "\n"
     return {**written, MANIFEST: manifest.encode()}
