@@ -73,23 +73,6 @@ def test_what_is_null_has_its_reason(masrel: Caller, tmp_path: Path) -> None:
 GROUPS = ["[0, 1)", "*", "a>b|c", "José", "Łukasz", "θ\u0307, ẋ, ē, ω\u0302"]
 
 
-def test_latex_of_many_groups_is_a_table_of_pages(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    groups = [*GROUPS, *map(str, range(20))]
-    rows = [f'"{g}",{i},{i % 2},{i // 2 % 2}' for g in groups for i in range(4)]
-    path = written(tmp_path, "\n".join(["ward,item,A,B", *rows]) + "\n")
-    out = masrel("agree", path, "--by", "ward", "--latex").out
-    assert out.startswith("% needs \\usepackage{booktabs,longtable}\n")
-    assert "lualatex" not in out
-    begun = re.findall(r"\\begin\{(\w+)\}", out)
-    assert begun == re.findall(r"\\end\{(\w+)\}", out)[::-1] == ["longtable"]
-    marked = r"$\dot{\theta}$, \.{x}, \={e}, $\hat{\omega}$ &"
-    for name in ("{[}0, 1) &", "{*} &", "a$>$b$|$c &", marked):
-        assert out.count(f"\n{name}") == 2
-    assert out.count("\\toprule") == 2  # on the first page, and on all others
-
-
 # The first screen.
 
 # grades of one kind alone, an item of one rating, and what may be a missing grade

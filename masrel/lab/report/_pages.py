@@ -4,14 +4,16 @@ In: sections whose figures are drawn. Out: the bytes of a page, in every format 
 `WRITERS` names.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from typing import Literal
 
 from masrel.lab.report._pandoc import converted
-from masrel.pages._sections import Document, html_page
-from masrel.tables._tables import page_cells
+from masrel.pages._sections import Block, Document, html_page, narrow
+from masrel.tables._latex import in_math
+from masrel.tables._tables import Column, Table, page_cells
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,11 +30,11 @@ def _as_html(document: Document) -> bytes:
 
 
 def _as_markdown(document: Document) -> bytes:
-    return _markdown(document, for_pandoc=False).encode()
+    return _markdown(document, None).encode()
 
 
-def _markdown(document: Document, *, for_pandoc: bool) -> str:
-    # for_pandoc: with captions as it has them
+def _markdown(document: Document, form: Literal["latex", "docx"] | None) -> str:
+    # form: what pandoc makes of it, whose captions it then has
     # Imported here: a section's tables alone load no templates.
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -42,18 +44,35 @@ def _markdown(document: Document, *, for_pandoc: bool) -> str:
         undefined=StrictUndefined,
         keep_trailing_newline=True,
     )
-    environment.filters |= {"md": as_markdown, "cells": page_cells}
+    escape = as_markdown
+    if form == "latex":  # whose own letters have no Greek ones
+
+        def escape(text: str) -> str:
+            return in_math(as_markdown(text).replace("$", r"\$"))
+
+    environment.filters |= {"md": escape, "cells": page_cells, "rule": _rule}
     template = environment.get_template("report.md")
-    return template.render(document=document, for_pandoc=for_pandoc)
+    return template.render(document=document, for_pandoc=form is not None)
 
 
 def _as_document(form: Literal["latex", "docx"], document: Document) -> bytes:
-    blocks = [block for section in document.sections for block in section.blocks]
+    # tables are no wider than paper
+    sections = tuple(
+        replace(section, blocks=tuple(chain(*map(_parts, section.blocks))))
+        for section in document.sections
+    )
+    document = replace(document, sections=sections)
+    blocks = [block for section in sections for block in section.blocks]
     pictures = {
         block.files["png"]: block.pictures["png"] for block in blocks if block.files
     }
-    markdown = _markdown(document, for_pandoc=True)
-    return converted(markdown, form, pictures=pictures)
+    return converted(_markdown(document, form), form, pictures=pictures)
+
+
+def _parts(block: Block) -> list[Block]:
+    if not isinstance(block.content, Table):
+        return [block]
+    return [replace(block, content=part) for part in narrow(block.content)]
 
 
 WRITERS: dict[str, Writer] = {
@@ -68,6 +87,20 @@ WRITERS: dict[str, Writer] = {
 }
 """The formats of pages by name, in the order in which they are written."""
 
+
+def _rule(columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> str:
+    # of a table: how columns are set, and how wide they are to each other
+    lines = []
+    for column, *cells in zip(columns, *rows, strict=True):
+        words = (word for text in (column.heading, *cells) for word in text.split())
+        widest = min(max(map(len, cells), default=0), _WIDEST)
+        line = "-" * max(widest, *map(len, words), 3)
+        colons = {"left": (":", ""), "right": ("", ":"), "center": (":", ":")}
+        lines.append(line.join(colons[column.align]))
+    return f"|{'|'.join(lines)}|"
+
+
+_WIDEST = 30  # letters of a column of text that may be broken into lines
 
 _MARKDOWN_ESCAPES = str.maketrans({letter: f"\\{letter}" for letter in "\\`*_|<>[]#"})
 

@@ -13,10 +13,17 @@ from masrel._files import write_file
 from masrel.errors import ParameterError
 
 _FIRST_DAY = "315532800"  # of 1980, the earliest that a zip can say
-_FROM = "markdown-smart-tex_math_dollars-citations"
+_SMALL = (  # letters of tables; figures stand where they are told of
+    r"header-includes=\usepackage{float}\floatplacement{figure}{H}"
+    r"\AtBeginEnvironment{longtable}{\footnotesize"
+    r"\setlength{\tabcolsep}{3pt}}"
+)
 _OPTIONS = {
-    "latex": ("--toc", "-V", "papersize=a4", "-V", "geometry=margin=25mm"),
-    "docx": (),
+    "latex": (
+        *("--from=markdown-smart-citations", "--toc"),
+        *("-V", "papersize=a4", "-V", "geometry=margin=20mm", "-V", _SMALL),
+    ),
+    "docx": ("--from=markdown-smart-citations-tex_math_dollars",),
 }
 
 
@@ -56,7 +63,7 @@ def converted(
             write_file(folder / path, data)
         subprocess.run(
             [
-                *(_pandoc(), "--from", _FROM, "--to", form, "--standalone"),
+                *(_pandoc(), "--to", form, "--standalone"),
                 *("--shift-heading-level-by=-1", *_OPTIONS[form], "--output", str(out)),
             ],
             input=markdown.encode(),

@@ -4,7 +4,6 @@ import hashlib
 import io
 import json
 import re
-import zipfile
 from collections import Counter
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
@@ -242,19 +241,15 @@ def test_each_form_has_every_fact(rated: Small, tmp_path: Path) -> None:
         assert path.read_bytes() == first
         texts[form] = first
     document = docx.Document(io.BytesIO(texts[".docx"]))
-    cells = [cell.text for row in document.tables[0].rows for cell in row.cells]
+    said = [paragraph.text for paragraph in document.paragraphs]
     page, markdown = texts[".html"].decode(), texts[".md"].decode()
     assert markdown == checklist_markdown(checklist)
     assert "http" not in page
     for item in checklist.items:
         for text in (item.topic, *item.facts):
-            assert any(text in cell for cell in cells)
+            assert any(text in of for of in said)
             assert _escaped(text) in page
     assert document.paragraphs[0].text == checklist.study
-    with zipfile.ZipFile(io.BytesIO(texts[".docx"])) as archive:
-        assert {entry.date_time for entry in archive.infolist()} == {
-            (1980, 1, 1, 0, 0, 0)
-        }
 
 
 def _escaped(text: str) -> str:

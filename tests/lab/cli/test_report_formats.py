@@ -7,7 +7,6 @@ import stat
 import subprocess
 import sys
 import sysconfig
-import zipfile
 from pathlib import Path
 
 import docx
@@ -19,8 +18,6 @@ from masrel.lab.protocol import copy_template
 from tests.cli.process import Caller
 
 SETPRIV = shutil.which("setpriv")
-OFFICE, TEXT_OF_PDF = shutil.which("soffice"), shutil.which("pdftotext")
-W = "{http://schemas.openxmlformats.org/wordprocessingml/2006/main}"
 FORMATS = ("html", "markdown", "latex", "docx")
 
 
@@ -60,7 +57,8 @@ def test_every_format_has_the_same_tables_and_figures(folder: Path) -> None:
     n_figures = len(list((folder / "figures").glob("*.png")))
     assert n_tables > 2
     assert n_figures > 0
-    assert latex.count("\\toprule") == len(word.tables) == n_tables
+    assert latex.count("\\begin{longtable}") == n_tables
+    assert len(word.tables) == n_tables
     assert latex.count("\\includegraphics") == len(word.inline_shapes) == n_figures
     for name in (folder / "figures").glob("*.png"):
         assert f"{{figures/{name.name}}}" in latex
@@ -72,88 +70,52 @@ def test_a_word_document_has_headings_captions_and_texts_for_pictures(
     word = docx.Document(str(folder / "report.docx"))
     styles = [paragraph.style.name for paragraph in word.paragraphs]
     assert styles.count("Heading 1") == 4
-    captions = [p.text for p in word.paragraphs if p.style.name == "Caption"]
+    captions = [of for of in styles if of in ("Table Caption", "Image Caption")]
     assert len(captions) == len(word.tables) + len(word.inline_shapes)
-    assert captions[0].startswith("Table 1. ")
     for shape in word.inline_shapes:
         assert len(shape._inline.docPr.get("descr")) > 30
     for table in word.tables:
         assert "w:tblHeader" in table.rows[0]._tr.xml
-    assert word.core_properties.title == "κ & 5 % of A_b #1 ± [x] {y} ~ ^"
-    with zipfile.ZipFile(folder / "report.docx") as archive:
-        assert {entry.date_time[:3] for entry in archive.infolist()} == {(1980, 1, 1)}
+    assert word.paragraphs[0].text == "κ & 5 % of A_b #1 ± [x] {y} ~ ^"
 
 
-def test_contents_of_a_word_document_are_there_before_they_are_updated(
-    folder: Path,
-) -> None:
-    word = docx.Document(str(folder / "report.docx"))
-    styles = [p.style.name for p in word.paragraphs]
-    assert word.paragraphs[styles.index("TOC Heading")].text == "Contents"
-    headings = [p for p in word.paragraphs if p.style.name == "Heading 1"]
-    entries = [p for p in word.paragraphs if p.style.name == "toc 1"]
-    links = [link for entry in entries for link in entry.hyperlinks]
-    assert [link.text for link in links] == [p.text for p in headings]
-    marks = [p._p.find(f"{W}bookmarkStart").get(f"{W}name") for p in headings]
-    assert [link.fragment for link in links] == marks
-    assert len(set(marks)) == len(marks) == len(entries)
-    # one field around all entries
-    body = word.element.body
-    kinds = [each.get(f"{W}fldCharType") for each in body.iter(f"{W}fldChar")]
-    assert kinds == ["begin", "separate", "end"]
-    assert [t.text.split()[0] for t in body.iter(f"{W}instrText")] == ["TOC"]
-    order = [e.tag for e in body.iter(f"{W}fldChar", f"{W}hyperlink")]
-    assert order == [f"{W}fldChar"] * 2 + [f"{W}hyperlink"] * len(links) + order[:1]
+def test_the_manifest_says_which_pandoc_it_was(folder: Path) -> None:
+    manifest = msgspec.json.decode((folder / "manifest.json").read_bytes())
+    assert re.fullmatch(r"[\d.]+", manifest["pandoc"])
 
 
-def test_docx_without_python_docx_is_refused_in_a_sentence(
+def test_without_pandoc_its_formats_are_refused_in_a_sentence(
     study: Path, tmp_path: Path
 ) -> None:
-    # an interpreter whose packages are all but python-docx
+    # an interpreter whose packages are all but pandoc's
     packages = tmp_path / "packages"
     packages.mkdir()
     for entry in Path(sysconfig.get_path("purelib")).iterdir():
-        if not entry.name.startswith(("docx", "python_docx")):
+        if not entry.name.startswith("pypandoc"):
             (packages / entry.name).symlink_to(entry)
     root = Path(masrel.__file__).parents[1]
     call = ["-S", "-m", "masrel", "report", str(study), "-o", str(tmp_path / "out")]
+    python_path = os.pathsep.join(map(str, (root, packages)))
     done = subprocess.run(
         [sys.executable, *call],
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (root, packages)))},
+        env={**os.environ, "PYTHONPATH": python_path, "PATH": ""},
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 2
     assert done.stderr == (
-        "masrel: docx: needs python-docx; install it with: pip install 'masrel[docx]'\n"
+        "masrel: latex and docx: need pandoc; install it with: pip install "
+        "'masrel[docx]'\n"
     )
     assert not (tmp_path / "out").exists()
 
 
 def test_text_of_a_study_is_escaped_in_latex(folder: Path) -> None:
     latex = (folder / "report.tex").read_text(encoding="utf-8")
-    title = r"$\kappa$ \& 5 \% of A\_b \#1 $\pm$ {[}x] \{y\} "
-    assert title + r"$\sim$ \textasciicircum{}" in latex
+    title = r"\(\kappa\) \& 5 \% of A\_b \#1 \(\pm\) "
+    assert title in " ".join(latex.split())
 
 
-def test_tables_of_a_word_document_fit_and_keep_their_captions(folder: Path) -> None:
-    word = docx.Document(str(folder / "report.docx"))
-    (section,) = word.sections  # none of these tables needs a page that is turned
-    room = section.page_width - section.left_margin - section.right_margin
-    for table in word.tables:
-        assert 0 < sum(column.width for column in table.columns) <= room
-        caption = table._tbl.getprevious()
-        assert caption.xpath("w:pPr/w:keepNext")
-        for row in table.rows:
-            assert row._tr.xpath("w:trPr/w:cantSplit")
-    for shape in word.inline_shapes:
-        assert shape.width <= room
-        picture = shape._inline.getparent().getparent().getparent()
-        assert picture.xpath("w:pPr/w:keepNext")
-
-
-def test_a_table_of_many_columns_turns_its_page_in_a_word_document(
-    tmp_path: Path,
-) -> None:
+def test_tables_too_wide_for_paper_are_in_parts(tmp_path: Path) -> None:
     root = tmp_path / "study"
     copy_template("hess2012", root)
     names = [f"rater {nth} of the north" for nth in range(1, 9)]
@@ -164,40 +126,11 @@ def test_a_table_of_many_columns_turns_its_page_in_a_word_document(
         (root / file).write_text(text, encoding="utf-8")
     build(root, tmp_path / "report", {}, "--format", "docx", "--only", "grades")
     word = docx.Document(str(tmp_path / "report" / "report.docx"))
-    first, turned, *_ = word.sections
-    assert first.page_width < first.page_height
-    assert turned.page_width > turned.page_height
-    # its heading stands on the page of the table, and no page has nothing on it
-    (before, *_) = word.element.body.xpath("w:p[w:pPr/w:sectPr]")
-    assert before.xpath("w:r")
-    assert before.getnext().xpath("w:pPr/w:pStyle/@w:val") == ["Heading1"]
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(None in (OFFICE, TEXT_OF_PDF), reason="LibreOffice, pdftotext")
-def test_a_word_processor_keeps_captions_with_their_tables(tmp_path: Path) -> None:
-    root = tmp_path / "study"
-    copy_template("hess2012", root)
-    build(root, tmp_path / "report", {}, "--format", "docx")
-    file = tmp_path / "report" / "report.docx"
-    office = [str(OFFICE), f"-env:UserInstallation=file://{tmp_path}/office"]
-    convert = [*office, "--headless", "--convert-to", "pdf", "--outdir", str(tmp_path)]
-    for call in (
-        [*convert, str(file)],
-        [str(TEXT_OF_PDF), str(tmp_path / "report.pdf")],
-    ):
-        subprocess.run(call, check=True, capture_output=True)
-    pages = (tmp_path / "report.txt").read_text(encoding="utf-8").split("\f")
-    word = docx.Document(str(file))
-    for nth, table in enumerate(word.tables, start=1):
-        (page,) = [page for page in pages if f"Table {nth}. " in page]
-        below = page.partition(f"Table {nth}. ")[2].split()
-        for cells in table.rows[0].cells, table.rows[1].cells:
-            words = " ".join(cell.text for cell in cells).split()
-            assert not [word for word in words if "-" not in word and word not in below]
-    # what is laid out has the contents that were written
-    contents = [p.text for p in word.paragraphs if p.style.name == "toc 1"]
-    assert "\n".join(contents) in pages[0]
+    heads = [[cell.text for cell in table.rows[0].cells] for table in word.tables]
+    assert len(heads) > 1
+    assert all(head[0] == "Model" for head in heads)
+    raters = [name for head in heads for name in head if name.startswith("rater")]
+    assert len(raters) == 8
 
 
 def compiled(folder: Path, engine: str) -> str:

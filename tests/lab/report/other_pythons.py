@@ -3,7 +3,7 @@
 ``python -m tests.lab.report.other_pythons INTERPRETER…`` builds the published study's
 report and a simulated one, in all formats, with this interpreter and with each of those
 named, and ends with 1 if a byte differs. An interpreter needs what masrel needs, and
-python-docx, in the same versions: another one of a library may draw another picture.
+pypandoc_binary, in the same versions: another one may draw another picture.
 """
 
 import os
@@ -16,12 +16,12 @@ import masrel
 from masrel.lab.protocol import copy_template
 
 FORMATS = ("html", "markdown", "latex", "docx")
-LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "pillow", "jinja2", "lxml")
+LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "pillow", "jinja2")
 VERSIONS = f"""
 import platform
 from importlib.metadata import version
 print(platform.python_version())
-for name in {LIBRARIES} + ("python-docx",):
+for name in {LIBRARIES} + ("pypandoc_binary",):
     print(name, version(name))
 """
 
