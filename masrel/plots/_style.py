@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
@@ -154,6 +155,7 @@ def stacked(pictures: Sequence[tuple[str, Picture]]) -> Figure:
     heights = [picture.height for _, picture in pictures]
     width = max(picture.width for _, picture in pictures)
     figure = Figure(figsize=(width, sum(heights)))
+    FigureCanvasAgg(figure)
     rows = figure.subplots(len(pictures), squeeze=False, height_ratios=heights)
     for ax, (title, picture) in zip(rows[:, 0], pictures, strict=True):
         picture.draw(ax)
@@ -239,6 +241,7 @@ def _inlined(svg: str) -> str:
 
 def lay_out(figure: Figure, stamp: str) -> None:
     """Place the axes of a figure between its stamp above and its legends below."""
+    FigureCanvasAgg(figure)  # which measures texts by one renderer, not by one a text
     for axes in figure.axes:
         axes.xaxis.label.set_wrap(True)
     _enlarge(figure)

@@ -1,6 +1,6 @@
 """Figures of torque and angle against time, of the model and as it was measured."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import compress
 from typing import Any
 
@@ -55,28 +55,30 @@ def _draw_panel(axes: Axes, panel: TracePanel, quantity: Quantity) -> None:
     for is_graded, factor in ((False, 1.0), (True, _GRADED)):
         chosen = [is_graded == of for of in panel.graded]
         draw_traces(axes, list(compress(panel.traces, chosen)), quantity, factor)
+    axes.margins(y=0.1)  # for names above the highest
 
 
 def _small_panels(panels: Sequence[TracePanel]) -> tuple[Figure, NDArray[Any]]:
-    # torque alone, all on the same axes
+    # torque alone, all on one scale; axes are not shared, as that doubles the time
     n_columns = min(_SMALL_IN_A_ROW, len(panels))
     n_rows = -(-len(panels) // n_columns)
     figure = Figure(figsize=(8.7, 0.6 + 1.75 * n_rows))
-    grid = figure.subplots(n_rows, n_columns, sharex=True, sharey=True, squeeze=False)
-    for axes, panel in zip(grid.flat, panels, strict=False):
+    grid = figure.subplots(n_rows, n_columns, squeeze=False)
+    shown, others = grid.ravel()[: len(panels)], grid.ravel()[len(panels) :]
+    for axes, panel in zip(shown, panels, strict=True):
         _draw_panel(axes, panel, "torque")
+    last = max(axes.get_xlim()[1] for axes in shown)
+    ends = _bottom(shown), max(axes.get_ylim()[1] for axes in shown)
+    for place, (axes, panel) in enumerate(zip(shown, panels, strict=True)):
+        axes.set(xlim=(0.0, last), ylim=ends)
         axes.set_title(panel.title, fontsize=8)
         axes.grid(axis="y")
-    for axes in grid.ravel()[len(panels) :]:
+        is_first, is_lowest = place % n_columns == 0, place + n_columns >= len(panels)
+        axes.tick_params(labelleft=is_first, labelbottom=is_lowest)
+        axes.set_xlabel("time (s)" if is_lowest else "")
+        axes.set_ylabel("torque (N·m)" if is_first else "")
+    for axes in others:
         axes.set_visible(False)
-    _begin_at_zero(grid[0, 0])
-    for place in range(n_columns):  # the last panel of each column has the label
-        last = n_rows - 1 if (n_rows - 1) * n_columns + place < len(panels) else -2
-        axes = grid[last, place]
-        axes.set_xlabel("time (s)")
-        axes.tick_params(labelbottom=True)
-    for axes in grid[:, 0]:
-        axes.set_ylabel("torque (N·m)")
     return figure, grid
 
 
@@ -121,13 +123,13 @@ def _finish(figure: Figure, grid: NDArray[Any], torque_label: str) -> None:
         axes.grid(axis="y")
     for axes in grid[1]:
         axes.set_xlabel("time (s)")
-    _begin_at_zero(grid[0, 0])
+    # limits come last: set before the last stretch they would cut it off
+    grid[0, 0].set(xlim=(0.0, None), ylim=(_bottom(grid[0]), None))
     grid[0, 0].set_ylabel(torque_label)
     grid[1, 0].set_ylabel("elbow angle (deg)")
     figure.align_ylabels(grid[:, 0])
 
 
-def _begin_at_zero(axes: Axes) -> None:
-    # limits come last: set before the last stretch they would cut it off
-    axes.set_xlim(left=0)
-    axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+def _bottom(row: Iterable[Axes]) -> float:
+    # where an axis of torque begins: at 0, or below what is less
+    return 1.05 * min(0.0, *(float(axes.dataLim.y0) for axes in row))
