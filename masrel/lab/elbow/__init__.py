@@ -19,7 +19,7 @@ from masrel.lab.elbow._torque import (
     work,
 )
 from masrel.lab.elbow.joint_model import JointModel, Stepper
-from masrel.lab.elbow.laws import MODELS
+from masrel.lab.elbow.laws import MODELS, Tardieu, tardieu
 from masrel.lab.elbow.motions import (
     ConstantSpeed,
     Hold,
@@ -33,7 +33,6 @@ from masrel.lab.elbow.motions import (
 )
 from masrel.lab.elbow.parameters import STANDARD_MODELS, ElbowParameters
 from masrel.lab.elbow.sampled import SampledJoint
-from masrel.lab.elbow.tardieu import Tardieu, tardieu
 from masrel.lab.elbow.trace import Outline, Trace, outline, trace
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ Two places of an interval nearer than `TIE` of its length are one place, and Ber
 coefficients within `NOTHING` of the largest count as 0: floats tell no more.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import comb, inf, isfinite, nan, sqrt
 from operator import ne
@@ -146,25 +146,12 @@ def first_above(
         b = bernstein(shifted(p, low), width)
         if (most := max(b)) <= 0.0:
             return nan
-        x = _first_rise(p, b, low, high, NOTHING * max(most, -min(b)), TIE * width)
+        nothing = NOTHING * max(most, -min(b))
+        if next((c for c in b if not -nothing <= c <= nothing), 0.0) > 0.0:
+            return low
+        changes = _sign_changes(p, b, low, high, nothing, TIE * width)
+        x = next((place for place, rises in changes if rises), nan)
     return x if x <= high - TIE * width else nan
-
-
-def _first_rise(
-    p: Polynomial, b: list[float], low: float, high: float, nothing: float, tie: float
-) -> float:
-    signs = [c > 0.0 for c in b if not -nothing <= c <= nothing]
-    if True not in signs:
-        return nan
-    if signs[0]:
-        return low
-    if False not in signs[signs.index(True) :]:  # below, then above
-        return _refined(p, low, high, guess=_guess(b, low, high))
-    if high - low <= tie:
-        return nan  # touches 0, or is above it for less than a tie
-    middle, (one, other) = 0.5 * (low + high), _halves(b)
-    x = _first_rise(p, one, low, middle, nothing, tie)
-    return x if x == x else _first_rise(p, other, middle, high, nothing, tie)
 
 
 def _halves(b: Sequence[Number]) -> tuple[list[Number], list[Number]]:
@@ -192,7 +179,7 @@ def _first_above_in_rows(
 
 
 def _first_rises(p: Polynomial, low: Number, high: Number, first: Number) -> Number:
-    # `_first_rise` of rows, whose halves are rows in their turn; `first` is all nan
+    # the first places where rows rise, whose halves are rows; `first` is all nan
     b = np.stack(
         np.broadcast_arrays(*bernstein(shifted(p, low), high - low), first)[:-1]
     )
@@ -231,7 +218,8 @@ def split_at_roots(
             from_level = [c - level for c in b]
             nothing = NOTHING * max(top, -bottom, abs(level))
             above = [p[0] - level, *p[1:]]
-            inner += _sign_changes(above, from_level, 0.0, length, nothing, tie)
+            changes = _sign_changes(above, from_level, 0.0, length, nothing, tie)
+            inner += [place for place, _ in changes]
     places = [0.0]
     for x in sorted(inner):
         if x - places[-1] > tie and length - x > tie:
@@ -241,22 +229,20 @@ def split_at_roots(
 
 def _sign_changes(
     p: Polynomial, b: list[float], low: float, high: float, nothing: float, tie: float
-) -> list[float]:
+) -> Iterator[tuple[float, bool]]:
+    # places in order, and whether it rises there
     signs = [c > 0.0 for c in b if not -nothing <= c <= nothing]
     n_changes = sum(map(ne, signs, signs[1:]))
-    if n_changes == 0:
-        return []
     if n_changes == 1:
         guess = _guess(b, low, high)
-        return [_refined(p, low, high, rises=signs[-1], guess=guess)]
-    if high - low <= tie:
-        return []  # touches 0
+        yield _refined(p, low, high, rises=signs[-1], guess=guess), signs[-1]
+    if n_changes < 2 or high - low <= tie:
+        return  # touches 0, or passes it for less than a tie
     middle, (one, other) = 0.5 * (low + high), _halves(b)
-    return [
-        *_sign_changes(p, one, low, middle, nothing, tie),
-        *([middle] if -nothing <= one[-1] <= nothing else []),
-        *_sign_changes(p, other, middle, high, nothing, tie),
-    ]
+    yield from _sign_changes(p, one, low, middle, nothing, tie)
+    if -nothing <= one[-1] <= nothing:
+        yield middle, next((c > 0.0 for c in other if abs(c) > nothing), False)
+    yield from _sign_changes(p, other, middle, high, nothing, tie)
 
 
 def largest(p: Polynomial, length: Number, known: Number = -inf) -> Number:

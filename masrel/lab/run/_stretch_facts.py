@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from masrel.lab.elbow import JointModel
-from masrel.lab.elbow.tardieu import _caught
+from masrel.lab.elbow.laws import _caught
 from masrel.lab.hess import PresentationStatus, StretchRules
 from masrel.lab.protocol import PresentationRules, Protocol, joint_model
 from masrel.lab.recording import Recording, Stretch, _Fact, stretches

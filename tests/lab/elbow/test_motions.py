@@ -1,6 +1,7 @@
-"""Kinds of motion: by hand, against SciPy, and pieces against samples."""
+"""Motions: by hand, against SciPy, pieces against samples, refusals."""
 
-from math import inf, nan, pi, radians
+import math
+from math import inf, nan, pi
 
 import numpy as np
 import pytest
@@ -21,13 +22,96 @@ from masrel.lab.elbow import (
     Reversed,
     Trapezoid,
     interrupted,
+    times_at,
 )
 from tests.lab.elbow.scenes import KINDS, random_scene
+from tests.lab.elbow.stretches import constant, minimum_jerk, motions
 
-LINE = ConstantSpeed(start=0.5, end=2.5, speed=1.0)
+# From 0.5 to 2.5 rad at a mean of 1 rad/s: 2 rad in 2 s.
 REACH = MinimumJerk(start=0.5, end=2.5, mean_speed=1.0)
+LINE = ConstantSpeed(start=0.5, end=2.5, speed=1.0)
 # ramps of 0.5 s and 0.25 rad, 1.5 rad at 1 rad/s between them
 RAMPS = Trapezoid(start=0.5, end=2.5, speed=1.0, acceleration_rate=2.0)
+
+
+@pytest.mark.parametrize(
+    ("time", "angle", "velocity", "acceleration"),
+    [
+        # p(s) = 10 s³ - 15 s⁴ + 6 s⁵, p' = 30 s² (1-s)², p'' = 60 s (1-s)(1-2s) with
+        # s = t/2: θ = 0.5 + 2 p, ω = 2/2 p' = p', α = 2/4 p'' = p''/2.
+        (0.0, 0.5, 0.0, 0.0),
+        # s = 1/4: p = 10/64 - 15/256 + 6/1024 = (160 - 60 + 6)/1024 = 106/1024;
+        # p' = 30 · 1/16 · 9/16 = 270/256; p'' = 60 · 1/4 · 3/4 · 1/2 = 5.625.
+        (0.5, 0.5 + 212 / 1024, 270 / 256, 2.8125),
+        # s = 1/2: p = 1/2, half the way; p' = 30/16 = 1.875; p'' = 0.
+        (1.0, 1.5, 1.875, 0.0),
+        (1.5, 2.5 - 212 / 1024, 270 / 256, -2.8125),  # mirrored
+        (2.0, 2.5, 0.0, 0.0),
+    ],
+)
+def test_minimum_jerk_has_the_values_of_the_quintic(
+    time: float, angle: float, velocity: float, acceleration: float
+) -> None:
+    # These are dyadic fractions: no operation rounds.
+    assert float(REACH.angle(time)) == angle
+    assert float(REACH.velocity(time)) == velocity
+    assert float(REACH.acceleration(time)) == acceleration
+
+
+def test_minimum_jerk_is_stationary_for_the_integral_of_squared_jerk() -> None:
+    # Its sixth derivative is 0 (Euler-Lagrange): the sixth difference of 7 points of a
+    # quintic vanishes, up to 2⁶ roundings of 2.5.
+    angle = REACH.angle(np.linspace(0.0, 2.0, 7))
+    assert abs(float(np.diff(angle, 6)[0])) < 64 * 2.5 * np.finfo(float).eps
+
+
+@given(motion=motions())
+def test_mean_speed_is_travel_over_duration(motion: Motion) -> None:
+    asked = motion.speed if isinstance(motion, ConstantSpeed) else motion.mean_speed
+    first, last = motion.angle(np.array([0.0, motion.duration]))
+    assert first == motion.start
+    # end - start and the sum in angle() each round once: a few ulp of at most π
+    assert last == pytest.approx(motion.end, abs=2e-15)
+    assert (last - first) / motion.duration == pytest.approx(asked, rel=1e-14)
+
+
+@given(motion=motions(), share=st.floats(0.001, 0.999))
+def test_times_at_undoes_angle(motion: Motion, share: float) -> None:
+    angle = motion.start + share * (motion.end - motion.start)
+    found = float(times_at(motion, [angle])[0])
+    assert 0.0 <= found <= motion.duration
+    assert float(motion.angle(found)) == pytest.approx(angle, abs=4e-15)
+
+
+@pytest.mark.parametrize("kind", [constant, minimum_jerk])
+@pytest.mark.parametrize(
+    ("start", "end"),
+    [(50.0, 50.0), (60.0, 50.0), (-1.0, 50.0), (10.0, 181.0), (nan, 50.0), (10.0, nan)],
+)
+def test_angles_out_of_order_or_range_are_refused(kind, start, end) -> None:
+    said = (
+        r"start, end: need 0 <= start < end <= 180 degrees, "
+        rf"got {start:g} and {end:g} degrees"
+    )
+    with pytest.raises(ParameterError, match=said):
+        kind(90.0, start_deg=start, end_deg=end)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"), [(constant, "speed"), (minimum_jerk, "mean_speed")]
+)
+@pytest.mark.parametrize("speed", [0.0, -90.0, nan, math.inf])
+def test_speeds_that_do_not_move_are_refused(kind, name: str, speed: float) -> None:
+    said = rf"^{name}: needs more than 0 and finite, got {speed:g} deg/s"
+    with pytest.raises(ParameterError, match=said):
+        kind(speed)
+
+
+@pytest.mark.parametrize("goal", [2.6, 0.4, float("nan"), float("inf")])
+def test_an_angle_that_is_not_reached_has_no_time(goal: float) -> None:
+    stretch = ConstantSpeed(start=0.5, end=2.5, speed=1.0)
+    with pytest.raises(ParameterError, match="angles: need ones that the motion reach"):
+        times_at(stretch, [goal])
 
 
 def any_motion(seed: int, kind: str) -> Motion:
@@ -138,16 +222,6 @@ def test_cubics_between_samples_are_those_of_scipy(
     assert motion.velocity(at) == pytest.approx(peer(at, 1), abs=1e-10 * steepest)
 
 
-def test_a_recorded_line_is_a_line() -> None:
-    motion = Recorded(
-        time=[3.0, 3.5, 5.0], angle=[0.5, 1.0, 2.5], interpolation="linear"
-    )
-    times = np.linspace(0.0, 2.0, 41)
-    assert motion.angle(times) == pytest.approx(LINE.angle(times), abs=1e-15)
-    assert set(motion.velocity(times).tolist()) == {1.0}
-    assert set(motion.acceleration(times).tolist()) == {0.0}
-
-
 def test_two_samples_are_enough() -> None:
     for interpolation in ("pchip", "linear"):
         motion = Recorded(
@@ -187,7 +261,7 @@ def test_an_unknown_interpolation_is_refused() -> None:
 def test_backwards_by_hand() -> None:
     back = Reversed(motion=REACH)
     assert (back.start, back.end, back.duration) == (2.5, 0.5, 2.0)
-    # the quintic of test_motion.py, at 0.5 s before its end
+    # the quintic above, at 0.5 s before its end
     assert float(back.angle(0.5)) == 2.5 - 212 / 1024
     assert float(back.velocity(0.5)) == -270 / 256
     assert float(back.acceleration(0.5)) == -2.8125
@@ -248,7 +322,3 @@ def test_a_long_rest_costs_no_more_digits_than_its_time_has() -> None:
 def test_movements_that_cannot_be_are_refused(make, said: str) -> None:
     with pytest.raises(ParameterError, match=said):
         make()
-
-
-def test_degrees_are_radians_inside() -> None:
-    assert float(Hold(start=radians(90.0), duration=1.0).angle(0.5)) == pi / 2
