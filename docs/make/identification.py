@@ -18,7 +18,7 @@ import numpy as np
 from tqdm import tqdm
 
 from masrel.lab.elbow import STANDARD_MODELS, fit, fit_friction
-from masrel.lab.elbow.identification._quantities import QUANTITIES
+from masrel.lab.elbow.identification._model_file import QUANTITIES
 from masrel.lab.report._fits import fit_figures
 from tests.lab.elbow.identification.synthesis import Scatter, recording, study
 from tests.lab.elbow.identification.test_friction import backdriven

@@ -4,7 +4,6 @@ Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
 https://doi.org/10.1109/TNSRE.2012.2195330, equations (1) to (6).
 """
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,14 +11,15 @@ from numpy.typing import NDArray
 
 from masrel.lab.elbow.identification import ElbowFit
 from masrel.lab.elbow.identification._catches import (
-    Arm,
     Catch,
     CatchLevels,
-    PreCatchLaw,
+    Law,
     catch_levels,
 )
 
 Floats = NDArray[np.float64]
+
+_BEFORE_CATCH = ("damping", "stiffness", "inertia")
 
 
 def slow_error(fit: ElbowFit, place: int) -> float:
@@ -78,22 +78,18 @@ def catches(fit: ElbowFit) -> list[Catch]:
 def catch_readings(fit: ElbowFit) -> list[tuple[Catch, CatchLevels]]:
     """Return the catches whose peak and residual of (3) can be read off the torque."""
     values = {e.name: e.value for e in fit.estimates}
-    names = [trial.name for trial in fit.trials]
-    terms: dict[str, Any] = {
+    held: dict[str, Any] = {
         name: values[name] if term == "fitted" else term
         for name, term in fit.arm.items()
         if name not in ("offset", "drift") and term != "off"
     }
+    joint: dict[str, Any] = {n: values[n] for n in _BEFORE_CATCH if n in values}
+    names = [trial.name for trial in fit.trials]
     drifts = dict(zip(names, fit.drifts, strict=True))
-    arm = replace(Arm(drifts=drifts), **terms)
-    law = PreCatchLaw(
-        damping=values["damping"],
-        stiffness=values["stiffness"],
-        inertia=values.get("inertia", 0.0),
-    )
+    law = Law(**joint, **held, drifts=drifts)
     readings = []
     for trial in fit.trials:
-        levels = catch_levels(trial, law, fit.constants, arm)
+        levels = catch_levels(trial, law, fit.constants)
         if trial.catch is not None and levels is not None:
             readings.append((trial.catch, levels))
     return readings

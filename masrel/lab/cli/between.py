@@ -219,8 +219,7 @@ def _document(placed: list[_Between], files: list[Path]) -> dict[str, object]:
 
 
 def _table(placed: list[_Between]) -> "Table":
-    from masrel.lab.elbow.identification._model_file import MODEL_KEYS
-    from masrel.lab.elbow.identification._quantities import QUANTITIES
+    from masrel.lab.elbow.identification._model_file import MODEL_KEYS, QUANTITIES
     from masrel.tables._tables import Column, Table
 
     quantities = [q for q in QUANTITIES.values() if q.key in MODEL_KEYS]

@@ -11,7 +11,7 @@ from masrel.lab.elbow.identification import (
     LackOfFit,
 )
 from masrel.lab.elbow.identification._catches import Trial
-from masrel.lab.elbow.identification._quantities import ALL_QUANTITIES, Quantity
+from masrel.lab.elbow.identification._model_file import ALL_QUANTITIES, Quantity
 from masrel.lab.report._figure_data import FIGURES
 from masrel.plots._drawn_values import Drawn, Form
 from masrel.tables._tables import (

@@ -8,9 +8,12 @@ of a device.
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from masrel.lab.elbow.identification._comparison import ComparedFit, compare_fits
     from masrel.lab.elbow.identification._friction import FrictionFit, fit_friction
-    from masrel.lab.elbow.identification._identify import fit
+    from masrel.lab.elbow.identification._identify import (
+        ComparedFit,
+        compare_fits,
+        fit,
+    )
     from masrel.lab.elbow.identification._lack_of_fit import (
         LackOfFit,
         PhaseResidual,
@@ -44,14 +47,14 @@ __all__ = [
 ]
 
 _HOMES = {
-    "ComparedFit": "_comparison",
+    "ComparedFit": "_identify",
     "FrictionFit": "_friction",
     "LackOfFit": "_lack_of_fit",
     "Movement": "_reading",
     "PhaseResidual": "_lack_of_fit",
     "StructureTest": "_lack_of_fit",
     "as_toml": "_model_file",
-    "compare_fits": "_comparison",
+    "compare_fits": "_identify",
     "fit": "_identify",
     "fit_friction": "_friction",
     "intermediate_models": "_model_file",
@@ -66,5 +69,6 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     import importlib
 
-    home = _HOMES.get(name, "_results")
-    return getattr(importlib.import_module(f"{__name__}.{home}"), name)
+    return getattr(
+        importlib.import_module(f"{__name__}.{_HOMES.get(name, '_results')}"), name
+    )

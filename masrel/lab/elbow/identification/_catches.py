@@ -6,12 +6,12 @@ https://doi.org/10.1109/TNSRE.2012.2195330, section II and equations (1) to (5).
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.lab.elbow.identification._changes import Changes, find_changes
 from masrel.lab.elbow.identification._clusters import Rows
 from masrel.lab.elbow.identification._stretches import (
     Pace,
@@ -24,73 +24,17 @@ from masrel.lab.elbow.identification._stretches import (
 from masrel.lab.elbow.parameters import ElbowParameters
 
 _Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
 
+# Candidates of the first search, whatever the number of samples.
+_COARSE = 150
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Arm:
-    """What an arm and a sensor have beside the law, SI units; 0 is not there.
+# A rise or climb of less than so many standard deviations of the residuals is none.
+MIN_SIGNAL = 3.0
 
-    `gravity` is m·g·l, whose torque is 0 at `gravity_angle`; `arm_inertia` acts in
-    every phase; `lag` is the sensor's time constant; `drift` is N·m/s, of single trials
-    in `drifts`.
-    """
-
-    gravity: float = 0.0
-    gravity_angle: float = 0.0
-    arm_inertia: float = 0.0
-    lag: float = 0.0
-    catch_rise: float = 0.0
-    fits_inertia: bool = False
-    drift: float = 0.0
-    drifts: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def takes_time(self) -> bool:
-        """Return whether the torque that is read takes time to step."""
-        return self.lag > 0.0 or self.catch_rise > 0.0
-
-    def torque(self, part: Part, trial: str) -> _Floats:
-        """Return what weight, inertia and drift add to the torque, N·m."""
-        weight = self.gravity * np.sin(part.angle - self.gravity_angle)
-        drift = self.drifts.get(trial, self.drift) * part.time
-        return np.asarray(weight + self.arm_inertia * part.acceleration + drift)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PreCatchLaw:
-    """b, k and m of (1)."""
-
-    damping: float
-    stiffness: float
-    inertia: float
-
-    def torque(self, part: Part) -> _Floats:
-        """Return the torque of (1) without the constant k·θ_rest, N·m."""
-        law = self.damping * part.velocity + self.stiffness * part.angle
-        return np.asarray(law + self.inertia * part.acceleration)
-
-    def at(self, catch: "Catch") -> float:
-        """Return the torque of (1) at the start of a catch, without the constant."""
-        law = self.damping * catch.speed + self.stiffness * catch.angle
-        return law + self.inertia * catch.acceleration
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Catch:
-    """The catch of one stretch; SI units, its start between two samples."""
-
-    time: float
-    angle: float
-    speed: float
-    acceleration: float  # just before it
-    mean_speed: float  # from movement onset, v̄ of (2)
-    speed_gain: float  # dv̄/dθ, 1/s
-    end: float | None  # None if the stretch ends within it
-    travel: float  # up to its end or the stretch's
-    mean_catch_speed: float  # v̄_c of (4)
-    within_peak: bool  # it ends before the peak does
-    residual_sd: float  # of torque about the law of the change points, N·m
-
+# An end that takes less than so many residual variances off the sum of squares is none:
+# of the ends of white noise the best takes 2 ln n, about 15.
+MIN_GAIN = 50.0
 
 # A speed that reaches the threshold in less time jumps, s.
 _JUMP = 0.03
@@ -111,6 +55,62 @@ _AFTER_WINDOW, _PUSHED_WINDOW = 0.06, 0.09
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Law:
+    """What is known of a joint before its catches, of the arm and of the sensor.
+
+    SI units; 0 is not there. `damping`, `stiffness` and `inertia` are those of (1);
+    `gravity` is m·g·l, whose torque is 0 at `gravity_angle`; `arm_inertia` acts in
+    every phase and is a regressor if `fits_inertia`; `lag` is the sensor's time
+    constant; `drift` is N·m/s, of single trials in `drifts`.
+    """
+
+    damping: float = math.nan
+    stiffness: float = math.nan
+    inertia: float = 0.0
+    gravity: float = 0.0
+    gravity_angle: float = 0.0
+    arm_inertia: float = 0.0
+    fits_inertia: bool = False
+    lag: float = 0.0
+    catch_rise: float = 0.0
+    drift: float = 0.0
+    drifts: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def takes_time(self) -> bool:
+        """Return whether the torque that is read takes time to step."""
+        return self.lag > 0.0 or self.catch_rise > 0.0
+
+    def pre_catch(self, part: Part) -> _Floats:
+        """Return the torque of (1) without the constant k·θ_rest, N·m."""
+        law = self.damping * part.velocity + self.stiffness * part.angle
+        return np.asarray(law + self.inertia * part.acceleration)
+
+    def arm(self, part: Part, trial: str) -> _Floats:
+        """Return what weight, inertia and drift add to the torque, N·m."""
+        weight = self.gravity * np.sin(part.angle - self.gravity_angle)
+        drift = self.drifts.get(trial, self.drift) * part.time
+        return np.asarray(weight + self.arm_inertia * part.acceleration + drift)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Catch:
+    """The catch of one stretch; SI units, its start between two samples."""
+
+    time: float
+    angle: float
+    speed: float
+    acceleration: float  # just before it
+    mean_speed: float  # from movement onset, v̄ of (2)
+    speed_gain: float  # dv̄/dθ, 1/s
+    end: float | None  # None if the stretch ends within it
+    travel: float  # up to its end or the stretch's
+    mean_catch_speed: float  # v̄_c of (4)
+    within_peak: bool  # it ends before the peak does
+    residual_sd: float  # of torque about the law of the change points, N·m
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
     """One stretch, as the fits see it; SI units.
 
@@ -124,28 +124,40 @@ class Trial:
     duration: float
     peak_speed: float
     rest_angle: float
-    pre_catch: Part
-    after: Part | None = None
+    pre_catch: Part = field(compare=False)
+    after: Part | None = field(default=None, compare=False)
     catch: Catch | None = None
     remark: str = ""
 
 
+def _trial(stretch: Stretch, name: str, pre_catch: Part, remark: str) -> Trial:
+    time = stretch.samples.time
+    return Trial(
+        name=name,
+        pace=stretch.pace,
+        start=float(time[0]),
+        duration=float(time[-1] - time[0]),
+        peak_speed=stretch.peak_speed,
+        rest_angle=stretch.rest_angle,
+        pre_catch=pre_catch,
+        remark=remark,
+    )
+
+
 def slow_trial(stretch: Stretch, name: str) -> Trial:
     """Return a slow stretch as one pre-catch phase (section II.B)."""
-    unusable = stretch.in_gap | stretch.saturated
-    lost = int(unusable.sum())
-    whole = filtered_part(stretch, unusable, (0, stretch.time.size), SLOW_WINDOW)
+    lost = int((stretch.samples.in_gap | stretch.samples.saturated).sum())
+    whole = filtered_part(stretch, (0, stretch.samples.time.size), SLOW_WINDOW)
     remark = f"{lost} samples missing or saturated" if lost else ""
-    return _trial(stretch, name, whole, remark=remark)
+    return _trial(stretch, name, whole, remark)
 
 
 def fast_trial(
     stretch: Stretch,
     name: str,
     constants: ElbowParameters,
-    law: PreCatchLaw,
+    law: Law,
     window: float,
-    arm: Arm | None = None,
     instant: float | None = None,
 ) -> Trial:
     """Return a fast stretch with its catch, or a remark that says why it has none.
@@ -153,61 +165,36 @@ def fast_trial(
     The catch is looked for; where a fit has it begin (`instant`) goes before if that is
     near.
     """
-    arm = arm or Arm()
-    nothing = part_of(stretch, slice(0, 0))
+    samples = stretch.samples
     onset, stop = _fast_part(stretch, constants.speed_threshold, window)
-    if stretch.in_gap[:stop].any():
-        why = "not used: a gap in the recording"
-        return _trial(stretch, name, nothing, remark=why)
-    changes = _changes(stretch, name, constants, law, arm, (onset, stop))
+    none = _trial(stretch, name, part_of(stretch, slice(0, 0)), "")
+    if samples.in_gap[:stop].any():
+        return replace(none, remark="not used: a gap in the recording")
+    changes = _changes(stretch, name, (onset, stop), constants, law)
     catch = None
     if changes.catch is not None:
-        half = 0.5 * stretch.samples.period  # between two samples
-        start, end = (
-            None if at is None else float(stretch.time[at]) - half
-            for at in (changes.catch, changes.end)
-        )
-        if instant is not None and abs(instant - (start or 0.0)) < _NEAR:
+        half = 0.5 * samples.period  # between two samples
+        start = float(samples.time[changes.catch]) - half
+        end = None if changes.end is None else float(samples.time[changes.end]) - half
+        if instant is not None and abs(instant - start) < _NEAR:
             start = instant
-        instants = start or 0.0, end
-        catch = _catch_at(stretch, (onset, stop), instants, constants, changes)
+        catch = _catch_at(
+            stretch, (onset, stop), (start, end), constants, changes.residual_sd
+        )
     if catch is None:
         why = "not used: no catch that stands out of the noise"
-        return _trial(stretch, name, nothing, remark=why)
-    first = int(np.searchsorted(stretch.time, catch.time))
-    before = filtered_part(stretch, stretch.saturated, (0, first), _FAST_WINDOW)
-    if stretch.saturated[:stop].any():
+        return replace(none, remark=why)
+    first = int(np.searchsorted(samples.time, catch.time))
+    before = filtered_part(stretch, (0, first), _FAST_WINDOW)
+    trial = replace(none, pre_catch=before, catch=catch)
+    if samples.saturated[:stop].any():
         why = "torque is saturated: nothing after the catch is used"
-    elif before.time.size == 0:
+        return replace(trial, remark=why)
+    if before.time.size == 0:
         why = "it catches at once: no torque before the catch to compare with"
-    else:
-        smooth_end = constants.post_catch == "additive" or law.inertia != 0.0
-        after = _after(stretch, (first, stop), catch, constants, arm, smooth_end)
-        return _trial(stretch, name, before, after=after, catch=catch)
-    return _trial(stretch, name, before, catch=catch, remark=why)
-
-
-def _trial(
-    stretch: Stretch,
-    name: str,
-    pre_catch: Part,
-    *,
-    after: Part | None = None,
-    catch: Catch | None = None,
-    remark: str = "",
-) -> Trial:
-    return Trial(
-        name=name,
-        pace=stretch.pace,
-        start=float(stretch.time[0]),
-        duration=float(stretch.time[-1] - stretch.time[0]),
-        peak_speed=stretch.peak_speed,
-        rest_angle=stretch.rest_angle,
-        pre_catch=pre_catch,
-        after=after,
-        catch=catch,
-        remark=remark,
-    )
+        return replace(trial, remark=why)
+    after = _after(stretch, (first, stop), catch, constants, law)
+    return replace(trial, after=after)
 
 
 def _fast_part(stretch: Stretch, limit: float, window: float) -> tuple[int, int]:
@@ -224,52 +211,42 @@ def _fast_part(stretch: Stretch, limit: float, window: float) -> tuple[int, int]
 def _changes(
     stretch: Stretch,
     name: str,
-    constants: ElbowParameters,
-    law: PreCatchLaw,
-    arm: Arm,
     ends: tuple[int, int],
-) -> Changes:
+    constants: ElbowParameters,
+    law: Law,
+) -> "Changes":
     onset, stop = ends
     part = part_of(stretch, slice(0, stop))
-    if stop == 0:
-        return Changes(catch=None, end=None, residual_sd=math.nan)
+    times = constants.peak_duration, law.catch_rise + 3.0 * law.lag, 3.0 * law.lag
+    peak, gap, last_gap = (round(time / stretch.samples.period) for time in times)
     return find_changes(
-        part.torque - arm.torque(part, name),
-        law.torque(part),
+        part.torque - law.arm(part, name),
+        law.pre_catch(part),
         part.angle,
         first=onset,
-        peak=round(constants.peak_duration / stretch.samples.period),
+        lengths=(peak, gap, last_gap),
         additive=constants.post_catch == "additive",
-        pushed=law.inertia * part.acceleration if law.inertia else None,
-        gaps=(
-            round((arm.catch_rise + 3.0 * arm.lag) / stretch.samples.period),
-            round(3.0 * arm.lag / stretch.samples.period),
-        ),
+        pushed=law.inertia * part.acceleration,
     )
 
 
 def _catch_at(
     stretch: Stretch,
-    ends: tuple[int, int],
+    part: tuple[int, int],
     instants: tuple[float, float | None],
     constants: ElbowParameters,
-    changes: Changes,
+    residual_sd: float,
 ) -> Catch | None:
     # motion and travel of a catch; None if the joint hardly moves there
-    time, period = stretch.time, stretch.samples.period
-    instant, end = instants
-    reach = slice(stretch.start, stretch.start + ends[1])
-    angle, speed, acceleration = state_at_break(
-        stretch.samples.time[reach], stretch.samples.angle[reach], instant
-    )
-    onset, onset_angle = _crossing(stretch, ends[0], constants.speed_threshold)
-    if not (instant > onset and angle > onset_angle and speed > 0.0):
+    samples, (instant, end) = stretch.samples, instants
+    fast = samples.cut(slice(part[1]))
+    angle, speed, acceleration = state_at_break(fast.time, fast.angle, instant)
+    onset, onset_angle = _onset(stretch, part[0], constants.speed_threshold)
+    last = float(fast.time[-1]) if end is None else end
+    if not (instant > onset and angle > onset_angle and speed > 0.0 and last > instant):
         return None
     mean_speed = (angle - onset_angle) / (instant - onset)
-    last = float(time[ends[1] - 1]) if end is None else end
-    if not last > instant:
-        return None
-    travel = float(np.interp(last, time, stretch.angle)) - angle
+    travel = float(np.interp(last, samples.time, stretch.angle)) - angle
     peak_end = instant + constants.peak_duration
     return Catch(
         time=instant,
@@ -282,29 +259,31 @@ def _catch_at(
         end=end,
         travel=travel,
         mean_catch_speed=travel / (last - instant),
-        within_peak=end is not None and end < peak_end - 2.0 * period,
-        residual_sd=changes.residual_sd,
+        within_peak=end is not None and end < peak_end - 2.0 * samples.period,
+        residual_sd=residual_sd,
     )
 
 
-def _crossing(stretch: Stretch, place: int, limit: float) -> tuple[float, float]:
+def _onset(stretch: Stretch, place: int, limit: float) -> tuple[float, float]:
     # time and angle at which the speed reaches the limit, between two samples
-    time = float(stretch.time[place])
+    samples, velocity = stretch.samples, stretch.velocity
+    time = float(samples.time[place])
     if stretch.acceleration[place] > limit / _JUMP:
-        return _jump(stretch, time)
+        return _jump(stretch.recording.time, stretch.recording.angle, time), (
+            stretch.rest_angle
+        )
     if place == 0:
         return time, float(stretch.angle[0])
-    low, high = stretch.velocity[place - 1], stretch.velocity[place]
-    time -= stretch.samples.period * float((high - limit) / (high - low))
-    return time, float(np.interp(time, stretch.time, stretch.angle))
+    low, high = velocity[place - 1], velocity[place]
+    time -= samples.period * float((high - limit) / (high - low))
+    return time, float(np.interp(time, samples.time, stretch.angle))
 
 
-def _jump(stretch: Stretch, near: float) -> tuple[float, float]:
+def _jump(time: _Floats, angle: _Floats, near: float) -> float:
     # where a motor starts at once, which a filter of speeds sees before it is: rest,
     # and a parabola from an instant on, by least squares
-    samples = stretch.samples
-    window = np.abs(samples.time - near) <= 3.0 * _JUMP
-    time, angle = samples.time[window], samples.angle[window]
+    window = np.abs(time - near) <= 3.0 * _JUMP
+    time, angle = time[window], angle[window]
     best, squares = near, math.inf
     for instant in time[(time > near - _JUMP) & (time < near + 2.0 * _JUMP)].tolist():
         since = np.maximum(time - instant, 0.0)
@@ -313,39 +292,34 @@ def _jump(stretch: Stretch, near: float) -> tuple[float, float]:
         left = float(((angle - design @ values) ** 2).sum())
         if left < squares:
             best, squares = instant, left
-    return best, stretch.rest_angle
+    return best
 
 
 def _after(
     stretch: Stretch,
-    ends: tuple[int, int],
+    part: tuple[int, int],
     catch: Catch,
     constants: ElbowParameters,
-    arm: Arm,
-    smooth_end: bool,
+    law: Law,
 ) -> Part:
     # samples from the catch on, without those next to a step of torque
-    pushes = arm.arm_inertia != 0.0 or arm.fits_inertia
+    pushes = law.arm_inertia != 0.0 or law.fits_inertia
     window = _PUSHED_WINDOW if pushes else _AFTER_WINDOW
-    part = part_of(stretch, slice(*ends), anew=window)
-    if catch.end is not None and smooth_end:
+    after = part_of(stretch, slice(*part), anew=window)
+    additive = constants.post_catch == "additive"
+    if catch.end is not None and (additive or law.inertia != 0.0):
         # speed and acceleration are regressors here, as they are before the catch
-        first = int(np.searchsorted(stretch.time, catch.end))
-        later = filtered_part(
-            stretch, stretch.saturated, (first, ends[1]), _FAST_WINDOW
-        )
-        part = part.keep(part.time < catch.end).then(later)
-    if arm.lag > 0.0:  # no step passes a sensor that lags
-        return part
-    steps = [catch.time + constants.peak_duration]
-    if arm.catch_rise == 0.0:
-        steps.append(catch.time)
-    if catch.end is not None:
-        steps[0] = min(steps[0], catch.end)
-        if constants.post_catch == "additive":
-            steps.append(catch.end)
-    near = np.min([np.abs(part.time - step) for step in steps], axis=0) < _GUARD
-    return part.keep(~near)
+        first = int(np.searchsorted(stretch.samples.time, catch.end))
+        later = filtered_part(stretch, (first, part[1]), _FAST_WINDOW)
+        after = after.keep(after.time < catch.end).then(later)
+    if law.lag > 0.0:  # no step passes a sensor that lags
+        return after
+    end = math.inf if catch.end is None else catch.end
+    steps = [min(catch.time + constants.peak_duration, end)]
+    steps += [catch.time] if law.catch_rise == 0.0 else []
+    steps += [end] if additive else []
+    near = np.min([np.abs(after.time - step) for step in steps], axis=0) < _GUARD
+    return after.keep(~near)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -362,26 +336,34 @@ class CatchLevels:
 
 
 def catch_levels(
-    trial: Trial, law: PreCatchLaw, constants: ElbowParameters, arm: Arm | None = None
+    trial: Trial, law: Law, constants: ElbowParameters
 ) -> CatchLevels | None:
     """Return what is read off the torque of a trial; None without a usable catch."""
-    arm = arm or Arm()
     catch, after, pre = trial.catch, trial.after, trial.pre_catch
     if catch is None or after is None or pre.torque.size == 0 or after.torque.size == 0:
         return None
-    before = pre.torque - arm.torque(pre, trial.name)
-    measured = after.torque - arm.torque(after, trial.name)
-    offset = float((before - law.torque(pre)).mean())  # -k·θ_rest
-    above = measured - (offset + law.at(catch))  # over τ_pre_end of (3)
+    before = pre.torque - law.arm(pre, trial.name)
+    measured = after.torque - law.arm(after, trial.name)
+    offset = float((before - law.pre_catch(pre)).mean())  # -k·θ_rest
+    pre_end = law.damping * catch.speed + law.stiffness * catch.angle
+    pre_end += law.inertia * catch.acceleration
+    above = measured - (offset + pre_end)  # over τ_pre_end of (3)
     end = math.inf if catch.end is None else catch.end
     in_peak = after.time < min(catch.time + constants.peak_duration, end)
-    risen = in_peak & (after.time >= catch.time + arm.catch_rise + 3.0 * arm.lag)
+    risen = in_peak & (after.time >= catch.time + law.catch_rise + 3.0 * law.lag)
     later = after.time >= end
     past = np.where(later, after.angle - (catch.angle + catch.travel), 0.0)
     torque = above - np.where(later, law.inertia * after.acceleration, 0.0)
     if constants.post_catch == "additive":
-        torque = np.where(later, measured - law.torque(after) - offset, above)
-    climb, residual = _residual_and_climb(past[~in_peak], torque[~in_peak])
+        torque = np.where(later, measured - law.pre_catch(after) - offset, above)
+    past, torque = past[~in_peak], torque[~in_peak]
+    residual, slope = float(torque.mean()) if torque.size else math.nan, 0.0
+    climb = Rows(np.zeros((1, 1)), np.zeros(1))
+    if past.any():  # a level and a slope; the level alone is the residual torque
+        moved, left = past - past.mean(), torque - torque.mean()
+        slope = float(moved @ left) / float(moved @ moved)
+        residual -= slope * float(past.mean())
+        climb = Rows(moved[:, None], left)
     return CatchLevels(
         peak=float(above[risen].mean()) if risen.any() else math.nan,
         residual=residual,
@@ -389,14 +371,149 @@ def catch_levels(
     )
 
 
-def _residual_and_climb(past: _Floats, torque: _Floats) -> tuple[Rows, float]:
-    # a level and a slope; the level alone is the residual torque
-    nothing = Rows(design=np.zeros((1, 1)), target=np.zeros(1))
-    if torque.size == 0:
-        return nothing, math.nan
-    if not past.any():
-        return nothing, float(torque.mean())
-    moved, left = past - past.mean(), torque - torque.mean()
-    slope = float(moved @ left) / float(moved @ moved)
-    rows = Rows(design=moved[:, None], target=left)
-    return rows, float(torque.mean()) - slope * float(past.mean())
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Changes:
+    """Where the torque of one stretch changes, as places of its samples."""
+
+    catch: int | None = None
+    end: int | None = None
+    residual_sd: float = math.nan
+
+
+class _Running(NamedTuple):
+    # sums of values and of their squares before each place: any stretch of them in O(1)
+    one: _Floats
+    two: _Floats
+
+    @classmethod
+    def of(cls, values: _Floats) -> "_Running":
+        return cls(*np.cumsum([np.append(0.0, values), np.append(0.0, values**2)], 1))
+
+    def about_mean(self, low: _Ints, high: _Ints) -> _Floats:
+        # Σ(x - mean)² over the samples from low to before high; 0 of none
+        one, two = self.one[high] - self.one[low], self.two[high] - self.two[low]
+        return np.asarray(two - one**2 / np.maximum(high - low, 1))
+
+
+class _Sums(NamedTuple):
+    torque: _Running
+    rest: _Running  # torque - pre-catch law
+    angle: _Running
+    later: _Running  # torque - what the law adds after the catch
+    later_angle: _Floats  # of their products
+    offset: _Floats  # what the law adds at each place
+    at: _Floats  # the angle there
+
+
+def find_changes(
+    torque: _Floats,
+    pre_catch: _Floats,
+    angle: _Floats,
+    *,
+    first: int,
+    lengths: tuple[int, int, int],
+    additive: bool,
+    pushed: _Floats | float = 0.0,
+) -> Changes:
+    """Return the catch of a stretch, by least squares over all pairs of instants.
+
+    Every level is free: the pre-catch law up to a constant, one level during the peak,
+    one after it, and a climb in proportion to the angle travelled after the end of the
+    catch. No catch is before sample `first`. `lengths` are the samples of the peak, and
+    those after its start and its end that are left out, where torque takes time.
+    `additive` says that post-catch adds to the pre-catch law instead of going on from
+    the residual torque; `pushed` is m·θ̈ of (5), which post-catch has and the catch has
+    not.
+
+    A catch whose rise, or an end whose climb, is below `MIN_SIGNAL` standard deviations
+    of the residuals is none; nor is an end that takes less than `MIN_GAIN` residual
+    variances off the sum of squares. If post-catch is additive, that gain alone decides
+    of an end.
+    """
+    n = torque.size
+    if n - 2 <= first + 1:
+        return Changes()
+    angle = angle - angle.mean()
+    torque, pre_catch = torque - torque.mean(), pre_catch - pre_catch.mean()
+    rest = torque - pre_catch
+    later = rest if additive else torque - pushed
+    sums = _Sums(
+        torque=_Running.of(torque),
+        rest=_Running.of(rest),
+        angle=_Running.of(angle),
+        later=_Running.of(later),
+        later_angle=np.append(0.0, np.cumsum(later * angle)),
+        offset=pre_catch if additive else np.zeros(n),
+        at=np.append(angle, angle[-1]),
+    )
+    # First both coarsely, then the catch to the sample, then the end to the sample.
+    step = max(1, n // _COARSE)
+    starts, ends = np.arange(first + 1, n - 2, step), np.arange(first + 2, n - 1, step)
+    peak, *gaps = lengths
+    near = peak, *(max(step, gap) for gap in gaps)
+    for finer in (False, True, True):
+        squares = _squares(sums, starts, np.append(ends, n), near)
+        place = np.unravel_index(int(np.argmin(squares)), squares.shape)
+        catch, end = int(starts[place[0]]), int(np.append(ends, n)[place[1]])
+        reach, near = 2 if finer else 3 * step, lengths
+        starts = np.arange(max(catch - reach, first + 1), min(catch + reach, n - 3) + 1)
+        ends = np.arange(first + 2, n - 1) if finer else ends
+    least = float(squares[place])
+    if not math.isfinite(least) or catch >= end:
+        return Changes()
+    sd = math.sqrt(max(least, 0.0) / max(n - 6, 1))
+    step = min(catch + peak, end)
+    rise = torque[catch:step].mean() - rest[:catch].mean() - pre_catch[catch]
+    if rise < MIN_SIGNAL * sd:
+        return Changes(residual_sd=sd)
+    if end < n:
+        _, along, length = _hinge(sums, np.array(step), np.array(end), 0.0)
+        climb = (angle[-1] - angle[end]) * along / length if length > 0.0 else 0.0
+        endless = _squares(sums, starts, np.array([n]), lengths)[:, 0]
+        seen = additive or climb >= MIN_SIGNAL * sd
+        if seen and float(endless.min()) - least >= MIN_GAIN * sd**2:
+            return Changes(catch=catch, end=end, residual_sd=sd)
+        catch = int(starts[int(np.argmin(endless))])
+    return Changes(catch=catch, residual_sd=sd)
+
+
+def _squares(
+    sums: _Sums, starts: _Ints, ends: _Ints, lengths: tuple[int, ...]
+) -> _Floats:
+    # residual sum of squares of every pair, shape (n_starts, n_ends); without `gap`
+    # samples after a step, which then may be anywhere between two candidates, and
+    # without the two around the end of the peak, whose length is no whole number
+    peak, gap, last_gap = lengths
+    i, e = starts[:, None], ends[None, :]
+    step = np.minimum(i + peak, e)  # down, from the peak
+    low = np.minimum(i + gap, step)
+    total = sums.rest.about_mean(np.zeros_like(i), i)
+    total = total + sums.torque.about_mean(low, np.maximum(step - 1, low))
+    after = np.minimum(step + max(last_gap, 1), sums.offset.size)
+    end = np.maximum(e, after)
+    whole, along, length = _hinge(sums, after, end, sums.offset[i])
+    usable = (length > 0.0) & (along > 0.0)
+    total += whole - np.where(usable, along**2 / np.where(usable, length, 1.0), 0.0)
+    # an end just before that of the peak is the same as one just after it
+    separate = (e > i + gap) & ((e < i + peak - 3) | (e > i + peak + 1))
+    return np.where(separate, total, np.inf)
+
+
+def _hinge(
+    sums: _Sums, low: _Ints, end: _Ints, offset: _Floats | float
+) -> tuple[_Floats, _Floats, _Floats]:
+    # Of torque from `low` on, about its mean: its squares, its products with the angle
+    # travelled since `end`, and the squares of that.
+    n = sums.offset.size
+    count, m, at = np.maximum(n - low, 1), n - end, sums.at[end]
+    before, after, angle = sums.torque, sums.later, sums.angle
+    later = after.one[n] - after.one[end]
+    squares = after.two[n] - after.two[end] + offset * (2.0 * later + offset * m)
+    squares = squares + before.two[end] - before.two[low]
+    later = later + offset * m
+    total = before.one[end] - before.one[low] + later
+    moved = angle.one[n] - angle.one[end]
+    h = moved - m * at  # Σ max(θ - θ_e, 0)
+    h2 = angle.two[n] - angle.two[end] - 2.0 * at * moved + m * at**2
+    cross = sums.later_angle[n] - sums.later_angle[end] + offset * moved - at * later
+    return squares - total**2 / count, cross - total * h / count, h2 - h**2 / count

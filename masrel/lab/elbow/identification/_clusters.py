@@ -12,6 +12,7 @@ Pustejovsky, J. E., Tipton, E. (2018). Journal of Business & Economic Statistics
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +25,11 @@ _RANK_TOLERANCE = 1e-10
 _BLOCK = 256  # rows of a block
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Rows:
+class Rows(NamedTuple):
     """The equations of one trial: design (n_rows, n_parameters), target (n_rows,)."""
 
-    design: _Floats = field(compare=False, repr=False)
-    target: _Floats = field(compare=False, repr=False)
+    design: _Floats
+    target: _Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,10 +64,10 @@ def triangle(table: _Floats) -> _Floats:
 
 
 def partial_out(table: _Floats, n_local: int) -> _Floats:
-    """Return rows of a table without what its first `n_own` columns explain.
+    """Return rows of a table without what its first `n_local` columns explain.
 
-    Shape (n_columns - n_determined, n_columns - n_own): all that least squares see of a
-    trial once its own parameters are eliminated.
+    Shape (n_columns - n_determined, n_columns - n_local): all that least squares see of
+    a trial once its own parameters are eliminated.
     """
     size = np.linalg.norm(table, axis=0)
     r = triangle(table)
@@ -86,12 +86,12 @@ def partial_out(table: _Floats, n_local: int) -> _Floats:
 def solve(trials: Sequence[Rows], *, n_local: int = 0) -> ClusteredFit:
     """Fit the shared parameters by least squares.
 
-    `n_own` counts the parameters that were taken out of all trials together.
+    `n_local` counts the parameters that were taken out of all trials together.
 
     A mean of three trials, one row each: s²/n with n - 1 degrees of freedom.
 
     >>> one = np.ones((1, 1))
-    >>> rows = [Rows(design=one, target=np.array([y])) for y in (1.0, 2.0, 6.0)]
+    >>> rows = [Rows(one, np.array([y])) for y in (1.0, 2.0, 6.0)]
     >>> fit = solve(rows)
     >>> [round(float(x), 12) for x in (fit.values[0], fit.df[0])]
     [3.0, 2.0]
@@ -99,43 +99,38 @@ def solve(trials: Sequence[Rows], *, n_local: int = 0) -> ClusteredFit:
     True
     """
     n_rows = sum(t.target.size for t in trials)
-    n_parameters = trials[0].design.shape[1]
-    trials = [_reduced(t) for t in trials]
-    gram = sum((t.design.T @ t.design for t in trials), np.zeros((n_parameters,) * 2))
+    x, y = _stacked(trials)
+    gram = np.einsum("gri,grj->ij", x, x)
     keep = _determined(gram)
-    values = np.full(n_parameters, np.nan)
-    covariance = np.full((n_parameters, n_parameters), np.nan)
-    df = np.full(n_parameters, np.nan)
-    used = [t.design[:, keep] for t in trials]
-    scale = np.sqrt(np.diag(gram)[keep])
+    values, df = np.full((2, keep.size), np.nan)
+    covariance = np.full((keep.size, keep.size), np.nan)
+    used, scale = x[..., keep], np.sqrt(np.diag(gram)[keep])
     scaled = gram[np.ix_(keep, keep)] / np.outer(scale, scale)
-    inverse = np.asarray(np.linalg.inv(scaled)) / np.outer(scale, scale)
-    moment = sum(
-        (d.T @ t.target for d, t in zip(used, trials, strict=True)),
-        np.zeros(int(keep.sum())),
-    )
-    values[keep] = inverse @ moment
-    errors = [t.target - d @ values[keep] for d, t in zip(used, trials, strict=True)]
+    inverse = np.linalg.inv(scaled) / np.outer(scale, scale)
+    values[keep] = inverse @ np.einsum("gri,gr->i", used, y)
+    errors = y - used @ values[keep]
     if len(trials) > 1:
-        block, degrees = _robust(used, errors, inverse)
-        covariance[np.ix_(keep, keep)], df[keep] = block, degrees
-    squares = sum(float(e @ e) for e in errors)
+        covariance[np.ix_(keep, keep)], df[keep] = _robust(used, errors, inverse)
     spare = n_rows - n_local - int(keep.sum())
+    squares = float((errors**2).sum())
     return ClusteredFit(
         values=values,
         covariance=covariance,
         df=df,
         residual_sd=math.sqrt(squares / spare) if spare > 0 else math.nan,
-        n_trials=_informed(trials, gram),
+        n_trials=((x**2).sum(axis=1) > 1e-9 * np.diag(gram)).sum(axis=0),
     )
 
 
-def _reduced(rows: Rows) -> Rows:
-    # as few equations that say the same
-    if rows.target.size <= rows.design.shape[1] + 1:
-        return rows
-    r = triangle(np.column_stack([rows.design, rows.target]))
-    return Rows(design=r[:, :-1], target=r[:, -1])
+def _stacked(trials: Sequence[Rows]) -> tuple[_Floats, _Floats]:
+    # designs (n_trials, n_rows, n_parameters) and targets (n_trials, n_rows) of as few
+    # rows that say the same, zeros where a trial has fewer
+    n = trials[0].design.shape[1] + 1
+    stacked = np.zeros((len(trials), n, n))
+    for place, trial in enumerate(trials):
+        r = triangle(np.column_stack([trial.design, trial.target]))
+        stacked[place, : r.shape[0]] = r
+    return stacked[..., :-1], stacked[..., -1]
 
 
 def _determined(gram: _Floats) -> NDArray[np.bool_]:
@@ -149,58 +144,52 @@ def _determined(gram: _Floats) -> NDArray[np.bool_]:
     return np.asarray(keep)
 
 
-def _informed(trials: Sequence[Rows], gram: _Floats) -> NDArray[np.int64]:
-    total = np.diag(gram)
-    share = np.array([(t.design**2).sum(axis=0) for t in trials])
-    return np.asarray((share > 1e-9 * total).sum(axis=0), dtype=np.int64)
+def _outside(x: _Floats, inverse: _Floats) -> tuple[_Floats, _Floats, _Floats]:
+    # I - H of every trial, (n_trials, n_rows, n_rows), its eigenvalues and -vectors
+    matrix = np.eye(x.shape[1]) - x @ inverse @ x.transpose(0, 2, 1)
+    sizes, directions = np.linalg.eigh(0.5 * (matrix + matrix.transpose(0, 2, 1)))
+    return matrix, sizes, directions
 
 
-def _robust(
-    designs: Sequence[_Floats], errors: Sequence[_Floats], inverse: _Floats
-) -> tuple[_Floats, _Floats]:
-    # CR2: V = M (Σ X'A e e' A X) M with M = (X'X)⁻¹ and A = (I - H_gg)^(-1/2)
-    adjusted = [_adjustment(x, inverse) for x in designs]  # X'(I - XMX')^(-1/2)
-    scores = np.array([a @ e for a, e in zip(adjusted, errors, strict=True)])
-    covariance = inverse @ (scores.T @ scores) @ inverse
-    df = np.empty(inverse.shape[0])
-    for place in range(inverse.shape[0]):
-        # V = Σ (w_g'e)²; under e ~ N(0, I) its moments are those of G = W'(I - H)W,
-        # matched to a χ² of (tr G)²/tr(G²) degrees
-        weights = [a.T @ inverse[:, place] for a in adjusted]
-        sides = np.array([x.T @ w for x, w in zip(designs, weights, strict=True)])
-        matrix = np.diag([float(w @ w) for w in weights])
-        matrix = matrix - sides @ inverse @ sides.T
-        squares = float((matrix**2).sum())
-        # as many trials as parameters fit exactly: nothing is left to differ
-        df[place] = np.trace(matrix) ** 2 / squares if squares else math.nan
-    return covariance, df
-
-
-def _adjustment(design: _Floats, inverse: _Floats) -> _Floats:
-    inside = np.eye(design.shape[0]) - design @ inverse @ design.T
-    sizes, directions = np.linalg.eigh(0.5 * (inside + inside.T))
-    # A trial that alone determines a direction has no error along it: generalized
-    # inverse, as Pustejovsky and Tipton have it.
+def _robust(x: _Floats, errors: _Floats, inverse: _Floats) -> tuple[_Floats, _Floats]:
+    # CR2: V = M (Σ X'A e e' A X) M with M = (X'X)⁻¹ and A = (I - H_gg)^(-1/2). A trial
+    # that alone determines a direction has no error along it: generalized inverse, as
+    # Pustejovsky and Tipton have it.
+    _, sizes, directions = _outside(x, inverse)
     safe = sizes > 1e-10
     roots = np.where(safe, 1.0 / np.sqrt(np.where(safe, sizes, 1.0)), 0.0)
-    return np.asarray(design.T @ (directions * roots) @ directions.T)
+    # A X M: (n_trials, n_rows, n_parameters)
+    weights = (
+        (directions * roots[:, None]) @ directions.transpose(0, 2, 1) @ x @ inverse
+    )
+    scores = np.einsum("gri,gr->gi", weights, errors)
+    # V = Σ (w_g'e)²; under e ~ N(0, I) its moments are those of G = W'(I - H)W, matched
+    # to a χ² of (tr G)²/tr(G²) degrees
+    sides = np.einsum("gri,grk->kgi", x, weights)
+    matrices = -sides @ inverse @ sides.transpose(0, 2, 1)  # (n_parameters, n, n)
+    trial = np.arange(len(x))
+    matrices[:, trial, trial] += (weights**2).sum(axis=1).T
+    squares = (matrices**2).sum(axis=(1, 2))
+    traces = np.trace(matrices, axis1=1, axis2=2)
+    # as many trials as parameters fit exactly: nothing is left to differ
+    known = squares > 0.0
+    df = np.where(known, traces**2 / np.where(known, squares, 1.0), np.nan)
+    return scores.T @ scores, df
 
 
-def left_out_steps(trials: Sequence[Rows]) -> list[_Floats]:
+def left_out_steps(trials: Sequence[Rows]) -> _Floats:
     """Return per trial what its rows move the fit by, were they left out.
 
     The fit of all trials is at 0: -(X'X)⁻¹X_g'(I - H_gg)⁻¹e_g; ``nan`` of a trial that
     alone determines something.
     """
-    n_parameters = trials[0].design.shape[1]
-    gram = sum((t.design.T @ t.design for t in trials), np.zeros((n_parameters,) * 2))
-    inverse = np.linalg.pinv(gram, rcond=1e-13, hermitian=True)
-    steps = []
-    for rows in trials:
-        inside = np.eye(rows.target.size) - rows.design @ inverse @ rows.design.T
-        step = np.full(n_parameters, np.nan)
-        if np.linalg.eigvalsh(0.5 * (inside + inside.T)).min() > 1e-10:
-            errors = np.linalg.solve(inside, rows.target)
-            step = -(inverse @ (rows.design.T @ errors))
-        steps.append(step)
+    x, y = _stacked(trials)
+    inverse = np.linalg.pinv(
+        np.einsum("gri,grj->ij", x, x), rcond=1e-13, hermitian=True
+    )
+    matrix, sizes, _ = _outside(x, inverse)
+    told = sizes.min(axis=1) > 1e-10
+    steps = np.full((len(trials), x.shape[2]), np.nan)
+    errors = np.linalg.solve(matrix[told], y[told][..., None])[..., 0]
+    steps[told] = -np.einsum("gri,gr->gi", x[told], errors) @ inverse
     return steps

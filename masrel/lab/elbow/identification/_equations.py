@@ -1,160 +1,223 @@
-"""What one trial says of the parameters: residuals and their derivatives.
+"""The last fit: every parameter from every trial together, nonlinear least squares.
+
+Trials differ: each has a constant torque of its own, -k·θ_rest, and each catch a peak,
+a residual and a travel of its own. What the joint has in common is what the torque of
+all trials shares (b, k, m, k_post), and what their catches scatter about: the line of
+catch angles (L, α), peaks in proportion to speed (H), residuals in proportion to peaks
+(Q), and travels (D).
 
 Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
 https://doi.org/10.1109/TNSRE.2012.2195330, equations (1)-(6).
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 from scipy.signal import lfilter
+from scipy.special import erfcx, log_ndtr
 
-from masrel.lab.elbow.identification._catches import Arm, Catch, Trial
-from masrel.lab.elbow.identification._clusters import Rows, partial_out, triangle
+from masrel.lab.elbow.identification._catches import Catch, Law, Trial
+from masrel.lab.elbow.identification._clusters import (
+    ClusteredFit,
+    Rows,
+    left_out_steps,
+    partial_out,
+    solve,
+    triangle,
+)
 from masrel.lab.elbow.identification._stretches import Part
-from masrel.lab.elbow.identification._travels import DetectionLimit, beyond
 from masrel.lab.elbow.parameters import ElbowParameters
 
 _Floats = NDArray[np.float64]
-Row = tuple[float, dict[str, float]]  # a residual over its sd, and its derivatives
+_Bools = NDArray[np.bool_]
 
-_LINEAR = ("damping", "stiffness", "inertia", "gravity", "arm_inertia", "drift", "peak")
-_CURVED = ("lag", "catch_rise", "shift")  # differentiated numerically
-_STEP = 1e-4  # of that, s
+# What a trial's torque is linear in, in the order of the design matrix's columns, and
+# what it is differentiated by numerically, in steps of so many seconds.
+LINEAR = (
+    "damping",
+    "stiffness",
+    "inertia",
+    "gravity",
+    "arm_inertia",
+    "drift",
+    "offset",
+    "peak",
+    "residual",
+)
+_CURVED, _STEP = ("lag", "catch_rise", "shift"), 1e-4
+
+_SCATTERED = (
+    "catch_angle_constant",
+    "catch_slope",
+    "catch_torque_constant",
+    "residual_ratio",
+    "catch_travel",
+    "peak",
+    "residual",
+)
+
+_EVALUATIONS = 60
+# Relative fall of the sum of squares that ends the search; with derivatives that are
+# differences, or of more rounds to come, less is enough. And relative size of a step:
+# where a climb begins at a sample, nothing is more precise.
+_PRECISE, _TIMED, _KINK = 1e-10, 1e-7, 1e-7
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Spreads:
-    """What a residual of each kind is divided by: N·m, N·m, N·m, rad, rad."""
+class DetectionLimit(NamedTuple):
+    """The travel up to which the end of one catch would have been seen."""
 
-    torque: float
-    peak: float
-    residual: float
-    catch_angle: float
-    travel: float
+    travel: float  # an end here would be seen as often as not, rad
+    sd: float  # of where noise lets the search see one last, rad
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Known:
     """What the equations of a trial do not change.
 
-    `names` are the shared parameters in the order of their vector; `offset` the fixed
-    constant torque above -k·θ_rest (None if each trial has its own); `drifts` says
-    whether a trial's offset may drift; `on_line` whether its catch is on the line of
-    (2); `limit` behind which its catch ends, if it does not end before.
+    `names` are the shared parameters in the order of their vector; `spreads` what a
+    residual is divided by ("torque", "peak", "residual", N·m; "catch angle", "travel",
+    rad); `offset` the fixed constant torque above -k·θ_rest (None if each trial has its
+    own); `drifts` says whether a trial's offset may drift; `on_line` whether its catch
+    is on the line of (2); `limit` behind which its catch ends, if it does not end
+    before.
     """
 
     names: tuple[str, ...]
     constants: ElbowParameters
-    spreads: Spreads
-    arm: Arm
+    spreads: Mapping[str, float]
+    law: Law
     offset: float | None = None
     drifts: bool = False
     on_line: bool = False
     limit: DetectionLimit | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class _Columns:
-    # What multiplies each parameter, shape (n_samples,), and the climbing angle
-    linear: dict[str, _Floats]
-    held: _Floats  # 1 where the residual torque acts, through the sensor
-    past: _Floats  # angle since the catch, -inf where nothing climbs
-    over: NDArray[np.bool_] | None = field(default=None)  # after a fixed end
+class Row(NamedTuple):
+    """A residual over its spread that is not of a sample, and its derivatives."""
+
+    name: str
+    left: float
+    slopes: Mapping[str, float]
+
+
+class _Design(NamedTuple):
+    # the matrix (n_samples, n_linear), what was measured, the angle since the catch,
+    # and where torque may climb with it
+    matrix: _Floats
+    torque: _Floats
+    past: _Floats
+    climbs: _Bools
 
 
 class Equations:
     """Residuals of one trial as a function of shared parameters and its own.
 
-    Its own (`own`) are the constant torque and its drift, and of a catch the peak and
+    Its own (`local`) are the constant torque and its drift, and of a catch the peak and
     residual torque above the end of pre-catch (N·m), the angle travelled (rad), and how
     much later than `catch.time` it was (s), as far as the trial has them.
     """
 
     def __init__(self, trial: Trial, known: Known) -> None:
         self.trial, self.known = trial, known
-        pre = trial.pre_catch
         self.catch = trial.catch if trial.after is not None else None
-        self.n_pre = pre.torque.size
-        parts = [pre] if trial.after is None else [pre, trial.after]
-        self.torque = np.concatenate([part.torque for part in parts])
-        self.measured = np.concatenate([part.measured for part in parts])
-        self.time = np.concatenate([part.time for part in parts])
-        self._middle = float(self.time.mean()) if self.time.size else 0.0
-        self._curved = known.arm.takes_time
+        self.n_pre = trial.pre_catch.time.size
+        self.part = trial.pre_catch
+        if trial.after is not None:
+            self.part = trial.pre_catch.then(trial.after)
+        law, constants = known.law, known.constants
+        self.end = math.inf  # of the catch, s
+        if self.catch is not None and self.catch.end is not None:
+            self.end = self.catch.end
+        # an end whose torque steps stays where it was found; others move with D
+        steps = constants.post_catch == "additive"
+        steps |= self.catch is not None and self.catch.within_peak
+        self.fixed_end = steps and math.isfinite(self.end)
+        self.peak_end = math.inf
+        if self.catch is not None:
+            stop = self.end if self.fixed_end else math.inf
+            self.peak_end = min(self.catch.time + constants.peak_duration, stop)
         self.local = self._local_names()
-        self._static = None if self._curved else self._columns({}, {})
-        self._compact = self._compressed() if self._static else None
+        later = self.part.time[self.n_pre :]
+        self._period = float(np.median(np.diff(later))) if later.size > 1 else 0.0
+        self._whole = self._design(law.lag, law.catch_rise, 0.0)
+        self._compact = self._whole
+        if not law.takes_time:
+            # Where nothing climbs, all is linear: QR leaves a row for each column.
+            matrix, torque, past, climbs = self._whole
+            table = np.column_stack([matrix, torque])
+            rows = np.concatenate([triangle(table[~climbs]), table[climbs]])
+            n_flat = rows.shape[0] - int(climbs.sum())
+            self._compact = _Design(
+                rows[:, :-1],
+                rows[:, -1],
+                np.append(np.zeros(n_flat), past[climbs]),
+                np.arange(rows.shape[0]) >= n_flat,
+            )
 
     def _local_names(self) -> tuple[str, ...]:
-        names = ["offset"] if self.known.offset is None else []
-        names += ["drift"] if self.known.drifts else []
+        later = self.part.time[self.n_pre :] >= self.peak_end
+        has_peak = self.catch is not None and not later.all()
+        has = {
+            "offset": self.known.offset is None,
+            "drift": self.known.drifts,
+            "peak": has_peak,
+            "residual": self.catch is not None and bool(later.any()),
+            "travel": math.isfinite(self.end)
+            and not self.fixed_end
+            and "catch_travel" in self.known.names,
+            "shift": self.known.law.takes_time and has_peak,
+        }
+        return tuple(name for name, is_there in has.items() if is_there)
+
+    def values(self, shared: _Floats, local: _Floats) -> dict[str, float]:
+        """Return all parameters by name, those of the arm that are held among them."""
+        law, offset = self.known.law, self.known.offset
+        held = {
+            name: getattr(law, name) for name in ("gravity", "arm_inertia", "drift")
+        }
+        held |= {"lag": law.lag, "catch_rise": law.catch_rise, "offset": offset or 0.0}
+        now = zip(self.known.names, shared.tolist(), strict=True)
+        return {
+            **held,
+            **dict(now),
+            **dict(zip(self.local, local.tolist(), strict=True)),
+        }
+
+    def _design(self, lag: float, rise: float, shift: float) -> _Design:
+        part, n = self.part, self.part.time.size
+        columns = self._smooth(self.trial.pre_catch, lag)
+        past, climbs = np.zeros(n), np.zeros(n, dtype=np.bool_)
         catch, after = self.catch, self.trial.after
-        if catch is None or after is None:
-            return tuple(names)
-        in_peak = self._in_peak(after, catch)
-        names += ["peak"] if in_peak.any() else []
-        names += ["residual"] if not in_peak.all() else []
-        moves = catch.end is not None and not self._fixed_end(catch)
-        names += ["travel"] if moves and "catch_travel" in self.known.names else []
-        names += ["shift"] if self._curved and in_peak.any() else []
-        return tuple(names)
+        steps = np.zeros((n, 2))
+        if catch is not None and after is not None:
+            later, up, down = self._from_catch(after, catch, (lag, rise, shift))
+            columns = np.concatenate([columns, later])
+            steps[self.n_pre :] = np.column_stack([up - down, down])
+            past = part.angle - (catch.angle + catch.speed * shift)
+            if math.isfinite(self.end):
+                begin = self.end if self.fixed_end else self.peak_end + shift
+                climbs = part.time >= begin
+                climbs[: self.n_pre] = False
+        # a drift is that of the trial's own constant, in its middle, or of a known one
+        middle = float(part.time.mean()) if n and self.known.offset is None else 0.0
+        own = np.column_stack([part.time - middle, np.ones(n), steps])
+        return _Design(np.column_stack([columns, own]), part.torque, past, climbs)
 
-    def _fixed_end(self, catch: Catch) -> bool:
-        additive = self.known.constants.post_catch == "additive"
-        return catch.end is not None and (catch.within_peak or additive)
-
-    def _peak_end(self, catch: Catch) -> float:
-        end = (
-            catch.end if catch.end is not None and self._fixed_end(catch) else math.inf
-        )
-        return min(catch.time + self.known.constants.peak_duration, end)
-
-    def _in_peak(self, after: Part, catch: Catch) -> NDArray[np.bool_]:
-        return np.asarray(after.time < self._peak_end(catch))
-
-    def _columns(
-        self, now: Mapping[str, float], local: Mapping[str, float]
-    ) -> _Columns:
-        arm = self.known.arm
-        lag = now.get("lag", arm.lag)
-        rise = now.get("catch_rise", arm.catch_rise)
-        before = self._before(self.trial.pre_catch, lag)
-        catch, after = self.catch, self.trial.after
-        zero = np.zeros(self.n_pre)
-        if catch is None or after is None:
-            return _Columns(before | {"peak": zero}, zero, zero - math.inf)
-        later, held, past = self._from_catch(
-            after, catch, lag, rise, local.get("shift", 0.0)
-        )
-        linear = {name: np.concatenate([before[name], later[name]]) for name in before}
-        linear["peak"] = np.concatenate([zero, later["peak"]])
-        over = None
-        if self._fixed_end(catch):
-            over = np.concatenate([zero > 0.0, after.time >= (catch.end or math.inf)])
-        return _Columns(
-            linear,
-            np.concatenate([zero, held]),
-            np.concatenate([zero - math.inf, past]),
-            over,
-        )
-
-    def _before(self, part: Part, lag: float) -> dict[str, _Floats]:
+    def _smooth(self, part: Part, lag: float) -> _Floats:
         # a sensor that lags by T reads x - T·x' + T²·x'' of what is smooth
         angle = part.angle - lag * (part.velocity - lag * part.acceleration)
         velocity = part.velocity - lag * (part.acceleration - lag * part.jerk)
         acceleration = part.acceleration - lag * part.jerk
-        return {
-            "damping": velocity,
-            "stiffness": angle - self._rest(),
-            "inertia": acceleration,
-            "gravity": np.sin(angle - self.known.arm.gravity_angle),
-            "arm_inertia": acceleration,
-            "drift": part.time - self._middle,
-        }
+        weight = np.sin(angle - self.known.law.gravity_angle)
+        stretched = angle - self._rest()
+        return np.column_stack(
+            [velocity, stretched, acceleration, weight, acceleration]
+        )
 
     def _rest(self) -> float:
         # without an offset of its own, the torque of a trial is 0 at its rest angle
@@ -164,75 +227,47 @@ class Equations:
         return self.trial.rest_angle if rest is None else rest
 
     def _from_catch(
-        self, part: Part, catch: Catch, lag: float, rise: float, shift: float
-    ) -> tuple[dict[str, _Floats], _Floats, _Floats]:
+        self, part: Part, catch: Catch, timed: tuple[float, float, float]
+    ) -> tuple[_Floats, _Floats, _Floats]:
+        # what _smooth returns, of samples from the catch on, and the two steps of (3)
+        lag, rise, shift = timed
         since = part.time - (catch.time + shift)
         fading = np.exp(-np.maximum(since, 0.0) / lag) if lag > 0.0 else 0.0 * since
         speed = catch.speed + catch.acceleration * shift
         angle = catch.angle + catch.speed * shift
         # τ_pre_end of (3) is held; the sensor comes from what it was before
-        held = {
-            "damping": speed - lag * catch.acceleration * fading,
-            "stiffness": angle - self._rest() - lag * speed * fading,
-            "inertia": np.full(part.time.size, catch.acceleration),
-        }
-        seen = part.angle - lag * part.velocity
-        if self.known.constants.post_catch == "additive" and catch.end is not None:
-            law = self._before(part, lag)
-            over = part.time >= catch.end
-            held = {name: np.where(over, law[name], held[name]) for name in held}
-        elif catch.end is not None:  # m·θ̈ of (5)
-            held["inertia"] += np.where(part.time >= catch.end, part.acceleration, 0.0)
-        last = self._peak_end(catch) - catch.time
-        risen = _risen(since, rise)
-        risen = _slow(risen, part.time, lag) if rise > 0.0 else _step(since, lag)
-        fallen = _step(since - last, lag)
-        held |= {
-            "gravity": np.sin(seen - self.known.arm.gravity_angle),
-            # the hand slows at once, and the sensor comes from what it was before
-            "arm_inertia": _slow(part.acceleration, part.time, lag)
-            + catch.acceleration * fading,
-            "drift": part.time - self._middle,
-            "peak": risen - fallen,
-        }
-        climbs = since >= last
-        if self._fixed_end(catch):
-            climbs = part.time >= (catch.end or math.inf)
-        past = np.where(climbs, part.angle - angle, -math.inf)
-        return held, fallen, past
-
-    def _compressed(self) -> tuple[_Columns, _Floats]:
-        # Where nothing climbs, everything is linear: QR leaves a row for each column.
-        columns = self._static or self._columns({}, {})
-        flat = columns.held == 0.0
-        names = list(columns.linear)
-        table = np.column_stack(
-            [*columns.linear.values(), np.ones(self.torque.size), self.torque]
+        held = np.column_stack(
+            [
+                speed - lag * catch.acceleration * fading,
+                angle - self._rest() - lag * speed * fading,
+                np.full(part.time.size, catch.acceleration),
+            ]
         )
-        first = triangle(table[flat])
-        whole = np.concatenate([first, table[~flat]])
-        pad = np.zeros(first.shape[0])
-        over = columns.over
-        compact = _Columns(
-            {name: whole[:, i] for i, name in enumerate([*names, "offset"])},
-            np.concatenate([pad, columns.held[~flat]]),
-            np.concatenate([pad - math.inf, columns.past[~flat]]),
-            None if over is None else np.concatenate([pad > 0.0, over[~flat]]),
+        over = (part.time >= self.end)[:, None]
+        if self.known.constants.post_catch == "additive":
+            held = np.where(over, self._smooth(part, lag)[:, :3], held)
+        else:  # m·θ̈ of (5)
+            held[:, 2:] += np.where(over, part.acceleration[:, None], 0.0)
+        weight = np.sin(part.angle - lag * part.velocity - self.known.law.gravity_angle)
+        # the hand slows at once, and the sensor comes from what it was before
+        pushed = (
+            _slow(part.acceleration, self._period, lag) + catch.acceleration * fading
         )
-        return compact, whole[:, -1]
+        up = _step(since, lag)
+        if rise > 0.0:  # 3x² - 2x³
+            x = np.clip(since / rise, 0.0, 1.0)
+            up = _slow(x * x * (3.0 - 2.0 * x), self._period, lag)
+        down = _step(since - (self.peak_end - catch.time), lag)
+        return np.column_stack([held, weight, pushed]), up, down
 
     def start(self, shared: Mapping[str, float]) -> _Floats:
         """Return where to begin with the trial's own: (3), and what was seen."""
-        catch = self.catch
         values = dict.fromkeys(self.local, 0.0)
-        if catch is not None:
-            peak = shared["catch_torque_constant"] * catch.speed
+        if self.catch is not None:
+            peak = shared["catch_torque_constant"] * self.catch.speed
             residual = peak * shared["residual_ratio"]
-            values |= {
-                "peak": peak if math.isfinite(peak) else 0.0,
-                "residual": residual if math.isfinite(residual) else 0.0,
-                "travel": catch.travel,
-            }
+            own = {"peak": peak, "residual": residual, "travel": self.catch.travel}
+            values |= {name: x if math.isfinite(x) else 0.0 for name, x in own.items()}
         return np.array([values[name] for name in self.local])
 
     def table(self, shared: _Floats, local: _Floats, *, whole: bool = False) -> _Floats:
@@ -240,114 +275,97 @@ class Equations:
 
         Of all samples if `whole`, else of what least squares see of them.
         """
-        now = dict(zip(self.known.names, shared.tolist(), strict=True))
-        mine = dict(zip(self.local, local.tolist(), strict=True))
-        by_name, law, torque = self._torque_rows(now, mine, whole)
-        rows = self.catch_rows(now, mine).values()
+        values = self.values(shared, local)
+        design = self._whole if whole else self._compact
+        if self.known.law.takes_time:
+            design = self.design(values)
+        law, climb, slope = self._evaluate(design, values)
+        by_name = dict(zip(LINEAR, design.matrix.T, strict=True))
+        by_name |= {"post_catch_stiffness": climb, "travel": slope}
+        names = (*self.local, *self.known.names)
+        for name in set(_CURVED) & set(names):
+            laws = [
+                self.law({**values, name: values[name] + step})
+                for step in (_STEP, -_STEP)
+            ]
+            by_name[name] = (laws[0] - laws[1]) / (2.0 * _STEP)
+        rows, sd = self.catch_rows(values), self.known.spreads["torque"]
         zeros = np.zeros(law.size)
-        sd = self.known.spreads.torque
         columns = [
             np.append(
                 by_name.get(name, zeros) / sd,
-                [slopes.get(name, 0.0) for _, slopes in rows],
+                [row.slopes.get(name, 0.0) for row in rows],
             )
-            for name in (*self.local, *self.known.names)
+            for name in names
         ]
-        left = np.append((law - torque) / sd, [value for value, _ in rows])
+        left = np.append((law - design.torque) / sd, [row.left for row in rows])
         return np.column_stack([*columns, left])
 
-    def _torque_rows(
-        self, now: Mapping[str, float], mine: Mapping[str, float], whole: bool
-    ) -> tuple[dict[str, _Floats], _Floats, _Floats]:
-        # derivatives of the torque by each parameter, the law, and what was measured
-        torque, ones = self.torque, np.ones(self.torque.size)
-        if self._compact is not None and not whole:
-            columns, torque = self._compact
-            ones = columns.linear["offset"]
-        else:
-            columns = self._static or self._columns(now, mine)
-        by_name, law = self._evaluate(columns, ones, now, mine)
-        for name in (n for n in _CURVED if n in now or n in mine):
-            laws = []
-            for step in (_STEP, -_STEP):
-                near, local = {**now}, {**mine}
-                (near if name in near else local)[name] += step
-                laws.append(
-                    self._evaluate(self._columns(near, local), ones, near, local)[1]
-                )
-            by_name[name] = (laws[0] - laws[1]) / (2.0 * _STEP)
-        return by_name, law, torque
+    def law(self, values: Mapping[str, float]) -> _Floats:
+        """Return the torque of the law at the trial's samples, N·m."""
+        return self._evaluate(self.design(values), values)[0]
+
+    def design(self, values: Mapping[str, float]) -> _Design:
+        timed = values["lag"], values["catch_rise"], values.get("shift", 0.0)
+        if timed == (self.known.law.lag, self.known.law.catch_rise, 0.0):
+            return self._whole
+        return self._design(*timed)
 
     def _evaluate(
-        self,
-        columns: _Columns,
-        ones: _Floats,
-        now: Mapping[str, float],
-        mine: Mapping[str, float],
-    ) -> tuple[dict[str, _Floats], _Floats]:
-        arm = self.known.arm
-        fixed = {
-            name: getattr(arm, name) for name in ("gravity", "arm_inertia", "drift")
-        }
-        values = {**fixed, **now, **mine}
-        by_name = {name: columns.linear[name] for name in _LINEAR} | {"offset": ones}
-        offset = self.known.offset
-        law = ones * (mine.get("offset", 0.0) if offset is None else offset)
-        for name in _LINEAR:
-            if values.get(name, 0.0) != 0.0:
-                law = law + values[name] * by_name[name]
-        if "residual" in mine:
-            catch = self.catch
-            k_post = now.get("post_catch_stiffness", 0.0)
-            past = np.zeros_like(law)
-            over = past > 0.0
-            if catch is not None and catch.end is not None:
-                past = columns.past - mine.get("travel", catch.travel)
-                over = past > 0.0 if columns.over is None else columns.over
-            climb, slope = np.where(over, past, 0.0), np.where(over, -k_post, 0.0)
-            lag = now.get("lag", arm.lag)
-            if lag > 0.0:
+        self, design: _Design, values: Mapping[str, float]
+    ) -> tuple[_Floats, _Floats, _Floats]:
+        # the law, what k_post multiplies in it, and its derivative by the travel
+        stiffness = values.get("post_catch_stiffness", 0.0)
+        climb = np.zeros(design.torque.size)
+        slope = climb
+        if self.catch is not None:
+            past = design.past - values.get("travel", self.catch.travel)
+            over = design.climbs & (self.fixed_end | (past > 0.0))
+            climb, slope = np.where(over, past, 0.0), np.where(over, -stiffness, 0.0)
+            if (lag := values["lag"]) > 0.0:
                 later = slice(self.n_pre, None)
-                climb[later] = _slow(climb[later], self.time[later], lag)
-                slope[later] = _slow(slope[later], self.time[later], lag)
-            by_name |= {"residual": columns.held, "post_catch_stiffness": climb}
-            by_name["travel"] = slope
-            law = law + mine["residual"] * columns.held + k_post * climb
-        return by_name, law
+                climb[later] = _slow(climb[later], self._period, lag)
+                slope[later] = _slow(slope[later], self._period, lag)
+        linear = np.array([values.get(name, 0.0) for name in LINEAR])
+        return design.matrix @ linear + stiffness * climb, climb, slope
 
-    def catch_rows(
-        self, now: Mapping[str, float], mine: Mapping[str, float]
-    ) -> dict[str, Row]:
+    def catch_rows(self, values: Mapping[str, float]) -> list[Row]:
         """Return how far the trial's own values are from what they scatter about."""
-        rows, used, size = {}, self.catch, self.known.spreads
-        if self.known.on_line and self.trial.catch and "catch_slope" in now:
-            rows["catch angle"] = _line(self.known, self.trial.catch, now)
-        if used is None:
-            return rows
-        if "peak" in mine and "catch_torque_constant" in now:
-            left = now["catch_torque_constant"] * used.speed - mine["peak"]  # (3)
+        rows, used, size = [], self.catch, self.known.spreads
+        line, slope, height, ratio, mean, peak, residual = (
+            values.get(name, math.nan) for name in _SCATTERED
+        )
+        if self.known.on_line and self.trial.catch is not None:
+            slowest = self.known.constants.slowest_mean_speed
+            left, by_line, by_slope = line_row(self.trial.catch, line, slope, slowest)
+            slopes = {"catch_angle_constant": by_line, "catch_slope": by_slope}
+            rows.append(Row("catch angle", left, slopes))  # (2)
+        if used is not None:
             slopes = {"catch_torque_constant": used.speed, "peak": -1.0}
-            rows["peak"] = _scaled(left, slopes, size.peak)
-        if "residual" in mine and "peak" in mine and "residual_ratio" in now:
-            ratio, peak = now["residual_ratio"], mine["peak"]
-            left = ratio * peak - mine["residual"]  # (3)
+            rows.append(Row("peak", height * used.speed - peak, slopes))  # (3)
             slopes = {"residual_ratio": peak, "peak": ratio, "residual": -1.0}
-            rows["residual"] = _scaled(left, slopes, size.residual)
-        if "catch_travel" in now and used.end is not None:
-            left = now["catch_travel"] - mine.get("travel", used.travel)  # (4)
-            slopes = {"catch_travel": 1.0, "travel": -1.0}
-            rows["travel"] = _scaled(left, slopes, size.travel)
-        elif "catch_travel" in now and self.known.limit is not None:
-            left, slope, _ = beyond(now["catch_travel"], self.known.limit, size.travel)
-            rows["limit"] = left, {"catch_travel": slope}
+            rows.append(Row("residual", ratio * peak - residual, slopes))  # (3)
+            if used.end is not None:
+                left = mean - values.get("travel", used.travel)  # (4)
+                rows.append(Row("travel", left, {"catch_travel": 1.0, "travel": -1.0}))
+        # what is not fitted is nan, and says nothing
+        rows = [
+            Row(name, left / size[name], {n: x / size[name] for n, x in slopes.items()})
+            for name, left, slopes in rows
+            if not math.isnan(left)
+        ]
+        limit = self.known.limit
+        if used is not None and limit is not None and not math.isnan(mean):
+            left, by_mean, _ = beyond(mean, limit, size["travel"])
+            rows.append(Row("limit", left, {"catch_travel": by_mean}))
         return rows
 
     def rows(self, shared: _Floats, table: _Floats) -> Rows:
         """Return what a whole table says of the shared parameters, linearly."""
         names, limit = self.known.names, self.known.limit
-        if limit is not None and "catch_travel" in names:
+        if self.catch is not None and limit is not None and "catch_travel" in names:
             place = names.index("catch_travel")
-            scale = self.known.spreads.travel
+            scale = self.known.spreads["travel"]
             _, slope, root = beyond(float(shared[place]), limit, scale)
             # the last row: as steep as the likelihood is curved, and of equal score
             if slope != 0.0:
@@ -355,45 +373,23 @@ class Equations:
                 table[-1, -1] *= slope / -root
                 table[-1, :-1] *= -root / slope
         rest = partial_out(table, len(self.local))
-        return Rows(design=rest[:, :-1], target=-rest[:, -1])
-
-    def law_at(self, now: Mapping[str, float], mine: Mapping[str, float]) -> _Floats:
-        """Return the law at other values than those it was fitted with, N·m."""
-        ones = np.ones(self.torque.size)
-        return self._evaluate(self._columns(now, mine), ones, now, mine)[1]
-
-    def law(self, shared: _Floats, local: _Floats) -> _Floats:
-        """Return the torque of the law at the trial's samples, N·m."""
-        now = dict(zip(self.known.names, shared.tolist(), strict=True))
-        return self.law_at(now, dict(zip(self.local, local.tolist(), strict=True)))
-
-
-def _risen(since: _Floats, rise: float) -> _Floats:
-    # 3x² - 2x³ up to the rise, a step without one
-    if rise <= 0.0:
-        return np.where(since >= 0.0, 1.0, 0.0)
-    x = np.clip(since / rise, 0.0, 1.0)
-    return np.asarray(x * x * (3.0 - 2.0 * x))
+        return Rows(rest[:, :-1], -rest[:, -1])
 
 
 def _step(since: _Floats, lag: float) -> _Floats:
     # a step as a sensor of first order reads it
     if lag <= 0.0:
-        return _risen(since, 0.0)
+        return np.where(since >= 0.0, 1.0, 0.0)
     return np.where(since > 0.0, -np.expm1(-np.maximum(since, 0.0) / lag), 0.0)
 
 
-def _slow(values: _Floats, time: _Floats, lag: float) -> _Floats:
+def _slow(values: _Floats, period: float, lag: float) -> _Floats:
     # what is 0 at first as that sensor reads it
     if lag <= 0.0 or values.size < 2:
         return values
-    keep = math.exp(-float(np.median(np.diff(time))) / lag)
+    keep = math.exp(-period / lag)
     half = 0.5 * (1.0 - keep)
     return np.asarray(lfilter([half, half], [1.0, -keep], values))
-
-
-def _scaled(left: float, slopes: dict[str, float], size: float) -> Row:
-    return left / size, {name: value / size for name, value in slopes.items()}
 
 
 def line_row(
@@ -419,9 +415,155 @@ def line_row(
     return left, 1.0 / scale, -(speed + left * gain) / scale
 
 
-def _line(known: Known, catch: Catch, now: Mapping[str, float]) -> Row:
-    slowest, size = known.constants.slowest_mean_speed, known.spreads.catch_angle
-    line, slope = now["catch_angle_constant"], now["catch_slope"]
-    left, by_line, by_slope = line_row(catch, line, slope, slowest)  # (2)
-    slopes = {"catch_angle_constant": by_line, "catch_slope": by_slope}
-    return _scaled(left, slopes, size)
+def beyond(mean: float, limit: DetectionLimit, sd: float) -> tuple[float, float, float]:
+    """Residual whose square is -2 ln of the chance to lie beyond a limit."""
+    size = math.hypot(sd, limit.sd)
+    z = (mean - limit.travel) / size
+    left = math.sqrt(-2.0 * float(log_ndtr(z)))
+    ratio = float(mills(np.array(z)))
+    if left == 0.0:  # so far beyond that a float64 knows of no chance to lie before
+        return 0.0, 0.0, 0.0
+    return left, -ratio / (size * left), math.sqrt(ratio * (z + ratio)) / size
+
+
+def mills(z: _Floats) -> _Floats:
+    """Evaluate φ/Φ of the standard normal distribution."""
+    return np.asarray(math.sqrt(2.0 / math.pi) / erfcx(-z / math.sqrt(2.0)))
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """Where the sum of squares is smallest: shared parameters, and each trial's own."""
+
+    shared: _Floats
+    local: list[_Floats]
+    typical: float  # median over catches of the mean square that is left, (N·m)²
+    n_evaluations: int
+
+    def values(self, equations: Sequence[Equations]) -> list[dict[str, float]]:
+        """Return every trial's parameters by name."""
+        pairs = zip(equations, self.local, strict=True)
+        return [e.values(self.shared, local) for e, local in pairs]
+
+
+def fit_together(
+    equations: Sequence[Equations],
+    start: Mapping[str, float],
+    floors: Mapping[str, float],
+) -> Solution:
+    """Fit every parameter to every trial at once.
+
+    Instants of catches stay where the change points are, unless the torque takes time:
+    the law is not differentiable in them. Everything else is. No parameter falls
+    below its floor.
+    """
+    names = equations[0].known.names
+    n = len(names)
+    lowest = np.array([floors.get(name, -math.inf) for name in names])
+    first = np.maximum([start[name] for name in names], lowest)
+    begin = np.concatenate([first, *(e.start(start) for e in equations)])
+    cuts = np.cumsum([n, *(len(e.local) for e in equations)])
+    jacobian = np.zeros((0, begin.size))
+
+    def residuals(x: _Floats) -> _Floats:
+        # Of each trial, R of the QR of [Jacobian | residuals]: the same sum of squares
+        # and gradient in as many rows as columns.
+        nonlocal jacobian
+        local = np.split(x[n:], cuts[:-1] - n)[1:]
+        tables = [
+            triangle(e.table(x[:n], own))
+            for e, own in zip(equations, local, strict=True)
+        ]
+        jacobian = np.zeros((sum(t.shape[0] for t in tables), x.size))
+        row = 0
+        for table, stop in zip(tables, cuts[1:].tolist(), strict=True):
+            rows, n_own = slice(row, row + table.shape[0]), table.shape[1] - 1 - n
+            jacobian[rows, stop - n_own : stop] = table[:, :n_own]
+            jacobian[rows, :n] = table[:, n_own:-1]
+            row = rows.stop
+        return np.concatenate([t[:, -1] for t in tables])
+
+    def derivatives(_: _Floats) -> _Floats:
+        return jacobian  # of the last residuals, which are those of this point
+
+    found = least_squares(
+        residuals,
+        begin,
+        jac=derivatives,
+        bounds=(np.append(lowest, np.full(begin.size - n, -math.inf)), math.inf),
+        x_scale="jac",
+        ftol=_TIMED if equations[0].known.law.takes_time else _PRECISE,
+        xtol=_KINK,
+        gtol=None,
+        max_nfev=_EVALUATIONS,
+    )
+    shared, local = found.x[:n], np.split(found.x[n:], cuts[:-1] - n)[1:]
+    left = [
+        float(((e.part.measured - e.law(e.values(shared, own))) ** 2).mean())
+        for e, own in zip(equations, local, strict=True)
+        if e.catch is not None
+    ]
+    typical = float(np.median(left)) if left else math.nan
+    return Solution(shared, local, typical, found.nfev)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointFit:
+    """What a solution says of the shared parameters, and leaves over of each trial."""
+
+    fit: ClusteredFit
+    tables: list[_Floats] = field(repr=False)  # of all samples, at the solution
+    laws: tuple[_Floats, ...] = field(repr=False)
+    torque_sd: float
+    cross_validation: _Floats = field(repr=False)
+
+
+def joint_fit(equations: Sequence[Equations], solution: Solution) -> JointFit:
+    """Return values of all parameters with their covariance, clustered by trial."""
+    shared = solution.shared
+    pairs = list(zip(equations, solution.local, strict=True))
+    tables = [e.table(shared, local, whole=True) for e, local in pairs]
+    rows = [e.rows(shared, t) for e, t in zip(equations, tables, strict=True)]
+    laws = tuple(e.law(e.values(shared, local)) for e, local in pairs)
+    left = np.concatenate(
+        [e.part.measured - law for e, law in zip(equations, laws, strict=True)]
+    )
+    spare = left.size - sum(local.size for local in solution.local) - shared.size
+    step = solve(rows)
+    # what no trial determines is nan in the step and stays so
+    values = np.where(np.isnan(step.values), np.nan, shared)
+    return JointFit(
+        fit=replace(step, values=values),
+        tables=tables,
+        laws=laws,
+        torque_sd=math.sqrt(float(left @ left) / max(spare, 1)),
+        cross_validation=_left_out(equations, solution, rows, tables, laws),
+    )
+
+
+def _left_out(
+    equations: Sequence[Equations],
+    solution: Solution,
+    rows: Sequence[Rows],
+    tables: Sequence[_Floats],
+    laws: Sequence[_Floats],
+) -> _Floats:
+    # Per trial the mean square of its torque less what the others' parameters give, as
+    # linear as they are at the fit. Constant, peak, residual and travel are its own;
+    # its drift is the others' mean, or a drift would better every fit.
+    drifts = np.array([values["drift"] for values in solution.values(equations)])
+    made = []
+    for i, (e, step) in enumerate(zip(equations, left_out_steps(rows), strict=True)):
+        table, law, n = tables[i], laws[i], len(e.local)
+        r = triangle(table)
+        local = np.zeros(n)
+        if "drift" in e.local and drifts.size > 1:
+            others = (drifts.sum() - drifts[i]) / (drifts.size - 1)
+            local[e.local.index("drift")] = others - drifts[i]
+        left = r[:, -1] + r[:, n:-1] @ np.nan_to_num(step) + r[:, :n] @ local
+        free = [j for j, name in enumerate(e.local) if name != "drift"]
+        local[free] = np.linalg.lstsq(r[:, free], -left, rcond=1e-12)[0]
+        columns = table[: law.size, :-1] * np.concatenate([local, step])
+        error = e.part.measured - law - e.known.spreads["torque"] * columns.sum(axis=1)
+        made.append(float((error**2).mean()) if error.size else math.nan)
+    return np.array(made)

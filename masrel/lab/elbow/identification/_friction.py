@@ -7,7 +7,7 @@ https://doi.org/10.1109/TNSRE.2012.2195330, section III.B.2 and Fig. 8.
 import math
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -18,7 +18,6 @@ from masrel.errors import RecordingError, RecordingWarning
 from masrel.lab.elbow.identification._clusters import Rows, solve
 from masrel.lab.elbow.identification._reading import (
     Movement,
-    Samples,
     even_samples,
     read_movement,
 )
@@ -34,9 +33,6 @@ _WINDOW = 0.1  # of the filter of angle and torque, s
 _MIN_STROKE = 0.1  # a stroke lasts at least this long, s
 _NAMES = ("inertia", "viscous", "coulomb")
 
-# Time, velocity, acceleration and torque of a stroke, SI units.
-_Moved = tuple[_Floats, _Floats, _Floats, _Floats]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stroke:
@@ -50,13 +46,13 @@ class Stroke:
     fitted: _Floats = field(compare=False, repr=False)
 
 
-def _find_strokes(samples: Samples) -> list[_Moved]:
-    # movements in one direction that last long enough and hold no gap
+def _strokes(movement: Movement) -> list[Stroke]:
+    # movements in one direction that last long enough and hold no gap, not fitted yet
+    samples = even_samples(movement)
     margin = window_length(_WINDOW, samples.period) // 2 + 1
     _, velocity, acceleration, torque = filter_alike(
         samples.angle, samples.torque, samples.period, _WINDOW
     )
-    time = samples.time[margin:-margin]
     unusable = np.convolve(
         samples.in_gap | samples.saturated, np.ones(2 * margin + 1), mode="valid"
     )
@@ -64,15 +60,20 @@ def _find_strokes(samples: Samples) -> list[_Moved]:
     direction = np.where(np.abs(velocity) > _MOVING, np.sign(velocity), 0.0)
     direction[unusable > 0.5] = 0.0
     edges = np.flatnonzero(np.diff(direction, prepend=0.0, append=0.0))
-    strokes = []
-    for start, stop in pairwise(edges):
-        inner = slice(start + margin, stop - margin)
-        long = (stop - start - 2 * margin) * samples.period >= _MIN_STROKE
-        if direction[start] != 0.0 and long:
-            strokes.append(
-                (time[inner], velocity[inner], acceleration[inner], torque[inner])
-            )
-    return strokes
+    return [
+        Stroke(
+            recording=movement.name,
+            time=samples.time[margin:-margin][inner],
+            velocity=velocity[inner],
+            acceleration=acceleration[inner],
+            torque=torque[inner],
+            fitted=torque[inner],
+        )
+        for start, stop in pairwise(edges)
+        if direction[start] != 0.0
+        and (stop - start - 2 * margin) * samples.period >= _MIN_STROKE
+        for inner in [slice(start + margin, stop - margin)]
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,12 +148,28 @@ def fit_friction(
         else read_movement(Path(entry), of_device=True)
         for entry in recordings
     ]
-    parts = _parts(movements)
-    rows = _rows(parts)
+    strokes = [stroke for movement in movements for stroke in _strokes(movement)]
+    forward = sum(stroke.velocity.mean() > 0.0 for stroke in strokes)
+    if min(forward, len(strokes) - forward) < 2:
+        raise RecordingError(
+            "recordings: friction needs two strokes or more in each direction, got "
+            f"{forward} in extension and {len(strokes) - forward} in flexion"
+        )
+    rows = _rows(strokes)
     fit = solve(rows, n_local=len(movements))
     estimates = fitted(_NAMES, fit, level)
-    _warn_of_negative(estimates)
-    strokes = _fitted_strokes(parts, rows, fit.values)
+    for estimate in estimates:
+        if estimate.value < 0.0:
+            warnings.warn(
+                f"{estimate.name} is negative ({estimate.value:.4g}): is torque that "
+                "of the hand, counted as the angle is?",
+                RecordingWarning,
+                stacklevel=2,
+            )
+    strokes = [
+        replace(stroke, fitted=stroke.torque - (row.target - row.design @ fit.values))
+        for stroke, row in zip(strokes, rows, strict=True)
+    ]
     far = np.concatenate([stroke.torque - stroke.fitted for stroke in strokes])
     size = np.concatenate([stroke.torque for stroke in strokes])
     sd = np.sqrt(np.diag(fit.covariance))
@@ -161,66 +178,23 @@ def fit_friction(
         correlation=fit.covariance / np.outer(sd, sd),
         relative_error=float(np.abs(far).mean() / np.abs(size).mean()),
         torque_sd=fit.residual_sd,
-        strokes=strokes,
+        strokes=tuple(strokes),
         level=level,
         simulated=any(movement.simulated for movement in movements),
     )
 
 
-def _parts(movements: Sequence[Movement]) -> list[tuple[str, _Moved]]:
-    # strokes with the name of their recording
-    parts = [
-        (movement.name, stroke)
-        for movement in movements
-        for stroke in _find_strokes(even_samples(movement))
-    ]
-    forward = sum(stroke[1].mean() > 0.0 for _, stroke in parts)
-    if min(forward, len(parts) - forward) < 2:
-        raise RecordingError(
-            "recordings: friction needs two strokes or more in each direction, got "
-            f"{forward} in extension and {len(parts) - forward} in flexion"
-        )
-    return parts
-
-
-def _warn_of_negative(estimates: Sequence[FittedParameter]) -> None:
-    for estimate in estimates:
-        if estimate.value < 0.0:
-            warnings.warn(
-                f"{estimate.name} is negative ({estimate.value:.4g}): is torque that "
-                "of the hand, counted as the angle is?",
-                RecordingWarning,
-                stacklevel=3,
-            )
-
-
-def _rows(parts: Sequence[tuple[str, _Moved]]) -> list[Rows]:
+def _rows(strokes: Sequence[Stroke]) -> list[Rows]:
     # the constant of a recording is taken out of all its strokes together
-    rows: list[Rows] = []
-    for name in dict.fromkeys(name for name, _ in parts):
-        strokes = [part for other, part in parts if other == name]
-        tables = [
-            np.stack([part[2], part[1], np.sign(part[1]), part[3]], axis=1)
-            for part in strokes
-        ]
-        mean = np.concatenate(tables).mean(axis=0)
-        rows += [
-            Rows(design=(t - mean)[:, :3], target=(t - mean)[:, 3]) for t in tables
-        ]
-    return rows
-
-
-def _fitted_strokes(
-    parts: Sequence[tuple[str, _Moved]], rows: Sequence[Rows], values: _Floats
-) -> tuple[Stroke, ...]:
-    return tuple(
-        Stroke(
-            recording=name,
-            time=part[0],
-            velocity=part[1],
-            acceleration=part[2],
-            torque=part[3],
-            fitted=part[3] - (row.target - row.design @ values),
-        )
-        for (name, part), row in zip(parts, rows, strict=True)
-    )
+    tables = [
+        np.stack([s.acceleration, s.velocity, np.sign(s.velocity), s.torque], axis=1)
+        for s in strokes
+    ]
+    means = {
+        name: np.concatenate(
+            [t for s, t in zip(strokes, tables, strict=True) if s.recording == name]
+        ).mean(axis=0)
+        for name in {stroke.recording for stroke in strokes}
+    }
+    left = [t - means[s.recording] for s, t in zip(strokes, tables, strict=True)]
+    return [Rows(t[:, :3], t[:, 3]) for t in left]

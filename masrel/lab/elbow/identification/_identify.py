@@ -1,5 +1,7 @@
 """From recordings to a joint: what is fitted, what is read, what is used of it.
 
+And which of what an arm may have makes a fit better: cross-validation over trials.
+
 Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
 https://doi.org/10.1109/TNSRE.2012.2195330, section II.
 """
@@ -10,29 +12,27 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from masrel.errors import (
+    MasrelError,
     RecordingError,
     RecordingWarning,
     SmallSampleWarning,
 )
-from masrel.lab.elbow.identification._catches import (
-    Trial,
-    slow_trial,
+from masrel.lab.elbow.identification._catches import Trial, slow_trial
+from masrel.lab.elbow.identification._equations import JointFit, joint_fit
+from masrel.lab.elbow.identification._lack_of_fit import (
+    LEVEL,
+    lack_of_fit,
+    own_drifts,
+    p_text,
 )
-from masrel.lab.elbow.identification._drifts import own_drifts
-from masrel.lab.elbow.identification._fit_options import FitOptions, Term, check_options
-from masrel.lab.elbow.identification._joint_fit import (
-    JointFit,
-    joint_fit,
-)
-from masrel.lab.elbow.identification._lack_of_fit import LEVEL, p_text
-from masrel.lab.elbow.identification._quantities import (
+from masrel.lab.elbow.identification._model_file import (
     ALL_QUANTITIES,
     ARM_QUANTITIES,
     QUANTITIES,
@@ -40,37 +40,32 @@ from masrel.lab.elbow.identification._quantities import (
 from masrel.lab.elbow.identification._reading import (
     Movement,
     TorqueSource,
-    even_samples,
     read_movement,
 )
 from masrel.lab.elbow.identification._results import (
     UNDETERMINED,
     ElbowFit,
     FittedParameter,
-    Step,
     fitted,
 )
 from masrel.lab.elbow.identification._rounds import (
     ALWAYS,
+    FitOptions,
     Round,
+    Term,
     fit_in_rounds,
-    locals_of,
-    untimed,
+    slow_fit,
 )
-from masrel.lab.elbow.identification._steps import (
-    SlowFit,
-    fit_slow,
-)
-from masrel.lab.elbow.identification._stretches import (
-    Stretch,
-    check_velocity,
-    find_stretches,
-)
+from masrel.lab.elbow.identification._steps import SlowFit
+from masrel.lab.elbow.identification._stretches import Stretch, find_stretches
 from masrel.lab.elbow.parameters import STANDARD_MODELS, ElbowParameters
 
 _Floats = NDArray[np.float64]
 
 _WINDOW = 0.06  # of the filter of speeds, s: 20.5 Hz at 1 kHz
+# Options of `fit` that are tried in a comparison, each alone.
+TERMS = ("gravity", "arm_inertia", "drift", "lag", "rise")
+
 # Two slow trials say little of how they differ, but not nothing of b.
 _MIN_DF = 4.0
 # So many times its error may each be below 0: a joint may have no inertia at all.
@@ -170,42 +165,52 @@ def fit(
             "catch_rise": rise,
         },
         gravity_angle=gravity_angle,
-        with_inertia=inertia == "fitted",
+        inertia=inertia,
         slow_below=held.speed_threshold if slow_below is None else slow_below,
         window=window,
         level=level,
     )
-    check_options(options, inertia)
     movements = [
         entry if isinstance(entry, Movement) else read_movement(Path(entry))
         for entry in recordings
     ]
-    _check_models(movements)
+    models = sorted({m.model for m in movements if m.model is not None})
+    if len(models) > 1:
+        raise RecordingError(
+            "recordings: a fit needs presentations of one model, which the .json "
+            f"beside each recording names; got some of {', '.join(models)}"
+        )
     stretches, rest_sd = _stretches(movements, options)
-    slow = _slow_trials(stretches, options.slow_below)
-    result = _identified(_Material(movements, stretches, slow, rest_sd), options)
-    _warn_of_lone(result)
+    trials = _slow_trials(stretches, options.slow_below)
+    slow, made, reasons = _fitted(trials, stretches, options)
+    for trial in (*slow.trials, *made.fast):
+        if trial.remark:
+            _warn(f"{trial.name}: {trial.remark}")
+    result = _result(movements, slow, made, options, rest_sd, reasons)
+    lone = [
+        ALL_QUANTITIES[estimate.name].symbol
+        for estimate in result.estimates
+        if estimate.reason is not None and not math.isnan(estimate.value)
+    ]
+    if lone:
+        warnings.warn(
+            f"{', '.join(lone)}: too few trials to say how trials differ; there is no "
+            "interval",
+            SmallSampleWarning,
+            stacklevel=2,
+        )
     return result
-
-
-@dataclass(frozen=True, slots=True)
-class _Material:
-    movements: Sequence[Movement]
-    stretches: Mapping[str, Stretch]
-    slow: Sequence[Trial]
-    rest_sd: float
 
 
 def _stretches(
     movements: Sequence[Movement], options: FitOptions
 ) -> tuple[dict[str, Stretch], float]:
+    # by name, and the median noise at rest
     named: dict[str, Stretch] = {}
     noise = []
     for movement in movements:
-        samples = even_samples(movement)
-        check_velocity(movement, samples, options.window)
         here, rest_sd = find_stretches(
-            samples, window=options.window, slow_below=options.slow_below
+            movement, window=options.window, slow_below=options.slow_below
         )
         noise += [] if math.isnan(rest_sd) else [rest_sd]
         if not here:
@@ -224,74 +229,60 @@ def _stretches(
 
 
 def _slow_trials(stretches: Mapping[str, Stretch], limit: float) -> list[Trial]:
-    used = []
-    for name, stretch in stretches.items():
-        if stretch.pace == "slow":
-            trial = slow_trial(stretch, name)
-            if trial.pre_catch.time.size:
-                used.append(trial)
-            else:
-                why = trial.remark or "too short for the filter of slow stretches"
-                _warn(f"{name}: {why}; not used")
+    slow = [
+        slow_trial(stretch, name)
+        for name, stretch in stretches.items()
+        if stretch.pace == "slow"
+    ]
+    used = [trial for trial in slow if trial.pre_catch.time.size]
+    for trial in slow:
+        if trial not in used:
+            why = trial.remark or "too short for the filter of slow stretches"
+            _warn(f"{trial.name}: {why}; not used")
+    if slow and not used:
+        raise RecordingError(
+            f"recordings: b and k need a slow stretch; none of {len(slow)} can be used"
+        )
     if not used:
-        raise RecordingError(_no_slow(stretches, limit))
+        slowest = min(stretch.peak_speed for stretch in stretches.values())
+        raise RecordingError(
+            "recordings: b and k need a slow stretch, one whose speed stays below "
+            f"{math.degrees(limit):g} deg/s; the slowest of {len(stretches)} reaches "
+            f"{math.degrees(slowest):.3g} deg/s. --slow-below raises the limit"
+        )
     return used
 
 
-def _no_slow(stretches: Mapping[str, Stretch], limit: float) -> str:
-    n_slow = sum(stretch.pace == "slow" for stretch in stretches.values())
-    if n_slow:
-        return f"recordings: b and k need a slow stretch; none of {n_slow} can be used"
-    slowest = min(stretch.peak_speed for stretch in stretches.values())
-    return (
-        "recordings: b and k need a slow stretch, one whose speed stays below "
-        f"{math.degrees(limit):g} deg/s; the slowest of {len(stretches)} reaches "
-        f"{math.degrees(slowest):.3g} deg/s. --slow-below raises the limit"
-    )
-
-
-def _identified(
-    material: _Material,
-    options: FitOptions,
-    reasons: Mapping[str, str] | None = None,
-) -> ElbowFit:
-    arm = options.arm()
-    to_fit = (*options.fitted, *(["inertia"] if options.with_inertia else []))
-    slow = fit_slow(
-        material.slow,
-        to_fit,
-        arm,
-        offset=options.offset,
-        rest_angle=options.constants.rest_angle,
-        level=options.level,
-    )
-    _check_slow(slow, material.stretches, options)
-    made = fit_in_rounds(material.stretches, slow, arm, options)
-    none = untimed(made)
-    if none and not reasons:
-        terms: dict[str, Term] = dict(options.terms)
-        terms.update(dict.fromkeys(none, 0.0))
-        return _identified(material, replace(options, terms=terms), none)
-    _warn_of_parts([*slow.trials, *made.fast])
-    return _result(material, slow, made, options, reasons or {})
+def _fitted(
+    trials: Sequence[Trial], stretches: Mapping[str, Stretch], options: FitOptions
+) -> tuple[SlowFit, Round, dict[str, str]]:
+    # with why a lag or a rise that was to be fitted is not
+    slow = slow_fit(trials, options)
+    _check_slow(slow, stretches, options)
+    made = fit_in_rounds(stretches, slow, options)
+    reasons: dict[str, str] = {}
+    while untimed := made.untimed():
+        reasons |= untimed
+        terms: dict[str, Term] = {**options.terms, **dict.fromkeys(reasons, 0.0)}
+        made = fit_in_rounds(stretches, slow, replace(options, terms=terms))
+    return slow, made, reasons
 
 
 def _check_slow(
     slow: SlowFit, stretches: Mapping[str, Stretch], options: FitOptions
 ) -> None:
     # b and k are told by their error: what it does to the torque of these stretches
-    torque = [float(np.ptp(t.pre_catch.torque)) for t in slow.trials]
+    torque = max(float(np.ptp(t.pre_catch.torque)) for t in slow.trials)
     speed = max(stretch.peak_speed for stretch in stretches.values())
     travel = max(float(np.ptp(stretch.angle)) for stretch in stretches.values())
     for name, size in (("damping", speed), ("stiffness", travel)):
-        estimate = slow.step[name]
+        estimate, symbol = slow.step[name], QUANTITIES[name].symbol
         df = estimate.df if estimate.df > _MIN_DF else _MIN_DF
-        half = float(stdtrit(df, 0.5 + 0.5 * options.level)) * slow.errors[name]
+        whole = 2.0 * slow.errors[name] * float(stdtrit(df, 0.5 + 0.5 * options.level))
         # an error that matters: of the value, and of the torque at the largest speed
-        unsure = 2.0 * half > abs(estimate.value) and 2.0 * half * size > max(torque)
+        unsure = whole > abs(estimate.value) and whole * size > torque
         if math.isnan(estimate.value) or unsure:
             raise RecordingError(_untold(name, estimate.value, slow, options))
-        symbol = QUANTITIES[name].symbol
         if estimate.high < 0.0:
             raise RecordingError(
                 f"recordings: this is not the law: {symbol} is {estimate.value:.4g}, "
@@ -329,43 +320,44 @@ def _untold(name: str, value: float, slow: SlowFit, options: FitOptions) -> str:
 
 
 def _result(
-    material: _Material,
+    movements: Sequence[Movement],
     slow: SlowFit,
     made: Round,
     options: FitOptions,
-    no_time: Mapping[str, str],
+    rest_sd: float,
+    untimed: Mapping[str, str],
 ) -> ElbowFit:
-    joint, steps = (
-        joint_fit(made.equations, made.solution, material.rest_sd),
-        made.steps,
-    )
-    reasons = {**_reasons(steps, made.fast, options), **no_time}
+    joint = joint_fit(made.equations, made.solution)
+    reasons = {**_reasons(made, options), **untimed}
     estimates = _all_estimates(joint, made, reasons, options)
-    _check_ratio(estimates)
-    local = locals_of(made)
+    _check_law(estimates)
+    values = made.solution.values(made.equations)
+    terms = {**options.terms, **dict.fromkeys(untimed, 0.0)}
     return ElbowFit(
         estimates=estimates,
-        correlation=_correlation(joint, estimates),
-        steps=tuple(steps),
+        correlation=_correlation(joint, made, estimates),
+        steps=tuple(made.steps),
         relative_error=slow.relative_error,
         torque_sd=joint.torque_sd,
-        lack_of_fit=joint.lack_of_fit,
+        lack_of_fit=lack_of_fit(
+            made.equations, made.solution, joint.tables, joint.laws, rest_sd
+        ),
         cross_validation=joint.cross_validation,
         trials=tuple(made.trials),
-        fitted_torque=joint.fitted_torque,
+        fitted_torque=joint.laws,
         constants=options.constants,
-        arm=dict(options.terms) | {"gravity_angle": options.gravity_angle},
-        offsets=tuple(each.get("offset", options.offset or 0.0) for each in local),
-        drifts=tuple(each.get("drift", options.arm().drift) for each in local),
-        n_evaluations=joint.n_evaluations,
+        arm={**terms, "gravity_angle": options.gravity_angle},
+        offsets=tuple(each["offset"] for each in values),
+        drifts=tuple(each["drift"] for each in values),
+        n_evaluations=made.solution.n_evaluations,
         level=options.level,
-        simulated=any(movement.simulated for movement in material.movements),
-        sources={m.name: m.sha256 for m in material.movements},
-        remarks=_torque_remarks(material.movements) + _remarks(estimates, made),
+        simulated=any(movement.simulated for movement in movements),
+        sources={m.name: m.sha256 for m in movements},
+        remarks=_torque_remarks(movements) + _remarks(estimates, made),
     )
 
 
-def _check_ratio(estimates: Sequence[FittedParameter]) -> None:
+def _check_law(estimates: Sequence[FittedParameter]) -> None:
     for estimate in estimates:
         if estimate.name == "residual_ratio" and estimate.low >= 1.0:
             raise RecordingError(
@@ -383,23 +375,17 @@ def _check_ratio(estimates: Sequence[FittedParameter]) -> None:
             )
 
 
-def _reasons(
-    steps: Sequence[Step], fast: Sequence[Trial], options: FitOptions
-) -> dict[str, str]:
+def _reasons(made: Round, options: FitOptions) -> dict[str, str]:
     # why the steps do not determine what they do not
-    if all(trial.catch is None for trial in fast):
+    if all(trial.catch is None for trial in made.fast):
         why = "there are only slow stretches, in which nothing catches"
-        if fast:
+        if made.fast:
             why = "no fast stretch has a catch that can be used"
         names = [name for name in QUANTITIES if name not in ALWAYS]
         names += [name for name in options.fitted if name in ("lag", "catch_rise")]
         return dict.fromkeys(names, why)
-    return {
-        estimate.name: estimate.reason
-        for step in steps
-        for estimate in step.estimates
-        if estimate.reason is not None
-    }
+    estimates = [e for step in made.steps for e in step.estimates]
+    return {e.name: e.reason for e in estimates if e.reason is not None}
 
 
 def _all_estimates(
@@ -408,41 +394,29 @@ def _all_estimates(
     # Where travels are censored, D is that of its step. Least squares hold the spread
     # of travels and know less than they say; and they draw each end towards D, by
     # which that spread would come out too small.
-    level = options.level
-    by_name = {e.name: e for e in fitted(joint.names, joint.fit, level, reasons)}
+    level, names = options.level, list(made.shared())
+    by_name = {e.name: e for e in fitted(names, joint.fit, level, reasons)}
     if any(each is not None for each in made.limits):
         whole = {e.name: e for step in made.steps for e in step.estimates}
         by_name["catch_travel"] = whole["catch_travel"]
     optional = {"inertia", *ARM_QUANTITIES} - set(options.fitted) - set(reasons)
-    return tuple(
-        by_name[name]
-        if name in by_name
-        else FittedParameter(
-            name=name, level=level, reason=reasons.get(name, UNDETERMINED)
-        )
-        for name in ALL_QUANTITIES
-        if name in by_name or name not in optional
-    )
+    for name in ALL_QUANTITIES:
+        if name not in by_name and name not in optional:
+            reason = reasons.get(name, UNDETERMINED)
+            by_name[name] = FittedParameter(name=name, level=level, reason=reason)
+    return tuple(by_name[name] for name in ALL_QUANTITIES if name in by_name)
 
 
-def _correlation(joint: JointFit, estimates: Sequence[FittedParameter]) -> _Floats:
-    places = [
-        joint.names.index(e.name) if e.name in joint.names else -1 for e in estimates
-    ]
+def _correlation(
+    joint: JointFit, made: Round, estimates: Sequence[FittedParameter]
+) -> _Floats:
+    names = list(made.shared())
+    places = [names.index(e.name) if e.name in names else -1 for e in estimates]
     sd = np.sqrt(np.diag(joint.fit.covariance))
     whole = np.full((len(sd) + 1, len(sd) + 1), np.nan)
     with np.errstate(invalid="ignore", divide="ignore"):
         whole[:-1, :-1] = joint.fit.covariance / np.outer(sd, sd)
     return whole[np.ix_(places, places)]
-
-
-def _check_models(movements: Sequence[Movement]) -> None:
-    models = sorted({m.model for m in movements if m.model is not None})
-    if len(models) > 1:
-        raise RecordingError(
-            "recordings: a fit needs presentations of one model, which the .json "
-            f"beside each recording names; got some of {', '.join(models)}"
-        )
 
 
 def _torque_remarks(movements: Sequence[Movement]) -> tuple[str, ...]:
@@ -468,53 +442,130 @@ def _remarks(estimates: Sequence[FittedParameter], made: Round) -> tuple[str, ..
     ]
     catches = [trial.catch for trial in made.trials if trial.catch is not None]
     unended = sum(catch.end is None for catch in catches)
-    if 0 < unended < len(catches):
-        behind = sum(each is not None for each in made.limits)
-        remarks += _unended(unended, behind, len(catches))
+    behind = sum(each is not None for each in made.limits)
+    if behind:
+        remarks.append(
+            f"{behind} of {len(catches)} catches do not end within their stretch: D "
+            "counts each as longer than what could be seen of it (censored), and "
+            "takes travels to be normal"
+        )
+    if behind < unended < len(catches):
+        remarks.append(
+            f"{unended - behind} of {len(catches)} catches do not end within their "
+            "stretch and say nothing of D: if D differs between trials, those with a "
+            "short one are left, and D is underestimated"
+        )
     unused = sum(trial.catch is None for trial in made.fast)
     if unused:
         remarks.append(f"{unused} of {len(made.fast)} fast stretches are not used")
     return tuple(remarks)
 
 
-def _unended(unended: int, behind: int, n_catches: int) -> list[str]:
-    remarks = []
-    if behind:
-        remarks.append(
-            f"{behind} of {n_catches} catches do not end within their stretch: D "
-            "counts each as longer than what could be seen of it (censored), and "
-            "takes travels to be normal"
-        )
-    if behind < unended:
-        remarks.append(
-            f"{unended - behind} of {n_catches} catches do not end within their "
-            "stretch and say nothing of D: if D differs between trials, those with a "
-            "short one are left, and D is underestimated"
-        )
-    return remarks
-
-
-def _warn_of_parts(trials: Sequence[Trial]) -> None:
-    for trial in trials:
-        if trial.remark:
-            _warn(f"{trial.name}: {trial.remark}")
-
-
-def _warn_of_lone(result: ElbowFit) -> None:
-    lone = [
-        ALL_QUANTITIES[estimate.name].symbol
-        for estimate in result.estimates
-        if estimate.reason is not None and not math.isnan(estimate.value)
-    ]
-    if lone:
-        warnings.warn(
-            f"{', '.join(lone)}: too few trials to say how trials differ; there is no "
-            "interval",
-            SmallSampleWarning,
-            stacklevel=3,
-        )
-
-
 def _warn(message: str) -> None:
     # called by what `fit` calls: the warning points to who called that
     warnings.warn(message, RecordingWarning, stacklevel=4)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ComparedFit:
+    """One fit of a comparison.
+
+    Attributes
+    ----------
+    fitted : tuple of str
+        What is fitted of the arm.
+    fit : ElbowFit or None
+        The fit; None if there is none.
+    reason : str or None
+        Why there is none.
+    error : float
+        Root mean square distance of a trial's torque from what the parameters of all
+        other trials give, N·m.
+    worse : float
+        Mean over trials of the squared distance less that of the best fit, (N·m)².
+    worse_se : float
+        Standard error of that, over trials; 0 for the best.
+    is_chosen : bool
+        Whether no fit with less of an arm is within one standard error of the best.
+    """
+
+    fitted: tuple[str, ...]
+    fit: ElbowFit | None
+    reason: str | None
+    error: float
+    worse: float
+    worse_se: float
+    is_chosen: bool
+
+
+def compare_fits(
+    recordings: Sequence[Movement | Path | str], **options: Any
+) -> tuple[ComparedFit, ...]:
+    """Fit with each thing that an arm may have, and predict each trial from the others.
+
+    Parameters
+    ----------
+    recordings : sequence of Movement or path
+        Slow and fast stretches, as for `fit`.
+    **options
+        Those of `fit`. What is fitted or fixed there is so in every fit.
+
+    Returns
+    -------
+    tuple of ComparedFit
+        The fit with these options first, then with one thing more of the arm each.
+        A trial left out keeps its own constant, peak, residual and travel; what the
+        others say of it is reckoned as linear as the equations are at the fit. The
+        number of trials that all fits use is what is compared.
+
+    Raises
+    ------
+    ParameterError
+        If an option is outside its range.
+    RecordingError
+        If the first fit is refused.
+    """
+    movements = [
+        entry if isinstance(entry, Movement) else read_movement(Path(entry))
+        for entry in recordings
+    ]
+    fits: list[tuple[tuple[str, ...], ElbowFit | None, str | None]] = [
+        ((), fit(movements, **options), None)
+    ]
+    tried = [term for term in TERMS if options.get(term, "off") == "off"]
+    with warnings.catch_warnings():  # the first fit said them
+        warnings.simplefilter("ignore", RecordingWarning)
+        warnings.simplefilter("ignore", SmallSampleWarning)
+        for term in tried:
+            try:
+                made = fit(movements, **{**options, term: "fitted"})
+                fits.append(((term,), made, None))
+            except MasrelError as error:
+                fits.append(((term,), None, str(error)))
+    squares = [{} if made is None else _finite_errors(made) for _, made, _ in fits]
+    order = sorted(set.intersection(*(set(each) for each in squares if each)))
+    table = np.array([[each.get(n, math.nan) for n in order] for each in squares])
+    means = table.mean(axis=1) if order else np.full(len(fits), math.nan)
+    best = int(np.nanargmin(means)) if order else 0
+    more, ses = table - table[best], np.full(len(fits), math.nan)
+    if len(order) > 1:
+        ses = more.std(axis=1, ddof=1) / math.sqrt(len(order))
+    worse = means - means[best]
+    near = np.flatnonzero(worse <= ses).tolist()  # fits with fewer terms come first
+    return tuple(
+        ComparedFit(
+            fitted=terms,
+            fit=made,
+            reason=reason,
+            error=math.sqrt(means[i]) if means[i] >= 0.0 else math.nan,
+            worse=float(worse[i]),
+            worse_se=float(ses[i]),
+            is_chosen=near[:1] == [i],
+        )
+        for i, (terms, made, reason) in enumerate(fits)
+    )
+
+
+def _finite_errors(made: ElbowFit) -> dict[str, float]:
+    pairs = zip(made.trials, made.cross_validation.tolist(), strict=True)
+    return {trial.name: value for trial, value in pairs if math.isfinite(value)}

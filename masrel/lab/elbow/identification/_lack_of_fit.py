@@ -14,17 +14,16 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtr
+from scipy.special import fdtrc, stdtr
 
-from masrel.lab.elbow.identification._catches import Trial
 from masrel.lab.elbow.identification._clusters import Rows, partial_out, solve
-from masrel.lab.elbow.identification._drifts import own_drifts
-from masrel.lab.elbow.identification._equations import Equations
+from masrel.lab.elbow.identification._equations import LINEAR, Equations, Solution
+from masrel.lab.elbow.identification._stretches import Part
 
 _Floats = NDArray[np.float64]
 
+# Of all tests together: how often a fit of the right law is called a wrong one.
 LEVEL = 0.02
-"""Of all tests together: how often a fit of the right law is called a wrong one."""
 
 # What is tried for lag and rise, s: of the size that a sensor and a muscle have.
 _LAG, _RISE = 0.005, 0.04
@@ -40,6 +39,13 @@ _SMOOTHING_SD = 0.01
 
 _MIN_DF, _MIN_TRIALS = 1.0, 5  # a test with fewer says nothing
 
+# Of drifts that differ: means over so many seconds, of a trial so many at least, and
+# relative to columns of length 1 what a column adds to the others.
+_DRIFT_BLOCK, _MIN_BLOCKS, _RANK_TOLERANCE = 0.25, 4, 1e-8
+
+_PHASES = ("slow", "pre-catch", "peak", "catch", "post-catch")
+
+# What is added to the law: in words, and the option that fits it.
 STRUCTURES = {
     "gravity": ("the weight of the arm", "--gravity fitted"),
     "bent stiffness": ("a stiffness that changes with the angle", ""),
@@ -56,11 +62,10 @@ STRUCTURES = {
     "travel": ("travels that change with the speed", ""),
     "own drifts": ("drifts that differ from trial to trial", "--drift fitted"),
 }
-"""What is added to the law: in words, and the option that fits it."""
 
 
+# Whether the law is that of the recordings.
 Verdict = Literal["fits", "does not fit", "no evidence either way", "undecided"]
-"""Whether the law is that of the recordings."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -184,8 +189,7 @@ class LackOfFit:
 
 def lack_of_fit(
     equations: Sequence[Equations],
-    shared: _Floats,
-    local: Sequence[_Floats],
+    solution: Solution,
     tables: Sequence[_Floats],
     laws: Sequence[_Floats],
     rest_sd: float,
@@ -194,7 +198,10 @@ def lack_of_fit(
 
     `tables` are the equations' whole ones, `laws` their torques.
     """
-    added = [_added(e, shared, mine) for e, mine in zip(equations, local, strict=True)]
+    values = solution.values(equations)
+    added = [
+        _added(e, at, law) for e, at, law in zip(equations, values, laws, strict=True)
+    ]
     # of catches that outlast their stretch, those that end are the short ones
     unended = any(e.catch is not None and e.catch.end is None for e in equations)
     names = [
@@ -203,25 +210,37 @@ def lack_of_fit(
         if any(name in each for each in added)
         and not (unended and name in ("travel", "bent climb"))
     ]
-    reduced = [
-        _reduced(e, table, columns, names)
-        for e, table, columns in zip(equations, tables, added, strict=True)
-    ]
-    in_common = [t for i, name in enumerate(names) if (t := _test(i, name, reduced))]
-    tests = _holm([*in_common, *_own_drifts(equations)])
+    # rows of [shared | residuals | added] of each trial
+    rest = []
+    for e, table, columns in zip(equations, tables, added, strict=True):
+        more = [columns.get(name, np.zeros(table.shape[0])) for name in names]
+        rest.append(partial_out(np.column_stack([table, *more]), len(e.local)))
+    n = len(equations[0].known.names)
+    found = [_test(name, n, n + 1 + i, rest) for i, name in enumerate(names)]
+    tests = _holm([*filter(None, found), *_own_drifts(equations)])
     phases = _phases(equations, laws)
-    ratio = _after_to_before(phases)
+    before, after = (
+        [p for p in phases if (p.phase in ("slow", "pre-catch")) is early]
+        for early in (True, False)
+    )
+    ratio = math.nan
+    if before and after and _pooled(before) > 0.0:
+        ratio = _pooled(after) / _pooled(before)
     verdict: Verdict = "undecided"
     if ratio > _MAX_RATIO or (tests and tests[0].adjusted < LEVEL):
         verdict = "does not fit"
     elif tests:
         is_noise = not _not_noise(phases, rest_sd)
         verdict = "fits" if is_noise else "no evidence either way"
+    measured = [e.part.measured for e in equations if e.part.measured.size]
+    whole = sum(float(((m - m.mean()) ** 2).sum()) for m in measured)
+    left = [e.part.measured - law for e, law in zip(equations, laws, strict=True)]
+    far = sum(float((each**2).sum()) for each in left)
     return LackOfFit(
         verdict=verdict,
         level=LEVEL,
         tests=tests,
-        explained=_explained(equations, laws),
+        explained=1.0 - far / whole if whole > 0.0 else math.nan,
         phases=phases,
         after_to_before=ratio,
         rest_sd=rest_sd,
@@ -252,75 +271,23 @@ def _rest_text(rest_sd: float) -> str:
     return "unknown" if math.isnan(rest_sd) else f"{rest_sd:.2g} N·m"
 
 
-def _explained(equations: Sequence[Equations], laws: Sequence[_Floats]) -> float:
-    left = sum(
-        float(((e.measured - law) ** 2).sum())
-        for e, law in zip(equations, laws, strict=True)
-    )
-    whole = sum(
-        float(((e.measured - e.measured.mean()) ** 2).sum())
-        for e in equations
-        if e.measured.size
-    )
-    return 1.0 - left / whole if whole > 0.0 else math.nan
-
-
-def _after_to_before(phases: Sequence[PhaseResidual]) -> float:
-    before = [p for p in phases if p.phase in ("slow", "pre-catch")]
-    after = [p for p in phases if p.phase not in ("slow", "pre-catch")]
-    if not (after and before and _pooled(before) > 0.0):
-        return math.nan
-    return _pooled(after) / _pooled(before)
-
-
 def _pooled(phases: Sequence[PhaseResidual]) -> float:
     squares = sum(p.n_samples * p.sd**2 for p in phases)
     return math.sqrt(squares / sum(p.n_samples for p in phases))
 
 
-def _reduced(
-    e: Equations, table: _Floats, columns: Mapping[str, _Floats], names: Sequence[str]
-) -> tuple[_Floats, int]:
-    # rows of [shared | residuals | added], and how many columns are not added
-    zeros = np.zeros(table.shape[0])
-    added = [columns.get(name, zeros) for name in names]
-    rest = partial_out(np.column_stack([table, *added]), len(e.local))
-    return rest, table.shape[1] - len(e.local)
-
-
 def _test(
-    place: int, name: str, reduced: Sequence[tuple[_Floats, int]]
+    name: str, n_shared: int, place: int, rest: Sequence[_Floats]
 ) -> StructureTest | None:
-    rows = []
-    for whole, n in reduced:
-        design = np.column_stack([whole[:, : n - 1], whole[:, n + place]])
-        rows.append(Rows(design=design, target=-whole[:, n - 1]))
-    fit = solve(rows)
+    # of the column at this place beside the shared ones; residuals are after these
+    columns = [*range(n_shared), place]
+    fit = solve([Rows(r[:, columns], -r[:, n_shared]) for r in rest])
     value, df = float(fit.values[-1]), float(fit.df[-1])
     error = math.sqrt(max(fit.covariance[-1, -1], 0.0))
     if not (error > 0.0 and df >= _MIN_DF and fit.n_trials[-1] >= _MIN_TRIALS):
         return None
     p = 2.0 * float(stdtr(df, -abs(value / error)))
     return StructureTest(name=name, t=value / error, df=df, p_value=p, adjusted=p)
-
-
-def _own_drifts(equations: Sequence[Equations]) -> list[StructureTest]:
-    known = equations[0].known
-    slow = [e.trial.pre_catch for e in equations if e.trial.pace == "slow"]
-    if known.drifts or len(equations) < _MIN_TRIALS:
-        return []
-    test = own_drifts(slow, known.arm.gravity_angle)
-    if test is None:
-        return []
-    return [
-        StructureTest(
-            name="own drifts",
-            t=math.sqrt(test.ratio),
-            df=float(test.df),
-            p_value=test.p_value,
-            adjusted=test.p_value,
-        )
-    ]
 
 
 def _holm(tests: Sequence[StructureTest]) -> tuple[StructureTest, ...]:
@@ -332,105 +299,130 @@ def _holm(tests: Sequence[StructureTest]) -> tuple[StructureTest, ...]:
     return tuple(adjusted)
 
 
-def _added(e: Equations, shared: _Floats, local: _Floats) -> dict[str, _Floats]:
+def _added(
+    e: Equations, values: Mapping[str, float], law: _Floats
+) -> dict[str, _Floats]:
     # columns of what the law has not, over the rows of the whole table
-    now = dict(zip(e.known.names, shared.tolist(), strict=True))
-    mine = dict(zip(e.local, local.tolist(), strict=True))
-    rows = list(e.catch_rows(now, mine))
+    n, catch, after = e.part.time.size, e.catch, e.trial.after
+    matrix = dict(zip(LINEAR, e.design(values).matrix.T, strict=True))
+    columns = {name: matrix[name] for name in ("gravity", "arm_inertia", "drift")}
+    angle, speed = e.part.angle, e.part.velocity
+    if catch is not None and after is not None:
+        # what the law holds from the catch on
+        held = np.arange(n) >= e.n_pre
+        if e.known.constants.post_catch == "additive":
+            held &= e.part.time < e.end
+        angle, speed = (
+            np.where(held, catch.angle, angle),
+            np.where(held, catch.speed, speed),
+        )
+        since, end = e.part.time - catch.time, e.end - catch.time
+        peak_end = e.known.constants.peak_duration
+        slope = np.clip(np.minimum(since, end) - peak_end, 0.0, None)
+        slope[: e.n_pre] = 0.0
+        past = e.part.angle - catch.angle - values.get("travel", catch.travel)
+        past = np.where(since >= end, np.maximum(past, 0.0), 0.0)
+        columns |= {"residual slope": slope, "bent climb": past**2}
+        for name, more in (("lag", _LAG), ("catch_rise", _RISE)):
+            timed = {**values, name: getattr(e.known.law, name) + more}
+            columns[name] = e.law(timed) - law
+    columns |= {"bent stiffness": angle**2, "bent damping": speed**2}
+    rows = [row.name for row in e.catch_rows(values)]
+    sd, fitted = e.known.spreads["torque"], {*e.known.names, *e.local}
     columns = {
-        name: np.append(column / e.known.spreads.torque, np.zeros(len(rows)))
-        for name, column in (_before(e) | _from_catch(e, now, mine)).items()
-        if name not in now and name not in mine and column.any()
+        name: np.append(column / sd, np.zeros(len(rows)))
+        for name, column in columns.items()
+        if name not in fitted and column.any()
     }
-    catch = e.trial.catch
-    size = {"catch angle": 0.0, "peak": 1.0, "residual": 1.0, "travel": 0.0}
-    if catch is not None:
+    size = {"peak": 1.0, "residual": 1.0}
+    if catch := e.trial.catch:
         size |= {"catch angle": catch.mean_speed**2, "travel": catch.mean_catch_speed}
-    for name, value in size.items():
-        if name in rows:
-            column = np.zeros(e.torque.size + len(rows))
-            column[e.torque.size + rows.index(name)] = value
-            columns[name] = column
+    for place, name in enumerate(rows):
+        if name in size:
+            columns[name] = np.zeros(n + len(rows))
+            columns[name][n + place] = size[name]
     return columns
 
 
-def _before(e: Equations) -> dict[str, _Floats]:
-    # what acts in every phase, and what the law holds from the catch on
-    parts = [e.trial.pre_catch]
-    if e.catch is not None and e.trial.after is not None:
-        parts.append(e.trial.after)
-    angle = np.concatenate([part.angle for part in parts])
-    speed = np.concatenate([part.velocity for part in parts])
-    held_angle, held_speed = angle.copy(), speed.copy()
-    if e.catch is not None:
-        held = np.arange(angle.size) >= e.n_pre
-        if e.known.constants.post_catch == "additive" and e.catch.end is not None:
-            held &= e.time < e.catch.end
-        held_angle[held], held_speed[held] = e.catch.angle, e.catch.speed
-    return {
-        "gravity": np.sin(angle - e.known.arm.gravity_angle),
-        "arm_inertia": np.concatenate([part.acceleration for part in parts]),
-        "drift": e.time - e.time.mean() if e.time.size else e.time,
-        "bent stiffness": held_angle**2,
-        "bent damping": held_speed**2,
-    }
+def _own_drifts(equations: Sequence[Equations]) -> list[StructureTest]:
+    slow = [e.trial.pre_catch for e in equations if e.trial.pace == "slow"]
+    if equations[0].known.drifts or len(equations) < _MIN_TRIALS:
+        return []
+    test = own_drifts(slow, equations[0].known.law.gravity_angle)
+    return [] if test is None else [test]
 
 
-def _from_catch(
-    e: Equations, now: Mapping[str, float], mine: Mapping[str, float]
-) -> dict[str, _Floats]:
-    catch, after = e.catch, e.trial.after
-    if catch is None or after is None:
-        return {}
-    since = np.concatenate([np.zeros(e.n_pre), after.time - catch.time])
-    peak_end = e.known.constants.peak_duration
-    end = math.inf if catch.end is None else catch.end - catch.time
-    slope = np.where(since < end, np.maximum(since - peak_end, 0.0), 0.0)
-    travel = mine.get("travel", catch.travel)
-    past = np.concatenate([np.zeros(e.n_pre), after.angle - catch.angle - travel])
-    past = np.where(since >= end, np.maximum(past, 0.0), 0.0)
-    if math.isfinite(end):
-        slope[since >= end] = slope.max(initial=0.0)
-    made = {"residual slope": slope, "bent climb": past**2}
-    law = e.law_at(now, mine)
-    if "lag" not in now:
-        made["lag"] = e.law_at({**now, "lag": e.known.arm.lag + _LAG}, mine) - law
-    if "catch_rise" not in now:
-        rise = {**now, "catch_rise": e.known.arm.catch_rise + _RISE}
-        made["catch_rise"] = e.law_at(rise, mine) - law
-    return made
+def own_drifts(slow: Sequence[Part], gravity_angle: float) -> StructureTest | None:
+    """Test whether slow trials drift each in a way of its own; None if too few tell.
+
+    Those are drifts beyond what trials have in common: one drift, b, k, weight,
+    inertia, a stiffness and a damping that bend. Drifts whose signs differ cancel in a
+    mean over trials. So each slow trial is given one, and what they explain is held
+    against what is left (F), in means over 0.25 s, which are as good as independent
+    where a sensor's noise is correlated over less.
+    """
+    trials = []
+    for part in slow:
+        if part.time.size:
+            n_blocks = max(int((part.time[-1] - part.time[0]) / _DRIFT_BLOCK), 1)
+            columns = (
+                part.time - part.time.mean(),
+                part.velocity,
+                part.angle,
+                part.acceleration,
+                np.sin(part.angle - gravity_angle),
+                part.angle**2,
+                part.velocity**2,
+                part.measured,
+            )
+            blocks = np.array_split(np.column_stack(columns), n_blocks)
+            trials.append(np.array([block.mean(axis=0) for block in blocks]))
+    trials = [means for means in trials if len(means) >= _MIN_BLOCKS]
+    if len(trials) < 2:
+        return None
+    which = np.repeat(np.arange(len(trials)), [len(means) for means in trials])
+    offsets = np.eye(len(trials))[which]  # (n_blocks, n_trials)
+    table = np.concatenate(trials)
+    in_common = np.column_stack([offsets, table[:, :-1]])
+    torque = table[:, -1]
+    before, n_before = _left(in_common, torque)
+    left, n_columns = _left(
+        np.column_stack([in_common, offsets * table[:, :1]]), torque
+    )
+    n_more, df = n_columns - n_before, which.size - n_columns
+    if n_more < 1 or df < 1:
+        return None
+    left = max(left, 1e-20 * float(torque @ torque))  # of torque without noise
+    ratio = max((before - left) / n_more / (left / df), 0.0)
+    p = float(fdtrc(n_more, df, ratio))
+    t = math.sqrt(ratio)
+    return StructureTest(name="own drifts", t=t, df=float(df), p_value=p, adjusted=p)
+
+
+def _left(design: _Floats, target: _Floats) -> tuple[float, int]:
+    # sum of squares of what least squares leave, and the rank of the design
+    size = np.linalg.norm(design, axis=0)
+    scaled = design / np.where(size > 0.0, size, 1.0)
+    values, _, rank, _ = np.linalg.lstsq(scaled, target, rcond=_RANK_TOLERANCE)
+    return float(((target - scaled @ values) ** 2).sum()), int(rank)
 
 
 def _phases(
     equations: Sequence[Equations], laws: Sequence[_Floats]
 ) -> tuple[PhaseResidual, ...]:
-    pieces: dict[str, list[_Floats]] = {}
+    pieces: dict[str, list[_Floats]] = {name: [] for name in _PHASES}
     for e, law in zip(equations, laws, strict=True):
-        left = e.measured - law
-        for phase, which in _phase_masks(e.trial, e):
-            if which.sum() > 2:
-                pieces.setdefault(phase, []).append(left[which])
-    order = ("slow", "pre-catch", "peak", "catch", "post-catch")
-    return tuple(_phase(name, pieces[name]) for name in order if name in pieces)
-
-
-def _phase_masks(trial: Trial, e: Equations) -> list[tuple[str, NDArray[np.bool_]]]:
-    before = np.arange(e.time.size) < e.n_pre
-    if trial.pace == "slow":
-        return [("slow", before)]
-    masks = [("pre-catch", before)]
-    if e.catch is not None:
-        end = math.inf if e.catch.end is None else e.catch.end
-        peak = ~before & (
-            e.time < min(e.catch.time + e.known.constants.peak_duration, end)
-        )
-        over = ~before & ~peak & (e.time >= end)
-        masks += [
-            ("peak", peak),
-            ("catch", ~before & ~peak & ~over),
-            ("post-catch", over),
-        ]
-    return masks
+        time, place = e.part.time, np.zeros(e.part.time.size, dtype=np.int64)
+        if e.trial.pace == "fast":
+            place[:] = 1
+        if e.catch is not None:
+            peak_end = min(e.catch.time + e.known.constants.peak_duration, e.end)
+            later = 2 + np.where(time < peak_end, 0, np.where(time < e.end, 1, 2))
+            place[e.n_pre :] = later[e.n_pre :]
+        for i, name in enumerate(_PHASES):
+            left = (e.part.measured - law)[place == i]
+            pieces[name] += [left] if left.size > 2 else []
+    return tuple(_phase(name, each) for name, each in pieces.items() if each)
 
 
 def _phase(phase: str, pieces: Sequence[_Floats]) -> PhaseResidual:

@@ -1,17 +1,12 @@
-"""Files of joints for a protocol to name, and the joints between others."""
+"""What can be fitted, files of joints for a protocol to name, and joints in between."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from masrel.errors import ParameterError
-from masrel.lab.elbow.identification._quantities import (
-    ALL_QUANTITIES,
-    DEGREES,
-    QUANTITIES,
-)
 from masrel.lab.elbow.parameters import ElbowParameters
 
 if TYPE_CHECKING:
@@ -19,35 +14,75 @@ if TYPE_CHECKING:
     from masrel.lab.elbow.identification._results import ElbowFit
 
 
+DEGREES = 180.0 / math.pi  # of a radian
+
+
+class Quantity(NamedTuple):
+    """A symbol, a key with the unit for files, that unit in words, and its size.
+
+    A value in SI units times `factor` is in the unit.
+    """
+
+    symbol: str
+    key: str
+    unit: str
+    factor: float = 1.0
+
+
+# The law's parameters, by the names they have in `ElbowParameters`.
+QUANTITIES: dict[str, Quantity] = {
+    "damping": Quantity("b", "damping_nms_rad", "N·m·s/rad"),
+    "stiffness": Quantity("k", "stiffness_nm_rad", "N·m/rad"),
+    "inertia": Quantity("m", "inertia_kg_m2", "kg·m²"),
+    "catch_angle_constant": Quantity("L", "catch_angle_constant_deg", "deg", DEGREES),
+    "catch_slope": Quantity("α", "catch_slope_s", "s"),
+    "catch_torque_constant": Quantity("H", "catch_torque_nms_rad", "N·m·s/rad"),
+    "residual_ratio": Quantity("Q", "residual_ratio", "1"),
+    "catch_travel": Quantity("D", "catch_travel_deg", "deg", DEGREES),
+    "post_catch_stiffness": Quantity(
+        "k_post", "post_catch_stiffness_nm_rad", "N·m/rad"
+    ),
+}
+
+# What an arm and a sensor have beside the law.
+ARM_QUANTITIES: dict[str, Quantity] = {
+    "gravity": Quantity("G", "gravity_nm", "N·m"),
+    "arm_inertia": Quantity("J", "arm_inertia_kg_m2", "kg·m²"),
+    "lag": Quantity("T", "lag_s", "s"),
+    "catch_rise": Quantity("rise", "catch_rise_s", "s"),
+}
+
+ALL_QUANTITIES = QUANTITIES | ARM_QUANTITIES
+
+# What the key ``format`` of a model file says.
 FORMAT = "masrel joint model 1"
-"""What the key ``format`` of a model file says."""
 
 
 def _keys(*names: str) -> dict[str, tuple[str, float]]:
     return {QUANTITIES[name].key: (name, QUANTITIES[name].factor) for name in names}
 
 
+# Key of a protocol's model to the parameter and its unit in SI units.
 MODEL_KEYS = _keys(
     "catch_angle_constant",  # L
     "catch_torque_constant",  # H
     "residual_ratio",  # Q
     "catch_travel",  # D
 )
-"""Key of a protocol's model to the parameter and its unit in SI units."""
 
+# Likewise the constants that a model may have of its own.
 CONSTANT_KEYS = _keys(
     "inertia", "damping", "stiffness", "catch_slope", "post_catch_stiffness"
 )
-"""Likewise the constants that a model may have of its own."""
 
+# How H, Q and k_post are to be read: without it the numbers are another joint.
 READING_KEYS = ("post_catch", "residual_reading")
-"""How H, Q and k_post are to be read: without it the numbers are another joint."""
 
+# Constants that are written where they are not the default.
 VARIANT_KEYS = {
     "rest_angle_deg": ("rest_angle", DEGREES),
     "catch_rise_s": ("catch_rise", 1.0),
 }
-"""Constants that are written where they are not the default."""
 
 Document = dict[str, object]
 

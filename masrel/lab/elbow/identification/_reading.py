@@ -6,13 +6,12 @@ what must not be used marked.
 
 import csv
 import hashlib
-import json
 import math
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,25 +31,25 @@ TorqueSource = Literal["recorded", "sensor", "model"]
 _Floats = NDArray[np.float64]
 
 
+# Shorter is no stretch at any rate that is allowed.
 _MIN_SAMPLES = 50
-"""Shorter is no stretch at any rate that is allowed."""
 
+# Below the first, nothing is left of a peak of 0.1 s; above the second, no evaluator
+# works.
 _MIN_RATE_HZ, _MAX_RATE_HZ = 50.0, 100_000.0
-"""Below the first, nothing is left of a peak of 0.1 s; above the second, no evaluator
-works."""
 
+# An elbow's range with room for a goniometer that is not zeroed, rad.
 _ANGLE_RANGE = (math.radians(-30.0), math.radians(210.0))
-"""An elbow's range with room for a goniometer that is not zeroed, rad."""
 
+# A movement of less is no stretch, rad.
 MIN_TRAVEL = math.radians(15.0)
-"""A movement of less is no stretch, rad."""
 
+# No manual stretch of an elbow asks for more, N·m.
 _MAX_TORQUE = 100.0
-"""No manual stretch of an elbow asks for more, N·m."""
 
+# So many equal samples in a row, at the largest torque and nowhere else, are a sensor
+# at the end of its range.
 _SATURATED_RUN = 10
-"""So many equal samples in a row, at the largest torque and nowhere else, are a
-sensor at the end of its range."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -186,21 +185,17 @@ def _saturated(name: str, torque: _Floats) -> NDArray[np.bool_]:
     return marked
 
 
+# Quantity to unit to its size in SI; the velocity may be absent.
 _UNITS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
     "angle": {"deg": math.pi / 180.0, "rad": 1.0},
     "torque": {"nm": 1.0, "mnm": 1e-3, "ncm": 1e-2},
     "velocity": {"deg_s": math.pi / 180.0, "rad_s": 1.0},
 }
-"""Quantity to unit to its size in SI; the velocity may be absent."""
-
-_OPTIONAL = ("velocity",)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Column:
-    """A column of a recording."""
-
+class _Column(NamedTuple):
+    # of a recording, and the size of its unit in SI
     name: str
     factor: float
 
@@ -209,20 +204,31 @@ def _find_columns(
     names: Sequence[str],
     *,
     source: str,
-    columns: Mapping[str, str] | None = None,
-    units: Mapping[str, str] | None = None,
+    columns: Mapping[str, str],
+    units: Mapping[str, str],
     quantities: Iterable[str] = _UNITS,
 ) -> dict[str, _Column]:
-    """Find the columns of time, angle, torque and, if there is one, velocity."""
-    columns, units = dict(columns or {}), dict(units or {})
+    # the columns of time, angle, torque and, if there is one, velocity
     _check_options(columns, units)
     result = {}
     for quantity in quantities:
-        column = _find(names, quantity, source, columns.get(quantity), units)
-        if column is not None:
-            result[quantity] = column
-        elif quantity not in _OPTIONAL:
-            forms = [f"{quantity}_{unit}" for unit in _UNITS[quantity]]
+        forms = [f"{quantity}_{unit}" for unit in _UNITS[quantity]]
+        declared = columns.get(quantity)
+        fitting = [n for n in names if n.strip().lower() in (quantity, *forms)]
+        if declared is not None:
+            fitting = [declared]
+            if declared not in names:
+                raise RecordingError(
+                    f"{source}: needs the column {declared!r}, got {', '.join(names)}"
+                )
+        if len(fitting) > 1:
+            raise RecordingError(
+                f"{source}: needs one column of {quantity}, got {', '.join(fitting)}"
+            )
+        if fitting:
+            requested = units.get(quantity)
+            result[quantity] = _with_unit(fitting[0], quantity, source, requested)
+        elif quantity != "velocity":
             raise RecordingError(
                 f"{source}: needs a column of {quantity}: {', '.join(forms)}, or its "
                 f"name given; got {', '.join(names) or 'no columns'}"
@@ -244,115 +250,131 @@ def _check_options(columns: Mapping[str, str], units: Mapping[str, str]) -> None
             )
 
 
-def _find(
-    names: Sequence[str],
-    quantity: str,
-    source: str,
-    declared: str | None,
-    units: Mapping[str, str],
-) -> _Column | None:
-    if declared is not None:
-        if declared not in names:
-            raise RecordingError(
-                f"{source}: needs the column {declared!r}, got {', '.join(names)}"
-            )
-        fitting = [declared]
-    else:
-        forms = {quantity, *(f"{quantity}_{unit}" for unit in _UNITS[quantity])}
-        fitting = [name for name in names if name.strip().lower() in forms]
-    if len(fitting) > 1:
-        raise RecordingError(
-            f"{source}: needs one column of {quantity}, got {', '.join(fitting)}"
-        )
-    if not fitting:
-        return None
-    return _with_unit(fitting[0], quantity, source, units.get(quantity))
-
-
 def _with_unit(name: str, quantity: str, source: str, requested: str | None) -> _Column:
+    units = _UNITS[quantity]
     suffix = name.strip().lower().removeprefix(f"{quantity}_")
-    named = suffix if suffix in _UNITS[quantity] else None
-    if named is not None and requested is not None and named != requested:
+    if suffix in units and requested not in (None, suffix):
         raise RecordingError(
-            f"{source}: column {name} says {named}, units says {requested} for "
+            f"{source}: column {name} says {suffix}, units says {requested} for "
             f"{quantity}"
         )
-    unit = named or requested
+    unit = suffix if suffix in units else requested
     if unit is None:
         raise RecordingError(
             f"{source}: column {name} has no unit: name it "
-            f"{' or '.join(f'{quantity}_{u}' for u in _UNITS[quantity])}, or say the "
+            f"{' or '.join(f'{quantity}_{u}' for u in units)}, or say the "
             f"unit of {quantity}"
         )
-    return _Column(name=name, factor=_UNITS[quantity][unit])
+    return _Column(name, units[unit])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Archive:
-    path: Path
-    arrays: dict[str, NDArray[np.generic]] = field(repr=False)
+class _Table:
+    """A recording of any kind: its columns by name, as they are asked for."""
+
+    names: Sequence[str]
+    column: Callable[[str], _Floats]
     simulated: bool
     model: str | None = None
+    sha256: str
 
-    @property
-    def names(self) -> list[str]:
-        return list(self.arrays)
 
-    def column(self, name: str) -> _Floats:
-        array = self.arrays[name]
+def _read_table(path: Path) -> _Table:
+    if not path.is_file():
+        why = "a folder; needs a file" if path.is_dir() else "no such file"
+        why = "not a regular file" if path.exists() and not path.is_dir() else why
+        raise RecordingError(f"{path}: {why}")
+    content = read_regular(path, most=MAX_RECORDING)
+    read = _read_archive if path.suffix.lower() == ".npz" else _read_text
+    return read(path, content)
+
+
+def _read_archive(path: Path, content: bytes) -> _Table:
+    arrays, model = _read_columns(path, content), None
+    if _is_own(arrays) and path.with_suffix(".json").is_file():
+        local = read_recording(path)  # holds it to its checksum
+        simulated = local.facts.get("simulated") is True
+        arrays = {
+            name: column[: local.n_presented] for name, column in local.columns.items()
+        }
+        if faults := local.facts.get("channel_faults"):
+            warnings.warn(f"{path}: {faults}", RecordingWarning, stacklevel=4)
+        model = local.facts.get("model")
+    else:
+        simulated = bool(np.any(arrays.pop("simulated", False)))
+
+    def column(name: str) -> _Floats:
+        array = arrays[name]
         if array.ndim != 1 or array.dtype.kind not in "iuf":
             raise RecordingError(
-                f"{self.path}: column {name} needs numbers in one dimension, got "
+                f"{path}: column {name} needs numbers in one dimension, got "
                 f"{array.dtype} of shape {array.shape}"
             )
         numbers = array.astype(np.float64)
         if np.isinf(numbers).any():
             place = int(np.argmax(np.isinf(numbers)))
             raise RecordingError(
-                f"{self.path}, sample {place} (counted from 0), column {name}: needs a "
+                f"{path}, sample {place} (counted from 0), column {name}: needs a "
                 f"finite number, got {numbers[place]}"
             )
         return numbers
 
-
-def _read_archive(path: Path, content: bytes) -> _Archive:
-    arrays = _read_columns(path, content)
-    if _is_own(arrays) and path.with_suffix(".json").is_file():
-        local = read_recording(path)  # holds it to its checksum
-        simulated = local.facts.get("simulated") is True
-        shown: dict[str, NDArray[np.generic]] = {
-            name: column[: local.n_presented] for name, column in local.columns.items()
-        }
-        if faults := local.facts.get("channel_faults"):
-            warnings.warn(f"{path}: {faults}", RecordingWarning, stacklevel=4)
-        model = local.facts.get("model")
-        named = model if isinstance(model, str) else None
-        return _Archive(path=path, arrays=shown, simulated=simulated, model=named)
-    simulated = bool(np.any(arrays.pop("simulated", False)))
-    return _Archive(path=path, arrays=arrays, simulated=simulated)
+    return _Table(
+        names=list(arrays),
+        column=column,
+        simulated=simulated,
+        model=model if isinstance(model, str) else None,
+        sha256=hashlib.sha256(content).hexdigest(),
+    )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Text:
-    path: Path
-    names: list[str]
-    rows: list[list[str]] = field(repr=False)
-    lines: list[int] = field(repr=False)  # where each row stands, from 1 on
-    simulated: bool
-    model: None = None
+def _read_text(path: Path, content: bytes) -> _Table:
+    try:
+        lines = content.decode("utf-8-sig").splitlines()
+    except UnicodeDecodeError as error:
+        raise RecordingError(f"{path}: {not_utf8(error)}") from error
+    is_remark = [line.startswith("#") or not line.strip() for line in lines]
+    if all(is_remark):
+        raise RecordingError(f"{path}: needs a line of column names, got none")
+    remarks = is_remark.index(False)
+    separator = max(",;\t", key=lines[remarks].count)
+    try:
+        names, *rows = csv.reader(lines[remarks:], delimiter=separator)
+    except csv.Error as error:
+        raise RecordingError(f"{path}: needs cells of numbers ({error})") from error
+    names = [name.strip() for name in names]
+    if len(set(names)) != len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise RecordingError(f"{path}: column {twice!r} is there twice")
+    # rows that are not blank, by the line where they stand
+    filled = {line: row for line, row in enumerate(rows, remarks + 2) if row}
+    for line, row in filled.items():
+        if len(row) != len(names):
+            raise RecordingError(
+                f"{path}, line {line}: needs {len(names)} cells, got {len(row)}"
+            )
 
-    def column(self, name: str) -> _Floats:
-        place = self.names.index(name)
-        numbers = np.empty(len(self.rows))
-        for i, row in enumerate(self.rows):
+    def column(name: str) -> _Floats:
+        place = names.index(name)
+        numbers = []
+        for line, row in filled.items():
             try:
-                numbers[i] = _number(row[place])
+                numbers.append(_number(row[place]))
             except ValueError as error:
                 raise RecordingError(
-                    f"{self.path}, line {self.lines[i]}, column {name}: needs a number "
+                    f"{path}, line {line}, column {name}: needs a number "
                     f"with a decimal point, or nothing; got {row[place]!r}"
                 ) from error
-        return numbers
+        return np.array(numbers, dtype=np.float64)
+
+    pairs = [line.removeprefix("#").partition(":") for line in lines[:remarks]]
+    return _Table(
+        names=names,
+        column=column,
+        simulated=("simulated", "true")
+        in [(k.strip(), v.strip()) for k, _, v in pairs],
+        sha256=hashlib.sha256(content).hexdigest(),
+    )
 
 
 def _number(cell: str) -> float:
@@ -364,70 +386,16 @@ def _number(cell: str) -> float:
     return value
 
 
-def _read_text(path: Path, content: bytes) -> _Text:
-    try:
-        lines = content.decode("utf-8-sig").splitlines()
-    except UnicodeDecodeError as error:
-        raise RecordingError(f"{path}: {not_utf8(error)}") from error
-    remarks = 0
-    while remarks < len(lines) and (
-        lines[remarks].startswith("#") or not lines[remarks].strip()
-    ):
-        remarks += 1
-    if remarks == len(lines):
-        raise RecordingError(f"{path}: needs a line of column names, got none")
-    separator = max(",;\t", key=lines[remarks].count)
-    try:
-        rows = list(csv.reader(lines[remarks:], delimiter=separator))
-    except csv.Error as error:
-        raise RecordingError(f"{path}: needs cells of numbers ({error})") from error
-    names = [name.strip() for name in rows[0]]
-    if len(set(names)) != len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise RecordingError(f"{path}: column {twice!r} is there twice")
-    filled = _filled(path, rows[1:], len(names), remarks + 2)
-    return _Text(
-        path=path,
-        names=names,
-        rows=[row for _, row in filled],
-        lines=[line for line, _ in filled],
-        simulated=any(_is_simulated(line) for line in lines[:remarks]),
-    )
-
-
-def _filled(
-    path: Path, rows: list[list[str]], n_columns: int, first: int
-) -> list[tuple[int, list[str]]]:
-    # rows that are not blank, each with its line; `first` is the line of the first
-    filled = [(first + i, row) for i, row in enumerate(rows) if row]
-    for line, row in filled:
-        if len(row) != n_columns:
-            raise RecordingError(
-                f"{path}, line {line}: needs {n_columns} cells, got {len(row)}"
-            )
-    return filled
-
-
-def _is_simulated(remark: str) -> bool:
-    key, _, value = remark.removeprefix("#").partition(":")
-    return key.strip() == "simulated" and value.strip() == json.dumps(True)
-
-
-def _read_table(path: Path) -> tuple[_Archive | _Text, bytes]:
-    # a recording of any kind, and its bytes
-    if not path.is_file():
-        why = "a folder; needs a file" if path.is_dir() else "no such file"
-        why = "not a regular file" if path.exists() and not path.is_dir() else why
-        raise RecordingError(f"{path}: {why}")
-    content = read_regular(path, most=MAX_RECORDING)
-    read = _read_archive if path.suffix.lower() == ".npz" else _read_text
-    return read(path, content), content
-
-
 def read_angles(path: Path) -> tuple[_Floats, _Floats]:
     """Return times, s, and angles, rad, of a recording, whatever else is in it."""
-    table, _ = _read_table(path)
-    columns = _find_columns(table.names, source=str(path), quantities=("time", "angle"))
+    table = _read_table(path)
+    columns = _find_columns(
+        table.names,
+        source=str(path),
+        columns={},
+        units={},
+        quantities=("time", "angle"),
+    )
     time, angle = (table.column(c.name) * c.factor for c in columns.values())
     return time, angle
 
@@ -492,13 +460,13 @@ def read_movement(
     -----
     Columns that are not named here, such as EMG, are left alone.
     """
-    table, content = _read_table(path)
+    table = _read_table(path)
+    columns, units = dict(columns or {}), dict(units or {})
     source: TorqueSource = "recorded"
-    if _is_own(table.names) and "torque" not in (columns or {}):
+    if _is_own(table.names) and "torque" not in columns:
         source = "sensor" if MEASURED_TORQUE.column in table.names else "model"
         torque = MEASURED_TORQUE.column if source == "sensor" else _MODEL
-        columns = {"torque": torque, **(columns or {})}
-        units = {"torque": "nm", **(units or {})}
+        columns, units = {"torque": torque, **columns}, {"torque": "nm", **units}
     result = _find_columns(table.names, source=str(path), columns=columns, units=units)
     values = {key: table.column(column.name) for key, column in result.items()}
     if of_device and source != "recorded":
@@ -508,12 +476,22 @@ def read_movement(
                 "does beside the torque that is sent only its sensor can tell"
             )
         values["torque"] = values["torque"] - table.column(_COMMANDED)
-    _check_lengths(path, {result[key].name: values[key] for key in values})
+    sizes = {result[key].name: column.size for key, column in values.items()}
+    if len(set(sizes.values())) > 1:
+        words = ", ".join(f"{name} {size}" for name, size in sizes.items())
+        raise RecordingError(f"{path}: columns need one length, got {words}")
     whole = np.isfinite(np.stack(list(values.values()))).all(axis=0)
     if not whole.all():
         empty = {result[key].name: int(np.isnan(values[key]).sum()) for key in values}
+        words = ", ".join(f"{name} {count}" for name, count in empty.items() if count)
+        n_rows = int((~whole).sum())
+        rows, left = (
+            (f"{n_rows} rows have", "are") if n_rows > 1 else ("1 row has", "is")
+        )
         warnings.warn(
-            _left_out(path, int((~whole).sum()), empty), RecordingWarning, stacklevel=2
+            f"{path}: {rows} an empty cell ({words}) and {left} left out",
+            RecordingWarning,
+            stacklevel=2,
         )
     si = {key: values[key][whole] * result[key].factor for key in values}
     return Movement(
@@ -525,69 +503,55 @@ def read_movement(
         simulated=table.simulated,
         torque_source=source,
         model=table.model,
-        sha256=hashlib.sha256(content).hexdigest(),
+        sha256=table.sha256,
     )
 
 
-def _check_lengths(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> None:
-    sizes = {name: column.size for name, column in columns.items()}
-    if len(set(sizes.values())) > 1:
-        message = ", ".join(f"{name} {size}" for name, size in sizes.items())
-        raise RecordingError(f"{path}: columns need one length, got {message}")
-
-
-def _left_out(path: Path, n_rows: int, empty: Mapping[str, int]) -> str:
-    message = ", ".join(f"{name} {count}" for name, count in empty.items() if count)
-    rows = "1 row has" if n_rows == 1 else f"{n_rows} rows have"
-    left = "is" if n_rows == 1 else "are"
-    return f"{path}: {rows} an empty cell ({message}) and {left} left out"
-
-
+# Gaps up to this are bridged by straight lines, longer ones are left out, s.
 _LONGEST_GAP = 0.02
-"""Gaps up to this are bridged by straight lines, longer ones are left out, s."""
 
+# Steps that differ from the median by less than this share of it are even.
 _EVEN = 1e-3
-"""Steps that differ from the median by less than this share of it are even."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Samples:
-    """A movement at even times."""
+class Samples(NamedTuple):
+    """A movement at even times, each column of shape (n_samples,), SI units."""
 
-    name: str
     period: float
-    time: _Floats = field(compare=False, repr=False)
-    angle: _Floats = field(compare=False, repr=False)
-    torque: _Floats = field(compare=False, repr=False)
-    in_gap: NDArray[np.bool_] = field(compare=False, repr=False)
-    saturated: NDArray[np.bool_] = field(compare=False, repr=False)
+    time: _Floats
+    angle: _Floats
+    torque: _Floats
+    in_gap: NDArray[np.bool_]
+    saturated: NDArray[np.bool_]
+
+    def cut(self, which: slice) -> "Samples":
+        """Return some of the samples."""
+        return Samples(
+            self.period,
+            self.time[which],
+            self.angle[which],
+            self.torque[which],
+            self.in_gap[which],
+            self.saturated[which],
+        )
 
 
 def even_samples(movement: Movement) -> Samples:
     """Put a movement on even times."""
-    time = movement.time
+    time, cut = movement.time, movement.saturated
     steps = np.diff(time)
     period = float(np.median(steps))
     if np.abs(steps - period).max() <= _EVEN * period:
-        return Samples(
-            name=movement.name,
-            period=period,
-            time=time,
-            angle=movement.angle,
-            torque=movement.torque,
-            in_gap=np.zeros(time.size, dtype=np.bool_),
-            saturated=movement.saturated,
-        )
+        whole = np.zeros(time.size, dtype=np.bool_)
+        return Samples(period, time, movement.angle, movement.torque, whole, cut)
     even = time[0] + period * np.arange(int((time[-1] - time[0]) / period + 1e-9) + 1)
     before = np.clip(np.searchsorted(time, even, side="right") - 1, 0, time.size - 2)
-    cut = movement.saturated
     inside = (even > time[before]) & (even < time[before + 1])
     return Samples(
-        name=movement.name,
-        period=period,
-        time=even,
-        angle=np.interp(even, time, movement.angle),
-        torque=np.interp(even, time, movement.torque),
-        in_gap=inside & (steps[before] > max(_LONGEST_GAP, 5.0 * period)),
-        saturated=cut[before] | (cut[before + 1] & inside),
+        period,
+        even,
+        np.interp(even, time, movement.angle),
+        np.interp(even, time, movement.torque),
+        inside & (steps[before] > max(_LONGEST_GAP, 5.0 * period)),
+        cut[before] | (cut[before + 1] & inside),
     )

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _Floats = NDArray[np.float64]
 
+
 UNDETERMINED = "these trials do not determine it"
 
 

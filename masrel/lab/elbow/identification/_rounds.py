@@ -1,51 +1,142 @@
 """Trials and the fit of them, in turn: each round knows what the one before found.
 
-In: stretches and the fit of the slow ones. Out: the last round.
+In: stretches, and what a fit is asked for. Out: the last round.
 """
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
+from masrel.errors import ParameterError
 from masrel.lab.elbow.identification._catches import (
-    Arm,
-    Catch,
-    CatchLevels,
-    PreCatchLaw,
+    Law,
     Trial,
     catch_levels,
     fast_trial,
 )
-from masrel.lab.elbow.identification._equations import Equations, Known, Spreads
-from masrel.lab.elbow.identification._fit_options import STARTS, FitOptions
-from masrel.lab.elbow.identification._joint_fit import Solution, fit_together
-from masrel.lab.elbow.identification._quantities import ARM_QUANTITIES, QUANTITIES
+from masrel.lab.elbow.identification._equations import (
+    DetectionLimit,
+    Equations,
+    Known,
+    Solution,
+    fit_together,
+)
+from masrel.lab.elbow.identification._model_file import ARM_QUANTITIES, QUANTITIES
 from masrel.lab.elbow.identification._results import Step
 from masrel.lab.elbow.identification._steps import (
     SlowFit,
     can_be_censored,
+    detection_limit,
     fit_catch_line,
-    fit_catch_torque,
-    fit_catch_travel,
+    fit_catches,
     fit_post_catch,
+    fit_slow,
     on_the_line,
+    travels_seen,
 )
 from masrel.lab.elbow.identification._stretches import Stretch
-from masrel.lab.elbow.identification._travels import DetectionLimit, detection_limit
 from masrel.lab.elbow.parameters import ElbowParameters
 
+# What an arm has: nothing of it, a fixed value in SI units, or what is fitted.
+Term = float | Literal["off", "fitted"]
+
+# What slow trials tell.
 ALWAYS = ("damping", "stiffness", "inertia")
-"""What slow trials tell."""
+
+# Of what takes time: where the search for it begins, s.
+_STARTS = {"lag": (0.004, 0.016), "catch_rise": (0.01, 0.04, 0.08)}
+
+# In periods of samples: none is told from nothing that is shorter. The search may go
+# below, to a quarter of it.
+_FLOORS, _BELOW = {"lag": 0.2, "catch_rise": 3.0}, 0.25
 
 # Of catches and fit, where what an arm has moves the catches, or makes them last.
 _ROUNDS, _TIMED_ROUNDS = 2, 8
 
-# Of a lag and a rise, in periods of samples: none is found that is shorter.
-_FLOORS = {"lag": 0.2, "catch_rise": 3.0}
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FitOptions:
+    """The options of a fit, as it takes them; refuses those outside their ranges."""
+
+    constants: ElbowParameters
+    terms: Mapping[str, Term]  # of the arm
+    gravity_angle: float
+    inertia: str
+    slow_below: float
+    window: float
+    level: float
+
+    def __post_init__(self) -> None:
+        held = self.constants
+        if not 0.5 < self.level < 1.0:
+            raise ParameterError(
+                f"level: needs more than 0.5 and less than 1, got {self.level}"
+            )
+        if held.residual_reading != "residual" or held.catch_rise != 0.0:
+            raise ParameterError(
+                "constants: a fit reads Q as section II does and takes the rise of a "
+                'catch from its option; needs residual_reading "residual" and '
+                f"catch_rise 0, got {held.residual_reading!r} and {held.catch_rise:g}"
+            )
+        for name, unit in (("slow_below", ""), ("window", " s")):
+            if not 0.0 < (value := getattr(self, name)) < math.inf:
+                raise ParameterError(f"{name}: needs more than 0{unit}, got {value}")
+        if self.inertia not in ("zero", "fitted"):
+            raise ParameterError(
+                f'inertia: needs "zero" or "fitted", got {self.inertia!r}'
+            )
+        if self.inertia == "fitted" and held.post_catch == "additive":
+            raise ParameterError(
+                'inertia: with post_catch "additive", m is in every phase but the '
+                "catch, and where one ends cannot be told from the jump of m·θ̈; needs "
+                '"zero", got "fitted"'
+            )
+        for name, term in self.terms.items():
+            _check_term({"catch_rise": "rise"}.get(name, name), term, held)
+        if not math.isfinite(self.gravity_angle):
+            raise ParameterError(
+                f"gravity_angle: needs a finite angle, got {self.gravity_angle}"
+            )
+
+    @property
+    def fitted(self) -> tuple[str, ...]:
+        """Return the names of what is fitted of the arm."""
+        return tuple(name for name, term in self.terms.items() if term == "fitted")
+
+    @property
+    def offset(self) -> float | None:
+        """Return the constant torque of every trial, N·m; None if it is fitted."""
+        term = self.terms["offset"]
+        return None if term == "fitted" else _number(term)
+
+    def law(self) -> Law:
+        """Return what is held of the arm."""
+        values: dict[str, Any] = {
+            name: _number(term) for name, term in self.terms.items() if name != "offset"
+        }
+        fits = "arm_inertia" in self.fitted
+        return Law(gravity_angle=self.gravity_angle, fits_inertia=fits, **values)
+
+
+def _number(term: Term) -> float:
+    return 0.0 if isinstance(term, str) else float(term)
+
+
+def _check_term(name: str, term: object, held: ElbowParameters) -> None:
+    if isinstance(term, str) and term in ("off", "fitted"):
+        return
+    if not isinstance(term, int | float) or not math.isfinite(term):
+        raise ParameterError(f'{name}: needs "off", "fitted" or a number, got {term!r}')
+    if name in ("arm_inertia", "lag", "rise") and term < 0.0:
+        raise ParameterError(f"{name}: needs 0 or more, got {term:g}")
+    if name == "rise" and term > held.peak_duration:
+        raise ParameterError(
+            f"rise: needs 0 to ΔT_peak, {held.peak_duration:g} s, got {term:g} s"
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,242 +145,219 @@ class Round:
 
     fast: Sequence[Trial]
     trials: list[Trial]  # slow and fast ones that are used
-    arm: Arm
+    law: Law
     limits: list[DetectionLimit | None]
     steps: list[Step]
     equations: list[Equations]
     solution: Solution
 
+    def shared(self) -> dict[str, float]:
+        """Return the shared parameters by name."""
+        names = self.equations[0].known.names
+        return dict(zip(names, self.solution.shared.tolist(), strict=True))
+
+    def floor(self, name: str) -> float:
+        """Return what a lag or a rise must exceed to be told from none, s."""
+        return _FLOORS[name] * _period(self.trials)
+
+    def untimed(self) -> dict[str, str]:
+        """Return why a lag or a rise is not fitted: samples tell it from none."""
+        floors = {name: self.floor(name) for name in _FLOORS}
+        return {
+            name: f"shorter than {1000.0 * floors[name]:.2g} ms, which these samples "
+            "do not tell from nothing: taken as 0"
+            for name, value in self.shared().items()
+            if name in floors and value <= floors[name]
+        }
+
+
+def _period(trials: Sequence[Trial]) -> float:
+    return float(np.median(np.diff(trials[0].pre_catch.time)))
+
+
+def slow_fit(trials: Sequence[Trial], options: FitOptions) -> SlowFit:
+    """Fit what slow trials tell: step 1."""
+    more = {
+        "inertia": options.inertia == "fitted",
+        "gravity": "gravity" in options.fitted,
+    }
+    known = Known(
+        names=("damping", "stiffness", *(name for name, fits in more.items() if fits)),
+        constants=options.constants,
+        spreads={"torque": 1.0},
+        law=options.law(),
+        offset=options.offset,
+        drifts="drift" in options.fitted,
+    )
+    # in front of a catch, a lag that is not known yet is none
+    return fit_slow(
+        trials, replace(known, law=replace(known.law, lag=0.0)), level=options.level
+    )
+
 
 def fit_in_rounds(
-    stretches: Mapping[str, Stretch], slow: SlowFit, arm: Arm, options: FitOptions
+    stretches: Mapping[str, Stretch], slow: SlowFit, options: FitOptions
 ) -> Round:
     """Fit trials in rounds: what an arm has moves catches, and catches tell that."""
-    law, arm = slow.law, replace(arm, gravity=slow.gravity)
+    first = replace(options.law(), **_of_law(slow))
+    # the sum of squares has a valley for each of several lags and rises
+    timed = [name for name in _STARTS if name in options.fitted]
+    starts: list[dict[str, Any]] = [
+        dict(zip(timed, each, strict=True))
+        for each in product(*(_STARTS[name] for name in timed))
+    ]
     tries = [
-        _round(stretches, slow, law, each, options) for each in _starts(options, arm)
+        _round(stretches, slow, replace(first, **each), options) for each in starts
     ]
     made = min(tries, key=lambda each: each.solution.typical)
     n_rounds = _ROUNDS if set(options.fitted) - {"offset"} else 1
-    for _ in range((_TIMED_ROUNDS if made.arm.takes_time else n_rounds) - 1):
-        law, arm = _next(law, made)
-        instants = _instants(made)
-        settled = instants and _is_settled(made)
-        made = _round(stretches, slow, law, arm, options, instants)
+    for _ in range((_TIMED_ROUNDS if made.law.takes_time else n_rounds) - 1):
+        values = made.solution.values(made.equations)
+        shifts = {
+            trial.name: at["shift"]
+            for trial, at in zip(made.trials, values, strict=True)
+            if "shift" in at
+        }
+        # no catch moves by more than a sample
+        settled = shifts and max(map(abs, shifts.values())) < _period(made.trials)
+        made = _round(
+            stretches, slow, _next(made, options), options, _instants(made, shifts)
+        )
         if settled:
             break
     return made
 
 
-def _starts(options: FitOptions, arm: Arm) -> list[Arm]:
-    # the sum of squares has a valley for each of several lags and rises
-    timed = [name for name in STARTS if name in options.fitted]
-    starts: list[dict[str, Any]] = [
-        dict(zip(timed, each, strict=True))
-        for each in product(*(STARTS[name] for name in timed))
-    ]
-    return [replace(arm, **each) for each in starts]
+def _of_law(slow: SlowFit) -> dict[str, Any]:
+    return {e.name: e.value for e in slow.step.estimates}
+
+
+def _next(made: Round, options: FitOptions) -> Law:
+    # what the fit says of the law before a catch, and of the arm
+    values = made.solution.values(made.equations)
+    drifts = {t.name: at["drift"] for t, at in zip(made.trials, values, strict=True)}
+    found: dict[str, Any] = {
+        name: value
+        for name, value in made.shared().items()
+        if name in ALWAYS or name in ARM_QUANTITIES
+    }
+    found["drifts"] = drifts if "drift" in options.fitted else {}
+    return replace(made.law, **found)
+
+
+def _instants(made: Round, shifts: Mapping[str, float]) -> dict[str, float]:
+    # where the fit has each catch begin
+    return {
+        trial.name: trial.catch.time + shifts[trial.name]
+        for trial in made.trials
+        if trial.catch is not None and trial.name in shifts
+    }
 
 
 def _round(
     stretches: Mapping[str, Stretch],
     slow: SlowFit,
-    law: PreCatchLaw,
-    arm: Arm,
+    law: Law,
     options: FitOptions,
     instants: Mapping[str, float] | None = None,
 ) -> Round:
+    constants, level, instants = options.constants, options.level, instants or {}
     fast = [
-        fast_trial(
-            stretch,
-            name,
-            options.constants,
-            law,
-            options.window,
-            arm,
-            (instants or {}).get(name),
-        )
+        fast_trial(stretch, name, constants, law, options.window, instants.get(name))
         for name, stretch in stretches.items()
         if stretch.pace == "fast"
     ]
-    return _fit_trials(slow, fast, arm, options)
-
-
-def _is_settled(made: Round) -> bool:
-    # no catch moves by more than a sample
-    period = _floor("catch_rise", made.equations) / _FLOORS["catch_rise"]
-    return all(abs(local.get("shift", 0.0)) < period for local in locals_of(made))
-
-
-def untimed(made: Round) -> dict[str, str]:
-    """Return why a lag or a rise is not fitted: samples do not tell it from none."""
-    names = made.equations[0].known.names
-    values = dict(zip(names, made.solution.shared.tolist(), strict=True))
-    floors = {n: _floor(n, made.equations) for n in STARTS if n in values}
-    return {
-        name: f"shorter than {1000.0 * floor:.2g} ms, which these samples do not tell "
-        "from nothing: taken as 0"
-        for name, floor in floors.items()
-        if values[name] <= 1.001 * floor
+    caught = [trial for trial in fast if trial.catch is not None]
+    trials = [*slow.trials, *caught]
+    # steps take what earlier ones found as known
+    alone = replace(law, **{k: v for k, v in _of_law(slow).items() if k in ALWAYS})
+    read = {
+        trial.name: levels
+        for trial in caught
+        if (levels := catch_levels(trial, alone, constants))
     }
-
-
-def _fit_trials(
-    slow: SlowFit,
-    fast: Sequence[Trial],
-    arm: Arm,
-    options: FitOptions,
-) -> Round:
-    constants, level = options.constants, options.level
-    trials = [*slow.trials, *(trial for trial in fast if trial.catch is not None)]
-    read = [catch_levels(trial, slow.law, constants, arm) for trial in trials]
-    post = fit_post_catch([each for each in read if each is not None], level=level)
-    stiffness = post["post_catch_stiffness"].value
-    limits = _limits(trials, read, slow, stiffness, options)
-    steps = [slow.step]
-    if len(trials) > len(slow.trials):
-        steps += [*_catch_steps(trials, read, limits, constants, level), post]
-    start = _start(steps, options, arm)
-    names = tuple(name for name, value in start.items() if not math.isnan(value))
-    lines = _on_line(trials, constants)
+    post = fit_post_catch(list(read.values()), level=level)
+    limits = _limits(
+        trials, list(read), alone, post["post_catch_stiffness"].value, options
+    )
+    steps, on_line = [slow.step], {}
+    if caught:
+        catches = [trial.catch for trial in caught if trial.catch is not None]
+        used = [t.catch for t in caught if t.catch is not None and t.name in read]
+        behind = [limit for limit in limits if limit is not None]
+        steps += [
+            fit_catch_line(catches, constants, level=level),
+            *fit_catches(used, list(read.values()), behind, level=level),
+            post,
+        ]
+        lies = on_the_line(catches, constants).tolist()
+        on_line = {trial.name: on for trial, on in zip(caught, lies, strict=True)}
+    start = _start(steps, options, law)
+    known = Known(
+        names=tuple(name for name, value in start.items() if not math.isnan(value)),
+        constants=constants,
+        spreads=_spreads(steps),
+        law=law,
+        offset=options.offset,
+        drifts="drift" in options.fitted,
+    )
     equations = [
-        Equations(
-            trial,
-            Known(
-                names=names,
-                constants=constants,
-                spreads=_spreads(steps),
-                arm=arm,
-                offset=options.offset,
-                drifts="drift" in options.fitted,
-                on_line=on_line,
-                limit=limit,
-            ),
-        )
-        for trial, on_line, limit in zip(trials, lines, limits, strict=True)
+        Equations(t, replace(known, on_line=on_line.get(t.name, False), limit=limit))
+        for t, limit in zip(trials, limits, strict=True)
     ]
-    floors = {name: _floor(name, equations) for name in STARTS if name in start}
+    lowest = {name: _BELOW * n * _period(trials) for name, n in _FLOORS.items()}
     return Round(
         fast=fast,
         trials=trials,
-        arm=arm,
+        law=law,
         limits=limits,
         steps=steps,
         equations=equations,
-        solution=fit_together(equations, start, floors),
+        solution=fit_together(equations, start, lowest),
     )
-
-
-def _floor(name: str, equations: Sequence[Equations]) -> float:
-    return _FLOORS[name] * float(np.median(np.diff(equations[0].time)))
-
-
-def _start(steps: Sequence[Step], options: FitOptions, arm: Arm) -> dict[str, float]:
-    start = dict.fromkeys(QUANTITIES, math.nan)
-    start |= {e.name: e.value for step in steps for e in step.estimates}
-    has_catch = not math.isnan(start["catch_torque_constant"])
-    for name in ARM_QUANTITIES:
-        needs_catch = name in ("lag", "catch_rise")
-        if name in options.fitted and (has_catch or not needs_catch):
-            start[name] = float(getattr(arm, name))
-    return start
-
-
-def locals_of(made: Round) -> list[dict[str, float]]:
-    """Return each trial's own parameters by name."""
-    return [
-        dict(zip(e.local, values.tolist(), strict=True))
-        for e, values in zip(made.equations, made.solution.local, strict=True)
-    ]
-
-
-def _next(law: PreCatchLaw, made: Round) -> tuple[PreCatchLaw, Arm]:
-    # what the fit says of the law before a catch, and of the arm
-    names = made.equations[0].known.names
-    values = dict(zip(names, made.solution.shared.tolist(), strict=True))
-    drifts = {
-        trial.name: local["drift"]
-        for trial, local in zip(made.trials, locals_of(made), strict=True)
-        if "drift" in local
-    }
-    of_arm: dict[str, Any] = {n: values[n] for n in ARM_QUANTITIES if n in values}
-    of_law = {n: values[n] for n in ALWAYS if n in values}
-    return replace(law, **of_law), replace(made.arm, **of_arm, drifts=drifts)
-
-
-def _instants(made: Round) -> dict[str, float]:
-    # where the fit has each catch begin
-    return {
-        trial.name: trial.catch.time + local["shift"]
-        for trial, local in zip(made.trials, locals_of(made), strict=True)
-        if trial.catch is not None and "shift" in local
-    }
 
 
 def _limits(
     trials: Sequence[Trial],
-    read: Sequence[CatchLevels | None],
-    slow: SlowFit,
+    read: Sequence[str],
+    law: Law,
     stiffness: float,
     options: FitOptions,
 ) -> list[DetectionLimit | None]:
     # Of catches that do not end, if those that do tell how much travels differ. With
     # m, or where the pre-catch law goes on after a catch, the torque may climb or not
     # whatever k_post is: what could have been seen is not one angle.
-    used = [trial.catch for trial, levels in zip(trials, read, strict=True) if levels]
-    seen = [c.travel for c in used if c is not None and c.end is not None]
-    climbs_alone = options.constants.post_catch == "continuous"
-    climbs_alone &= slow.law.inertia == 0.0
-    if not climbs_alone or not can_be_censored(seen):
+    used = [t.catch for t in trials if t.catch is not None and t.name in read]
+    climbs_alone = options.constants.post_catch == "continuous" and law.inertia == 0.0
+    if not climbs_alone or not can_be_censored(travels_seen(used)):
         return [None] * len(trials)
     return [
         detection_limit(trial, stiffness, options.constants)
-        if levels is not None and trial.catch is not None and trial.catch.end is None
+        if trial.name in read and trial.catch is not None and trial.catch.end is None
         else None
-        for trial, levels in zip(trials, read, strict=True)
+        for trial in trials
     ]
 
 
-def _catch_steps(
-    trials: Sequence[Trial],
-    read: Sequence[CatchLevels | None],
-    limits: Sequence[DetectionLimit | None],
-    constants: ElbowParameters,
-    level: float,
-) -> list[Step]:
-    catches = [trial.catch for trial in trials if trial.catch is not None]
-    pairs: list[tuple[Catch, CatchLevels]] = [
-        (trial.catch, levels)
-        for trial, levels in zip(trials, read, strict=True)
-        if trial.catch is not None and levels is not None
-    ]
-    used, levels = [catch for catch, _ in pairs], [read for _, read in pairs]
-    behind = [each for each in limits if each is not None]
-    return [
-        fit_catch_line(catches, constants, level=level),
-        *fit_catch_torque(used, levels, level=level),
-        fit_catch_travel(used, behind, level=level),
-    ]
+def _start(steps: Sequence[Step], options: FitOptions, law: Law) -> dict[str, float]:
+    start = dict.fromkeys(QUANTITIES, math.nan)
+    start |= {e.name: e.value for step in steps for e in step.estimates}
+    has_catch = not math.isnan(start["catch_torque_constant"])
+    for name in ARM_QUANTITIES:
+        if name in options.fitted and (has_catch or name not in _FLOORS):
+            start[name] = float(getattr(law, name))
+    return start
 
 
-def _spreads(steps: Sequence[Step]) -> Spreads:
-    def size_of(name: str) -> float:
-        for step in steps:
-            if any(estimate.name == name for estimate in step.estimates):
-                # of one trial, or of none that differ, any size serves
-                return step.residual_sd if step.residual_sd > 0.0 else 1.0
-        return 1.0
-
-    return Spreads(
-        torque=size_of("damping"),
-        peak=size_of("catch_torque_constant"),
-        residual=size_of("residual_ratio"),
-        catch_angle=size_of("catch_slope"),
-        travel=size_of("catch_travel"),
-    )
-
-
-def _on_line(trials: Sequence[Trial], held: ElbowParameters) -> list[bool]:
-    catches = [trial.catch for trial in trials if trial.catch is not None]
-    lies = iter(on_the_line(catches, held).tolist() if catches else [])
-    return [trial.catch is not None and next(lies) for trial in trials]
+def _spreads(steps: Sequence[Step]) -> dict[str, float]:
+    # of one trial, or of none that differ, any size serves
+    sds = {e.name: step.residual_sd for step in steps for e in step.estimates}
+    of = {
+        "torque": "damping",
+        "peak": "catch_torque_constant",
+        "residual": "residual_ratio",
+        "catch angle": "catch_slope",
+        "travel": "catch_travel",
+    }
+    sizes = {kind: sds.get(name, math.nan) for kind, name in of.items()}
+    return {kind: sd if sd > 0.0 else 1.0 for kind, sd in sizes.items()}

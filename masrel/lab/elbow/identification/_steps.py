@@ -5,37 +5,33 @@ https://doi.org/10.1109/TNSRE.2012.2195330, equations (1)-(6), Figs. 3 to 5.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq, least_squares
+from scipy.special import log_ndtr, stdtrit
 
+from masrel.errors import ConvergenceError
 from masrel.lab.elbow.identification._catches import (
+    MIN_GAIN,
+    MIN_SIGNAL,
     SLOW_WINDOW,
-    Arm,
     Catch,
     CatchLevels,
-    PreCatchLaw,
     Trial,
 )
-from masrel.lab.elbow.identification._clusters import (
-    ClusteredFit,
-    Rows,
-    partial_out,
-    solve,
-)
-from masrel.lab.elbow.identification._equations import line_row
-from masrel.lab.elbow.identification._results import (
-    FittedParameter,
-    Step,
-    fitted,
-)
-from masrel.lab.elbow.identification._travels import (
-    CensoredTravels,
+from masrel.lab.elbow.identification._clusters import Rows, solve
+from masrel.lab.elbow.identification._equations import (
     DetectionLimit,
-    fit_censored,
+    Equations,
+    Known,
+    line_row,
+    mills,
 )
+from masrel.lab.elbow.identification._results import FittedParameter, Step, fitted
 from masrel.lab.elbow.parameters import ElbowParameters
 
 _Floats = NDArray[np.float64]
@@ -43,116 +39,67 @@ _Floats = NDArray[np.float64]
 # Mean speeds must span this, rad/s: less is one speed, which has no slope.
 _MIN_SPAN = math.radians(5.0)
 
-_ITERATIONS = 20  # of Gauss and Newton's method for a line that is nearly straight
+_CANDIDATES = 200  # ends that are tried, whatever the number of samples
+_DOUBLINGS = 60  # of a step towards a change of sign
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlowFit:
     """What slow trials say: b, k and m, and the paper's relative error (Fig. 3)."""
 
-    trials: tuple[Trial, ...]
+    trials: Sequence[Trial]
     step: Step
-    law: PreCatchLaw
-    gravity: float
     relative_error: float
     errors: Mapping[str, float]  # standard errors, of one trial those of its samples
 
 
-def fit_slow(
-    trials: Sequence[Trial],
-    fitted_names: Sequence[str],
-    arm: Arm,
-    *,
-    offset: float | None,
-    rest_angle: float | None,
-    level: float,
-) -> SlowFit:
+def fit_slow(trials: Sequence[Trial], known: Known, *, level: float) -> SlowFit:
     """Fit b, k, and of m, weight and drift what is fitted, to slow trials: step 1.
 
     Each trial has a constant of its own, -k·θ_rest of (1) and the sensor's zero, unless
     the offset is fixed.
     """
-    names = ["damping", "stiffness"]
-    names += [name for name in ("inertia", "gravity") if name in fitted_names]
-    tables, owns = [], []
-    for trial in trials:
-        part = trial.pre_catch
-        rest = trial.rest_angle if rest_angle is None else rest_angle
-        columns = {
-            "damping": part.velocity,
-            "stiffness": part.angle - (0.0 if offset is None else rest),
-            "inertia": part.acceleration,
-            "gravity": np.sin(part.angle - arm.gravity_angle),
-        }
-        local = [np.ones(part.time.size)] if offset is None else []
-        local += [part.time - part.time.mean()] if "drift" in fitted_names else []
-        target = part.torque - arm.torque(part, trial.name) - (offset or 0.0)
-        tables.append(np.column_stack([*local, *(columns[n] for n in names), target]))
-        owns.append(len(local))
-    left = [partial_out(table, n) for table, n in zip(tables, owns, strict=True)]
-    fit = solve([Rows(design=r[:, :-1], target=r[:, -1]) for r in left])
-    far, squares, size, count = _distance(trials, tables, owns, fit.values)
+    equations = [Equations(trial, known) for trial in trials]
+    zeros = np.zeros(len(known.names))
+    starts = [np.zeros(len(e.local)) for e in equations]
+    tables = [
+        e.table(zeros, x, whole=True) for e, x in zip(equations, starts, strict=True)
+    ]
+    rows = [e.rows(zeros, table) for e, table in zip(equations, tables, strict=True)]
+    fit = solve(rows)
+    values, left, size = np.nan_to_num(fit.values), [], 0.0
+    for e, table in zip(equations, tables, strict=True):
+        n = len(e.local)
+        at = table[:, -1] + table[:, n:-1] @ values
+        own = np.linalg.lstsq(table[:, :n], -at, rcond=1e-12)[0]
+        left.append(e.part.torque + at + table[:, :n] @ own - e.part.measured)
+        size += float(np.abs(e.part.measured).sum())
+    away = np.concatenate(left)
     step = Step(
         name="slow trials: b, k of (1)",
-        estimates=fitted(names, fit, level),
-        residual_sd=math.sqrt(squares / count),
+        estimates=fitted(known.names, fit, level),
+        residual_sd=math.sqrt(float((away**2).mean())),
     )
-    return SlowFit(
-        trials=tuple(trials),
-        step=step,
-        law=PreCatchLaw(
-            damping=step["damping"].value,
-            stiffness=step["stiffness"].value,
-            inertia=step["inertia"].value if "inertia" in names else 0.0,
-        ),
-        gravity=step["gravity"].value if "gravity" in names else arm.gravity,
-        relative_error=far / size if size > 0.0 else math.nan,
-        errors=_errors(step, left, trials),
-    )
-
-
-def _errors(
-    step: Step, rows: Sequence[_Floats], trials: Sequence[Trial]
-) -> dict[str, float]:
     errors = {e.name: e.standard_error for e in step.estimates}
-    if len(trials) > 1 or math.isnan(step["damping"].value + step["stiffness"].value):
-        return errors
-    # samples of one trial, of which the filter leaves one in so many independent
-    time, (table,) = trials[0].pre_catch.time, rows
+    if len(trials) == 1 and not np.isnan(fit.values[:2]).any():
+        sds = _errors_of_samples(equations[0].part.time, rows[0], fit.values)
+        errors = dict(zip(errors, sds, strict=True))
+    return SlowFit(
+        trials=trials,
+        step=step,
+        relative_error=float(np.abs(away).sum()) / size if size > 0.0 else math.nan,
+        errors=errors,
+    )
+
+
+def _errors_of_samples(time: _Floats, rows: Rows, values: _Floats) -> list[float]:
+    # of one trial, of which the filter leaves one sample in so many independent
     period = float(np.median(np.diff(time))) if time.size > 1 else 1.0
-    inverse = np.linalg.pinv(table[:, :-1].T @ table[:, :-1], hermitian=True)
-    values = inverse @ (table[:, :-1].T @ table[:, -1])
-    squares = float(((table[:, -1] - table[:, :-1] @ values) ** 2).sum())
+    inverse = np.linalg.pinv(rows.design.T @ rows.design, hermitian=True)
+    left = rows.target - rows.design @ np.nan_to_num(values)
     n_alike = max(SLOW_WINDOW / period, 1.0)
-    df = max(time.size / n_alike - table.shape[1], 1.0)
-    variances = squares / df * np.diag(inverse)
-    return dict(zip(errors, np.sqrt(variances).tolist(), strict=True))
-
-
-def _distance(
-    trials: Sequence[Trial],
-    tables: Sequence[_Floats],
-    owns: Sequence[int],
-    values: _Floats,
-) -> tuple[float, float, float, int]:
-    # measured torque from the law: sums of |distance|, of its square and of |torque|,
-    # and the number of samples
-    far, squares, size, count = 0.0, 0.0, 0.0, 0
-    for trial, table, n in zip(trials, tables, owns, strict=True):
-        left = table[:, -1] - (table[:, n:-1] * values).sum(axis=1)
-        if n:
-            left = left - left.mean()
-        if n == 2:
-            left = left - table[:, 1] * (table[:, 1] @ left) / (
-                table[:, 1] @ table[:, 1]
-            )
-        part = trial.pre_catch
-        error = part.measured - (part.torque - left)
-        far += float(np.abs(error).sum())
-        squares += float((error**2).sum())
-        size += float(np.abs(part.measured).sum())
-        count += part.measured.size
-    return far, squares, size, count
+    df = max(time.size / n_alike - values.size - 1, 1.0)
+    return [math.sqrt(float(left @ left) / df * x) for x in np.diag(inverse)]
 
 
 def on_the_line(
@@ -179,8 +126,8 @@ def fit_catch_line(
     """Fit L and α to catch angles: (2) within the clamps of (6)."""
     names = ("catch_angle_constant", "catch_slope")
     title, slowest = "catch angles: L, α of (2)", constants.slowest_mean_speed
-    on = on_the_line(catches, constants)
-    used = [catch for catch, lies in zip(catches, on.tolist(), strict=True) if lies]
+    on = on_the_line(catches, constants).tolist()
+    used = [catch for catch, lies in zip(catches, on, strict=True) if lies]
     speeds = np.maximum([catch.mean_speed for catch in used], slowest)
     if np.ptp(speeds) < _MIN_SPAN:
         reason = (
@@ -192,84 +139,70 @@ def fit_catch_line(
             for name in names
         )
         return Step(name=title, estimates=estimates, residual_sd=math.nan)
-    design = np.stack([np.ones_like(speeds), -speeds], axis=1)
+
+    def left(x: _Floats) -> _Floats:
+        return np.array([line_row(c, x[0], x[1], slowest)[0] for c in used])
+
+    def slopes(x: _Floats) -> _Floats:
+        return np.array([line_row(c, x[0], x[1], slowest)[1:] for c in used])
+
     angles = np.array([catch.angle for catch in used])
-    values = np.linalg.lstsq(design, angles, rcond=None)[0]
-    for _ in range(_ITERATIONS):
-        rows = _line_rows(used, values, slowest)
-        jacobian = np.concatenate([row.design for row in rows])
-        left = np.concatenate([row.target for row in rows])
-        values = values + np.linalg.lstsq(jacobian, left, rcond=None)[0]
-    fit: ClusteredFit = replace(solve(_line_rows(used, values, slowest)), values=values)
+    plain = np.polyfit(-speeds, angles, 1)[::-1]
+    found = least_squares(left, plain, jac=slopes, ftol=1e-14, gtol=1e-14)
+    pairs = zip(slopes(found.x), left(found.x), strict=True)
+    fit = solve([Rows(by[None], -np.array([far])) for by, far in pairs])
     return Step(
-        name=title, estimates=fitted(names, fit, level), residual_sd=fit.residual_sd
+        name=title,
+        estimates=fitted(names, replace(fit, values=found.x), level),
+        residual_sd=fit.residual_sd,
     )
 
 
-def _line_rows(catches: Sequence[Catch], values: _Floats, slowest: float) -> list[Rows]:
-    rows = []
-    for catch in catches:
-        left, by_line, by_slope = line_row(catch, values[0], values[1], slowest)
-        design = np.array([[by_line, by_slope]])
-        rows.append(Rows(design=design, target=np.array([-left])))
-    return rows
+def fit_catches(
+    catches: Sequence[Catch],
+    levels: Sequence[CatchLevels],
+    limits: Sequence[DetectionLimit],
+    *,
+    level: float,
+) -> list[Step]:
+    """Fit H to peaks against speed, Q to residuals against peaks, (3), and D of (4).
 
-
-def fit_catch_torque(
-    catches: Sequence[Catch], levels: Sequence[CatchLevels], *, level: float
-) -> tuple[Step, Step]:
-    """Fit H to peaks against speed, and Q to residuals against peaks: (3)."""
-    peaks = [
-        (catch.speed, read.peak)
-        for catch, read in zip(catches, levels, strict=True)
-        if not math.isnan(read.peak)
-    ]
+    D is the angle travelled during the catch, ΔT_c·v̄_c: its mean if all catches end,
+    otherwise where the likelihood of all travels is largest, those behind a limit
+    censored there.
+    """
+    read = list(zip(catches, levels, strict=True))
+    peaks = [(c.speed, at.peak) for c, at in read if not math.isnan(at.peak)]
     ratios = [
-        (read.peak, read.residual)
-        for read in levels
-        if not math.isnan(read.residual + read.peak)
+        (at.peak, at.residual) for at in levels if not math.isnan(at.residual + at.peak)
     ]
-    reason = {"residual_ratio": "no torque was recorded after a peak"}
-    return (
+    steps = [
         _one("catch torque: H of (3)", "catch_torque_constant", _rows(peaks), level),
         _one(
-            "residual torque: Q of (3)", "residual_ratio", _rows(ratios), level, reason
+            "residual torque: Q of (3)",
+            "residual_ratio",
+            _rows(ratios),
+            level,
+            "no torque was recorded after a peak",
         ),
-    )
-
-
-def _rows(pairs: Sequence[tuple[float, float]]) -> list[Rows]:
-    return [Rows(design=np.array([[x]]), target=np.array([y])) for x, y in pairs]
-
-
-def fit_catch_travel(
-    catches: Sequence[Catch], limits: Sequence[DetectionLimit], *, level: float
-) -> Step:
-    """Average the angle travelled during the catch, ΔT_c·v̄_c of (4): D.
-
-    The mean if all catches end, otherwise where the likelihood of all travels is
-    largest, those behind a limit censored there.
-    """
-    title, name = "catch travel: D of (4)", "catch_travel"
-    seen = [catch.travel for catch in catches if catch.end is not None]
+    ]
+    title, seen = "catch travel: D of (4)", travels_seen(catches)
     if limits and can_be_censored(seen):
-        fit = fit_censored(CensoredTravels.of(seen, limits), level=level)
-        estimate = FittedParameter(
-            name=name,
-            value=fit.mean,
-            standard_error=fit.standard_error,
-            df=fit.df,
-            low=fit.low,
-            high=fit.high,
-            level=level,
-            n_trials=len(seen) + len(limits),
-        )
-        return Step(name=title, estimates=(estimate,), residual_sd=fit.sd)
+        behind = np.array(limits)
+        travels = Travels(np.array(seen), behind[:, 0], behind[:, 1])
+        estimate, sd = fit_censored(travels, level=level)
+        return [*steps, Step(name=title, estimates=(estimate,), residual_sd=sd)]
     longest = max((catch.travel for catch in catches), default=0.0)
     reason = "no catch ends within its stretch"
     if catches:
         reason += f"; D is more than {math.degrees(longest):.4g} deg"
-    return _one(title, name, _rows([(1.0, x) for x in seen]), level, {name: reason})
+    rows = _rows([(1.0, travel) for travel in seen])
+    return [*steps, _one(title, "catch_travel", rows, level, reason)]
+
+
+def travels_seen(catches: Sequence[Catch]) -> list[float]:
+    """Return the travels of catches that end."""
+    return [catch.travel for catch in catches if catch.end is not None]
 
 
 def can_be_censored(seen: Sequence[float]) -> bool:
@@ -280,23 +213,169 @@ def can_be_censored(seen: Sequence[float]) -> bool:
 def fit_post_catch(levels: Sequence[CatchLevels], *, level: float) -> Step:
     """Fit k_post to the torque after the catch: (5)."""
     rows = [read.climb for read in levels if read.climb.design.any()]
-    reason = {"post_catch_stiffness": "no stretch goes on after its catch"}
+    reason = "no stretch goes on after its catch"
     title = "post-catch: k_post of (5)"
     return _one(title, "post_catch_stiffness", rows, level, reason)
 
 
+def _rows(pairs: Sequence[tuple[float, float]]) -> list[Rows]:
+    return [Rows(np.array([[x]]), np.array([y])) for x, y in pairs]
+
+
 def _one(
-    title: str,
-    name: str,
-    rows: list[Rows],
-    level: float,
-    reasons: Mapping[str, str] | None = None,
+    title: str, name: str, rows: list[Rows], level: float, reason: str | None = None
 ) -> Step:
-    if not rows:  # nothing to fit: a value that no row determines
-        rows = [Rows(design=np.zeros((1, 1)), target=np.zeros(1))]
-    fit = solve(rows)
+    # with nothing to fit, a value that no row determines
+    fit = solve(rows or _rows([(0.0, 0.0)]))
+    reasons = {} if reason is None else {name: reason}
     return Step(
         name=title,
         estimates=fitted((name,), fit, level, reasons),
         residual_sd=fit.residual_sd,
+    )
+
+
+# How far catches travel of which some outlast their stretch. A catch that goes on where
+# its stretch ends has a travel that is larger than what was seen of it. Leaving it out
+# keeps the short travels and loses the long ones; here it is an observation censored on
+# the right, not where the stretch stops but at the last angle at which an end would
+# still be told from noise.
+
+
+def detection_limit(
+    trial: Trial, stiffness: float, constants: ElbowParameters
+) -> DetectionLimit | None:
+    """Return how late the catch of a trial could end and be seen to.
+
+    None without a catch, or if no end of it could be seen at all. `stiffness` is
+    k_post: what an end makes the torque climb with, and nothing else. An end is seen if
+    its climb takes `MIN_GAIN` residual variances off the sum of squares and adds up to
+    `MIN_SIGNAL` standard deviations. The root of that gain is a t whose error has a
+    standard deviation of 1, which over the slope of t against the angle of the end is
+    the standard deviation of the limit.
+    """
+    if trial.catch is None or trial.after is None or not stiffness > 0.0:
+        return None
+    catch = trial.catch
+    angle = trial.after.angle[trial.after.time >= catch.time + constants.peak_duration]
+    if angle.size == 0:
+        return None
+    ends = np.unique(np.linspace(0, angle.size - 1, _CANDIDATES).astype(np.int64))
+    climb = np.maximum(angle - angle[ends, None], 0.0)  # (n_ends, n_samples)
+    about = climb - climb.mean(axis=1, keepdims=True)
+    scatter = np.sqrt((about**2).sum(axis=1))
+    seen = stiffness * scatter / max(catch.residual_sd, 1e-12)  # 0 of exact data
+    rises = climb[:, -1] > 0.0  # but for the last sample
+    needed = np.full(ends.size, math.sqrt(MIN_GAIN))
+    least = MIN_SIGNAL * scatter[rises] / climb[rises, -1]
+    needed[rises] = np.maximum(needed[rises], least)
+    spare, travel = seen - needed, angle[ends] - catch.angle
+    # where it runs out for good: an end at the last sample adds nothing
+    enough = np.flatnonzero(spare[:-1] >= 0.0)
+    if enough.size == 0:
+        return None
+    last = int(enough[-1])
+    fall = float(spare[last] - spare[last + 1])
+    slope = float(travel[last + 1] - travel[last]) / fall if fall > 0.0 else 0.0
+    return DetectionLimit(float(travel[last]) + slope * float(spare[last]), slope)
+
+
+class Travels(NamedTuple):
+    """Travels that were seen, and limits behind which the others lie, (n,) each."""
+
+    seen: _Floats
+    limit: _Floats
+    limit_sd: _Floats
+
+    def log_likelihood(self, mean: float, sd: float) -> float:
+        """Evaluate the log-likelihood of normal travels, without its constant."""
+        scaled = (self.seen - mean) / sd
+        z = (mean - self.limit) / np.hypot(sd, self.limit_sd)
+        density = -0.5 * float(scaled @ scaled) - self.seen.size * math.log(sd)
+        return density + float(log_ndtr(z).sum())
+
+    def score(self, mean: float, sd: float) -> _Floats:
+        """Differentiate the log-likelihood by mean and sd."""
+        scaled = (self.seen - mean) / sd
+        # travels scatter, and so does what is seen of an end
+        size = np.hypot(sd, self.limit_sd)
+        z = (mean - self.limit) / size
+        ratio = mills(z) / size
+        by_sd = (scaled @ scaled - scaled.size) / sd - (ratio * z * sd / size).sum()
+        return np.array([scaled.sum() / sd + ratio.sum(), by_sd])
+
+    def sd_at(self, mean: float) -> float:
+        """Return the most likely standard deviation for this mean."""
+        first = math.log(math.sqrt(float(((self.seen - mean) ** 2).mean())))
+        if not self.limit.size:
+            return math.exp(first)
+
+        def slope(log_sd: float) -> float:
+            return float(self.score(mean, math.exp(log_sd))[1])
+
+        return math.exp(_root(slope, first, math.copysign(0.5, slope(first))))
+
+
+def fit_censored(travels: Travels, *, level: float) -> tuple[FittedParameter, float]:
+    """Return the mean of travels, some not seen to end, and their standard deviation.
+
+    Where the likelihood of normal travels is largest. The interval of the mean holds
+    all values whose profile likelihood is no smaller than the one that, of as many
+    values of which all are seen, the end of Student's interval has: of n values without
+    censoring, twice the profile's fall from its maximum is n·ln(1 + t²/(n - 1)), so
+    that this *is* Student's interval then. With censoring n is the number seen.
+    Simulated, of 6 to 24 values of which 7 to 75 % are censored, such intervals of 95 %
+    cover 94 to 98 %; with all values in n it would be 92 to 97 %, and with the quantile
+    of χ² 88 to 96 %. (Cohen 1959, https://doi.org/10.1080/00401706.1959.10489859)
+
+    >>> nothing = np.empty(0)
+    >>> travels = Travels(np.array([1.0, 2.0, 6.0]), nothing, nothing)
+    >>> mean, _ = fit_censored(travels, level=0.95)
+    >>> round(mean.value, 9), round(mean.high - 3.0, 6)  # 4.302653·√(7/3)
+    (3.0, 6.572411)
+    """
+
+    def slope(value: float) -> float:
+        return float(travels.score(value, travels.sd_at(value))[0])
+
+    # At the mean of those seen, censored ones pull upwards; the likelihood is
+    # log-concave (but for the limits' sd), so that its slope changes sign once.
+    mean = float(travels.seen.mean())
+    if travels.limit.size and slope(mean) > 0.0:
+        mean = _root(slope, mean, float(travels.seen.std()))
+    sd, number = travels.sd_at(mean), travels.seen.size
+    t = float(stdtrit(number - 1.0, 0.5 + 0.5 * level))
+    fall = 0.5 * number * math.log1p(t**2 / (number - 1.0))
+    least = travels.log_likelihood(mean, sd) - fall
+
+    def spare(value: float) -> float:
+        return travels.log_likelihood(value, travels.sd_at(value)) - least
+
+    # minus the second derivatives of the log-likelihood, by differences of the first
+    h = 1e-5 * sd
+    a, b = (travels.score(mean - h, sd) - travels.score(mean + h, sd)) / (2.0 * h)
+    _, d = (travels.score(mean, sd - h) - travels.score(mean, sd + h)) / (2.0 * h)
+    variance = d / (a * d - b * b)  # of the mean, the spread being unknown
+    estimate = FittedParameter(
+        name="catch_travel",
+        value=mean,
+        standard_error=math.sqrt(variance * number / (number - 1.0)),
+        df=number - 1.0,
+        low=_root(spare, mean, -sd),
+        high=_root(spare, mean, sd),
+        level=level,
+        n_trials=number + travels.limit.size,
+    )
+    return estimate, sd
+
+
+def _root(function: Callable[[float], float], start: float, step: float) -> float:
+    # the first change of sign from `start` in the direction of `step`
+    sign, last = function(start) >= 0.0, start
+    for _ in range(_DOUBLINGS):
+        if (function(last + step) >= 0.0) != sign:
+            return float(brentq(function, last, last + step, xtol=1e-14, rtol=1e-14))
+        last, step = last + step, 2.0 * step
+    raise ConvergenceError(
+        "catch_travel: the likelihood of the travels of the catches has no end in sight"
     )

@@ -1,15 +1,20 @@
 """Stretches of a recording, their speed and acceleration, and samples used together."""
 
 import math
-from dataclasses import dataclass, field, fields
-from typing import Literal
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from masrel.errors import RecordingError
-from masrel.lab.elbow.identification._reading import MIN_TRAVEL, Movement, Samples
+from masrel.lab.elbow.identification._reading import (
+    MIN_TRAVEL,
+    Movement,
+    Samples,
+    even_samples,
+)
 
 _Floats = NDArray[np.float64]
 _Bools = NDArray[np.bool_]
@@ -76,8 +81,7 @@ def filter_alike(
     >>> bool(np.allclose(torque, 2.0 * v + 3.0 * x, atol=1e-3))
     True
     """
-    length = window_length(window, period)
-    weights = np.hanning(length + 2)[1:-1]
+    weights = np.hanning(window_length(window, period) + 2)[1:-1]
     weights /= weights.sum()
     means = np.convolve(angle, weights, mode="valid")
     resistance = np.convolve(torque, weights, mode="valid")
@@ -105,8 +109,7 @@ def state_at_break(
     since = (time[near] - at) / _REACH
     early, late = np.minimum(since, 0.0), np.maximum(since, 0.0)
     columns = [np.ones_like(since), since, early**2, late**2, early**3, late**3]
-    design = np.stack(columns, axis=1)
-    values = np.linalg.lstsq(design, angle[near], rcond=None)[0]
+    values = np.linalg.lstsq(np.stack(columns, axis=1), angle[near], rcond=None)[0]
     return (
         float(values[0]),
         float(values[1]) / _REACH,
@@ -116,88 +119,82 @@ def state_at_break(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stretch:
-    """One extension of the joint: samples `start` to before `stop` of a recording."""
+    """One extension of the joint, from sample `start` of a recording on; SI units."""
 
-    samples: Samples
+    recording: Samples = field(repr=False)
+    samples: Samples = field(repr=False)  # of the extension alone
     start: int
-    stop: int
     angle: _Floats = field(compare=False, repr=False)  # smoothed, like the next two
     velocity: _Floats = field(compare=False, repr=False)
     acceleration: _Floats = field(compare=False, repr=False)
     pace: Pace
-
-    @property
-    def time(self) -> _Floats:
-        """Return the times of its samples, s."""
-        return self.samples.time[self.start : self.stop]
-
-    @property
-    def raw_angle(self) -> _Floats:
-        """Return the angles as the encoder reads them, rad."""
-        return self.samples.angle[self.start : self.stop]
-
-    @property
-    def torque(self) -> _Floats:
-        """Return the torque, N·m."""
-        return self.samples.torque[self.start : self.stop]
-
-    @property
-    def in_gap(self) -> _Bools:
-        """Return which samples are in a gap."""
-        return self.samples.in_gap[self.start : self.stop]
-
-    @property
-    def saturated(self) -> _Bools:
-        """Return the samples whose torque is cut off."""
-        return self.samples.saturated[self.start : self.stop]
-
-    @property
-    def peak_speed(self) -> float:
-        """Return the largest speed, rad/s."""
-        return float(self.velocity.max())
-
-    @property
-    def rest_angle(self) -> float:
-        """Return the angle where it starts, rad: the smallest of the 0.5 s before."""
-        first = max(0, self.start - round(0.5 / self.samples.period))
-        before = self.samples.angle[first : self.start + 1]
-        return float(np.median(before[before <= before.min() + 1e-9]))
+    peak_speed: float
+    rest_angle: float  # the smallest of the 0.5 s before
 
 
 def find_stretches(
-    samples: Samples, *, window: float, slow_below: float
+    movement: Movement, *, window: float, slow_below: float
 ) -> tuple[list[Stretch], float]:
     """Return where the joint is extended by 15 degrees or more, and the noise at rest.
 
     A stretch whose speed stays below `slow_below` is slow. The noise is the standard
-    deviation of the torque about a line in each rest of 0.1 s or more, N·m.
+    deviation of the torque about a line in each rest of 0.1 s or more, N·m. Refuses a
+    recorded velocity that is not the derivative of the angle.
     """
+    samples = even_samples(movement)
     angle, velocity, acceleration = differentiate(samples.angle, samples.period, window)
+    if movement.velocity is not None:
+        recorded = np.interp(samples.time, movement.time, movement.velocity)
+        ratio = float(recorded @ velocity) / float(velocity @ velocity)
+        if not 0.8 <= ratio <= 1.25:
+            raise RecordingError(
+                f"{movement.name}: the velocity is {ratio:.3g} times the derivative of "
+                "the angle; is its unit right?"
+            )
     stretches = []
     for start, stop in _runs(samples, angle, velocity):
+        part = slice(start, stop)
         if angle[stop - 1] - angle[start] < MIN_TRAVEL:
             continue
-        part = slice(start, stop)
-        pace: Pace = "slow" if velocity[part].max() < slow_below else "fast"
+        before = samples.angle[max(0, start - round(0.5 / samples.period)) : start + 1]
+        peak_speed = float(velocity[part].max())
         stretches.append(
             Stretch(
-                samples=samples,
+                recording=samples,
+                samples=samples.cut(part),
                 start=start,
-                stop=stop,
                 angle=angle[part],
                 velocity=velocity[part],
                 acceleration=acceleration[part],
-                pace=pace,
+                pace="slow" if peak_speed < slow_below else "fast",
+                peak_speed=peak_speed,
+                rest_angle=float(np.median(before[before <= before.min() + 1e-9])),
             )
         )
     return stretches, _rest_noise(samples, velocity)
 
 
+def _spans(mask: _Bools) -> list[tuple[int, int]]:
+    # first sample of each run that is marked, and the first after it
+    edges = np.flatnonzero(np.diff(mask, prepend=False, append=False)).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def _runs(samples: Samples, angle: _Floats, velocity: _Floats) -> list[tuple[int, int]]:
+    runs: list[tuple[int, int]] = []
+    for start, stop in _spans(velocity > _MOVING):
+        if runs and (start - runs[-1][1]) * samples.period < _MIN_REST:
+            if angle[start] >= angle[runs[-1][1] - 1] - _MOVING * _MIN_REST:
+                runs[-1] = (runs[-1][0], stop)
+                continue
+        runs.append((start, stop))
+    return runs
+
+
 def _rest_noise(samples: Samples, velocity: _Floats) -> float:
     still = (np.abs(velocity) < 0.5 * _MOVING) & ~samples.in_gap & ~samples.saturated
-    edges = np.flatnonzero(np.diff(still, prepend=False, append=False))
     squares, df = 0.0, 0
-    for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for start, stop in _spans(still):
         if (stop - start) * samples.period >= _MIN_REST:
             torque = samples.torque[start:stop]
             since = np.arange(torque.size) - 0.5 * (torque.size - 1)
@@ -207,92 +204,54 @@ def _rest_noise(samples: Samples, velocity: _Floats) -> float:
     return math.sqrt(squares / df) if df > 0 else math.nan
 
 
-def check_velocity(movement: Movement, samples: Samples, window: float) -> None:
-    """Refuse a recorded velocity that is not the derivative of the angle."""
-    if movement.velocity is None:
-        return
-    _, velocity, _ = differentiate(samples.angle, samples.period, window)
-    recorded = np.interp(samples.time, movement.time, movement.velocity)
-    ratio = float(recorded @ velocity) / float(velocity @ velocity)
-    if not 0.8 <= ratio <= 1.25:
-        raise RecordingError(
-            f"{movement.name}: the velocity is {ratio:.3g} times the derivative of the "
-            "angle; is its unit right?"
-        )
-
-
-def _runs(samples: Samples, angle: _Floats, velocity: _Floats) -> list[tuple[int, int]]:
-    moving = np.concatenate([[False], velocity > _MOVING, [False]])
-    edges = np.flatnonzero(np.diff(moving.astype(np.int8)))
-    runs: list[tuple[int, int]] = []
-    shortest = _MIN_REST / samples.period
-    for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        if runs and start - runs[-1][1] < shortest:
-            if angle[start] >= angle[runs[-1][1] - 1] - _MOVING * _MIN_REST:
-                runs[-1] = (runs[-1][0], stop)
-                continue
-        runs.append((start, stop))
-    return runs
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Part:
+class Part(NamedTuple):
     """Samples of a trial that are used, each column of shape (n_samples,), SI units.
 
     Angle and its derivatives are smoothed within the part, before a catch the torque as
     well; `measured` is the torque as recorded.
     """
 
-    time: _Floats = field(compare=False, repr=False)
-    angle: _Floats = field(compare=False, repr=False)
-    velocity: _Floats = field(compare=False, repr=False)
-    acceleration: _Floats = field(compare=False, repr=False)
-    jerk: _Floats = field(compare=False, repr=False)
-    torque: _Floats = field(compare=False, repr=False)
-    measured: _Floats = field(compare=False, repr=False)
+    time: _Floats
+    angle: _Floats
+    velocity: _Floats
+    acceleration: _Floats
+    jerk: _Floats
+    torque: _Floats
+    measured: _Floats
 
     def keep(self, which: _Bools) -> "Part":
         """Return the samples that are marked."""
-        return Part(**{each.name: getattr(self, each.name)[which] for each in _COLUMNS})
+        return Part(*(column[which] for column in self))
 
     def then(self, later: "Part") -> "Part":
         """Return both parts as one."""
-        pairs = {
-            f.name: (getattr(self, f.name), getattr(later, f.name)) for f in _COLUMNS
-        }
-        return Part(**{name: np.concatenate(pair) for name, pair in pairs.items()})
+        return Part(*map(np.concatenate, zip(self, later, strict=True)))
 
 
-_COLUMNS = fields(Part)
-
-
-def filtered_part(
-    stretch: Stretch, unusable: _Bools, ends: tuple[int, int], window: float
-) -> Part:
-    """Return the samples between the ends whose window holds nothing unusable.
+def filtered_part(stretch: Stretch, ends: tuple[int, int], window: float) -> Part:
+    """Return the samples between the ends whose window has no gap and is not saturated.
 
     Angle and torque go through one filter, as a linear law allows.
     """
-    period = stretch.samples.period
-    margin = window_length(window, period) // 2 + 1
+    samples = stretch.samples
+    margin = window_length(window, samples.period) // 2 + 1
     start, stop = ends
     if stop - start <= 2 * margin:
         return part_of(stretch, slice(0, 0))
-    angle, torque = stretch.raw_angle[start:stop], stretch.torque[start:stop]
-    smooth, velocity, acceleration, resistance = filter_alike(
-        angle, torque, period, window
+    part, inner = slice(start, stop), slice(start + margin, stop - margin)
+    angle, velocity, acceleration, torque = filter_alike(
+        samples.angle[part], samples.torque[part], samples.period, window
     )
-    inner = slice(start + margin, stop - margin)
-    reach = np.ones(2 * margin + 1)
-    touched = np.convolve(unusable[start:stop], reach, mode="valid") > 0.5
+    unusable = (samples.in_gap | samples.saturated)[part]
+    touched = np.convolve(unusable, np.ones(2 * margin + 1), mode="valid") > 0.5
     whole = Part(
-        time=stretch.time[inner],
-        angle=smooth,
-        velocity=velocity,
-        acceleration=acceleration,
-        jerk=_slope(acceleration, period),
-        torque=resistance,
-        measured=stretch.torque[inner],
+        samples.time[inner],
+        angle,
+        velocity,
+        acceleration,
+        _slope(acceleration, samples.period),
+        torque,
+        samples.torque[inner],
     )
     return whole.keep(~touched)
 
@@ -301,26 +260,18 @@ def part_of(stretch: Stretch, which: slice, *, anew: float | None = None) -> Par
     """Return samples of a stretch with torque as measured.
 
     With `anew` the angle is smoothed within the part alone, by a window of so many
-    seconds, so that it knows
-    nothing of the motion beyond.
+    seconds, so that it knows nothing of the motion beyond.
     """
+    samples = stretch.samples.cut(which)
     angle, velocity, acceleration = (
-        values[which]
-        for values in (stretch.angle, stretch.velocity, stretch.acceleration)
+        x[which] for x in (stretch.angle, stretch.velocity, stretch.acceleration)
     )
     if anew is not None:
         angle, velocity, acceleration = differentiate(
-            stretch.raw_angle[which], stretch.samples.period, anew
+            samples.angle, samples.period, anew
         )
-    return Part(
-        time=stretch.time[which],
-        angle=angle,
-        velocity=velocity,
-        acceleration=acceleration,
-        jerk=_slope(acceleration, stretch.samples.period),
-        torque=stretch.torque[which],
-        measured=stretch.torque[which],
-    )
+    jerk, torque = _slope(acceleration, samples.period), samples.torque
+    return Part(samples.time, angle, velocity, acceleration, jerk, torque, torque)
 
 
 def _slope(values: _Floats, period: float) -> _Floats:

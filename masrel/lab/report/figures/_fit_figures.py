@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from masrel.lab.analysis import _fit_residuals as residuals
 from masrel.lab.elbow.identification import ElbowFit, FrictionFit
 from masrel.lab.elbow.identification._catches import Catch, Trial
-from masrel.lab.elbow.identification._quantities import QUANTITIES
+from masrel.lab.elbow.identification._model_file import QUANTITIES
 from masrel.lab.report._fits import FRICTION
 from masrel.plots._style import BLACK, BLUE, GREY, ORANGE
 from masrel.tables._tables import interval_text, number

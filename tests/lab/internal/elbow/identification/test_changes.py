@@ -3,11 +3,25 @@
 import numpy as np
 import pytest
 
-from masrel.lab.elbow.identification._changes import find_changes
+from masrel.lab.elbow.identification._catches import Changes, find_changes
 
 N, PEAK = 400, 50
 ANGLE = np.linspace(0.5, 2.3, N)
 PRE = 3.0 * ANGLE
+
+
+def search(
+    felt: np.ndarray, *, additive: bool = False, pushed: np.ndarray | float = 0.0
+) -> Changes:
+    return find_changes(
+        felt,
+        PRE[: felt.size],
+        ANGLE[: felt.size],
+        first=20,
+        lengths=(PEAK, 0, 0),
+        additive=additive,
+        pushed=pushed,
+    )
 
 
 def torque(
@@ -33,7 +47,9 @@ def test_a_catch_is_found_to_the_sample(
     # end is a kink, known to a few samples
     rng = np.random.default_rng(5)
     felt = torque(catch, end) + noise * rng.standard_normal(N)
-    found = find_changes(felt, PRE, ANGLE, first=20, peak=PEAK, additive=False)
+    found = find_changes(
+        felt, PRE, ANGLE, first=20, lengths=(PEAK, 0, 0), additive=False
+    )
     assert found.catch == catch
     if end is None:
         assert found.end is None
@@ -45,7 +61,9 @@ def test_no_pair_of_instants_fits_better_than_what_is_found() -> None:
     # the same sum of squares by numpy's lstsq for every pair of a coarser grid
     rng = np.random.default_rng(8)
     felt = torque(120, 230) + 0.3 * rng.standard_normal(N)
-    found = find_changes(felt, PRE, ANGLE, first=20, peak=PEAK, additive=False)
+    found = find_changes(
+        felt, PRE, ANGLE, first=20, lengths=(PEAK, 0, 0), additive=False
+    )
     assert found.end is not None
     assert found.catch is not None
     best = _squares(felt, found.catch, found.end)
@@ -82,14 +100,18 @@ def test_noise_alone_has_no_catch() -> None:
     # 60 series, nor in 1e50.
     for seed in range(60):
         felt = PRE + 0.2 * np.random.default_rng(seed).standard_normal(N)
-        found = find_changes(felt, PRE, ANGLE, first=20, peak=PEAK, additive=False)
+        found = find_changes(
+            felt, PRE, ANGLE, first=20, lengths=(PEAK, 0, 0), additive=False
+        )
         assert found.catch is None
         assert found.end is None
 
 
 def test_a_torque_that_falls_is_no_catch() -> None:
     felt = torque(150, None, rise=-3.0, residual=-3.0)
-    found = find_changes(felt, PRE, ANGLE, first=20, peak=PEAK, additive=False)
+    found = find_changes(
+        felt, PRE, ANGLE, first=20, lengths=(PEAK, 0, 0), additive=False
+    )
     assert found.catch is None
 
 
@@ -99,7 +121,9 @@ def test_the_additive_reading_goes_on_from_the_residual_with_the_law() -> None:
     felt[end:] = PRE[end:] + 2.0 + 5.8 * (ANGLE[end:] - ANGLE[end])
     rng = np.random.default_rng(4)
     felt = felt + 0.05 * rng.standard_normal(N)
-    found = find_changes(felt, PRE, ANGLE, first=20, peak=PEAK, additive=True)
+    found = find_changes(
+        felt, PRE, ANGLE, first=20, lengths=(PEAK, 0, 0), additive=True
+    )
     assert (found.catch, found.end) == (120, end)
 
 
@@ -110,15 +134,9 @@ def test_an_inertial_torque_after_the_catch_is_told_from_its_climb() -> None:
     felt = torque(120, end)
     felt[end:] += pushed[end:]
     felt = felt + 0.05 * np.random.default_rng(9).standard_normal(N)
-    found = find_changes(
-        felt, PRE, ANGLE, first=20, peak=PEAK, additive=False, pushed=pushed
-    )
+    found = search(felt, pushed=pushed)
     assert (found.catch, found.end) == (120, end)
 
 
 def test_too_short_a_stretch_has_no_catch() -> None:
-    short = slice(0, 4)
-    found = find_changes(
-        PRE[short], PRE[short], ANGLE[short], first=2, peak=PEAK, additive=False
-    )
-    assert found.catch is None
+    assert search(PRE[:22]).catch is None

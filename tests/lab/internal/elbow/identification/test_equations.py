@@ -6,27 +6,31 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from masrel.lab.elbow.identification._catches import (
-    Arm,
-    PreCatchLaw,
-    Trial,
-    fast_trial,
-)
+from masrel.lab.elbow.identification._catches import Law, Trial, fast_trial
 from masrel.lab.elbow.identification._clusters import triangle
-from masrel.lab.elbow.identification._equations import Equations, Known, Spreads
-from masrel.lab.elbow.identification._quantities import QUANTITIES
-from masrel.lab.elbow.identification._reading import even_samples
+from masrel.lab.elbow.identification._equations import (
+    DetectionLimit,
+    Equations,
+    Known,
+    beyond,
+)
+from masrel.lab.elbow.identification._model_file import QUANTITIES
 from masrel.lab.elbow.identification._stretches import find_stretches
-from masrel.lab.elbow.identification._travels import DetectionLimit, beyond
 from masrel.lab.elbow.parameters import STANDARD_MODELS, ElbowParameters
 from tests.lab.elbow.identification.synthesis import recording
 
 NAMES = tuple(QUANTITIES)
-SPREADS = Spreads(torque=0.1, peak=0.3, residual=0.2, catch_angle=0.02, travel=0.03)
+SPREADS = {
+    "torque": 0.1,
+    "peak": 0.3,
+    "residual": 0.2,
+    "catch angle": 0.02,
+    "travel": 0.03,
+}
 
 
 def caught(
-    joint: ElbowParameters, speed: float, seed: int = 1, arm: Arm | None = None
+    joint: ElbowParameters, speed: float, seed: int = 1, arm: Law | None = None
 ) -> Trial:
     movement, _ = recording(
         joint,
@@ -35,13 +39,14 @@ def caught(
         mean_speed=math.radians(speed),
         rng=np.random.default_rng(seed),
     )
-    (stretch,), _ = find_stretches(
-        even_samples(movement), window=0.06, slow_below=math.radians(20.0)
+    (stretch,), _ = find_stretches(movement, window=0.06, slow_below=math.radians(20.0))
+    law = replace(
+        arm or Law(),
+        damping=joint.damping,
+        stiffness=joint.stiffness,
+        inertia=joint.inertia,
     )
-    law = PreCatchLaw(
-        damping=joint.damping, stiffness=joint.stiffness, inertia=joint.inertia
-    )
-    return fast_trial(stretch, "trial", joint, law, 0.06, arm)
+    return fast_trial(stretch, "trial", joint, law, 0.06)
 
 
 def jacobian_holds(equations: Equations, shared: np.ndarray, own: np.ndarray) -> None:
@@ -78,7 +83,7 @@ def test_derivatives_are_those_of_the_residuals(
 ) -> None:
     joint = replace(STANDARD_MODELS[model], post_catch=post_catch, inertia=0.05)
     known = Known(
-        names=NAMES, constants=joint, spreads=SPREADS, arm=Arm(), on_line=True
+        names=NAMES, constants=joint, spreads=SPREADS, law=Law(), on_line=True
     )
     equations = Equations(caught(joint, speed), known)
     additive_end = post_catch == "additive" and model == "HM3"
@@ -95,13 +100,13 @@ def test_derivatives_hold_with_all_that_an_arm_has(
 ) -> None:
     joint = STANDARD_MODELS["HM3"]
     names = (*NAMES, "gravity", "arm_inertia", *curved)
-    arm = Arm(gravity=0.5, gravity_angle=0.3, lag=0.01, catch_rise=0.05)
+    arm = Law(gravity=0.5, gravity_angle=0.3, lag=0.01, catch_rise=0.05)
     trial = caught(joint, 80.0, arm=arm)
     known = Known(
         names=names,
         constants=joint,
         spreads=SPREADS,
-        arm=arm,
+        law=arm,
         offset=offset,
         drifts=True,
         on_line=True,
@@ -115,7 +120,7 @@ def test_derivatives_hold_with_all_that_an_arm_has(
 
 def test_compressing_the_samples_leaves_the_sum_of_squares_as_it_is() -> None:
     joint = STANDARD_MODELS["HM3"]
-    known = Known(names=NAMES, constants=joint, spreads=SPREADS, arm=Arm())
+    known = Known(names=NAMES, constants=joint, spreads=SPREADS, law=Law())
     trial = caught(joint, 85.0)
     equations = Equations(trial, known)
     for factor in (1.0, 1.2):
@@ -127,7 +132,9 @@ def test_compressing_the_samples_leaves_the_sum_of_squares_as_it_is() -> None:
         # and of the torque it is that of the law at every sample
         assert trial.after is not None
         torque = np.concatenate([trial.pre_catch.torque, trial.after.torque])
-        left = (equations.law(shared, mine) - torque) / SPREADS.torque
+        left = (equations.law(equations.values(shared, mine)) - torque) / SPREADS[
+            "torque"
+        ]
         table = equations.table(shared, mine, whole=True)
         np.testing.assert_allclose(table[:-3, -1], left, rtol=1e-12, atol=1e-12)
 
@@ -139,7 +146,7 @@ def test_the_law_is_evaluated_on_few_rows_before_the_residual_torque() -> None:
     assert trial.after is not None
     assert trial.catch is not None
     known = Known(
-        names=NAMES, constants=joint, spreads=SPREADS, arm=Arm(), on_line=True
+        names=NAMES, constants=joint, spreads=SPREADS, law=Law(), on_line=True
     )
     equations = Equations(trial, known)
     shared = np.array([getattr(joint, name) for name in NAMES])
@@ -161,7 +168,7 @@ def test_a_censored_travel_adds_one_row_of_d_alone() -> None:
                 names=NAMES,
                 constants=joint,
                 spreads=SPREADS,
-                arm=Arm(),
+                law=Law(),
                 on_line=True,
                 limit=each,
             ),
@@ -172,7 +179,7 @@ def test_a_censored_travel_adds_one_row_of_d_alone() -> None:
     mine = plain.start(dict(zip(NAMES, shared.tolist(), strict=True)))
     table = censored.table(shared, mine, whole=True)
     np.testing.assert_array_equal(table[:-1], plain.table(shared, mine, whole=True))
-    left, slope, root = beyond(joint.catch_travel, behind, SPREADS.travel)
+    left, slope, root = beyond(joint.catch_travel, behind, SPREADS["travel"])
     place = NAMES.index("catch_travel")
     expected = np.zeros(len(censored.local) + len(NAMES) + 1)
     expected[len(censored.local) + place] = slope

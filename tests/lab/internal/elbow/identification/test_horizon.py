@@ -9,13 +9,12 @@ import pytest
 from masrel.lab.elbow import STANDARD_MODELS
 from masrel.lab.elbow.identification._catches import (
     Catch,
-    PreCatchLaw,
+    Law,
     Trial,
     fast_trial,
 )
-from masrel.lab.elbow.identification._reading import even_samples
+from masrel.lab.elbow.identification._steps import detection_limit
 from masrel.lab.elbow.identification._stretches import Part, find_stretches
-from masrel.lab.elbow.identification._travels import detection_limit
 from tests.lab.elbow.identification.synthesis import recording
 
 HM2 = STANDARD_MODELS["HM2"]
@@ -110,7 +109,7 @@ def test_the_search_finds_ends_before_and_none_behind() -> None:
     # 60 simulated stretches whose catches end 38° to 54° on. Of those further than
     # four softnesses from their horizon, none is on the wrong side; the seed is fixed.
     rng = np.random.default_rng(5)
-    law = PreCatchLaw(damping=HM2.damping, stiffness=HM2.stiffness, inertia=HM2.inertia)
+    law = Law(damping=HM2.damping, stiffness=HM2.stiffness, inertia=HM2.inertia)
     sides = []
     for _ in range(60):
         joint = replace(HM2, catch_travel=math.radians(rng.uniform(38.0, 54.0)))
@@ -122,7 +121,7 @@ def test_the_search_finds_ends_before_and_none_behind() -> None:
             rng=rng,
         )
         (stretch,), _ = find_stretches(
-            even_samples(movement), window=0.06, slow_below=math.radians(20.0)
+            movement, window=0.06, slow_below=math.radians(20.0)
         )
         made = fast_trial(stretch, "trial", HM2, law, 0.06)
         found = detection_limit(made, HM2.post_catch_stiffness, HM2)
