@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from masrel.errors import LimitExceededError, ParameterError
 from masrel.lab.hess._signals import speed_margin
-from masrel.lab.hess.limits import DeviceLimits
+from masrel.lab.hess.limits import DeviceLimits, _check_positive
 from masrel.lab.recording import PHASES
 
 _PRE_CATCH = PHASES.index("pre-catch")
@@ -56,10 +56,7 @@ class StretchRules:
     def __post_init__(self) -> None:
         if self.n is not None and self.n < 1:
             raise ParameterError(f"n: needs 1 stretch or more, got {self.n}")
-        for name in ("time_limit", "stretch_limit"):
-            value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise ParameterError(f"{name}: needs more than 0 s, got {value}")
+        _check_positive(time_limit=self.time_limit, stretch_limit=self.stretch_limit)
 
 
 class PresentationStatus:

@@ -4,9 +4,10 @@ import importlib
 import math
 import warnings
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
-from typing import ClassVar, Literal, NamedTuple, Protocol, Self, cast
+from typing import ClassVar, Literal, NamedTuple, Protocol, Self, TypeVar, cast
 
 from masrel.errors import DeviceError
 from masrel.lab.hess.clock import Clock
@@ -14,6 +15,7 @@ from masrel.lab.hess.hand import Hand
 from masrel.lab.recording import Channel
 
 _State = Literal["new", "open", "closed"]
+_Result = TypeVar("_Result")
 
 
 class Reading(NamedTuple):
@@ -91,19 +93,13 @@ class Device(ABC):
         DeviceError
             If it was closed before, or cannot be opened.
         """
-        if self._state == "open":
-            return
         if self._state == "closed":
             raise DeviceError(
                 f"{self.name}: needs a new device, this one has been closed"
             )
-        try:
-            self._start()
-        except DeviceError:
-            raise
-        except Exception as error:
-            raise self._failure("opening", error) from error
-        self._state = "open"  # only after it has worked
+        if self._state == "new":
+            self._try("opening", self._start)
+            self._state = "open"  # only after it has worked
 
     def read(self) -> Reading:
         """Read the encoder and the channels.
@@ -120,12 +116,7 @@ class Device(ABC):
         """
         if self._state != "open":
             raise self._not_open("read")
-        try:
-            return self._read()
-        except DeviceError:
-            raise
-        except Exception as error:
-            raise self._failure("reading", error) from error
+        return self._try("reading", self._read)
 
     def command(self, torque_nm: float) -> None:
         """Send a torque, held until the next one.
@@ -145,12 +136,7 @@ class Device(ABC):
             raise self._not_open("command")
         if not math.isfinite(torque_nm):
             raise DeviceError(f"{self.name}: needs a finite torque, got {torque_nm}")
-        try:
-            self._send(torque_nm)
-        except DeviceError:
-            raise
-        except Exception as error:
-            raise self._failure("sending a torque", error) from error
+        self._try("sending a torque", self._send, torque_nm)
 
     def check(self) -> None:
         """Ask the device whether it still does what it is told.
@@ -165,12 +151,7 @@ class Device(ABC):
         """
         if self._state != "open":
             raise self._not_open("check")
-        try:
-            self._check()
-        except DeviceError:
-            raise
-        except Exception as error:
-            raise self._failure("asking for its state", error) from error
+        self._try("asking for its state", self._check)
 
     def idle_command(self) -> IdleCommand | None:
         """Return how another process can idle the device, once it is open.
@@ -192,15 +173,13 @@ class Device(ABC):
         """
         state, self._state = self._state, "closed"
         if state == "open":
-            try:
-                try:
-                    self._send(0.0)
-                finally:
-                    self._stop()
-            except DeviceError:
-                raise
-            except Exception as error:
-                raise self._failure("letting go", error) from error
+            self._try("letting go", self._let_go)
+
+    def _let_go(self) -> None:
+        try:
+            self._send(0.0)
+        finally:
+            self._stop()
 
     def __enter__(self) -> Self:
         self.open()
@@ -226,9 +205,18 @@ class Device(ABC):
             finally:  # also when warnings are errors
                 self.close()
 
-    def _failure(self, act: str, error: Exception) -> DeviceError:
+    def _try(
+        self, act: str, hook: Callable[..., _Result], *arguments: float
+    ) -> _Result:
         # Whatever goes wrong within a backend is a fault of the device.
-        return DeviceError(f"{self.name}: {act}: {type(error).__name__}: {error}")
+        try:
+            return hook(*arguments)
+        except DeviceError:
+            raise
+        except Exception as error:
+            raise DeviceError(
+                f"{self.name}: {act}: {type(error).__name__}: {error}"
+            ) from error
 
     def _not_open(self, wish: str) -> DeviceError:
         return DeviceError(

@@ -9,6 +9,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from masrel.errors import ParameterError
+from masrel.lab.hess.limits import _check_not_negative, _check_positive
 
 # All of these are our choice: how gently the intended speed rises and falls, s; what
 # the hand has learnt to expect, b and k of (1) and the inertia of device and arm, in
@@ -79,57 +80,39 @@ class Hand(Protocol):
         ...
 
 
-@dataclass(slots=True, kw_only=True)
 class _Leg:
     """One way of a hand, there or back: a trapezoid of speed between two rests."""
 
-    start: float  # rad
-    end: float  # rad
-    speed: float  # rad/s, negative on the way back
-    ramp_up: float  # s
-    ramp_down: float  # s
-    delay: float  # when it leaves, s
-    cruise_time: float  # and has its speed
-    cruise_angle: float  # where it has it, rad
-    brake_time: float  # when it begins to brake, s
-    final_time: float  # when it is there, s
-    since: float = -math.inf  # when it comes after the leg before, s
-    until: float = math.inf  # and when the next one comes
-
-
-def _leg(
-    start: float,
-    end: float,
-    speed: float,
-    *,
-    delay: float,
-    ramp_up: float,
-    ramp_down: float,
-) -> _Leg:
     # Raises ParameterError where the ramps leave nothing between them
-    way = end - start
-    speed = math.copysign(speed, way)
-    ramps = 0.5 * speed * (ramp_up + ramp_down)
-    cruise = way - ramps
-    if cruise / speed <= 0.0:
-        raise ParameterError(
-            f"mean_speed: needs ramps shorter than the stretch, at {abs(speed)} "
-            f"rad/s they take {abs(ramps):.3g} of {abs(way):.3g} rad"
-        )
-    cruise_time = delay + ramp_up
-    brake_time = cruise_time + cruise / speed
-    return _Leg(
-        start=start,
-        end=end,
-        speed=speed,
-        ramp_up=ramp_up,
-        ramp_down=ramp_down,
-        delay=delay,
-        cruise_time=cruise_time,
-        cruise_angle=start + 0.5 * speed * ramp_up,
-        brake_time=brake_time,
-        final_time=brake_time + ramp_down,
-    )
+
+    def __init__(
+        self,
+        start: float,
+        end: float,
+        speed: float,
+        *,
+        delay: float,
+        ramp_up: float,
+        ramp_down: float,
+    ) -> None:
+        way = end - start
+        self.speed = speed = math.copysign(speed, way)  # negative on the way back
+        ramps = 0.5 * speed * (ramp_up + ramp_down)
+        cruise = way - ramps
+        if cruise / speed <= 0.0:
+            raise ParameterError(
+                f"mean_speed: needs ramps shorter than the stretch, at {abs(speed)} "
+                f"rad/s they take {abs(ramps):.3g} of {abs(way):.3g} rad"
+            )
+        self.start, self.end = start, end
+        self.ramp_up, self.ramp_down = ramp_up, ramp_down
+        self.delay = delay  # when it leaves, s
+        self.cruise_time = delay + ramp_up  # when it has its speed, s; and where, rad
+        self.cruise_angle = start + 0.5 * speed * ramp_up
+        self.brake_time = self.cruise_time + cruise / speed  # when it begins to brake
+        self.final_time = self.brake_time + ramp_down  # when it is there
+        # When it comes after the leg before, and when the next one comes
+        self.since, self.until = -math.inf, math.inf
 
 
 class SimulatedHand:
@@ -188,11 +171,8 @@ class SimulatedHand:
     """
 
     __slots__ = (
-        "_delay",
         "_leg",
         "_legs",
-        "_ramp_down",
-        "_ramp_up",
         "damping",
         "end",
         "inertia",
@@ -222,6 +202,23 @@ class SimulatedHand:
         rest: float = 0.3,
         returns: bool = False,
     ) -> None:
+        _check_positive(
+            mean_speed=mean_speed,
+            **{f"again[{n}]": speed for n, speed in enumerate(again)},
+            return_speed=return_speed,
+            stiffness=stiffness,
+            damping=damping,
+            ramp_up=ramp_up,
+            ramp_down=ramp_down,
+        )
+        _check_not_negative(delay=delay, follow_through=follow_through, rest=rest)
+        if slip_time is not None and not slip_time >= 0.0:
+            raise ParameterError(f"slip_time: needs 0 or more, got {slip_time}")
+        if not 0.0 <= start < end <= math.pi:
+            raise ParameterError(
+                "start, end: need 0 <= start < end <= 180 degrees, "
+                f"got {start} and {end} rad"
+            )
         self.start = start
         self.end = end
         self.mean_speed = mean_speed
@@ -229,10 +226,6 @@ class SimulatedHand:
         self.stiffness = stiffness
         self.damping = damping
         self.inertia = 0.0
-        self._delay = delay
-        self._ramp_up = ramp_up
-        self._ramp_down = ramp_down
-        self._check(follow_through, again, return_speed, rest)
         final = end + follow_through
         ways = [(start, final, mean_speed)]  # there, and again back and there
         for speed in again:
@@ -243,44 +236,12 @@ class SimulatedHand:
         for way in ways:
             # No hand is as brisk where it brings the arm back
             brisk = ramp_up if way[1] > way[0] else max(ramp_up, ramp_down)
-            ramps = {"ramp_up": brisk, "ramp_down": ramp_down}
-            leg = _leg(*way, delay=delay, **ramps)
+            leg = _Leg(*way, delay=delay, ramp_up=brisk, ramp_down=ramp_down)
             if self._legs:
                 self._legs[-1].until = leg.since = delay
             self._legs.append(leg)
             delay = leg.final_time + rest
         self._leg = self._legs[0]
-
-    def _check(
-        self,
-        follow_through: float,
-        again: Sequence[float],
-        return_speed: float,
-        rest: float,
-    ) -> None:
-        positive = {
-            "mean_speed": self.mean_speed,
-            **{f"again[{n}]": speed for n, speed in enumerate(again)},
-            "return_speed": return_speed,
-            "stiffness": self.stiffness,
-            "damping": self.damping,
-            "ramp_up": self._ramp_up,
-            "ramp_down": self._ramp_down,
-        }
-        for name, value in positive.items():
-            if not 0.0 < value < math.inf:
-                raise ParameterError(f"{name}: needs more than 0, got {value}")
-        times = {"delay": self._delay, "follow_through": follow_through, "rest": rest}
-        for name, value in times.items():
-            if not 0.0 <= value < math.inf:
-                raise ParameterError(f"{name}: needs 0 or more, got {value}")
-        if not self.slip_time >= 0.0:
-            raise ParameterError(f"slip_time: needs 0 or more, got {self.slip_time}")
-        if not 0.0 <= self.start < self.end <= math.pi:
-            raise ParameterError(
-                "start, end: need 0 <= start < end <= 180 degrees, "
-                f"got {self.start} and {self.end} rad"
-            )
 
     @property
     def final_time(self) -> float:
@@ -302,7 +263,8 @@ class SimulatedHand:
         """
         leg = self._leg
         if not leg.since <= time_s < leg.until:
-            leg = self._leg = self._leg_at(time_s)
+            leg = next(leg for leg in self._legs if leg.since <= time_s < leg.until)
+            self._leg = leg
         speed = leg.speed
         if leg.cruise_time <= time_s < leg.brake_time:
             return leg.cruise_angle + speed * (time_s - leg.cruise_time), speed
@@ -317,9 +279,6 @@ class SimulatedHand:
             return leg.end, 0.0
         fall = speed / leg.ramp_down
         return leg.end - 0.5 * fall * left * left, fall * left
-
-    def _leg_at(self, time_s: float) -> _Leg:
-        return next(leg for leg in self._legs if leg.since <= time_s < leg.until)
 
     def feel(self, time_s: float, torque: float) -> None:
         """Feel nothing: this hand goes on whatever the torque."""
@@ -394,12 +353,8 @@ class YieldingHand(SimulatedHand):
             rest=rest,
             returns=returns,
         )
-        if not 0.0 <= yielding < math.inf:
-            raise ParameterError(f"yielding: needs 0 or more, got {yielding}")
-        if not 0.0 < reaction_time < math.inf:
-            raise ParameterError(
-                f"reaction_time: needs more than 0, got {reaction_time}"
-            )
+        _check_not_negative(yielding=yielding)
+        _check_positive(reaction_time=reaction_time)
         self._yielding = yielding
         self._reaction_time = reaction_time
         self._rate = 1.0
@@ -485,14 +440,18 @@ class HandTraits:
     correction_time: float = 0.5
 
     def __post_init__(self) -> None:
-        for name in ("tremor", "tremor_phase", "reaction_delay"):
-            value = getattr(self, name)
-            if not 0.0 <= value < math.inf:
-                raise ParameterError(f"{name}: needs 0 or more, got {value}")
-        for name in ("stiffness", "damping", "inertia", "tremor_hz", "correction_time"):
-            value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise ParameterError(f"{name}: needs more than 0, got {value}")
+        _check_not_negative(
+            tremor=self.tremor,
+            tremor_phase=self.tremor_phase,
+            reaction_delay=self.reaction_delay,
+        )
+        _check_positive(
+            stiffness=self.stiffness,
+            damping=self.damping,
+            inertia=self.inertia,
+            tremor_hz=self.tremor_hz,
+            correction_time=self.correction_time,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -560,10 +519,11 @@ class HandDistribution:
         HandTraits
             The hand, with a tremor of any phase.
         """
-        drawn = {}
-        for quantity in fields(self):
-            low, high = getattr(self, quantity.name)
-            drawn[quantity.name] = low * (high / low) ** rng.random()
+        ranges = {field.name: getattr(self, field.name) for field in fields(self)}
+        drawn = {
+            name: low * (high / low) ** rng.random()
+            for name, (low, high) in ranges.items()
+        }
         return HandTraits(
             damping=drawn.pop("damping_time") * drawn["stiffness"],
             tremor_phase=2.0 * math.pi * rng.random(),

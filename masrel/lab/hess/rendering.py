@@ -20,7 +20,11 @@ from masrel.lab.hess._signals import passive_damping
 from masrel.lab.hess.clock import SimulatedClock
 from masrel.lab.hess.controller import Controller
 from masrel.lab.hess.device import open_device
-from masrel.lab.hess.limits import DeviceLimits
+from masrel.lab.hess.limits import (
+    DeviceLimits,
+    _check_not_negative,
+    _check_positive,
+)
 from masrel.lab.hess.loop import run_presentation
 
 # Between two samples of a motion the hand intends a straight line: at 100 rad/s² it is
@@ -85,11 +89,8 @@ class MotionHand:
         damping: float = 40.0,
         tremor: float = math.radians(0.02),
     ) -> None:
-        for name, value in (("stiffness", stiffness), ("damping", damping)):
-            if not 0.0 < value < math.inf:
-                raise ParameterError(f"{name}: needs more than 0, got {value}")
-        if not 0.0 <= tremor < math.inf:
-            raise ParameterError(f"tremor: needs 0 or more, got {tremor}")
+        _check_positive(stiffness=stiffness, damping=damping)
+        _check_not_negative(tremor=tremor)
         if slip_time is not None and not slip_time >= 0.0:
             raise ParameterError(f"slip_time: needs 0 or more, got {slip_time}")
         n_steps = math.ceil(motion.duration / _HAND_STEP_S)
@@ -250,22 +251,22 @@ def _compared(
     taken = np.concatenate(([0.0], np.cumsum(torques[:-1] * np.diff(angles))))
     speed = float(np.abs(goal_velocities).max(initial=0.0))
     stiffness, damping = model.largest_slope(speed=speed)
+    max_angle_error, rms_angle_error = _largest_and_rms(angles - goal_angles)
+    max_torque_error, rms_torque_error = _largest_and_rms(torques - goal_torques)
     return Rendering(
         presented=presented,
-        max_angle_error=_largest(angles - goal_angles),
-        rms_angle_error=_rms(angles - goal_angles),
-        max_torque_error=_largest(torques - goal_torques),
-        rms_torque_error=_rms(torques - goal_torques),
-        peak_torque=_largest(goal_torques),
+        max_angle_error=max_angle_error,
+        rms_angle_error=rms_angle_error,
+        max_torque_error=max_torque_error,
+        rms_torque_error=rms_torque_error,
+        peak_torque=float(np.abs(goal_torques).max(initial=0.0)),
         energy_taken=float(taken[-1]),
         energy_given=float(-taken.min()) + 0.0,  # no minus zero
         damping_needed=passive_damping(stiffness, damping, rate_hz),
     )
 
 
-def _largest(values: NDArray[np.float64]) -> float:
-    return float(np.abs(values).max(initial=0.0))
-
-
-def _rms(values: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
+def _largest_and_rms(errors: NDArray[np.float64]) -> tuple[float, float]:
+    if not errors.size:
+        return 0.0, 0.0
+    return float(np.abs(errors).max()), float(np.sqrt(np.mean(errors**2)))

@@ -275,8 +275,8 @@ def test_an_arm_that_trembles_is_not_stretched() -> None:
     ("options", "message"),
     [
         ({"n": 0}, "n: needs 1 stretch or more, got 0"),
-        ({"time_limit": 0.0}, "time_limit: needs more than 0 s, got 0.0"),
-        ({"stretch_limit": math.inf}, "stretch_limit: needs more than 0 s, got inf"),
+        ({"time_limit": 0.0}, "time_limit: needs more than 0, got 0.0"),
+        ({"stretch_limit": math.inf}, "stretch_limit: needs more than 0, got inf"),
     ],
 )
 def test_rules_that_leave_nothing_are_refused(options, message: str) -> None:
