@@ -230,6 +230,11 @@ class Stretch:
     pre_end: Number = nan  # τ_pre_end of (3)
     rise: Number = nan  # H·v_c of (3)
 
+    def mark(self, which: Flag, **numbers: Number) -> None:
+        """Have some numbers come, in some rows."""
+        for name, number in numbers.items():
+            setattr(self, name, pick(which, number, getattr(self, name)))
+
 
 class Timeline:
     """What happens in a motion: the state machine of Fig. 7, led from piece to piece.
@@ -355,11 +360,11 @@ class Timeline:
         # the stretch is over, and the next may catch
         if self.phase != PRE_CATCH:
             stretch = self.stretches[-1]
-            stretch.over, stretch.over_angle = time, angle
+            stretch.mark(True, over=time, over_angle=angle)
             if self.phase == CATCH:
-                stretch.catch_end, stretch.left_angle = time, angle
+                stretch.mark(True, catch_end=time, left_angle=angle)
             else:
-                stretch.post_catch_end = time
+                stretch.mark(True, post_catch_end=time)
         self.phase, self.is_armed, self.since = PRE_CATCH, True, nan
 
     def _slow(
@@ -371,102 +376,73 @@ class Timeline:
         fastest: Number,
     ) -> None:
         lasts = high > low
-        leaves = lasts & (self.phase == CATCH)
+        top = value(angle, low) + fastest * (high - low)
+        leaves = lasts & (self.phase == CATCH) & (top > self.goal)
         if some(leaves):
-            leaves = leaves & (value(angle, low) + fastest * (high - low) > self.goal)
-            if some(leaves):
-                low = self._leave_catch(leaves, start, angle, low, high, grows=False)
+            low = self._leave_catch(leaves, start, angle, low, high, grows=False)
         ends = lasts & (self.phase == POST_CATCH)  # below ν_th, Fig. 7
         if some(ends):
+            over, there = start + low, value(angle, low)
             stretch = self.stretches[-1]
-            time = pick(ends, start + low, stretch.post_catch_end)
-            stretch.over = stretch.post_catch_end = time
-            stretch.over_angle = pick(ends, value(angle, low), stretch.over_angle)
+            stretch.mark(ends, over=over, over_angle=there, post_catch_end=over)
             self.phase = pick(ends, PRE_CATCH, self.phase)
         self.since = pick(lasts, nan, self.since)
 
     def _fast(
         self, start: Number, angle: Polynomial, length: Number, *, may_catch: Flag
     ) -> None:
-        lasts = length > 0.0
-        pre, at = lasts & (self.phase == PRE_CATCH), 0.0
+        lasts, end, at = length > 0.0, value(angle, length), 0.0
+        pre = lasts & (self.phase == PRE_CATCH)
         if some(pre):
             if some(begins := pre & (self.since != self.since)):
-                self._begin(begins, start, angle[0])
-            end = value(angle, length)
-            ready = pre & self.is_armed & may_catch & (end > self.lowest)
+                if not self.stretches or not isinstance(begins, np.ndarray):
+                    self.stretches.append(Stretch())
+                self.stretches[-1].mark(begins, onset=start, onset_angle=angle[0])
+                self.since = pick(begins, 0.0, self.since)
             later = pick(pre, self.since + length, self.since)
+            ready = pre & self.is_armed & may_catch & (end > self.lowest)
             if some(ready):
-                at = self._try_catch(ready, start, angle, length, end)
+                at = self._catch(ready, start, angle, length, end)
             self.since = pick(self.phase == PRE_CATCH, later, nan)
-        leaves = lasts & (self.phase == CATCH)
+        leaves = lasts & (self.phase == CATCH) & (end > self.goal)
         if some(leaves):
-            leaves = leaves & (value(angle, length) > self.goal)
-            if some(leaves):
-                self._leave_catch(leaves, start, angle, at, length, grows=True)
-
-    def _begin(self, which: Flag, start: Number, angle: Number) -> None:
-        if not self.stretches or not isinstance(which, np.ndarray):
-            self.stretches.append(Stretch())
-        stretch = self.stretches[-1]
-        stretch.onset = pick(which, start, stretch.onset)
-        stretch.onset_angle = pick(which, angle, stretch.onset_angle)
-        self.since = pick(which, 0.0, self.since)
-
-    def _try_catch(
-        self, ready: Flag, start: Number, angle: Polynomial, length: Number, end: Number
-    ) -> Number:
-        # v̄ is way over since; both are over the time, in the piece of the onset
-        at: Number = 0.0
-        if some(new := ready & (self.since == 0.0)):
-            at = self._catch(new, start, angle, length, end, angle[1:], [1.0])
-        if some(ready := ready & (self.since > 0.0)):
-            travelled = end - self.stretches[-1].onset_angle
-            top = end + self.p.catch_slope * travelled / self.since
-            # else not even at its end, with the mean speed too large
-            ready = ready & (self.jumps | (end > self.highest) | (top > self.constant))
-        if some(ready):
-            way = [angle[0] - self.stretches[-1].onset_angle, *angle[1:]]
-            since = [self.since, 1.0]
-            late = self._catch(ready, start, angle, length, end, way, since)
-            at = pick(ready, late, at)
-        return at
+            self._leave_catch(leaves, start, angle, at, length, grows=True)
 
     def _catch(
-        self,
-        ready: Flag,
-        start: Number,
-        angle: Polynomial,
-        length: Number,
-        end: Number,
-        way: Polynomial,
-        since: Polynomial,
+        self, ready: Flag, start: Number, angle: Polynomial, length: Number, end: Number
     ) -> Number:
         # where it catches, else 0
-        p, stretch = self.p, self.stretches[-1]
-        at = self._catch_place(ready, angle, length, end, way, since)
+        p, stretch, at = self.p, self.stretches[-1], nan
+        # v̄ is way over since; both are over the time, in the piece of the onset
+        if some(new := ready & (self.since == 0.0)):
+            at = self._catch_place(new, angle, length, end, angle[1:], [1.0])
+        if some(later := ready & (self.since > 0.0)):
+            top = end + p.catch_slope * (end - stretch.onset_angle) / self.since
+            # else not even at its end, with the mean speed too large
+            later = later & (self.jumps | (end > self.highest) | (top > self.constant))
+        if some(later):
+            way, since = [angle[0] - stretch.onset_angle, *angle[1:]], [self.since, 1.0]
+            place = self._catch_place(later, angle, length, end, way, since)
+            at = pick(later, place, at)
         caught = at == at
         if not some(caught):
             return 0.0
-        speeds = derivative(angle)
+        speeds, time = derivative(angle), self.since + at
         there, speed = value(angle, at), value(speeds, at)
-        if len(since) == 1:
-            mean_speed = value(way, at)
-        else:
-            mean_speed = (there - stretch.onset_angle) / (since[0] + at)
+        mean = (there - stretch.onset_angle) / pick(time > 0.0, time, 1.0)
         pre_end = self.law.commanded(there, speed)
         if some(p.inertia != 0.0):
             pre_end = pre_end + p.inertia * value(derivative(speeds), at)
-        for name, number in (
-            ("catch", start + at),
-            ("catch_angle", self.origin + there),
-            ("catch_speed", speed),
-            ("mean_speed", mean_speed),
-            ("caught_angle", there),
-            ("pre_end", pre_end),
-            ("rise", p.catch_torque_constant * speed),
-        ):
-            setattr(stretch, name, pick(caught, number, getattr(stretch, name)))
+        stretch.mark(
+            caught,
+            catch=start + at,
+            catch_angle=self.origin + there,
+            catch_speed=speed,
+            mean_speed=pick(self.since == 0.0, value(angle[1:], at), mean),
+            caught_angle=there,
+            pre_end=pre_end,
+            rise=p.catch_torque_constant * speed,
+        )
         self.goal = pick(caught, there + p.catch_travel, self.goal)
         self.is_armed = pick(caught, False, self.is_armed)
         self.phase = pick(caught, CATCH, self.phase)
@@ -515,9 +491,8 @@ class Timeline:
         leaves = high - place > TIE * high
         if not some(leaves):
             return low
-        stretch = self.stretches[-1]
-        stretch.catch_end = pick(leaves, start + place, stretch.catch_end)
-        stretch.left_angle = pick(leaves, value(angle, place), stretch.left_angle)
+        stretch, there = self.stretches[-1], value(angle, place)
+        stretch.mark(leaves, catch_end=start + place, left_angle=there)
         self.phase = pick(leaves, POST_CATCH, self.phase)
         return pick(leaves, place, low)
 

@@ -94,9 +94,8 @@ class Motion(ABC):
         ndarray, shape of `time`
             Angles, rad; the same bits for one time as for many at once.
         """
-        rows, place, since = self._place(time)
-        travel = _horner([*0.0 * rows.angle[:1], *rows.angle[1:]], place, since)
-        return np.asarray(((self.origin - origin) + rows.angle[0][place]) + travel)
+        first, travel = self._at(time, 0)
+        return np.asarray(((self.origin - origin) + first) + travel)
 
     def velocity(self, time: Floats | float) -> Floats:
         """Return angular velocities at times within the duration.
@@ -111,8 +110,7 @@ class Motion(ABC):
         ndarray, shape of `time`
             Velocities, rad/s, positive in extension. Where it jumps, the later one.
         """
-        rows, place, since = self._place(time)
-        return _horner(derivative(list(rows.angle)), place, since)
+        return self._at(time, 1)[1]
 
     def acceleration(self, time: Floats | float) -> Floats:
         """Return angular accelerations at times within the duration.
@@ -127,20 +125,17 @@ class Motion(ABC):
         ndarray, shape of `time`
             Accelerations, rad/s². Where it jumps, the later one.
         """
-        rows, place, since = self._place(time)
-        return _horner(derivative(derivative(list(rows.angle))), place, since)
+        return self._at(time, 2)[1]
 
-    def _place(self, time: Floats | float) -> tuple[Rows, NDArray[np.intp], Floats]:
-        # the piece of each time, and the time since it began
+    def _at(self, time: Floats | float, order: int) -> tuple[Floats, Floats]:
+        # where the piece of each time begins, rad, and what came since, or a derivative
         rows, times = self.rows(), np.asarray(time)
-        place = np.searchsorted(rows.start, times, side="right") - 1
-        place = np.maximum(place, 0)
-        return rows, place, times - rows.start[place]
-
-
-def _horner(p: Polynomial, place: NDArray[np.intp], since: Floats) -> Floats:
-    total = np.zeros(since.shape)
-    for column in p[::-1]:
-        if np.ndim(column):
-            total = total * since + column[place]
-    return total
+        place = np.maximum(np.searchsorted(rows.start, times, side="right") - 1, 0)
+        since, total = times - rows.start[place], np.zeros(times.shape)
+        p: Polynomial = [*0.0 * rows.angle[:1], *rows.angle[1:]]
+        for _ in range(order):
+            p = derivative(p)
+        for column in p[::-1]:
+            if np.ndim(column):
+                total = total * since + column[place]
+        return rows.angle[0][place], total

@@ -54,7 +54,7 @@ def greatest(a: Number, b: Number) -> Number:
     return a if is_first else b
 
 
-def rows_of(columns: Sequence[Number], which: Any) -> list[Number]:
+def chosen(columns: Sequence[Number], which: Any) -> list[Number]:
     """Return some rows of columns; one value for all stays one."""
     return [c[which] if isinstance(c, np.ndarray) else c for c in columns]
 
@@ -169,7 +169,7 @@ def _first_above_in_rows(
 ) -> Number:
     place = np.full(among.shape, nan)
     rows = slice(None) if among.all() else np.flatnonzero(among)
-    low, high, *p = rows_of([low, high, *p], rows)
+    low, high, *p = chosen([low, high, *p], rows)
     if len(p) == 2 and np.all(p[1] > 0.0):
         x = np.maximum(-p[0] / p[1], low)
     else:
@@ -197,7 +197,7 @@ def _first_rises(p: Polynomial, low: Number, high: Number, first: Number) -> Num
         once = is_above & ~at_once & ~again
         np.fmin.at(first, which[at_once], begin[at_once])
         if (i := np.flatnonzero(once)).size:
-            root = _refined_in_rows(rows_of(p, which[i]), begin[i], end[i])
+            root = _refined_in_rows(chosen(p, which[i]), begin[i], end[i])
             np.fmin.at(first, which[i], root)
         i = np.flatnonzero(again & (end - begin > tie[which]))
         middle, (one, other) = 0.5 * (begin[i] + end[i]), _halves(list(b[:, i]))

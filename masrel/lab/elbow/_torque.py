@@ -22,6 +22,7 @@ from masrel.lab.elbow._polynomials import (
     Number,
     Polynomial,
     bernstein,
+    chosen,
     derivative,
     first_above,
     greatest,
@@ -30,7 +31,6 @@ from masrel.lab.elbow._polynomials import (
     least,
     pick,
     product,
-    rows_of,
     shifted,
     some,
     value,
@@ -439,5 +439,5 @@ def _largest_of_pieces(along: Polynomial, length: Floats, best: float) -> float:
     best = max(best, float(np.max(greatest(along[0], value(along, length)))))
     bounds = np.max(np.broadcast_arrays(*bernstein(along, length), length)[:-1], axis=0)
     for i in np.flatnonzero(~(bounds <= best)).tolist():
-        best = largest(list(map(float, rows_of(along, i))), float(length[i]), best)
+        best = largest(list(map(float, chosen(along, i))), float(length[i]), best)
     return best
