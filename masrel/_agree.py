@@ -18,7 +18,7 @@ from masrel.tables._first_screen import (
     lacks_interval,
     reading_warnings,
 )
-from masrel.tables._tables import Table, as_html, as_text
+from masrel.tables._tables import SIMULATED, Table, as_html, as_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -159,7 +159,7 @@ class Agreement:
         drawn = picture_of(
             picture, self.file, self.estimating, [self.answer], group=group
         )
-        return _on_axes(drawn, ax)
+        return _on_axes(drawn, ax, SIMULATED if self.file.simulated else "")
 
     def __str__(self) -> str:
         return as_text(self._screen("brief"), width=_WIDTH)

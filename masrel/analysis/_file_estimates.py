@@ -305,7 +305,7 @@ _EXPLANATIONS = {
     "largest": "Largest κ: what the margins of the raters allow.",
     "limits": "Limits: mean ∓ 1.96 standard deviations, between which 95 % of "
     "differences lie if they are normal.",
-    "exact_ends": "Low, High: {level} % CI, exact (t, noncentral t), each for itself; "
+    "exact_ends": "{level} % CI: exact (t, noncentral t), each for itself; "
     "both: for the two limits together, factors of tolerance; for other items like "
     "these, rated by the same raters.",
     # diagnosis

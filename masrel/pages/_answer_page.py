@@ -38,10 +38,11 @@ from masrel.tables._first_screen import (
     what_was_read,
 )
 from masrel.tables._tables import (
+    ABSENT,
     SIMULATED,
     Column,
     Table,
-    counted,
+    capital,
     interval_text,
     number,
     percent,
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
 
 _MOST_PARTS = 4  # whose pictures are all shown
 _MOST_LISTED = 12  # items
+_MOST_NAMED = 8  # raters whose grades stand one after the other
 _TITLES = {
     "compare": "Agreement of groups in",
     "diagnose": "Raters, pairs and grades in",
@@ -175,6 +177,7 @@ def _with_interval(table: Table, level: float) -> Table:
     beside = ("standard_error", "median" if "value" in keys else "")
     of = max(at for at in range(low) if keys[at] not in beside)
     order = [at for at in range(len(keys)) if at not in (low, high)]
+    order.sort(key=lambda at: keys[at] == "items")  # whether they are the same: last
     place = order.index(of) + 1
     column = Column(
         key="interval",
@@ -222,7 +225,6 @@ def _picture_sections(
 _OF_ITEMS = (
     Column(key="item", heading="Item", align="left"),
     Column(key="disagreement", heading="Disagreement", digits=3),
-    Column(key="grades", heading="Grades", align="left"),
 )
 
 
@@ -232,28 +234,35 @@ def _items_table(seen: PartSeen) -> Table | None:
     if seen.coded is None or places.size == 0:
         return None
     grades, rows = seen.file.scale.grades, []
+    is_named = len(seen.raters) <= _MOST_NAMED
     for place in places:
         codes = seen.coded.codes[place].tolist()
         counts = [(codes.count(code), grade) for code, grade in enumerate(grades)]
+        text = ", ".join(f"{grade} ×{n}" for n, grade in counts if n)
+        if is_named:  # in the order of the raters
+            text = " · ".join(grades[code] if code >= 0 else ABSENT for code in codes)
         rows.append(
             {
                 "item": seen.items[place],
                 "disagreement": float(seen.disagreement[place]),
-                "grades": ", ".join(f"{grade} ×{n}" for n, grade in counts if n),
+                "grades": text,
             }
         )
+    heading = f"Grades of {', '.join(seen.raters)}" if is_named else "Grades"
     of_part = f"{seen.group}: " if seen.group else ""
+    metric = seen.questions.metric
+    by = f"{seen.distance} weights" if metric is None else f"{metric} metric"
     return table_of(
         "items_to_discuss",
-        f"{of_part}{counted(len(rows), 'item')} that raters disagree on most",
-        _OF_ITEMS,
+        f"{of_part}{capital(seen.how_many(len(rows)))}",
+        [*_OF_ITEMS, Column(key="grades", heading=heading, align="left")],
         rows,
         notes=(
             "Disagreement: of the pairs of ratings of an item, "
             + (
                 "the share that differs."
                 if seen.distance == "identity"
-                else f"how far they differ on average ({seen.distance} weights)."
+                else f"how far they differ on average ({by})."
             ),
         ),
         data="simulated" if seen.file.simulated else "foreign",

@@ -68,6 +68,12 @@ _CLOPPER = (
     ("korn1998",),
     True,
 )
+_LIMITS = (
+    "Limits of agreement are the mean difference ± 1.96 standard deviations of "
+    "differences; their intervals are exact for normal differences{}.",
+    ("bland1999", "carkeet2015"),
+    False,
+)
 _WITHOUT = (
     "What each rater adds is how the coefficient changes without the rater; its "
     "interval is by a jackknife over items{}.",
@@ -86,12 +92,8 @@ _TEXTS: dict[str, tuple[str, tuple[str, ...], bool]] = {
         ("byrt1993", "cicchetti1990"),
         False,
     ),
-    "limits_of_agreement": (
-        "Limits of agreement are the mean difference ± 1.96 standard deviations of "
-        "differences; their intervals are exact for normal differences{}.",
-        ("bland1999", "carkeet2015"),
-        False,
-    ),
+    "limits_of_agreement": _LIMITS,
+    "bland_altman": _LIMITS,
     "differences": (
         "Differences between groups have intervals and tests by a jackknife over "
         "{units}, with Student's t{}.",
@@ -104,6 +106,11 @@ _TEXTS: dict[str, tuple[str, tuple[str, ...], bool]] = {
     "diagnosis_categories": _SPECIFIC,
     "diagnosis_categories:ends": _CLOPPER,
     "categories": _SPECIFIC,
+    "components": (
+        "Variances of items, raters and the rest are those of ICC(A,1){}.",
+        ("mcgraw1996",),
+        False,
+    ),
     "categories:ends": _CLOPPER,
 }
 """Answers and pictures by name to how they were made, what that is cited for, and
@@ -143,14 +150,13 @@ def _of_data(file: RatingsFile, items: str) -> str:
     rated = counted(read["n_items"], "item", items)
     if read.get("clusters"):
         rated += f" in {counted(read.get('n_clusters', 0), 'cluster')}"
-    listed = ", ".join(grades)
-    if len(grades) > _MOST_LISTED:
-        listed = f"from {grades[0]} to {grades[-1]}" if file.is_ordered else "as met"
     order = "ordered grade" if file.is_ordered else "unordered grade"
-    text = (
-        f"{counted(read['n_raters'], 'rater')} rated {rated} with "
-        f"{counted(len(grades), order)} ({listed})."
-    )
+    how = f"with {counted(len(grades), order)}"
+    if len(grades) <= _MOST_LISTED:
+        how += f" ({', '.join(grades)})"
+    elif file.is_ordered:
+        how = f"with values from {grades[0]} to {grades[-1]}"
+    text = f"{counted(read['n_raters'], 'rater')} rated {rated} {how}."
     if n_missing := read["n_missing"]:
         are = "is" if n_missing == 1 else "are"
         text += (

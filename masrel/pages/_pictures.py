@@ -20,10 +20,12 @@ from masrel.agreement import (
     code_ratings,
     coefficient,
     contingency_table,
+    count_ratings,
     item_disagreement,
     limits_of_agreement,
     variance_components,
 )
+from masrel.agreement.krippendorff import _metric_weights
 from masrel.analysis._file_estimates import Answer, Questions, on_grades, parts_of
 from masrel.errors import MasrelError, MasrelWarning, ParameterError
 from masrel.pages._sections import Drawing
@@ -116,7 +118,11 @@ class PartSeen:
 
     @property
     def distance(self) -> Any:
-        """The weights by which ratings of an item are apart: linear, if ordered."""
+        """The weights by which ratings are apart; linear ones, if in order."""
+        metric = self.questions.metric
+        if metric is not None and self.coded is not None:
+            ratings = on_grades(self.coded, self.entry, self.file)
+            return _metric_weights(metric, count_ratings(ratings))
         if self.questions.weights == "identity" and self.file.is_ordered:
             return "linear"
         return self.questions.weights
@@ -130,13 +136,21 @@ class PartSeen:
         ):
             return np.zeros(0)
         with warnings.catch_warnings(action="ignore", category=MasrelWarning):
-            return item_disagreement(self.coded, weights=self.distance)
+            ratings = on_grades(self.coded, self.entry, self.file)
+            return item_disagreement(ratings, weights=self.distance)
 
     @property
     def disputed(self) -> "NDArray[np.intp]":
         """Items that raters disagree on, most first."""
         order = np.argsort(-np.nan_to_num(self.disagreement), kind="stable")[:_SHOWN]
         return order[self.disagreement[order] > 0.0]
+
+    def how_many(self, n: int) -> str:
+        """Return which items are shown, of all that raters disagree on."""
+        n_all = int((self.disagreement > 0.0).sum())
+        which = f"{n} of {n_all}" if n < n_all else str(n)
+        noun = "item" if n_all == 1 else "items"
+        return f"{which} {noun} that raters disagree on, most first"
 
     @property
     def items(self) -> list[str]:
@@ -202,6 +216,7 @@ def _pairs(seen: PartSeen) -> Drawing | None:
     if of is None or len(of.raters) < 3 or not np.isfinite(of.pair_values).any():
         return None
     title = seen.questions.title(seen.entry)
+    name = title + "," * (", " in title)
     i, j = np.unravel_index(np.nanargmin(of.pair_values), of.pair_values.shape)
     least = number(float(of.pair_values[i, j]), 3)
     panel = (
@@ -217,9 +232,9 @@ def _pairs(seen: PartSeen) -> Drawing | None:
     return seen.drawing(
         "pairs",
         "masrel.plots._rater_pairs:pairs_picture",
-        (of, title),
-        f"{title} of every two raters{panel}{ends}.",
-        f"{title} of every two of {counted(len(of.raters), 'rater')}: from {least} "
+        (of, name),
+        f"{name} of every two raters{panel}{ends}.",
+        f"{name} of every two of {counted(len(of.raters), 'rater')}: from {least} "
         f"({of.raters[i]} and {of.raters[j]}) to "
         f"{number(float(np.nanmax(of.pair_values)), 3)}.",
     )
@@ -293,7 +308,7 @@ def _bland_altman(seen: PartSeen) -> Drawing | None:
         raters = seen.raters
         result = limits_of_agreement(seen.coded, level=seen.questions.level)
     return seen.drawing(
-        "bland-altman",
+        "bland_altman",
         "masrel.plots._limits_figure:limits_pictures",
         ([("", (raters, result))], seen.questions.unit or ""),
         f"Difference of {raters[0]} and {raters[1]} over their mean, with the mean "
@@ -330,8 +345,7 @@ def _items(seen: PartSeen) -> Drawing | None:
             seen.file.is_ordered,
             np.array(scale.values, dtype=np.float64),
         ),
-        f"Ratings of the {counted(len(shown), 'item')} that raters disagree on most, "
-        "the most on top.",
+        f"Ratings of {seen.how_many(len(shown))}.",
     )
 
 

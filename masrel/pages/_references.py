@@ -86,7 +86,7 @@ def reference_texts(keys: Iterable[str]) -> list[str]:
 def _reference_text(key: str) -> str:
     fields = dict(re.findall(r"^  (\w+) = \{(.*)\},?$", _entries()[key], re.M))
     fields = {name: re.sub("[{}]", "", text) for name, text in fields.items()}
-    authors = ", ".join(fields["author"].split(" and ")).replace(", others", " et al.")
+    authors = "; ".join(fields["author"].split(" and ")).replace("; others", " et al.")
     where = fields.get("journal") or fields.get("booktitle") or fields["publisher"]
     number = f"({fields['number']})" if "number" in fields else ""
     parts = (where, f"{fields.get('volume', '')}{number}", fields.get("pages", ""))

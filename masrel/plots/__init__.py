@@ -94,13 +94,15 @@ def draw(
         return finished(drawn, stamp=stamp, forms=forms)
 
 
-def _on_axes(content: Drawn, ax: "Axes | None") -> "Axes":
+def _on_axes(content: Drawn, ax: "Axes | None", stamp: str) -> "Axes":
     """Draw the first picture on axes, or on those of a new figure of pyplot."""
     _load_matplotlib()
-    from masrel.plots._style import shown
+    from masrel.plots._style import ALARM, shown
 
     drawn = _drawn(content)
-    return shown(drawn[0][1] if isinstance(drawn, list) else drawn, ax)
+    ax = shown(drawn[0][1] if isinstance(drawn, list) else drawn, ax)
+    ax.set_title(stamp, loc="right", color=ALARM, weight="bold", fontsize=8)
+    return ax
 
 
 def _drawn(content: Drawn) -> Any:

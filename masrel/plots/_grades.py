@@ -338,7 +338,7 @@ def categories(
     >>> found = diagnose([["a", "a"], ["b", "b"], ["a", "b"]])
     >>> ax = categories(found, ax=Figure().add_subplot())
     >>> [text.get_text() for text in ax.texts]
-    ['0.67 of 3 ratings', '0.67 of 3 ratings']
+    ['0.67 (3 ratings)', '0.67 (3 ratings)']
     """
     n, ends = (
         len(diagnosis.categories),
@@ -363,7 +363,7 @@ def categories_picture(
     """Return the agreement on each grade as a dot with its interval."""
     n, cell = len(grades), min(0.3, _DOWN / len(grades))
     texts = [
-        f"{number(value, 2)} of {counted(size, 'rating')}"
+        f"{number(value, 2)} ({counted(size, 'rating')})"
         for value, size in zip(values.tolist(), counts.tolist(), strict=True)
     ]
     dot: dict[str, Any] = {"marker": "o", "color": BLACK, "linestyle": "none"}

@@ -49,7 +49,7 @@ ON_CELL = ("#111111", "#FEFEFE")
 """Letters on a light cell and on a dark one, whatever the page is."""
 
 SEQUENTIAL = LinearSegmentedColormap.from_list(
-    "sequential", ["#D6E6F2", "#5BA3D0", "#003A5D"]
+    "sequential", ["#D6E6F2", "#5BA3D0", "#00487A"]
 )
 """From little to much, lighter to darker: in a grey print, too."""
 
@@ -82,6 +82,7 @@ STYLE: "dict[RcKeyType, object]" = {
     "figure.constrained_layout.use": True,  # no label is cut off
 }
 
+_SCREEN = 120  # pixels to the inch in a notebook
 _DPI = 200  # of pixels, also of those inside vectors
 _LEAST_ACROSS, _LEAST_DOWN = 100.0, 72.0  # points of an axes
 _ABOVE = 20.0  # points of a stamp
@@ -93,6 +94,7 @@ _NO_TIME: dict[Form, dict[str, None]] = {  # what no file is to hold
 }
 _OF_PAGE = {  # colours that follow the page into the dark
     BLACK: "currentColor",
+    BLUE: "var(--blue)",
     GREY: "var(--soft)",
     PAGE: "var(--page)",
     GRID: "var(--rule)",
@@ -144,7 +146,8 @@ def shown(picture: Picture, ax: Axes | None) -> Axes:
         if ax is None:
             import matplotlib.pyplot as plt  # whose figures notebooks show
 
-            ax = plt.figure(figsize=(picture.width, picture.height)).add_subplot()
+            size = picture.width, picture.height
+            ax = plt.figure(figsize=size, dpi=_SCREEN).add_subplot()
         picture.draw(ax)
         complete_fonts(ax)
     return ax
@@ -191,13 +194,14 @@ def legend_below(
         return
     # texts are as high however large the axes become
     outer = ax.get_tightbbox(for_layout_only=True)
-    below = 0.0 if outer is None else min(outer.y0 - ax.bbox.y0, 0.0) - 5.0
+    below = 0.0 if outer is None else min(outer.y0 - ax.bbox.y0, 0.0)
+    dpi = cast(Figure, ax.get_figure(root=True)).dpi
     ax.legend(
         handles=handles,
         ncols=ncols,
         fontsize=8,
         loc="upper center",
-        bbox_to_anchor=(0.0, below / _POINTS),
+        bbox_to_anchor=(0.0, below / dpi - 0.07),
         bbox_transform=inches_from(ax, 0.5, 0.0),
         borderaxespad=0.0,
         **how,

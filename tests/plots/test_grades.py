@@ -164,7 +164,7 @@ def test_agreement_on_each_grade_has_its_dot_and_its_interval() -> None:
     np.testing.assert_array_equal(ends[:, 0], result.category_low)
     np.testing.assert_array_equal(ends[:, 1], result.category_high)
     assert axes.get_xlim() == (0.0, 1.0)
-    first = f"{result.category_values[0]:.2f} of {result.category_counts[0]} ratings"
+    first = f"{result.category_values[0]:.2f} ({result.category_counts[0]} ratings)"
     assert {"low", "middle", "high", first, "95 % confidence interval"} <= set(
         texts_of(axes)
     )
@@ -173,7 +173,7 @@ def test_agreement_on_each_grade_has_its_dot_and_its_interval() -> None:
 def test_without_intervals_none_are_explained_and_the_undefined_is_said_to_be() -> None:
     result = diagnose(TWO, categories=["a", "b", "c", "d"])
     axes = categories(result, ax=blank())
-    assert "undefined of 0 ratings" in texts_of(axes)
+    assert "undefined (0 ratings)" in texts_of(axes)
     assert axes.get_legend() is None
 
 
