@@ -51,14 +51,6 @@ def test_torques(
     model: ToneModel, times: tuple[float, ...], expected: tuple[float, ...]
 ) -> None:
     assert model.torque(m1(), times) == pytest.approx(expected, abs=5e-5)
-
-
-@pytest.mark.parametrize(
-    ("model", "times", "expected"), TORQUES, ids=[m.kind for m, _, _ in TORQUES]
-)
-def test_torques_stepped(
-    model: ToneModel, times: tuple[float, ...], expected: tuple[float, ...]
-) -> None:
     grid, torque, _ = stepped(model, m1())
     at = torque[np.searchsorted(grid, np.asarray(times) - 1e-9)]
     # the clasp-knife's latch closes one sample late: 2.0066 in place of 2.0064

@@ -117,14 +117,6 @@ def test_no_sample_is_steeper_than_the_largest_slope(model: ToneModel) -> None:
 
 
 @EVERY
-def test_a_joint_is_repeatable_and_a_stepper_starts_anew(model: ToneModel) -> None:
-    motion = random_motion(np.random.default_rng(2))
-    one, other = stepped(model, motion), stepped(model, motion)
-    assert np.array_equal(one[1], other[1])
-    assert np.array_equal(one[2], other[2])
-
-
-@EVERY
 def test_time_may_begin_anywhere(model: ToneModel) -> None:
     motion = m1()
     times, torque, _ = stepped(model, motion)
