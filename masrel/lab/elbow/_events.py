@@ -15,7 +15,7 @@ import numpy as np
 
 from masrel.errors import ParameterError
 from masrel.lab.elbow import _law
-from masrel.lab.elbow._motion import Motion
+from masrel.lab.elbow._motion import Motion, Piece
 from masrel.lab.elbow._polynomials import (
     NOTHING,
     TIE,
@@ -25,6 +25,7 @@ from masrel.lab.elbow._polynomials import (
     derivative,
     first_above,
     greatest,
+    known,
     least,
     pick,
     shifted,
@@ -247,18 +248,16 @@ class Timeline:
         check_starts(motion.start, p.range_end)
         self.p, self.origin = p, motion.origin
         self.pieces = motion.pieces()
-        rest: Number = motion.start
+        rest = motion.start
         if p.rest_angle is not None:
-            rest = pick(p.rest_angle == p.rest_angle, p.rest_angle, rest)
+            rest = known(p.rest_angle, rest)
         self.law = _law.pre_catch(p, rest - self.origin)  # of pre-catch
         self.constant = p.catch_angle_constant - self.origin  # L
         smallest, largest = _law.catch_bounds(p, self.origin)
         # θ_catch jumps at ν_H where ν_L is above that
         self.jumps = smallest > largest
-        self.lowest, self.highest = (
-            least(smallest, largest),
-            greatest(smallest, largest),
-        )
+        self.lowest = least(smallest, largest)
+        self.highest = greatest(smallest, largest)
         self.phase: Number = PRE_CATCH
         self.is_armed: Flag = True
         self.since: Number = nan  # time since onset, of a movement in pre-catch
@@ -266,47 +265,49 @@ class Timeline:
         self.stretches: list[Stretch] = []
         self.end: Number = nan  # of the motion, or of the range of motion, s
         self.end_angle: Number = motion.end - self.origin
-        limit = p.range_end - self.origin
-        near = limit + NOTHING * abs(limit)
-        for start, length, angle, slowest, fastest in self.pieces:
-            highest = value(angle, length)
-            if not isinstance(highest, np.ndarray) and slowest < 0.0:
-                highest = angle[0] + fastest * length
-            until, is_left = length, self.end != self.end
-            if some(cut := is_left & (highest > near)):
-                beyond = first_above(angle, 0.0, length, level=limit, among=cut)
-                cut = beyond == beyond
-                until = pick(cut, beyond, length)
-                self.end = pick(cut, start + beyond, self.end)
-                self.end_angle = pick(cut, limit, self.end_angle)
-            until = pick(is_left, until, 0.0)
-            if some(until > 0.0):
-                self._piece(start, angle, until, slowest, fastest)
+        for piece in self.pieces:
+            self._piece(piece)
             if not some(self.end != self.end):
                 break
-        self.end = pick(self.end == self.end, self.end, motion.duration)
+        self.end = known(self.end, motion.duration)
         for stretch in self.stretches:  # the catch may end before its peak
-            left = pick(
-                stretch.catch_end == stretch.catch_end, stretch.catch_end, self.end
-            )
+            left = known(stretch.catch_end, self.end)
             stretch.peak_end = least(left, stretch.catch + p.peak_duration)
         caught = [s for s in self.stretches if some(s.catch == s.catch)]
         # that catches first, or the first of all if none does
         self.first = next(iter(caught or self.stretches), Stretch())
 
-    def _piece(
+    def _piece(self, piece: Piece) -> None:
+        # cut where the range of motion ends
+        start, length, angle, slowest, fastest = piece
+        limit, until = self.p.range_end - self.origin, length
+        highest = value(angle, length)
+        if not isinstance(highest, np.ndarray) and slowest < 0.0:
+            highest = angle[0] + fastest * length
+        is_left = self.end != self.end
+        if some(cut := is_left & (highest > limit + NOTHING * abs(limit))):
+            beyond = first_above(angle, 0.0, length, level=limit, among=cut)
+            cut = beyond == beyond
+            until = pick(cut, beyond, length)
+            self.end = pick(cut, start + beyond, self.end)
+            self.end_angle = pick(cut, limit, self.end_angle)
+        until = pick(is_left, until, 0.0)
+        if isinstance(until, np.ndarray):
+            self._piece_of_rows(start, angle, until, fastest)
+        elif until > 0.0:
+            self._piece_of_one(start, angle, until, slowest, fastest)
+
+    def _piece_of_one(
         self,
-        start: Number,
+        start: float,
         angle: Polynomial,
-        length: Number,
-        slowest: Number,
-        fastest: Number,
+        length: float,
+        slowest: float,
+        fastest: float,
     ) -> None:
         # cut where the speed passes ν_th either way
         threshold = self.p.speed_threshold
-        if isinstance(length, np.ndarray):
-            self._piece_of_rows(start, angle, length, fastest)
-        elif slowest > threshold:
+        if slowest > threshold:
             self._fast(start, angle, length, may_catch=True)
         elif fastest <= -threshold:
             self._flexed(start, angle[0])
@@ -331,11 +332,8 @@ class Timeline:
         self, start: Number, angle: Polynomial, length: Number, fastest: Number
     ) -> None:
         # the speed is constant, only rises, or only falls
-        threshold, speed, lasts = (
-            self.p.speed_threshold,
-            derivative(angle),
-            length > 0.0,
-        )
+        threshold, speed = self.p.speed_threshold, derivative(angle)
+        lasts = length > 0.0
         if len(speed) == 1:
             slow, fast = lasts & (speed[0] < threshold), lasts & (speed[0] >= threshold)
             self._slow(start, angle, 0.0, pick(slow, length, 0.0), fastest)
@@ -347,7 +345,7 @@ class Timeline:
         passed = first_above(
             [sign * c for c in speed], 0.0, length, level=sign * threshold, among=lasts
         )
-        passed = pick(passed == passed, passed, length)
+        passed = known(passed, length)
         if falls:
             self._fast(start, angle, passed, may_catch=True)
             self._slow(start, angle, passed, length, fastest)

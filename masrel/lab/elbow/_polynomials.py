@@ -38,6 +38,11 @@ def pick(flag: Flag, one: Any, other: Any) -> Any:
     return one if flag else other
 
 
+def known(number: Number, otherwise: Number) -> Number:
+    """Return a number, or another one where it is nan."""
+    return pick(number == number, number, otherwise)
+
+
 def least(a: Number, b: Number) -> Number:
     """Return the smaller number; b if either is nan."""
     is_first = a < b

@@ -27,6 +27,7 @@ from masrel.lab.elbow._polynomials import (
     first_above,
     greatest,
     integral,
+    known,
     largest,
     least,
     pick,
@@ -338,7 +339,7 @@ def segments(line: Timeline) -> list[TorqueSegment]:
             continue
         # what does not come has no length at the end
         catch, peak_end, left, over = (
-            pick(time == time, time, line.end)
+            known(time, line.end)
             for time in (
                 stretch.catch,
                 stretch.peak_end,
@@ -347,7 +348,7 @@ def segments(line: Timeline) -> list[TorqueSegment]:
             )
         )
         pre_end, rise, angle = (
-            pick(number == number, number, 0.0)
+            known(number, 0.0)
             for number in (stretch.pre_end, stretch.rise, stretch.left_angle)
         )
         peak, residual = _law.catch(p, pre_end, rise)
