@@ -106,12 +106,12 @@ _TEXTS: dict[str, tuple[str, tuple[str, ...], bool]] = {
     "diagnosis_categories": _SPECIFIC,
     "diagnosis_categories:ends": _CLOPPER,
     "categories": _SPECIFIC,
+    "categories:ends": _CLOPPER,
     "components": (
         "Variances of items, raters and the rest are those of ICC(A,1){}.",
         ("mcgraw1996",),
         False,
     ),
-    "categories:ends": _CLOPPER,
 }
 """Answers and pictures by name to how they were made, what that is cited for, and
 whether it is of intervals that are there with a target alone."""

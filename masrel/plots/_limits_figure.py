@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 _MAX_DOTS = 2000
 _MAX_IN_A_LINE = 24  # letters of both raters
-_DOT: dict[str, Any] = {"color": BLUE, "alpha": 0.6}
+_DOT: dict[str, Any] = {"color": BLUE, "alpha": 0.75}
 _SMALLEST, _LARGEST = 14.0, 160.0  # areas of dots, points²
 _LIMIT: dict[str, Any] = {"color": ORANGE, "linestyle": (0, (6, 2))}
 
