@@ -1,11 +1,15 @@
 """What makes a loop prompt: its scheduling, its processor, locked memory, timers."""
 
-import contextlib
 import ctypes
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import (
+    AbstractContextManager,
+    ExitStack,
+    contextmanager,
+    nullcontext,
+)
 
 from masrel.lab.hess.clock import Clock, RealClock
 
@@ -16,15 +20,10 @@ _SLACK_NS = 1
 _USUAL_SLACK_NS = 50_000
 
 
-@contextmanager
-def scheduled(clock: Clock) -> Iterator[str | None]:
+def scheduled(clock: Clock) -> AbstractContextManager[str | None]:
     """Ask for real-time scheduling on a real clock -> what was granted, or None."""
     # Only where a tick comes at a time of the day does it matter how late it comes
-    if not isinstance(clock, RealClock):
-        yield None
-        return
-    with real_time() as granted:
-        yield granted
+    return real_time() if isinstance(clock, RealClock) else nullcontext()
 
 
 @contextmanager
@@ -39,23 +38,19 @@ def real_time() -> Iterator[str]:
         yield f"ordinary scheduling: none better is known on {sys.platform}"
         return
     library = ctypes.CDLL(None, use_errno=True)
-    with contextlib.ExitStack() as granted:
-        outcomes = (
-            _fifo(granted),
-            _locked(granted, library),
-            _prompt(granted, library),
-        )
+    with ExitStack() as back:
+        outcomes = _fifo(back), _locked(back, library), _prompt(back, library)
         yield ", ".join(outcomes)
 
 
-def _fifo(granted: contextlib.ExitStack) -> str:
+def _fifo(back: ExitStack) -> str:
     policy = os.sched_getscheduler(0)
     parameters = os.sched_getparam(0)
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
     except OSError as error:
         return f"no SCHED_FIFO ({error.strerror})"
-    granted.callback(os.sched_setscheduler, 0, policy, parameters)
+    back.callback(os.sched_setscheduler, 0, policy, parameters)
     return f"SCHED_FIFO {_PRIORITY}{_placed()}"
 
 
@@ -110,18 +105,18 @@ def _moved(processors: set[int]) -> bool:
     return True
 
 
-def _locked(granted: contextlib.ExitStack, library: ctypes.CDLL) -> str:
+def _locked(back: ExitStack, library: ctypes.CDLL) -> str:
     if library.mlockall(_LOCK_CURRENT | _LOCK_FUTURE) != 0:
         return f"no locked memory ({os.strerror(ctypes.get_errno())})"
-    granted.callback(library.munlockall)
+    back.callback(library.munlockall)
     return "locked memory"
 
 
-def _prompt(granted: contextlib.ExitStack, library: ctypes.CDLL) -> str:
+def _prompt(back: ExitStack, library: ctypes.CDLL) -> str:
     # The kernel may let an ordinary thread's sleep end later by its timer slack.
     prctl = library.prctl
     prctl.argtypes = [ctypes.c_int, *[ctypes.c_ulong] * 4]
     if prctl(_SET_TIMER_SLACK, _SLACK_NS, 0, 0, 0) != 0:
         return f"usual timers ({os.strerror(ctypes.get_errno())})"
-    granted.callback(prctl, _SET_TIMER_SLACK, _USUAL_SLACK_NS, 0, 0, 0)
+    back.callback(prctl, _SET_TIMER_SLACK, _USUAL_SLACK_NS, 0, 0, 0)
     return "prompt timers"

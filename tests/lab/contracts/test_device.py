@@ -4,6 +4,8 @@ import gc
 import importlib.util
 import math
 import pkgutil
+import subprocess
+import sys
 import warnings
 from collections.abc import Callable
 from functools import cache
@@ -148,8 +150,32 @@ def tick(clock: SimulatedClock, n: int = 1) -> None:
     clock.sleep_until_ns(clock.now_ns() + n * 1_000_000)
 
 
-def test_the_simulated_device_is_among_the_names() -> None:
-    assert "simulated" in device_names()
+@pytest.mark.parametrize("name", ["wam", *device_names()])
+def test_a_name_without_a_device_or_without_what_it_needs_is_refused(name: str) -> None:
+    with pytest.raises(
+        DeviceError, match=r": needs (a hand|options|one of .*simulated)"
+    ):
+        open_device(name, clock=SimulatedClock())
+
+
+def test_options_of_another_backend_are_refused(backend: str) -> None:
+    class Foreign(BackendOptions):
+        pass
+
+    if backend in device_names():
+        with pytest.raises(
+            DeviceError, match=f"{backend}: needs options .* got Foreign"
+        ):
+            open_device(
+                backend, clock=SimulatedClock(), hand=_stretching(), options=Foreign()
+            )
+
+
+def test_a_backend_is_imported_when_it_is_chosen() -> None:
+    code = "import sys, masrel.lab.hess; print('masrel.lab.hess.puck' in sys.modules)"
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
 
 
 def test_every_registered_name_is_held_to_this_suite() -> None:

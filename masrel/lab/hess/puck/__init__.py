@@ -1,12 +1,18 @@
 """The Barrett Puck, a motor amplifier on a CAN bus: bring it up, or emulate it.
 
 `open_device("puck", ...)` of `masrel.lab.hess` drives it. In: where the puck is, as
-`PuckOptions`. The names that speak on a bus load python-can on first use (PEP 562).
+`PuckOptions`. Opening a bus loads python-can.
 """
 
-import importlib
-from typing import TYPE_CHECKING
-
+from masrel.lab.hess.puck._bus import Frame, Link
+from masrel.lab.hess.puck._commissioning import (
+    Check,
+    NodeReport,
+    check,
+    connected,
+    probe,
+    zero,
+)
 from masrel.lab.hess.puck._properties import (
     PropertyTable,
     property_table,
@@ -17,23 +23,12 @@ from masrel.lab.hess.puck._puck_options import (
     InjectedFault,
     PuckOptions,
 )
-
-if TYPE_CHECKING:
-    from masrel.lab.hess.puck._bus import Frame, Link
-    from masrel.lab.hess.puck._commissioning import (
-        Check,
-        NodeReport,
-        check,
-        connected,
-        probe,
-        zero,
-    )
-    from masrel.lab.hess.puck._steady_rotation import (
-        FrictionEstimate,
-        SteadyRun,
-        fit_friction,
-        steady_runs,
-    )
+from masrel.lab.hess.puck._steady_rotation import (
+    FrictionEstimate,
+    SteadyRun,
+    fit_friction,
+    steady_runs,
+)
 
 __all__ = [
     "Check",
@@ -55,25 +50,3 @@ __all__ = [
     "steady_runs",
     "zero",
 ]
-
-_LOADED_ON_USE = {
-    "_bus": ("Frame", "Link"),
-    "_commissioning": ("Check", "NodeReport", "check", "connected", "probe", "zero"),
-    "_steady_rotation": (
-        "FrictionEstimate",
-        "SteadyRun",
-        "fit_friction",
-        "steady_runs",
-    ),
-}
-
-
-def __getattr__(name: str) -> object:
-    for module, names in _LOADED_ON_USE.items():
-        if name in names:
-            return getattr(importlib.import_module(f"{__name__}.{module}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)

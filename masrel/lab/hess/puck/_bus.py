@@ -4,18 +4,14 @@ Each frame on the bus becomes a `Frame`, each error of python-can a `BusError`, 
 every wait ends at a time on the loop's clock.
 """
 
-from types import TracebackType
-from typing import Any, NamedTuple, Protocol, Self
+from types import ModuleType, TracebackType
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self
 
 from masrel.errors import BusError, DeviceError
 from masrel.lab.hess.clock import Clock
 
-try:
-    import can
-except ImportError as error:
-    raise DeviceError(
-        "puck: needs python-can; install it with: pip install 'masrel[can]'"
-    ) from error
+if TYPE_CHECKING:
+    import can  # loaded when a bus is opened
 
 BITRATE = 1_000_000
 """Bits a second on a Puck's bus."""
@@ -23,10 +19,9 @@ BITRATE = 1_000_000
 # Classes of error in the identifier of SocketCAN's error frames (linux/can/error.h)
 BUS_OFF, BUS_RESTARTED = 0x040, 0x100
 
-# What python-can raises for an interface that it does not know, and what its interfaces
-# raise when an adapter or its maker's library is missing, or a channel is not enough
+# What python-can's interfaces raise, beside its own `CanError`, when an adapter or its
+# maker's library is missing, or a channel is not enough
 _NOT_OPENED = (
-    can.CanError,
     ImportError,
     NameError,
     NotImplementedError,
@@ -86,11 +81,12 @@ class Link:
         waits, so that a bus works on a simulated clock too, and closed with it.
     """
 
-    __slots__ = ("_bus", "_clock", "_peer")
+    __slots__ = ("_bus", "_can", "_clock", "_peer")
 
     def __init__(
-        self, bus: can.BusABC, clock: Clock, *, peer: InProcessPeer | None = None
+        self, bus: "can.BusABC", clock: Clock, *, peer: InProcessPeer | None = None
     ) -> None:
+        self._can = _python_can()
         self._bus = bus
         self._clock = clock
         self._peer = peer
@@ -128,7 +124,7 @@ class Link:
         BusError
             If the bus does not take it.
         """
-        message = can.Message(
+        message = self._can.Message(
             arbitration_id=frame.identifier,
             data=frame.data,
             is_extended_id=False,
@@ -137,7 +133,7 @@ class Link:
         now_ns = self._clock.now_ns()
         try:
             self._bus.send(message)
-        except (can.CanError, OSError) as error:
+        except (self._can.CanError, OSError) as error:
             raise BusError(f"puck: the bus takes no frame ({error})") from error
         if self._peer is not None:
             self._peer.serve()
@@ -186,7 +182,7 @@ class Link:
         """
         try:
             self._bus.shutdown()
-        except (can.CanError, OSError) as error:
+        except (self._can.CanError, OSError) as error:
             raise BusError(f"puck: the bus cannot be left ({error})") from error
         finally:
             if self._peer is not None:
@@ -196,7 +192,7 @@ class Link:
         # A timeout of 0 does not wait.
         try:
             message = self._bus.recv(timeout_s)
-        except (can.CanError, OSError) as error:
+        except (self._can.CanError, OSError) as error:
             raise BusError(f"puck: the bus cannot be read ({error})") from error
         if message is None:
             return None
@@ -205,6 +201,16 @@ class Link:
         if message.is_extended_id or message.is_remote_frame:
             return Frame(0, b"")  # not of a puck's bus; from the host to the host
         return Frame(message.arbitration_id, bytes(message.data))
+
+
+def _python_can() -> ModuleType:
+    try:
+        import can
+    except ImportError as error:
+        raise DeviceError(
+            "puck: needs python-can; install it with: pip install 'masrel[can]'"
+        ) from error
+    return can
 
 
 def open_link(
@@ -218,7 +224,8 @@ def open_link(
     """Open one end of a bus; `accepted` identifiers are filtered in the kernel."""
     # Where no kernel filters, whoever receives looks at the identifiers: filters of
     # python-can would drop error frames too.
-    filters: list[can.typechecking.CanFilter] | None = None
+    can = _python_can()
+    filters: list[dict[str, Any]] | None = None
     if accepted is not None and interface in _FILTERS_IN_KERNEL:
         filters = [
             {"can_id": identifier, "can_mask": 0x7FF, "extended": False}
@@ -231,7 +238,7 @@ def open_link(
             ignore_config=True,  # no file of python-can's changes what is opened
             **_bus_arguments(interface, channel),
         )
-    except _NOT_OPENED as error:
+    except (can.CanError, *_NOT_OPENED) as error:
         raise BusError(
             f"puck: cannot open channel {channel!r} of interface {interface!r} "
             f"({error})"

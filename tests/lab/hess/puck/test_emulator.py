@@ -1,0 +1,339 @@
+"""The emulated puck, frame by frame: every trait a driver has to cope with."""
+
+from math import degrees, radians
+
+import pytest
+
+from masrel.errors import BusError, DeviceTimeoutError, FrameError, ParameterError
+from masrel.lab.hess.puck import EmulatorOptions, Frame, InjectedFault
+from tests.lab.hess.puck.rig import Bench, bench, fault, loose, packed_torques
+
+VERS, ROLE, STAT = 0, 1, 5
+MODE, T, MT, P, CTS, IPNM, GRPA, PIDX = 8, 42, 43, 48, 68, 86, 26, 70
+AT_90_DEG = 19251  # of 77004.8 counts in 360 deg
+
+
+@pytest.fixture
+def on():
+    benches: list[Bench] = []
+
+    def make(**options) -> Bench:
+        benches.append(bench(**options))
+        return benches[-1]
+
+    yield make
+    for one in benches:
+        one.close()
+
+
+def answers(one: Bench, identifier: int, data: bytes) -> list[Frame]:
+    """What comes within a millisecond of a frame of the host."""
+    one.link.send(Frame(identifier, data))
+    end_ns = one.clock.now_ns() + 1_000_000
+    received = []
+    while (frame := one.link.receive(end_ns)) is not None:
+        received.append(frame)
+    return received
+
+
+def told(one: Bench, *settings: tuple[int, int], wait_s: float = 0.001) -> Bench:
+    for number, value in settings:
+        one.node.set(number, value)
+    one.node.wait(wait_s)
+    one.node.receive_waiting()
+    return one
+
+
+def position(one: Bench) -> int:
+    return one.node.position(P, patience_s=0.001)[1]
+
+
+def angle_deg(one: Bench) -> float:
+    return degrees(one.emulator.motor.angle(one.clock.now_ns()))
+
+
+# Asleep and awake
+
+
+def test_it_starts_in_its_monitor_and_leaves_the_bus_while_it_wakes(on) -> None:
+    one = on(wake_s=0.01)
+    assert [one.node.get(number) for number in (STAT, VERS, ROLE)] == [0, 148, 0]
+    for number in (MODE, T, P, CTS, IPNM):  # asleep it answers nothing else
+        assert answers(one, 1, bytes((number,))) == []
+    told(one, (MODE, 2))
+    assert one.emulator.settings[-1].name == "LOCK"  # asleep 8 is not its mode
+    assert one.emulator.mode == 0
+    told(one, (STAT, 2), wait_s=0.009)
+    assert answers(one, 1, bytes((STAT,))) == []
+    assert one.emulator.n_disturbances == 1
+    assert told(one).node.get(STAT) == 2
+    assert position(one) == 0  # it counts from where the arm was when it was asleep
+
+
+# Answers
+
+
+def test_an_answer_takes_150_microseconds_and_the_encoder_is_read_after_75(on) -> None:
+    one = on(awake=True)
+    asked_ns = one.clock.now_ns()
+    assert one.node.position(P, patience_s=0.001) == (asked_ns + 75_000, AT_90_DEG)
+    assert one.clock.now_ns() == asked_ns + 150_000
+
+
+@pytest.mark.parametrize(
+    ("traits", "number", "data"),
+    [
+        ({"reply_bytes": 4}, IPNM, "d600 8c0a"),  # 2700
+        ({"reply_bytes": 6}, IPNM, "d600 8c0a0000"),
+        ({"reply_bytes": 4, "counts_per_turn": 40960}, CTS, "c400 00a00000"),
+        ({}, P, "004b33"),
+        ({"is_flagged": True}, P, "804b33"),
+        ({"has_secondary": True}, P, "004b33 3fb4cd"),
+    ],
+)
+def test_what_it_answers(on, traits: dict, number: int, data: str) -> None:
+    one = on(awake=True, **traits)
+    (frame,) = answers(one, 1, bytes((number,)))
+    sender = 0x423 if number == P else 0x426
+    assert frame == Frame(sender, bytes.fromhex(data))
+
+
+@pytest.mark.parametrize("counts", [2**21 - 1, 2**21, -5])
+def test_positions_wrap_at_22_bits(on, counts: int) -> None:
+    one = told(on(awake=True), (P, counts))
+    assert position(one) == (counts + 2**21) % 2**22 - 2**21
+
+
+@pytest.mark.parametrize(
+    ("identifier", "data", "n"),
+    [
+        (0x400 | 2, b"\x30", 1),  # its factory groups are 0, 2, 5
+        (0x400 | 1, b"\x30", 0),
+        (2, b"\x30", 0),  # another puck's
+        (0x426, b"\x30", 0),  # from itself
+        (1, b"", 0),
+        (1, b"\xaa\x00\x01", 0),
+        (1, b"\x7f", 0),  # no such property
+    ],
+)
+def test_it_answers_what_is_for_it_and_means_something(
+    on, identifier: int, data: bytes, n: int
+) -> None:
+    assert len(answers(on(awake=True), identifier, data)) == n
+
+
+def test_a_group_that_it_was_told_is_answered(on) -> None:
+    assert len(answers(told(on(awake=True), (GRPA, 1)), 0x401, b"\x30")) == 1
+
+
+def test_noise_of_others_does_not_hide_its_answer(on) -> None:
+    one = on(awake=True, is_noisy=True)
+    assert [position(one) for _ in range(3)] == [AT_90_DEG] * 3
+    assert one.node.n_foreign == 12
+    assert 0x540 in {frame.identifier for frame in answers(one, 1, b"\x30")}
+
+
+# Torque
+
+
+def test_it_holds_its_last_torque_for_ever_but_not_idle(on) -> None:
+    one = told(on(awake=True), (T, 1000), wait_s=0.1)
+    assert position(one) == AT_90_DEG  # idle it ignores torques
+    told(one, (MODE, 2), (T, 144), wait_s=60.0)  # nobody says anything for a minute
+    torque = one.emulator.motor.plant.motor_torque
+    assert torque == pytest.approx(-144 * 18.8 / 2700, abs=1e-9)
+    assert angle_deg(one) > 145.9
+
+
+def test_its_own_limit_clips(on) -> None:
+    one = told(on(awake=True), (MT, 100), (MODE, 2), (T, 8000))
+    assert one.node.get(T) == 100
+    assert told(one, (T, -8000)).node.get(T) == -100
+
+
+def test_idle_it_brakes(on) -> None:
+    def coasted_deg(*settings: tuple[int, int]) -> float:
+        one = told(on(awake=True, hand=loose(45.0)), (MODE, 2), (T, 288), wait_s=0.1)
+        here = angle_deg(told(one, *settings))
+        one.node.wait(0.3)
+        return angle_deg(one) - here
+
+    # 0.06 kg·m² against B = 0.168 and β = 0.189, with or without 1 N·m·s/rad more
+    assert 0.0 < coasted_deg((T, 0), (MODE, 0)) < 0.3 * coasted_deg((T, 0))
+
+
+@pytest.mark.parametrize("slot", [1, 2, 3, 4])
+def test_it_obeys_its_place_in_a_packed_frame(on, slot: int) -> None:
+    one = told(on(awake=True), (GRPA, 1), (PIDX, slot), (MODE, 2))
+    answers(one, 0x401, packed_torques(10, 20, 30, 40))
+    assert one.node.get(T) == 10 * slot
+
+
+def test_writing_its_memory_is_counted(on) -> None:
+    one = told(on(awake=True), *((number, -1) for number in (30, 31, 32)))
+    assert one.emulator.n_memory_writes == 3  # SAVE, LOAD, DEF
+
+
+# Faults; they begin when it is first put into torque mode
+
+
+def failing(on, kind, start_s: float = 0.0, **more) -> Bench:
+    one = on(awake=True, faults=(fault(kind, start_s, **more),))
+    return told(one, (MODE, 2))
+
+
+@pytest.mark.parametrize(
+    ("kind", "error", "words"),
+    [
+        ("dropped-requests", DeviceTimeoutError, "puck 1: no position within 1 ms"),
+        ("dropped-replies", DeviceTimeoutError, "puck 1: no position within 1 ms"),
+        ("unplugged", DeviceTimeoutError, "puck 1: no position within 1 ms"),
+        ("short-replies", FrameError, "position: needs 3 or 6 bytes, got 00 4b"),
+    ],
+)
+def test_what_is_lost_or_torn_is_no_answer(on, kind, error, words: str) -> None:
+    with pytest.raises(error, match=words):
+        position(failing(on, kind))
+
+
+@pytest.mark.parametrize(
+    ("kind", "counts"),
+    [
+        ("frozen-encoder", AT_90_DEG),
+        ("jumping-encoder", AT_90_DEG + 2000),
+        ("wrapping-encoder", AT_90_DEG % 4096),
+    ],
+)
+def test_an_encoder_fails(on, kind, counts: int) -> None:
+    one = failing(on, kind)
+    assert position(one) == counts
+    told(one, (T, 300), wait_s=0.1)
+    assert (position(one) == counts) == (kind == "frozen-encoder")
+    assert angle_deg(one) > 91.0
+
+
+def test_every_third_answer_can_be_lost(on) -> None:
+    one = failing(on, "dropped-replies", every=3)
+    answered = []
+    for _ in range(6):
+        try:
+            answered.append(position(one) > 0)
+        except DeviceTimeoutError:
+            answered.append(False)
+    # After a loss a second question marks the answer: the third one sent, the fourth
+    # to be lost, is a position again.
+    assert answered == [False, True, False, True, False, True]
+
+
+def test_a_lost_torque_leaves_the_one_before(on) -> None:
+    one = told(failing(on, "dropped-torques", 0.05), (T, 50), wait_s=0.1)
+    assert told(one, (T, 0)).node.get(T) == 50
+
+
+def test_a_late_answer_is_not_taken_for_the_next_one(on) -> None:
+    # Each comes 1.2 ms late, for the first 2 ms; the arm moves meanwhile.
+    faults = (fault("late-replies", 0.1, end_s=0.102, size=0.0012),)
+    one = on(awake=True, hand=loose(45.0), faults=faults)
+    told(one, (T, 288), (MODE, 2), wait_s=0.0995)
+    n_lost, previous = 0, (0, 0)
+    for _ in range(12):
+        next_ns = one.clock.now_ns() + 1_000_000
+        try:
+            sampled_ns, counts = one.node.position(P, patience_s=0.001)
+        except DeviceTimeoutError:
+            n_lost += 1
+            previous = (0, 0)
+        else:
+            if previous[0]:  # the speed between readings is that of the arm
+                speed = (counts - previous[1]) / (sampled_ns - previous[0]) * 1e9
+                true = one.emulator.motor.plant.velocity / radians(360 / 77004.8)
+                assert speed == pytest.approx(true, rel=0.06)
+            previous = sampled_ns, counts
+        one.clock.sleep_until_ns(next_ns)
+    assert (n_lost, one.node.n_late) == (2, 2)
+
+
+def test_a_second_answer_is_thrown_away(on) -> None:
+    one = failing(on, "duplicated-replies")
+    for _ in range(5):
+        position(one)
+        one.node.wait(0.001)
+    assert one.node.n_late == 4  # the last has not been listened to
+
+
+def test_answers_come_in_the_order_of_their_questions(on) -> None:
+    # Late until 2 ms after the beginning, and then not: nobody is overtaken.
+    one = failing(on, "late-replies", 0.001, end_s=0.002)
+    numbers = [CTS, IPNM, STAT, VERS]
+    for number in numbers:
+        one.node.request(number)
+        one.node.wait(0.0006)
+    answered = answers(one, 2, b"")
+    assert [frame.data[0] & 0x7F for frame in answered] == numbers
+
+
+def test_error_frames_are_counted_and_too_many_refused(on) -> None:
+    one = failing(on, "error-frames")
+    for _ in range(10):
+        position(one)
+    assert one.node.n_errors == 10
+    with pytest.raises(BusError, match="at most 10 error frames") as caught:
+        position(one)
+    assert caught.value.kind == "error-frames"
+
+
+def test_bus_off_is_named_and_ends_with_a_restart(on) -> None:
+    one = failing(on, "bus-off", 0.01, end_s=0.02)
+    one.node.wait(0.015)
+    with pytest.raises(BusError, match="bus off") as caught:
+        position(one)
+    assert caught.value.kind == "bus-off"
+    with pytest.raises(DeviceTimeoutError):
+        position(one)
+    one.node.wait(0.01)
+    assert position(one) == AT_90_DEG
+
+
+@pytest.mark.parametrize(("kind", "number"), [("idled", MODE), ("reset", STAT)])
+def test_it_is_idled_from_outside_or_loses_its_supply(on, kind, number: int) -> None:
+    one = told(failing(on, kind, 0.01), (T, 100))
+    assert one.node.get(number) == 2
+    one.node.wait(0.02)
+    assert one.node.get(number) == 0
+    assert one.emulator.motor.plant.motor_torque == pytest.approx(0.0, abs=0.05)
+
+
+def test_the_babbling_of_others_is_bounded(on) -> None:
+    one = on(awake=True)
+    for _ in range(1001):
+        one.emulator.link.send(Frame(0x443, b"\x00\x00\x00"))
+    with pytest.raises(BusError, match="flooded") as caught:
+        position(one)
+    assert caught.value.kind == "flooded"
+
+
+# What it cannot be
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: EmulatorOptions(wake_s=-1.0), "wake_s: needs 0 or more, got -1.0"),
+        (lambda: EmulatorOptions(reply_bytes=5), "reply_bytes: needs 4 or 6, got 5"),
+        (
+            lambda: InjectedFault(kind="fire", start_s=0.0),
+            "kind: needs one of dropped-requests, .* got fire",
+        ),
+        (
+            lambda: InjectedFault(kind="idled", start_s=2.0, end_s=1.0),
+            "start_s, end_s: need 0 <= start_s < end_s, got 2.0 and 1.0",
+        ),
+        (
+            lambda: InjectedFault(kind="idled", start_s=0.0, every=0),
+            "every: needs 1 or more, got 0",
+        ),
+    ],
+)
+def test_options_out_of_range_are_refused(make, words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        make()

@@ -1,0 +1,132 @@
+"""The simulated device: an arm that sticks, slides, stops, and a hand that moves it."""
+
+from math import pi, radians
+
+import pytest
+
+from masrel.errors import ParameterError
+from masrel.lab.hess import (
+    HandTraits,
+    HumanHand,
+    SimulatedClock,
+    SimulatedHand,
+    open_device,
+)
+
+STEP = radians(0.005)  # of the encoder
+
+
+class Bench:
+    """An open device and its clock; nobody holds the arm unless told otherwise."""
+
+    def __init__(self, slip_time: float | None = 0.0) -> None:
+        self.clock = SimulatedClock()
+        hand = SimulatedHand(start=1.0, end=2.5, mean_speed=1.5, slip_time=slip_time)
+        self.device = open_device("simulated", clock=self.clock, hand=hand)
+        self.device.read()
+
+    def run(self, until_s: float) -> list[float]:
+        angles = []
+        while self.clock.now_ns() < round(until_s * 1e9):
+            self.clock.sleep_until_ns(self.clock.now_ns() + 1_000_000)
+            angles.append(self.device.read().angle)
+        return angles
+
+
+@pytest.fixture
+def bench(request: pytest.FixtureRequest):
+    made = Bench(*getattr(request, "param", ()))
+    yield made
+    made.device.close()
+
+
+held = pytest.mark.parametrize("bench", [(None,)], indirect=True)
+
+
+@pytest.mark.parametrize(
+    ("torque", "moves"), [(0.188, 0), (-0.188, 0), (0.25, -1), (-0.25, 1)]
+)
+def test_below_coulomb_friction_it_sticks_and_above_goes_against_the_command(
+    bench: Bench, torque: float, moves: int
+) -> None:
+    start = bench.device.read().angle
+    bench.device.command(torque)  # positive resists extension
+    way = bench.run(0.5)[-1] - start
+    assert (way > 0.0) - (way < 0.0) == moves
+
+
+@held
+def test_the_end_stop_holds_the_arm_within_a_fifth_of_a_degree(bench: Bench) -> None:
+    assert max(bench.run(2.0)) <= radians(146.2)
+    bench.device.command(-20.0)
+    assert max(bench.run(3.0)) <= radians(146.2)
+
+
+def test_the_stop_at_full_flexion_holds_too(bench: Bench) -> None:
+    bench.device.command(20.0)
+    assert min(bench.run(2.0)) >= radians(-1.5)
+    assert bench.run(3.0)[-1] == pytest.approx(0.0, abs=radians(0.1))
+
+
+@held
+def test_the_encoder_reads_multiples_of_its_step_and_the_same_twice(bench) -> None:
+    for angle in bench.run(1.0):
+        assert angle / STEP == pytest.approx(round(angle / STEP), abs=1e-6)
+    assert bench.device.read() == bench.device.read()
+
+
+def test_a_gap_in_the_readings_does_not_change_where_the_arm_is() -> None:
+    often, once = Bench(None), Bench(None)
+    with often.device, once.device:
+        angle = often.run(0.7)[-1]
+        once.clock.sleep_until_ns(700_000_000)
+        assert once.device.read().angle == angle
+
+
+@held
+def test_the_hand_moves_it_as_it_intends_and_presses_as_hard_as_it_resists(
+    bench: Bench,
+) -> None:
+    # Between the stops, at rest: 10 N·m, which is 1436 quanta, 9.9988 N·m;
+    # friction carries up to 0.189 of it.
+    bench.device.command(10.0)
+    angles = bench.run(0.8)
+    assert (angles[799] - angles[399]) / 0.4 == pytest.approx(1.5, rel=0.01)
+    bench.run(3.0)
+    assert bench.device.hand_torque == pytest.approx(9.9988, abs=0.1891)
+
+
+@pytest.mark.parametrize("bench", [(0.3997,)], indirect=True)
+def test_a_hand_that_has_let_go_gives_no_torque(bench: Bench) -> None:
+    bench.run(0.3)
+    assert bench.device.hand_torque != 0.0
+    bench.run(0.4)
+    assert bench.device.hand_torque == 0.0
+
+
+@pytest.mark.parametrize("range_end", [0.9, 3.2])
+def test_an_arm_that_cannot_be_is_refused(range_end: float) -> None:
+    hand = SimulatedHand(start=1.0, end=2.5, mean_speed=1.5)
+    assert not 1.0 < range_end <= pi
+    with pytest.raises(ParameterError, match="range_end"):
+        open_device("simulated", clock=SimulatedClock(), hand=hand, range_end=range_end)
+
+
+def test_a_sensor_reads_what_a_heavy_hand_gives_the_arm() -> None:
+    # What moves the arm's own 0.0597 kg·m² is the hand less motor and friction
+    clock = SimulatedClock()
+    traits = HandTraits(stiffness=60.0, damping=3.0, inertia=0.1)
+    hand = HumanHand(traits, start=1.0, end=2.5, mean_speed=1.5)
+    given, last = 0.0, 1.0
+    with open_device("simulated", clock=clock, hand=hand) as device:
+        for tick in range(400):
+            angle = device.read().angle
+            if tick:
+                viscous, coulomb = 0.168 * (angle - last), 0.189e-3 * (angle > last)
+                given -= viscous + coulomb + device.motor_torque * 1e-3
+            given += device.hand_torque * 1e-3
+            speed, last = (angle - last) / 1e-3, angle
+            device.command(3.0 if tick > 200 else 0.0)
+            clock.sleep_until_ns(clock.now_ns() + 1_000_000)
+    # a step of the encoder is 0.0052 N·m·s of 0.0597 kg·m²
+    assert given == pytest.approx(0.0597 * speed, abs=0.009)
