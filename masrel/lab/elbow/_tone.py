@@ -347,9 +347,31 @@ def movements(motion: Motion, speed: float) -> list[tuple[float, float]]:
     return sorted(extends + spans(motion, lambda part: part.faster(speed, -1)))
 
 
-def negative(level: Sequence[Number]) -> Polynomial:
-    """Return what is 0 or more where a polynomial is 0 or less."""
-    return [-c for c in level]
+def latched(
+    motion: Motion,
+    closes: Callable[[OneWay], Sequence[Polynomial]],
+    opens: Callable[[float], float],
+) -> list[tuple[float, float]]:
+    """Return between which times a latch is closed, s; the last may never open.
+
+    It closes where all polynomials of a part are 0 or more, and opens where the arm is
+    back at an angle, of the farthest that it has been since, rad.
+    """
+    result: list[tuple[float, float]] = []
+    closed: float | None = None
+    farthest = -math.inf
+    for part in one_way(motion):
+        since = part.start
+        if closed is not None and part.direction < 0:
+            opened = part.reached([-c for c in part.beyond(opens(farthest))])
+            if opened is not None:
+                result.append((closed, opened))
+                closed, since, farthest = None, opened, -math.inf
+        if closed is None:
+            closed = part.reached(*closes(part), after=since)
+        if closed is not None and part.direction > 0:
+            farthest = max(farthest, float(part.angle_at(part.end)))
+    return result if closed is None else [*result, (closed, math.inf)]
 
 
 def _is_met(level: Polynomial, place: float) -> bool:

@@ -25,8 +25,8 @@ from masrel.lab.elbow._tone import (
     ToneStepper,
     events_at,
     grade_of,
+    latched,
     movements,
-    negative,
     one_way,
     quantity,
     spans,
@@ -479,20 +479,15 @@ class ClaspKnife(ToneModel):
 
     def _latched(self, motion: Motion) -> list[tuple[float, float]]:
         # when the latch closes and opens, s; the last may never open
-        latched: list[tuple[float, float]] = []
-        closed: float | None = None
         fires_at = self.threshold + self.firing_torque / self.reflex_stiffness
-        for part in one_way(motion):
-            armed, since = part.beyond(self.arming_angle), part.start
-            if closed is not None and part.direction < 0:
-                opened = part.reached(negative(armed))
-                if opened is not None:
-                    latched.append((closed, opened))
-                    closed, since = None, opened
-            if closed is None:
-                fires = self._beyond(part, fires_at)
-                closed = part.reached(fires, armed, after=since)
-        return latched if closed is None else [*latched, (closed, math.inf)]
+        return latched(
+            motion,
+            lambda part: (
+                self._beyond(part, fires_at),
+                part.beyond(self.arming_angle),
+            ),
+            lambda _: self.arming_angle,
+        )
 
     def events(self, motion: Motion) -> tuple[ToneEvent, ...]:
         """Return when the reflex sets in, fires, gives way, ends and is armed again."""
@@ -860,21 +855,14 @@ class Clonus(ToneModel):
 
     def _trains(self, motion: Motion) -> list[tuple[float, float]]:
         # when a stretch sets beats off and when it is given up, s
-        trains: list[tuple[float, float]] = []
-        begun, farthest = None, 0.0
-        for part in one_way(motion):
-            if part.direction > 0:
-                if begun is None:
-                    far = part.beyond(self.trigger_angle)
-                    begun = part.reached(part.faster(self.trigger_speed, 1), far)
-                    farthest = 0.0
-                farthest = max(farthest, float(part.angle_at(part.end)))
-            elif part.direction < 0 and begun is not None:
-                until = part.reached(negative(part.beyond(self._given_up(farthest))))
-                if until is not None:
-                    trains.append((begun, until))
-                    begun = None
-        return trains if begun is None else [*trains, (begun, math.inf)]
+        return latched(
+            motion,
+            lambda part: (
+                part.faster(self.trigger_speed, 1),
+                part.beyond(self.trigger_angle),
+            ),
+            self._given_up,
+        )
 
     def events(self, motion: Motion) -> tuple[ToneEvent, ...]:
         """Return when beats are set off, each beat begins, and they stop."""
