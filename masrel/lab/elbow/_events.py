@@ -266,25 +266,24 @@ class Timeline:
         self.end: Number = nan  # of the motion, or of the range of motion, s
         self.end_angle: Number = motion.end - self.origin
         for piece in self.pieces:
-            self._piece(piece)
-            if not some(self.end != self.end):
+            if not some(is_left := self.end != self.end):
                 break
+            self._piece(piece, is_left)
         self.end = known(self.end, motion.duration)
         for stretch in self.stretches:  # the catch may end before its peak
             left = known(stretch.catch_end, self.end)
             stretch.peak_end = least(left, stretch.catch + p.peak_duration)
         caught = [s for s in self.stretches if some(s.catch == s.catch)]
         # that catches first, or the first of all if none does
-        self.first = next(iter(caught or self.stretches), Stretch())
+        self.first = (caught or self.stretches or [Stretch()])[0]
 
-    def _piece(self, piece: Piece) -> None:
+    def _piece(self, piece: Piece, is_left: Flag) -> None:
         # cut where the range of motion ends
         start, length, angle, slowest, fastest = piece
         limit, until = self.p.range_end - self.origin, length
         highest = value(angle, length)
         if not isinstance(highest, np.ndarray) and slowest < 0.0:
             highest = angle[0] + fastest * length
-        is_left = self.end != self.end
         if some(cut := is_left & (highest > limit + NOTHING * abs(limit))):
             beyond = first_above(angle, 0.0, length, level=limit, among=cut)
             cut = beyond == beyond
@@ -374,10 +373,11 @@ class Timeline:
         fastest: Number,
     ) -> None:
         lasts = high > low
-        top = value(angle, low) + fastest * (high - low)
-        leaves = lasts & (self.phase == CATCH) & (top > self.goal)
+        leaves = lasts & (self.phase == CATCH)
         if some(leaves):
-            low = self._leave_catch(leaves, start, angle, low, high, grows=False)
+            top = value(angle, low) + fastest * (high - low)
+            if some(leaves := leaves & (top > self.goal)):
+                low = self._leave_catch(leaves, start, angle, low, high, grows=False)
         ends = lasts & (self.phase == POST_CATCH)  # below ν_th, Fig. 7
         if some(ends):
             over, there = start + low, value(angle, low)
@@ -428,6 +428,8 @@ class Timeline:
         speeds, time = derivative(angle), self.since + at
         there, speed = value(angle, at), value(speeds, at)
         mean = (there - stretch.onset_angle) / pick(time > 0.0, time, 1.0)
+        if some(begun := self.since == 0.0):
+            mean = pick(begun, value(angle[1:], at), mean)
         pre_end = self.law.commanded(there, speed)
         if some(p.inertia != 0.0):
             pre_end = pre_end + p.inertia * value(derivative(speeds), at)
@@ -436,7 +438,7 @@ class Timeline:
             catch=start + at,
             catch_angle=self.origin + there,
             catch_speed=speed,
-            mean_speed=pick(self.since == 0.0, value(angle[1:], at), mean),
+            mean_speed=mean,
             caught_angle=there,
             pre_end=pre_end,
             rise=p.catch_torque_constant * speed,

@@ -42,6 +42,13 @@ class TorqueLaw(NamedTuple):
         )
         return level + stiffness * (angle - origin) + damping * velocity
 
+    @property
+    def is_flat(self) -> bool:
+        """Whether it is its level, whatever the arm does."""
+        terms = (self.stiffness, self.damping, self.inertia)
+        is_level = all(isinstance(term, float) and term == 0.0 for term in terms)
+        return is_level and self.onset is None
+
     def along(self, angle: Polynomial, since: Number) -> Polynomial:
         """Return the torque along an angle that begins so long after the law, s."""
         if self.onset is not None:
@@ -50,9 +57,9 @@ class TorqueLaw(NamedTuple):
             square, last = product(y, y), [3.0 - 2.0 * y[0], -2.0 * y[1]]
             first, *later = product(square, last)  # `onset_share`
             return [self.level + rise * first, *[rise * c for c in later]]
-        k, b, m = self.stiffness, self.damping, self.inertia
-        if all(isinstance(term, float) and term == 0.0 for term in (k, b, m)):
+        if self.is_flat:
             return [self.level]
+        k, b, m = self.stiffness, self.damping, self.inertia
         speed = [*derivative(angle), 0.0]
         torque = [k * x + b * v for x, v in zip(angle, speed, strict=False)]
         torque[0] = self.commanded(angle[0], speed[0])

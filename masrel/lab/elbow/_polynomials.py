@@ -138,8 +138,8 @@ def first_above(
     p = [p[0] - level, *p[1:]]
     if isinstance(among, np.ndarray):
         return _first_above_in_rows(p, low, high, among)
-    width, end = high - low, value(p, high)
-    if not width > 0.0 or (grows and end <= 0.0):
+    width, end = high - low, value(p, high) if grows else inf
+    if not width > 0.0 or end <= 0.0:
         return nan
     if len(p) == 2 and p[1] > 0.0:
         x = max(-p[0] / p[1], low)
@@ -254,7 +254,7 @@ def largest(p: Polynomial, length: Number, known: Number = -inf) -> Number:
     """Return the largest value on 0 to length, or what is known to be, if more."""
     if isinstance(length, np.ndarray):
         return _largest_in_rows(p, length, known)
-    if not isfinite(sum(map(abs, p))):
+    if not isfinite(sum(p)):
         return inf  # more than a float can hold
     peak = max(p[0], value(p, length), known)
     if len(p) > 2 and max(bernstein(p, length)) > peak:

@@ -389,10 +389,12 @@ class Section(NamedTuple):
     torque: Polynomial  # N·m
 
 
-def sections(line: Timeline, motion: Motion) -> Iterator[Section]:
-    """Cut a motion where its law or its polynomial changes, the last first."""
+def sections(
+    line: Timeline, motion: Motion, laid: list[TorqueSegment]
+) -> Iterator[Section]:
+    """Cut laws where the motion's polynomial changes, the last first."""
     pieces: list[Any] = [piece[:3] for piece in line.pieces]
-    for begun, ended, law in reversed(segments(line)):
+    for begun, ended, law in reversed(laid):
         if len(line.pieces) > _MANY:
             pieces = _column_of_pieces(motion, begun, ended)
         for start, length, angle in pieces:
@@ -418,21 +420,31 @@ def load(line: Timeline, motion: Motion, name: str) -> Number:
     if name == "residual_torque":
         first = line.first
         return _law.catch(line.p, first.pre_end, first.rise)[1].level
-    is_one = not isinstance(line.end, np.ndarray)
-    best: Number = -math.inf
+    laid = segments(line)
+    if name == "peak_torque":
+        return _peak(line, motion, laid)
     amounts: list[Number] = []
-    for length, angle, along in sections(line, motion):
-        if name == "peak_torque":
-            if is_one and isinstance(length, np.ndarray):
-                best = _largest_of_pieces(along, length, best)
-            else:
-                best = largest(along, length, best)
-            continue
+    for length, angle, along in sections(line, motion, laid):
         rate = along if name == "impulse" else product(along, derivative(angle))
         amounts.append(value(integral(rate), greatest(length, 0.0)))
-    if name == "peak_torque":
-        return best
-    return math.fsum(map(np.sum, amounts)) if is_one else sum(amounts)
+    if isinstance(line.end, np.ndarray):
+        return sum(amounts)
+    return math.fsum(map(np.sum, amounts))  # of one scene, also over its pieces
+
+
+def _peak(line: Timeline, motion: Motion, laid: list[TorqueSegment]) -> Number:
+    # levels first: what is more is then looked for only where it may be
+    best: Number = -math.inf
+    for begun, ended, law in laid:
+        if law.is_flat:
+            best = greatest(best, pick(ended > begun, law.level, -math.inf))
+    moving = [segment for segment in laid if not segment.law.is_flat]
+    for length, _, along in sections(line, motion, moving):
+        if isinstance(length, np.ndarray) and not isinstance(line.end, np.ndarray):
+            best = _largest_of_pieces(along, length, best)
+        else:
+            best = largest(along, length, best)
+    return best
 
 
 def _largest_of_pieces(along: Polynomial, length: Floats, best: float) -> float:
