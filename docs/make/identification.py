@@ -110,7 +110,7 @@ def seconds() -> None:
         mean = math.radians(9.0 if slow else rng.uniform(75.0, 120.0))
         options = {"rng": rng, "duration": 2.0, "rest": 0.15, "name": f"trial {i}"}
         made = recording(joint, start=start, end=end, mean_speed=mean, **options)
-        movements.append(made[0])
+        movements.append(made)
     taken = []
     for _ in range(7):
         begun = time.process_time()

@@ -106,10 +106,9 @@ class Row(NamedTuple):
 
 
 class _Design(NamedTuple):
-    # the matrix (n_samples, n_linear), what was measured, the angle since the catch,
-    # and where torque may climb with it
+    # the matrix (n_samples, n_linear), the angle since the catch, and where torque may
+    # climb with it
     matrix: _Floats
-    torque: _Floats
     past: _Floats
     climbs: _Bools
 
@@ -123,56 +122,33 @@ class Equations:
     """
 
     def __init__(self, trial: Trial, known: Known) -> None:
-        self.trial, self.known = trial, known
-        self.catch = trial.catch if trial.after is not None else None
-        self.n_pre = trial.pre_catch.time.size
-        self.part = trial.pre_catch
-        if trial.after is not None:
-            self.part = trial.pre_catch.then(trial.after)
-        law, constants = known.law, known.constants
-        self.end = math.inf  # of the catch, s
-        if self.catch is not None and self.catch.end is not None:
-            self.end = self.catch.end
-        # an end whose torque steps stays where it was found; others move with D
-        steps = constants.post_catch == "additive"
-        steps |= self.catch is not None and self.catch.within_peak
-        self.fixed_end = steps and math.isfinite(self.end)
-        self.peak_end = math.inf
-        if self.catch is not None:
+        self.trial, self.known, self.part = trial, known, trial.pre_catch
+        self.n_pre, later = self.part.time.size, self.part.time[:0]
+        self.catch: Catch | None = None
+        self.end, self.peak_end, self.fixed_end = math.inf, math.inf, False
+        if trial.catch is not None and trial.after is not None:
+            self.catch, later = trial.catch, trial.after.time
+            self.part = self.part.then(trial.after)
+            if self.catch.end is not None:
+                self.end = self.catch.end
+                # an end whose torque steps stays where it was found; others move with D
+                additive = known.constants.post_catch == "additive"
+                self.fixed_end = additive or self.catch.within_peak
             stop = self.end if self.fixed_end else math.inf
-            self.peak_end = min(self.catch.time + constants.peak_duration, stop)
-        self.local = self._local_names()
-        later = self.part.time[self.n_pre :]
+            self.peak_end = min(self.catch.time + known.constants.peak_duration, stop)
         self._period = float(np.median(np.diff(later))) if later.size > 1 else 0.0
-        self._whole = self._design(law.lag, law.catch_rise, 0.0)
-        self._compact = self._whole
-        if not law.takes_time:
-            # Where nothing climbs, all is linear: QR leaves a row for each column.
-            matrix, torque, past, climbs = self._whole
-            table = np.column_stack([matrix, torque])
-            rows = np.concatenate([triangle(table[~climbs]), table[climbs]])
-            n_flat = rows.shape[0] - int(climbs.sum())
-            self._compact = _Design(
-                rows[:, :-1],
-                rows[:, -1],
-                np.append(np.zeros(n_flat), past[climbs]),
-                np.arange(rows.shape[0]) >= n_flat,
-            )
-
-    def _local_names(self) -> tuple[str, ...]:
-        later = self.part.time[self.n_pre :] >= self.peak_end
-        has_peak = self.catch is not None and not later.all()
+        n_peak, timed = int((later < self.peak_end).sum()), known.law.takes_time
+        moves = math.isfinite(self.end) and not self.fixed_end
         has = {
-            "offset": self.known.offset is None,
-            "drift": self.known.drifts,
-            "peak": has_peak,
-            "residual": self.catch is not None and bool(later.any()),
-            "travel": math.isfinite(self.end)
-            and not self.fixed_end
-            and "catch_travel" in self.known.names,
-            "shift": self.known.law.takes_time and has_peak,
+            "offset": known.offset is None,
+            "drift": known.drifts,
+            "peak": n_peak > 0,
+            "residual": n_peak < later.size,
+            "travel": moves and "catch_travel" in known.names,
+            "shift": timed and n_peak > 0,
         }
-        return tuple(name for name, is_there in has.items() if is_there)
+        self.local = tuple(name for name, is_there in has.items() if is_there)
+        self._first = self._design(known.law.lag, known.law.catch_rise, 0.0)
 
     def values(self, shared: _Floats, local: _Floats) -> dict[str, float]:
         """Return all parameters by name, those of the arm that are held among them."""
@@ -206,7 +182,7 @@ class Equations:
         # a drift is that of the trial's own constant, in its middle, or of a known one
         middle = float(part.time.mean()) if n and self.known.offset is None else 0.0
         own = np.column_stack([part.time - middle, np.ones(n), steps])
-        return _Design(np.column_stack([columns, own]), part.torque, past, climbs)
+        return _Design(np.column_stack([columns, own]), past, climbs)
 
     def _smooth(self, part: Part, lag: float) -> _Floats:
         # a sensor that lags by T reads x - T·x' + T²·x'' of what is smooth
@@ -270,36 +246,28 @@ class Equations:
             values |= {name: x if math.isfinite(x) else 0.0 for name, x in own.items()}
         return np.array([values[name] for name in self.local])
 
-    def table(self, shared: _Floats, local: _Floats, *, whole: bool = False) -> _Floats:
-        """Return the columns [own | shared | residuals], over their spreads.
-
-        Of all samples if `whole`, else of what least squares see of them.
-        """
-        values = self.values(shared, local)
-        design = self._whole if whole else self._compact
-        if self.known.law.takes_time:
-            design = self.design(values)
+    def table(self, shared: _Floats, local: _Floats) -> _Floats:
+        """Return the columns [own | shared | residuals], over their spreads."""
+        values, names = self.values(shared, local), (*self.local, *self.known.names)
+        design = self.design(values)
         law, climb, slope = self._evaluate(design, values)
         by_name = dict(zip(LINEAR, design.matrix.T, strict=True))
         by_name |= {"post_catch_stiffness": climb, "travel": slope}
-        names = (*self.local, *self.known.names)
         for name in set(_CURVED) & set(names):
-            laws = [
+            more, less = (
                 self.law({**values, name: values[name] + step})
                 for step in (_STEP, -_STEP)
-            ]
-            by_name[name] = (laws[0] - laws[1]) / (2.0 * _STEP)
-        rows, sd = self.catch_rows(values), self.known.spreads["torque"]
-        zeros = np.zeros(law.size)
-        columns = [
-            np.append(
-                by_name.get(name, zeros) / sd,
-                [row.slopes.get(name, 0.0) for row in rows],
             )
-            for name in names
-        ]
-        left = np.append((law - design.torque) / sd, [row.left for row in rows])
-        return np.column_stack([*columns, left])
+            by_name[name] = (more - less) / (2.0 * _STEP)
+        rows, sd, n = self.catch_rows(values), self.known.spreads["torque"], law.size
+        table = np.zeros((n + len(rows), len(names) + 1))
+        for place, name in enumerate(names):
+            table[:n, place] = by_name.get(name, 0.0)
+            table[n:, place] = [row.slopes.get(name, 0.0) for row in rows]
+        table[:n, -1] = law - self.part.torque
+        table[:n] /= sd
+        table[n:, -1] = [row.left for row in rows]
+        return table
 
     def law(self, values: Mapping[str, float]) -> _Floats:
         """Return the torque of the law at the trial's samples, N·m."""
@@ -308,7 +276,7 @@ class Equations:
     def design(self, values: Mapping[str, float]) -> _Design:
         timed = values["lag"], values["catch_rise"], values.get("shift", 0.0)
         if timed == (self.known.law.lag, self.known.law.catch_rise, 0.0):
-            return self._whole
+            return self._first
         return self._design(*timed)
 
     def _evaluate(
@@ -316,8 +284,7 @@ class Equations:
     ) -> tuple[_Floats, _Floats, _Floats]:
         # the law, what k_post multiplies in it, and its derivative by the travel
         stiffness = values.get("post_catch_stiffness", 0.0)
-        climb = np.zeros(design.torque.size)
-        slope = climb
+        climb = slope = np.zeros(design.past.size)
         if self.catch is not None:
             past = design.past - values.get("travel", self.catch.travel)
             over = design.climbs & (self.fixed_end | (past > 0.0))
@@ -522,7 +489,7 @@ def joint_fit(equations: Sequence[Equations], solution: Solution) -> JointFit:
     """Return values of all parameters with their covariance, clustered by trial."""
     shared = solution.shared
     pairs = list(zip(equations, solution.local, strict=True))
-    tables = [e.table(shared, local, whole=True) for e, local in pairs]
+    tables = [e.table(shared, local) for e, local in pairs]
     rows = [e.rows(shared, t) for e, t in zip(equations, tables, strict=True)]
     laws = tuple(e.law(e.values(shared, local)) for e, local in pairs)
     left = np.concatenate(

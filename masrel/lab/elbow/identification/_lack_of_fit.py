@@ -196,7 +196,7 @@ def lack_of_fit(
 ) -> LackOfFit:
     """Return what a fit leaves over, and whether that goes with anything.
 
-    `tables` are the equations' whole ones, `laws` their torques.
+    `tables` are the equations' at the solution, `laws` their torques.
     """
     values = solution.values(equations)
     added = [

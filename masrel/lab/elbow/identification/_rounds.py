@@ -4,7 +4,7 @@ In: stretches, and what a fit is asked for. Out: the last round.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any, Literal
@@ -71,36 +71,45 @@ class FitOptions:
     level: float
 
     def __post_init__(self) -> None:
-        held = self.constants
-        if not 0.5 < self.level < 1.0:
-            raise ParameterError(
-                f"level: needs more than 0.5 and less than 1, got {self.level}"
-            )
-        if held.residual_reading != "residual" or held.catch_rise != 0.0:
-            raise ParameterError(
+        held, fits_inertia = self.constants, self.inertia == "fitted"
+        needs = [
+            (
+                0.5 < self.level < 1.0,
+                f"level: needs more than 0.5 and less than 1, got {self.level}",
+            ),
+            (
+                held.residual_reading == "residual" and held.catch_rise == 0.0,
                 "constants: a fit reads Q as section II does and takes the rise of a "
                 'catch from its option; needs residual_reading "residual" and '
-                f"catch_rise 0, got {held.residual_reading!r} and {held.catch_rise:g}"
-            )
-        for name, unit in (("slow_below", ""), ("window", " s")):
-            if not 0.0 < (value := getattr(self, name)) < math.inf:
-                raise ParameterError(f"{name}: needs more than 0{unit}, got {value}")
-        if self.inertia not in ("zero", "fitted"):
-            raise ParameterError(
-                f'inertia: needs "zero" or "fitted", got {self.inertia!r}'
-            )
-        if self.inertia == "fitted" and held.post_catch == "additive":
-            raise ParameterError(
+                f"catch_rise 0, got {held.residual_reading!r} and {held.catch_rise:g}",
+            ),
+            (
+                0.0 < self.slow_below < math.inf,
+                f"slow_below: needs more than 0, got {self.slow_below}",
+            ),
+            (
+                0.0 < self.window < math.inf,
+                f"window: needs more than 0 s, got {self.window}",
+            ),
+            (
+                self.inertia in ("zero", "fitted"),
+                f'inertia: needs "zero" or "fitted", got {self.inertia!r}',
+            ),
+            (
+                not (fits_inertia and held.post_catch == "additive"),
                 'inertia: with post_catch "additive", m is in every phase but the '
                 "catch, and where one ends cannot be told from the jump of m·θ̈; needs "
-                '"zero", got "fitted"'
-            )
-        for name, term in self.terms.items():
-            _check_term({"catch_rise": "rise"}.get(name, name), term, held)
-        if not math.isfinite(self.gravity_angle):
-            raise ParameterError(
-                f"gravity_angle: needs a finite angle, got {self.gravity_angle}"
-            )
+                '"zero", got "fitted"',
+            ),
+            *(need for term in self.terms.items() for need in _of_term(*term, held)),
+            (
+                math.isfinite(self.gravity_angle),
+                f"gravity_angle: needs a finite angle, got {self.gravity_angle}",
+            ),
+        ]
+        for is_met, need in needs:
+            if not is_met:
+                raise ParameterError(need)
 
     @property
     def fitted(self) -> tuple[str, ...]:
@@ -126,17 +135,22 @@ def _number(term: Term) -> float:
     return 0.0 if isinstance(term, str) else float(term)
 
 
-def _check_term(name: str, term: object, held: ElbowParameters) -> None:
+def _of_term(
+    name: str, term: object, held: ElbowParameters
+) -> Iterator[tuple[bool, str]]:
+    # what an option must be, in the order in which it is asked
+    name = {"catch_rise": "rise"}.get(name, name)
     if isinstance(term, str) and term in ("off", "fitted"):
         return
-    if not isinstance(term, int | float) or not math.isfinite(term):
-        raise ParameterError(f'{name}: needs "off", "fitted" or a number, got {term!r}')
-    if name in ("arm_inertia", "lag", "rise") and term < 0.0:
-        raise ParameterError(f"{name}: needs 0 or more, got {term:g}")
-    if name == "rise" and term > held.peak_duration:
-        raise ParameterError(
-            f"rise: needs 0 to ΔT_peak, {held.peak_duration:g} s, got {term:g} s"
-        )
+    is_number = isinstance(term, int | float) and math.isfinite(term)
+    yield is_number, f'{name}: needs "off", "fitted" or a number, got {term!r}'
+    value = float(term) if isinstance(term, int | float) else 0.0
+    if name in ("arm_inertia", "lag", "rise"):
+        yield value >= 0.0, f"{name}: needs 0 or more, got {value:g}"
+    if name == "rise":
+        longest = f"{held.peak_duration:g} s"
+        text = f"rise: needs 0 to ΔT_peak, {longest}, got {value:g} s"
+        yield value <= held.peak_duration, text
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,13 +170,9 @@ class Round:
         names = self.equations[0].known.names
         return dict(zip(names, self.solution.shared.tolist(), strict=True))
 
-    def floor(self, name: str) -> float:
-        """Return what a lag or a rise must exceed to be told from none, s."""
-        return _FLOORS[name] * _period(self.trials)
-
     def untimed(self) -> dict[str, str]:
         """Return why a lag or a rise is not fitted: samples tell it from none."""
-        floors = {name: self.floor(name) for name in _FLOORS}
+        floors = {name: n * _period(self.trials) for name, n in _FLOORS.items()}
         return {
             name: f"shorter than {1000.0 * floors[name]:.2g} ms, which these samples "
             "do not tell from nothing: taken as 0"
@@ -199,7 +209,7 @@ def fit_in_rounds(
     stretches: Mapping[str, Stretch], slow: SlowFit, options: FitOptions
 ) -> Round:
     """Fit trials in rounds: what an arm has moves catches, and catches tell that."""
-    first = replace(options.law(), **_of_law(slow))
+    first = replace(options.law(), **slow.values)
     # the sum of squares has a valley for each of several lags and rises
     timed = [name for name in _STARTS if name in options.fitted]
     starts: list[dict[str, Any]] = [
@@ -214,44 +224,28 @@ def fit_in_rounds(
     for _ in range((_TIMED_ROUNDS if made.law.takes_time else n_rounds) - 1):
         values = made.solution.values(made.equations)
         shifts = {
-            trial.name: at["shift"]
+            trial.name: (trial.catch.time, at["shift"])
             for trial, at in zip(made.trials, values, strict=True)
-            if "shift" in at
+            if trial.catch is not None and "shift" in at
         }
+        instants = {name: sum(pair) for name, pair in shifts.items()}
         # no catch moves by more than a sample
-        settled = shifts and max(map(abs, shifts.values())) < _period(made.trials)
-        made = _round(
-            stretches, slow, _next(made, options), options, _instants(made, shifts)
-        )
-        if settled:
+        furthest = max((abs(by) for _, by in shifts.values()), default=math.inf)
+        period = _period(made.trials)
+        made = _round(stretches, slow, _next(made, options), options, instants)
+        if furthest < period:
             break
     return made
-
-
-def _of_law(slow: SlowFit) -> dict[str, Any]:
-    return {e.name: e.value for e in slow.step.estimates}
 
 
 def _next(made: Round, options: FitOptions) -> Law:
     # what the fit says of the law before a catch, and of the arm
     values = made.solution.values(made.equations)
     drifts = {t.name: at["drift"] for t, at in zip(made.trials, values, strict=True)}
-    found: dict[str, Any] = {
-        name: value
-        for name, value in made.shared().items()
-        if name in ALWAYS or name in ARM_QUANTITIES
-    }
+    known = {*ALWAYS, *ARM_QUANTITIES}
+    found: dict[str, Any] = {n: x for n, x in made.shared().items() if n in known}
     found["drifts"] = drifts if "drift" in options.fitted else {}
     return replace(made.law, **found)
-
-
-def _instants(made: Round, shifts: Mapping[str, float]) -> dict[str, float]:
-    # where the fit has each catch begin
-    return {
-        trial.name: trial.catch.time + shifts[trial.name]
-        for trial in made.trials
-        if trial.catch is not None and trial.name in shifts
-    }
 
 
 def _round(
@@ -270,7 +264,7 @@ def _round(
     caught = [trial for trial in fast if trial.catch is not None]
     trials = [*slow.trials, *caught]
     # steps take what earlier ones found as known
-    alone = replace(law, **{k: v for k, v in _of_law(slow).items() if k in ALWAYS})
+    alone = replace(law, **{k: v for k, v in slow.values.items() if k in ALWAYS})
     read = {
         trial.name: levels
         for trial in caught

@@ -7,7 +7,7 @@ https://doi.org/10.1109/TNSRE.2012.2195330, equations (1)-(6), Figs. 3 to 5.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +52,11 @@ class SlowFit:
     relative_error: float
     errors: Mapping[str, float]  # standard errors, of one trial those of its samples
 
+    @property
+    def values(self) -> dict[str, Any]:
+        """Return what was fitted, by name."""
+        return {e.name: e.value for e in self.step.estimates}
+
 
 def fit_slow(trials: Sequence[Trial], known: Known, *, level: float) -> SlowFit:
     """Fit b, k, and of m, weight and drift what is fitted, to slow trials: step 1.
@@ -62,9 +67,7 @@ def fit_slow(trials: Sequence[Trial], known: Known, *, level: float) -> SlowFit:
     equations = [Equations(trial, known) for trial in trials]
     zeros = np.zeros(len(known.names))
     starts = [np.zeros(len(e.local)) for e in equations]
-    tables = [
-        e.table(zeros, x, whole=True) for e, x in zip(equations, starts, strict=True)
-    ]
+    tables = [e.table(zeros, x) for e, x in zip(equations, starts, strict=True)]
     rows = [e.rows(zeros, table) for e, table in zip(equations, tables, strict=True)]
     fit = solve(rows)
     values, left, size = np.nan_to_num(fit.values), [], 0.0

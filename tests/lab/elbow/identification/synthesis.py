@@ -6,7 +6,6 @@ does not use but for the parameters.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -56,22 +55,6 @@ class Arm:
     noise_time: float = 0.0  # s, over which noise is correlated; 0 is white
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Truth:
-    """What really happened in one stretch."""
-
-    catch: float | None
-    catch_angle: float | None
-    catch_speed: float | None
-    catch_end: float | None
-    mean_speed: float | None
-
-
-NEVER = Truth(
-    catch=None, catch_angle=None, catch_speed=None, catch_end=None, mean_speed=None
-)
-
-
 def recording(
     joint: ElbowParameters,
     *,
@@ -89,7 +72,7 @@ def recording(
     offset: float = 0.0,
     arm: Arm | None = None,
     name: str = "simulated",
-) -> tuple[Movement, Truth]:
+) -> Movement:
     """One stretch with `rest` seconds of rest before and after it."""
     hand, scatter, arm = hand or Hand(), scatter or Scatter(), arm or Arm()
     joint = replace(joint, catch_rise=arm.rise)
@@ -113,17 +96,16 @@ def recording(
     inside = np.clip(at - rest, 0.0, time[-1])
     sampled = np.interp(inside, time, angle)
     motion = time, angle, speed
-    torque, truth = _torque(joint, *motion, catch, inside, free)
+    torque = _torque(joint, *motion, catch, inside, free)
     if arm != Arm():
         fine = np.arange(at[0], at[-1] + STEP, STEP) - rest
         within = np.clip(fine, 0.0, time[-1])
-        law, _ = _torque(joint, *motion, catch, within, free)
+        law = _torque(joint, *motion, catch, within, free)
         torque = np.interp(at - rest, fine, _sensed(arm, law, *motion, fine))
     felt = torque + offset + noise * _noise(rng, at.size, arm.noise_time * rate)
     if encoder:
         sampled = np.round(sampled / encoder) * encoder
-    made = Movement(name=name, time=at, angle=sampled, torque=felt, simulated=True)
-    return made, _shifted(truth, rest)
+    return Movement(name=name, time=at, angle=sampled, torque=felt, simulated=True)
 
 
 def study(
@@ -155,7 +137,7 @@ def study(
                 name=f"slow {i}",
                 arm=_drifting(arm, i),
                 **sensors,
-            )[0]
+            )
         )
     for i in range(n_fast):
         made.append(
@@ -169,7 +151,7 @@ def study(
                 name=f"fast {i}",
                 arm=_drifting(arm, i),
                 **sensors,
-            )[0]
+            )
         )
     return made
 
@@ -261,15 +243,14 @@ def _torque(
     catch: float | None,
     at: Floats,
     free: Floats,
-) -> tuple[Floats, Truth]:
+) -> Floats:
     # torque at the times `at`; a step is before or after a sample, never smeared
     rest = angle[0] if joint.rest_angle is None else joint.rest_angle
     law = joint.damping * speed + joint.stiffness * (angle - rest)
     law = law + joint.inertia * np.gradient(speed, STEP)
     pre = np.interp(at, time, law)
     if catch is None:
-        return pre, NEVER
-    onset = int(np.argmax(speed >= joint.speed_threshold))
+        return pre
     catch_angle = float(np.interp(catch, time, angle))
     catch_speed = float(np.interp(catch, time, speed))
     pre_end = joint.damping * catch_speed + joint.stiffness * (catch_angle - rest)
@@ -294,24 +275,4 @@ def _torque(
         torque = np.where(at >= catch_end, pre + added, torque)
     slow = time[np.flatnonzero(speed >= joint.speed_threshold)[-1]]
     torque = np.where((at > slow) & (at > catch_end), pre, torque)
-    truth = Truth(
-        catch=catch,
-        catch_angle=catch_angle,
-        catch_speed=catch_speed,
-        catch_end=None if math.isinf(catch_end) else catch_end,
-        mean_speed=(catch_angle - float(angle[onset])) / (catch - time[onset]),
-    )
-    return torque, truth
-
-
-def _shifted(truth: Truth, by: float) -> Truth:
-    return replace(
-        truth,
-        catch=None if truth.catch is None else truth.catch + by,
-        catch_end=None if truth.catch_end is None else truth.catch_end + by,
-    )
-
-
-def durations(movements: Sequence[Movement]) -> list[float]:
-    """How long each lasts, s."""
-    return [float(m.time[-1] - m.time[0]) for m in movements]
+    return torque

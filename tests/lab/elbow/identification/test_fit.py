@@ -291,8 +291,8 @@ def test_uneven_times_and_short_gaps_change_little_and_long_ones_are_said(
 
 def test_a_recording_of_several_stretches_is_several_trials() -> None:
     rng = np.random.default_rng(7)
-    one, _ = recording(HM3, start=0.6, end=1.0, mean_speed=0.1, rng=rng)
-    two, _ = recording(HM3, start=0.6, end=1.0, mean_speed=0.12, rng=rng)
+    one = recording(HM3, start=0.6, end=1.0, mean_speed=0.1, rng=rng)
+    two = recording(HM3, start=0.6, end=1.0, mean_speed=0.12, rng=rng)
     back = np.linspace(1.0, 0.6, 1500)[1:-1]
     joined = Movement(
         name="both",

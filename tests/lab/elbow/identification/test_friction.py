@@ -75,14 +75,6 @@ def test_values_are_those_of_statsmodels_on_the_filtered_samples() -> None:
     np.testing.assert_allclose(fitted, peer.fittedvalues, atol=1e-8)
 
 
-def test_several_recordings_narrow_the_intervals() -> None:
-    one = fit_friction([backdriven(3)])
-    three = fit_friction([backdriven(seed) for seed in (3, 4, 5)])
-    assert len(three.strokes) > 2 * len(one.strokes)
-    for name in TRUTH:
-        assert three[name].standard_error < one[name].standard_error
-
-
 def test_one_direction_cannot_tell_coulomb_friction_from_the_zero() -> None:
     whole = backdriven(4)
     rising = np.gradient(np.asarray(whole.angle), 1e-3)

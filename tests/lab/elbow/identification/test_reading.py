@@ -1,7 +1,6 @@
 """Recordings are read in the unit they say, or refused with the place of the fault."""
 
 import math
-import warnings
 from pathlib import Path
 
 import numpy as np
@@ -61,16 +60,6 @@ def test_a_unit_in_the_name_is_taken(
     assert not read.simulated
 
 
-def test_names_and_units_can_be_said_beside_the_file(tmp_path: Path) -> None:
-    path = put(tmp_path, table(time_s=TIME, goniometer=ANGLE, torque=TORQUE))
-    read = read_movement(
-        path,
-        columns={"angle": "goniometer"},
-        units={"angle": "deg", "torque": "nm"},
-    )
-    np.testing.assert_allclose(np.degrees(read.angle), ANGLE, rtol=1e-12)
-
-
 def test_semicolons_remarks_blank_lines_and_a_byte_order_mark(tmp_path: Path) -> None:
     text = table(**good()).replace(",", ";")
     path = put(tmp_path, f"\ufeff# simulated: true\n# by: nobody\n\n{text}\n\n")
@@ -78,14 +67,6 @@ def test_semicolons_remarks_blank_lines_and_a_byte_order_mark(tmp_path: Path) ->
     assert read.simulated
     assert read.time.size == TIME.size
     assert read.sha256 is not None
-
-
-def test_an_archive_is_read_like_a_table(tmp_path: Path) -> None:
-    path = tmp_path / "trial.npz"
-    np.savez(path, simulated=True, **good())
-    read = read_movement(path)
-    np.testing.assert_allclose(read.torque, TORQUE)
-    assert read.simulated
 
 
 def test_a_recording_of_the_driver_gives_the_torque_of_its_model(
@@ -119,34 +100,76 @@ def test_rows_with_an_empty_cell_are_left_out_and_counted(tmp_path: Path) -> Non
     assert read.time.size == TIME.size - 2
 
 
+def test_columns_that_are_not_asked_for_may_be_anything(tmp_path: Path) -> None:
+    lines = table(**good()).splitlines()
+    noted = [f"{lines[0]},phase", *(f"{line},at rest" for line in lines[1:])]
+    read = read_movement(put(tmp_path, "\n".join(noted)))
+    np.testing.assert_allclose(read.torque, TORQUE, rtol=1e-12)
+    path = tmp_path / "trial.npz"
+    np.savez(path, emg=np.zeros((TIME.size, 4)), rater=np.array("R1"), **good())
+    np.testing.assert_allclose(read_movement(path).torque, TORQUE)
+
+
+def test_names_and_units_can_be_said_beside_the_file(tmp_path: Path) -> None:
+    path = put(tmp_path, table(time_s=TIME, goniometer=ANGLE, torque=TORQUE))
+    units = {"angle": "deg", "torque": "nm"}
+    read = read_movement(path, columns={"angle": "goniometer"}, units=units)
+    np.testing.assert_allclose(np.degrees(read.angle), ANGLE, rtol=1e-12)
+    good_path = put(tmp_path, table(**good()))
+    for wrong, error, said in [
+        ({"torque": "lbf"}, ParameterError, "torque needs one of nm, mnm, ncm, got 'l"),
+        ({"force": "n"}, ParameterError, "need one of time, angle, torque, velocity"),
+        ({"angle": "rad"}, RecordingError, "angle_deg says deg, units says rad"),
+    ]:
+        with pytest.raises(error, match=said):
+            read_movement(good_path, units=wrong)
+
+
+def test_a_sensor_at_the_end_of_its_range_is_said_and_marked() -> None:
+    rng = np.random.default_rng(1)
+    torque = np.minimum(TORQUE + 0.05 * rng.standard_normal(TIME.size), 2.0)
+    columns = {"time": TIME, "angle": np.radians(ANGLE)}
+    with pytest.warns(RecordingWarning, match="the torque stays at 2 N·m for"):
+        made = Movement(name="cut", torque=torque, **columns)
+    np.testing.assert_array_equal(made.saturated, torque == 2.0)
+    # one without noise that holds levels is not
+    levels = np.repeat([0.0, 3.0, 2.0, 2.5], 100)
+    assert not Movement(name="levels", torque=levels, **columns).saturated.any()
+
+
+def test_times_rounded_as_they_are_written_are_of_50_hz_still() -> None:
+    time = np.round(np.arange(200) * 0.020001, 6)  # 49.9975 a second
+    angle = np.linspace(0.5, 1.5, 200)
+    assert Movement(name="film", time=time, angle=angle, torque=angle).time.size == 200
+
+
+HEAD = "time_s,angle_deg,torque_nm\n"
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
         ("", "needs a line of column names, got none"),
         ("# only: remarks\n", "needs a line of column names, got none"),
         ("time_s,angle_deg\n0,1\n", "needs a column of torque: torque_nm, torque_mnm"),
+        ("time_s,angle,torque_nm\n", "column angle has no unit: name it angle_d"),
+        ("time_s,time_ms,torque_nm\n", "needs one column of time, got time_s"),
+        ("time_s,time_s,torque_nm\n", "column 'time_s' is there twice"),
+        (f"{HEAD}0,1,2\n0.1,1\n", "line 3: needs 3 cells, got 2"),
         (
-            "time_s,angle,torque_nm\n0,1,2\n",
-            "column angle has no unit: name it angle_d",
-        ),
-        (
-            "time_s,time_ms,angle_deg,torque_nm\n",
-            "needs one column of time, got time_s",
-        ),
-        ("time_s,time_s,angle_deg,torque_nm\n", "column 'time_s' is there twice"),
-        (
-            "time_s,angle_deg,torque_nm\n0,1,2\n0.1,1\n",
-            "line 3: needs 3 cells, got 2",
-        ),
-        (
-            "# x: y\ntime_s,angle_deg,torque_nm\n0,1,2\n0.1,eins,2\n",
+            f"# x: y\n{HEAD}0,1,2\n0.1,eins,2\n",
             "line 4, column angle_deg: needs a number with a decimal point",
         ),
         (
             "time_s;angle_deg;torque_nm\n0;1;2\n0.1;1,5;2\n",
             "line 3, column angle_deg: needs a number .* got '1,5'",
         ),
-        ("time_s,angle_deg,torque_nm\n0,1,2\n", "needs at least 50 samples, got 1"),
+        (f"{HEAD}0,1,2\n", "needs at least 50 samples, got 1"),
+        *(
+            (f"{HEAD}0,1,{cell}\n", f"line 2, column torque_nm.*{cell}")
+            for cell in ("inf", "-Infinity", "1_000", "1e999")
+        ),
+        (f"{HEAD}0,{'1' * 200_000},2\n", "field larger than field limit"),
     ],
 )
 def test_a_faulty_file_is_named_with_the_place(
@@ -160,145 +183,68 @@ def test_a_faulty_file_is_named_with_the_place(
 def test_files_that_are_none_are_refused(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="no such file"):
         read_movement(tmp_path / "absent.csv")
-    (tmp_path / "latin.csv").write_bytes(b"time_s,\xe9\n")
-    with pytest.raises(RecordingError, match="needed UTF-8 text, got the byte 0xe9"):
-        read_movement(tmp_path / "latin.csv")
-    (tmp_path / "long.csv").write_text(f"time_s,angle_deg\n0,{'1' * 200_000}\n")
-    with pytest.raises(RecordingError, match="field larger than field limit"):
-        read_movement(tmp_path / "long.csv")
-    (tmp_path / "broken.npz").write_bytes(b"PK no archive")
-    with pytest.raises(RecordingError, match="not an archive of columns"):
-        read_movement(tmp_path / "broken.npz")
-    np.savez(tmp_path / "odd.npz", time_s=TIME, angle_deg=ANGLE[1:], torque_nm=TORQUE)
-    with pytest.raises(RecordingError, match="need one length, got time_s 400, angle"):
-        read_movement(tmp_path / "odd.npz")
+    for name, content, said in [
+        ("latin.csv", b"time_s,\xe9\n", "needed UTF-8 text, got the byte 0xe9"),
+        ("broken.npz", b"PK no archive", "not an archive of columns"),
+    ]:
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(RecordingError, match=said):
+            read_movement(tmp_path / name)
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("changes", "said"),
     [
-        ({"units": {"torque": "lbf"}}, "torque needs one of nm, mnm, ncm, got 'lbf'"),
-        ({"units": {"force": "n"}}, "need one of time, angle, torque, velocity"),
-    ],
-)
-def test_a_unit_that_there_is_not_is_refused(
-    tmp_path: Path, options: dict[str, dict[str, str]], said: str
-) -> None:
-    with pytest.raises(ParameterError, match=said):
-        read_movement(put(tmp_path, table(**good())), **options)
-
-
-def test_a_unit_that_contradicts_the_name_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match="angle_deg says deg, units says rad"):
-        read_movement(put(tmp_path, table(**good())), units={"angle": "rad"})
-
-
-@pytest.mark.parametrize(
-    ("columns", "said"),
-    [
-        (  # radians called degrees
-            good(angle_deg=np.radians(ANGLE)),
+        ({"angle_deg": ANGLE[1:]}, "need one length, got time_s 400, angle"),
+        ({"torque_nm": TORQUE + 0j}, "column torque_nm needs numbers"),
+        (
+            {"torque_nm": np.where(TIME == TIME[7], np.inf, TORQUE)},
+            r"sample 7 .* column torque_nm",
+        ),
+        (
+            {"time_s": np.where(TIME == TIME[200], TIME[199], TIME)},
+            r"time must increase, got .* \(samples 199 and 200",
+        ),
+        (
+            {"time_s": np.where(TIME == TIME[200], TIME[199] - 0.004, TIME)},
+            r"time must increase, got .* \(samples 199 and 200",
+        ),
+        (
+            {"angle_deg": np.radians(ANGLE)},
             "travels 15 degrees or more. Is the unit of the angle right",
         ),
-        (  # degrees called radians
-            {"time_s": TIME, "angle_rad": ANGLE, "torque_nm": TORQUE},
-            "is the unit of the angle right",
-        ),
-        (good(time_s=TIME * 1e3), "is the unit of time right"),  # ms called s
-        ({"time_ms": TIME, "angle_deg": ANGLE, "torque_nm": TORQUE}, "unit of time"),
-        (good(torque_nm=TORQUE * 1e3), "is the unit of torque right"),  # mN·m
-        (  # swapped
-            good(angle_deg=TORQUE, torque_nm=ANGLE),
+        ({"angle_deg": np.degrees(ANGLE)}, "is the unit of the angle right"),
+        ({"time_s": TIME * 1e3}, "is the unit of time right"),
+        ({"time_s": TIME * 1e-3}, "is the unit of time right"),
+        ({"torque_nm": TORQUE * 1e3}, "is the unit of torque right"),
+        (
+            {"angle_deg": TORQUE, "torque_nm": ANGLE},
             "columns of angle and torque swapped",
         ),
-        (good(time_s=ANGLE, angle_deg=TIME), "is the unit of time right"),
+        ({"time_s": ANGLE, "angle_deg": TIME}, "is the unit of time right"),
     ],
 )
 def test_what_cannot_be_is_refused_with_the_likely_reason(
-    tmp_path: Path, columns: dict[str, np.ndarray], said: str
+    tmp_path: Path, changes: dict[str, np.ndarray], said: str
 ) -> None:
+    path = tmp_path / "trial.npz"
+    np.savez(path, **good(**changes))
     with pytest.raises(RecordingError, match=said):
-        read_movement(put(tmp_path, table(**columns)))
+        read_movement(path)
 
 
-@pytest.mark.parametrize("step", [0.0, -0.004])
-def test_time_that_does_not_increase_is_refused_with_the_samples(
-    tmp_path: Path, step: float
-) -> None:
-    time = TIME.copy()
-    time[200] = time[199] + step
-    with pytest.raises(
-        RecordingError, match=r"time must increase, got .* \(samples 199 and 200"
-    ):
-        read_movement(put(tmp_path, table(**good(time_s=time))))
-
-
-def test_a_torque_cut_off_at_the_end_of_its_range_is_said_and_marked(
-    tmp_path: Path,
-) -> None:
-    rng = np.random.default_rng(1)
-    torque = np.minimum(TORQUE + 0.05 * rng.standard_normal(TIME.size), 2.0)
-    with pytest.warns(RecordingWarning, match="the torque stays at 2 N·m for"):
-        read = read_movement(put(tmp_path, table(**good(torque_nm=torque))))
-    np.testing.assert_array_equal(read.saturated, torque == 2.0)
-
-
-def test_a_torque_without_noise_that_holds_levels_is_not_saturated(
-    tmp_path: Path,
-) -> None:
-    levels = np.repeat([0.0, 3.0, 2.0, 2.5], 100)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        read = read_movement(put(tmp_path, table(**good(torque_nm=levels))))
-    assert not read.saturated.any()
-
-
-def test_columns_that_are_not_asked_for_may_be_anything(tmp_path: Path) -> None:
-    lines = table(**good()).splitlines()
-    noted = [f"{lines[0]},phase", *(f"{line},at rest" for line in lines[1:])]
-    read = read_movement(put(tmp_path, "\n".join(noted)))
-    np.testing.assert_allclose(read.torque, TORQUE, rtol=1e-12)
+def test_archives_are_read_like_tables_and_spoiled_ones_refused(tmp_path: Path) -> None:
     path = tmp_path / "trial.npz"
-    np.savez(path, emg=np.zeros((TIME.size, 4)), rater=np.array("R1"), **good())
-    np.testing.assert_allclose(read_movement(path).torque, TORQUE)
-
-
-@pytest.mark.parametrize("cell", ["inf", "-Infinity", "1_000", "1e999"])
-def test_numbers_that_are_none_are_refused_with_their_place(
-    tmp_path: Path, cell: str
-) -> None:
-    lines = table(**good()).splitlines()
-    lines[5] = f"{lines[5].rpartition(',')[0]},{cell}"
-    path = put(tmp_path, "\n".join(lines))
-    with pytest.raises(RecordingError, match=f"line 6, column torque_nm.*{cell}"):
-        read_movement(path)
-
-
-def test_archives_that_hold_something_else_are_refused(tmp_path: Path) -> None:
-    lone = tmp_path / "lone.npy"
-    np.save(lone, ANGLE)
-    lone = lone.rename(tmp_path / "lone.npz")
-    with pytest.raises(RecordingError, match="one array without a name"):
-        read_movement(lone)
-    path = tmp_path / "trial.npz"
-    np.savez(path, **{**good(), "torque_nm": TORQUE + 0j})
-    with pytest.raises(RecordingError, match="column torque_nm needs numbers"):
-        read_movement(path)
-    beyond = TORQUE.copy()
-    beyond[7] = np.inf
-    np.savez(path, **{**good(), "torque_nm": beyond})
-    with pytest.raises(RecordingError, match=r"sample 7 .* column torque_nm"):
-        read_movement(path)
-    np.savez_compressed(path, **good())
+    np.savez_compressed(path, simulated=True, **good())
+    read = read_movement(path)
+    np.testing.assert_allclose(read.torque, TORQUE)
+    assert read.simulated
     content = bytearray(path.read_bytes())
     content[200:260] = bytes(60)
     path.write_bytes(bytes(content))
     with pytest.raises(RecordingError, match="not an archive of columns"):
         read_movement(path)
-
-
-def test_times_rounded_as_they_are_written_are_of_50_hz_still() -> None:
-    time = np.round(np.arange(200) * 0.020001, 6)  # 49.9975 a second
-    angle = np.linspace(0.5, 1.5, 200)
-    made = Movement(name="film", time=time, angle=angle, torque=angle)
-    assert made.time.size == 200
+    np.save(tmp_path / "lone.npy", ANGLE)
+    lone = (tmp_path / "lone.npy").rename(tmp_path / "lone.npz")
+    with pytest.raises(RecordingError, match="one array without a name"):
+        read_movement(lone)

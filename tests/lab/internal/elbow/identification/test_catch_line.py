@@ -55,28 +55,6 @@ def test_late_catches_of_hands_that_speed_up_do_not_bias_the_slope() -> None:
     assert step["catch_angle_constant"].value == pytest.approx(LINE, abs=0.06)
 
 
-def test_without_scatter_it_is_the_line() -> None:
-    step = fit_catch_line(caught(np.random.default_rng(2), 6, 0.0), HM3, level=0.95)
-    assert step["catch_slope"].value == pytest.approx(SLOPE, rel=1e-9)
-    assert step["catch_angle_constant"].value == pytest.approx(LINE, rel=1e-9)
-
-
-def test_derivatives_of_a_row_are_those_of_its_residual() -> None:
-    one = catch(1.3, 1.7, 0.6)
-    _, by_line, by_slope = line_row(one, LINE, SLOPE, 1.0)
-    h = 1e-6
-    ahead, behind = (
-        line_row(one, LINE + h, SLOPE, 1.0),
-        line_row(one, LINE - h, SLOPE, 1.0),
-    )
-    assert by_line == pytest.approx((ahead[0] - behind[0]) / (2 * h), rel=1e-6)
-    ahead, behind = (
-        line_row(one, LINE, SLOPE + h, 1.0),
-        line_row(one, LINE, SLOPE - h, 1.0),
-    )
-    assert by_slope == pytest.approx((ahead[0] - behind[0]) / (2 * h), rel=1e-6)
-
-
 def test_slow_means_meet_the_catch_where_the_slowest_on_the_line_does() -> None:
     slowest = HM3.slowest_mean_speed
     held = catch(LINE - SLOPE * slowest, 0.6 * slowest, 0.7)

@@ -95,26 +95,6 @@ def _squares(felt: np.ndarray, catch: int, end: int) -> float:
     return float(left[0])
 
 
-def test_noise_alone_has_no_catch() -> None:
-    # A rise of 3 sd of the residuals over 50 samples is 21 standard errors: not in
-    # 60 series, nor in 1e50.
-    for seed in range(60):
-        felt = PRE + 0.2 * np.random.default_rng(seed).standard_normal(N)
-        found = find_changes(
-            felt, PRE, ANGLE, first=20, lengths=(PEAK, 0, 0), additive=False
-        )
-        assert found.catch is None
-        assert found.end is None
-
-
-def test_a_torque_that_falls_is_no_catch() -> None:
-    felt = torque(150, None, rise=-3.0, residual=-3.0)
-    found = find_changes(
-        felt, PRE, ANGLE, first=20, lengths=(PEAK, 0, 0), additive=False
-    )
-    assert found.catch is None
-
-
 def test_the_additive_reading_goes_on_from_the_residual_with_the_law() -> None:
     felt = torque(120, None)
     end = 250
@@ -138,5 +118,12 @@ def test_an_inertial_torque_after_the_catch_is_told_from_its_climb() -> None:
     assert (found.catch, found.end) == (120, end)
 
 
-def test_too_short_a_stretch_has_no_catch() -> None:
+def test_neither_noise_nor_a_fall_nor_a_short_stretch_is_a_catch() -> None:
+    # A rise of 3 sd of the residuals over 50 samples is 21 standard errors: not in
+    # 60 series, nor in 1e50.
+    for seed in range(60):
+        noise = 0.2 * np.random.default_rng(seed).standard_normal(N)
+        found = search(PRE + noise)
+        assert (found.catch, found.end) == (None, None)
+    assert search(torque(150, None, rise=-3.0, residual=-3.0)).catch is None
     assert search(PRE[:22]).catch is None

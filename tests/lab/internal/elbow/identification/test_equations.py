@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from masrel.lab.elbow.identification._catches import Law, Trial, fast_trial
-from masrel.lab.elbow.identification._clusters import triangle
 from masrel.lab.elbow.identification._equations import (
     DetectionLimit,
     Equations,
@@ -32,7 +31,7 @@ SPREADS = {
 def caught(
     joint: ElbowParameters, speed: float, seed: int = 1, arm: Law | None = None
 ) -> Trial:
-    movement, _ = recording(
+    movement = recording(
         joint,
         start=0.5,
         end=joint.range_end,
@@ -52,7 +51,7 @@ def caught(
 def jacobian_holds(equations: Equations, shared: np.ndarray, own: np.ndarray) -> None:
     """Columns of the table are the derivatives of its last one."""
     n, names = shared.size, (*equations.local, *equations.known.names)
-    table = equations.table(shared, own, whole=True)
+    table = equations.table(shared, own)
     whole = np.concatenate([own, shared])
     for place, name in enumerate(names):
         step = 1e-6 * max(abs(whole[place]), 0.1)
@@ -60,7 +59,7 @@ def jacobian_holds(equations: Equations, shared: np.ndarray, own: np.ndarray) ->
         for signed in (step, -step):
             moved = whole.copy()
             moved[place] += signed
-            near = equations.table(moved[-n:], moved[:-n], whole=True)
+            near = equations.table(moved[-n:], moved[:-n])
             sides.append(near[:, -1])
         slope = (sides[0] - sides[1]) / (2.0 * step)
         # a sample within one step of a kink has both slopes: none is that near, but
@@ -118,46 +117,6 @@ def test_derivatives_hold_with_all_that_an_arm_has(
     jacobian_holds(equations, shared, equations.start(values))
 
 
-def test_compressing_the_samples_leaves_the_sum_of_squares_as_it_is() -> None:
-    joint = STANDARD_MODELS["HM3"]
-    known = Known(names=NAMES, constants=joint, spreads=SPREADS, law=Law())
-    trial = caught(joint, 85.0)
-    equations = Equations(trial, known)
-    for factor in (1.0, 1.2):
-        shared = np.array([factor * getattr(joint, name) for name in NAMES])
-        mine = equations.start(dict(zip(NAMES, shared.tolist(), strict=True)))
-        whole = triangle(equations.table(shared, mine, whole=True))
-        part = triangle(equations.table(shared, mine))
-        np.testing.assert_allclose(part.T @ part, whole.T @ whole, rtol=1e-9, atol=1e-7)
-        # and of the torque it is that of the law at every sample
-        assert trial.after is not None
-        torque = np.concatenate([trial.pre_catch.torque, trial.after.torque])
-        left = (equations.law(equations.values(shared, mine)) - torque) / SPREADS[
-            "torque"
-        ]
-        table = equations.table(shared, mine, whole=True)
-        np.testing.assert_allclose(table[:-3, -1], left, rtol=1e-12, atol=1e-12)
-
-
-def test_the_law_is_evaluated_on_few_rows_before_the_residual_torque() -> None:
-    # counted: slow trials and the rest before the peak's end are a handful of rows
-    joint = STANDARD_MODELS["HM1"]
-    trial = caught(joint, 85.0)
-    assert trial.after is not None
-    assert trial.catch is not None
-    known = Known(
-        names=NAMES, constants=joint, spreads=SPREADS, law=Law(), on_line=True
-    )
-    equations = Equations(trial, known)
-    shared = np.array([getattr(joint, name) for name in NAMES])
-    mine = equations.start(dict(zip(NAMES, shared.tolist(), strict=True)))
-    rows = equations.table(shared, mine).shape[0]
-    peak_end = trial.catch.time + joint.peak_duration
-    held = int((trial.after.time >= peak_end).sum())
-    assert rows <= held + 9 + 3
-    assert trial.pre_catch.time.size > 300
-
-
 def test_a_censored_travel_adds_one_row_of_d_alone() -> None:
     joint = STANDARD_MODELS["HM1"]
     behind = DetectionLimit(travel=joint.catch_travel - 0.02, sd=0.004)
@@ -177,8 +136,8 @@ def test_a_censored_travel_adds_one_row_of_d_alone() -> None:
     )
     shared = np.array([getattr(joint, name) for name in NAMES])
     mine = plain.start(dict(zip(NAMES, shared.tolist(), strict=True)))
-    table = censored.table(shared, mine, whole=True)
-    np.testing.assert_array_equal(table[:-1], plain.table(shared, mine, whole=True))
+    table = censored.table(shared, mine)
+    np.testing.assert_array_equal(table[:-1], plain.table(shared, mine))
     left, slope, root = beyond(joint.catch_travel, behind, SPREADS["travel"])
     place = NAMES.index("catch_travel")
     expected = np.zeros(len(censored.local) + len(NAMES) + 1)

@@ -84,18 +84,6 @@ def test_a_climb_at_constant_speed_by_hand() -> None:
     assert 0.0 < found.sd < 10.0 * h
 
 
-def test_more_noise_or_less_stiffness_hides_more() -> None:
-    limits = [detection_limit(trial(1000, sd), 5.8, HM2) for sd in (0.02, 0.1, 0.5)]
-    travels = [made.travel for made in limits if made is not None]
-    assert len(travels) == 3
-    assert travels == sorted(travels, reverse=True)
-    half = detection_limit(trial(1000, 0.1), 2.9, HM2)
-    twice = detection_limit(trial(1000, 0.2), 5.8, HM2)
-    assert half is not None
-    assert twice is not None
-    assert half.travel <= twice.travel + 1e-12
-
-
 def test_where_no_end_could_be_seen_there_is_none() -> None:
     assert detection_limit(trial(1000, 1e3), 5.8, HM2) is None  # noise
     assert detection_limit(trial(1000, 0.1), math.nan, HM2) is None  # no k_post
@@ -113,7 +101,7 @@ def test_the_search_finds_ends_before_and_none_behind() -> None:
     sides = []
     for _ in range(60):
         joint = replace(HM2, catch_travel=math.radians(rng.uniform(38.0, 54.0)))
-        movement, _ = recording(
+        movement = recording(
             joint,
             start=math.radians(30.0),
             end=joint.range_end,

@@ -33,18 +33,6 @@ def test_speed_at_20_5_hz_comes_out_at_half_its_power() -> None:
     assert ratio == pytest.approx(math.sqrt(0.5), rel=5e-3)
 
 
-def test_neither_filter_delays() -> None:
-    # An even function of time about the middle stays even, its derivative odd.
-    about = TIME - TIME[300]
-    bump = np.exp(-((about / 0.08) ** 2))[1:]
-    _, velocity, acceleration = differentiate(bump, PERIOD, 0.06)
-    np.testing.assert_allclose(velocity, -velocity[::-1], atol=1e-9)
-    means, rate, _, torque = filter_alike(bump, bump, PERIOD, 0.1)
-    np.testing.assert_allclose(means, torque, atol=1e-15)
-    np.testing.assert_allclose(rate, -rate[::-1], atol=1e-12)
-    assert acceleration.size == bump.size
-
-
 def test_a_linear_law_survives_filtering_angle_and_torque_alike() -> None:
     # whatever the motion: here one far beyond the filter's bandwidth
     rng = np.random.default_rng(3)
