@@ -81,8 +81,6 @@ class PresentationStatus:
     True
     """
 
-    __slots__ = ("is_armed", "is_done", "n_stretches")
-
     def __init__(self) -> None:
         self.is_done = False
         self.is_armed = False
@@ -95,26 +93,6 @@ class PresentationStatus:
 
 class Course:
     """Follow the arm through its stretches, and say when the presentation is over."""
-
-    __slots__ = (
-        "_arrival_speed",
-        "_arrival_time",
-        "_back_at",
-        "_begins_after",
-        "_begun_at",
-        "_end_angle",
-        "_flexing_speed",
-        "_has_caught",
-        "_is_single",
-        "_lowest_angle",
-        "_n",
-        "_over_at",
-        "_resting_since",
-        "_stretch_limit",
-        "_time_limit",
-        "status",
-        "stretch",
-    )
 
     def __init__(
         self,

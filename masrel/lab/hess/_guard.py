@@ -58,34 +58,6 @@ _BACK = math.radians(3.0)
 class Guard:
     """Check readings, torques and ticks against limits that look at more than one."""
 
-    __slots__ = (
-        "_angle",
-        "_creep_angle",
-        "_drift",
-        "_held_time",
-        "_limits",
-        "_lower",
-        "_missed",
-        "_moved_at",
-        "_n_in_a_row",
-        "_period",
-        "_raw_speed",
-        "_sent",
-        "_sent_at",
-        "_settled_at",
-        "_settled_from",
-        "_slope",
-        "_slow_from",
-        "_speed",
-        "_stopped_dead",
-        "_time",
-        "_upper",
-        "_window_s",
-        "_without",
-        "n_missed_ticks",
-        "n_without_reading",
-    )
-
     def __init__(
         self, limits: DeviceLimits, period_s: float, *, has_hand: bool = True
     ) -> None:
@@ -322,8 +294,6 @@ class Guard:
 class Drift:
     """Tell whether an arm that leaves its rest starts, or its encoder drifts."""
 
-    __slots__ = ("_first", "_left_at", "_limits", "_rest", "_speed")
-
     def __init__(self, limits: DeviceLimits, rest: float) -> None:
         self._limits = limits
         self._rest = rest  # rad
@@ -371,15 +341,6 @@ class ActiveGuard:
     # the model's torque that counts: what compensates friction is eaten by friction.
     # Hannaford, B., Ryu, J.-H. (2002). IEEE Trans. Robot. Autom. 18(1), 1-10 (passivity
     # observer): https://doi.org/10.1109/70.988969
-
-    __slots__ = (
-        "_angle",
-        "_first_angle",
-        "_forgiven_at",
-        "_held",
-        "_limits",
-        "energy_given",
-    )
 
     def __init__(self, limits: DeviceLimits) -> None:
         self._limits = limits

@@ -86,15 +86,18 @@ class Samples:
         self._values = values
         starts = range(1, n_values, max(capacity, 1))
         self._columns = [values[start : start + capacity] for start in starts]
+        self._written = self._columns[:_N_COLUMNS]
         self._measured = self._columns[_N_COLUMNS:]
         for column in self._measured:  # so that rows without a reading have no values
             column[:] = array("d", [math.nan]) * capacity
 
     def add(self, row: tuple[float, ...]) -> None:
         """Write one sample, a number for each column; they must not be full."""
+        # Unpacked, for a loop over the columns would take twice as long
         n = self.n
-        for column, value in zip(self._columns, row, strict=False):
-            column[n] = value
+        time, angle, velocity, model, command, phase, ramp, stretch = self._written
+        time[n], angle[n], velocity[n], model[n] = row[:4]
+        command[n], phase[n], ramp[n], stretch[n] = row[4:]
         self.n = self._values[0] = n + 1  # last, so that what is counted is complete
 
     def measure(self, values: Sequence[float]) -> None:

@@ -12,8 +12,6 @@ class VelocityEstimate:
     # At 1 kHz one encoder step of 0.005 deg is 5 deg/s from sample to sample. The
     # low-pass leaves 0.8 deg/s of it and delays the speed by 1/180 s = 5.6 ms.
 
-    __slots__ = ("_angle", "_gain", "_interval", "_time", "_velocity")
-
     def __init__(self) -> None:
         self._time: float | None = None
         self._angle = 0.0

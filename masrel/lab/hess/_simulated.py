@@ -116,35 +116,6 @@ class Plant:
     # [1] Park, H.-S., Kim, J., Damiano, D. L. (2012). IEEE TNSRE 20(3), 361-370, Table
     # II and equation (7). https://doi.org/10.1109/TNSRE.2012.2195330
 
-    __slots__ = (
-        "_arm_inertia",
-        "_commanded",
-        "_contact",
-        "_coulomb",
-        "_delay_ns",
-        "_force",
-        "_hand",
-        "_holds",
-        "_inertia",
-        "_lag",
-        "_lag_time",
-        "_pending",
-        "_propagators",
-        "_range_end",
-        "_slide",
-        "_start_ns",
-        "_stop_damping",
-        "_stop_stiffness",
-        "_time",
-        "_torque_step",
-        "_viscous",
-        "_yields",
-        "angle",
-        "now_ns",
-        "step_ns",
-        "velocity",
-    )
-
     def __init__(self, hand: Hand, parameters: PlantParameters) -> None:
         if not 0.0 <= hand.start < parameters.range_end:
             raise ParameterError(
@@ -472,7 +443,8 @@ class SimulatedDevice(Device):
 
     def _read(self) -> Reading:
         now_ns = self._advance()
-        angle = _rounded(self._plant.angle_at(now_ns), self._resolution)
+        steps = math.floor(self._plant.angle_at(now_ns) / self._resolution + 0.5)
+        angle = steps * self._resolution
         if self._sensing is None:
             return Reading(now_ns, angle)
         return Reading(now_ns, angle, (self._sensing.read(),))

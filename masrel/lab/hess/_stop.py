@@ -42,8 +42,6 @@ class EmergencyStop:
     masrel.errors.EmergencyStopError: emergency stop: key
     """
 
-    __slots__ = ("reason",)
-
     def __init__(self) -> None:
         self.reason: str | None = None
 

@@ -33,8 +33,6 @@ class Watching(Protocol):
 class NoWatchdog:
     """Nobody watches: for a device that nothing else can reach."""
 
-    __slots__ = ()
-
     def beat(self) -> None:
         """Tell nobody."""
 

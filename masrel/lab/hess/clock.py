@@ -44,8 +44,6 @@ class RealClock:
     True
     """
 
-    __slots__ = ()
-
     def now_ns(self) -> int:
         """Return the monotonic time.
 
@@ -91,8 +89,6 @@ class SimulatedClock:
     >>> clock.now_ns()
     3000000000
     """
-
-    __slots__ = ("_now_ns",)
 
     def __init__(self, start_ns: int = 0) -> None:
         if start_ns < 0:

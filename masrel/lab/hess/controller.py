@@ -100,8 +100,6 @@ class FrictionCompensation:
     0.3213
     """
 
-    __slots__ = ("_coulomb", "_dead_zone", "_full_speed", "_slope", "_viscous")
-
     def __init__(
         self,
         friction: Friction,
@@ -236,36 +234,6 @@ class Controller:
     >>> Controller(STANDARD_MODELS["HM2"], start_angle=0.5).step(0.0, 0.5, 0.0)
     0.0
     """
-
-    __slots__ = (
-        "_command",
-        "_compensation",
-        "_easing",
-        "_free_end",
-        "_gain",
-        "_held",
-        "_joint",
-        "_late_torque",
-        "_loose_inertia",
-        "_loose_past",
-        "_max_restored",
-        "_past",
-        "_post_catch_ramp",
-        "_slip_speed_drop",
-        "_steepest_fall",
-        "_stood",
-        "_taken",
-        "_time",
-        "grip_lost",
-        "is_easing",
-        "is_guarded",
-        "is_new",
-        "model_torque",
-        "phase",
-        "rate_hz",
-        "speed_margin",
-        "speed_threshold",
-    )
 
     def __init__(
         self,

@@ -170,18 +170,6 @@ class SimulatedHand:
     1.5
     """
 
-    __slots__ = (
-        "_leg",
-        "_legs",
-        "damping",
-        "end",
-        "inertia",
-        "mean_speed",
-        "slip_time",
-        "start",
-        "stiffness",
-    )
-
     yields: ClassVar[bool] = False
 
     def __init__(
@@ -326,8 +314,6 @@ class YieldingHand(SimulatedHand):
     >>> round(hand.intended(1.0)[1], 2)
     0.75
     """
-
-    __slots__ = ("_felt_at", "_intended_at", "_rate", "_reaction_time", "_yielding")
 
     yields: ClassVar[bool] = True
 
@@ -584,15 +570,6 @@ class HumanHand(SimulatedHand):
     >>> hand.intended(1.0)[0] > soft.intended(1.0)[0]
     True
     """
-
-    __slots__ = (
-        "_correction",
-        "_felt_at",
-        "_lag",
-        "_lags",
-        "_traits",
-        "_tremor",
-    )
 
     yields: ClassVar[bool] = True
 

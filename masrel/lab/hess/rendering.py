@@ -66,16 +66,6 @@ class MotionHand:
     [1.5, 1.875]
     """
 
-    __slots__ = (
-        "_angles",
-        "_tremor",
-        "_velocities",
-        "damping",
-        "slip_time",
-        "start",
-        "stiffness",
-    )
-
     inertia: ClassVar[float] = 0.0
     yields: ClassVar[bool] = False
     _TREMOR_RAD_S: ClassVar[float] = 2.0 * math.pi * 9.0  # physiological: 8 to 12 Hz

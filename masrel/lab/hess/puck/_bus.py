@@ -81,8 +81,6 @@ class Link:
         waits, so that a bus works on a simulated clock too, and closed with it.
     """
 
-    __slots__ = ("_bus", "_can", "_clock", "_peer")
-
     def __init__(
         self, bus: "can.BusABC", clock: Clock, *, peer: InProcessPeer | None = None
     ) -> None:
