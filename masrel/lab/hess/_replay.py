@@ -44,7 +44,10 @@ class ReplayDevice(Device):
 
     def __init__(self, recording: Recording, *, clock: Clock) -> None:
         columns = recording.columns
-        n_readings = _n_readings(recording)
+        # Rows from a fault on are the torque being taken back, without readings.
+        noticed_s, n_readings = recording.facts.get("fault_time_s"), recording.n_samples
+        if isinstance(noticed_s, float):
+            n_readings = int(np.searchsorted(columns["time_s"], noticed_s))
         times = columns["time_s"][:n_readings]
         if n_readings == 0 or np.any(np.diff(times) <= 0.0) or times[0] < 0.0:
             raise DeviceError(
@@ -59,7 +62,9 @@ class ReplayDevice(Device):
             columns["velocity_deg_s"][:n_readings].tolist(),
         )
         self.channels = recording.channels
-        self._values = _values(recording, n_readings)
+        # What the channels gave, reading by reading
+        rows = (columns[each.column][:n_readings].tolist() for each in self.channels)
+        self._values = list(zip(*rows, strict=True)) or [()] * n_readings
         self._start_ns: int | None = None
         self._next = 0
 
@@ -82,23 +87,6 @@ class ReplayDevice(Device):
 
     def _stop(self) -> None:
         """Nothing to let go of."""
-
-
-def _n_readings(recording: Recording) -> int:
-    # Rows from a fault on are the torque being taken back, without readings.
-    noticed_s = recording.facts.get("fault_time_s")
-    if not isinstance(noticed_s, float):
-        return recording.n_samples
-    return int(np.searchsorted(recording.columns["time_s"], noticed_s))
-
-
-def _values(recording: Recording, n_readings: int) -> list[tuple[float, ...]]:
-    # What the channels gave, reading by reading
-    if not recording.channels:
-        return [()] * n_readings
-    columns = [recording.columns[channel.column] for channel in recording.channels]
-    rows = (column[:n_readings].tolist() for column in columns)
-    return list(zip(*rows, strict=True))
 
 
 def build(setup: DeviceSetup) -> ReplayDevice:

@@ -23,11 +23,9 @@ class Watching(Protocol):
 
     def beat(self) -> None:
         """Tell it now, and again before its time is over."""
-        ...
 
     def rest(self) -> None:
         """Tell it that no beat follows for a while, and none is missed."""
-        ...
 
 
 class NoWatchdog:

@@ -19,7 +19,6 @@ class Clock(Protocol):
         int
             Time from an arbitrary zero, ns; it never goes back.
         """
-        ...
 
     def sleep_until_ns(self, deadline_ns: int) -> None:
         """Sleep until an absolute time; return at once when it has passed.
@@ -29,7 +28,6 @@ class Clock(Protocol):
         deadline_ns : int
             When to return, ns on this clock.
         """
-        ...
 
 
 class RealClock:

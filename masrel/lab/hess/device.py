@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
-from typing import ClassVar, Literal, NamedTuple, Protocol, Self, TypeVar, cast
+from typing import ClassVar, Literal, NamedTuple, Self, TypeVar
 
 from masrel.errors import DeviceError
 from masrel.lab.hess.clock import Clock
@@ -275,13 +275,8 @@ _BACKENDS = {
     "replay": "masrel.lab.hess._replay",
     "simulated": "masrel.lab.hess._simulated",
 }
-"""Name to the module whose `build` makes the device; imported when it is chosen."""
-
-
-class _Backend(Protocol):
-    def build(self, setup: DeviceSetup) -> Device:
-        """Make a device, not yet open; `DeviceError` when the setup does not fit."""
-        ...
+"""Name to the module whose `build` makes a device of a `DeviceSetup`, not yet open, or
+raises `DeviceError` when it does not fit; imported when it is chosen."""
 
 
 def device_names() -> tuple[str, ...]:
@@ -349,8 +344,7 @@ def open_device(
         raise DeviceError(
             f"device: needs one of {', '.join(device_names())}, got {name!r}"
         )
-    backend = cast(_Backend, importlib.import_module(module))
-    device = backend.build(
+    device: Device = importlib.import_module(module).build(
         DeviceSetup(clock=clock, hand=hand, range_end=range_end, options=options)
     )
     device.open()

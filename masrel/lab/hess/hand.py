@@ -25,32 +25,26 @@ class Hand(Protocol):
     @property
     def stiffness(self) -> float:
         """Spring towards the intended angle, N·m/rad."""
-        ...
 
     @property
     def damping(self) -> float:
         """Damper towards the intended speed, N·m·s/rad."""
-        ...
 
     @property
     def inertia(self) -> float:
         """What of its own moves with the arm that it holds, kg·m²."""
-        ...
 
     @property
     def slip_time(self) -> float:
         """When the hand lets go for good, s; infinite when it never does."""
-        ...
 
     @property
     def start(self) -> float:
         """Where the arm is before the hand moves, rad."""
-        ...
 
     @property
     def yields(self) -> bool:
         """Whether its intention depends on the torque it feels, which `feel` takes."""
-        ...
 
     def intended(self, time_s: float) -> tuple[float, float]:
         """Return where the hand means to be.
@@ -65,7 +59,6 @@ class Hand(Protocol):
         tuple of float
             Intended angle, rad, and speed, rad/s.
         """
-        ...
 
     def feel(self, time_s: float, torque: float) -> None:
         """Take in what the hand feels now.
@@ -77,7 +70,6 @@ class Hand(Protocol):
         torque : float
             Torque of its spring and damper, N·m.
         """
-        ...
 
 
 class _Leg:

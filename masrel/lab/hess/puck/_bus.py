@@ -56,15 +56,12 @@ class InProcessPeer(Protocol):
 
     def next_due_ns(self) -> int | None:
         """Return when it will act next, ns; None when it waits for a frame."""
-        ...
 
     def serve(self) -> None:
         """Take in what was sent and do what is due by now."""
-        ...
 
     def close(self) -> None:
         """Leave the bus, after the host."""
-        ...
 
 
 class Link:
