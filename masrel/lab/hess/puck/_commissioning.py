@@ -176,13 +176,6 @@ def _node_report(node: PuckNode, properties: PropertyTable | None) -> NodeReport
     )
 
 
-def awake(link: Link, clock: Clock, options: PuckOptions) -> AwakePuck:
-    """Wake a puck if it sleeps, idle it, and set what the driver needs set."""
-    node = PuckNode(link, clock, options.puck)
-    identity = identify(node)
-    return AwakePuck(node, identity, identity.table(options.properties), options)
-
-
 def zero(link: Link, clock: Clock, options: PuckOptions, *, angle: float) -> int:
     """Tell a puck where the arm is; it forgets when its supply is switched off.
 
@@ -209,7 +202,7 @@ def zero(link: Link, clock: Clock, options: PuckOptions, *, angle: float) -> int
     DeviceError
         If the puck does not answer, is not supported, or does not take a setting.
     """
-    return awake(link, clock, options).set_position(angle)
+    return _awake(link, clock, options).set_position(angle)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -257,11 +250,7 @@ def check(link: Link, clock: Clock, options: PuckOptions) -> tuple[Check, ...]:
         If the bus fails, or the puck does not answer, is not supported, does not take a
         setting, or cannot be idled again.
     """
-    return check_awake(awake(link, clock, options), options)
-
-
-def check_awake(puck: AwakePuck, options: PuckOptions) -> tuple[Check, ...]:
-    """See whether a puck that is awake and configured can be driven."""
+    puck = _awake(link, clock, options)
     node, transmission = puck.node, puck.transmission
     counts, took_s, n_lost = _request_positions(puck, options.patience_s)
     checks = [
@@ -285,6 +274,12 @@ def check_awake(puck: AwakePuck, options: PuckOptions) -> tuple[Check, ...]:
         result=f"{node.n_errors}, and {node.n_foreign} frames of others",
     )
     return (*checks, errors)
+
+
+def _awake(link: Link, clock: Clock, options: PuckOptions) -> AwakePuck:
+    node = PuckNode(link, clock, options.puck)
+    identity = identify(node)
+    return AwakePuck(node, identity, identity.table(options.properties), options)
 
 
 def _request_positions(

@@ -106,3 +106,30 @@ def test_a_bus_on_which_nobody_is_cannot_be_checked() -> None:
 def test_the_emulated_arm_is_where_its_hand_holds_it() -> None:
     checks = checked(loose(45.0), awake=True)
     assert checks["position"].result.startswith("45.00 deg")
+
+
+@pytest.mark.parametrize(
+    ("kind", "more", "failed"),
+    [
+        ("dropped-replies", {"every": 100}, ["answers"]),
+        ("late-replies", {"size": 0.0006}, ["answers"]),
+        ("late-replies", {"size": 0.0004}, []),
+        ("jumping-encoder", {"every": 2, "size": 5.0}, ["rest"]),
+        ("jumping-encoder", {"every": 2, "size": 4.0}, []),
+        ("jumping-encoder", {"size": 30_000.0}, ["position", "rest"]),
+        ("error-frames", {"every": 400}, ["error frames"]),
+        ("unplugged", {"end_s": 1.0}, ["answers"]),
+    ],
+)
+def test_what_is_wrong_with_a_puck_is_found(
+    kind, more: dict, failed: list[str]
+) -> None:
+    # The faults of an emulated puck begin after its first torque mode: that of a check
+    # before, 20 ms in which it is woken and configured once more.
+    clock, hand = SimulatedClock(), loose()
+    emulator = {"awake": True, "faults": (fault(kind, 0.02, **more),)}
+    options = puck_options(hand, emulator=emulator)
+    with connected(options, clock=clock, hand=hand, range_end=END) as link:
+        assert all(one.holds for one in check(link, clock, options))
+        checks = check(link, clock, options)
+    assert [one.name for one in checks if not one.holds] == failed
