@@ -83,8 +83,13 @@ def stretch(kind: type, **speeds: float) -> Motion:
     return kind(start=radians(30.0), end=radians(146.0), **speeds)
 
 
-def columns(kind: str, n: int, *, inertia: float = 0.0) -> tuple[Columns, Columns]:
-    """Joints between the standard models, stretched at the speeds of Table V."""
+SPEEDS_DEG_S = {"as in Table V": (60.0, 131.0), "slow": (2.0, 9.0)}
+
+
+def columns(
+    kind: str, n: int, *, inertia: float = 0.0, speeds: str = "as in Table V"
+) -> tuple[Columns, Columns]:
+    """Joints between the standard models, and stretches."""
     rng = np.random.default_rng(7)
     base = list(STANDARD_MODELS.values())
     names = [
@@ -107,16 +112,18 @@ def columns(kind: str, n: int, *, inertia: float = 0.0) -> tuple[Columns, Column
     moves: dict[str, object] = {
         "start": radians(30.0),
         "end": np.radians(rng.uniform(120.0, 145.0, n)),
-        speed: np.radians(rng.uniform(60.0, 131.0, n)),
+        speed: np.radians(rng.uniform(*SPEEDS_DEG_S[speeds], n)),
     }
     if kind == "trapezoid":
         moves["acceleration_rate"] = radians(600.0)
     return joints, Columns(KINDS[kind], **moves)
 
 
-def many_scenes(kind: str, turns: int, *, inertia: float = 0.0) -> str:
+def many_scenes(
+    kind: str, turns: int, *, inertia: float = 0.0, speeds: str = "as in Table V"
+) -> str:
     """Events and peak torque of 10 000 scenes beside stepping them all at once."""
-    joints, motions = columns(kind, N_SCENES, inertia=inertia)
+    joints, motions = columns(kind, N_SCENES, inertia=inertia, speeds=speeds)
     rows = range(N_SCENES)
     each = [joints.row(i) for i in rows], [motions.row(i) for i in rows]
     models = list(STANDARD_MODELS.values())
@@ -143,6 +150,7 @@ def many_scenes(kind: str, turns: int, *, inertia: float = 0.0) -> str:
     )
     table = evaluate(joints, motions, outputs)
     name = f"{kind}, with inertia" if inertia else kind
+    name += ", slow" if speeds == "slow" else ""
     cells = [f"{1e3 * timings['step'].median:.0f} ms"]
     for way in ("columns", "models", "objects"):
         cells.append(f"{1e3 * timings[way].median:.1f} ms")
@@ -288,10 +296,13 @@ def main() -> None:
     scenes = [(kind, 0.0) for kind in KINDS]
     scenes += [("minimum jerk", 0.1), ("trapezoid", 0.1)]
     rows = one_scene(turns)
-    with tqdm(total=len(scenes) + 2, desc="parts", disable=options.quiet) as bar:
+    with tqdm(total=len(scenes) + 3, desc="parts", disable=options.quiet) as bar:
         for kind, inertia in scenes:
             rows.append(many_scenes(kind, turns, inertia=inertia))
             bar.update()
+        # one turn takes half a minute of stepping
+        rows.append(many_scenes("minimum jerk", min(turns, 3), speeds="slow"))
+        bar.update()
         points = work_against_error(turns)
         bar.update()
         from docs.make.benchmarks import elbow_figures
