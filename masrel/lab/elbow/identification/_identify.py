@@ -353,7 +353,7 @@ def _result(
         level=options.level,
         simulated=any(movement.simulated for movement in movements),
         sources={m.name: m.sha256 for m in movements},
-        remarks=_torque_remarks(movements) + _remarks(estimates, made),
+        remarks=_remarks(movements, estimates, made),
     )
 
 
@@ -419,30 +419,28 @@ def _correlation(
     return whole[np.ix_(places, places)]
 
 
-def _torque_remarks(movements: Sequence[Movement]) -> tuple[str, ...]:
-    # which torque it is, of recordings of masrel's driver
+def _remarks(
+    movements: Sequence[Movement], estimates: Sequence[FittedParameter], made: Round
+) -> tuple[str, ...]:
+    # first which torque it is, of recordings of masrel's driver
     texts: dict[TorqueSource, str] = {
         "sensor": "measured by the device's sensor: what friction compensation leaves "
         "of the device is in it",
         "model": "what the joint model asked for, not measured",
     }
     n_from = Counter(movement.torque_source for movement in movements)
-    return tuple(
+    catches = [trial.catch for trial in made.trials if trial.catch is not None]
+    unended = sum(catch.end is None for catch in catches)
+    behind = sum(limit is not None for limit in made.limits)
+    unused = sum(trial.catch is None for trial in made.fast)
+    remarks = [
         f"Torque of {n_from[source]} of {len(movements)} recordings: {text}"
         for source, text in texts.items()
         if n_from[source]
-    )
-
-
-def _remarks(estimates: Sequence[FittedParameter], made: Round) -> tuple[str, ...]:
-    remarks = [
-        f"{ALL_QUANTITIES[e.name].symbol}: {e.reason}"
-        for e in estimates
-        if e.reason is not None
     ]
-    catches = [trial.catch for trial in made.trials if trial.catch is not None]
-    unended = sum(catch.end is None for catch in catches)
-    behind = sum(each is not None for each in made.limits)
+    remarks += [
+        f"{ALL_QUANTITIES[e.name].symbol}: {e.reason}" for e in estimates if e.reason
+    ]
     if behind:
         remarks.append(
             f"{behind} of {len(catches)} catches do not end within their stretch: D "
@@ -455,7 +453,6 @@ def _remarks(estimates: Sequence[FittedParameter], made: Round) -> tuple[str, ..
             "stretch and say nothing of D: if D differs between trials, those with a "
             "short one are left, and D is underestimated"
         )
-    unused = sum(trial.catch is None for trial in made.fast)
     if unused:
         remarks.append(f"{unused} of {len(made.fast)} fast stretches are not used")
     return tuple(remarks)

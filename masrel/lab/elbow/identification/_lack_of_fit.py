@@ -217,7 +217,11 @@ def lack_of_fit(
         rest.append(partial_out(np.column_stack([table, *more]), len(e.local)))
     n = len(equations[0].known.names)
     found = [_test(name, n, n + 1 + i, rest) for i, name in enumerate(names)]
-    tests = _holm([*filter(None, found), *_own_drifts(equations)])
+    first = equations[0].known
+    if not first.drifts and len(equations) >= _MIN_TRIALS:
+        slow = [e.trial.pre_catch for e in equations if e.trial.pace == "slow"]
+        found.append(own_drifts(slow, first.law.gravity_angle))
+    tests = _holm([test for test in found if test is not None])
     phases = _phases(equations, laws)
     before, after = (
         [p for p in phases if (p.phase in ("slow", "pre-catch")) is early]
@@ -292,11 +296,11 @@ def _test(
 
 def _holm(tests: Sequence[StructureTest]) -> tuple[StructureTest, ...]:
     ordered = sorted(tests, key=lambda test: test.p_value)
-    adjusted, last = [], 0.0
-    for i, test in enumerate(ordered):
-        last = max(last, min(1.0, (len(ordered) - i) * test.p_value))
-        adjusted.append(replace(test, adjusted=last))
-    return tuple(adjusted)
+    n = len(ordered)
+    least = [min(1.0, (n - i) * test.p_value) for i, test in enumerate(ordered)]
+    running = np.maximum.accumulate(least).tolist()
+    pairs = zip(ordered, running, strict=True)
+    return tuple(replace(test, adjusted=p) for test, p in pairs)
 
 
 def _added(
@@ -342,14 +346,6 @@ def _added(
             columns[name] = np.zeros(n + len(rows))
             columns[name][n + place] = size[name]
     return columns
-
-
-def _own_drifts(equations: Sequence[Equations]) -> list[StructureTest]:
-    slow = [e.trial.pre_catch for e in equations if e.trial.pace == "slow"]
-    if equations[0].known.drifts or len(equations) < _MIN_TRIALS:
-        return []
-    test = own_drifts(slow, equations[0].known.law.gravity_angle)
-    return [] if test is None else [test]
 
 
 def own_drifts(slow: Sequence[Part], gravity_angle: float) -> StructureTest | None:

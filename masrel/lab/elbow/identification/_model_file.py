@@ -10,8 +10,7 @@ from masrel.errors import ParameterError
 from masrel.lab.elbow.parameters import ElbowParameters
 
 if TYPE_CHECKING:
-    from masrel.lab.elbow.identification._lack_of_fit import LackOfFit
-    from masrel.lab.elbow.identification._results import ElbowFit
+    from masrel.lab.elbow.identification._results import ElbowFit, FittedParameter
 
 
 DEGREES = 180.0 / math.pi  # of a radian
@@ -122,6 +121,15 @@ def model_document(
     >>> made["model"]["catch_torque_nms_rad"]
     1.4
     """
+    constants: Document = {
+        key: getattr(joint, name) * factor
+        for key, (name, factor) in CONSTANT_KEYS.items()
+    }
+    constants |= {key: getattr(joint, key) for key in READING_KEYS}
+    defaults = {field.name: field.default for field in fields(joint)}
+    for key, (name, factor) in VARIANT_KEYS.items():
+        if (value := getattr(joint, name)) != defaults[name]:
+            constants[key] = value * factor
     document: Document = {
         "format": FORMAT,
         "made_from": made_from,
@@ -130,12 +138,23 @@ def model_document(
             key: getattr(joint, name) * factor
             for key, (name, factor) in MODEL_KEYS.items()
         },
-        "constants": _constants(joint),
+        "constants": constants,
     }
     if fit is not None:
-        document["remarks"] = [fit.lack_of_fit.sentence, *fit.remarks]
-        document["lack_of_fit"] = _lack_of_fit(fit.lack_of_fit)
-        document["estimates"] = _estimates(fit)
+        lack = fit.lack_of_fit
+        first = lack.tests[0] if lack.tests else None
+        document["remarks"] = [lack.sentence, *fit.remarks]
+        document["lack_of_fit"] = {
+            "verdict": lack.verdict,
+            "level": lack.level,
+            **_finite(
+                explained=lack.explained,
+                after_to_before=lack.after_to_before,
+                rest_sd_nm=lack.rest_sd,
+            ),
+            **({"structure": first.name, "p_value": first.adjusted} if first else {}),
+        }
+        document["estimates"] = [_estimate(estimate) for estimate in fit.estimates]
         document["recordings"] = [
             {"name": name, **({} if sha256 is None else {"sha256": sha256})}
             for name, sha256 in fit.sources.items()
@@ -143,52 +162,25 @@ def model_document(
     return document
 
 
-def _constants(joint: ElbowParameters) -> Document:
-    made: Document = {
-        key: getattr(joint, name) * factor
-        for key, (name, factor) in CONSTANT_KEYS.items()
+def _finite(**numbers: float) -> Document:
+    return {key: value for key, value in numbers.items() if math.isfinite(value)}
+
+
+def _estimate(estimate: "FittedParameter") -> Document:
+    quantity = ALL_QUANTITIES[estimate.name]
+    return {
+        "key": quantity.key,
+        "level": estimate.level,
+        **_finite(
+            value=estimate.value * quantity.factor,
+            standard_error=estimate.standard_error * quantity.factor,
+            low=estimate.low * quantity.factor,
+            high=estimate.high * quantity.factor,
+            degrees_of_freedom=estimate.df,
+        ),
+        "n_trials": estimate.n_trials,
+        **({} if estimate.reason is None else {"reason": estimate.reason}),
     }
-    made.update({key: getattr(joint, key) for key in READING_KEYS})
-    defaults = {field.name: field.default for field in fields(joint)}
-    for key, (name, factor) in VARIANT_KEYS.items():
-        if (value := getattr(joint, name)) != defaults[name]:
-            made[key] = value * factor
-    return made
-
-
-def _lack_of_fit(lack: "LackOfFit") -> Document:
-    document: Document = {"verdict": lack.verdict, "level": lack.level}
-    numbers = {
-        "explained": lack.explained,
-        "after_to_before": lack.after_to_before,
-        "rest_sd_nm": lack.rest_sd,
-    }
-    document |= {key: value for key, value in numbers.items() if math.isfinite(value)}
-    if lack.tests:
-        first = lack.tests[0]
-        document |= {"structure": first.name, "p_value": first.adjusted}
-    return document
-
-
-def _estimates(fit: "ElbowFit") -> list[Document]:
-    made = []
-    for estimate in fit.estimates:
-        quantity = ALL_QUANTITIES[estimate.name]
-        factor = quantity.factor
-        numbers = {
-            "value": estimate.value * factor,
-            "standard_error": estimate.standard_error * factor,
-            "low": estimate.low * factor,
-            "high": estimate.high * factor,
-            "degrees_of_freedom": estimate.df,
-        }
-        entry: Document = {"key": quantity.key, "level": estimate.level}
-        entry.update({k: v for k, v in numbers.items() if math.isfinite(v)})
-        entry["n_trials"] = estimate.n_trials
-        if estimate.reason is not None:
-            entry["reason"] = estimate.reason
-        made.append(entry)
-    return made
 
 
 def as_toml(document: Mapping[str, object]) -> str:
@@ -217,17 +209,13 @@ def as_toml(document: Mapping[str, object]) -> str:
     [model]
     residual_ratio = 0.3
     """
-    lines = [
-        f"{key} = {_value(value)}"
-        for key, value in document.items()
-        if not _is_table(value)
-    ]
-    for key, value in document.items():
+    tables = {key: value for key, value in document.items() if _is_table(value)}
+    lines = _pairs({k: v for k, v in document.items() if k not in tables})
+    for key, value in tables.items():
         if isinstance(value, Mapping):
             lines += ["", f"[{key}]", *_pairs(value)]
-        elif _is_table(value) and isinstance(value, list):
-            for entry in value:
-                lines += ["", f"[[{key}]]", *_pairs(entry)]
+        elif isinstance(value, list):
+            lines += [x for row in value for x in ("", f"[[{key}]]", *_pairs(row))]
     return "\n".join(lines) + "\n"
 
 
@@ -246,20 +234,13 @@ def _value(value: object) -> str:
     if isinstance(value, int | float) and math.isfinite(value):
         return repr(float(value)) if isinstance(value, float) else str(value)
     if isinstance(value, str):
-        return _text(value)
+        # a basic string: quotes, backslashes and control characters are escaped
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        letters = (x if x.isprintable() else f"\\U{ord(x):08X}" for x in escaped)
+        return f'"{"".join(letters)}"'
     if isinstance(value, list):
         return f"[{', '.join(_value(entry) for entry in value)}]"
     raise ParameterError(f"value: needs text, a finite number or a list, got {value!r}")
-
-
-def _text(value: str) -> str:
-    # a basic string: quotes, backslashes and control characters are escaped
-    escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-    plain = "".join(
-        letter if letter.isprintable() else f"\\U{ord(letter):08X}"
-        for letter in escaped
-    )
-    return f'"{plain}"'
 
 
 def intermediate_models(
@@ -304,33 +285,30 @@ def intermediate_models(
             f"got {n_models}"
         )
     each = n_models // gaps
-    names = list(models)
-    made = []
-    for first, second in pairwise(names):
-        _check_alike(first, models[first], second, models[second])
-        for i in range(1, each + 1):
-            made.append(_between(models[first], models[second], i, each + 1))
+    made = [
+        _between(pair, models[pair[0]], models[pair[1]], i, each + 1)
+        for pair in pairwise(models)
+        for i in range(1, each + 1)
+    ]
     digits = max(2, int(math.log10(n_models)) + 1)
     return {f"D{i:0{digits}}": model for i, model in enumerate(made, start=1)}
 
 
 def _between(
-    one: ElbowParameters, two: ElbowParameters, part: int, whole: int
+    names: tuple[str, str],
+    one: ElbowParameters,
+    two: ElbowParameters,
+    part: int,
+    whole: int,
 ) -> ElbowParameters:
     values: dict[str, Any] = {}
     for field in fields(one):
         a, b = getattr(one, field.name), getattr(two, field.name)
         if isinstance(a, float) and isinstance(b, float) and a != b:
             values[field.name] = ((whole - part) * a + part * b) / whole
-    return replace(one, **values)
-
-
-def _check_alike(
-    name: str, one: ElbowParameters, other: str, two: ElbowParameters
-) -> None:
-    for field in fields(one):
-        a, b = getattr(one, field.name), getattr(two, field.name)
-        if a != b and not (isinstance(a, float) and isinstance(b, float)):
+        elif a != b:
             raise ParameterError(
-                f"models: {name} and {other} need one {field.name}, got {a!r} and {b!r}"
+                f"models: {names[0]} and {names[1]} need one {field.name}, got {a!r} "
+                f"and {b!r}"
             )
+    return replace(one, **values)
