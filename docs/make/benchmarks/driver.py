@@ -32,7 +32,7 @@ from masrel.lab.hess import (
     open_device,
     run_presentation,
 )
-from masrel.lab.hess._realtime import real_time
+from masrel.lab.hess._clock import real_time
 from tests.benchmarks import driver_integrators
 
 START, END = radians(30.0), radians(146.0)

@@ -14,7 +14,7 @@ import numpy as np
 
 import masrel
 from docs.make.benchmarks.parts import write_part
-from masrel.lab.hess._realtime import real_time
+from masrel.lab.hess._clock import real_time
 from tests.benchmarks.bench_serve import (
     Lateness,
     Stops,

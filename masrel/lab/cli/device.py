@@ -114,7 +114,7 @@ def _friction(session: PuckSession, arm_is_free: bool) -> None:
     """
     from masrel.lab.hess._watchdog import watched
     from masrel.lab.hess.puck import fit_friction, steady_runs
-    from masrel.lab.hess.puck._steady_rotation import LIMITS, SPEEDS
+    from masrel.lab.hess.puck._commissioning import LIMITS, SPEEDS
 
     if not arm_is_free:
         raise click.UsageError(

@@ -1,11 +1,11 @@
 """The driver of the simulator: devices, the controller of Fig. 7, the 1 kHz loop."""
 
+from masrel.lab.hess._clock import Clock, RealClock, SimulatedClock
 from masrel.lab.hess._course import PresentationStatus, StretchRules
 from masrel.lab.hess._recorder import Fault, Presented, cut_off
 from masrel.lab.hess._replay import ReplayOptions
 from masrel.lab.hess._simulated import SimulatedOptions, TorqueSensor
 from masrel.lab.hess._stop import EmergencyStop
-from masrel.lab.hess.clock import Clock, RealClock, SimulatedClock
 from masrel.lab.hess.controller import Controller, Friction, FrictionCompensation
 from masrel.lab.hess.device import (
     BackendOptions,

@@ -8,8 +8,8 @@ from typing import TypeAlias
 import numpy as np
 
 from masrel.errors import DeviceError
+from masrel.lab.hess._clock import Clock
 from masrel.lab.hess._signals import VelocityEstimate
-from masrel.lab.hess.clock import Clock
 from masrel.lab.hess.device import BackendOptions, Device, DeviceSetup, Reading
 from masrel.lab.recording import Recording
 

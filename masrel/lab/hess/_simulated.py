@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.errors import DeviceError, ParameterError
-from masrel.lab.hess.clock import Clock
+from masrel.lab.hess._clock import Clock
 from masrel.lab.hess.controller import Friction
 from masrel.lab.hess.device import BackendOptions, Device, DeviceSetup, Reading
 from masrel.lab.hess.hand import Hand

@@ -13,13 +13,13 @@ from masrel.errors import (
     DeviceTimeoutError,
     LimitExceededError,
 )
+from masrel.lab.hess._clock import Clock
 from masrel.lab.hess._course import Course
 from masrel.lab.hess._guard import ActiveGuard, Guard
 from masrel.lab.hess._recorder import Fault, Samples
 from masrel.lab.hess._signals import VelocityEstimate, raised_cosine
 from masrel.lab.hess._stop import EmergencyStop
 from masrel.lab.hess._watchdog import Watching
-from masrel.lab.hess.clock import Clock
 from masrel.lab.hess.controller import Controller
 from masrel.lab.hess.device import Device
 from masrel.lab.hess.limits import DeviceLimits

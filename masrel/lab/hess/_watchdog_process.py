@@ -14,7 +14,7 @@ import sys
 from collections.abc import Callable
 
 from masrel.errors import DeviceError
-from masrel.lab.hess._realtime import off_the_loop
+from masrel.lab.hess._clock import off_the_loop
 
 _FAILED, _IDLED = 1, 3
 _TRIES = 5  # a bus that fails once may work a moment later

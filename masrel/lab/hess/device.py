@@ -10,7 +10,7 @@ from types import TracebackType
 from typing import ClassVar, Literal, NamedTuple, Self, TypeVar
 
 from masrel.errors import DeviceError
-from masrel.lab.hess.clock import Clock
+from masrel.lab.hess._clock import Clock
 from masrel.lab.hess.hand import Hand
 from masrel.lab.recording import Channel
 

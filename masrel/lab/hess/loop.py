@@ -12,14 +12,13 @@ from masrel.errors import (
     ParameterError,
     RecordingWarning,
 )
+from masrel.lab.hess._clock import Clock, scheduled
 from masrel.lab.hess._course import Course, PresentationStatus, StretchRules
-from masrel.lab.hess._realtime import scheduled
 from masrel.lab.hess._recorder import Presented, Samples, as_presented
 from masrel.lab.hess._signals import speed_margin
 from masrel.lab.hess._stop import EmergencyStop
 from masrel.lab.hess._ticks import Ticks
 from masrel.lab.hess._watchdog import NoWatchdog, Watching
-from masrel.lab.hess.clock import Clock
 from masrel.lab.hess.controller import Controller
 from masrel.lab.hess.device import Device
 from masrel.lab.hess.limits import DeviceLimits

@@ -15,9 +15,9 @@ from masrel.errors import ParameterError
 from masrel.lab.elbow._motion import Motion
 from masrel.lab.elbow.joint_model import JointModel
 from masrel.lab.elbow.trace import _stepped
+from masrel.lab.hess._clock import SimulatedClock
 from masrel.lab.hess._recorder import Presented
 from masrel.lab.hess._signals import passive_damping
-from masrel.lab.hess.clock import SimulatedClock
 from masrel.lab.hess.controller import Controller
 from masrel.lab.hess.device import open_device
 from masrel.lab.hess.limits import (

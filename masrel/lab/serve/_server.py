@@ -20,7 +20,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from masrel._files import make_folder
 from masrel.errors import ParameterError
-from masrel.lab.hess._realtime import off_the_loop
+from masrel.lab.hess._clock import off_the_loop
 from masrel.lab.protocol import StudyPaths
 from masrel.lab.serve._access import Access
 from masrel.lab.serve._app import make_app

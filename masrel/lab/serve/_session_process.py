@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from masrel.errors import MasrelError, SessionLogInUseError, SessionStoppedError
-from masrel.lab.hess._realtime import may_use
+from masrel.lab.hess._clock import may_use
 from masrel.lab.protocol import StudyPaths, read_protocol, scale_of
 from masrel.lab.run import SessionSummary, run_session
 from masrel.lab.serve._channel import Channel, Message

@@ -7,10 +7,14 @@
 from masrel.lab.hess.puck._bus import Frame, Link
 from masrel.lab.hess.puck._commissioning import (
     Check,
+    FrictionEstimate,
     NodeReport,
+    SteadyRun,
     check,
     connected,
+    fit_friction,
     probe,
+    steady_runs,
     zero,
 )
 from masrel.lab.hess.puck._properties import (
@@ -22,12 +26,6 @@ from masrel.lab.hess.puck._puck_options import (
     EmulatorOptions,
     InjectedFault,
     PuckOptions,
-)
-from masrel.lab.hess.puck._steady_rotation import (
-    FrictionEstimate,
-    SteadyRun,
-    fit_friction,
-    steady_runs,
 )
 
 __all__ = [

@@ -1,14 +1,17 @@
-"""The CAN bus, by python-can: the only module that imports it.
+"""The Puck's CAN bus: bytes to values and back, and frames by python-can.
 
-Each frame on the bus becomes a `Frame`, each error of python-can a `BusError`, and
-every wait ends at a time on the loop's clock.
+Source of the frames: Barrett WAM Arm User's Manual D1001 AH.00, pp. 46-48. What the
+pages leave open is decided here as the two public drivers of the arm do it, and so that
+a decoder takes whatever either of them takes. This is the only module that imports
+python-can: each of its errors becomes a `BusError`, and every wait ends at a time on
+the loop's clock.
 """
 
 from types import ModuleType, TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self
 
-from masrel.errors import BusError, DeviceError
-from masrel.lab.hess.clock import Clock
+from masrel.errors import BusError, DeviceError, FrameError
+from masrel.lab.hess._clock import Clock
 
 if TYPE_CHECKING:
     import can  # loaded when a bus is opened
@@ -31,6 +34,140 @@ _NOT_OPENED = (
 )
 
 _FILTERS_IN_KERNEL = frozenset({"socketcan"})
+
+
+# Identifiers: 11 bits, G FFFFF TTTTT, which are whether the receiver is a group, the
+# sender, and the receiver (p. 46). The host is node 0, so that its frames to one puck
+# have the puck's number.
+
+HOST = 0
+SAFETY_NODE = 10  # watches a whole arm; has nothing to say to a driver of one joint
+MAX_NODE = 31
+
+TORQUE_GROUP = 1  # packed torques for pucks 1-4
+POSITION_GROUP = 3  # where pucks answer a request for P
+PROPERTY_GROUP = 6  # where they answer any other
+
+_GROUP_FLAG = 0x400
+
+
+def from_node(sender: int, group: int) -> int:
+    """Return the identifier of a frame to a group."""
+    return _GROUP_FLAG | sender << 5 | group
+
+
+def reply_identifiers(puck: int) -> tuple[int, int]:
+    """Return under which identifiers a puck sends positions, and other properties."""
+    return from_node(puck, POSITION_GROUP), from_node(puck, PROPERTY_GROUP)
+
+
+def split_identifier(identifier: int) -> tuple[int, int, bool]:
+    """Return the sender of a frame, its receiver, and whether that is a group."""
+    return (
+        identifier >> 5 & MAX_NODE,
+        identifier & MAX_NODE,
+        bool(identifier & _GROUP_FLAG),
+    )
+
+
+# Properties: a byte with the property's number, then the value, lowest byte first
+# (p. 47). The top bit of the first byte says that a value follows.
+
+_VALUE_FLAG = 0x80
+_PROPERTY_MASK = 0x7F
+
+
+def encode_get(number: int) -> bytes:
+    """Return the data that request a property."""
+    return bytes((_checked(number),))
+
+
+def _checked(number: int) -> int:
+    if not 0 <= number <= _PROPERTY_MASK:
+        raise FrameError(f"property: needs 0 to {_PROPERTY_MASK}, got {number}")
+    return number
+
+
+def encode_value(number: int, value: int, *, size: int = 6) -> bytes:
+    """Return the data that set a property, or with which a puck answers: 4 or 6."""
+    try:
+        in_bytes = value.to_bytes(size - 2, "little", signed=True)
+    except OverflowError as error:
+        raise FrameError(
+            f"value: needs {8 * (size - 2)} bits with sign, got {value}"
+        ) from error
+    return bytes((_VALUE_FLAG | _checked(number), 0)) + in_bytes
+
+
+def decode_request(data: bytes) -> tuple[int, int | None]:
+    """Return the property that is requested and None, or that is set and its value."""
+    if len(data) == 1 and not data[0] & _VALUE_FLAG:
+        return data[0], None
+    return decode_value(data, "request")
+
+
+def decode_value(data: bytes, what: str = "reply") -> tuple[int, int]:
+    """Return the number of a property, and its value."""
+    if len(data) not in (4, 6) or not data[0] & _VALUE_FLAG:
+        raise _malformed(f"{what}: needs 4 or 6 bytes, the first from 80 up", data)
+    value = int.from_bytes(data[2:], "little", signed=True)
+    return data[0] & _PROPERTY_MASK, value
+
+
+def _malformed(needs: str, data: bytes) -> FrameError:
+    return FrameError(f"{needs}, got {data.hex(' ') or 'none'}")
+
+
+# Positions: 22 bits, highest byte first, unlike all else (p. 48). One public driver
+# ignores the two bits above them, the other needs the upper one to be set. Three more
+# bytes are the position of a second encoder, which this driver does not use.
+
+_POSITION_FLAG = 0x800000
+_POSITION_MASK = 0x3FFFFF
+_POSITION_BITS = 22
+
+
+def encode_position(counts: int, *, flagged: bool = False) -> bytes:
+    """Return the data with which a puck answers a request for its position."""
+    flag = _POSITION_FLAG if flagged else 0
+    return (flag | counts & _POSITION_MASK).to_bytes(3, "big")
+
+
+def decode_position(data: bytes) -> int:
+    """Return the lowest 22 bits of the encoder's count, signed: it wraps."""
+    if len(data) not in (3, 6):
+        raise _malformed("position: needs 3 or 6 bytes", data)
+    return _signed(int.from_bytes(data[:3], "big"), _POSITION_BITS)
+
+
+def _signed(value: int, n_bits: int) -> int:
+    # The lowest bits as a two's complement
+    sign = 1 << n_bits - 1
+    return (value & 2 * sign - 1 ^ sign) - sign
+
+
+# Packed torques: four times 14 bits, highest byte first (p. 47). The driver reads but
+# never sends them: on a bus with other pucks the frame sets the torque of each of them,
+# and which of the four a puck obeys depends on its PIDX and groups.
+
+MAX_TORQUE = 8191  # current units; the most that 14 bits with sign can say
+
+_TORQUE_BITS = 14
+_N_PACKED = 4
+
+
+def decode_torques(data: bytes) -> tuple[int, ...]:
+    """Return the torques of four pucks."""
+    if len(data) != 8 or not data[0] & _VALUE_FLAG:
+        raise _malformed("torques: need 8 bytes, the first from 80 up", data)
+    packed = int.from_bytes(data[1:], "big")
+    return tuple(
+        _signed(packed >> _TORQUE_BITS * slot, _TORQUE_BITS)
+        for slot in reversed(range(_N_PACKED))
+    )
+
+
+# Frames, by python-can
 
 
 class Frame(NamedTuple):

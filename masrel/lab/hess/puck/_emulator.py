@@ -13,21 +13,25 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from masrel.errors import FrameError
+from masrel.lab.hess._clock import Clock
 from masrel.lab.hess._simulated import Plant, PlantParameters
-from masrel.lab.hess.clock import Clock
 from masrel.lab.hess.hand import Hand
-from masrel.lab.hess.puck._bus import BUS_OFF, BUS_RESTARTED, Frame, Link, open_link
-from masrel.lab.hess.puck._codec import (
+from masrel.lab.hess.puck._bus import (
+    BUS_OFF,
+    BUS_RESTARTED,
     HOST,
     POSITION_GROUP,
     PROPERTY_GROUP,
     SAFETY_NODE,
     TORQUE_GROUP,
+    Frame,
+    Link,
     decode_request,
     decode_torques,
     encode_position,
     encode_value,
     from_node,
+    open_link,
     reply_identifiers,
     split_identifier,
 )

@@ -18,14 +18,18 @@ from masrel.errors import (
     FrameError,
     ParameterError,
 )
-from masrel.lab.hess.clock import Clock, RealClock
-from masrel.lab.hess.puck._bus import BUS_OFF, BUS_RESTARTED, Frame, Link, open_link
-from masrel.lab.hess.puck._codec import (
+from masrel.lab.hess._clock import Clock, RealClock
+from masrel.lab.hess.puck._bus import (
+    BUS_OFF,
+    BUS_RESTARTED,
     MAX_TORQUE,
+    Frame,
+    Link,
     decode_position,
     decode_value,
     encode_get,
     encode_value,
+    open_link,
     reply_identifiers,
 )
 from masrel.lab.hess.puck._properties import (

@@ -11,7 +11,7 @@ from masrel.errors import (
     IdledError,
     LimitExceededError,
 )
-from masrel.lab.hess.clock import SimulatedClock
+from masrel.lab.hess._clock import SimulatedClock
 from masrel.lab.hess.device import Device, DeviceSetup, IdleCommand, Reading
 from masrel.lab.hess.limits import DeviceLimits
 from masrel.lab.hess.puck._bus import Link

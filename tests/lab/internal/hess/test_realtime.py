@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from masrel.lab.hess._realtime import off_the_loop, real_time
+from masrel.lab.hess._clock import off_the_loop, real_time
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="scheduling and locked memory as Linux has them"
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.skipif(
 # Without privileges: a child that gives up root, and may neither lock nor schedule
 UNPRIVILEGED = """
 import os, resource
-from masrel.lab.hess._realtime import real_time
+from masrel.lab.hess._clock import real_time
 for limit in (resource.RLIMIT_RTPRIO, resource.RLIMIT_MEMLOCK):
     resource.setrlimit(limit, (0, 0))
 if os.getuid() == 0:

@@ -9,8 +9,7 @@ from can.interfaces.virtual import VirtualBus
 from masrel.errors import BusError
 from masrel.lab.hess import RealClock, SimulatedClock
 from masrel.lab.hess.puck import Frame, Link
-from masrel.lab.hess.puck._bus import open_link
-from masrel.lab.hess.puck._codec import reply_identifiers
+from masrel.lab.hess.puck._bus import open_link, reply_identifiers
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from masrel.errors import FrameError
-from masrel.lab.hess.puck._codec import (
+from masrel.lab.hess.puck._bus import (
     HOST,
     POSITION_GROUP,
     PROPERTY_GROUP,

@@ -10,7 +10,7 @@ from masrel.errors import DeviceError
 from masrel.lab.elbow import STANDARD_MODELS, ConstantSpeed, trace
 from masrel.lab.hess import Controller, DeviceSetup, RealClock, SimulatedClock
 from masrel.lab.hess.puck import PuckOptions
-from masrel.lab.hess.puck._codec import (
+from masrel.lab.hess.puck._bus import (
     decode_position,
     decode_request,
     encode_position,
