@@ -4,10 +4,7 @@ Goes in: ``protocol.toml``. Comes out: a :class:`Protocol`, and from it the scal
 the joint parameters of each model in SI units, and two hashes.
 """
 
-from masrel.lab.protocol._gates import Gate, GateKeys, gates_of, parse_gate
-from masrel.lab.protocol._occasions import Occasions
-from masrel.lab.protocol._questions import Question, Questionnaire
-from masrel.lab.protocol._sample_sizes import SampleSize
+from masrel.lab.protocol._gates import Gate, gates_of, parse_gate
 from masrel.lab.protocol.content import (
     elbow_parameters,
     joint_model,
@@ -22,13 +19,18 @@ from masrel.lab.protocol.definition import (
     DeviceSettings,
     ElbowConstants,
     EstimatePlan,
+    GateKeys,
     Model,
     ModelConstants,
+    Occasions,
     PresentationRules,
     Protocol,
+    Question,
+    Questionnaire,
     Rater,
     RaterField,
     Report,
+    SampleSize,
     ScaleDefinition,
     ScheduleScheme,
     Session,

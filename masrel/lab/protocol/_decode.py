@@ -1,4 +1,4 @@
-"""Decode a TOML table into a struct key by key, collecting every problem."""
+"""What is wrong with the types of a TOML table, key by key."""
 
 import datetime
 import json
@@ -6,8 +6,7 @@ import math
 import sys
 import types
 import typing
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
 
 import msgspec
@@ -16,145 +15,96 @@ from msgspec.structs import FieldInfo
 
 _MAX_HINTS = 20
 
-Table = dict[str, typing.Any]
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Decoded:
-    """What could be decoded of a table, and what could not."""
-
-    # the keys whose values are usable, defaults filled in; tables as dicts, arrays as
-    # lists in which an unusable entry is None
-    values: Table = field(default_factory=dict)
-    # everything else, each ``key.path: needed ..., got ...``
-    problems: list[str] = field(default_factory=list)
-
-
-def decode_table(
+def type_problems(
     raw: Mapping[str, object], struct: type[msgspec.Struct], at: str = ""
-) -> Decoded:
-    """Decode a table into the fields of a struct, going on after each problem."""
+) -> Iterator[str]:
+    """Yield each key of a table that a struct cannot take, as ``key: needed ...``."""
     try:
-        whole = msgspec.convert(raw, struct)
+        msgspec.convert(raw, struct)
     except msgspec.ValidationError:  # of the first problem alone: look key by key
-        decoded = Decoded()
+        pass
     else:
-        return Decoded(values=msgspec.to_builtins(whole))
+        return
     fields = {info.encode_name: info for info in msgspec.structs.fields(struct)}
     prefix = f"{at}." if at else ""
-    unknown = [key for key in raw if key not in fields]
-    for place, key in enumerate(unknown):
+    for place, key in enumerate(key for key in raw if key not in fields):
         # what was meant takes long to find, and helps with the first few
         known = fields if place < _MAX_HINTS else {}
-        decoded.problems.append(_unknown(f"{prefix}{key}", key, known))
+        yield _unknown(f"{prefix}{key}", key, known)
     for key, info in fields.items():
         where = f"{prefix}{key}"
         if key in raw:
-            _decode_value(raw[key], info.type, where, key, decoded)
+            yield from _value_problems(raw[key], info.type, where)
         elif info.required:
-            decoded.problems.append(f"{where}: needed {_form(info, where)}, got none")
-        else:
-            decoded.values[key] = _default(info)
-    return decoded
+            yield f"{where}: needed {_form(info.type, where)}, got none"
 
 
-def _default(info: FieldInfo) -> object:
-    if info.default_factory is not msgspec.NODEFAULT:
-        return info.default_factory()
-    return msgspec.to_builtins(info.default)
-
-
-def _decode_value(
-    value: object, annotation: object, where: str, key: str, into: Decoded
-) -> None:
+def _value_problems(value: object, annotation: object, where: str) -> Iterator[str]:
     if isinstance(value, list):
         annotation = _array_of(annotation)
-    if _is_struct(annotation):
-        if isinstance(value, Mapping):
-            part = decode_table(value, annotation, where)
-            into.values[key] = part.values
-            into.problems.extend(part.problems)
-        else:
-            into.problems.append(f"{where}: needed a table, got {got(value)}")
-    elif (entry := _entry_type(annotation)) is not None:
-        _decode_array(value, annotation, entry, where, key, into)
+    entry = _entry_type(annotation)
+    if _is_struct(annotation) and isinstance(value, Mapping):
+        yield from type_problems(value, annotation, where)
+    elif _is_struct(annotation):
+        yield f"{where}: needed a table, got {got(value)}"
+    elif entry is not None and isinstance(value, list):
+        yield from _array_problems(value, annotation, entry, where)
+    elif entry is not None:
+        yield f"{where}: needed {_form(annotation, where)}, got {got(value)}"
     elif typing.get_origin(annotation) is dict and isinstance(value, Mapping):
-        entries = Decoded()
+        of_value = typing.get_args(annotation)[1]
         for name, item in value.items():
-            of_value = typing.get_args(annotation)[1]
-            _decode_value(item, of_value, f"{where}.{name}", name, entries)
-        into.values[key] = entries.values
-        into.problems.extend(entries.problems)
-    elif (problem := _leaf_problem(value, annotation, where)) is None:
-        into.values[key] = value
+            yield from _value_problems(item, of_value, f"{where}.{name}")
     else:
-        into.problems.append(problem)
+        yield from _leaf_problems(value, annotation, where)
 
 
-def _decode_array(
-    value: object,
-    annotation: object,
-    entry: object,
-    where: str,
-    key: str,
-    into: Decoded,
-) -> None:
-    if not isinstance(value, list):
-        tables = f"an array of tables [[{where}]]"
-        form = tables if _is_struct(entry) else needed(annotation)
-        into.problems.append(f"{where}: needed {form}, got {got(value)}")
-        return
-    entries = Decoded()
+def _array_problems(
+    value: list[object], annotation: object, entry: object, where: str
+) -> Iterator[str]:
     for index, item in enumerate(value):
-        n_before = len(entries.problems)
-        _decode_value(item, entry, f"{where}[{index}]", str(index), entries)
+        # Entries are counted from 0; their id helps to find them in the file.
         name = item.get("id") if isinstance(item, Mapping) else None
-        if isinstance(name, str):
-            # Entries are counted from 0; their id helps to find them in the file.
-            of_item = entries.problems[n_before:]
-            named = [f"{problem} (id {got(name)})" for problem in of_item]
-            entries.problems[n_before:] = named
-    into.problems.extend(entries.problems)
-    into.values[key] = [entries.values.get(str(i)) for i in range(len(value))]
+        at_end = f" (id {got(name)})" if isinstance(name, str) else ""
+        for problem in _value_problems(item, entry, f"{where}[{index}]"):
+            yield problem + at_end
     # limits on the length of the array, which no entry shows
     info = inspect.type_info(annotation)
     if isinstance(info, inspect.VarTupleType) and not (
         (info.min_length or 0) <= len(value) <= (info.max_length or math.inf)
     ):
-        into.problems.append(f"{where}: needed {needed(annotation)}, got {got(value)}")
+        yield f"{where}: needed {needed(annotation)}, got {got(value)}"
 
 
-def _leaf_problem(value: object, annotation: object, where: str) -> str | None:
+def _leaf_problems(value: object, annotation: object, where: str) -> Iterator[str]:
     try:
         msgspec.convert(value, annotation)
     except msgspec.ValidationError:
-        pass
-    else:
-        return None
-    info = inspect.type_info(annotation)
-    options = info.values if isinstance(info, inspect.LiteralType) else ()
-    hint = _closest(value, [str(option) for option in options])
-    return f"{where}: needed {needed(annotation)}, got {got(value)}{hint}"
+        info = inspect.type_info(annotation)
+        options = info.values if isinstance(info, inspect.LiteralType) else ()
+        hint = closest(value, map(str, options))
+        yield f"{where}: needed {needed(annotation)}, got {got(value)}{hint}"
 
 
 def _unknown(where: str, key: str, fields: Mapping[str, FieldInfo]) -> str:
-    hint = _closest(key, list(fields))
+    hint = closest(key, fields)
     known = "" if hint or not fields else f" ({', '.join(fields)})"
     return f"{where}: needed a known key{known}, got {got(key)}{hint}"
 
 
-def _closest(value: object, options: list[str]) -> str:
-    near = get_close_matches(str(value), options, n=1)
+def closest(value: object, options: Iterable[str]) -> str:
+    """Ask at the end of a message for the option that may be meant, if one is near."""
+    near = get_close_matches(str(value), list(options), n=1)
     return f"; did you mean {near[0]}?" if near else ""
 
 
-def _form(info: FieldInfo, where: str) -> str:
-    if _is_struct(info.type):
+def _form(annotation: object, where: str) -> str:
+    if _is_struct(annotation):
         return f"a table [{where}]"
-    entry = _entry_type(info.type)
-    if entry is not None and _is_struct(entry):
+    if _is_struct(_entry_type(annotation)):
         return f"an array of tables [[{where}]]"
-    return needed(info.type)
+    return needed(annotation)
 
 
 def _is_struct(annotation: object) -> typing.TypeGuard[type[msgspec.Struct]]:
@@ -256,8 +206,3 @@ def got(value: object) -> str:
     if isinstance(value, datetime.date | datetime.time):
         return value.isoformat()
     return str(value)
-
-
-def with_id(entry: Mapping[str, object]) -> str:
-    """Name an entry of an array of tables at the end of a message."""
-    return f" (id {got(entry['id'])})" if "id" in entry else ""

@@ -3,17 +3,12 @@
 import math
 import operator
 import re
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 from masrel._input import listed
 from masrel.errors import ParameterError
-from masrel.lab.protocol._decode import got
-from masrel.lab.protocol._keys import _Table, _Text
-
-if TYPE_CHECKING:
-    from masrel.lab.protocol.definition import Protocol
+from masrel.lab.protocol.definition import Protocol
 
 GATE_NUMBERS = ("value", "low", "high", "width", "n", "n_missing", "p")
 """Numbers of an estimate that a gate can be about."""
@@ -26,13 +21,6 @@ _COMPARISONS: dict[str, Callable[[float, float], bool]] = {
 }
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _PARTS = re.compile(r"\s*([^<>=\s]+)\s*(>=|<=|>|<)\s*([^<>=\s]+)\s*")
-
-
-class GateKeys(_Table, frozen=True, kw_only=True):
-    """``[[report.gates]]``: one requirement and why there is one."""
-
-    require: _Text
-    why: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,7 +132,7 @@ def parse_gate(
     )
 
 
-def gates_of(protocol: "Protocol") -> tuple[Gate, ...]:
+def gates_of(protocol: Protocol) -> tuple[Gate, ...]:
     """Return the gates of a protocol's report.
 
     Parameters
@@ -169,24 +157,3 @@ def _limit(text: str, where: str) -> float:
     if not math.isfinite(limit):
         raise ParameterError(f"{where}: needed a number as limit, got {text!r}")
     return limit
-
-
-def gate_rules(values: dict[str, Any]) -> Iterator[str]:
-    """Check that every gate is one, on an estimate of the plan."""
-    plan = (values.get("analysis") or {}).get("estimates") or []
-    names = [line.get("id") for line in plan if line is not None]
-    if None in names or len(names) < len(plan):
-        return  # the plan is refused
-    for index, gate in enumerate((values.get("report") or {}).get("gates") or []):
-        if gate is None or gate.get("require") is None:
-            continue
-        why = gate.get("why") or ""
-        if not why.isprintable():  # it stands in a line of a table, and in XML
-            yield (
-                f"report.gates[{index}].why: needed one line without control "
-                f"characters, got {got(why)}"
-            )
-        try:
-            parse_gate(gate["require"], names, where=f"report.gates[{index}].require")
-        except ParameterError as error:
-            yield str(error)

@@ -7,7 +7,6 @@ what is wrong with them.
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
-from difflib import get_close_matches
 from typing import Any
 
 from masrel.errors import ParameterError
@@ -15,7 +14,7 @@ from masrel.lab.elbow.joint_model import JointModel
 from masrel.lab.elbow.laws import MODELS
 from masrel.lab.elbow.parameters import ElbowParameters
 from masrel.lab.elbow.tone import ToneModel
-from masrel.lab.protocol._decode import got
+from masrel.lab.protocol._decode import closest, got
 
 DEFAULT_KIND = ElbowParameters.kind
 """The paper's own law, whose numbers have keys of their own."""
@@ -110,19 +109,18 @@ def kind_problem(kind: str) -> str | None:
     names = kind_names()
     if kind in names:
         return None
-    near = get_close_matches(kind, names, n=1)
-    hint = f"; did you mean {near[0]}?" if near else ""
-    return f"needed one of {', '.join(names)}, got {got(kind)}{hint}"
+    return f"needed one of {', '.join(names)}, got {got(kind)}{closest(kind, names)}"
 
 
 def value_problems(kind: str, values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
     """Yield a key, or "", and what is wrong with it, of all that is wrong."""
     keys = keys_of(kind)
     for key in values.keys() - keys:
-        near = get_close_matches(key, keys, n=1)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        known = ", ".join(keys)
-        yield key, f"needed a key of kind {got(kind)} ({known}), got {got(key)}{hint}"
+        yield (
+            key,
+            f"needed a key of kind {got(kind)} ({', '.join(keys)}), got {got(key)}"
+            f"{closest(key, keys)}",
+        )
     left = {key: value for key, value in values.items() if key in keys}
     while True:
         try:

@@ -1,14 +1,10 @@
 """What is known of each rater: fields that a protocol declares, and their values."""
 
-from collections.abc import Iterator, Mapping
 from datetime import date, datetime
-from typing import Any
-
-import msgspec
 
 from masrel._input import listed
-from masrel.lab.protocol._decode import got, with_id
-from masrel.lab.protocol.definition import _FIELD_NAME, RaterField
+from masrel.lab.protocol._decode import got
+from masrel.lab.protocol.definition import RaterField
 
 FieldValue = str | int | float
 """What a field holds; a date is text, ``YYYY-MM-DD``."""
@@ -69,49 +65,6 @@ def _day(value: object) -> str | None:
     return value if value == day.isoformat() else None
 
 
-def rater_field_rules(values: Mapping[str, Any]) -> Iterator[str]:
-    """Check fields of raters, and what raters have in them."""
-    fields = values.get("rater_fields") or {}
-    for name, field in fields.items():
-        yield from _declaration(name, field or {})
-    for index, rater in enumerate(values.get("raters") or []):
-        where = f"raters[{index}].fields"
-        for name, value in ((rater or {}).get("fields") or {}).items():
-            problem = _value_problem(name, value, fields)
-            if problem is not None:
-                yield f"{where}.{name}: {problem}{with_id(rater)}"
-
-
 def field_heading(name: str, field: RaterField) -> str:
     """Return what a field is called in a table, unit included."""
     return (field.title or name) + (f" ({field.unit})" if field.unit else "")
-
-
-def _declaration(name: str, field: Mapping[str, Any]) -> Iterator[str]:
-    where = f"rater_fields.{name}"
-    if not _FIELD_NAME.fullmatch(name) or name in RESERVED:
-        yield (
-            f"{where}: needed a name of 1 to 32 small letters, digits and '_', the "
-            f"first a letter, other than {', '.join(RESERVED)}, got {got(name)}"
-        )
-    kind, choices = field.get("type"), field.get("choices")
-    if kind == "choice" and choices is not None and len(set(choices)) < 2:
-        yield f"{where}.choices: needed at least 2 that differ, got {got(choices)}"
-    if kind not in (None, "choice") and choices:
-        yield f'{where}.choices: needed for type "choice" only, got it for {got(kind)}'
-    if kind in ("text", "choice", "date") and field.get("unit"):
-        yield f"{where}.unit: needed for numbers only, got it for {got(kind)}"
-
-
-def _value_problem(name: str, value: object, fields: Mapping[str, Any]) -> str | None:
-    # what is wrong with a rater's value, or None
-    if name not in fields:
-        known = listed(fields) if fields else "there is none"
-        return f"needed a field of [rater_fields] ({known}), got {got(name)}"
-    try:
-        field = msgspec.convert(fields[name], RaterField)
-    except msgspec.ValidationError:
-        return None  # the field itself is refused
-    if field_value(field, value) is None:
-        return f"needed {needed_of(field)}, got {got(value)}"
-    return None

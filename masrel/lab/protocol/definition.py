@@ -8,15 +8,14 @@ import re
 import sys
 from typing import Annotated, Literal
 
+import msgspec
 from msgspec import Meta
 
 from masrel.estimates import IntervalMethod, Target
 from masrel.lab.elbow.parameters import PostCatch, ResidualReading
-from masrel.lab.protocol._gates import GateKeys
-from masrel.lab.protocol._keys import _Identifier, _Table, _Text
-from masrel.lab.protocol._occasions import Occasions
-from masrel.lab.protocol._questions import Questionnaire
-from masrel.lab.protocol._sample_sizes import SampleSize
+
+_Identifier = Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,31}\Z")]
+_Text = Annotated[str, Meta(min_length=1)]
 
 # TOML has inf and nan, no key of a protocol does: every float here has its limits.
 _LARGEST = sys.float_info.max
@@ -26,6 +25,10 @@ _RestAngle = Annotated[float, Meta(ge=0, le=180)]
 _Positive = Annotated[float, Meta(gt=0, le=_LARGEST)]
 _Finite = Annotated[float, Meta(ge=-_LARGEST, le=_LARGEST)]
 _NonNegative = Annotated[float, Meta(ge=0, le=_LARGEST)]
+
+
+class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A table of the protocol file; unknown keys are errors."""
 
 
 class Study(_Table, frozen=True, kw_only=True):
@@ -96,7 +99,7 @@ class Model(_Table, frozen=True, kw_only=True):
     file: _Text | None = None
     simulated: bool = False
     constants: ModelConstants = ModelConstants()
-    parameters: dict[str, _Finite] = {}  # noqa: RUF012 - msgspec makes each its own
+    parameters: dict[str, _Finite] = {}
 
 
 class Rater(_Table, frozen=True, kw_only=True):
@@ -105,7 +108,7 @@ class Rater(_Table, frozen=True, kw_only=True):
     id: _Identifier
     note: str = ""
     site: _Identifier | None = None
-    fields: dict[str, object] = {}  # noqa: RUF012 - msgspec makes each its own
+    fields: dict[str, object] = {}
 
 
 _FIELD_NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
@@ -178,6 +181,69 @@ class PresentationRules(_Table, frozen=True, kw_only=True):
     slow_speed_deg_s: Annotated[float, Meta(ge=1, le=600)] = 10.0  # V1
     fast_speed_deg_s: Annotated[float, Meta(ge=1, le=600)] = 120.0  # V3
     done_with: Literal["enter", "button"] = "enter"
+
+
+class Occasions(_Table, frozen=True, kw_only=True):
+    """``[occasions]``: practice, instructions, breaks, and coming back to a session."""
+
+    instructions: Annotated[str, Meta(max_length=10_000)] = ""
+    practice: Annotated[tuple[str, ...], Meta(max_length=100)] = ()
+    break_after: Annotated[int, Meta(ge=1)] | None = None
+    break_minutes: Annotated[float, Meta(gt=0, le=1440)] = 5.0
+    resume: Literal["always", "same-day", "restart", "ask"] = "always"
+
+
+_When = Literal["presentation", "session", "study"]
+"""What questions are about, and so when they are asked."""
+
+_Whole = Annotated[int, Meta(ge=-1_000_000, le=1_000_000)]
+
+_ANALOGUE_RANGE = (0, 100)
+"""The ends of a visual analogue scale."""
+
+
+class Question(_Table, frozen=True, kw_only=True):
+    """``[[questionnaires.questions]]``: one question and what can answer it."""
+
+    id: _Identifier
+    text: _Text
+    type: Literal["whole", "visual-analogue", "choice", "text"]
+    low: _Whole | None = None
+    high: _Whole | None = None
+    low_label: str = ""
+    high_label: str = ""
+    choices: tuple[_Text, ...] = ()
+    required: bool = True
+    public: bool = False
+
+    @property
+    def range(self) -> tuple[int, int] | None:
+        """The least and the largest answer; None where answers are no numbers."""
+        if self.type == "visual-analogue":
+            return _ANALOGUE_RANGE
+        if self.low is None or self.high is None:
+            return None
+        return self.low, self.high
+
+    @property
+    def needed(self) -> str:
+        """What an answer is, in words."""
+        if self.type == "text":
+            return "text"
+        if self.type == "choice":
+            return f"one of {', '.join(self.choices)}"
+        low, high = self.range or _ANALOGUE_RANGE
+        kind = "a whole number" if self.type == "whole" else "a number"
+        return f"{kind}, {low} to {high}"
+
+
+class Questionnaire(_Table, frozen=True, kw_only=True):
+    """``[[questionnaires]]``: questions that are asked together."""
+
+    id: _Identifier
+    title: _Text
+    when: _When
+    questions: Annotated[tuple[Question, ...], Meta(min_length=1)]
 
 
 class DeviceSettings(_Table, frozen=True, kw_only=True):
@@ -278,6 +344,39 @@ class EstimatePlan(_Table, frozen=True, kw_only=True):
     interval: Literal["none", IntervalMethod] = "none"
 
 
+_Coefficient = Annotated[float, Meta(ge=-1, le=1)]
+_Chance = Annotated[float, Meta(ge=0, le=1)]
+_Width = Annotated[float, Meta(ge=0, le=100)]
+_End = Annotated[float, Meta(ge=-100, le=100)]
+
+
+class SampleSize(_Table, frozen=True, kw_only=True):
+    """``[[analysis.sample_sizes]]``: what was taken to be true, and what it showed."""
+
+    estimate: _Identifier
+    n_items: Annotated[int, Meta(ge=2, le=10_000_000)]
+    n_raters: Annotated[int, Meta(ge=1, le=1_000_000)]
+    value: _Coefficient
+    model: Literal["mixture", "dirichlet-multinomial", "latent", "table", "normal"]
+    prevalences: tuple[_Chance, ...] = ()
+    table: tuple[tuple[_Chance, ...], ...] = ()
+    p_missing: Annotated[float, Meta(ge=0, lt=1)] = 0.0
+    sides: Literal[1, 2] = 2
+    half_width: Annotated[float, Meta(gt=0, le=1)] | None = None
+    lower: _Coefficient | None = None
+    upper: _Coefficient | None = None
+    null: _Coefficient | None = None
+    expected_half_width: _Width | None = None
+    expected_low: _End | None = None
+    expected_high: _End | None = None
+    assurance: _Chance | None = None
+    power: _Chance | None = None
+    coverage: _Chance | None = None
+    method: Literal["exact", "simulation", "wald", "goodness-of-fit"] | None = None
+    n_studies: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
+    seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] | None = None
+
+
 class Analysis(_Table, frozen=True, kw_only=True):
     """``[analysis]``: the plan, written before the data."""
 
@@ -286,6 +385,13 @@ class Analysis(_Table, frozen=True, kw_only=True):
     n_resamples: Annotated[int, Meta(ge=100, le=1_000_000)] = 10_000
     estimates: tuple[EstimatePlan, ...] = ()
     sample_sizes: tuple[SampleSize, ...] = ()
+
+
+class GateKeys(_Table, frozen=True, kw_only=True):
+    """``[[report.gates]]``: one requirement and why there is one."""
+
+    require: _Text
+    why: str = ""
 
 
 class Report(_Table, frozen=True, kw_only=True):
@@ -330,7 +436,7 @@ class Protocol(_Table, frozen=True, kw_only=True):
     elbow: ElbowConstants = ElbowConstants()
     models: Annotated[tuple[Model, ...], Meta(min_length=1)]
     raters: Annotated[tuple[Rater, ...], Meta(min_length=1)]
-    rater_fields: dict[str, RaterField] = {}  # noqa: RUF012 - msgspec makes each its own
+    rater_fields: dict[str, RaterField] = {}
     sessions: Annotated[tuple[Session, ...], Meta(min_length=1)]
     schedule: ScheduleScheme
     stretch: Stretch = Stretch()

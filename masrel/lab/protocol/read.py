@@ -1,8 +1,7 @@
 """Read a protocol file, or a model file, and say everything wrong with it at once."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from itertools import chain, islice
+from collections.abc import Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -24,25 +23,13 @@ from masrel.lab.elbow.identification._model_file import (
     VARIANT_KEYS,
 )
 from masrel.lab.elbow.parameters import ElbowParameters
-from masrel.lab.protocol._decode import decode_table, got
-from masrel.lab.protocol._published_scale import spell_out_scale
-from masrel.lab.protocol._rules import broken_rules, joint_rules, kind_rules
+from masrel.lab.protocol._decode import closest, got, type_problems
+from masrel.lab.protocol._rules import broken_rules, model_rules
 from masrel.lab.protocol.content import _joint_of
 from masrel.lab.protocol.definition import ElbowConstants, Model, Protocol
+from masrel.scales import PUBLISHED_SCALES, PublishedScale
 
 _MAX_PROBLEMS = 200
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Resolved:
-    """A protocol's content with the numbers of its model files in it."""
-
-    raw: dict[str, object]  # the content
-    # what is wrong with the files, each with the key that names one
-    problems: list[str] = field(default_factory=list)
-    # places of the models whose file could not be used: their keys are missing for that
-    # reason alone
-    unread: list[int] = field(default_factory=list)
 
 
 def read_protocol(path: Path) -> Protocol:
@@ -70,33 +57,25 @@ def read_protocol(path: Path) -> Protocol:
     A model that names a model file gets its numbers from there, and the protocol has
     them as if they stood in it: hashes follow the numbers, not the file.
 
-    Rules across keys are applied to what could be decoded, so that one wrong key
-    hides no other problem.
+    Rules across keys are applied once every key alone is right.
     """
     content = _read_toml(path)
     problem = format_problem(content.pop("format", 1), newest=1)
     if problem is not None:
         raise ProtocolError(f"{path}: {problem}")
-    resolved = _resolve_model_files(content, path.parent)
-    raw = resolved.raw
-    # A model whose file could not be used lacks its keys for that reason alone; so
-    # does a protocol its scale.
-    unread = tuple(f"models[{index}]." for index in resolved.unread)
-    if (problem := spell_out_scale(raw)) is not None:
-        resolved.problems.append(problem)
-        unread += ("scale:",)
-    decoded = decode_table(raw, Protocol)
-    of_content = (
-        problem
-        for problem in chain(decoded.problems, broken_rules(decoded.values))
-        if not (problem.startswith(unread) and ", got none" in problem)
-    )
-    problems = list(islice(chain(resolved.problems, of_content), _MAX_PROBLEMS + 1))
+    problems = [
+        *_resolve_model_files(content, path.parent),
+        *_spell_out_scale(content),
+    ]
+    problems += islice(type_problems(content, Protocol), _MAX_PROBLEMS + 1)
+    if not problems:
+        protocol = msgspec.convert(content, Protocol)
+        problems += islice(broken_rules(protocol), _MAX_PROBLEMS + 1)
+    if len(problems) > _MAX_PROBLEMS:
+        problems[_MAX_PROBLEMS:] = ["there are more problems"]
     if problems:
-        if len(problems) > _MAX_PROBLEMS:
-            problems[-1] = "there are more problems"
         raise ProtocolError(*(f"{path}: {problem}" for problem in problems))
-    return msgspec.convert(raw, Protocol)
+    return protocol
 
 
 def _read_toml(path: Path) -> dict[str, object]:
@@ -115,24 +94,21 @@ def _read_toml(path: Path) -> dict[str, object]:
         raise ProtocolError(f"{path}: needed valid TOML, got: {error}") from error
 
 
-def _resolve_model_files(raw: Mapping[str, object], folder: Path) -> _Resolved:
-    """Read the model files that a protocol names."""
-    resolved = _Resolved(raw=dict(raw))
+def _resolve_model_files(raw: dict[str, object], folder: Path) -> Iterator[str]:
+    """Put the numbers of model files in their places; yield what is wrong."""
     models = raw.get("models")
     if not isinstance(models, list):
-        return resolved
-    resolved_models = list(models)
+        return
+    raw["models"] = models = list(models)
     for index, entry in enumerate(models):
-        if isinstance(entry, Mapping) and isinstance(entry.get("file"), str):
-            where = f"models[{index}]"
-            read = _read_tables(folder / entry["file"])
-            if isinstance(read, str):
-                resolved.problems.append(f"{where}.file: {read}")
-                resolved.unread.append(index)
-                continue
-            resolved_models[index] = _merged(entry, read, where, resolved.problems)
-    resolved.raw["models"] = resolved_models
-    return resolved
+        if not isinstance(entry, Mapping) or not isinstance(entry.get("file"), str):
+            continue
+        where, read = f"models[{index}]", _read_tables(folder / entry["file"])
+        if isinstance(read, str):
+            yield f"{where}.file: {read}"
+        else:
+            yield from (f"{where}.{problem}" for problem in _in_both(entry, read))
+            models[index] = _merged(entry, read)
 
 
 def read_model_file(path: Path) -> ElbowParameters:
@@ -158,15 +134,14 @@ def read_model_file(path: Path) -> ElbowParameters:
     if isinstance(read, str):
         raise ProtocolError(read)
     raw = {**read.get("model", {}), "constants": read.get("constants", {})}
-    decoded = decode_table({"id": "model", **raw}, Model)
-    elbow = ElbowConstants()
-    numbers = {key: value for key, value in decoded.values.items() if key != "id"}
-    values = {"elbow": msgspec.to_builtins(elbow), "models": [numbers]}
-    rules = (*kind_rules(values), *joint_rules(values))
-    problems = [*decoded.problems, *(rule.removeprefix("models[0].") for rule in rules)]
+    raw["id"] = "model"
+    problems = list(type_problems(raw, Model))
+    if not problems:
+        model, elbow = msgspec.convert(raw, Model), ElbowConstants()
+        problems = list(model_rules(model, elbow))
     if problems:
         raise ProtocolError(*(f"{path}: {problem}" for problem in problems))
-    return _joint_of(msgspec.convert({"id": "model", **raw}, Model), elbow)
+    return _joint_of(model, elbow)
 
 
 def _read_tables(path: Path) -> dict[str, Any] | str:
@@ -196,24 +171,76 @@ def _read_tables(path: Path) -> dict[str, Any] | str:
     return content
 
 
-def _merged(
-    entry: Mapping[str, Any], read: Mapping[str, Any], where: str, problems: list[str]
-) -> dict[str, object]:
-    model, constants = read.get("model", {}), read.get("constants", {})
-    if "simulated" in read:
-        model = {**model, "simulated": read["simulated"]}
-    inline = entry.get("constants", {})
-    for key in model:
-        if key in entry:
-            problems.append(
-                f"{where}.{key}: needed in {entry['file']} or here, got it in both"
-            )
+def _in_both(entry: Mapping[str, Any], read: Mapping[str, Any]) -> Iterator[str]:
+    # what stands in the protocol and in the file that it names
+    inline, keys = entry.get("constants", {}), [*read.get("model", {})]
+    keys += [key for key in ("simulated",) if key in read]
+    both = [key for key in keys if key in entry]
     if isinstance(inline, Mapping):
-        for key in inline:
-            if key in constants:
-                problems.append(
-                    f"{where}.constants.{key}: needed in {entry['file']} or here, got "
-                    "it in both"
-                )
-        inline = {**constants, **inline}
-    return {**model, **entry, "constants": inline}
+        constants = read.get("constants", {})
+        both += [f"constants.{key}" for key in inline if key in constants]
+    for key in both:
+        yield f"{key}: needed in {entry['file']} or here, got it in both"
+
+
+def _merged(entry: Mapping[str, Any], read: Mapping[str, Any]) -> dict[str, object]:
+    inline = entry.get("constants", {})
+    if isinstance(inline, Mapping):
+        inline = {**read.get("constants", {}), **inline}
+    known = {key: read[key] for key in ("simulated",) if key in read}
+    return {**read.get("model", {}), **known, **entry, "constants": inline}
+
+
+def _spell_out_scale(raw: dict[str, object]) -> Iterator[str]:
+    """Put the table of a scale in the place of its name; yield what is wrong.
+
+    The angles that belong to a scale are asked for in a questionnaire of its name.
+    """
+    # TOML takes a key below the head of a table for one of that table
+    for key, table in raw.items():
+        if "scale" not in raw and isinstance(table, dict) and "scale" in table:
+            raw["scale"] = table.pop("scale")
+            yield (
+                f"{key}.scale: needed above the first table of the file, got it in "
+                f"[{key}]"
+            )
+            break
+    name = raw.get("scale")
+    if not isinstance(name, str):
+        return
+    if name not in PUBLISHED_SCALES:
+        names = ", ".join(map(got, PUBLISHED_SCALES))
+        yield (
+            f"scale: needed a table [scale] or one of {names}, got {got(name)}"
+            f"{closest(name, PUBLISHED_SCALES)}"
+        )
+    # What else is wrong does not hang on its grades.
+    published = PUBLISHED_SCALES.get(name, next(iter(PUBLISHED_SCALES.values())))
+    raw["scale"] = {"name": published.scale.name, "grades": published.scale.grades}
+    others = raw.get("questionnaires", [])
+    if (
+        published.angles
+        and isinstance(others, list)
+        and not any(isinstance(q, Mapping) and q.get("id") == name for q in others)
+    ):
+        raw["questionnaires"] = [_angles(published), *others]
+
+
+def _angles(published: PublishedScale) -> dict[str, object]:
+    return {
+        "id": published.id,
+        "title": "Angles",
+        "when": "presentation",
+        "questions": [
+            {
+                "id": name,
+                "text": f"{name}, {meaning}, deg",
+                "type": "whole",
+                "low": 0,
+                "high": 180,
+                "required": False,  # without a catch there is no such angle
+                "public": True,
+            }
+            for name, meaning in published.angles
+        ],
+    }

@@ -465,24 +465,21 @@ def test_too_many_presentations_for_the_codes_are_refused(tmp_path: Path) -> Non
     ]
 
 
-def test_all_problems_come_at_once_whatever_table_they_are_in(tmp_path: Path) -> None:
-    document = changed("study", "tilte", to="x")
-    document["models"][0]["catch_travel_deg"] = "far"
-    document["models"][1]["intended_grade"] = "9"
-    document["raters"][1]["id"] = "R 2"
-    document["sessions"][1]["raters"] = []
+def test_all_problems_come_at_once_types_before_rules(tmp_path: Path) -> None:
+    def keys() -> list[str]:
+        return sorted(text.split(": ")[0] for text in problems_of(document, tmp_path))
+
+    document = changed("models", 1, "intended_grade", to="9")
     document["stretch"]["start_deg"] = 147
+    document["sessions"][1]["raters"] = ["R3"]
+    rules = ["models[1].intended_grade", "sessions[1].raters[0]", "stretch.start_deg"]
+    assert keys() == rules
+    document["study"]["tilte"] = "x"
+    document["models"][0]["catch_travel_deg"] = "far"
+    document["raters"][1]["id"] = "R 2"
     del document["schedule"]
-    keys = [text.split(": ")[0] for text in problems_of(document, tmp_path)]
-    assert sorted(keys) == [
-        "models[0].catch_travel_deg",
-        "models[1].intended_grade",
-        "raters[1].id",
-        "schedule",
-        "sessions[1].raters",
-        "stretch.start_deg",
-        "study.tilte",
-    ]
+    types = ["models[0].catch_travel_deg", "raters[1].id", "schedule", "study.tilte"]
+    assert keys() == types
 
 
 def test_a_wrong_id_makes_no_reference_to_it_unknown(tmp_path: Path) -> None:
