@@ -18,7 +18,7 @@ from tests.lab.hess.injected import small_study
 FREE = """[device]
 missed_ticks_limit = 100000
 watchdog_ms = 100
-stale_limit_ms = 100
+stale_limit_ms = 50
 
 [presentation]
 stretches = "free"
