@@ -5,8 +5,8 @@ files that say so; what only the authors know is left to them.
 """
 
 from masrel.lab.checklist._checklist_forms import checklist_markdown, write_checklist
-from masrel.lab.checklist._filling import GUIDELINES, fill_checklist
-from masrel.lab.checklist._items import Checklist, ChecklistItem
+from masrel.lab.checklist._filling import GUIDELINES, Checklist, fill_checklist
+from masrel.lab.checklist._guidelines import ChecklistItem
 
 __all__ = [
     "GUIDELINES",

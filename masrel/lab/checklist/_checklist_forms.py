@@ -7,7 +7,8 @@ from pathlib import Path
 
 from masrel._files import write_file
 from masrel.errors import ParameterError
-from masrel.lab.checklist._items import Checklist, ChecklistItem, State
+from masrel.lab.checklist._filling import Checklist
+from masrel.lab.checklist._guidelines import ChecklistItem, State
 from masrel.lab.report._pandoc import converted
 
 _HEADINGS = ("Item", "Asks for", "State", "What the record says", "Files")
@@ -128,12 +129,8 @@ def _html(checklist: Checklist) -> str:
     )
 
 
-def _docx(checklist: Checklist) -> bytes:
-    return converted(checklist_markdown(checklist), "docx", pictures={})
-
-
 _FORMS: dict[str, Callable[[Checklist], str | bytes]] = {
     ".html": _html,
     ".md": checklist_markdown,
-    ".docx": _docx,
+    ".docx": lambda made: converted(checklist_markdown(made), "docx", pictures={}),
 }

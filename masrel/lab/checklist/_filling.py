@@ -1,15 +1,14 @@
 """The guidelines by name, and a checklist filled from a study."""
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import masrel
 from masrel.errors import ParameterError
 from masrel.lab._bounded_files import MAX_TABLE, read_regular
-from masrel.lab.checklist._cosmin import cosmin_items
 from masrel.lab.checklist._facts import StudyFacts, gather_facts
-from masrel.lab.checklist._grras import grras_items
-from masrel.lab.checklist._items import Checklist, ChecklistItem
+from masrel.lab.checklist._guidelines import ChecklistItem, cosmin_items, grras_items
 from masrel.lab.protocol import Protocol, StudyPaths
 
 _Items = Callable[[StudyFacts], tuple[ChecklistItem, ...]]
@@ -31,6 +30,40 @@ _GUIDELINES: dict[str, tuple[str, str, _Items]] = {
 
 GUIDELINES = tuple(_GUIDELINES)
 """Names of the guidelines."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Checklist:
+    """A guideline with what the record of a study says to each of its items.
+
+    Attributes
+    ----------
+    guideline : str
+        Its short name, of `GUIDELINES`.
+    title : str
+        Its name.
+    reference : str
+        Where it is published.
+    study : str
+        The title of the study.
+    items : tuple of ChecklistItem
+        In the guideline's order.
+    notes : tuple of str
+        What a reader must know before the items.
+    files : mapping of str to str
+        SHA-256 of each file that an item names.
+    masrel_version : str
+        The version that filled it.
+    """
+
+    guideline: str
+    title: str
+    reference: str
+    study: str
+    items: tuple[ChecklistItem, ...]
+    notes: tuple[str, ...]
+    files: Mapping[str, str] = field(hash=False)
+    masrel_version: str
 
 
 def fill_checklist(study: StudyPaths, protocol: Protocol, guideline: str) -> Checklist:
