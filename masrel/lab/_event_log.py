@@ -9,7 +9,7 @@ import json
 import math
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,7 +18,12 @@ from typing import TYPE_CHECKING, Self
 
 from masrel._files import make_folder, naming, sync_folder
 from masrel.errors import SessionLogError, SessionLogInUseError
-from masrel.lab._bounded_files import MAX_TABLE, parse_json, read_regular
+from masrel.lab._bounded_files import (
+    MAX_TABLE,
+    format_problem,
+    parse_json,
+    read_regular,
+)
 from masrel.lab._durable_files import no_follow
 from masrel.lab._once import once
 
@@ -164,6 +169,39 @@ def _parse_line(path: Path, number: int, line: bytes) -> tuple[Event, object]:
         line=number, kind=kind, time_utc=time_utc, fields=MappingProxyType(fields)
     )
     return event, document["previous"]
+
+
+def check_kinds(
+    path: Path,
+    events: Iterable[Event],
+    kinds: Mapping[str, tuple[str, ...]],
+    *,
+    head: str,
+    newest: int,
+    later: Mapping[str, tuple[set[str], ...]] = MappingProxyType({}),
+) -> None:
+    """Refuse events that are not of these kinds, each with its fields.
+
+    The event `head` says which format it is; `later` has fields of a kind that events
+    of earlier versions lack, those that came together in one set.
+    """
+    for event in events:
+        problem = None
+        if event.kind not in kinds:
+            problem = f"needed an event of {', '.join(kinds)}"
+        elif event.kind == head:  # first: another format has other fields
+            problem = format_problem(event.fields.get("format"), newest=newest)
+        if problem is None:
+            fields, got = set(kinds[event.kind]), set(event.fields)
+            absent = fields - got
+            old = (each for each in later.get(event.kind, ()) if each <= absent)
+            if got - fields or absent != set().union(*old):
+                problem = (
+                    f"needed the fields {', '.join(kinds[event.kind])}, "
+                    f"got {', '.join(event.fields)}"
+                )
+        if problem is not None:
+            raise SessionLogError(f"{path}: line {event.line}: {event.kind}: {problem}")
 
 
 def _facts_of(entry: object) -> list[object]:

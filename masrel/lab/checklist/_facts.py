@@ -15,8 +15,7 @@ from masrel.lab.ratings import (
     read_study_data,
     study_remarks,
 )
-from masrel.lab.run._session_logs import read_session
-from masrel.lab.run._state import SessionState
+from masrel.lab.run._state import SessionState, read_session
 from masrel.lab.schedule import read_schedule
 
 

@@ -15,9 +15,14 @@ from typing import TYPE_CHECKING
 
 import masrel
 from masrel._input import listed
-from masrel.errors import ParameterError, SessionLogError
-from masrel.lab._bounded_files import format_problem
-from masrel.lab._event_log import Event, SessionLog, read_log, utc_now
+from masrel.errors import ParameterError
+from masrel.lab._event_log import (
+    Event,
+    SessionLog,
+    check_kinds,
+    read_log,
+    utc_now,
+)
 from masrel.lab.protocol import Protocol, StudyPaths
 
 if TYPE_CHECKING:
@@ -112,7 +117,8 @@ def events_of_logs(study: StudyPaths) -> Iterator[tuple[Path, Event]]:
 
 def _timed(log: Path) -> list[tuple[str, Path, Event]]:
     # a clock that is set back changes no order within a log
-    events = _checked(log, read_log(log))
+    events = read_log(log)
+    check_kinds(log, events, _EVENTS, head="conduct", newest=_FORMAT)
     latest = accumulate((event.time_utc for event in events), max)
     return [(time, log, event) for time, event in zip(latest, events, strict=True)]
 
@@ -136,7 +142,7 @@ def open_conduct(
 ) -> Iterator[SessionLog]:
     """Give the log of a study, verified and with its head, to append events to."""
     with SessionLog.open(study.conduct_file, now=now) as log:
-        _checked(log.path, log.events)
+        check_kinds(log.path, log.events, _EVENTS, head="conduct", newest=_FORMAT)
         if not any(event.kind == "conduct" for event in log.events):
             head: dict[str, _Fact] = {
                 "format": _FORMAT,
@@ -160,23 +166,3 @@ def check_rater(protocol: Protocol, rater: str) -> None:
     known = [each.id for each in protocol.raters]
     if rater not in known:
         raise ParameterError(f"rater: needed one of {listed(known)}, got {rater!r}")
-
-
-def _checked(path: Path, events: tuple[Event, ...]) -> tuple[Event, ...]:
-    """Return the events of a log of conduct; refuse any other."""
-    for event in events:
-        where = f"{path}: line {event.line}"
-        if event.kind not in _EVENTS:
-            raise SessionLogError(
-                f"{where}: needed an event of {', '.join(_EVENTS)}, got {event.kind!r}"
-            )
-        if event.kind == "conduct":  # first: another format has other fields
-            problem = format_problem(event.fields.get("format"), newest=_FORMAT)
-            if problem is not None:
-                raise SessionLogError(f"{where}: {problem}")
-        if set(event.fields) != set(_EVENTS[event.kind]):
-            raise SessionLogError(
-                f"{where}: {event.kind}: needed the fields "
-                f"{', '.join(_EVENTS[event.kind])}, got {', '.join(event.fields)}"
-            )
-    return events

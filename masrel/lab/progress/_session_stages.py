@@ -8,8 +8,7 @@ from typing import Literal
 from masrel.errors import SessionLogError
 from masrel.lab._event_log import Event, events_before_torn
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.run._session_logs import read_session
-from masrel.lab.run._state import SessionState, replay
+from masrel.lab.run._state import SessionState, read_session, replay
 from masrel.lab.schedule import site_of_copy
 from masrel.lab.schedule._sites import site_of
 

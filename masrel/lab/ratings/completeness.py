@@ -10,8 +10,7 @@ from masrel.lab.conduct import excluded_raters, read_conduct
 from masrel.lab.conduct._study_answers import study_answers
 from masrel.lab.paper._differences import StudyAnswers, sheet_differences
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.run._session_logs import read_session
-from masrel.lab.run._state import SessionState
+from masrel.lab.run._state import SessionState, read_session
 from masrel.lab.schedule import read_schedule
 
 

@@ -12,8 +12,7 @@ from masrel.lab._bounded_files import MAX_RECORDING, MAX_SMALL, read_regular
 from masrel.lab._event_log import Event
 from masrel.lab.protocol import Protocol, StudyPaths, scale_of
 from masrel.lab.ratings.table import _NEEDED_TIME, Ratings, _is_utc, ratings_from_rows
-from masrel.lab.run._session_logs import read_session
-from masrel.lab.run._state import FROM_PAPER, FROM_PERSONS, SessionState
+from masrel.lab.run._state import FROM_PAPER, FROM_PERSONS, SessionState, read_session
 from masrel.lab.schedule import Schedule, check_schedule, read_schedule
 
 

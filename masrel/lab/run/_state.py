@@ -5,11 +5,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, cast, get_args
+from typing import TYPE_CHECKING, Any, Literal, cast, get_args
+
+import msgspec
 
 from masrel.errors import SessionLogError
-from masrel.lab._bounded_files import format_problem
-from masrel.lab._event_log import Event
+from masrel.lab._event_log import Event, check_kinds, read_log
+from masrel.lab._once import once
 
 if TYPE_CHECKING:
     from masrel.lab.protocol._questions import Answer
@@ -35,9 +37,6 @@ FORMAT = 2
 
 _TYPED = ("file", "row", "file_sha256", "who")  # where it stood, and who typed it
 
-_GRIP_LOST = "grip_lost"
-"""A field that logs of earlier versions lack."""
-
 _PRESENTED = (
     "code",
     "position",
@@ -55,7 +54,7 @@ _PRESENTED = (
     "felt",
     "r1_deg",
     "r2_deg",
-    _GRIP_LOST,
+    "grip_lost",
 )
 
 _RESUMED = ("protocol_sha256", "n_graded", "clock", "masrel_version", "grades")
@@ -117,25 +116,23 @@ EVENTS: dict[str, tuple[str, ...]] = {
 }
 """Every kind of event with the fields it has."""
 
-_LATER = {
-    "presented": {
-        "facts_sha256",
-        "stretches",
-        "ended",
-        "n_stretches",
-        "felt",
-        "r1_deg",
-        "r2_deg",
-    },
-    "grade": {"stretch"},
-    "session": {"rehearsal"},
-    "resumed": {"grades"},
-    "restarted": {"grades"},
+_LATER: dict[str, tuple[set[str], ...]] = {
+    "presented": (
+        {"grip_lost"},
+        {
+            *("facts_sha256", "stretches", "ended", "n_stretches"),
+            *("felt", "r1_deg", "r2_deg"),
+        },
+    ),
+    "practised": ({"grip_lost"},),
+    "grade": ({"stretch"},),
+    "session": ({"rehearsal"},),
+    "resumed": ({"grades"},),
+    "restarted": ({"grades"},),
 }
 """Fields that events had not when every presentation was one stretch, none was
-rehearsed, only the columns of a recording were hashed, and a session went on with the
-source of grades that it was begun with."""
-
+rehearsed, only the columns of a recording were hashed, a session went on with the
+source of grades that it was begun with, and nobody looked whether the grip was lost."""
 
 # Of practice the same can follow as of the presentations that are rated.
 _OF_PRACTICE = {
@@ -144,11 +141,23 @@ _OF_PRACTICE = {
     "practice-skipped": "skipped",
 }
 
-_TEXTS = (
-    *("code", "grade", "grades", "who", "why"),
-    *("questionnaire", "question", "column", "file"),
-)
-"""Fields that hold text or null, whatever the event."""
+
+class _Stretch(msgspec.Struct):
+    """What is read of a stretch."""
+
+    mean_speed_deg_s: float | None
+
+
+_TYPES: dict[str, object] = {
+    **dict.fromkeys(("code", "grade", "grades", "who", "why", "file"), str | None),
+    **dict.fromkeys(("questionnaire", "question", "column"), str | None),
+    **dict.fromkeys(("after", "answer", "value"), str | float | bool | None),
+    "on": date,
+    "row": int,
+    "mean_speed_deg_s": float | None,
+    "stretches": list[_Stretch] | None,
+}
+"""What a field that is read by its type holds, whatever the event."""
 
 _AFTER_COMPLETE = ("correction", "answer-correction", "reentered")
 
@@ -207,97 +216,124 @@ class SessionState(CodesState):
         return [*self.set_aside, *now]
 
 
+@once
+def read_session(log: Path) -> tuple[tuple[Event, ...], SessionState]:
+    """Return the verified events of a session's log, and where the session stands."""
+    events = read_log(log)
+    return events, replay(log, events)
+
+
 def replay(path: Path, events: Sequence[Event]) -> SessionState:
     """Return where a session stands after the events of its log."""
+    check_kinds(path, events, EVENTS, head="session", newest=FORMAT, later=_LATER)
     state = SessionState()
     for event in events:
-        fault = _contradiction(state, event)
-        if fault is not None:
-            raise SessionLogError(f"{path}: line {event.line}: {event.kind}: {fault}")
+        problem = _of_another_type(event) or _contradiction(state, event)
+        if problem is not None:
+            raise SessionLogError(f"{path}: line {event.line}: {event.kind}: {problem}")
         _apply(state, event)
     return state
 
 
-def _misshape(event: Event) -> str | None:
-    # -> why it is no event of a session, or None
-    if event.kind not in EVENTS:
-        return f"needed an event of {', '.join(EVENTS)}"
-    if event.kind == "session":  # first: another format has other fields
-        problem = format_problem(event.fields.get("format"), newest=FORMAT)
-        if problem is not None:
-            return problem
-    fields, got = set(EVENTS[event.kind]), set(event.fields)
-    absent = fields - got - {_GRIP_LOST}
-    if got - fields or absent not in (set(), _LATER.get(event.kind)):
-        return (
-            f"needed the fields {', '.join(EVENTS[event.kind])}, "
-            f"got {', '.join(event.fields)}"
-        )
-    wrong = _of_another_type(event)
-    if wrong is not None:
-        return f"needed another value of {wrong}, got {event.fields[wrong]!r}"
+def _of_another_type(event: Event) -> str | None:
+    for name, value in event.fields.items():
+        try:
+            msgspec.convert(value, _TYPES.get(name, Any))
+        except msgspec.ValidationError:
+            return f"needed another value of {name}, got {value!r}"
     return None
 
 
 def _contradiction(state: SessionState, event: Event) -> str | None:
-    # -> why the event cannot follow, or None
-    problem = _misshape(event)
-    if problem is not None or event.kind == "recovered":
-        return problem
+    """Return why the event cannot follow those before it, or None."""
+    if event.kind == "recovered":
+        return None
     if (event.kind == "session") == bool(state.header):
         return "needed the event session once, before all others"
     if state.is_complete and event.kind not in _AFTER_COMPLETE:
         return "needed no event but a correction after complete"
-    if event.kind in ("resumed", "restarted"):
-        return _contradiction_of_source(state, event)
-    if "question" in event.fields:
-        return _contradiction_of_answer(state, event)
-    if "file_sha256" in event.fields:
-        return _contradiction_of_entry(state, event)
-    return _contradiction_of_code(*_part(state, event))
-
-
-def _part(state: SessionState, event: Event) -> tuple[CodesState, Event]:
-    # what an event is about, and the event as one of that part
-    if event.kind in _OF_PRACTICE:
-        return state.practice, dataclasses.replace(event, kind=_OF_PRACTICE[event.kind])
-    if event.kind == "fault" and event.fields["code"] in state.practice.presented:
-        return state.practice, event
-    return state, event
-
-
-def _of_another_type(event: Event) -> str | None:
-    # the field that has no value of its type, or None
-    for name in _TEXTS:
-        if not isinstance(event.fields.get(name), str | None):
-            return name
-    for name in ("after", "answer", "value"):
-        if isinstance(event.fields.get(name), list):
-            return name
-    if event.kind == "held" and not _is_day(event.fields["on"]):
-        return "on"
-    if not isinstance(event.fields.get("row", 0), int):
-        return "row"
-    speed = event.fields.get("mean_speed_deg_s")
-    if not isinstance(speed, float | int | None):
-        return "mean_speed_deg_s"
-    stretches = event.fields.get("stretches")
-    are_stretches = stretches is None or (
-        isinstance(stretches, list)
-        and all(
-            isinstance(stretch, Mapping)
-            and isinstance(stretch.get("mean_speed_deg_s", ""), float | int | None)
-            for stretch in stretches
-        )
+    part, kind = _part(state, event)
+    fields = event.fields
+    code, begun = fields.get("code"), state.header.get("grades")
+    source = fields.get("grades")
+    before = part.presented.get(str(code), [])
+    is_settled = code in part.settled
+    is_stopped = bool(before) and before[-1].fields["fault"] is not None
+    is_known = code is None or code in state.presented
+    is_missing = fields.get("grade") is None
+    answered = _answer_key(event) if kind == "answered" else None
+    # Events, whether this would be wrong of one of them, and what it needs
+    rules: tuple[tuple[tuple[str, ...], bool, str], ...] = (
+        (
+            ("resumed", "restarted"),
+            source is not None and not may_go_on(begun, source),
+            f"a session that goes on with {begun}, got {source}",
+        ),
+        (
+            ("answered", "answer-correction"),
+            not is_known,
+            f"a code that was presented, got {code}",
+        ),
+        (
+            ("answered",),
+            answered in state.answers,
+            f"one answer to {'.'.join(answered[:2])}, got another" if answered else "",
+        ),
+        (
+            ("entered", "reentered"),
+            begun != FROM_PAPER,
+            f"a session on paper, got one with {begun}",
+        ),
+        (
+            ("entered",),
+            code is None or is_settled,
+            f"one entry of each code, got another of {code}",
+        ),
+        (
+            ("reentered",),
+            code is not None and not is_settled,
+            f"a code that was entered, got {code}",
+        ),
+        (
+            ("presented", "skipped"),
+            is_settled,
+            f"a code that is neither graded nor skipped, got {code}",
+        ),
+        (
+            ("fault", "skipped"),
+            not is_stopped,
+            f"a presentation of {code} that a fault stopped before it",
+        ),
+        (("grade",), is_settled, f"one grade of {code}, got another"),
+        (("grade",), is_missing, f"a grade of {code}, got none"),
+        (
+            ("grade",),
+            is_stopped or not before,
+            f"a presentation of {code} without fault before its grade",
+        ),
+        (
+            ("correction",),
+            code not in part.presented,
+            f"a code that was presented, got {code}",
+        ),
+        (
+            ("correction",),
+            is_missing and code not in part.grades,
+            f"a code that has a grade, got {code}",
+        ),
     )
-    return None if are_stretches else "stretches"
+    broken = (needs for of, is_wrong, needs in rules if kind in of and is_wrong)
+    needs = next(broken, None)
+    return None if needs is None else f"needed {needs}"
 
 
-def _is_day(value: object) -> bool:
-    try:
-        return date.fromisoformat(str(value)).isoformat() == value
-    except ValueError:
-        return False
+def _part(state: SessionState, event: Event) -> tuple[CodesState, str]:
+    # what an event is about, and the kind of event that it is there
+    if event.kind in _OF_PRACTICE:
+        return state.practice, _OF_PRACTICE[event.kind]
+    if event.kind == "fault" and event.fields["code"] in state.practice.presented:
+        return state.practice, event.kind
+    return state, event.kind
 
 
 def _answer_key(event: Event) -> AnswerKey:
@@ -314,82 +350,33 @@ def may_go_on(begun: object, source: object) -> bool:
     return begun == source or (begun in AT_THE_DEVICE and source in AT_THE_DEVICE)
 
 
-def _contradiction_of_source(state: SessionState, event: Event) -> str | None:
-    begun, source = state.header["grades"], event.fields.get("grades")
-    if source is not None and not may_go_on(begun, source):
-        return f"needed a session that goes on with {begun}, got {source}"
-    return None
-
-
-def _contradiction_of_answer(state: SessionState, event: Event) -> str | None:
-    key = _answer_key(event)
-    name, code = f"{key[0]}.{key[1]}", key[2]
-    if code is not None and code not in state.presented:
-        return f"needed a code that was presented, got {code}"
-    if event.kind == "answered" and key in state.answers:
-        return f"needed one answer to {name}, got another"
-    return None
-
-
-def _contradiction_of_entry(state: SessionState, event: Event) -> str | None:
-    code = event.fields["code"]
-    if state.header["grades"] != FROM_PAPER:
-        return f"needed a session on paper, got one with {state.header['grades']}"
-    if event.kind == "entered" and code in (None, *state.settled):
-        return f"needed one entry of each code, got another of {code}"
-    if event.kind == "reentered" and code not in (None, *state.settled):
-        return f"needed a code that was entered, got {code}"
-    return None
-
-
-def _contradiction_of_code(state: CodesState, event: Event) -> str | None:
-    code = event.fields.get("code")
-    before = state.presented.get(str(code), [])
-    if event.kind in ("presented", "skipped") and code in state.settled:
-        return f"needed a code that is neither graded nor skipped, got {code}"
-    if event.kind in ("fault", "skipped"):
-        if not before or before[-1].fields["fault"] is None:
-            return f"needed a presentation of {code} that a fault stopped before it"
-    if event.kind == "grade":
-        if code in state.settled:
-            return f"needed one grade of {code}, got another"
-        if not before or before[-1].fields["fault"] is not None:
-            return f"needed a presentation of {code} without fault before its grade"
-    if event.kind == "correction" and code not in state.presented:
-        return f"needed a code that was presented, got {code}"
-    if event.kind == "correction" and event.fields["grade"] is None:
-        if code not in state.grades:
-            return f"needed a code that has a grade, got {code}"
-    return None
-
-
 def _apply(state: SessionState, event: Event) -> None:
+    fields, source = event.fields, event.fields.get("grades")
     if event.kind == "restarted":
         _set_aside(state)
-    if event.kind in ("session", "resumed", "restarted"):
-        source = event.fields.get("grades")
-        state.source = state.source if source is None else str(source)
-    if event.kind == "session":
-        state.header = event.fields
-    elif event.kind == "complete":
-        state.is_complete = True
-    elif event.kind == "held":
-        state.held_on = str(event.fields["on"])
-    elif event.kind == "instructed":
-        state.is_instructed = True
-    elif event.kind == "break":
-        state.breaks.add(event.fields["after"])
-    elif "question" in event.fields:
-        # no list, or the event would have been refused
-        key = _answer_key(event)
-        state.answers[key] = cast("Answer", event.fields["answer"])
-        state.answered_from.setdefault(key, str(state.source))
-    elif event.kind == "reentered":
-        code = event.fields["code"]
-        of = (None if code is None else str(code), str(event.fields["column"]))
-        state.reentered[of] = event
-    else:
-        _apply_to_code(*_part(state, event), str(state.source))
+    if source is not None:
+        state.source = str(source)
+    match event.kind:
+        case "session":
+            state.header = fields
+        case "complete":
+            state.is_complete = True
+        case "held":
+            state.held_on = str(fields["on"])
+        case "instructed":
+            state.is_instructed = True
+        case "break":
+            state.breaks.add(fields["after"])
+        case "answered" | "answer-correction":
+            key = _answer_key(event)
+            # no list, or the event would have been refused
+            state.answers[key] = cast("Answer", fields["answer"])
+            state.answered_from.setdefault(key, str(state.source))
+        case "reentered":
+            code = None if fields["code"] is None else str(fields["code"])
+            state.reentered[code, str(fields["column"])] = event
+        case _:
+            _apply_to_code(*_part(state, event), event, str(state.source))
 
 
 def _set_aside(state: SessionState) -> None:
@@ -404,28 +391,27 @@ def _set_aside(state: SessionState) -> None:
         setattr(state, each.name, getattr(fresh, each.name))
 
 
-def _apply_to_code(state: CodesState, event: Event, source: str) -> None:
+def _apply_to_code(state: CodesState, kind: str, event: Event, source: str) -> None:
     code, grade = str(event.fields.get("code")), event.fields.get("grade")
-    if event.kind in ("grade", "skipped", "correction", "entered"):
+    match kind:
+        case "presented":
+            state.presented.setdefault(code, []).append(event)
+        case "entered":
+            state.presented[code] = []  # by what or whom is not known here
+            if grade is not None:
+                state.first_grades[code] = str(grade)
+        case "grade":
+            state.first_grades[code] = str(grade)
+            state.graded_at[code] = event.time_utc
+        case "skipped":
+            state.skipped[code] = event
+    if kind in ("grade", "skipped"):
+        state.graded_from[code] = source
+    if kind in ("grade", "skipped", "correction", "entered"):
         state.settled.add(code)
-    if event.kind == "presented":
-        state.presented.setdefault(code, []).append(event)
-    elif event.kind == "entered":
-        state.presented[code] = []  # by what or whom is not known here
-        if grade is not None:
-            state.first_grades[code] = state.grades[code] = str(grade)
-    elif event.kind == "grade":
-        state.first_grades[code] = state.grades[code] = str(grade)
-        state.graded_at[code] = event.time_utc
-        state.graded_from[code] = source
-        stretch = event.fields.get("stretch")
-        if isinstance(stretch, int):
-            state.graded_stretches[code] = stretch
-    elif event.kind == "correction":
         state.grades.pop(code, None)
-        if grade is not None:
-            state.grades[code] = str(grade)
         state.graded_stretches.pop(code, None)  # what was felt was another grade's
-    elif event.kind == "skipped":
-        state.skipped[code] = event
-        state.graded_from[code] = source
+    if grade is not None:
+        state.grades[code] = str(grade)
+        if isinstance(stretch := event.fields.get("stretch"), int):
+            state.graded_stretches[code] = stretch

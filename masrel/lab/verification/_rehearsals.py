@@ -8,8 +8,7 @@ from masrel.errors import ScheduleError
 from masrel.lab._event_log import Event
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
 from masrel.lab.run._rehearsal import RehearsalPaths, drawn_rehearsal
-from masrel.lab.run._session_logs import read_session
-from masrel.lab.run._state import SessionState
+from masrel.lab.run._state import SessionState, read_session
 from masrel.lab.verification._finding import Finding, broken, doubt
 from masrel.lab.verification._log_findings import (
     checked_log,

@@ -12,8 +12,7 @@ from masrel.lab._event_log import Event
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.protocol._questions import checked_answer
 from masrel.lab.run._practice import practice_presentations
-from masrel.lab.run._session_logs import read_session
-from masrel.lab.run._state import SessionState
+from masrel.lab.run._state import SessionState, read_session
 from masrel.lab.schedule import Presentation, Schedule
 from masrel.lab.verification._finding import Finding, broken
 from masrel.lab.verification._log_findings import (

@@ -66,7 +66,7 @@ def test_a_session_log_in_its_place_is_refused(small: Small) -> None:
     study.conduct_file.write_bytes(study.log_file("R1", "test").read_bytes())
     with pytest.raises(SessionLogError, match="needed an event of conduct, withdrawn"):
         read_conduct(study)
-    with pytest.raises(SessionLogError, match="line 1: needed an event"):
+    with pytest.raises(SessionLogError, match="line 1: session: needed an event"):
         record_standing(study, protocol, "R2", "withdrawn", **BY)
 
 

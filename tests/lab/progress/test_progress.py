@@ -19,7 +19,7 @@ from masrel.lab.progress import (
     session_progress,
 )
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
-from masrel.lab.run import ScriptGrades, _session_logs, record_correction, run_session
+from masrel.lab.run import ScriptGrades, _state, record_correction, run_session
 from masrel.lab.schedule import read_schedule, write_schedules
 
 Small = tuple[StudyPaths, Protocol]
@@ -210,13 +210,13 @@ def test_every_log_is_read_once(
     for name in names:
         run(small, name)
     reads: list[Path] = []
-    original = _session_logs.read_log
+    original = _state.read_log
 
     def counted(path: Path) -> tuple[Event, ...]:
         reads.append(path)
         return original(path)
 
-    monkeypatch.setattr(_session_logs, "read_log", counted)
+    monkeypatch.setattr(_state, "read_log", counted)
     call("status", small[0].root)
     assert len(reads) == len(set(reads)) == n_raters
     reads.clear()

@@ -108,7 +108,7 @@ def test_the_speed_is_that_of_the_presentation_before_the_grade(
     path = study.log_file("R1", "test")
     with SessionLog.open(path) as log:
         # an event of format 1, when every presentation was one stretch
-        names = set(EVENTS["presented"]) - _LATER["presented"]
+        names = set(EVENTS["presented"]).difference(*_LATER["presented"])
         presented = {name: log.events[-1].fields[name] for name in names}
         presented |= {"attempt": 2, "mean_speed_deg_s": 12.5}
         log.append("presented", presented)
