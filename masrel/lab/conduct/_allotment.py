@@ -15,7 +15,7 @@ from masrel.lab._event_log import Event, utc_now
 from masrel.lab.conduct._study_log import events_of_logs, open_conduct
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.schedule import Schedule, read_schedule, write_schedules
-from masrel.lab.schedule._designs import WITH_ROWS
+from masrel.lab.schedule._orders import WITH_ROWS
 from masrel.lab.schedule._sites import site_of
 
 if TYPE_CHECKING:

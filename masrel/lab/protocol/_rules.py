@@ -4,6 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator
 from itertools import chain
+from operator import attrgetter
 
 import msgspec
 
@@ -269,28 +270,31 @@ def _sites(protocol: Protocol) -> Iterator[str]:
             )
 
 
-def _device(protocol: Protocol) -> Iterator[str]:
-    # the stretch inside the range of motion and between the device's soft stops
-    device, range_end = protocol.device, protocol.elbow.range_end_deg
+_COMPARISONS = (
+    ("stretch.start_deg", "less than", "stretch.end_deg"),
+    ("stretch.end_deg", "at most", "elbow.range_end_deg"),
+    ("device.dead_zone_deg_s", "less than", "device.full_speed_deg_s"),
+    ("training.kappa_insufficient", "less than", "training.kappa_sufficient"),
+    ("training.window", "at most", "training.max_presentations"),
+    # θ_L of (6)
+    ("elbow.smallest_catch_angle_deg", "less than", "elbow.range_end_deg"),
+    ("elbow.catch_rise_s", "at most", "elbow.peak_duration_s"),
+)
+"""Keys, and how each compares with another."""
+
+
+def _comparisons(protocol: Protocol) -> Iterator[str]:
+    for key, comparison, other in _COMPARISONS:
+        value, limit = attrgetter(key, other)(protocol)
+        if value > limit or (value == limit and comparison == "less than"):
+            yield f"{key}: needed {comparison} {other} ({limit:g}), got {value:g}"
+
+
+def _soft_stops(protocol: Protocol) -> Iterator[str]:
+    # the stretch between the device's soft stops
     start, end = protocol.stretch.start_deg, protocol.stretch.end_deg
-    if start >= end:
-        yield (
-            f"stretch.start_deg: needed less than stretch.end_deg ({end:g}), "
-            f"got {start:g}"
-        )
-    if end > range_end:
-        yield (
-            f"stretch.end_deg: needed at most elbow.range_end_deg ({range_end:g}), "
-            f"got {end:g}"
-        )
-    slow, fast = device.dead_zone_deg_s, device.full_speed_deg_s
-    if slow >= fast:
-        yield (
-            f"device.dead_zone_deg_s: needed less than device.full_speed_deg_s "
-            f"({fast:g}), got {slow:g}"
-        )
+    device, width = protocol.device, protocol.device.soft_stop_deg
     low, high = device.lowest_angle_deg, device.highest_angle_deg
-    width = device.soft_stop_deg
     if start < low + width:
         yield (
             f"stretch.start_deg: needed at least device.lowest_angle_deg and the soft "
@@ -330,22 +334,6 @@ def _presentation(protocol: Protocol) -> Iterator[str]:
         yield (
             f"presentation.slow_speed_deg_s: needed a stretch of {way:g} deg "
             f"within presentation.stretch_limit_s ({limit:g}), got {slow:g}"
-        )
-
-
-def _training(protocol: Protocol) -> Iterator[str]:
-    # two kappas apart, and a window that training can fill
-    rules = protocol.training
-    low, high = rules.kappa_insufficient, rules.kappa_sufficient
-    if low >= high:
-        yield (
-            f"training.kappa_insufficient: needed less than training.kappa_sufficient "
-            f"({high:g}), got {low:g}"
-        )
-    if rules.window > rules.max_presentations:
-        yield (
-            f"training.window: needed at most training.max_presentations "
-            f"({rules.max_presentations}), got {rules.window}"
         )
 
 
@@ -470,13 +458,6 @@ def _choices(question: Question) -> Iterator[str]:
 def _models(protocol: Protocol) -> Iterator[str]:
     # shared constants, then models with the keys of their kind
     elbow = protocol.elbow
-    # θ_L of (6)
-    if elbow.smallest_catch_angle_deg >= elbow.range_end_deg:
-        yield (
-            f"elbow.smallest_catch_angle_deg: needed less than elbow.range_end_deg "
-            f"({elbow.range_end_deg:g}), got {elbow.smallest_catch_angle_deg:g}"
-        )
-    yield from _late_catch(elbow, "elbow")
     yield from _held_torque(protocol, elbow, "elbow")
     for index, model in enumerate(protocol.models):
         where = f"models[{index}]"
@@ -510,8 +491,12 @@ def model_rules(model: Model, elbow: ElbowConstants) -> Iterator[str]:
         overrides = _overrides(model)
         joint = msgspec.structs.replace(elbow, **overrides)
         yield from _catch_angle(model.catch_angle_constant_deg, joint)
-        if "catch_rise_s" in overrides:
-            yield from _late_catch(joint, "constants")
+        rise, peak = model.constants.catch_rise_s, joint.peak_duration_s
+        if rise is not None and rise > peak:
+            yield (
+                f"constants.catch_rise_s: needed at most elbow.peak_duration_s "
+                f"({peak:g}), got {rise:g}"
+            )
 
 
 _ELBOW_KEYS = (
@@ -559,15 +544,6 @@ def _catch_angle(constant: float | None, joint: ElbowConstants) -> Iterator[str]
             f"elbow.slowest_mean_speed_deg_s of at least "
             f"elbow.smallest_catch_angle_deg ({smallest:g}), got "
             f"{constant:g} - {slope:g} * {slowest:g} = {angle:g}"
-        )
-
-
-def _late_catch(joint: ElbowConstants, where: str) -> Iterator[str]:
-    rise, peak = joint.catch_rise_s, joint.peak_duration_s
-    if rise > peak:
-        yield (
-            f"{where}.catch_rise_s: needed at most elbow.peak_duration_s ({peak:g}), "
-            f"got {rise:g}"
         )
 
 
@@ -695,9 +671,9 @@ _RULES = (
     _schedules,
     _orders,
     _sites,
-    _device,
+    _comparisons,
+    _soft_stops,
     _presentation,
-    _training,
     _occasions,
     _session_order,
     _questions,

@@ -10,6 +10,16 @@ from masrel.errors import ParameterError
 
 
 @dataclass(frozen=True, slots=True)
+class _StudyFile:
+    """A file or folder of a study, by its path from the study's folder."""
+
+    path: str
+
+    def __get__(self, study: "StudyPaths", owner: object) -> Path:
+        return study.root / self.path
+
+
+@dataclass(frozen=True, slots=True)
 class StudyPaths:
     """The folder of a study and the place of every file in it.
 
@@ -26,105 +36,49 @@ class StudyPaths:
 
     root: Path
 
-    @property
-    def protocol(self) -> Path:
-        """The protocol file."""
-        return self.root / "protocol.toml"
+    protocol = _StudyFile("protocol.toml")
+    """The protocol file."""
+    schedules = _StudyFile("schedules")
+    """The folder of drawn schedules and raters' sheets."""
+    ratings_file = _StudyFile("ratings/ratings.csv")
+    """The table of ratings made from the session logs."""
+    answers_file = _StudyFile("ratings/answers.csv")
+    """The table of answers to questionnaires made from the logs."""
+    published_answers_file = _StudyFile("ratings/published_answers.csv")
+    """Answers published elsewhere, or that fit what is."""
+    published_file = _StudyFile("ratings/published.csv")
+    """Ratings published elsewhere, when the study has some."""
+    in_person_file = _StudyFile("ratings/in_person.csv")
+    """Grades given in person to the subjects behind the models."""
+    claims_file = _StudyFile("ratings/claims.csv")
+    """What a paper prints of the agreement, when the study was published."""
+    analysis_file = _StudyFile("analysis.json")
+    """The analysis, in full precision."""
+    report = _StudyFile("report")
+    """The folder of the report."""
+    conduct_file = _StudyFile("conduct.jsonl")
+    """The log of what happened beside the sessions."""
+    merged_conduct = _StudyFile("conduct")
+    """The folder of such logs of the studies that this one was merged from."""
+    raters_file = _StudyFile("ratings/raters.csv")
+    """The table of raters that goes with that of ratings."""
+    secret_file = _StudyFile(".key/secret.txt")
+    """The secret that decides orders and codes; its folder is its owner's alone."""
+    serve_key_file = _StudyFile(".key/serve.txt")
+    """The key that cookies of `masrel serve` are signed with; it stays there."""
+    published_secret_file = _StudyFile("published_secret.txt")
+    """The same secret once everybody may know it."""
+    training = _StudyFile("training")
+    """The folder of training logs and recordings; no rating of the study."""
+    rehearsals = _StudyFile("rehearsals")
+    """The folder of logs and recordings of rehearsals; no rating of the study."""
+    sheets = _StudyFile("sheets")
+    """The folder of sheets to print, and of files to type them into."""
 
     @property
-    def schedules(self) -> Path:
-        """The folder of drawn schedules and raters' sheets."""
-        return self.root / "schedules"
-
-    @property
-    def sessions(self) -> Path:
+    def sessions(self) -> Path:  # which a rehearsal has elsewhere
         """The folder of session logs and recordings."""
         return self.root / "sessions"
-
-    @property
-    def ratings_file(self) -> Path:
-        """The table of ratings made from the session logs."""
-        return self.root / "ratings" / "ratings.csv"
-
-    @property
-    def answers_file(self) -> Path:
-        """The table of answers to questionnaires made from the logs."""
-        return self.root / "ratings" / "answers.csv"
-
-    @property
-    def published_answers_file(self) -> Path:
-        """Answers published elsewhere, or that fit what is."""
-        return self.root / "ratings" / "published_answers.csv"
-
-    @property
-    def published_file(self) -> Path:
-        """Ratings published elsewhere, when the study has some."""
-        return self.root / "ratings" / "published.csv"
-
-    @property
-    def in_person_file(self) -> Path:
-        """Grades given in person to the subjects behind the models."""
-        return self.root / "ratings" / "in_person.csv"
-
-    @property
-    def claims_file(self) -> Path:
-        """What a paper prints of the agreement, when the study was published."""
-        return self.root / "ratings" / "claims.csv"
-
-    @property
-    def analysis_file(self) -> Path:
-        """The analysis, in full precision."""
-        return self.root / "analysis.json"
-
-    @property
-    def report(self) -> Path:
-        """The folder of the report."""
-        return self.root / "report"
-
-    @property
-    def conduct_file(self) -> Path:
-        """The log of what happened beside the sessions."""
-        return self.root / "conduct.jsonl"
-
-    @property
-    def merged_conduct(self) -> Path:
-        """The folder of such logs of the studies that this one was merged from."""
-        return self.root / "conduct"
-
-    @property
-    def raters_file(self) -> Path:
-        """The table of raters that goes with that of ratings."""
-        return self.root / "ratings" / "raters.csv"
-
-    @property
-    def secret_file(self) -> Path:
-        """The secret that decides orders and codes; its folder is its owner's alone."""
-        return self.root / ".key" / "secret.txt"
-
-    @property
-    def serve_key_file(self) -> Path:
-        """The key that cookies of `masrel serve` are signed with; it stays there."""
-        return self.root / ".key" / "serve.txt"
-
-    @property
-    def published_secret_file(self) -> Path:
-        """The same secret once everybody may know it."""
-        return self.root / "published_secret.txt"
-
-    @property
-    def training(self) -> Path:
-        """The folder of training logs and recordings; no rating of the study."""
-        return self.root / "training"
-
-    @property
-    def rehearsals(self) -> Path:
-        """The folder of logs and recordings of rehearsals; no rating of the study."""
-        return self.root / "rehearsals"
-
-    @property
-    def sheets(self) -> Path:
-        """The folder of sheets to print, and of files to type them into."""
-        return self.root / "sheets"
 
     def logs(self) -> list[Path]:
         """Return the session logs that are there, whosever they are."""

@@ -4,7 +4,7 @@ Goes in: a protocol. Comes out: for each rater and session a schedule file that
 names the models, and a blinded sheet that does not.
 """
 
-from masrel.lab.schedule._copies import copy_for_site, site_of_copy
+from masrel.lab.schedule._sites import copy_for_site, site_of_copy
 from masrel.lab.schedule.presentation import (
     Presentation,
     Schedule,

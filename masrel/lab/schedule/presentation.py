@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import masrel
 from masrel.errors import ScheduleError
 from masrel.lab.protocol import Protocol, presented_hash, protocol_hash
-from masrel.lab.schedule._designs import WITH_ROWS
-from masrel.lab.schedule._orders import draw_order
+from masrel.lab.schedule._orders import WITH_ROWS, draw_order
 from masrel.lab.schedule._secret import StudySecret, check_secret
 from masrel.lab.schedule._sites import site_of
 from masrel.lab.schedule._stream import Stream

@@ -24,8 +24,7 @@ from masrel.lab.protocol import (
     presented_hash,
 )
 from masrel.lab.schedule._changes import content_file, stale_sentences
-from masrel.lab.schedule._designs import WITH_ROWS
-from masrel.lab.schedule._orders import order_problem
+from masrel.lab.schedule._orders import WITH_ROWS, order_problem
 from masrel.lab.schedule._secret import StudySecret, find_secret, new_secret
 from masrel.lab.schedule._sites import checked_site, site_of
 from masrel.lab.schedule.presentation import (
