@@ -99,7 +99,7 @@ def _record_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
 
 
 def _sheet_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
-    from masrel.lab.paper._filled_form import off_scale
+    from masrel.lab.paper._form import off_scale
 
     for session in protocol.sessions:
         for rater in session.raters:

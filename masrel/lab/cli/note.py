@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from masrel.lab.conduct._notes import NOTE_KINDS, SEVERITIES, NoteKind, Severity
+from masrel.lab.conduct._statements import NOTE_KINDS, SEVERITIES, NoteKind, Severity
 from masrel.lab.protocol import StudyPaths, read_protocol
 
 

@@ -27,7 +27,7 @@ def ratings(study: Path, output: Path | None) -> None:
     against its checksum. Corrections take the place of the grades they correct. The
     table of raters, raters.csv, is written beside STUDY/ratings/ratings.csv.
     """
-    from masrel.lab.progress._raters import raters_text
+    from masrel.lab.progress._standing import raters_text
     from masrel.lab.ratings import (
         answers_from_logs,
         ratings_from_logs,

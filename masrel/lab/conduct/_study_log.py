@@ -5,7 +5,7 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import datetime
 from heapq import merge
@@ -15,18 +15,21 @@ from typing import TYPE_CHECKING
 
 import masrel
 from masrel._input import listed
-from masrel.errors import ParameterError
+from masrel.errors import ParameterError, SessionLogError
 from masrel.lab._event_log import (
     Event,
     SessionLog,
     check_kinds,
+    line_hashes,
     read_log,
     utc_now,
 )
 from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.protocol._questions import Answer
 
 if TYPE_CHECKING:
     from masrel.lab.recording import _Fact  # loads numpy
+
 
 _FORMAT = 1
 
@@ -161,8 +164,53 @@ def stated(**texts: str) -> dict[str, str]:
     return {name: text.strip() for name, text in texts.items()}
 
 
+def check_choice(name: str, value: str, choices: Iterable[str]) -> None:
+    """Refuse what is none of the choices."""
+    if value not in (known := tuple(choices)):
+        raise ParameterError(f"{name}: needed one of {listed(known)}, got {value!r}")
+
+
 def check_rater(protocol: Protocol, rater: str) -> None:
     """Refuse a rater that the protocol does not have."""
-    known = [each.id for each in protocol.raters]
-    if rater not in known:
-        raise ParameterError(f"rater: needed one of {listed(known)}, got {rater!r}")
+    check_choice("rater", rater, [each.id for each in protocol.raters])
+
+
+def study_answers(study: StudyPaths) -> dict[str, dict[tuple[str, str], Answer]]:
+    """Return the last answer of each rater by questionnaire and question."""
+    answers: dict[str, dict[tuple[str, str], Answer]] = {}
+    for event in all_events(study):
+        if event.kind in ("answered", "answer-correction"):
+            fields, answer = event.fields, event.fields["answer"]
+            if not isinstance(answer, str | int | float | None):
+                raise SessionLogError(
+                    f"{study.conduct_file}: line {event.line}: {event.kind}: needed "
+                    f"one answer, got {answer!r}"
+                )
+            key = str(fields["questionnaire"]), str(fields["question"])
+            answers.setdefault(str(fields["rater"]), {})[key] = answer
+    return answers
+
+
+def merged_log_problems(study: StudyPaths) -> Iterator[tuple[Path, str]]:
+    """Yield what is wrong with the logs in ``conduct/``, each with its file."""
+    named = set()
+    for event in read_conduct(study):
+        if event.kind != "merged" or event.fields["log"] is None:
+            continue
+        log = study.root / str(event.fields["log"])
+        named.add(log)
+        if not log.is_file():
+            yield log, "needed the log of a merged study, got no file"
+            continue
+        hashes = line_hashes(log)
+        sha256 = hashes[-1] if hashes else None
+        if (len(hashes), sha256) != (event.fields["n_lines"], event.fields["sha256"]):
+            yield (
+                log,
+                f"needed {event.fields['n_lines']} lines, the last with SHA-256 "
+                f"{event.fields['sha256']}, as they were merged, got {len(hashes)} and "
+                f"{sha256}",
+            )
+    for log in sorted(study.merged_conduct.glob("*")):
+        if log not in named:
+            yield log, "is in conduct/, and no merged study has it"

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from masrel.lab.paper._differences import SheetDifference
-    from masrel.lab.paper._entry import EnteredSheet, enter_sheet
+    from masrel.lab.paper._entry import EnteredSheet, compare_sheet, enter_sheet
     from masrel.lab.paper._printing import PaperSheets, write_sheets
-    from masrel.lab.paper._second_entry import compare_sheet
 
 __all__ = [
     "EnteredSheet",
@@ -24,9 +23,8 @@ __all__ = [
 
 _HOMES = {
     "masrel.lab.paper._differences": ("SheetDifference",),
-    "masrel.lab.paper._entry": ("EnteredSheet", "enter_sheet"),
+    "masrel.lab.paper._entry": ("EnteredSheet", "compare_sheet", "enter_sheet"),
     "masrel.lab.paper._printing": ("PaperSheets", "write_sheets"),
-    "masrel.lab.paper._second_entry": ("compare_sheet",),
 }
 
 

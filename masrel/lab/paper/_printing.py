@@ -13,10 +13,10 @@ from masrel.lab.paper._form import (
     Form,
     QuestionColumn,
     form_of,
+    read_typed,
 )
-from masrel.lab.paper._typed import read_typed
 from masrel.lab.protocol import Protocol, Question, StudyPaths, scale_of
-from masrel.lab.run._practice import practice_presentations
+from masrel.lab.run._around import practice_presentations
 from masrel.lab.run.console import _instruction
 from masrel.lab.schedule.sheets import _drawn_schedule
 from masrel.scales import published_scale

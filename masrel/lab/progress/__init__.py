@@ -4,9 +4,15 @@ In: a protocol, its schedules and logs. Out: where each session stands, what bec
 each rater, and one next step.
 """
 
-from masrel.lab.progress._next_step import NextStep, next_step
-from masrel.lab.progress._raters import RaterProgress, rater_progress, raters_csv
-from masrel.lab.progress._session_stages import SessionProgress, session_progress
+from masrel.lab.progress._standing import (
+    NextStep,
+    RaterProgress,
+    SessionProgress,
+    next_step,
+    rater_progress,
+    raters_csv,
+    session_progress,
+)
 
 __all__ = [
     "NextStep",

@@ -9,7 +9,7 @@ from pathlib import Path
 from masrel._files import from_safe_cell, safe_cell, write_file
 from masrel._input import listed
 from masrel.errors import ParameterError
-from masrel.lab.conduct._study_answers import study_answers
+from masrel.lab.conduct._study_log import study_answers
 from masrel.lab.protocol import Protocol, Question, StudyPaths
 from masrel.lab.protocol._questions import Answer, checked_answer, questions_of
 from masrel.lab.ratings.study_file import _Problem, _read_rows, _refusal

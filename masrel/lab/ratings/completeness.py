@@ -7,7 +7,7 @@ from pathlib import Path
 from masrel.errors import MasrelError, SessionLogError
 from masrel.lab._event_log import Event
 from masrel.lab.conduct import excluded_raters, read_conduct
-from masrel.lab.conduct._study_answers import study_answers
+from masrel.lab.conduct._study_log import study_answers
 from masrel.lab.paper._differences import StudyAnswers, sheet_differences
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.run._state import SessionState, read_session

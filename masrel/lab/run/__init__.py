@@ -24,11 +24,10 @@ if TYPE_CHECKING:
         Skip,
         StretchGrade,
     )
-    from masrel.lab.run._runner import SessionSummary
     from masrel.lab.run._settings import model_controller
     from masrel.lab.run._simulated_raters import SimulatedGrades
     from masrel.lab.run.console import ConsoleGrades
-    from masrel.lab.run.session import run_session
+    from masrel.lab.run.session import SessionSummary, run_session
 
 __all__ = [
     "ConsoleGrades",
@@ -69,11 +68,10 @@ _HOMES = {
         "StretchGrade",
     ),
     "masrel.lab._event_log": ("Event", "SessionLog", "read_log"),
-    "masrel.lab.run._runner": ("SessionSummary",),
     "masrel.lab.run._settings": ("model_controller",),
     "masrel.lab.run._simulated_raters": ("SimulatedGrades",),
     "masrel.lab.run.console": ("ConsoleGrades",),
-    "masrel.lab.run.session": ("run_session",),
+    "masrel.lab.run.session": ("SessionSummary", "run_session"),
 }
 
 

@@ -14,8 +14,8 @@ from masrel.lab.conduct._study_log import append_event, check_rater, stated
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.protocol._questions import checked_answer
 from masrel.lab.recording import _Fact
+from masrel.lab.run._around import question_named
 from masrel.lab.run._grade_sources import GradeCorrection
-from masrel.lab.run._questionnaires import question_named
 from masrel.lab.run._state import replay
 
 

@@ -98,7 +98,7 @@ def _answers_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding
 
 
 def _raters_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
-    from masrel.lab.progress._raters import raters_text
+    from masrel.lab.progress._standing import raters_text
 
     path = study.raters_file
     if not path.is_file():

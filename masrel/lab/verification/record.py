@@ -8,7 +8,7 @@ from pathlib import Path
 from masrel.errors import ProtocolError, ScheduleError, SessionLogError
 from masrel.lab._once import read_once
 from masrel.lab.conduct._allotment import allotment_problems
-from masrel.lab.conduct._merged_logs import merged_log_problems
+from masrel.lab.conduct._study_log import merged_log_problems
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.schedule import read_schedule, schedule_problems
 from masrel.lab.verification._finding import Finding, broken, doubt

@@ -20,7 +20,7 @@ from masrel.errors import (
     SessionLogError,
 )
 from masrel.lab.analysis import analyze
-from masrel.lab.conduct._study_answers import study_answers
+from masrel.lab.conduct._study_log import study_answers
 from masrel.lab.paper import compare_sheet, enter_sheet, write_sheets
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.ratings import corrections_of, ratings_from_logs, read_study_data

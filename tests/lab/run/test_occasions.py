@@ -12,7 +12,7 @@ from masrel.errors import (
     SessionLogError,
     SessionStoppedError,
 )
-from masrel.lab.conduct._study_answers import study_answers
+from masrel.lab.conduct._study_log import study_answers
 from masrel.lab.protocol import Protocol, StudyPaths, scale_of
 from masrel.lab.ratings import (
     answers_from_logs,

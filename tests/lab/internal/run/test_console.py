@@ -9,7 +9,7 @@ import pytest
 from masrel.lab.hess import PresentationStatus
 from masrel.lab.protocol import PresentationRules, Protocol, StudyPaths
 from masrel.lab.recording import RECORDING_COLUMNS, Recording
-from masrel.lab.run._stretch_facts import StatusOfHand, stretch_facts
+from masrel.lab.run._present import StatusOfHand, stretch_facts
 from masrel.lab.run.console import _cues_shown
 from tests.lab.run.conftest import new_study, small
 

@@ -1,13 +1,88 @@
-"""Days between sessions, and between beginning one and coming back to it."""
+"""What a session has around presentations: practice, questions, days before it."""
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from datetime import date, datetime
+from itertools import count
 
 from masrel.errors import MasrelWarning, ParameterError
 from masrel.lab._event_log import Event, read_log
-from masrel.lab.protocol import Protocol, Session, StudyPaths
+from masrel.lab.protocol import Protocol, Question, Questionnaire, Session, StudyPaths
+from masrel.lab.protocol._questions import When, checked_answer, questions_of
 from masrel.lab.recording import _Fact
+from masrel.lab.run._grade_sources import (
+    GradeCorrection,
+    OccasionSource,
+    QuestionRequest,
+)
+from masrel.lab.schedule import Presentation
+
+
+def practice_presentations(protocol: Protocol) -> tuple[Presentation, ...]:
+    """Return what comes before the first presentation of a schedule."""
+    # A schedule's codes begin with digits; a code that is a model's id would name it.
+    ids = {model.id.upper() for model in protocol.models}
+    codes = (code for n in count(1) if (code := f"P{n}") not in ids)
+    return tuple(
+        Presentation(position=place, code=code, model=model, repeat=0)
+        for place, (model, code) in enumerate(
+            zip(protocol.occasions.practice, codes, strict=False), start=1
+        )
+    )
+
+
+def ask_questions(
+    protocol: Protocol,
+    when: When,
+    source: OccasionSource,
+    *,
+    rater: str,
+    session: str,
+    presentation: Presentation | None = None,
+    answered: Container[tuple[str, str]] = (),
+    correct: Callable[[GradeCorrection], None] | None = None,
+    log: Callable[[dict[str, _Fact]], object],
+) -> None:
+    """Ask what has no answer yet, and log each answer before the next question."""
+    for questionnaire, question in questions_of(protocol, when):
+        if (questionnaire.id, question.id) in answered:
+            continue
+        request = QuestionRequest(
+            rater=rater,
+            session=session,
+            questionnaire=questionnaire,
+            question=question,
+            presentation=presentation,
+            correct=correct,
+        )
+        answer = checked_answer(question, source.answer(request), where=_place(request))
+        names: dict[str, _Fact] = {
+            "questionnaire": questionnaire.id,
+            "question": question.id,
+        }
+        log({**names, "answer": answer})
+
+
+def _place(request: QuestionRequest) -> str:
+    # which answer, in a message
+    name = f"{request.questionnaire.id}.{request.question.id}"
+    of = "" if request.presentation is None else f" of {request.presentation.code}"
+    return f"answer to {name}{of} by {request.rater} in session {request.session}"
+
+
+def question_named(protocol: Protocol, name: str) -> tuple[Questionnaire, Question]:
+    """Return the question that ``questionnaire.question`` names."""
+    known = {
+        f"{questionnaire.id}.{question.id}": (questionnaire, question)
+        for questionnaire in protocol.questionnaires
+        for question in questionnaire.questions
+    }
+    if name not in known:
+        raise ParameterError(
+            f"question: needed one of {', '.join(known) or 'none'}, got {name!r}"
+        )
+    return known[name]
+
 
 _NOT_THE_RATERS = ("recovered", "correction", "answer-correction", "stopped")
 """Events that do not say when a rater was there last."""

@@ -1,0 +1,396 @@
+"""What somebody states of a study, with who says so: each one event of its log."""
+
+from collections.abc import Callable, Iterator, Mapping
+from datetime import datetime
+from typing import TYPE_CHECKING, Literal, get_args
+
+from masrel._input import listed
+from masrel.errors import ParameterError, ScheduleError, SessionLogError
+from masrel.lab._event_log import utc_now
+from masrel.lab.conduct._study_log import (
+    append_event,
+    check_choice,
+    check_rater,
+    read_conduct,
+    stated,
+)
+from masrel.lab.protocol import Protocol, RaterField, StudyPaths
+from masrel.lab.protocol._rater_fields import (
+    FieldValue,
+    field_value,
+    needed_of,
+    parsed_value,
+)
+from masrel.lab.schedule import Presentation, Schedule, read_schedule
+
+if TYPE_CHECKING:
+    from masrel.lab.recording import _Fact  # loads numpy
+
+
+NoteKind = Literal["note", "adverse-event", "deviation"]
+"""What a note is of."""
+
+Severity = Literal["mild", "moderate", "severe"]
+"""How severe an adverse event is."""
+
+NOTE_KINDS: tuple[NoteKind, ...] = get_args(NoteKind)
+SEVERITIES: tuple[Severity, ...] = get_args(Severity)
+
+
+def record_note(
+    study: StudyPaths,
+    protocol: Protocol,
+    text: str,
+    *,
+    who: str,
+    kind: NoteKind = "note",
+    rater: str | None = None,
+    session: str | None = None,
+    severity: Severity | None = None,
+    action: str | None = None,
+    outcome: str | None = None,
+    now: Callable[[], datetime] = utc_now,
+) -> None:
+    """Record a note, a deviation from the protocol, or an adverse event.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+    text : str
+        What happened.
+    who : str
+        Who says so.
+    kind : {"note", "adverse-event", "deviation"}, optional
+        What it is.
+    rater, session : str, optional
+        To whom and in which session it happened; to the study as a whole unless given.
+    severity : {"mild", "moderate", "severe"}, optional
+        Of an adverse event alone, as `action` and `outcome`.
+    action, outcome : str, optional
+        What was done, and what came of it.
+    now : callable, optional
+        Gives the time of day, aware.
+
+    Raises
+    ------
+    ParameterError
+        If a text is blank, `kind` or `severity` is unknown, the protocol has no such
+        rater or session, or something of an adverse event is said of anything else.
+    SessionLogError
+        If the log of the study's conduct is damaged.
+    OSError
+        If it cannot be written.
+    """
+    check_choice("kind", kind, NOTE_KINDS)
+    if rater is not None:
+        check_rater(protocol, rater)
+    if session is not None:
+        check_choice("session", session, [each.id for each in protocol.sessions])
+    details = {"severity": severity, "action": action, "outcome": outcome}
+    for name, detail in details.items():
+        if detail is not None and kind != "adverse-event":
+            raise ParameterError(
+                f"{name}: needed with kind 'adverse-event' only, got it with {kind!r}"
+            )
+    if severity is not None:
+        check_choice("severity", severity, SEVERITIES)
+    facts = {name: detail for name, detail in details.items() if detail is not None}
+    fields: dict[str, _Fact] = {
+        "kind": kind,
+        **stated(text=text, who=who),
+        "rater": rater,
+        "session": session,
+        **details,
+        **stated(**facts),
+    }
+    append_event(study, protocol, "noted", fields, now=now)
+
+
+def rater_values(
+    study: StudyPaths, protocol: Protocol
+) -> dict[str, dict[str, FieldValue | None]]:
+    """Return what the fields of a study's raters hold.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+
+    Returns
+    -------
+    dict of str to dict
+        By rater and field, every one of them: text (a date too), a number, or None
+        where nothing is known. What was recorded last goes before the protocol.
+
+    Raises
+    ------
+    SessionLogError
+        If the log of the study's conduct is damaged, or what it says last of a rater is
+        not what the field holds by the protocol.
+    """
+    fields = protocol.rater_fields
+    latest = {
+        (event.fields["rater"], event.fields["field"]): event.fields["value"]
+        for event in read_conduct(study)
+        if event.kind == "rater-set"
+    }
+    values: dict[str, dict[str, FieldValue | None]] = {}
+    for rater in protocol.raters:
+        of_rater = values[rater.id] = dict.fromkeys(fields)
+        for name, field in fields.items():
+            value = latest.get((rater.id, name), rater.fields.get(name))
+            of_rater[name] = None if value is None else field_value(field, value)
+            if value is not None and of_rater[name] is None:
+                raise SessionLogError(
+                    f"{study.conduct_file}: {name} of {rater.id}: needed "
+                    f"{needed_of(field)}, as the protocol has it now, got {value!r}; "
+                    "masrel rater set records another"
+                )
+    return values
+
+
+def record_rater_values(
+    study: StudyPaths,
+    protocol: Protocol,
+    rater: str,
+    values: Mapping[str, str],
+    *,
+    who: str,
+    now: Callable[[], datetime] = utc_now,
+) -> None:
+    """Record what is known of a rater; what was recorded before stays in the log.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol, which declares the fields.
+    rater : str
+        Of whom.
+    values : mapping of str to str
+        Field to value, as text; an empty text stands for nothing known.
+    who : str
+        Who says so.
+    now : callable, optional
+        Gives the time of day, aware.
+
+    Raises
+    ------
+    ParameterError
+        If the protocol has no such rater or field, a value is not of the field's type,
+        or `who` is blank. Nothing is recorded then.
+    SessionLogError
+        If the log of the study's conduct is damaged.
+    OSError
+        If it cannot be written.
+    """
+    check_rater(protocol, rater)
+    checked = {
+        name: _checked_value(study, protocol.rater_fields, name, text)
+        for name, text in values.items()
+    }
+    by = stated(who=who)
+    for name, value in checked.items():
+        fields = {"rater": rater, "field": name, "value": value, **by}
+        append_event(study, protocol, "rater-set", fields, now=now)
+
+
+def _checked_value(
+    study: StudyPaths, fields: Mapping[str, RaterField], name: str, text: str
+) -> FieldValue | None:
+    if name not in fields:
+        known = listed(fields) if fields else "there is none"
+        raise ParameterError(
+            f"field: needed one of [rater_fields] of {study.protocol} ({known}), got "
+            f"{name!r}"
+        )
+    value = parsed_value(fields[name], text)
+    if value is None and text.strip():
+        raise ParameterError(f"{name}: needed {needed_of(fields[name])}, got {text!r}")
+    return value
+
+
+Standing = Literal["withdrawn", "excluded", "included"]
+"""What is recorded of a rater: who has left, or is left out of the analysis, or not."""
+
+
+def record_standing(
+    study: StudyPaths,
+    protocol: Protocol,
+    rater: str,
+    standing: Standing,
+    *,
+    who: str,
+    why: str,
+    now: Callable[[], datetime] = utc_now,
+) -> None:
+    """Record that a rater has left, or is excluded, or included again.
+
+    The grades of the rater stay in the study, and the protocol goes on having him or
+    her. Those of a rater who was withdrawn are counted, and no session goes on; those
+    of one who is excluded enter no number.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+    rater : str
+        Who.
+    standing : {"withdrawn", "excluded", "included"}
+        What is recorded; who was excluded is included again.
+    who, why : str
+        Who says so, and for what reason.
+    now : callable, optional
+        Gives the time of day, aware.
+
+    Raises
+    ------
+    ParameterError
+        If the protocol has no such rater, `standing` is unknown or what he or she has
+        already, or `who` or `why` is blank.
+    SessionLogError
+        If the log of the study's conduct is damaged.
+    OSError
+        If it cannot be written.
+    """
+    check_rater(protocol, rater)
+    check_choice("standing", standing, get_args(Standing))
+    is_excluded = rater in excluded_raters(study)
+    if standing == "withdrawn":
+        refuse_withdrawn(study, rater)
+    elif standing == "excluded" and is_excluded:
+        raise ParameterError(
+            f"rater: needed one who is not excluded, {rater} is; masrel rater include "
+            "takes it back"
+        )
+    elif standing == "included" and not is_excluded:
+        raise ParameterError(f"rater: needed one who is excluded, {rater} is not")
+    fields = {"rater": rater, **stated(who=who, why=why)}
+    append_event(study, protocol, standing, fields, now=now)
+
+
+def excluded_raters(study: StudyPaths) -> tuple[str, ...]:
+    """Return the raters who are excluded from the analysis of a study.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+
+    Returns
+    -------
+    tuple of str
+        In the order in which they were excluded; those included again are not there.
+
+    Raises
+    ------
+    SessionLogError
+        If the log of the study's conduct is damaged.
+    """
+    excluded: dict[str, None] = {}
+    for event in read_conduct(study):
+        if event.kind == "excluded":
+            excluded[str(event.fields["rater"])] = None
+        elif event.kind == "included":
+            excluded.pop(str(event.fields["rater"]), None)
+    return tuple(excluded)
+
+
+def refuse_withdrawn(study: StudyPaths, rater: str) -> None:
+    """Refuse a rater who has left the study."""
+    for event in read_conduct(study):
+        if event.kind == "withdrawn" and event.fields["rater"] == rater:
+            raise ParameterError(
+                f"rater: needed one who takes part, {rater} was withdrawn on "
+                f"{event.time_utc[:10]} by {event.fields['who']}: "
+                f"{event.fields['why']}"
+            )
+
+
+def record_unblinding(
+    study: StudyPaths,
+    protocol: Protocol,
+    code: str | None,
+    *,
+    who: str,
+    why: str,
+    rater: str | None = None,
+    session: str | None = None,
+    now: Callable[[], datetime] = utc_now,
+) -> tuple[tuple[Schedule, Presentation], ...]:
+    """Record that somebody learns which model a code stands for, and return it.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+    code : str or None
+        A code of a schedule; None for all of them.
+    who, why : str
+        Who is to know, and for what reason.
+    rater, session : str, optional
+        Whose schedules alone; where two sheets have one code, one has to be named.
+    now : callable, optional
+        Gives the time of day, aware.
+
+    Returns
+    -------
+    tuple of (Schedule, Presentation)
+        Every presentation that is unblinded; the event is on disk by then.
+
+    Raises
+    ------
+    ParameterError
+        If `who` or `why` is blank.
+    ScheduleError
+        If no drawn schedule has the code, several have it, or one is damaged.
+    SessionLogError
+        If the log of the study's conduct is damaged.
+    OSError
+        If it cannot be written.
+    """
+    reasons = stated(who=who, why=why)
+    revealed = tuple(
+        (schedule, shown)
+        for schedule in _schedules(study, protocol, rater, session)
+        for shown in schedule.presentations
+        if code in (None, shown.code)
+    )
+    if not revealed:
+        raise ScheduleError(
+            f"code: needed one of a drawn schedule in {study.schedules}, got "
+            f"{'none' if code is None else repr(code)}"
+        )
+    if code is not None and len(revealed) > 1:
+        places = " and ".join(f"{s.rater} in session {s.session}" for s, _ in revealed)
+        raise ScheduleError(
+            f"code: needed one of a single sheet, {code} is on those of {places}: say "
+            "which with --rater and --session"
+        )
+    where: dict[str, _Fact] = {"rater": rater, "session": session, "code": code}
+    if code is not None:
+        ((schedule, _),) = revealed
+        where |= {"rater": schedule.rater, "session": schedule.session}
+    append_event(study, protocol, "unblinded", {**where, **reasons}, now=now)
+    return revealed
+
+
+def _schedules(
+    study: StudyPaths, protocol: Protocol, rater: str | None, session: str | None
+) -> Iterator[Schedule]:
+    for each in protocol.sessions:
+        for of_rater in each.raters:
+            file = study.schedule_file(of_rater, each.id)
+            is_meant = rater in (None, of_rater) and session in (None, each.id)
+            if is_meant and file.exists():
+                yield read_schedule(file)

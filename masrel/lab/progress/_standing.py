@@ -1,0 +1,444 @@
+"""Where sessions and raters of a study stand, by its logs, and what comes next."""
+
+import csv
+import io
+import shlex
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from operator import itemgetter
+from pathlib import Path
+from typing import Literal
+
+from masrel._files import safe_cell
+from masrel.errors import ScheduleError, SessionLogError
+from masrel.lab._event_log import Event, events_before_torn
+from masrel.lab.conduct import excluded_raters, rater_values, read_conduct
+from masrel.lab.protocol import Protocol, StudyPaths, protocol_hash
+from masrel.lab.protocol._rater_fields import FieldValue
+from masrel.lab.run._state import SessionState, read_session, replay
+from masrel.lab.schedule import read_schedule, site_of_copy
+from masrel.lab.schedule._sites import site_of
+
+SessionStage = Literal["not drawn", "drawn", "begun", "complete", "unreadable"]
+"""How far a session came."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SessionProgress:
+    """Where one rater's session stands. No model is named.
+
+    Attributes
+    ----------
+    session, rater : str
+        Whose session.
+    stage : {"not drawn", "drawn", "begun", "complete", "unreadable"}
+        How far it came.
+    n_presentations : int
+        Presentations that the protocol has for a session.
+    n_graded, n_skipped, n_faults, n_corrections : int
+        Of them those with a grade and those left without one; presentations that a
+        fault stopped; corrections.
+    n_practised, n_breaks, n_answers : int
+        Practice presentations, breaks, and answers to questionnaires.
+    last_event, last_time_utc : str or None
+        What happened last in it, and when; None before it has begun.
+    grades_from : str or None
+        Where its grades come from, the last of them where it went on with another
+        source; None before it has begun.
+    simulated : bool
+        Whether grades or device are simulated.
+    problem : str or None
+        Why its log cannot be read, or None.
+    """
+
+    session: str
+    rater: str
+    stage: SessionStage
+    n_presentations: int
+    n_graded: int = 0
+    n_skipped: int = 0
+    n_faults: int = 0
+    n_corrections: int = 0
+    n_practised: int = 0
+    n_breaks: int = 0
+    n_answers: int = 0
+    last_event: str | None = None
+    last_time_utc: str | None = None
+    grades_from: str | None = None
+    simulated: bool = False
+    problem: str | None = None
+
+
+def session_progress(
+    study: StudyPaths, protocol: Protocol
+) -> tuple[SessionProgress, ...]:
+    """Say where every session of a study stands.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+
+    Returns
+    -------
+    tuple of SessionProgress
+        Sessions and raters in the protocol's order; in the copy of a site, those of its
+        raters. Of a log that is damaged the stage is ``"unreadable"``.
+
+    Raises
+    ------
+    ScheduleError
+        If the file of the study's secret is damaged.
+    OSError
+        If a log that is there cannot be read.
+    """
+    site = site_of_copy(study)
+    return tuple(
+        _progress(study, protocol, rater, session.id)
+        for session in protocol.sessions
+        for rater in session.raters
+        if site in (None, site_of(protocol, rater))
+    )
+
+
+def _progress(
+    study: StudyPaths, protocol: Protocol, rater: str, session: str
+) -> SessionProgress:
+    n_presentations = len(protocol.models) * protocol.schedule.repeats
+    log = study.log_file(rater, session)
+    stage: SessionStage = "not drawn"
+    if study.schedule_file(rater, session).exists():
+        stage = "drawn"
+    events, state, problem = _events(log)
+    if problem is not None and not events:
+        stage = "unreadable"
+    if state.header:
+        stage = "complete" if state.is_complete else "begun"
+    counts = Counter(event.kind for event in events)
+    presented = [event for of_code in state.presented.values() for event in of_code]
+    return SessionProgress(
+        session=session,
+        rater=rater,
+        stage=stage,
+        n_presentations=n_presentations,
+        n_graded=len(state.grades),
+        n_skipped=len(state.skipped),
+        n_faults=sum(event.fields["fault"] is not None for event in presented),
+        n_corrections=counts["correction"],
+        n_practised=counts["practised"],
+        n_breaks=counts["break"],
+        n_answers=counts["answered"],
+        last_event=events[-1].kind if events else None,
+        last_time_utc=events[-1].time_utc if events else None,
+        grades_from=state.source,
+        simulated=bool(state.header.get("simulated"))
+        or any(event.fields["simulated"] for event in presented),
+        problem=problem,
+    )
+
+
+def _events(log: Path) -> tuple[tuple[Event, ...], SessionState, str | None]:
+    # what a log says, or why it cannot be read; of one whose last line a kill cut off,
+    # which masrel run takes out again, both
+    if not log.exists():
+        return (), SessionState(), None
+    try:
+        return *read_session(log), None
+    except SessionLogError as error:
+        problem = str(error)
+    try:
+        events = events_before_torn(log) or ()
+        return events, replay(log, events), problem
+    except SessionLogError:
+        return (), SessionState(), problem
+
+
+RaterStatus = Literal["planned", "begun", "complete", "withdrawn", "excluded"]
+"""What became of a rater; of two that hold the later one."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RaterProgress:
+    """What became of one rater, and what is known of him or her.
+
+    Attributes
+    ----------
+    rater : str
+        Who.
+    site : str or None
+        Where, if the protocol says so.
+    status : {"planned", "begun", "complete", "withdrawn", "excluded"}
+        Whether a session has begun, and all of them are complete; or whether the rater
+        has left, or is left out of the analysis.
+    is_late : bool
+        Whether the rater joined after the site's first draw of schedules;
+        ``docs/conduct.md`` says how that is known.
+    values : mapping of str to (str, int, float or None)
+        What every field of the protocol holds; None where nothing is known.
+    """
+
+    rater: str
+    site: str | None
+    status: RaterStatus
+    is_late: bool
+    values: Mapping[str, FieldValue | None] = field(hash=False)
+
+
+def rater_progress(
+    study: StudyPaths, protocol: Protocol, sessions: Sequence[SessionProgress]
+) -> tuple[RaterProgress, ...]:
+    """Say what became of every rater of a study.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+    sessions : sequence of SessionProgress
+        What `session_progress` returned.
+
+    Returns
+    -------
+    tuple of RaterProgress
+        In the protocol's order.
+
+    Raises
+    ------
+    SessionLogError
+        If the log of the study's conduct is damaged.
+    """
+    values, late = rater_values(study, protocol), _late_raters(study, protocol)
+    excluded = excluded_raters(study)
+    withdrawn = {
+        event.fields["rater"]
+        for event in read_conduct(study)
+        if event.kind == "withdrawn"
+    }
+    sites = {rater.id: rater.site for rater in protocol.raters}
+    stages: dict[str, set[str]] = {rater.id: set() for rater in protocol.raters}
+    for session in sessions:
+        stages[session.rater].add(session.stage)
+    return tuple(
+        RaterProgress(
+            rater=rater,
+            site=sites[rater],
+            status=(
+                "excluded"
+                if rater in excluded
+                else "withdrawn"
+                if rater in withdrawn
+                else _reached(of_rater)
+            ),
+            is_late=rater in late,
+            values=values[rater],
+        )
+        for rater, of_rater in stages.items()
+    )
+
+
+def _reached(stages: set[str]) -> RaterStatus:
+    if stages == {"complete"}:
+        return "complete"
+    return "begun" if stages & {"begun", "complete", "unreadable"} else "planned"
+
+
+def _late_raters(study: StudyPaths, protocol: Protocol) -> set[str]:
+    # A rater who joins is put into the protocol, whose hash the schedules carry that
+    # are drawn from then on.
+    drawn_from: dict[str, str] = {}
+    for session in protocol.sessions:
+        for rater in session.raters:
+            file = study.schedule_file(rater, session.id)
+            if rater not in drawn_from and file.exists():
+                try:
+                    drawn_from[rater] = read_schedule(file).protocol_sha256
+                except ScheduleError:
+                    continue  # masrel check says so
+    in_force = _protocols_in_force(study, protocol)
+    late = set()
+    for site in {rater.site for rater in protocol.raters}:
+        of_site = {rater.id for rater in protocol.raters if rater.site == site}
+        draws = {rater: drawn_from[rater] for rater in drawn_from if rater in of_site}
+        first = _first_draw(draws, [pair for pair in in_force if pair[0] in draws])
+        late |= {rater for rater, sha256 in draws.items() if sha256 != first}
+    return late
+
+
+def _protocols_in_force(study: StudyPaths, protocol: Protocol) -> list[tuple[str, str]]:
+    # raters, each with the hash of the protocol under which a session of theirs began,
+    # in order of time; then every rater with that of the protocol as it is now
+    begun: list[tuple[str, str, str]] = []
+    for session in protocol.sessions:
+        for rater in session.raters:
+            events, state, _ = _events(study.log_file(rater, session.id))
+            if "protocol_sha256" in state.header:
+                sha256 = str(state.header["protocol_sha256"])
+                begun.append((events[0].time_utc, rater, sha256))
+    begun.sort(key=itemgetter(0))
+    now = protocol_hash(protocol)
+    return [pair[1:] for pair in begun] + [(each.id, now) for each in protocol.raters]
+
+
+def _first_draw(
+    draws: Mapping[str, str], in_force: Sequence[tuple[str, str]]
+) -> str | None:
+    # the hash of the protocol from which the first schedules of a site were drawn
+    hashes = [sha256 for _, sha256 in in_force]
+
+    def is_later(sha256: str) -> bool:
+        # A schedule is drawn before its session begins: one of another protocol whose
+        # session began under this one, or earlier, was drawn before this one's.
+        return sha256 in hashes and any(
+            draws[rater] != sha256 and hashes.index(other) <= hashes.index(sha256)
+            for rater, other in in_force
+        )
+
+    # Of several that may be the first it is that of the rater who is named first.
+    return min(dict.fromkeys(draws.values()), key=is_later, default=None)
+
+
+def raters_csv(
+    raters: Sequence[RaterProgress], protocol: Protocol, *, simulated: bool
+) -> str:
+    """Return the table of raters as the text of its file, ``ratings/raters.csv``.
+
+    Parameters
+    ----------
+    raters : sequence of RaterProgress
+        What `rater_progress` returned.
+    protocol : Protocol
+        The study's protocol.
+    simulated : bool
+        Whether any of their sessions is simulated.
+
+    Returns
+    -------
+    str
+        One row a rater, with a column for every field; NA where nothing is known.
+    """
+    head = "# Raters, one row each, as they stand in the study; NA is not known.\n"
+    if simulated:
+        head = f"# SIMULATED: not sessions of persons on hardware.\n{head}"
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["rater", "site", "status", "late", *protocol.rater_fields])
+    for each in raters:
+        cells = [each.values[name] for name in protocol.rater_fields]
+        late = "yes" if each.is_late else "no"
+        known = [each.rater, _cell(each.site), each.status, late]
+        writer.writerow([*known, *map(_cell, cells)])
+    return f"{head}# format: 1\n{text.getvalue()}"
+
+
+def raters_text(study: StudyPaths, protocol: Protocol) -> str:
+    """Return the table of raters as protocol and logs have it now."""
+    sessions = session_progress(study, protocol)
+    raters = rater_progress(study, protocol, sessions)
+    simulated = any(session.simulated for session in sessions)
+    return raters_csv(raters, protocol, simulated=simulated)
+
+
+def _cell(value: FieldValue | None) -> str:
+    if value is None:
+        return "NA"
+    return safe_cell(value) if isinstance(value, str) else repr(value)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NextStep:
+    """What is to be done next.
+
+    Attributes
+    ----------
+    command : str
+        The command.
+    why : str
+        What it is for.
+    verb : str
+        The verb of the command: ``"run"``, say.
+    rater, session : str or None
+        Whose session the verb is about; None where it is about the study.
+    """
+
+    command: str
+    why: str
+    verb: str
+    rater: str | None = None
+    session: str | None = None
+
+
+def next_step(
+    study: StudyPaths,
+    sessions: Sequence[SessionProgress],
+    raters: Sequence[RaterProgress],
+) -> NextStep:
+    """Say what is to be done next in a study.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    sessions : sequence of SessionProgress
+        What `session_progress` returned.
+    raters : sequence of RaterProgress
+        What `rater_progress` returned.
+
+    Returns
+    -------
+    NextStep
+        A command: what is damaged first, then what has begun, then what has not, and
+        what is made of complete sessions.
+    """
+    root = shlex.quote(str(study.root))
+    absent = {r.rater for r in raters if r.status in ("withdrawn", "excluded")}
+    open_ = [s for s in sessions if s.stage != "complete" and s.rater not in absent]
+    by_stage = {session.stage: session for session in reversed(open_)}
+    if "unreadable" in by_stage:
+        session = by_stage["unreadable"]
+        why = f"the log of {session.rater} in session {session.session} is damaged"
+        return _of_study("verify", root, why)
+    if "not drawn" in by_stage and "begun" not in by_stage:
+        n_absent = sum(session.stage == "not drawn" for session in open_)
+        why = f"{n_absent} of {len(sessions)} schedules are not drawn"
+        return _of_study("schedule", root, why)
+    for stage in ("begun", "drawn"):
+        if stage in by_stage:
+            return _to_run(root, by_stage[stage])
+    return _to_make(study, root)
+
+
+def _of_study(verb: str, root: str, why: str) -> NextStep:
+    return NextStep(command=f"masrel {verb} {root}", why=why, verb=verb)
+
+
+def _to_run(root: str, session: SessionProgress) -> NextStep:
+    place = f"--rater {session.rater} --session {session.session}"
+    verb, command = "run", f"masrel run {root} {place}"
+    if session.grades_from == "paper":
+        verb, command = "enter", f"masrel enter {root} FILE {place} --who WHO"
+    return NextStep(
+        command=command,
+        why=f"{session.n_graded} of {session.n_presentations} graded",
+        verb=verb,
+        rater=session.rater,
+        session=session.session,
+    )
+
+
+def _to_make(study: StudyPaths, root: str) -> NextStep:
+    # of sessions that are complete: each output is made after what it is made of
+    logs = [*study.logs(), *study.conduct_logs()]
+    manifest = study.report / "manifest.json"
+    newest = max((log.stat().st_mtime_ns for log in logs), default=0)
+    for verb, file in (("ratings", study.ratings_file), ("report", manifest)):
+        made = file.stat().st_mtime_ns if file.exists() else -1
+        if made < newest:
+            why = f"all sessions are complete; {file.name} is "
+            why += "not there yet" if made < 0 else "older than the logs"
+            return _of_study(verb, root, why)
+    why = "all sessions are complete, and their report is written"
+    return _of_study("verify", root, why)
