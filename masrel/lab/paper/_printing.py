@@ -16,7 +16,7 @@ from masrel.lab.paper._form import (
     read_typed,
 )
 from masrel.lab.protocol import Protocol, Question, StudyPaths, scale_of
-from masrel.lab.run._around import practice_presentations
+from masrel.lab.run._rehearsal import practice_presentations
 from masrel.lab.run.console import _instruction
 from masrel.lab.schedule.sheets import _drawn_schedule
 from masrel.scales import published_scale

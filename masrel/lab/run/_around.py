@@ -1,9 +1,8 @@
-"""What a session has around presentations: practice, questions, days before it."""
+"""What a session has around its presentations: questions, and days before it."""
 
 import warnings
 from collections.abc import Callable, Container, Sequence
 from datetime import date, datetime
-from itertools import count
 
 from masrel.errors import MasrelWarning, ParameterError
 from masrel.lab._event_log import Event, read_log
@@ -16,19 +15,6 @@ from masrel.lab.run._grade_sources import (
     QuestionRequest,
 )
 from masrel.lab.schedule import Presentation
-
-
-def practice_presentations(protocol: Protocol) -> tuple[Presentation, ...]:
-    """Return what comes before the first presentation of a schedule."""
-    # A schedule's codes begin with digits; a code that is a model's id would name it.
-    ids = {model.id.upper() for model in protocol.models}
-    codes = (code for n in count(1) if (code := f"P{n}") not in ids)
-    return tuple(
-        Presentation(position=place, code=code, model=model, repeat=0)
-        for place, (model, code) in enumerate(
-            zip(protocol.occasions.practice, codes, strict=False), start=1
-        )
-    )
 
 
 def ask_questions(

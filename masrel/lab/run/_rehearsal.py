@@ -1,19 +1,33 @@
-"""Rehearsals of a session: in a folder of their own, and never among the ratings."""
+"""What is never among the ratings: practice, and rehearsals in folders of their own."""
 
 import dataclasses
 import hashlib
 import json
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 
 import msgspec
 
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
-from masrel.lab.schedule import Schedule
+from masrel.lab.schedule import Presentation, Schedule
 from masrel.lab.schedule._secret import StudySecret, find_secret, new_secret
 from masrel.lab.schedule.presentation import _draw_with_key
 
 _COMPLETE = b'{"event": "complete"'  # how the last line of a finished log begins
+
+
+def practice_presentations(protocol: Protocol) -> tuple[Presentation, ...]:
+    """Return what comes before the first presentation of a schedule."""
+    # A schedule's codes begin with digits; a code that is a model's id would name it.
+    ids = {model.id.upper() for model in protocol.models}
+    codes = (code for n in count(1) if (code := f"P{n}") not in ids)
+    return tuple(
+        Presentation(position=place, code=code, model=model, repeat=0)
+        for place, (model, code) in enumerate(
+            zip(protocol.occasions.practice, codes, strict=False), start=1
+        )
+    )
 
 
 @dataclass(frozen=True, slots=True)

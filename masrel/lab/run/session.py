@@ -31,7 +31,6 @@ from masrel.lab.run._around import (
     interval_fields,
     is_complete,
     last_time,
-    practice_presentations,
 )
 from masrel.lab.run._corrections import correct_in_session
 from masrel.lab.run._grade_sources import (
@@ -43,7 +42,11 @@ from masrel.lab.run._grade_sources import (
 )
 from masrel.lab.run._present import spool_of
 from masrel.lab.run._presenter import CLOCKS, ClockName, Presenter
-from masrel.lab.run._rehearsal import RehearsalPaths, begin_rehearsal
+from masrel.lab.run._rehearsal import (
+    RehearsalPaths,
+    begin_rehearsal,
+    practice_presentations,
+)
 from masrel.lab.run._settings import (
     check_backend,
     check_button,
