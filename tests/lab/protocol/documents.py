@@ -5,6 +5,11 @@ import json
 from pathlib import Path
 from typing import Any
 
+import pytest
+
+from masrel.errors import ProtocolError
+from masrel.lab.protocol import read_protocol
+
 VALID: dict[str, Any] = {
     "study": {"id": "pilot", "title": "A pilot"},
     "scale": {"name": "MAS", "grades": ["0", "1", "1+", "2"]},
@@ -96,3 +101,12 @@ def _inline(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     return repr(value)
+
+
+def problems_of(document: dict[str, Any], folder: Path) -> list[str]:
+    """The problems of a protocol, without the file they all start with."""
+    path = write(document, folder)
+    with pytest.raises(ProtocolError) as caught:
+        read_protocol(path)
+    assert all(text.startswith(f"{path}: ") for text in caught.value.problems)
+    return [text.removeprefix(f"{path}: ") for text in caught.value.problems]

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from masrel.errors import ParameterError, ProtocolError
+from masrel.errors import ParameterError
 from masrel.lab.elbow import MODELS, ElbowParameters
 from masrel.lab.elbow.tone import Contracture, LeadPipe
 from masrel.lab.protocol import (
@@ -17,7 +17,7 @@ from masrel.lab.protocol import (
     protocol_hash,
     read_protocol,
 )
-from tests.lab.protocol.documents import VALID, changed, write
+from tests.lab.protocol.documents import VALID, changed, problems_of, write
 
 KINDS = [kind for kind in MODELS if kind != ElbowParameters.kind]
 PAGE = Path(__file__).parents[3] / "docs" / "protocol.md"
@@ -29,13 +29,6 @@ def of_kind(kind: str, **parameters: object) -> dict[str, Any]:
     if parameters:
         model["parameters"] = parameters
     return changed("models", to=[*VALID["models"], model])
-
-
-def problems_of(document: dict[str, Any], folder: Path) -> list[str]:
-    path = write(document, folder)
-    with pytest.raises(ProtocolError) as caught:
-        read_protocol(path)
-    return [p.removeprefix(f"{path}: ") for p in caught.value.problems]
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -9,16 +9,13 @@ from hypothesis import strategies as st
 
 from masrel.errors import MasrelError, ProtocolError
 from masrel.lab.protocol import elbow_parameters, read_protocol
-from tests.lab.protocol.documents import VALID, changed, without, write
-
-
-def problems_of(document: dict[str, Any], folder: Path) -> list[str]:
-    """The problems of a protocol, without the file they all start with."""
-    path = write(document, folder)
-    with pytest.raises(ProtocolError) as caught:
-        read_protocol(path)
-    assert all(text.startswith(f"{path}: ") for text in caught.value.problems)
-    return [text.removeprefix(f"{path}: ") for text in caught.value.problems]
+from tests.lab.protocol.documents import (
+    VALID,
+    changed,
+    problems_of,
+    without,
+    write,
+)
 
 
 def test_the_valid_protocol_is_read_with_its_defaults(tmp_path: Path) -> None:

@@ -11,14 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from masrel import __version__
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.schedule import draw_schedule, schedule_problems, write_schedules
-from masrel.lab.schedule.sheets import _schedule_text as schedule_text
-from masrel.lab.schedule.sheets import _sheet_text as sheet_text
 
 BEFORE = Path(__file__).parent / "drawn_before_kinds"
 DRAWN = json.loads((BEFORE / "sha256.json").read_text(encoding="utf-8"))
+
+HEAD = ("study", "rater", "session", "seed", "scheme")
+HEAD += ("protocol_sha256", "presented_sha256")  # no file named its format then
 
 
 def drawn_then(paths: StudyPaths, name: str) -> Protocol:
@@ -29,13 +29,21 @@ def drawn_then(paths: StudyPaths, name: str) -> Protocol:
     for session in protocol.sessions:
         for rater in session.raters:
             drawn = draw_schedule(protocol, rater, session.id)
-            texts = {
-                paths.schedule_file(rater, session.id): schedule_text(drawn),
-                paths.sheet_file(rater, session.id): sheet_text(drawn),
-            }
-            for path, text in texts.items():  # no file named its format then
-                text = text.removeprefix("# format: 1\n")
-                path.write_text(text.replace(__version__, "0.1.0"))
+            head = [f"# {key}: {getattr(drawn, key)}" for key in HEAD]
+            shown = [
+                (s.position, s.code, s.model, s.repeat) for s in drawn.presentations
+            ]
+            schedule = [*head, "# masrel_version: 0.1.0", "position,code,model,repeat"]
+            schedule += [",".join(map(str, row)) for row in shown]
+            sheet = [
+                "position,code,grade",
+                *(f"{p},{code}," for p, code, _, _ in shown),
+            ]
+            for path, lines in (
+                (paths.schedule_file(rater, session.id), schedule),
+                (paths.sheet_file(rater, session.id), sheet),
+            ):
+                path.write_text("\n".join(lines) + "\n")
     return protocol
 
 
