@@ -1,18 +1,15 @@
 """A model file's numbers are in the protocol as if they stood there."""
 
 import copy
-import hashlib
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import pytest
 
 from masrel.errors import ProtocolError
 from masrel.lab.elbow.identification import as_toml, model_document
 from masrel.lab.elbow.parameters import STANDARD_MODELS
 from masrel.lab.protocol import (
-    PresentationRules,
     elbow_parameters,
     presented_hash,
     protocol_hash,
@@ -151,64 +148,6 @@ def test_numbers_in_a_file_and_in_the_protocol_are_presented_alike(
     }
     written = read_protocol(write(inline, tmp_path))
     assert presented_hash(written) == presented_hash(filed)
-
-
-def test_a_protocol_without_files_has_the_hash_it_had_before_there_were_any() -> None:
-    # Schedules drawn then must not turn stale: what is not used does not enter.
-    folder = Path(__file__).parents[3] / "studies"
-    protocol = msgspec.structs.replace(
-        read_protocol(folder / "hess2012" / "protocol.toml"),
-        presentation=PresentationRules(),  # as it was then
-        questionnaires=(),
-    )
-    content = msgspec.to_builtins(protocol)
-    for model in content["models"]:
-        assert model.pop("file") is None
-        assert model.pop("simulated") is False
-        assert set(model.pop("constants").values()) == {None}
-        assert model.pop("kind") == "spastic-elbow"
-        assert model.pop("parameters") == {}
-    assert all(rater.pop("fields") == {} for rater in content["raters"])
-    assert content.pop("rater_fields") == {}
-    assert content["report"].pop("gates") == ()
-    assert content["report"].pop("formats") == ("html", "markdown")
-    assert content["stretch"].pop("largest_speed_deg_s") == 131.0
-    assert content.pop("presentation")["stretches"] == 1
-    assert content.pop("occasions")["resume"] == "always"
-    assert content.pop("questionnaires") == ()
-    for session in content["sessions"]:
-        for key in ("after", "at_least_days", "at_most_days"):
-            assert session.pop(key) is None
-        assert session.pop("order_policy") == "refuse"
-    for rater in content["raters"]:
-        assert rater.pop("site") is None
-    assert content["schedule"].pop("blocks_by") == "repeat"
-    assert content["schedule"].pop("standards_apart") is False
-    assert content["schedule"].pop("max_same_grade") is None
-    assert content["schedule"].pop("strata") == "none"
-    assert content.pop("training")["order"] == "blocked"
-    assert content["simulated_raters"].pop("hold_s") == 0.0
-    assert content["simulated_raters"].pop("hand") == "clamp"
-    assert content["elbow"].pop("rest_angle_deg") is None
-    assert content["elbow"].pop("residual_reading") == "residual"
-    assert content["elbow"].pop("catch_rise_s") == 0.0
-    assert content["device"].pop("active_torque_limit_nm") == 10.0
-    assert content["device"].pop("active_energy_limit_j") == 1.0
-    assert content["device"].pop("active_speed_limit_deg_s") == 180.0
-    assert content["device"].pop("end_ramp_ms") == 100.0
-    assert content["device"].pop("drift_limit_deg") == 3.0
-    assert content["device"].pop("drift_speed_deg_s") == 25.0
-    assert content["device"].pop("encoder_noise_deg") == 0.0
-    assert content["device"].pop("arrival_deg") == 3.0
-    assert content["device"].pop("arrival_speed_deg_s") == 5.0
-    assert content["device"].pop("arrival_ms") == 100.0
-    assert content["device"].pop("post_catch_ramp_ms") == 100.0
-    assert content["device"].pop("loose_inertia_kg_m2") == 0.06
-    assert content["device"].pop("torque_sensor") is False
-    assert content["analysis"].pop("sample_sizes") == ()
-    assert content["study"].pop("language") == "en"
-    canonical = msgspec.json.encode(content, order="sorted")
-    assert protocol_hash(protocol) == hashlib.sha256(canonical).hexdigest()
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import pytest
 
 import masrel
 from masrel.errors import ParameterError
-from masrel.lab.protocol import StudyPaths, copy_template, read_protocol, template_names
+from masrel.lab.protocol import copy_template, read_protocol, template_names
 
 STUDIES = Path(__file__).parents[3] / "studies"
 
@@ -103,19 +103,3 @@ def test_an_unknown_study_is_refused_with_those_there_are(
     with pytest.raises(ParameterError, match="needed one of hess2012, small"):
         copy_template(name, tmp_path / "new")
     assert not (tmp_path / "new").exists()
-
-
-def test_every_file_of_a_study_has_its_place() -> None:
-    study = StudyPaths(Path("s"))
-    assert study.protocol == Path("s/protocol.toml")
-    assert study.schedule_file("R1", "test") == Path("s/schedules/test_R1.csv")
-    assert study.sheet_file("R1", "test") == Path("s/schedules/test_R1_sheet.csv")
-    assert study.log_file("R1", "test") == Path("s/sessions/test_R1.jsonl")
-    recording = study.recording_file("R1", "test", "47K")
-    assert recording == Path("s/sessions/test_R1/47K.npz")
-    assert study.ratings_file == Path("s/ratings/ratings.csv")
-    assert study.published_file == Path("s/ratings/published.csv")
-    assert study.in_person_file == Path("s/ratings/in_person.csv")
-    assert study.secret_file == Path("s/.key/secret.txt")
-    assert study.published_secret_file == Path("s/published_secret.txt")
-    assert study.analysis_file == Path("s/analysis.json")

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from masrel.errors import ProtocolError, ScheduleError
+from masrel.errors import ScheduleError
 from masrel.lab.protocol import (
     Protocol,
     StudyPaths,
     presented_hash,
     protocol_hash,
-    read_protocol,
 )
 from masrel.lab.schedule import (
     check_schedule,
@@ -21,7 +20,7 @@ from masrel.lab.schedule import (
     schedule_problems,
     write_schedules,
 )
-from tests.lab.protocol.documents import VALID, changed, write
+from tests.lab.protocol.documents import VALID, changed, problems_of
 from tests.lab.schedule.studies import SECRET, protocol_of
 
 MODELS = tuple("ABCDEFGH")
@@ -210,47 +209,6 @@ def test_limits_are_kept_by_every_order(
     assert not all(is_kept(order(at_random, rater)) for rater in raters(40))
 
 
-@pytest.mark.slow  # that numbers are one to one with orders is tested for each
-@pytest.mark.parametrize(
-    ("rules", "n_orders", "limit"),
-    [
-        # chi-square with 29, 3 and 35 degrees of freedom: above with probability 1e-6
-        ({"models": ("A", "B", "C"), "scheme": "no-immediate-repeat"}, 30, 80.5),
-        (
-            {
-                "models": ("A", "B"),
-                "dummies": ("B",),
-                "repeats": 3,
-                "scheme": "restricted",
-                "standards_apart": True,
-            },
-            4,
-            30.7,
-        ),
-        (
-            {
-                "models": ("A", "B", "C"),
-                "grades": {"A": "1", "B": "1"},
-                "scheme": "restricted",
-                "max_same_grade": 2,
-            },
-            36,  # 6 patterns of the grade and none, times 6 orders of A A B B
-            90.0,
-        ),
-    ],
-)
-def test_every_admissible_order_is_equally_likely(
-    rules: dict[str, object], n_orders: int, limit: float
-) -> None:
-    protocol = protocol_of(**{"repeats": 2, **rules})
-    freq = Counter(
-        tuple(order(protocol, "R1", secret=number.to_bytes(16, "big")))
-        for number in range(100 * n_orders)
-    )
-    assert len(freq) == n_orders
-    assert sum((n - 100) ** 2 / 100 for n in freq.values()) < limit
-
-
 def test_orders_are_equally_likely_where_they_are_nearly_as_many_as_words() -> None:
     # 6 standards among 15 dummies, C(16, 6) 6! 15! orders, 2.4 times of which are 2^64:
     # if words beyond the second time were taken, 46 % would begin with a standard.
@@ -304,14 +262,6 @@ def test_limits_that_no_order_keeps_are_refused_at_the_draw() -> None:
         draw_schedule(protocol, "R1", "test", secret=SECRET)
 
 
-def problems(tmp_path: Path, document: dict[str, object]) -> list[str]:
-    path = write(document, tmp_path)
-    with pytest.raises(ProtocolError) as caught:
-        read_protocol(path)
-    assert all(text.startswith(f"{path}: ") for text in caught.value.problems)
-    return [text.removeprefix(f"{path}: ") for text in caught.value.problems]
-
-
 RESTRICTED = {"seed": 1, "scheme": "restricted"}
 
 
@@ -351,7 +301,7 @@ RESTRICTED = {"seed": 1, "scheme": "restricted"}
 def test_keys_that_do_not_go_together_are_refused_by_name(
     tmp_path: Path, rules: dict[str, object], sentence: str
 ) -> None:
-    first, *_ = problems(tmp_path, changed("schedule", to=rules))
+    first, *_ = problems_of(changed("schedule", to=rules), tmp_path)
     assert sentence in first
 
 
@@ -360,14 +310,12 @@ def of_models(
 ) -> dict[str, object]:
     """A document with models of a role and a grade, by id."""
     document = changed("schedule", to={"seed": 1, **rules})
-    first = VALID["models"][0]
+    first = VALID["models"][1]  # which has no grade
     document["models"] = [
-        {**first, "id": name, "role": role, "intended_grade": grade}
+        {**first, "id": name, "role": role}
+        | ({} if grade is None else {"intended_grade": grade})
         for name, role, grade in models
     ]
-    for model in document["models"]:
-        if model["intended_grade"] is None:
-            del model["intended_grade"]
     return document
 
 
@@ -408,7 +356,7 @@ def test_a_scheme_that_no_order_keeps_is_refused_with_the_reason(
     models: list[tuple[str, str, str | None]],
     sentence: str,
 ) -> None:
-    assert problems(tmp_path, of_models(rules, *models))[0] == sentence
+    assert problems_of(of_models(rules, *models), tmp_path)[0] == sentence
 
 
 def test_keys_at_their_defaults_are_what_protocols_always_had() -> None:
