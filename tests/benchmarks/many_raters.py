@@ -14,12 +14,11 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from masrel.lab._event_log import read_log
 from masrel.lab._once import read_once
 from masrel.lab.progress import next_step, rater_progress, session_progress
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.ratings import ratings_from_logs, study_remarks
-from masrel.lab.run import SimulatedGrades, run_session
+from masrel.lab.run import SimulatedGrades, read_log, run_session
 from masrel.lab.schedule import Schedule, read_schedule, write_schedules
 
 N_MODELS, N_REPEATS = 10, 5

@@ -249,7 +249,30 @@ def with_occasions(source: GradeSource, protocol: StudyProtocol) -> OccasionSour
     return cast(OccasionSource, source)
 
 
-class ScriptGrades:
+class Unattended:
+    """What is the same of sources of grades that nobody has to wait for."""
+
+    simulated: ClassVar[bool] = True
+
+    def make_ready(self, request: GradeRequest) -> None:
+        """Return at once."""
+
+    def present_again(self, request: GradeRequest, fault: str) -> bool:  # noqa: ARG002 - the interface's
+        """Return whether there were fewer faults in a row than `MAX_FAULTS`."""
+        return request.n_faults < MAX_FAULTS
+
+    def instruct(self, request: GradeRequest, text: str) -> None:
+        """Return at once."""
+
+    def take_break(self, request: GradeRequest, minutes: float) -> None:
+        """Return at once."""
+
+    def begins_anew(self, request: GradeRequest, days: int) -> bool:  # noqa: ARG002 - the interface's
+        """Return False: the session goes on."""
+        return False
+
+
+class ScriptGrades(Unattended):
     """Grades and answers fixed beforehand.
 
     Parameters
@@ -263,7 +286,6 @@ class ScriptGrades:
     """
 
     name: ClassVar[str] = "script"
-    simulated: ClassVar[bool] = True
 
     def __init__(
         self,
@@ -275,9 +297,6 @@ class ScriptGrades:
         self._grades = grades
         self._practice = practice
         self._answers = answers or {}
-
-    def make_ready(self, request: GradeRequest) -> None:
-        """Return at once."""
 
     def grade(self, request: GradeRequest) -> str | None:
         """Return the grade of the script.
@@ -309,20 +328,6 @@ class ScriptGrades:
             f"code {presentation.code}"
         )
 
-    def instruct(self, request: GradeRequest, text: str) -> None:
-        """Return at once."""
-
-    def take_break(self, request: GradeRequest, minutes: float) -> None:
-        """Return at once."""
-
     def answer(self, request: QuestionRequest) -> Answer:
         """Return the answer of the script; None where it has none."""
         return self._answers.get(f"{request.questionnaire.id}.{request.question.id}")
-
-    def begins_anew(self, request: GradeRequest, days: int) -> bool:  # noqa: ARG002 - the interface's
-        """Return False: a script goes on."""
-        return False
-
-    def present_again(self, request: GradeRequest, fault: str) -> bool:  # noqa: ARG002 - the interface's
-        """Return whether there were fewer faults in a row than `MAX_FAULTS`."""
-        return request.n_faults < MAX_FAULTS

@@ -13,12 +13,12 @@ from typing import ClassVar
 from masrel.errors import ParameterError, ProtocolError
 from masrel.lab.protocol import Model, Protocol, scale_of
 from masrel.lab.protocol._questions import Answer
-from masrel.lab.run._grade_sources import MAX_FAULTS, GradeRequest, QuestionRequest
+from masrel.lab.run._grade_sources import GradeRequest, QuestionRequest, Unattended
 
 _MOST_STRETCHES = 3  # of a simulated rater who may stretch as often as wanted
 
 
-class SimulatedGrades:
+class SimulatedGrades(Unattended):
     """Simulated raters as ``[simulated_raters]`` of a protocol describes them.
 
     A grade depends on seed, rater, session, model and repeat alone: not on the
@@ -41,7 +41,6 @@ class SimulatedGrades:
     """
 
     name: ClassVar[str] = "simulated"
-    simulated: ClassVar[bool] = True
 
     def __init__(self, protocol: Protocol) -> None:
         self._settings = protocol.simulated_raters
@@ -53,9 +52,6 @@ class SimulatedGrades:
         for session in protocol.sessions:
             for rater in session.raters:
                 self._first_session.setdefault(rater, session.id)
-
-    def make_ready(self, request: GradeRequest) -> None:
-        """Return at once."""
 
     def grade(self, request: GradeRequest) -> str | None:
         """Return the grade the simulated rater gives.
@@ -90,20 +86,6 @@ class SimulatedGrades:
         return self._fresh(
             request.rater, session, presentation.model, presentation.repeat
         )
-
-    def present_again(self, request: GradeRequest, fault: str) -> bool:  # noqa: ARG002 - the interface's
-        """Return whether there were fewer faults in a row than `MAX_FAULTS`."""
-        return request.n_faults < MAX_FAULTS
-
-    def instruct(self, request: GradeRequest, text: str) -> None:
-        """Return at once."""
-
-    def take_break(self, request: GradeRequest, minutes: float) -> None:
-        """Return at once."""
-
-    def begins_anew(self, request: GradeRequest, days: int) -> bool:  # noqa: ARG002 - the interface's
-        """Return False: a simulated rater goes on."""
-        return False
 
     def answer(self, request: QuestionRequest) -> Answer:
         """Return an answer that is drawn, each that is possible equally likely.

@@ -4,7 +4,7 @@ import math
 from typing import ClassVar
 
 from masrel.lab.protocol import Protocol
-from masrel.lab.run._grade_sources import MAX_FAULTS, GradeRequest
+from masrel.lab.run._grade_sources import GradeRequest, Unattended
 from masrel.lab.schedule._stream import Stream
 from masrel.lab.training._trainees import confusion
 
@@ -15,7 +15,7 @@ _FIRST_NOISE, _LAST_NOISE, _PRESENTATIONS = 1.2, 0.2, 12.0
 _N_WORDS = 2.0**64
 
 
-class SimulatedTrainee:
+class SimulatedTrainee(Unattended):
     """A trainee who confuses neighbouring grades less and less.
 
     The grade depends on the seed of ``[simulated_raters]``, the rater, the model and
@@ -28,7 +28,6 @@ class SimulatedTrainee:
     """
 
     name: ClassVar[str] = "simulated"
-    simulated: ClassVar[bool] = True
 
     def __init__(self, protocol: Protocol) -> None:
         self._seed = protocol.simulated_raters.seed
@@ -38,9 +37,6 @@ class SimulatedTrainee:
             for model in protocol.models
             if model.intended_grade is not None
         }
-
-    def make_ready(self, request: GradeRequest) -> None:
-        """Return at once."""
 
     def grade(self, request: GradeRequest) -> str | None:
         """Return the grade that the trainee gives.
@@ -64,7 +60,3 @@ class SimulatedTrainee:
         share = Stream(self._seed, *purpose).word() / _N_WORDS
         row = table[self._intended[shown.model]].cumsum()
         return self._grades[min(int((share >= row).sum()), n_grades - 1)]
-
-    def present_again(self, request: GradeRequest, fault: str) -> bool:  # noqa: ARG002 - the interface's
-        """Return whether there were fewer faults in a row than `MAX_FAULTS`."""
-        return request.n_faults < MAX_FAULTS

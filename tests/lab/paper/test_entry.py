@@ -20,7 +20,6 @@ from masrel.errors import (
     SessionLogError,
 )
 from masrel.lab.analysis import analyze
-from masrel.lab.conduct._study_log import study_answers
 from masrel.lab.paper import compare_sheet, enter_sheet, write_sheets
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.ratings import corrections_of, ratings_from_logs, read_study_data
@@ -213,7 +212,7 @@ def test_a_rater_is_asked_about_the_study_on_the_sheet_of_the_last_session(
     rows[-1][4] = "yes"
     file = typed(small, rows, name="b.csv")
     enter_sheet(study, protocol, file, "R1", "retest", who="MK")
-    assert study_answers(study) == {"R1": {("all", "again"): "yes"}}
+    assert answered(study) == [("R1", "all", "again", "yes")]
     assert verify_study(study).is_whole
     again = typed(small, [*rows, [""]], name="c.csv")
     assert compare_sheet(study, protocol, again, "R1", "retest", who="JL") == ()
@@ -498,7 +497,16 @@ def test_a_mutated_sheet_is_entered_whole_or_refused_in_words(
         n_entered += 1
         kinds = [event.kind for event in read_log(log)]
         assert kinds == ["session", *["entered", "answered"] * 3, "complete"], seed
-        assert study_answers(study)["R1"].keys() == {("end", "tired"), ("end", "words")}
+        assert {row[:3] for row in answered(study)} == {
+            ("R1", "end", "tired"),
+            ("R1", "end", "words"),
+        }
         log.unlink()
         study.conduct_file.unlink()
     assert len(seeds) / 20 < n_entered < len(seeds) / 2  # both are met
+
+
+def answered(study: StudyPaths) -> list[tuple[object, ...]]:
+    """Return what the log of conduct has of answers about the study."""
+    log = read_log(study.conduct_file)
+    return [tuple(e.fields.values()) for e in log if e.kind == "answered"]

@@ -1,5 +1,6 @@
 """Where a study stands follows from its logs, and no model is named."""
 
+import os
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -9,7 +10,6 @@ from click.testing import CliRunner
 
 from masrel.cli import cli
 from masrel.errors import ParameterError
-from masrel.lab._event_log import Event
 from masrel.lab.conduct import record_note, record_standing
 from masrel.lab.progress import (
     NextStep,
@@ -19,7 +19,7 @@ from masrel.lab.progress import (
     session_progress,
 )
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
-from masrel.lab.run import ScriptGrades, _state, record_correction, run_session
+from masrel.lab.run import ScriptGrades, record_correction, run_session
 from masrel.lab.schedule import read_schedule, write_schedules
 
 Small = tuple[StudyPaths, Protocol]
@@ -210,13 +210,14 @@ def test_every_log_is_read_once(
     for name in names:
         run(small, name)
     reads: list[Path] = []
-    original = _state.read_log
+    opened = os.open
 
-    def counted(path: Path) -> tuple[Event, ...]:
-        reads.append(path)
-        return original(path)
+    def counted(path: str, *options: object, **others: object) -> int:
+        if str(path).endswith(".jsonl"):
+            reads.append(Path(path))
+        return opened(path, *options, **others)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(_state, "read_log", counted)
+    monkeypatch.setattr(os, "open", counted)
     call("status", small[0].root)
     assert len(reads) == len(set(reads)) == n_raters
     reads.clear()

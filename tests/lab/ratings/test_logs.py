@@ -19,7 +19,6 @@ from masrel.lab.run import (
     record_correction,
     run_session,
 )
-from masrel.lab.run._state import _LATER, EVENTS
 from masrel.lab.schedule import read_schedule
 from tests.lab.run.conftest import new_study, small
 
@@ -108,8 +107,10 @@ def test_the_speed_is_that_of_the_presentation_before_the_grade(
     path = study.log_file("R1", "test")
     with SessionLog.open(path) as log:
         # an event of format 1, when every presentation was one stretch
-        names = set(EVENTS["presented"]).difference(*_LATER["presented"])
-        presented = {name: log.events[-1].fields[name] for name in names}
+        later = "facts_sha256 stretches ended n_stretches felt r1_deg r2_deg grip_lost"
+        presented = dict(log.events[-1].fields)
+        for name in later.split():
+            del presented[name]
         presented |= {"attempt": 2, "mean_speed_deg_s": 12.5}
         log.append("presented", presented)
         code = presented["code"]

@@ -16,9 +16,9 @@ from masrel.lab.ratings import (
     read_study_ratings,
     write_ratings,
 )
-from masrel.lab.run._state import FELT
 from masrel.scales import MODIFIED_ASHWORTH
 
+FELT = ["felt", "below-threshold", "no-catch", None]
 ROW = {"rater": "R1", "model": "HM1", "grade": "1+"}
 
 SPEEDS = st.floats(0, 1e6) | st.just(float("nan"))
@@ -28,7 +28,7 @@ SPEEDS = st.floats(0, 1e6) | st.just(float("nan"))
 def stretches(draw: st.DrawFn) -> dict[str, object]:
     """What a row may say of its stretches, or nothing."""
     n = draw(st.none() | st.integers(0, 4))
-    row: dict[str, object] = {"felt": draw(st.sampled_from([*FELT, None]))}
+    row: dict[str, object] = {"felt": draw(st.sampled_from(FELT))}
     if n is not None:
         row |= {"n_stretches": n, "min_speed_deg_s": draw(SPEEDS)}
         speeds = st.floats(0, 1e6) | st.none()

@@ -4,12 +4,11 @@ import asyncio
 import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from masrel.lab.conduct import allot_schedules
 from masrel.lab.protocol import StudyPaths, copy_template, read_protocol
 from masrel.lab.run import read_log
-from masrel.lab.run._presenter import ClockName
 from masrel.lab.serve._desk import Desk
 
 PATIENCE_S = 60.0
@@ -105,7 +104,7 @@ class Page:
 def at(
     study: StudyPaths,
     act: Callable[[Desk], Awaitable[None]],
-    clock: ClockName = "simulated",
+    clock: Literal["real", "simulated"] = "simulated",
 ) -> None:
     """Run something at the desk of a study."""
 

@@ -5,13 +5,12 @@ import json
 import re
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
-from typing import Any
+from typing import Any, Literal
 
 import httpx
 from starlette.types import Message
 
 from masrel.lab.protocol import StudyPaths
-from masrel.lab.run._presenter import ClockName
 from masrel.lab.serve._access import Access, Role
 from masrel.lab.serve._app import make_app
 from masrel.lab.serve._desk import Desk
@@ -143,7 +142,7 @@ def with_tablets(
     study: StudyPaths,
     act: Callable[..., Awaitable[None]],
     *raters: str | None,
-    clock: ClockName = "simulated",
+    clock: Literal["real", "simulated"] = "simulated",
     coordinated: bool = False,
 ) -> None:
     """Run something with a desk, and tablets of these raters that are open.

@@ -5,7 +5,7 @@ import json
 import re
 import tomllib
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import Any, Literal, get_args, get_type_hints
 
 import pytest
 
@@ -14,7 +14,6 @@ from masrel.errors import MasrelError
 from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.protocol.definition import Study
 from masrel.lab.run import read_log
-from masrel.lab.run._presenter import ClockName
 from masrel.lab.serve._desk import Desk
 from masrel.lab.serve._words import words_in
 from masrel.scales import PUBLISHED_SCALES
@@ -83,7 +82,7 @@ SECRETS = (
     "clock", ["simulated", pytest.param("real", marks=pytest.mark.slow)]
 )
 def test_nothing_that_a_tablet_is_sent_says_what_is_presented(
-    tmp_path: Path, clock: ClockName
+    tmp_path: Path, clock: Literal["real", "simulated"]
 ) -> None:
     study = small_study(tmp_path / "study", OCCASIONS, quick=True)
     tablets: list[Tablet] = []

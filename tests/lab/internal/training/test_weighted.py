@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from masrel.lab._event_log import read_log
 from masrel.lab.protocol import StudyPaths, copy_template, read_protocol
+from masrel.lab.run import read_log
 from masrel.lab.training import SimulatedTrainee, train_rater
 from masrel.lab.training._lessons import record_of
 

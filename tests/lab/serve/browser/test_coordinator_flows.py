@@ -7,8 +7,8 @@ from statistics import quantiles
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from masrel.lab._event_log import read_log
 from masrel.lab.protocol import read_protocol
+from masrel.lab.run import read_log
 from tests.lab.serve.browser.stages import Stage
 from tests.lab.serve.browser.test_rater_flows import tab_to
 from tests.lab.serve.browser.visitors import LOST, Coordinator, Rater
