@@ -240,7 +240,7 @@ def _items_table(seen: PartSeen) -> Table | None:
         counts = [(codes.count(code), grade) for code, grade in enumerate(grades)]
         text = ", ".join(f"{grade} ×{n}" for n, grade in counts if n)
         if is_named:  # in the order of the raters
-            text = " · ".join(grades[code] if code >= 0 else ABSENT for code in codes)
+            text = ", ".join(grades[code] if code >= 0 else ABSENT for code in codes)
         rows.append(
             {
                 "item": seen.items[place],

@@ -132,7 +132,7 @@ def test_items_to_discuss_begin_with_those_furthest_apart() -> None:
     table = next(at for at in range(5) if page.heads(at)[0] == "Item")
     first = page.rows(table)[0]
     assert first[0] == "far 3"
-    assert first[2] == "1 · 5 · 3 · 5"
+    assert first[2] == "1, 5, 3, 5"
     disagreements = [float(row[1]) for row in page.rows(table)]
     assert disagreements == sorted(disagreements, reverse=True)
 
