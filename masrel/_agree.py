@@ -55,11 +55,14 @@ class Agreement:
         The estimates with what is said of each.
     estimating : Estimating
         What was estimated, and how.
+    reading : Reading
+        How it was read.
     """
 
     file: RatingsFile
     answer: Answer = field(compare=False)
     estimating: Questions
+    reading: Reading
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -125,7 +128,9 @@ class Agreement:
         """
         from masrel.pages._answer_page import answer_page
 
-        return answer_page(self.file, self.estimating, [self.answer])
+        return answer_page(
+            self.file, self.estimating, [self.answer], reading=self.reading.record()
+        )
 
     def plot(
         self, picture: str = "forest", *, group: str = "", ax: "Axes | None" = None
@@ -258,7 +263,7 @@ def agree(
     except MasrelError as error:
         error.add_note(_NAMES)
         raise
-    return Agreement(file=file, answer=answer, estimating=questions)
+    return Agreement(file=file, answer=answer, estimating=questions, reading=how)
 
 
 def _joined(

@@ -86,6 +86,10 @@ class OutputOptions:
                 f"{self.figure}",
             ),
             (
+                self.html is not None and self.html.suffix.lower() != ".html",
+                f"--html: needs a name that ends in .html, got {self.html}",
+            ),
+            (
                 self.raw_csv and self.csv is False,
                 "--raw-csv: needs --csv, whose table it is about",
             ),

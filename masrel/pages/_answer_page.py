@@ -5,6 +5,7 @@ its tables and pictures, items to discuss, methods to paste, and what repeats it
 """
 
 import math
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from masrel.analysis._file_estimates import Answer, Questions
+from masrel.errors import MasrelWarning
 from masrel.pages._methods_text import latent_methods, methods
 from masrel.pages._pictures import PICTURES, PartSeen, forest_drawing, parts_seen
 from masrel.pages._references import reference_texts
@@ -83,28 +85,27 @@ def answer_page(
     answers: Sequence[Answer],
     *,
     call: str = "",
+    reading: Mapping[str, object] | None = None,
     items: str = "items",
 ) -> str:
     """Return the page of answers; call: the command that repeats it."""
-    sections = [
-        _result_section(file, questions, answers, items),
-        *_picture_sections(file, questions, answers),
-    ]
+    # reading: the options of Python, where there is no command
+    # what is undefined is said in tables and pictures
+    with warnings.catch_warnings(action="ignore", category=MasrelWarning):
+        sections = [
+            _result_section(file, questions, answers, items),
+            *_picture_sections(file, questions, answers),
+        ]
     blocks = [block for section in sections for block in section.blocks]
     drawn = [block.name for block in blocks if isinstance(block, Drawing)]
     sections.append(_methods_section(file, questions, answers, drawn, items))
     _, sentence = result_sentence(answers, items)
-    options = {
-        name: value
-        for name, value in questions.record().items()
-        if value is not None and not isinstance(value, list)
-    }
-    listed = ", ".join(f"{name} {value}" for name, value in options.items())
-    of = f"coefficients {', '.join(questions.names)}, {listed}"
+    options = {**(reading or {}), **questions.record()}
+    listed = ", ".join(f"{name} {of}" for name, of in options.items() if of is not None)
     title = _TITLES.get(questions.command, "Agreement of the raters in")
     title += f" {Path(file.read['file']).name}"
-    how = {"Command": call} if call else {"Options": of}
-    return _page(file, title, sentence, sections, how)
+    how = {"Command": call} if call else {"Options": listed}
+    return _page(file, title, sentence, sections, how, items)
 
 
 def _page(
@@ -113,6 +114,7 @@ def _page(
     result: str,
     sections: Sequence[Section],
     inputs: Mapping[str, str],
+    items: str = "items",
 ) -> str:
     stamp = SIMULATED if file.simulated else ""
     # what repeats it: the command or else the options, and what it was made of
@@ -122,8 +124,8 @@ def _page(
         Document(
             title=title,
             tag=tag_of("simulated" if file.simulated else "foreign"),
-            banner=f"{stamp} – no person gave these grades" if stamp else "",
-            provenance=" ".join(what_was_read(file)),
+            banner=stamp,
+            provenance=" ".join(what_was_read(file, items)),
             result=result,
             sections=chapters(sections, partial(_block, stamp)),
             inputs=tuple((name, value) for name, value in known.items() if value),

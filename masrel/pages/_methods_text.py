@@ -1,15 +1,16 @@
 """How estimates were made, in sentences for a paper, written from what was computed."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from importlib.metadata import version
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from masrel.agreement import COEFFICIENTS
 from masrel.analysis._file_estimates import (
     AgreementRow,
     Answer,
     Questions,
+    Row,
 )
 from masrel.estimates import Interval, _population
 from masrel.pages._references import (
@@ -18,7 +19,7 @@ from masrel.pages._references import (
     interval_references,
 )
 from masrel.ratings import RatingsFile
-from masrel.tables._tables import counted, number, percent
+from masrel.tables._tables import counted, joined, number, percent
 
 if TYPE_CHECKING:
     from masrel.intervals import LatentTrait
@@ -38,18 +39,19 @@ def methods(
     used: list[str] = []
     by_name = {answer.name: answer for answer in answers}
     has_ends = questions.target is not None and not file.read.get("clusters")
-    names = {*by_name, *pictures}
-    also = [
-        name
-        for name, (_, _, is_of_ends) in _TEXTS.items()
-        if name.split(":")[0] in names and (has_ends or not is_of_ends)
-    ]
+    names = dict.fromkeys((*by_name, *pictures))
+    also = (
+        (text, by_name[name].shown or [] if name in by_name else [])
+        for name in names
+        for text in _TEXTS.get(name, ())
+        if has_ends or not text.is_of_ends
+    )
     units = "clusters" if file.read.get("clusters") else "items"
     texts = (
         _of_data(file, items),
-        _of_coefficients(rows, used),
-        *_of_intervals(rows, used, items),
-        *_of_tables(also, by_name, used, units),
+        _of_coefficients(rows, used, questions.metric),
+        *_of_intervals(rows, used, items, questions.metric),
+        *_of_tables(also, used, units),
         _SOFTWARE.format(*map(version, ("masrel", "numpy", "scipy"))),
     )
     return " ".join(filter(None, texts)), tuple(dict.fromkeys(used))
@@ -57,66 +59,78 @@ def methods(
 
 _SOFTWARE = "Numbers were computed with masrel {} (numpy {}, scipy {})."
 
-_SPECIFIC = (
-    "Agreement on a grade is specific agreement, the share of the ratings in it that "
-    "meets the same of another rater{}.",
-    ("cicchetti1990",),
-    False,
+
+class _Text(NamedTuple):
+    """A sentence on how something was made."""
+
+    text: str
+    keys: tuple[str, ...] = ()  # what it cites
+    is_of_ends: bool = False  # whether it is of intervals, which need a target
+
+
+_HOLM = _Text(
+    "The p-values of all pairs of groups are adjusted by Holm's method{}.",
+    ("holm1979",),
 )
-_CLOPPER = (
-    "Its intervals are Clopper and Pearson's at the effective number of items{}.",
-    ("korn1998",),
-    True,
-)
-_LIMITS = (
+_LIMITS = _Text(
     "Limits of agreement are the mean difference ± 1.96 standard deviations of "
     "differences; their intervals are exact for normal differences{}.",
     ("bland1999", "carkeet2015"),
-    False,
 )
-_WITHOUT = (
+_WITHOUT = _Text(
     "What each rater adds is how the coefficient changes without the rater; its "
     "interval is by a jackknife over items{}.",
     ("efron1981",),
-    True,
+    is_of_ends=True,
 )
-_TEXTS: dict[str, tuple[str, tuple[str, ...], bool]] = {
+_SPECIFIC = (
+    _Text(
+        "Agreement on a grade is specific agreement, the share of the ratings in it "
+        "that meets the same of another rater{}.",
+        ("cicchetti1990",),
+    ),
+    _Text(
+        "Its intervals are Clopper and Pearson's at the effective number of items{}.",
+        ("korn1998",),
+        is_of_ends=True,
+    ),
+)
+_TEXTS: dict[str, tuple[_Text, ...]] = {
     "symmetry": (
-        "Whether changes from one rater to the other balance was tested: {tests}{}.",
-        (),
-        False,
+        _Text(
+            "Whether changes from one rater to the other balance was tested: {tests}{}."
+        ),
     ),
     "indices": (
-        "Prevalence and bias are told by their indices, PABAK, the largest κ that the "
-        "margins allow, and agreement on each grade{}.",
-        ("byrt1993", "cicchetti1990"),
-        False,
+        _Text(
+            "Prevalence and bias are told by their indices, PABAK, the largest κ that "
+            "the margins allow, and agreement on each grade{}.",
+            ("byrt1993", "cicchetti1990"),
+        ),
     ),
-    "limits_of_agreement": _LIMITS,
-    "bland_altman": _LIMITS,
+    "limits_of_agreement": (_LIMITS,),
+    "bland_altman": (_LIMITS,),
     "differences": (
-        "Differences between groups have intervals and tests by a jackknife over "
-        "{units}, with Student's t{}.",
-        ("gwet2016", "efron1981"),
-        False,
+        _Text(
+            "Differences between groups have intervals and tests by a jackknife over "
+            "{units}, with Student's t{}.",
+            ("gwet2016", "efron1981"),
+        ),
+        _HOLM,
     ),
-    "equality": ("{tests} tests whether all groups agree as well{}.", (), False),
-    "diagnosis_raters": _WITHOUT,
-    "pairs": _WITHOUT,
+    "equality": (_Text("{tests} tests whether all groups agree as well{}."),),
+    "diagnosis_raters": (_WITHOUT,),
+    "pairs": (_WITHOUT,),
     "diagnosis_categories": _SPECIFIC,
-    "diagnosis_categories:ends": _CLOPPER,
     "categories": _SPECIFIC,
-    "categories:ends": _CLOPPER,
     "components": (
-        "Variances of items, raters and the rest are those of ICC(A,1){}.",
-        ("mcgraw1996",),
-        False,
+        _Text(
+            "Variances of items, raters and the rest are those of ICC(A,1){}.",
+            ("mcgraw1996",),
+        ),
     ),
 }
-"""Answers and pictures by name to how they were made, what that is cited for, and
-whether it is of intervals that are there with a target alone."""
-
-_HOLM = "The p-values of all pairs of groups are adjusted by Holm's method{}."
+"""Answers and pictures by name to how they were made."""
 
 _TESTS = {
     "McNemar, exact": "mcnemar1947",
@@ -129,19 +143,17 @@ _TESTS = {
 
 
 def _of_tables(
-    names: Iterable[str], answers: Mapping[str, Answer], used: list[str], units: str
+    texts: Iterable[tuple[_Text, Sequence[Row]]], used: list[str], units: str
 ) -> Iterator[str]:
+    # each with the rows of its table
     made: dict[str, None] = {}
-    for name in names:
-        text, keys, _ = _TEXTS[name]
-        rows = answers[name].shown or [] if name in answers else []
+    for text, rows in texts:
+        if text is _HOLM and len({row["group"] for row in rows}) < 2:
+            continue
         tests = list(dict.fromkeys(row["test"] for row in rows if "test" in row))
-        keys += tuple(_TESTS[test] for test in tests if test in _TESTS)
+        keys = (*text.keys, *(_TESTS[test] for test in tests if test in _TESTS))
         used += keys
-        made[text.format(cited(keys), units=units, tests=_joined(tests))] = None
-        if name == "differences" and len({row["group"] for row in rows}) > 1:
-            used.append("holm1979")
-            made[_HOLM.format(cited(["holm1979"]))] = None
+        made[text.text.format(cited(keys), units=units, tests=joined(tests))] = None
     yield from made
 
 
@@ -166,38 +178,43 @@ def _of_data(file: RatingsFile, items: str) -> str:
     return text
 
 
-def _of_coefficients(rows: Sequence[AgreementRow], used: list[str]) -> str:
+def _of_coefficients(
+    rows: Sequence[AgreementRow], used: list[str], metric: str | None
+) -> str:
     names: dict[str, None] = {}
     for row in rows:
         keys: tuple[str, ...] = ()
         if (name := row.estimate.coefficient) in COEFFICIENTS:
             keys = coefficient_references(name, row.estimate.weights)
         used += keys
-        names[_in_words(row) + cited(keys)] = None
-    return f"Agreement was estimated by {_joined(list(names))}." if names else ""
+        names[_in_words(row, metric) + cited(keys)] = None
+    return f"Agreement was estimated by {joined(list(names))}." if names else ""
 
 
-def _in_words(row: AgreementRow) -> str:
+def _in_words(row: AgreementRow, metric: str | None) -> str:
     # within a sentence, where only names of persons begin with a capital
-    entry = COEFFICIENTS.get(row.estimate.coefficient)
-    name = row.title
-    if entry is not None and name == f"{entry.title}, {row.estimate.weights}":
-        name = f"{entry.title} with {row.estimate.weights} weights"
-    return name.replace("Percent", "percent")
+    name, weights = row.estimate.coefficient, row.estimate.weights
+    entry = COEFFICIENTS.get(name)  # none of kappa of a category
+    if entry is None or (metric is not None and name == "krippendorff_alpha"):
+        return row.title
+    title = "percent agreement" if name == "percent_agreement" else entry.title
+    is_weighted = entry.weighted and weights != "identity"
+    return f"{title} with {weights} weights" if is_weighted else title
 
 
 def _of_intervals(
-    rows: Sequence[AgreementRow], used: list[str], items: str
+    rows: Sequence[AgreementRow], used: list[str], items: str, metric: str | None
 ) -> Iterator[str]:
     # one sentence for each kind of interval, with the coefficients that have it
     titles: dict[tuple[str, str, str, str], dict[str, None]] = {}
     for row in rows:
         interval = row.estimate.interval
         if interval is not None and not math.isnan(interval.low):
-            titles.setdefault(_kind(interval, items), {})[_in_words(row)] = None
+            of_kind = titles.setdefault(_kind(interval, items), {})
+            of_kind[_in_words(row, metric)] = None
             used += interval_references(interval)
     for (kind, to, method, references), of in titles.items():
-        which = "" if len(titles) == 1 else f" of {_joined(list(of))}"
+        which = "" if len(titles) == 1 else f" of {joined(list(of))}"
         yield f"The {kind}{which}, for {to} like these, are by {method}{references}."
 
 
@@ -209,11 +226,6 @@ def _kind(interval: Interval, items: str) -> tuple[str, str, str, str]:
         interval.method,
         cited(interval_references(interval)),
     )
-
-
-def _joined(names: Sequence[str]) -> str:
-    # a, b and c
-    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 
 
 def latent_methods(

@@ -25,6 +25,7 @@ from masrel.agreement import (
     limits_of_agreement,
     variance_components,
 )
+from masrel.agreement._codes import item_counts
 from masrel.agreement.krippendorff import _metric_weights
 from masrel.analysis._file_estimates import Answer, Questions, on_grades, parts_of
 from masrel.errors import MasrelError, MasrelWarning, ParameterError
@@ -73,10 +74,17 @@ class PartSeen:
         return list(self.part.raters or map(str, range(1, n_raters + 1)))
 
     @property
+    def is_measured(self) -> bool:
+        """Whether grades are measurements, or as many numbers."""
+        is_long = len(self.file.scale.grades) > _MOST_GRADES
+        doubted = any(of.code == "measurements" for of in self.file.warnings)
+        return self.file.is_ordered and (is_long or doubted)
+
+    @property
     def has_few_grades(self) -> bool:
         """Whether each grade has room in a picture, and is no measurement."""
-        measured = any(of.code == "measurements" for of in self.file.warnings)
-        return 2 <= len(self.file.scale.grades) <= _MOST_GRADES and not measured
+        n_grades = len(self.file.scale.grades)
+        return 2 <= n_grades <= _MOST_GRADES and not self.is_measured
 
     @property
     def has_intervals(self) -> bool:
@@ -104,15 +112,14 @@ class PartSeen:
         if self.coded is None or len(self.raters) > _MOST_RATERS:
             return None
         try:
-            with warnings.catch_warnings(action="ignore", category=MasrelWarning):
-                return diagnose(
-                    on_grades(self.coded, self.entry, self.file),
-                    coefficient=self.entry,
-                    target="items" if self.has_intervals else None,
-                    raters=self.raters,
-                    weights=self.questions.weights_of(self.entry),
-                    level=self.questions.level,
-                )
+            return diagnose(
+                on_grades(self.coded, self.entry, self.file),
+                coefficient=self.entry,
+                target="items" if self.has_intervals else None,
+                raters=self.raters,
+                weights=self.questions.weights_of(self.entry),
+                level=self.questions.level,
+            )
         except MasrelError:  # these ratings have none, of one item say
             return None
 
@@ -135,9 +142,8 @@ class PartSeen:
             self.part.items or self.coded is self.part.ratings
         ):
             return np.zeros(0)
-        with warnings.catch_warnings(action="ignore", category=MasrelWarning):
-            ratings = on_grades(self.coded, self.entry, self.file)
-            return item_disagreement(ratings, weights=self.distance)
+        ratings = on_grades(self.coded, self.entry, self.file)
+        return item_disagreement(ratings, weights=self.distance)
 
     @property
     def disputed(self) -> "NDArray[np.intp]":
@@ -268,10 +274,7 @@ def _grades(seen: PartSeen) -> Drawing | None:
     if seen.coded is None or not seen.has_few_grades or len(seen.raters) > _MOST_RATERS:
         return None
     grades = seen.file.scale.grades
-    codes = seen.coded.codes
-    counts = np.array(
-        [np.bincount(of[of >= 0], minlength=len(grades)) for of in codes.T]
-    )
+    counts = item_counts(seen.coded.codes.T, len(grades))
     return seen.drawing(
         "grades",
         f"{_GRADES}:grades_picture",
@@ -301,9 +304,7 @@ def _bland_altman(seen: PartSeen) -> Drawing | None:
             raters, result = dict(answer.figure)[seen.group]
             break
     else:
-        if seen.coded is None or seen.has_few_grades or len(seen.raters) != 2:
-            return None
-        if not seen.file.is_ordered:
+        if seen.coded is None or not seen.is_measured or len(seen.raters) != 2:
             return None
         raters = seen.raters
         result = limits_of_agreement(seen.coded, level=seen.questions.level)
@@ -389,7 +390,8 @@ def picture_of(
         parts = {seen.group: seen for seen in parts_seen(file, questions, answers)}
         if group:
             check_option("group", group, parts)
-        drawing = PICTURES[name][1](parts[group or next(iter(parts))])
+        with warnings.catch_warnings(action="ignore", category=MasrelWarning):
+            drawing = PICTURES[name][1](parts[group or next(iter(parts))])
     if drawing is None:
         raise ParameterError(f"picture: these ratings have no {name}; {_NEEDS[name]}")
     return drawing.content

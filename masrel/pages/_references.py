@@ -31,8 +31,8 @@ _SCALES = {
 def coefficient_references(coefficient: str, weights: str) -> tuple[str, ...]:
     """Return the keys of what a coefficient is cited for."""
     entry = COEFFICIENTS[coefficient]
-    is_of_kappa = entry.weighted and coefficient != "krippendorff_alpha"
-    is_of_kappa = is_of_kappa and weights != "identity"
+    is_alpha = coefficient == "krippendorff_alpha"
+    is_of_kappa = entry.weighted and weights != "identity" and not is_alpha
     keys = entry.references
     return (*keys, "cohen1968") if is_of_kappa else keys
 
@@ -66,16 +66,19 @@ def cited(keys: Iterable[str]) -> str:
     return f" ({names})" if names else ""
 
 
+@cache
+def _fields(key: str) -> dict[str, str]:
+    # of an entry, without the braces that keep capitals
+    fields = re.findall(r"^  (\w+) = \{(.*)\},?$", _entries()[key], re.M)
+    return {name: re.sub("[{}]", "", text) for name, text in fields}
+
+
 def _author_year(key: str) -> str:
-    entry = _entries()[key]
-    authors = re.search(r"author = \{(.*)\},", entry)
-    year = re.search(r"year = \{(\d+)\}", entry)
-    if authors is None or year is None:
-        raise KeyError(f"{_FILE.name}: {key} has no author or year")
-    surnames = [name.partition(",")[0] for name in authors[1].split(" and ")]
+    fields = _fields(key)
+    surnames = [name.partition(",")[0] for name in fields["author"].split(" and ")]
     if len(surnames) > 2 or surnames[-1] == "others":
-        return f"{surnames[0]} et al., {year[1]}"
-    return f"{' & '.join(surnames)}, {year[1]}"
+        return f"{surnames[0]} et al., {fields['year']}"
+    return f"{' & '.join(surnames)}, {fields['year']}"
 
 
 def reference_texts(keys: Iterable[str]) -> list[str]:
@@ -84,8 +87,7 @@ def reference_texts(keys: Iterable[str]) -> list[str]:
 
 
 def _reference_text(key: str) -> str:
-    fields = dict(re.findall(r"^  (\w+) = \{(.*)\},?$", _entries()[key], re.M))
-    fields = {name: re.sub("[{}]", "", text) for name, text in fields.items()}
+    fields = _fields(key)
     authors = "; ".join(fields["author"].split(" and ")).replace("; others", " et al.")
     where = fields.get("journal") or fields.get("booktitle") or fields["publisher"]
     number = f"({fields['number']})" if "number" in fields else ""

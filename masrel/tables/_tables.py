@@ -199,6 +199,11 @@ def counted(count: int, noun: str, plural: str = "") -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {plural or noun + 's'}"
 
 
+def joined(names: Sequence[str]) -> str:
+    """Return names as a sentence lists them: a, b and c."""
+    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
+
+
 def page_cells(table: Table) -> tuple[list[Column], list[list[str]]]:
     """Return the columns of a page or a screen, and its rows as shown in them."""
     places = [(i, c) for i, c in enumerate(table.columns) if c.where != "csv"]

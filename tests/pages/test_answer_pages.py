@@ -115,8 +115,20 @@ OF_GRADES = ["Use of each grade", "Agreement on each grade", "Ratings of "]
             {},
             [],
         ),
+        (
+            pd.DataFrame({"item": list("abcdef"), "A": [7] * 6, "B": [7] * 6}),
+            {},
+            [],
+        ),
     ],
-    ids=["raters", "two raters", "measured", "two who measured", "one grade"],
+    ids=[
+        "raters",
+        "two raters",
+        "measured",
+        "two who measured",
+        "one grade",
+        "one number",
+    ],
 )
 def test_pictures_are_those_that_the_ratings_have(
     data: pd.DataFrame, options: dict[str, object], captions: list[str]
@@ -270,6 +282,25 @@ def test_clusters_leave_intervals_of_single_items_out() -> None:
 def test_letters_that_no_font_has_are_text_on_a_page() -> None:
     page = page_of(ratings(3).rename(columns={"A": "김민지"}))
     assert len(re.findall(">김민지<", page.text)) > 2
+
+
+def test_a_page_made_in_python_says_its_options() -> None:
+    reading = Reading(missing_codes=("9",))
+    words = page_of(ratings(3), target="items", reading=reading).words
+    assert "missing_codes ['9']" in words
+    assert "target items" in words
+
+
+@pytest.mark.parametrize("name", ["-", "page.txt", "page"])
+def test_a_page_needs_a_name_that_says_what_it_is(
+    tmp_path: Path, masrel_command: Caller, name: str
+) -> None:
+    file = tmp_path / "wide.csv"
+    ratings(3).to_csv(file)
+    done = masrel_command("agree", file, "--html", name)
+    assert (done.code, done.out) == (2, "")
+    assert done.err == f"masrel: --html: needs a name that ends in .html, got {name}\n"
+    assert not Path(name).exists()
 
 
 def test_simulated_ratings_are_labelled_everywhere() -> None:

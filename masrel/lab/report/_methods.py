@@ -24,7 +24,7 @@ from masrel.pages._references import (
 )
 from masrel.pages._sections import Content, Listing, Paragraph, Section
 from masrel.scales import published_scale
-from masrel.tables._tables import counted, percent
+from masrel.tables._tables import counted, joined, percent
 
 
 def methods_section(material: Material) -> Section:
@@ -127,7 +127,7 @@ def _coefficients(planned: list[PlannedEstimate], used: list[str]) -> str:
         + _cite(coefficient_references(p.line.coefficient, p.line.weights), used): None
         for p in planned
     }
-    return _listing(list(names))
+    return joined(list(names))
 
 
 def _intervals(planned: list[PlannedEstimate], used: list[str]) -> Iterator[str]:
@@ -147,7 +147,7 @@ def _intervals(planned: list[PlannedEstimate], used: list[str]) -> Iterator[str]
         yield sentence(
             "methods",
             "interval",
-            estimates=_listing(lines[same]),
+            estimates=joined(lines[same]),
             level=percent(interval.level),
             kind=interval.kind,
             population=sentence("population", interval.target),
@@ -159,8 +159,3 @@ def _intervals(planned: list[PlannedEstimate], used: list[str]) -> Iterator[str]
 def _estimates(entry: PlannedEstimate) -> list[Estimate]:
     over_raters = [] if entry.estimate is None else [entry.estimate]
     return [*over_raters, *(rater.estimate for rater in entry.by_rater)]
-
-
-def _listing(names: list[str]) -> str:
-    # a, b and c
-    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))

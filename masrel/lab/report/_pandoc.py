@@ -61,15 +61,22 @@ def converted(
         for path, data in pictures.items():
             (folder / path).parent.mkdir(exist_ok=True)
             write_file(folder / path, data)
-        subprocess.run(
+        done = subprocess.run(
             [
-                *(_pandoc(), "--to", form, "--standalone"),
-                *("--shift-heading-level-by=-1", *_OPTIONS[form], "--output", str(out)),
+                *(_pandoc(), "--to", form, "--standalone", "--output", str(out)),
+                "--data-dir=.",  # templates of the user's change nothing
+                *("--shift-heading-level-by=-1", *_OPTIONS[form]),
             ],
             input=markdown.encode(),
             cwd=folder,
             env={**os.environ, "SOURCE_DATE_EPOCH": _FIRST_DAY},
-            check=True,
+            check=False,
             capture_output=True,
         )
+        if done.returncode:
+            why = " ".join(done.stderr.decode(errors="replace").split())
+            raise ParameterError(
+                f"{form}: needs a pandoc that makes it, 3.0 or newer; {_pandoc()} "
+                f"ended with: {why}"
+            )
         return out.read_bytes()

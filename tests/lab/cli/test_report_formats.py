@@ -15,6 +15,7 @@ import pytest
 
 import masrel
 from masrel.lab.protocol import copy_template
+from masrel.lab.report._pandoc import _pandoc
 from tests.cli.process import Caller
 
 SETPRIV = shutil.which("setpriv")
@@ -107,6 +108,34 @@ def test_without_pandoc_its_formats_are_refused_in_a_sentence(
         "'masrel[docx]'\n"
     )
     assert not (tmp_path / "out").exists()
+
+
+def test_a_pandoc_that_fails_is_said_in_a_sentence(
+    masrel: Caller, study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old = tmp_path / "pandoc"
+    old.write_text(
+        "#!/bin/sh\n[ $1 = --version ] && echo pandoc 1.9 || { echo no >&2; exit 6; }\n"
+    )
+    old.chmod(0o755)
+    monkeypatch.setenv("PYPANDOC_PANDOC", str(old))
+    _pandoc.cache_clear()
+    done = masrel("report", study, "-o", tmp_path / "out", "--format", "latex")
+    _pandoc.cache_clear()
+    assert done.code == 2
+    assert done.err.splitlines()[-1].endswith(f"3.0 or newer; {old} ended with: no")
+
+
+def test_templates_of_the_user_change_no_document(
+    study: Path, folder: Path, tmp_path: Path
+) -> None:
+    templates = tmp_path / "pandoc" / "templates"
+    templates.mkdir(parents=True)
+    (templates / "default.latex").write_text("mine")
+    variables = {"XDG_DATA_HOME": str(tmp_path)}
+    build(study, tmp_path / "other", variables, "--format", "latex")
+    same = (tmp_path / "other" / "report.tex").read_bytes()
+    assert same == (folder / "report.tex").read_bytes()
 
 
 def test_text_of_a_study_is_escaped_in_latex(folder: Path) -> None:
