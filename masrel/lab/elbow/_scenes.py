@@ -368,11 +368,11 @@ def _columns_of(items: Any, kind: type, rows: Rows) -> dict[str, Any]:
     # fields by name, each a column or one value for all
     which = _slice(rows) if len(items) > 1 else slice(None)
     if isinstance(items, Columns):
-        given = {
+        fields_of = {
             name: column[which] if isinstance(column, np.ndarray) else column
             for name, column in items.columns.items()
         }
-        return _DEFAULTS[kind] | given
+        return _DEFAULTS[kind] | fields_of
     if isinstance(which, np.ndarray):
         chosen = [items[i] for i in which.tolist()]
     else:

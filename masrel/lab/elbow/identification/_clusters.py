@@ -188,8 +188,8 @@ def left_out_steps(trials: Sequence[Rows]) -> _Floats:
         np.einsum("gri,grj->ij", x, x), rcond=1e-13, hermitian=True
     )
     matrix, sizes, _ = _outside(x, inverse)
-    told = sizes.min(axis=1) > 1e-10
+    determined = sizes.min(axis=1) > 1e-10
     steps = np.full((len(trials), x.shape[2]), np.nan)
-    errors = np.linalg.solve(matrix[told], y[told][..., None])[..., 0]
-    steps[told] = -np.einsum("gri,gr->gi", x[told], errors) @ inverse
+    errors = np.linalg.solve(matrix[determined], y[determined][..., None])[..., 0]
+    steps[determined] = -np.einsum("gri,gr->gi", x[determined], errors) @ inverse
     return steps

@@ -181,8 +181,8 @@ class Equations:
                 climbs[: self.n_pre] = False
         # a drift is that of the trial's own constant, in its middle, or of a known one
         middle = float(part.time.mean()) if n and self.known.offset is None else 0.0
-        own = np.column_stack([part.time - middle, np.ones(n), steps])
-        return _Design(np.column_stack([columns, own]), past, climbs)
+        of_trial = np.column_stack([part.time - middle, np.ones(n), steps])
+        return _Design(np.column_stack([columns, of_trial]), past, climbs)
 
     def _smooth(self, part: Part, lag: float) -> _Floats:
         # a sensor that lags by T reads x - T·x' + T²·x'' of what is smooth
@@ -453,7 +453,7 @@ def fit_together(
     def derivatives(_: _Floats) -> _Floats:
         return jacobian  # of the last residuals, which are those of this point
 
-    found = least_squares(
+    solution = least_squares(
         residuals,
         begin,
         jac=derivatives,
@@ -464,14 +464,14 @@ def fit_together(
         gtol=None,
         max_nfev=_EVALUATIONS,
     )
-    shared, local = found.x[:n], np.split(found.x[n:], cuts[:-1] - n)[1:]
+    shared, local = solution.x[:n], np.split(solution.x[n:], cuts[:-1] - n)[1:]
     left = [
         float(((e.part.measured - e.law(e.values(shared, own))) ** 2).mean())
         for e, own in zip(equations, local, strict=True)
         if e.catch is not None
     ]
     typical = float(np.median(left)) if left else math.nan
-    return Solution(shared, local, typical, found.nfev)
+    return Solution(shared, local, typical, solution.nfev)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
