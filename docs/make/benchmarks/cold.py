@@ -1,4 +1,4 @@
-"""``masrel report`` from nothing, beside what it was, and of a study of many raters.
+"""``masrel report`` from nothing, beside what it was, and a page of a file of ratings.
 
 ``python -m docs.make.benchmarks.cold [--before CHECKOUT]`` writes its part of
 ``docs/benchmarks.md``; the checkout is one of an earlier commit. Times are processor
@@ -16,6 +16,8 @@ import tempfile
 from pathlib import Path
 
 import matplotlib as mpl
+import numpy as np
+import pandas as pd
 
 import masrel
 from docs.make.benchmarks.parts import write_part
@@ -26,6 +28,7 @@ from tests.benchmarks.many_ratings import many_ratings
 ROOT = Path(__file__).parents[3]
 TURNS = 3
 SIZES = (200, 10, 5)  # raters, models, times each
+PAGES = ((1000, 5), (200, 30))  # items, raters
 
 
 def built(study: Path, place: Path, code: Path) -> float:
@@ -65,6 +68,32 @@ def large_row(folder: Path) -> str:
     return f"| {name}, HTML {megabytes:.1f} MB | {seconds:.2f} s | – | – |"
 
 
+def at_commit(checkout: Path | None) -> str:
+    """Which commit a checkout is at."""
+    command = ("git", "-C", str(checkout or ROOT), "rev-parse", "--short", "HEAD")
+    return subprocess.run(
+        command, check=True, capture_output=True, text=True
+    ).stdout.strip()
+
+
+def page_row(folder: Path, n_items: int, n_raters: int) -> str:
+    """A line of the second table: the page of one file of ratings."""
+    rng = np.random.default_rng(1)
+    usual = rng.integers(0, 5, n_items)
+    other = rng.integers(0, 5, (n_raters, n_items))
+    agrees = rng.random((n_raters, n_items)) < 0.7
+    table = pd.DataFrame(np.where(agrees, usual, other).T)
+    ratings = folder / "ratings.csv"
+    table.add_prefix("rater ").to_csv(ratings, index_label="item")
+    page = folder / "page.html"
+    os.environ["PYTHONPATH"] = str(ROOT)
+    command = ("-P", "-m", "masrel", "agree", str(ratings), "--target", "both")
+    command = (*command, "--html", str(page))
+    times = [processor_s(sys.executable, *command) for _ in range(TURNS + 1)][1:]
+    cells = f"{statistics.median(times):.2f} s", f"{page.stat().st_size / 1e3:.0f} kB"
+    return f"| {n_items:,} items × {n_raters} raters | {' | '.join(cells)} |"
+
+
 def main() -> None:
     """Make the studies, measure, and write the part."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -85,16 +114,15 @@ def main() -> None:
             row("the published study", published, before),
             large_row(folder),
         ]
-    print("\n".join(rows))
+        pages = [page_row(folder, *size) for size in PAGES]
+    print("\n".join(rows + pages))
     lines = [
         "## A report from nothing",
         "",
         "`python -m docs.make.benchmarks.cold --before CHECKOUT` repeats this part: "
         "`masrel report STUDY` as a process of its own, imports and all, no cache; "
         f"medians of {TURNS} turns of processor time, ± is half the range of the "
-        "ratios. Before: layout by constraints, each figure drawn for each of its "
-        "files. Figures are drawn by as many processes as there are cores, whose "
-        "processor time counts. The report has more sections now than before.",
+        f"ratios. Before is commit {at_commit(before)}.",
         "",
         f"{platform.machine()}, Python {platform.python_version()}; "
         f"masrel {masrel.__version__}, matplotlib {mpl.__version__}.",
@@ -102,6 +130,13 @@ def main() -> None:
         "| study | masrel report | before | ratio |",
         "|---|---|---|---|",
         *rows,
+        "",
+        "A page of a file of ratings, `masrel agree FILE --html PAGE`, medians of "
+        f"{TURNS} runs:",
+        "",
+        "| file | processor time | page |",
+        "|---|---|---|",
+        *pages,
     ]
     write_part(ROOT / "docs" / "benchmarks.md", "cold", lines)
 

@@ -15,7 +15,6 @@ import pytest
 
 import masrel
 from masrel.lab.protocol import copy_template
-from masrel.lab.report._pandoc import _pandoc
 from tests.cli.process import Caller
 
 SETPRIV = shutil.which("setpriv")
@@ -110,20 +109,30 @@ def test_without_pandoc_its_formats_are_refused_in_a_sentence(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_pandoc_that_fails_is_said_in_a_sentence(
-    masrel: Caller, study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_pandoc_that_fails_is_said_in_a_sentence(study: Path, tmp_path: Path) -> None:
     old = tmp_path / "pandoc"
     old.write_text(
         "#!/bin/sh\n[ $1 = --version ] && echo pandoc 1.9 || { echo no >&2; exit 6; }\n"
     )
     old.chmod(0o755)
-    monkeypatch.setenv("PYPANDOC_PANDOC", str(old))
-    _pandoc.cache_clear()
-    done = masrel("report", study, "-o", tmp_path / "out", "--format", "latex")
-    _pandoc.cache_clear()
-    assert done.code == 2
-    assert done.err.splitlines()[-1].endswith(f"3.0 or newer; {old} ended with: no")
+    # a process of its own: which pandoc it was is found once a process
+    call = [
+        "-m",
+        "masrel",
+        "report",
+        study,
+        "-o",
+        tmp_path / "out",
+        "--format",
+        "latex",
+    ]
+    done = subprocess.run(
+        [sys.executable, *call],
+        env={**os.environ, "PYPANDOC_PANDOC": str(old)},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1].endswith(f"3.0 or newer; {old} ended with: no")
 
 
 def test_templates_of_the_user_change_no_document(
