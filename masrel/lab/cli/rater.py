@@ -9,7 +9,7 @@ from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.errors import ParameterError
 from masrel.lab._once import read_once
 from masrel.lab.protocol import StudyPaths, read_protocol
-from masrel.lab.protocol._rater_fields import field_heading
+from masrel.lab.protocol._values import field_heading
 
 if TYPE_CHECKING:
     from masrel.lab.progress import RaterProgress

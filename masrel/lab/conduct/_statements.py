@@ -15,7 +15,7 @@ from masrel.lab.conduct._study_log import (
     stated,
 )
 from masrel.lab.protocol import Protocol, RaterField, StudyPaths
-from masrel.lab.protocol._rater_fields import (
+from masrel.lab.protocol._values import (
     FieldValue,
     field_value,
     needed_of,

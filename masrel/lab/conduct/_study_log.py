@@ -25,7 +25,7 @@ from masrel.lab._event_log import (
     utc_now,
 )
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.protocol._questions import Answer
+from masrel.lab.protocol._values import Answer
 
 if TYPE_CHECKING:
     from masrel.lab.recording import _Fact  # loads numpy

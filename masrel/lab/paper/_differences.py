@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from masrel.lab.protocol._questions import Answer
+from masrel.lab.protocol._values import Answer
 from masrel.lab.run._state import SessionState
 
 StudyAnswers = Mapping[tuple[str, str], Answer]

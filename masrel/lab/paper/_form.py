@@ -19,7 +19,7 @@ from masrel.lab._bounded_files import (
 )
 from masrel.lab.paper._differences import NO_GRADE
 from masrel.lab.protocol import Protocol, Question
-from masrel.lab.protocol._questions import Answer, When, checked_answer, questions_of
+from masrel.lab.protocol._values import Answer, When, checked_answer, questions_of
 from masrel.lab.schedule import Schedule
 
 FIRST_COLUMNS = ("sheet", "position", "code", "grade")

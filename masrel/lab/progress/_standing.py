@@ -15,7 +15,7 @@ from masrel.errors import ScheduleError, SessionLogError
 from masrel.lab._event_log import Event, events_before_torn
 from masrel.lab.conduct import excluded_raters, rater_values, read_conduct
 from masrel.lab.protocol import Protocol, StudyPaths, protocol_hash
-from masrel.lab.protocol._rater_fields import FieldValue
+from masrel.lab.protocol._values import FieldValue
 from masrel.lab.run._state import SessionState, read_session, replay
 from masrel.lab.schedule import read_schedule, site_of_copy
 from masrel.lab.schedule._sites import site_of

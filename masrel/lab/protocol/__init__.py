@@ -4,10 +4,12 @@ Goes in: ``protocol.toml``. Comes out: a :class:`Protocol`, and from it the scal
 the joint parameters of each model in SI units, and two hashes.
 """
 
-from masrel.lab.protocol._gates import Gate, gates_of, parse_gate
 from masrel.lab.protocol.content import (
+    Gate,
     elbow_parameters,
+    gates_of,
     joint_model,
+    parse_gate,
     presented_content,
     presented_hash,
     protocol_hash,

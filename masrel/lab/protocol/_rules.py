@@ -11,9 +11,9 @@ import msgspec
 from masrel._input import listed
 from masrel.errors import ParameterError
 from masrel.lab.protocol._decode import got, needed
-from masrel.lab.protocol._gates import parse_gate
 from masrel.lab.protocol._kinds import DEFAULT_KIND, kind_problem, value_problems
-from masrel.lab.protocol._rater_fields import RESERVED, field_value, needed_of
+from masrel.lab.protocol._values import RESERVED, field_value, needed_of
+from masrel.lab.protocol.content import parse_gate
 from masrel.lab.protocol.definition import (
     _FIELD_NAME,
     ElbowConstants,
@@ -36,13 +36,21 @@ _DEVICES = {
 _MISSING_MARKS = ("NA",)
 """Marks of a missing rating in a ratings file; no grade may be called that."""
 
-_SESSIONS_NEEDED = {"inter-rater": 1, "test-retest": 2}
+_SESSIONS_NEEDED = {
+    "inter-rater": (1, "one session"),
+    "test-retest": (2, "two sessions"),
+}
 """Kind of an estimate to the number of sessions it is made from."""
 
 
 def broken_rules(protocol: Protocol) -> Iterator[str]:
     """Check the rules across keys."""
     return chain.from_iterable(rule(protocol) for rule in _RULES)
+
+
+def _broken(*rules: tuple[object, str]) -> Iterator[str]:
+    """Yield what is said of those rules that are broken."""
+    return (sentence for is_broken, sentence in rules if is_broken)
 
 
 def _id(name: str) -> str:
@@ -61,18 +69,26 @@ def _scale(protocol: Protocol) -> Iterator[str]:
     grades = protocol.scale.grades
     for index, grade in enumerate(grades):
         where = f"scale.grades[{index}]"
-        if grade in grades[:index]:
-            yield f"{where}: needed grades that differ, got {got(grade)} again"
-        if grade != grade.strip() or not grade.isprintable():
-            yield (
+        yield from _broken(
+            (
+                grade in grades[:index],
+                f"{where}: needed grades that differ, got {got(grade)} again",
+            ),
+            (
+                _is_padded(grade),
                 f"{where}: needed a grade without spaces around it or control "
-                f"characters, got {got(grade)}"
-            )
-        if grade in _MISSING_MARKS:
-            yield (
+                f"characters, got {got(grade)}",
+            ),
+            (
+                grade in _MISSING_MARKS,
                 f"{where}: needed a grade that does not mean a missing one, "
-                f"got {got(grade)}"
-            )
+                f"got {got(grade)}",
+            ),
+        )
+
+
+def _is_padded(text: str) -> bool:
+    return text != text.strip() or not text.isprintable()
 
 
 def _ids(protocol: Protocol) -> Iterator[str]:
@@ -88,16 +104,18 @@ def _ids(protocol: Protocol) -> Iterator[str]:
         first: dict[str, int] = {}
         for index, name in enumerate(names):
             earlier = first.setdefault(name.casefold(), index)
-            if earlier != index:
-                yield (
+            yield from _broken(
+                (
+                    earlier != index,
                     f"{key}[{index}].id: needed ids that differ by more than case, "
-                    f"got {got(name)} where {key}[{earlier}] has {got(names[earlier])}"
-                )
-            if name.partition(".")[0].upper() in _DEVICES:
-                yield (
+                    f"got {got(name)} where {key}[{earlier}] has {got(names[earlier])}",
+                ),
+                (
+                    name.partition(".")[0].upper() in _DEVICES,
                     f"{key}[{index}].id: needed an id that Windows takes as the name "
-                    f"of a file, got {got(name)}"
-                )
+                    f"of a file, got {got(name)}",
+                ),
+            )
 
 
 def _references(protocol: Protocol) -> Iterator[str]:
@@ -113,39 +131,47 @@ def _references(protocol: Protocol) -> Iterator[str]:
     for index, session in enumerate(protocol.sessions):
         for place, rater in enumerate(session.raters):
             where = f"sessions[{index}].raters[{place}]"
-            if rater in session.raters[:place]:
-                yield (
+            is_again = rater in session.raters[:place]
+            yield from _broken(
+                (
+                    is_again,
                     f"{where}: needed each rater once, got {got(rater)} again"
-                    f"{_id(session.id)}"
-                )
-            elif rater not in known:
-                yield (
+                    f"{_id(session.id)}",
+                ),
+                (
+                    not is_again and rater not in known,
                     f"{where}: needed a rater of [[raters]] ({listed(known)}), "
-                    f"got {got(rater)}{_id(session.id)}"
-                )
+                    f"got {got(rater)}{_id(session.id)}",
+                ),
+            )
 
 
 def _rater_fields(protocol: Protocol) -> Iterator[str]:
     # fields that can be columns of a table, and what raters have in them
     fields = protocol.rater_fields
     for name, field in fields.items():
-        where = f"rater_fields.{name}"
-        if not _FIELD_NAME.fullmatch(name) or name in RESERVED:
-            yield (
+        where, kind = f"rater_fields.{name}", field.type
+        yield from _broken(
+            (
+                not _FIELD_NAME.fullmatch(name) or name in RESERVED,
                 f"{where}: needed a name of 1 to 32 small letters, digits and '_', the "
-                f"first a letter, other than {', '.join(RESERVED)}, got {got(name)}"
-            )
-        if field.type == "choice" and len(set(field.choices)) < 2:
-            choices = got(field.choices)
-            yield f"{where}.choices: needed at least 2 that differ, got {choices}"
-        if field.type != "choice" and field.choices:
-            yield (
+                f"first a letter, other than {', '.join(RESERVED)}, got {got(name)}",
+            ),
+            (
+                kind == "choice" and len(set(field.choices)) < 2,
+                f"{where}.choices: needed at least 2 that differ, got "
+                f"{got(field.choices)}",
+            ),
+            (
+                kind != "choice" and field.choices,
                 f'{where}.choices: needed for type "choice" only, got it for '
-                f"{got(field.type)}"
-            )
-        if field.type in ("text", "choice", "date") and field.unit:
-            kind = got(field.type)
-            yield f"{where}.unit: needed for numbers only, got it for {kind}"
+                f"{got(kind)}",
+            ),
+            (
+                kind in ("text", "choice", "date") and field.unit,
+                f"{where}.unit: needed for numbers only, got it for {got(kind)}",
+            ),
+        )
     for index, rater in enumerate(protocol.raters):
         for name, value in rater.fields.items():
             where = f"raters[{index}].fields.{name}"
@@ -199,31 +225,36 @@ _BELONGS_TO = {
 def _orders(protocol: Protocol) -> Iterator[str]:
     # keys of the scheme that go together, and an order at all
     rules, models = protocol.schedule, protocol.models
-    chosen = _chosen(rules, *_BELONGS_TO)
-    for key in chosen:
-        if rules.scheme != _BELONGS_TO[key]:
-            yield (
-                f"schedule.{key}: needed with schedule.scheme = "
-                f"{got(_BELONGS_TO[key])} only, got it with {got(rules.scheme)}"
-            )
-    if rules.scheme == "restricted" and not {*chosen} - {"blocks_by"}:
-        yield (
-            "schedule.scheme: needed standards_apart = true or max_same_grade beside "
-            f"{got(rules.scheme)}, got neither"
-        )
-    never_twice = ("williams", "latin-square", "no-immediate-repeat")
-    if rules.scheme in never_twice and len(models) == 1 and rules.repeats > 1:
-        yield (
-            "schedule.scheme: needed two models or more so that none comes twice in a "
-            f"row, got one {rules.repeats} times"
-        )
+    chosen, scheme = _chosen(rules, *_BELONGS_TO), rules.scheme
     roles = {model.role for model in models}
-    if rules.scheme == "blocks" and rules.blocks_by == "role" and len(roles) == 1:
-        yield (
+    never_twice = ("williams", "latin-square", "no-immediate-repeat")
+    yield from _broken(
+        *(
+            (
+                scheme != needed_by,
+                f"schedule.{key}: needed with schedule.scheme = {got(needed_by)} only, "
+                f"got it with {got(scheme)}",
+            )
+            for key, needed_by in _BELONGS_TO.items()
+            if key in chosen
+        ),
+        (
+            scheme == "restricted" and not {*chosen} - {"blocks_by"},
+            "schedule.scheme: needed standards_apart = true or max_same_grade beside "
+            f"{got(scheme)}, got neither",
+        ),
+        (
+            scheme in never_twice and len(models) == 1 and rules.repeats > 1,
+            "schedule.scheme: needed two models or more so that none comes twice in a "
+            f"row, got one {rules.repeats} times",
+        ),
+        (
+            scheme == "blocks" and rules.blocks_by == "role" and len(roles) == 1,
             "schedule.blocks_by: needed standards and dummies among the models with "
-            f'"role", got {"standards" if "standard" in roles else "dummies"} only'
-        )
-    if rules.scheme == "restricted":
+            f'"role", got {"standards" if "standard" in roles else "dummies"} only',
+        ),
+    )
+    if scheme == "restricted":
         yield from _too_strict(protocol)
 
 
@@ -258,16 +289,19 @@ def _sites(protocol: Protocol) -> Iterator[str]:
     first: dict[str, str] = {}
     for index, rater in enumerate(protocol.raters):
         where, site = f"raters[{index}].site", rater.site
-        if site is None and protocol.schedule.strata == "site":
-            yield (
+        other = None if site is None else first.setdefault(site.casefold(), site)
+        yield from _broken(
+            (
+                site is None and protocol.schedule.strata == "site",
                 f'{where}: needed the id of a site with schedule.strata = "site", got '
-                f"none{_id(rater.id)}"
-            )
-        if site is not None and first.setdefault(site.casefold(), site) != site:
-            yield (
+                f"none{_id(rater.id)}",
+            ),
+            (
+                other != site,
                 f"{where}: needed sites that differ by more than case, got {got(site)} "
-                f"beside {got(first[site.casefold()])}{_id(rater.id)}"
-            )
+                f"beside {got(other)}{_id(rater.id)}",
+            ),
+        )
 
 
 _COMPARISONS = (
@@ -295,16 +329,18 @@ def _soft_stops(protocol: Protocol) -> Iterator[str]:
     start, end = protocol.stretch.start_deg, protocol.stretch.end_deg
     device, width = protocol.device, protocol.device.soft_stop_deg
     low, high = device.lowest_angle_deg, device.highest_angle_deg
-    if start < low + width:
-        yield (
+    return _broken(
+        (
+            start < low + width,
             f"stretch.start_deg: needed at least device.lowest_angle_deg and the soft "
-            f"stop beside it ({low:g} + {width:g}), got {start:g}"
-        )
-    if end > high - width:
-        yield (
+            f"stop beside it ({low:g} + {width:g}), got {start:g}",
+        ),
+        (
+            end > high - width,
             f"stretch.end_deg: needed at most device.highest_angle_deg less the soft "
-            f"stop before it ({high:g} - {width:g}), got {end:g}"
-        )
+            f"stop before it ({high:g} - {width:g}), got {end:g}",
+        ),
+    )
 
 
 def _presentation(protocol: Protocol) -> Iterator[str]:
@@ -320,45 +356,52 @@ def _presentation(protocol: Protocol) -> Iterator[str]:
     slow, fast = rules.slow_speed_deg_s, rules.fast_speed_deg_s
     most, limit = stretch.largest_speed_deg_s, rules.stretch_limit_s
     way = stretch.end_deg - stretch.start_deg
-    if "fast" in cues and fast > most:
-        yield (
+    yield from _broken(
+        (
+            "fast" in cues and fast > most,
             f"presentation.fast_speed_deg_s: needed at most "
-            f"stretch.largest_speed_deg_s ({most:g}), got {fast:g}"
-        )
-    if {"slow", "fast"} <= cues and slow >= fast:
-        yield (
+            f"stretch.largest_speed_deg_s ({most:g}), got {fast:g}",
+        ),
+        (
+            {"slow", "fast"} <= cues and slow >= fast,
             f"presentation.slow_speed_deg_s: needed less than "
-            f"presentation.fast_speed_deg_s ({fast:g}), got {slow:g}"
-        )
-    if "slow" in cues and way >= slow * limit:
-        yield (
+            f"presentation.fast_speed_deg_s ({fast:g}), got {slow:g}",
+        ),
+        (
+            "slow" in cues and way >= slow * limit,
             f"presentation.slow_speed_deg_s: needed a stretch of {way:g} deg "
-            f"within presentation.stretch_limit_s ({limit:g}), got {slow:g}"
-        )
+            f"within presentation.stretch_limit_s ({limit:g}), got {slow:g}",
+        ),
+    )
 
 
 def _occasions(protocol: Protocol) -> Iterator[str]:
     # models of practice, and places of breaks
     occasions = protocol.occasions
     models = [model.id for model in protocol.models]
-    for place, model in enumerate(occasions.practice):
-        if model not in models:
-            yield (
-                f"occasions.practice[{place}]: needed a model of [[models]] "
-                f"({listed(models)}), got {got(model)}"
-            )
     after, n_presentations = occasions.break_after, len(models)
     n_presentations *= protocol.schedule.repeats
-    if after is not None and after >= n_presentations:
-        yield (
+    return _broken(
+        *(
+            (
+                model not in models,
+                f"occasions.practice[{place}]: needed a model of [[models]] "
+                f"({listed(models)}), got {got(model)}",
+            )
+            for place, model in enumerate(occasions.practice)
+        ),
+        (
+            after is not None and after >= n_presentations,
             f"occasions.break_after: needed fewer than the {n_presentations} "
-            f"presentations of a session, as no break comes after the last, got {after}"
-        )
-    if after is None and _chosen(occasions, "break_minutes"):
-        yield (
+            "presentations of a session, as no break comes after the last, got "
+            f"{after}",
+        ),
+        (
+            after is None and _chosen(occasions, "break_minutes"),
             f"occasions.break_minutes: needed with occasions.break_after only, got "
-            f"{occasions.break_minutes:g}"
-        )
+            f"{occasions.break_minutes:g}",
+        ),
+    )
 
 
 def _session_order(protocol: Protocol) -> Iterator[str]:
@@ -367,26 +410,32 @@ def _session_order(protocol: Protocol) -> Iterator[str]:
     for index, session in enumerate(protocol.sessions):
         where, after = f"sessions[{index}]", session.after
         low, high = session.at_least_days, session.at_most_days
-        if after is not None and after not in earlier:
-            yield (
-                f"{where}.after: needed another session of [[sessions]] "
-                f"({listed(earlier)}), got {got(after)}{_id(session.id)}"
-            )
-        elif after is not None and _comes_back(session.id, earlier):
-            yield (
-                f"{where}.after: needed a session that does not come after this "
-                f"one, got {got(after)}{_id(session.id)}"
-            )
-        if low is not None and high is not None and low > high:
-            yield (
-                f"{where}.at_least_days: needed at most at_most_days ({high}), "
-                f"got {low}{_id(session.id)}"
-            )
         needing_after = ("at_least_days", "at_most_days", "order_policy")
-        for key in _chosen(session, *needing_after) if after is None else ():
-            yield (
-                f"{where}.{key}: needed with after only, got it alone{_id(session.id)}"
-            )
+        yield from _broken(
+            (
+                after not in (None, *earlier),
+                f"{where}.after: needed another session of [[sessions]] "
+                f"({listed(earlier)}), got {got(after)}{_id(session.id)}",
+            ),
+            (
+                after in earlier and _comes_back(session.id, earlier),
+                f"{where}.after: needed a session that does not come after this "
+                f"one, got {got(after)}{_id(session.id)}",
+            ),
+            (
+                low is not None and high is not None and low > high,
+                f"{where}.at_least_days: needed at most at_most_days ({high}), "
+                f"got {low}{_id(session.id)}",
+            ),
+            *(
+                (
+                    after is None,
+                    f"{where}.{key}: needed with after only, got it alone"
+                    f"{_id(session.id)}",
+                )
+                for key in _chosen(session, *needing_after)
+            ),
+        )
 
 
 def _comes_back(name: str, earlier: dict[str, str | None]) -> bool:
@@ -400,59 +449,72 @@ def _comes_back(name: str, earlier: dict[str, str | None]) -> bool:
 def _questions(protocol: Protocol) -> Iterator[str]:
     # each question with the keys of its type, and its own id
     for index, questionnaire in enumerate(protocol.questionnaires):
-        ids: set[str] = set()
+        ids = [question.id.casefold() for question in questionnaire.questions]
         for place, question in enumerate(questionnaire.questions):
             where = f"questionnaires[{index}].questions[{place}]"
-            if question.id.casefold() in ids:
+            if ids[place] in ids[:place]:
                 yield (
                     f"{where}.id: needed ids that differ by more than case, got "
                     f"{got(question.id)} again"
                 )
-            ids.add(question.id.casefold())
             for problem in chain(_range(question), _choices(question)):
                 yield f"{where}.{problem}{_id(question.id)}"
 
 
 def _range(question: Question) -> Iterator[str]:
     kind, low, high = question.type, question.low, question.high
-    for key, end in (("low", low), ("high", high)):
-        if kind == "whole" and end is None:
-            yield f"{key}: needed a whole number for type {got(kind)}, got none"
-        elif kind != "whole" and end is not None:
-            yield (
-                f'{key}: needed for type "whole" only, got {got(end)} for type '
-                f"{got(kind)}"
+    labels = _chosen(question, "low_label", "high_label")
+    yield from _broken(
+        *(
+            (
+                (kind == "whole") == (end is None),
+                f"{key}: needed a whole number for type {got(kind)}, got none"
+                if end is None
+                else f'{key}: needed for type "whole" only, got {got(end)} for type '
+                f"{got(kind)}",
             )
-    if kind == "whole" and low is not None and high is not None and low >= high:
-        yield f"low: needed less than high ({high}), got {low}"
-    if kind in ("choice", "text"):
-        for key in _chosen(question, "low_label", "high_label"):
-            yield (
+            for key, end in (("low", low), ("high", high))
+        ),
+        (
+            kind == "whole" and low is not None and high is not None and low >= high,
+            f"low: needed less than high ({high}), got {low}",
+        ),
+        *(
+            (
+                kind in ("choice", "text"),
                 f'{key}: needed for type "whole" or "visual-analogue" only, got it for '
-                f"type {got(kind)}"
+                f"type {got(kind)}",
             )
+            for key in labels
+        ),
+    )
 
 
 def _choices(question: Question) -> Iterator[str]:
     kind, choices = question.type, question.choices
-    if kind != "choice":
-        if choices:
-            yield (
-                f'choices: needed for type "choice" only, got them for type {got(kind)}'
-            )
-        return
-    if len(choices) < 2:
-        yield f"choices: needed at least 2 texts, got {got(choices)}"
-    for place, choice in enumerate(choices):
-        if choice in choices[:place]:
-            yield (
-                f"choices[{place}]: needed choices that differ, got {got(choice)} again"
-            )
-        if choice != choice.strip() or not choice.isprintable():
-            yield (
+    yield from _broken(
+        (
+            kind != "choice" and choices,
+            f'choices: needed for type "choice" only, got them for type {got(kind)}',
+        ),
+        (
+            kind == "choice" and len(choices) < 2,
+            f"choices: needed at least 2 texts, got {got(choices)}",
+        ),
+    )
+    for place, choice in enumerate(choices if kind == "choice" else ()):
+        yield from _broken(
+            (
+                choice in choices[:place],
+                f"choices[{place}]: needed choices that differ, got {got(choice)} "
+                "again",
+            ),
+            (
+                _is_padded(choice),
                 f"choices[{place}]: needed a choice without spaces around it or "
-                f"control characters, got {got(choice)}"
-            )
+                f"control characters, got {got(choice)}",
+            ),
+        )
 
 
 def _models(protocol: Protocol) -> Iterator[str]:
@@ -528,23 +590,25 @@ def _tone_keys(model: Model) -> Iterator[str]:
 
 def _catch_angle(constant: float | None, joint: ElbowConstants) -> Iterator[str]:
     # constant: L of (2)
+    if constant is None:
+        return iter(())
     smallest = joint.smallest_catch_angle_deg
     slope, slowest = joint.catch_slope_s, joint.slowest_mean_speed_deg_s
-    if constant is None:
-        return
     angle = constant - slope * slowest  # first line of (6), the largest of them
-    if constant <= smallest:
-        yield (
+    return _broken(
+        (
+            constant <= smallest,
             f"catch_angle_constant_deg: needed more than "
-            f"elbow.smallest_catch_angle_deg ({smallest:g}), got {constant:g}"
-        )
-    elif angle < smallest:
-        yield (
+            f"elbow.smallest_catch_angle_deg ({smallest:g}), got {constant:g}",
+        ),
+        (
+            angle < smallest < constant,
             f"catch_angle_constant_deg: needed a catch angle at "
             f"elbow.slowest_mean_speed_deg_s of at least "
             f"elbow.smallest_catch_angle_deg ({smallest:g}), got "
-            f"{constant:g} - {slope:g} * {slowest:g} = {angle:g}"
-        )
+            f"{constant:g} - {slope:g} * {slowest:g} = {angle:g}",
+        ),
+    )
 
 
 def _held_torque(
@@ -571,11 +635,8 @@ def _plan(protocol: Protocol) -> Iterator[str]:
     for index, line in enumerate(protocol.analysis.estimates):
         for problem in _plan_line(line, protocol):
             yield f"analysis.estimates[{index}].{problem}{_id(line.id)}"
-    report = protocol.report
-    for key, names in (
-        ("sections", report.sections or ()),
-        ("formats", report.formats),
-    ):
+    for key in ("sections", "formats"):
+        names = getattr(protocol.report, key) or ()
         for index, name in enumerate(names):
             if name in names[:index]:
                 yield (
@@ -585,47 +646,63 @@ def _plan(protocol: Protocol) -> Iterator[str]:
 
 
 def _plan_line(line: EstimatePlan, protocol: Protocol) -> Iterator[str]:
-    if line.models not in ("all", *(model.role for model in protocol.models)):
-        yield f"models: needed a role that some model has, got {got(line.models)}"
     kind, named = line.kind, line.sessions
-    count = _SESSIONS_NEEDED[kind]
-    if len(named) != count:
-        phrase = "exactly one session" if count == 1 else "exactly two sessions"
-        yield f"sessions: needed {phrase} for {got(kind)}, got {len(named)}"
-    elif len(set(named)) != len(named):
-        yield f"sessions: needed two different sessions, got {got(named[0])} twice"
+    count, phrase = _SESSIONS_NEEDED[kind]
     raters = {session.id: set(session.raters) for session in protocol.sessions}
-    for place, name in enumerate(named):
-        if name not in raters:
-            yield (
-                f"sessions[{place}]: needed a session of [[sessions]] "
-                f"({', '.join(raters)}), got {got(name)}"
-            )
     groups = [raters[name] for name in named if name in raters]
     known = {rater.id for rater in protocol.raters}
-    if len(groups) != count or not set[str]().union(*groups) <= known:
-        return  # something else is wrong with a session; who meets whom is open
-    if kind == "inter-rater" and len(groups[0]) < 2:
-        yield "sessions: needed a session of at least two raters, got one of 1"
-    if kind == "test-retest" and not groups[0] & groups[1]:
-        yield "sessions: needed two sessions that share a rater, got none in both"
+    # where something else is wrong with a session, who meets whom is open
+    is_open = len(groups) != count or not set[str]().union(*groups) <= known
+    return _broken(
+        (
+            line.models not in ("all", *(model.role for model in protocol.models)),
+            f"models: needed a role that some model has, got {got(line.models)}",
+        ),
+        (
+            len(named) != count,
+            f"sessions: needed exactly {phrase} for {got(kind)}, got {len(named)}",
+        ),
+        (
+            len(named) == count and len(set(named)) != count,
+            f"sessions: needed two different sessions, got {got(named[0])} twice",
+        ),
+        *(
+            (
+                name not in raters,
+                f"sessions[{place}]: needed a session of [[sessions]] "
+                f"({', '.join(raters)}), got {got(name)}",
+            )
+            for place, name in enumerate(named)
+        ),
+        (
+            not is_open and kind == "inter-rater" and len(groups[0]) < 2,
+            "sessions: needed a session of at least two raters, got one of 1",
+        ),
+        (
+            not is_open and kind == "test-retest" and not set.intersection(*groups),
+            "sessions: needed two sessions that share a rater, got none in both",
+        ),
+    )
 
 
 def _sample_sizes(protocol: Protocol) -> Iterator[str]:
     # each of a line of the plan, with shares of its grades
     lines = [line.id for line in protocol.analysis.estimates]
-    seen: set[str] = set()
+    names = [size.estimate for size in protocol.analysis.sample_sizes]
+    known = listed(lines) if lines else "there is none"
     for index, size in enumerate(protocol.analysis.sample_sizes):
         where, name = f"analysis.sample_sizes[{index}]", size.estimate
-        if name not in lines:
-            known = listed(lines) if lines else "there is none"
-            yield (
+        yield from _broken(
+            (
+                name not in lines,
                 f"{where}.estimate: needed an estimate of the plan ({known}), got "
-                f"{got(name)}"
-            )
-        if name in seen:
-            yield f"{where}.estimate: needed each once, got {got(name)} again"
-        seen.add(name)
+                f"{got(name)}",
+            ),
+            (
+                name in names[:index],
+                f"{where}.estimate: needed each once, got {got(name)} again",
+            ),
+        )
         for problem in _shares(size, len(protocol.scale.grades)):
             yield f"{where}.{problem}"
 
@@ -635,17 +712,32 @@ _SUM = 1e-6  # by which prevalences may miss 1
 
 def _shares(size: SampleSize, n_grades: int) -> Iterator[str]:
     shares, rows = size.prevalences, size.table
-    if rows and size.model != "table":
-        yield f'table: needed model = "table", got {got(size.model)}'
-    if size.model == "table" and not rows:
-        yield "table: needed the joint probabilities of two raters, got none"
-    if shares and len(shares) != n_grades:
-        yield f"prevalences: needed one of each of {n_grades} grades, got {len(shares)}"
-    if rows and [len(row) for row in rows] != [n_grades] * n_grades:
-        yield f"table: needed {n_grades} rows of {n_grades}, one a grade"
-    for key, sum_ in (("prevalences", sum(shares)), ("table", sum(map(sum, rows)))):
-        if getattr(size, key) and abs(sum_ - 1.0) > _SUM:
-            yield f"{key}: needed numbers with sum 1, got sum {sum_:g}"
+    sums = {"prevalences": sum(shares), "table": sum(map(sum, rows))}
+    return _broken(
+        (
+            rows and size.model != "table",
+            f'table: needed model = "table", got {got(size.model)}',
+        ),
+        (
+            size.model == "table" and not rows,
+            "table: needed the joint probabilities of two raters, got none",
+        ),
+        (
+            shares and len(shares) != n_grades,
+            f"prevalences: needed one of each of {n_grades} grades, got {len(shares)}",
+        ),
+        (
+            rows and [len(row) for row in rows] != [n_grades] * n_grades,
+            f"table: needed {n_grades} rows of {n_grades}, one a grade",
+        ),
+        *(
+            (
+                getattr(size, key) and abs(sum_ - 1.0) > _SUM,
+                f"{key}: needed numbers with sum 1, got sum {sum_:g}",
+            )
+            for key, sum_ in sums.items()
+        ),
+    )
 
 
 def _gates(protocol: Protocol) -> Iterator[str]:

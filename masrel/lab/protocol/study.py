@@ -14,6 +14,7 @@ class _StudyFile:
     """A file or folder of a study, by its path from the study's folder."""
 
     path: str
+    __doc__: str
 
     def __get__(self, study: "StudyPaths", owner: object) -> Path:
         return study.root / self.path
@@ -36,44 +37,66 @@ class StudyPaths:
 
     root: Path
 
-    protocol = _StudyFile("protocol.toml")
-    """The protocol file."""
-    schedules = _StudyFile("schedules")
-    """The folder of drawn schedules and raters' sheets."""
-    ratings_file = _StudyFile("ratings/ratings.csv")
-    """The table of ratings made from the session logs."""
-    answers_file = _StudyFile("ratings/answers.csv")
-    """The table of answers to questionnaires made from the logs."""
-    published_answers_file = _StudyFile("ratings/published_answers.csv")
-    """Answers published elsewhere, or that fit what is."""
-    published_file = _StudyFile("ratings/published.csv")
-    """Ratings published elsewhere, when the study has some."""
-    in_person_file = _StudyFile("ratings/in_person.csv")
-    """Grades given in person to the subjects behind the models."""
-    claims_file = _StudyFile("ratings/claims.csv")
-    """What a paper prints of the agreement, when the study was published."""
-    analysis_file = _StudyFile("analysis.json")
-    """The analysis, in full precision."""
-    report = _StudyFile("report")
-    """The folder of the report."""
-    conduct_file = _StudyFile("conduct.jsonl")
-    """The log of what happened beside the sessions."""
-    merged_conduct = _StudyFile("conduct")
-    """The folder of such logs of the studies that this one was merged from."""
-    raters_file = _StudyFile("ratings/raters.csv")
-    """The table of raters that goes with that of ratings."""
-    secret_file = _StudyFile(".key/secret.txt")
-    """The secret that decides orders and codes; its folder is its owner's alone."""
-    serve_key_file = _StudyFile(".key/serve.txt")
-    """The key that cookies of `masrel serve` are signed with; it stays there."""
-    published_secret_file = _StudyFile("published_secret.txt")
-    """The same secret once everybody may know it."""
-    training = _StudyFile("training")
-    """The folder of training logs and recordings; no rating of the study."""
-    rehearsals = _StudyFile("rehearsals")
-    """The folder of logs and recordings of rehearsals; no rating of the study."""
-    sheets = _StudyFile("sheets")
-    """The folder of sheets to print, and of files to type them into."""
+    protocol = _StudyFile("protocol.toml", "The protocol file.")
+    schedules = _StudyFile(
+        "schedules", "The folder of drawn schedules and raters' sheets."
+    )
+    ratings_file = _StudyFile(
+        "ratings/ratings.csv", "The table of ratings made from the session logs."
+    )
+    answers_file = _StudyFile(
+        "ratings/answers.csv",
+        "The table of answers to questionnaires made from the logs.",
+    )
+    published_answers_file = _StudyFile(
+        "ratings/published_answers.csv",
+        "Answers published elsewhere, or that fit what is.",
+    )
+    published_file = _StudyFile(
+        "ratings/published.csv", "Ratings published elsewhere, when the study has some."
+    )
+    in_person_file = _StudyFile(
+        "ratings/in_person.csv",
+        "Grades given in person to the subjects behind the models.",
+    )
+    claims_file = _StudyFile(
+        "ratings/claims.csv",
+        "What a paper prints of the agreement, when the study was published.",
+    )
+    analysis_file = _StudyFile("analysis.json", "The analysis, in full precision.")
+    report = _StudyFile("report", "The folder of the report.")
+    conduct_file = _StudyFile(
+        "conduct.jsonl", "The log of what happened beside the sessions."
+    )
+    merged_conduct = _StudyFile(
+        "conduct",
+        "The folder of such logs of the studies that this one was merged from.",
+    )
+    raters_file = _StudyFile(
+        "ratings/raters.csv", "The table of raters that goes with that of ratings."
+    )
+    secret_file = _StudyFile(
+        ".key/secret.txt",
+        "The secret that decides orders and codes; its folder is its owner's alone.",
+    )
+    serve_key_file = _StudyFile(
+        ".key/serve.txt",
+        "The key that cookies of `masrel serve` are signed with; it stays there.",
+    )
+    published_secret_file = _StudyFile(
+        "published_secret.txt", "The same secret once everybody may know it."
+    )
+    training = _StudyFile(
+        "training",
+        "The folder of training logs and recordings; no rating of the study.",
+    )
+    rehearsals = _StudyFile(
+        "rehearsals",
+        "The folder of logs and recordings of rehearsals; no rating of the study.",
+    )
+    sheets = _StudyFile(
+        "sheets", "The folder of sheets to print, and of files to type them into."
+    )
 
     @property
     def sessions(self) -> Path:  # which a rehearsal has elsewhere

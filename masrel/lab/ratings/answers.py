@@ -11,7 +11,7 @@ from masrel._input import listed
 from masrel.errors import ParameterError
 from masrel.lab.conduct._study_log import study_answers
 from masrel.lab.protocol import Protocol, Question, StudyPaths
-from masrel.lab.protocol._questions import Answer, checked_answer, questions_of
+from masrel.lab.protocol._values import Answer, checked_answer, questions_of
 from masrel.lab.ratings.study_file import _Problem, _read_rows, _refusal
 from masrel.lab.run._state import FROM_PERSONS, SessionState, read_session
 from masrel.lab.schedule import read_schedule

@@ -18,7 +18,7 @@ from masrel.lab.progress import (
     session_progress,
 )
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.protocol._rater_fields import field_heading
+from masrel.lab.protocol._values import field_heading
 from masrel.lab.ratings import Correction, corrections_of, study_remarks
 from masrel.lab.report._figure_data import FIGURES, FlowStep
 from masrel.lab.report._material import Material

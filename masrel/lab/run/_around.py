@@ -7,7 +7,7 @@ from datetime import date, datetime
 from masrel.errors import MasrelWarning, ParameterError
 from masrel.lab._event_log import Event, read_log
 from masrel.lab.protocol import Protocol, Question, Questionnaire, Session, StudyPaths
-from masrel.lab.protocol._questions import When, checked_answer, questions_of
+from masrel.lab.protocol._values import When, checked_answer, questions_of
 from masrel.lab.recording import _Fact
 from masrel.lab.run._grade_sources import (
     GradeCorrection,

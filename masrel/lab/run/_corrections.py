@@ -12,7 +12,7 @@ from masrel.errors import ParameterError, SessionLogError
 from masrel.lab._event_log import SessionLog, utc_now
 from masrel.lab.conduct._study_log import append_event, check_rater, stated
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.protocol._questions import checked_answer
+from masrel.lab.protocol._values import checked_answer
 from masrel.lab.recording import _Fact
 from masrel.lab.run._around import question_named
 from masrel.lab.run._grade_sources import GradeCorrection

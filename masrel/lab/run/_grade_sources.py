@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Protocol, cast
 from masrel.errors import ParameterError
 from masrel.lab.protocol import PresentationRules, Question, Questionnaire
 from masrel.lab.protocol import Protocol as StudyProtocol
-from masrel.lab.protocol._questions import Answer
+from masrel.lab.protocol._values import Answer
 from masrel.lab.run._state import Felt
 from masrel.lab.schedule import Presentation
 

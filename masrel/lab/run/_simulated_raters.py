@@ -12,7 +12,7 @@ from typing import ClassVar
 
 from masrel.errors import ParameterError, ProtocolError
 from masrel.lab.protocol import Model, Protocol, scale_of
-from masrel.lab.protocol._questions import Answer
+from masrel.lab.protocol._values import Answer
 from masrel.lab.run._grade_sources import GradeRequest, QuestionRequest, Unattended
 
 _MOST_STRETCHES = 3  # of a simulated rater who may stretch as often as wanted

@@ -14,7 +14,7 @@ from masrel.lab._event_log import Event, check_kinds, read_log
 from masrel.lab._once import once
 
 if TYPE_CHECKING:
-    from masrel.lab.protocol._questions import Answer
+    from masrel.lab.protocol._values import Answer
     from masrel.lab.recording import _Facts  # loads numpy
 
 Felt = Literal["felt", "below-threshold", "no-catch"]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, TextIO
 
 from masrel.errors import ParameterError, SessionLogError, SessionStoppedError
 from masrel.lab.protocol import PresentationRules, Question
-from masrel.lab.protocol._questions import Answer, checked_answer
+from masrel.lab.protocol._values import Answer, checked_answer
 from masrel.lab.run._grade_sources import (
     GradeCorrection,
     GradeRequest,

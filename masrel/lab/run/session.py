@@ -23,7 +23,7 @@ from masrel.lab._event_log import Event, SessionLog, utc_now
 from masrel.lab.conduct._statements import refuse_withdrawn
 from masrel.lab.conduct._study_log import append_event, stated, study_answers
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
-from masrel.lab.protocol._questions import questions_of
+from masrel.lab.protocol._values import questions_of
 from masrel.lab.recording import _Fact, _Facts
 from masrel.lab.run._around import (
     ask_questions,

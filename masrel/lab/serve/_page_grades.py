@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from masrel.errors import ParameterError, SessionLogError
 from masrel.lab.protocol import PresentationRules
-from masrel.lab.protocol._questions import Answer, checked_answer
+from masrel.lab.protocol._values import Answer, checked_answer
 from masrel.lab.run import (
     GradeCorrection,
     GradeRequest,

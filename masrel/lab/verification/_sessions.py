@@ -10,7 +10,7 @@ from masrel.errors import ParameterError
 from masrel.lab._bounded_files import MAX_SMALL, read_regular
 from masrel.lab._event_log import Event
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.protocol._questions import checked_answer
+from masrel.lab.protocol._values import checked_answer
 from masrel.lab.run._rehearsal import practice_presentations
 from masrel.lab.run._state import SessionState, read_session
 from masrel.lab.schedule import Presentation, Schedule

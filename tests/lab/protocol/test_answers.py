@@ -6,7 +6,7 @@ import pytest
 
 from masrel.errors import ParameterError
 from masrel.lab.protocol import Question
-from masrel.lab.protocol._questions import checked_answer
+from masrel.lab.protocol._values import checked_answer
 
 
 def question(**keys: Any) -> Question:

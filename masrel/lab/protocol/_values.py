@@ -1,0 +1,139 @@
+"""What answers a question, and what a field of a rater holds."""
+
+import math
+from datetime import date, datetime
+
+from masrel._input import listed
+from masrel.errors import ParameterError
+from masrel.lab.protocol._decode import got
+from masrel.lab.protocol.definition import (
+    Protocol,
+    Question,
+    Questionnaire,
+    RaterField,
+    _When,
+)
+
+When = _When
+
+_LONGEST = 10_000  # letters of an answer
+
+Answer = str | int | float | None
+"""What can stand in a log as an answer; None for none."""
+
+
+def questions_of(
+    protocol: Protocol, when: When
+) -> list[tuple[Questionnaire, Question]]:
+    """Return the questions that are asked then, in order."""
+    return [
+        (questionnaire, question)
+        for questionnaire in protocol.questionnaires
+        if questionnaire.when == when
+        for question in questionnaire.questions
+    ]
+
+
+def checked_answer(question: Question, answer: Answer, *, where: str) -> Answer:
+    """Return an answer as the log has it, also of a text; refuse any other.
+
+    `where` begins the message: what is answered, of which file.
+    """
+    if isinstance(answer, str):
+        answer = answer.strip()
+    if answer in (None, ""):
+        if question.required:
+            raise ParameterError(f"{where}: needed {question.needed}, got none")
+        return None
+    if isinstance(answer, bool) or (value := _value(question, answer)) is None:
+        raise ParameterError(f"{where}: needed {question.needed}, got {answer!r}")
+    return value
+
+
+def _value(question: Question, answer: str | float) -> str | int | float | None:
+    # None where it does not answer the question
+    if question.type == "text":
+        return answer if isinstance(answer, str) and _can_be_kept(answer) else None
+    if question.type == "choice":
+        return answer if answer in question.choices else None
+    try:
+        number = float(answer)
+    except (ValueError, OverflowError):  # a whole number beyond every float
+        return None
+    if question.range is None or not math.isfinite(number):
+        return None
+    low, high = question.range
+    if not low <= number <= high:
+        return None
+    if number.is_integer():
+        return int(number)
+    return None if question.type == "whole" else number
+
+
+def _can_be_kept(text: str) -> bool:
+    # a lone surrogate, as a program may pass it, is in no file
+    return len(text) <= _LONGEST and not any("\ud800" <= s <= "\udfff" for s in text)
+
+
+FieldValue = str | int | float
+"""What a field holds; a date is text, ``YYYY-MM-DD``."""
+
+RESERVED = ("rater", "site", "status", "late")
+"""Columns of ``raters.csv`` that are no fields."""
+
+_LARGEST = 2**63  # whole numbers that the hash of a protocol can hold
+
+_FORMS = {
+    "text": "text that is not empty (in quotes)",
+    "whole": "a whole number",
+    "number": "a number",
+    "date": "a date, YYYY-MM-DD",
+}
+
+
+def needed_of(field: RaterField) -> str:
+    """Say what a value of a field is."""
+    if field.type == "choice":
+        return f"one of {listed(got(choice) for choice in field.choices)}"
+    return _FORMS[field.type]
+
+
+def field_value(field: RaterField, value: object) -> FieldValue | None:
+    """Return a value as its field holds it, or None if it is of another type."""
+    if isinstance(value, bool | datetime):
+        return None
+    if field.type == "date":
+        return _day(value)
+    if field.type == "whole":
+        return value if isinstance(value, int) and abs(value) < _LARGEST else None
+    if field.type == "number":  # not of nan
+        if isinstance(value, int | float) and abs(value) < _LARGEST:
+            return value
+        return None
+    if not isinstance(value, str) or not value.strip():
+        return None
+    return value if field.type == "text" or value in field.choices else None
+
+
+def parsed_value(field: RaterField, text: str) -> FieldValue | None:
+    """Return the value that a text stands for, or None if it stands for none."""
+    kind = {"whole": int, "number": float}.get(field.type, str)
+    try:
+        return field_value(field, kind(text.strip()))
+    except ValueError:
+        return None
+
+
+def _day(value: object) -> str | None:
+    if isinstance(value, date):
+        return value.isoformat()
+    try:
+        day = date.fromisoformat(str(value))
+    except ValueError:
+        return None
+    return value if value == day.isoformat() else None
+
+
+def field_heading(name: str, field: RaterField) -> str:
+    """Return what a field is called in a table, unit included."""
+    return (field.title or name) + (f" ({field.unit})" if field.unit else "")
