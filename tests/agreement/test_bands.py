@@ -5,7 +5,6 @@ from typing import get_args
 
 import mpmath
 import pytest
-from hypothesis import strategies as st
 
 from masrel.agreement import (
     BandScale,
@@ -51,9 +50,6 @@ def within(low: float, high: float, value: float, error: float) -> float:
         return float((high_ - low_) / (last - first))
 
 
-estimates = st.builds(estimate, st.floats(-1, 1), st.floats(0.005, 3))
-
-
 @pytest.mark.parametrize(
     ("scale", "published"),
     [
@@ -86,25 +82,6 @@ def test_words_and_ends_are_the_published_ones(
     found = bands(estimate(0.5, 0.1), scale=scale)
     assert {band.word: band.low for band in found} == published
     assert [band.high for band in found] == [1.0, *list(published.values())[:-1]]
-
-
-def test_probabilities_by_hand_from_a_table_of_phi() -> None:
-    # Value 0, error 1: Φ(1) - Φ(-1) = .682689, and Φ at .2, .4, .6, .8, 1 less .5 is
-    # .079260, .155422, .225747, .288145, .341345. Slight: .079260/.682689 = .116100.
-    found = {band.word: band for band in bands(estimate(0.0, 1.0))}
-    by_hand = {
-        "almost perfect": (0.341345 - 0.288145) / 0.682689,
-        "substantial": (0.288145 - 0.225747) / 0.682689,
-        "moderate": (0.225747 - 0.155422) / 0.682689,
-        "fair": (0.155422 - 0.079260) / 0.682689,
-        "slight": 0.079260 / 0.682689,
-        "poor": 0.5,
-    }
-    total = 0.0
-    for word, probability in by_hand.items():
-        total += probability
-        assert found[word].probability == pytest.approx(probability, abs=2e-6)
-        assert found[word].cumulative == pytest.approx(total, abs=5e-6)
 
 
 @pytest.mark.parametrize("scale", SCALES)

@@ -73,14 +73,6 @@ def test_by_hand() -> None:
     assert limits.differences.tolist() == [1.0, -2.0, 0.0, 1.0]
 
 
-@pytest.mark.parametrize("n", [2, 3, 50, 20_000])
-def test_ends_lie_in_order_at_every_size(n: int) -> None:
-    z = np.linspace(-1.0, 1.0, n)
-    limits = limits_of_agreement(np.column_stack([z, np.zeros(n)]))
-    assert limits.outer[0] < limits.lower < limits.inner[0] < limits.inner[1]
-    assert limits.upper_interval.low < limits.upper < limits.upper_interval.high
-
-
 def test_undefined_and_refused() -> None:
     with pytest.warns(UndefinedStatisticWarning, match="fewer than two items"):
         limits = limits_of_agreement([[1, 2], [None, 3]])

@@ -32,13 +32,6 @@ def test_value_error_and_interval_are_those_of_epir() -> None:
     assert result.interval.target == "items"
 
 
-def test_by_hand() -> None:
-    # x 1, 3, 5 and y 2, 3, 7: variances over 3 are 8/3 and 14/3, the covariance 10/3,
-    # the means 3 and 4: 2 · 10/3 / (8/3 + 14/3 + 1) = 20/25
-    ratings = [[1, 2], [3, 3], [5, 7]]
-    assert lin_ccc(ratings).value == pytest.approx(20 / 25, rel=1e-14)
-
-
 def test_of_three_raters_pairs_are_added_up() -> None:
     ratings = np.array([[1.0, 2, 1], [3, 3, 4], [5, 7, 6], [2, 1, 4]])
     numerator = denominator = 0.0

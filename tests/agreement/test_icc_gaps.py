@@ -91,32 +91,6 @@ def test_variances_are_those_of_lme4(name: str) -> None:
     assert parts == pytest.approx(expected, rel=1e-3, abs=1e-4)
 
 
-@pytest.mark.parametrize(
-    ("ratings", "why"),
-    [
-        ([[1, 2]], "fewer than two items"),
-        ([[1], [2]], "fewer than two raters"),
-        ([[1, None], [None, 2]], "no item has two ratings"),
-    ],
-)
-def test_variances_that_ratings_do_not_tell_have_a_reason(
-    ratings: list[list[int | None]], why: str
-) -> None:
-    with pytest.warns(UndefinedStatisticWarning, match=why):
-        result = variance_components(ratings)
-    assert math.isnan(result.items + result.raters + result.residual)
-    assert why in str(result.reason)
-
-
-@pytest.mark.parametrize("name", ["icc_missing-02", "icc_missing-06"])
-def test_the_likelihood_is_highest_there(name: str) -> None:
-    ratings = table(name)
-    (of_items, of_raters), _ = Dense(ratings, has_raters=True).best()
-    for form, error in (("ICC(A,1)", 1.0 + of_raters), ("ICC(C,1)", 1.0)):
-        value = icc(ratings, form=form).value  # type: ignore[arg-type]
-        assert value == pytest.approx(of_items / (of_items + error), rel=1e-6)
-
-
 WHOLE = np.array([[9, 2, 5, 8], [6, 1, 3, 2], [8, 4, 6, 8], [7, 1, 2, 6.0]])
 
 
@@ -166,14 +140,6 @@ def test_without_residual_by_hand() -> None:
     whole = icc([[1, 2], [3, 4], [5, 6]]).interval  # the same variances
     assert whole is not None
     assert (whole.low, whole.high) == pytest.approx((interval.low, interval.high))
-
-
-def test_one_way_by_hand() -> None:
-    # Two items, (0, 2) and (5), a one-way likelihood of two contrasts: the difference
-    # of the first two has variance 2 s, that of 5 from their mean 2 i + 3 s / 2. So
-    # s = 4/2 = 2, and 16 = 2 i + 3.
-    result = icc([[0, 2], [5, None]], form="ICC(1)")
-    assert result.value == pytest.approx(6.5 / 8.5, rel=1e-9)
 
 
 def test_a_variance_of_zero_is_said() -> None:

@@ -42,16 +42,6 @@ def has_kappa(cells: Cells) -> bool:
     return all(cells[k][k] < n for k in range(len(cells)))
 
 
-def test_a_table_by_hand() -> None:
-    # a = 20, b = 6, c = 4, d = 10 of 40: |20 - 10|/40 and |6 - 4|/40; margins 26, 14
-    # and 24, 16: at most 24 + 14 agree, by chance (26 · 24 + 14 · 16)/40 = 21.2:
-    # (38 - 21.2)/(40 - 21.2) = 168/188.
-    cells = [[20, 6], [4, 10]]
-    assert prevalence_index(cells) == 0.25
-    assert bias_index(cells) == 0.05
-    assert kappa_max(cells) == 168 / 188
-
-
 def test_cohens_own_example_of_the_largest_kappa() -> None:
     # Cohen (1960), Table 2: p_o = 140/200, margins .60 .30 .10 and .50 .30 .20, so that
     # p_c = .41 and kappa .492. At most .50 + .30 + .10 = .90 can agree: kappa_M = .831.
@@ -96,19 +86,6 @@ def test_no_kappa_is_above_the_largest(cells: Cells) -> None:
 def test_without_an_item_there_is_nothing(function) -> None:  # type: ignore[no-untyped-def]
     with pytest.warns(UndefinedStatisticWarning, match="no item has ratings of two"):
         assert math.isnan(function([[0, 0], [0, 0]]))
-
-
-def test_one_category_has_no_largest_kappa_but_a_prevalence() -> None:
-    with pytest.warns(UndefinedStatisticWarning, match="0/0"):
-        assert math.isnan(kappa_max([[5, 0], [0, 0]]))
-    assert prevalence_index([[5, 0], [0, 0]]) == 1.0
-    assert bias_index([[0, 5], [0, 0]]) == 1.0
-
-
-@pytest.mark.parametrize("function", [prevalence_index, bias_index])
-def test_indices_are_of_two_categories(function) -> None:  # type: ignore[no-untyped-def]
-    with pytest.raises(CountsError, match="needs 2 × 2, got 3 × 3"):
-        function([[1, 0, 0], [0, 1, 0], [0, 0, 1]])
 
 
 @pytest.mark.parametrize("function", [prevalence_index, bias_index, kappa_max])

@@ -6,22 +6,11 @@ from fractions import Fraction
 import pytest
 from hypothesis import given
 
-from masrel.agreement import cohen_kappa, conger_kappa, light_kappa
+from masrel.agreement import cohen_kappa, light_kappa
 from masrel.errors import UndefinedStatisticWarning
 from tests.strategies import LABELS, Table, tables
 
 SMALL: Table = [["a", "a", "a"], ["b", "b", "b"], ["a", "b", "b"]]
-
-
-def test_three_raters_by_hand() -> None:
-    # First with second, and with third: p_o = 2/3, p_e = 2/9 + 2/9: 2/5. Second with
-    # third: 1. Their mean is 3/5; Conger's, of means, 4/7.
-    found = light_kappa(SMALL)
-    assert found.value == 0.6
-    assert found.value != conger_kappa(SMALL).value
-    # means over pairs: (2/3 + 2/3 + 1)/3 and (4/9 + 4/9 + 5/9)/3
-    assert (found.observed, found.chance) == pytest.approx((7 / 9, 13 / 27), abs=1e-14)
-    assert (found.n_items, found.n_raters, found.n_categories) == (3, 3, 2)
 
 
 def test_error_of_three_raters_by_hand() -> None:
@@ -30,17 +19,6 @@ def test_error_of_three_raters_by_hand() -> None:
     # same; pair 2, 3 is perfect and does not move. u = (2/3)(12, 12, -24)/25; SE² =
     # (64 + 64 + 256)/625 / 6 = 64/625.
     assert light_kappa(SMALL).standard_error == pytest.approx(8 / 25, rel=1e-13)
-
-
-def test_pairs_that_share_a_rater_are_not_taken_for_independent() -> None:
-    # The same rater twice more tells nothing new: the error stays, and does not fall.
-    pairs: Table = [["a", "a"], ["b", "b"], ["a", "b"], ["b", "b"]]
-    twice = [[a, b, b] for a, b in pairs]
-    cohen = cohen_kappa(pairs)
-    found = light_kappa(twice)
-    # its pairs: the two of the first rater, and one that always agrees
-    assert found.value == pytest.approx((2 * cohen.value + 1) / 3, rel=1e-15)
-    assert found.standard_error == pytest.approx(cohen.standard_error * 2 / 3)
 
 
 def test_missing_ratings_listwise_and_pairwise_by_hand() -> None:
@@ -78,13 +56,6 @@ def test_one_pair_without_a_kappa_is_named_and_none_is_given() -> None:
     assert found.reason == "0/0: one category is all of the raters in columns 1 and 2"
     # with what chance gives all the same
     assert not math.isnan(found.observed)
-
-
-def test_a_pair_without_a_common_item_is_named() -> None:
-    table: Table = [["a", "a", None], ["b", "b", None], ["a", None, "b"]]
-    with pytest.warns(UndefinedStatisticWarning, match="columns 1 and 2"):
-        found = light_kappa(table, deletion="pairwise")
-    assert "no item has both ratings" in (found.reason or "")
 
 
 def test_the_reason_names_columns_of_the_table_as_given() -> None:

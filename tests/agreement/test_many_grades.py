@@ -18,9 +18,8 @@ from masrel.agreement import (
 )
 from masrel.errors import (
     ParameterError,
-    SmallSampleWarning,
 )
-from masrel.intervals import bootstrap, jackknife
+from masrel.intervals import bootstrap
 
 Distance = Callable[[Fraction, Fraction], Fraction]
 
@@ -105,66 +104,6 @@ def test_cohens_kappa_of_continuous_ratings_by_moments() -> None:
     light = COEFFICIENTS["light_kappa"](ratings[:, :2], weights="quadratic")
     assert light.value == pytest.approx(kappa, rel=1e-13)
     assert light.standard_error > 0.0
-
-
-def test_the_ordinal_metric_goes_by_ranks() -> None:
-    ratings = continuous()
-    ratings = ratings[np.isfinite(ratings).all(axis=1)]
-    ranks = ratings.ravel().argsort().argsort().reshape(ratings.shape).astype(float)
-    ordinal = krippendorff_alpha(ratings, metric="ordinal").value
-    exact = by_definition(ranks, lambda x, y: (x - y) ** 2)
-    assert ordinal == pytest.approx(float(exact), rel=1e-13)
-
-
-@pytest.mark.parametrize("options", [{"metric": "interval"}, {"weights": "linear"}])
-def test_the_jackknife_of_continuous_ratings_leaves_items_out(
-    options: dict[str, Any],
-) -> None:
-    ratings = continuous(60)
-    usable = [i for i, row in enumerate(ratings) if np.isfinite(row).sum() > 1]
-    n = len(usable)
-    without = [
-        krippendorff_alpha(np.delete(ratings, i, axis=0), **options).value
-        for i in usable
-    ]
-    variance = (n - 1) ** 2 / n * np.var(without, ddof=1)
-    result = jackknife("krippendorff_alpha", ratings, target="items", **options)
-    value = krippendorff_alpha(ratings, **options).value
-    from scipy.stats import t
-
-    half = t.ppf(0.975, n - 1) * math.sqrt(variance)
-    assert result.low == pytest.approx(value - half, rel=1e-9)
-
-
-@pytest.mark.parametrize("name", ["fleiss_kappa", "krippendorff_alpha"])
-def test_a_bootstrap_of_many_grades_is_that_of_a_matrix(name: str) -> None:
-    # all resamples of six items, on a scale of 150
-    ratings = [
-        [0, 149, 75],
-        [75, 3, 149],
-        [8, 1, 21],
-        [40, 52, 44],
-        [90] * 3,
-        [9, 8, 7],
-    ]
-    scale = np.arange(150.0)
-    matrix = 1.0 - np.abs(scale[:, None] - scale) / 149.0
-    with pytest.warns(SmallSampleWarning):
-        by_name, custom = (
-            bootstrap(
-                name,
-                ratings,
-                target="items",
-                categories=range(150),
-                weights=weights,  # type: ignore[arg-type]
-                kind="studentized",
-                exact=True,
-            )
-            for weights in ("linear", matrix)
-        )
-    assert (by_name.low, by_name.high) == pytest.approx(
-        (custom.low, custom.high), rel=1e-9
-    )
 
 
 def test_continuous_ratings_have_a_bootstrap_by_moments() -> None:

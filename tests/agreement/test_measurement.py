@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from masrel.agreement import ErrorKind, icc, mdc, sem
+from masrel.agreement import ErrorKind, mdc, sem
 from masrel.errors import UndefinedStatisticWarning
 from masrel.estimates import Estimate
 
@@ -69,25 +69,6 @@ def test_consistency_of_complete_tables_has_the_interval_of_chi_squared(
     expected = SETTINGS[name]["anova"]["sem_consistency_ci95"]
     result = sem(SETTINGS[name]["data"], kind="consistency")
     assert ends(result) == pytest.approx(expected, rel=1e-8)
-
-
-def test_it_is_the_error_in_the_icc() -> None:
-    ratings = np.array(SETTINGS["icc_missing-02"]["data"], dtype=float)
-    rho, consistency = icc(ratings).value, icc(ratings, form="ICC(C,1)").value
-    error, residual = (
-        sem(ratings).value ** 2,
-        sem(ratings, kind="consistency").value ** 2,
-    )
-    items = residual * consistency / (1.0 - consistency)
-    assert rho == pytest.approx(items / (items + error), rel=1e-9)
-
-
-def test_perfect_ratings_have_no_error() -> None:
-    for ratings in ([[1, 1], [4, 4], [6, 6]], [[1, 1], [4, 4], [6, None]]):
-        for kind in KINDS:
-            result = mdc(ratings, kind=kind)
-            assert result.value == 0.0
-            assert ends(result) == (0.0, 0.0)
 
 
 def test_undefined_with_a_reason() -> None:

@@ -33,12 +33,6 @@ def test_what_an_array_masks_is_missing() -> None:
     assert fleiss_kappa(whole) == fleiss_kappa([[1, 2], [2, 2]])
 
 
-def test_missing_in_the_ways_of_pandas_is_missing() -> None:
-    plain = gwet_ac([["a", None], ["b", "b"], ["a", "b"]])
-    for missing in (pd.NA, float("nan"), np.float64("nan"), pd.NaT):
-        assert gwet_ac([["a", missing], ["b", "b"], ["a", "b"]]) == plain
-
-
 FORMS: dict[str, Callable[[list[list[object]]], object]] = {
     "lists": lambda rows: rows,
     "array of text": lambda rows: np.array(rows),
@@ -117,20 +111,6 @@ def test_ordered_categories_of_a_frame_are_its_scale() -> None:
         **{"1": pd.Categorical(["bad", "bad", "mild"], scale[:2], ordered=True)}
     )
     assert gwet_ac(mixed).n_categories == 3
-
-
-class Frame:
-    """A table of another library: it gives an array, and knows no pandas."""
-
-    shape = (2, 2)
-
-    def to_numpy(self) -> np.ndarray:
-        """Return the labels."""
-        return np.array([["a", None], ["b", "b"]], dtype=object)
-
-
-def test_a_frame_of_another_library_is_its_array() -> None:
-    assert gwet_ac(Frame()) == gwet_ac([["a", None], ["b", "b"]])
 
 
 def test_a_set_of_labels_is_a_category() -> None:

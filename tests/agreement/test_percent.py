@@ -9,35 +9,8 @@ from masrel.agreement import count_items, item_disagreement, percent_agreement
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from tests.strategies import Table
 
-# Krippendorff (2011), four observers of twelve units; the last has a single rating.
-UNITS: Table = [
-    [None if grade == "." else grade for grade in row.split()]
-    for row in (
-        "1 1 . 1,2 2 3 2,3 3 3 3,3 3 3 3,2 2 2 2,1 2 3 4,4 4 4 4,1 1 2 1,2 2 2 2,"
-        ". 5 5 5,. . 1 1,. 3 . ."
-    ).split(",")
-]
-
 # Agreement 1, 1/3, none: n = 3 items, n' = 2 with a pair, their mean 2/3.
 SINGLE: Table = [["a", "a", "a"], ["a", "a", "b"], ["a", None, None]]
-
-
-def test_krippendorffs_units_by_hand() -> None:
-    # Eleven with a pair: eight agree in all, two in 3 of 6 and one in 0 of 6.
-    found = percent_agreement(UNITS)
-    assert found.value == pytest.approx(9 / 11, abs=1e-14)
-    assert (found.n_items, found.n_raters, found.n_categories) == (12, 4, 5)
-
-
-def test_linear_weights_count_how_far_apart_by_hand() -> None:
-    # 1 and 2 of a scale of 1 to 3 are half in agreement, 1 and 3 are not at all:
-    # items (1 2), (1 3), (2 2): 1/2, 0, 1.
-    table = [[1, 2], [1, 3], [2, 2]]
-    assert percent_agreement(table, weights="linear").value == 0.5
-    assert percent_agreement(table, weights="quadratic").value == pytest.approx(7 / 12)
-    # On a declared scale to 5 they are closer: 3/4, 1/2, 1.
-    wide = percent_agreement(table, categories=range(1, 6), weights="linear")
-    assert wide.value == 0.75
 
 
 def test_single_ratings_make_the_number_of_pairs_random_by_hand() -> None:

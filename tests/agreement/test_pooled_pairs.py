@@ -6,8 +6,6 @@ from fractions import Fraction
 import pytest
 
 from masrel.agreement import (
-    cohen_kappa,
-    count_table,
     pooled_kappa,
     stratified_kappa,
 )
@@ -41,11 +39,6 @@ def test_two_raters_by_hand() -> None:
     assert sum(items) == 0
     variance = Fraction(4, 3) * sum(u * u for u in items) / 64
     assert found.standard_error == pytest.approx(math.sqrt(variance), rel=1e-14)
-
-
-def test_it_is_cohens_kappa_of_the_table_of_all_pairs() -> None:
-    table = [[3, 2], [0, 3]]
-    assert pooled_kappa([FIRST, SECOND]).value == cohen_kappa(count_table(table)).value
 
 
 def test_margins_that_differ_between_raters_raise_it_above_the_stratified() -> None:

@@ -7,21 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from masrel.agreement import kendall_w, robinson_a
+from masrel.agreement import robinson_a
 from masrel.errors import UndefinedStatisticWarning
 from tests.agreement.undefined import assert_undefined
 
 Rows = list[list[int]]
 
-# Shrout and Fleiss (1979), Table 2: six targets, four judges.
-TABLE_2 = [
-    [9, 2, 5, 8],
-    [6, 1, 3, 2],
-    [8, 4, 6, 8],
-    [7, 1, 2, 6],
-    [10, 5, 6, 9],
-    [6, 2, 4, 7],
-]
 
 rows = st.integers(2, 5).flatmap(
     lambda k: st.lists(
@@ -62,21 +53,6 @@ def test_is_the_quotient_of_plain_sums(table: Rows) -> None:
         return
     assert robinson_a(table).value == pytest.approx(float(expected), rel=1e-15)
     assert 0 <= expected <= 1
-
-
-@given(rows)
-def test_of_ranks_it_is_kendalls_w(table: Rows) -> None:
-    # Ranks have one sum for every rater: nothing is left between raters.
-    ranks = [
-        [2 * sum(y < x for y in column) + column.count(x) for x in column]
-        for column in (list(c) for c in zip(*table, strict=True))
-    ]
-    of_items = [list(row) for row in zip(*ranks, strict=True)]
-    if plain(of_items) is None:
-        assert_undefined(lambda: robinson_a(of_items))
-        return
-    w = kendall_w(table).value
-    assert robinson_a(of_items).value == pytest.approx(w, rel=1e-14, abs=1e-15)
 
 
 @pytest.mark.parametrize(

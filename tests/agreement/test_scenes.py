@@ -37,12 +37,6 @@ def test_several_coefficients_of_counted_ratings_read_the_ratings_once() -> None
     assert rows.n_reads == 1
 
 
-def test_work_after_counting_grows_with_distinct_items_only() -> None:
-    small, large = count_ratings(RATINGS), count_ratings(np.repeat(RATINGS, 40, axis=0))
-    assert len(large.codes) <= len(small.codes) <= 500
-    assert sum(large.freq) == 40 * sum(small.freq) == 20_000
-
-
 def test_an_estimate_has_no_interval_unless_it_is_its_own() -> None:
     for entry in COEFFICIENTS.values():
         if entry.shape == "ratings" and entry.n_raters[1] is None:

@@ -12,8 +12,6 @@ from scipy import stats
 from masrel.agreement import (
     COEFFICIENTS,
     Alternative,
-    cohen_kappa,
-    count_table,
     equivalence_p_value,
     fleiss_kappa,
     holm,
@@ -58,15 +56,6 @@ def both_tails(t: float, df: int) -> float:
             angle = mpmath.atan(mpmath.mpf(t) / mpmath.sqrt(df))
             return float(1 - 2 / mpmath.pi * (angle + sine * total))
         return float(1 - sine * total)
-
-
-def test_of_a_table_of_two_raters_by_hand() -> None:
-    # [[20, 5], [10, 15]]: kappa 0.4, ASE² = 0.2016/12.5 over 50, ours over 49;
-    # t = 0.4/√(0.2016/12.5 · 50/49) = 3.1180, P(|t(49)| ≥ 3.1180) = 0.003045.
-    t = 0.4 / math.sqrt(0.2016 / 12.5 * 50 / 49)
-    found = p_value(cohen_kappa(count_table([[20, 5], [10, 15]])))
-    assert found == pytest.approx(both_tails(t, 49), rel=1e-10)
-    assert found == pytest.approx(0.003045, abs=5e-7)
 
 
 @pytest.mark.parametrize("df", [1, 2, 3, 4, 7, 29, 100, 1000, 20_000])
@@ -157,14 +146,6 @@ def test_is_undefined_where_the_estimate_or_its_error_is() -> None:
     assert one_item.reason is None
     with pytest.warns(UndefinedStatisticWarning, match="one item with a pair"):
         assert math.isnan(p_value(one_item))
-
-
-def test_holm_of_five_tests_by_hand() -> None:
-    # Ascending .005 .01 .03 .04 .6, times 5 4 3 2 1: .025 .04 .09 .08 .6, of which the
-    # fourth is less than the third before it.
-    assert holm([0.04, 0.01, 0.6, 0.005, 0.03]) == pytest.approx(
-        [0.09, 0.04, 0.6, 0.025, 0.09], rel=1e-15
-    )
 
 
 def test_holm_does_not_count_what_is_undefined() -> None:

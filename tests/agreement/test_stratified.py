@@ -35,12 +35,3 @@ def test_a_rater_without_pairs_moves_neither_value_nor_error() -> None:
     alone, beside = stratified_kappa([FIRST]), stratified_kappa([FIRST, none])
     assert (beside.value, beside.n_raters) == (0.4, 1)
     assert beside.standard_error == pytest.approx(alone.standard_error, rel=1e-14)
-
-
-def test_linear_weights_by_hand() -> None:
-    # Of 1 to 3: (1 2), (3 3), (2 2): D_o = 1/6; shares 1/3 each and 0, 2/3, 1/3; apart
-    # 1 - 2: 2/9 + 0, 1 - 3: 1/9 + 0, 2 - 3: 1/9 + 2/9, halves but 1 - 3: D_e =
-    # (2 + 3)/18 + 1/9 = 7/18. The other rater is perfect, at 1, 2, 3: D_e =
-    # (2/9 + 2/9)/2 + 2/9 = 8/18. 1 - (3/18)/(15/18) = 4/5.
-    first, second = [[1, 2], [3, 3], [2, 2]], [[1, 1], [2, 2], [3, 3]]
-    assert stratified_kappa([first, second], weights="linear").value == 0.8

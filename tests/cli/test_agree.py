@@ -36,16 +36,6 @@ def test_table_v_gives_its_kappa_to_the_last_digit() -> None:
     assert found["fleiss_kappa"]["interval"] is None
 
 
-def test_seeded_intervals_repeat(tmp_path: Path) -> None:
-    # so many different items that not every resample can be taken
-    path = tmp_path / "many.csv"
-    rows = [f"{i},{i % 5},{i % 7 % 5},{i % 11 % 5},{i % 13 % 5}" for i in range(80)]
-    path.write_text("\n".join(["item,A,B,C,D", *rows]) + "\n", encoding="utf-8")
-    asked = (path, "--target", "items", "--interval", "bootstrap", "--json", "-")
-    assert agree(*asked, "--seed", "4").stdout == agree(*asked, "--seed", "4").stdout
-    assert agree(*asked, "--seed", "4").stdout != agree(*asked, "--seed", "5").stdout
-
-
 def test_a_kappa_loads_no_interval_and_no_figure(wide: Path) -> None:
     code = (
         "import sys; from masrel.cli import cli; "

@@ -101,61 +101,6 @@ def test_the_reference_is_in_no_estimate_between_raters(
     assert with_it["notes"] == []  # not that Gold counts as a rater
 
 
-def test_of_many_raters_the_pairs_that_agree_least_are_shown(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    rng = np.random.default_rng(7)
-    lines = ["item," + ",".join(f"R{k}" for k in range(10))]
-    for k in range(30):
-        seen = [k % 3 if rng.random() < 0.7 else rng.integers(0, 3) for _ in range(10)]
-        lines.append(f"i{k}," + ",".join(map(str, seen)))
-    path = tmp_path / "many.csv"
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    document = record(masrel, "diagnose", path)
-    assert len(document["diagnosis_pairs"]) == 45
-    out = masrel("diagnose", path).out
-    assert "The 20 pairs that agree least; --json has 45." in out
-    lowest = min(row["value"] for row in document["diagnosis_pairs"])
-    below = out.split("every two raters\n")[1].splitlines()
-    assert below[2].split()[2].replace("−", "-") == f"{lowest:.3f}"
-
-
-@pytest.mark.parametrize("command", ["diagnose", "compare"])
-def test_sets_of_labels_are_taken_as_such(
-    masrel: Caller, tmp_path: Path, command: str
-) -> None:
-    rows = [("x", "a;b", "a", "a"), ("x", "b", "b", "b;c"), ("x", "c", "c", "c")]
-    rows += [("y", "b", "b", "b"), ("y", "a;c", "c", "a"), ("y", "c", "c", "c")]
-    path = tmp_path / "sets.csv"
-    lines = [",".join((str(k), *row)) for k, row in enumerate(rows)]
-    path.write_text("item,g,A,B,C\n" + "\n".join(lines) + "\n", encoding="utf-8")
-    document = record(masrel, command, path, "--by", "g", "--metric", "jaccard")
-    values = [row["value"] for row in document["estimates"]]
-    if command == "compare":
-        (row,) = document["differences"]
-        assert row["value"] == pytest.approx(values[0] - values[1], rel=1e-12)
-    else:
-        first = document["diagnosis_raters"][0]
-        assert first["without"] - first["change"] == pytest.approx(values[0])
-
-
-def test_clusters_are_left_out_as_in_the_library(masrel: Caller, sites: Path) -> None:
-    names = ("--item", "patient,tooth", "--ignore", "side", "--clusters", "patient")
-    document = record(masrel, "agree", sites, *names, "--coefficients", "scott_pi")
-    (row,) = document["estimates"]
-    (part,) = read_ratings(
-        sites, Reading(item="patient,tooth", ignore=["side"], clusters="patient")
-    ).parts
-    assert part.clusters[:4] == ("p0", "p1", "p1", "p2")
-    expected = intervals.estimate(
-        "scott_pi", part.ratings, target="items", clusters=part.clusters
-    )
-    assert expected.interval is not None
-    assert row["standard_error"] == expected.standard_error
-    assert row["interval"]["low"] == expected.interval.low
-    assert row["interval"]["unit"] == "clusters"
-
-
 def test_groups_with_clusters_in_common_are_compared_cluster_by_cluster(
     masrel: Caller, sites: Path
 ) -> None:

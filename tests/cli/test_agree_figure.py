@@ -11,13 +11,6 @@ from tests.cli.process import Caller
 TABLE_V = Path(__file__).parents[2] / "studies/hess2012/ratings/published.csv"
 STARTS = {".png": b"\x89PNG\r\n\x1a\n", ".svg": b"<?xml", ".pdf": b"%PDF"}
 
-TWO_SESSIONS = "session,item,rater,grade,source\n" + "".join(
-    f"{session},{item},{rater},{(item * rater) % 3},simulated\n"
-    for session in ("first", "second")
-    for item in range(4)
-    for rater in range(3)
-)
-
 
 @pytest.fixture
 def readable(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -71,17 +64,3 @@ def test_the_figure_says_what_the_table_says(masrel: Caller, tmp_path: Path) -> 
     assert "posterior density" in svg
     assert "resamples" not in svg
     assert "SIMULATED" not in svg
-
-
-@pytest.mark.usefixtures("readable")
-def test_simulated_sessions_are_headed_and_labelled(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    ratings, file = tmp_path / "ratings.csv", tmp_path / "drawn.svg"
-    ratings.write_text(TWO_SESSIONS, encoding="utf-8")
-    asked = ("--by", "session", "--target", "items", "--interval", "bootstrap")
-    done = masrel("agree", ratings, *asked, "--figure", file)
-    assert done.code == 0
-    svg = file.read_text("utf-8")
-    for words in ("SIMULATED DATA", ">first<", ">second<", "resamples"):
-        assert words in svg

@@ -68,12 +68,6 @@ def record(masrel: Caller, *arguments: object, command: str = "agree") -> Record
 
 
 @pytest.fixture
-def sessions(tmp_path: Path) -> Path:
-    path = tmp_path / "sessions.csv"
-    return write(path, "session,rater,item,grade", retest_rows())
-
-
-@pytest.fixture
 def clinics(tmp_path: Path) -> Path:
     # three clinics with items of their own, each rated by two
     rows = [
@@ -119,36 +113,6 @@ def test_retest_by_hand_whatever_the_order_of_the_rows(
     assert {row["n_items"] for row in rows} == {3}
 
 
-def test_retest_has_intervals_of_the_library(masrel: Caller, sessions: Path) -> None:
-    names = ("--session", "session", "--retest", "--target", "items")
-    rows = record(masrel, sessions, *names, "--interval", "jackknife")["retest"]
-    pairs = [[list(pair) for pair in of] for of in PAIRS.values()]
-    with pytest.warns(match="items"):
-        expected = intervals.jackknife("stratified_kappa", pairs, target="items")
-    with pytest.warns(match="items"):
-        first = intervals.jackknife("cohen_kappa", pairs[0], target="items")
-    for row, interval in ((rows[3], expected), (rows[0], first)):
-        assert (row["interval"]["low"], row["interval"]["high"]) == (
-            interval.low,
-            interval.high,
-        )
-        assert row["interval"]["method"] == interval.method
-
-
-def test_retest_of_groups_is_one_of_each(masrel: Caller, tmp_path: Path) -> None:
-    rows = [(clinic, *row) for clinic in "AB" for row in retest_rows()]
-    rows = [row for row in rows if row[0] == "A" or row[2] == "R1"]
-    path = write(tmp_path / "g.csv", "clinic,session,rater,item,grade", rows)
-    found = record(masrel, path, "--by", "clinic", "--retest")["retest"]
-    assert [(row["clinic"], row["rater"]) for row in found] == [
-        *[("A", rater) for rater in ("R1", "R2", "R3", None)],
-        ("B", "R1"),
-        ("B", None),
-    ]
-    of_both = [found[3]["value"], found[5]["value"]]
-    assert of_both == pytest.approx([2 / 3, 0.4], abs=1e-14)
-
-
 # --- each category
 
 
@@ -170,36 +134,6 @@ def test_the_kappa_of_each_diagnosis_is_the_published_one(
         ]
     for one, other in zip(of_ratings, of_counts, strict=True):
         assert other["standard_error"] == pytest.approx(one["standard_error"])
-
-
-def test_measurements_have_no_table_of_each(tmp_path: Path, masrel: Caller) -> None:
-    path = tmp_path / "measured.csv"
-    rows = (f"p{k},{k},{k}\n" for k in range(201))
-    path.write_text("item,Kim,Lee\n" + "".join(rows))
-    done = masrel("agree", path, "--each-category", "--target", "items")
-    assert (done.code, "at most 200" in done.err) == (2, True)
-
-
-def test_the_interval_of_a_category_is_that_of_the_folded_ratings(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    rows = [(n, *ratings) for n, ratings in enumerate(RATINGS)]
-    wide = write(tmp_path / "wide.csv", "patient,R1,R2,R3,R4,R5,R6", rows)
-    found = record(masrel, wide, "--each-category", "--target", "items")["categories"]
-    for row in found:
-        folded = [
-            ["no", "yes"][grade == row["category"]] for r in RATINGS for grade in r
-        ]
-        table = [folded[at : at + 6] for at in range(0, len(folded), 6)]
-        expected = intervals.estimate(  # in this order, as draws depend on it
-            "fleiss_kappa", table, target="items", categories=["yes", "no"]
-        )
-        assert row["value"] == pytest.approx(expected.value, rel=1e-14)
-        assert expected.interval is not None
-        assert row["interval"]["low"] == pytest.approx(expected.interval.low, rel=1e-9)
-        assert row["interval"]["high"] == pytest.approx(
-            expected.interval.high, rel=1e-9
-        )
 
 
 # --- two raters
@@ -298,27 +232,6 @@ def test_differences_of_clinics_are_those_of_the_library(
     assert {e["interval"]["target"] for e in document["estimates"]} == {"items"}
 
 
-def test_groups_of_the_same_items_are_compared_item_by_item(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    before, after = "aa ab bb ba aa ab bb aa ba bb", "aa aa bb ba aa bb bb aa ba bb"
-    rows = [
-        (when, f"I{n}", *pair)
-        for when, pairs in (("before", before), ("after", after))
-        for n, pair in enumerate(pairs.split())
-    ]
-    rows = rows[:10] + rows[10:][::-1]  # by name, not by place
-    path = write(tmp_path / "w.csv", "when,item,Kim,Lee", rows)
-    names = ("--by", "when", "--coefficients", "percent_agreement")
-    (row,) = record(masrel, path, *names, command="compare")["differences"]
-    both = [[float(p[0] == p[1]) for p in of.split()] for of in (before, after)]
-    expected = stats.ttest_rel(*both)
-    assert row["design"] == "dependent"
-    assert row["t"] == pytest.approx(expected.statistic, rel=1e-9)
-    assert row["p_value"] == pytest.approx(expected.pvalue, rel=1e-9)
-    assert row["p_holm"] == row["p_value"]
-
-
 def three_groups(folder: Path, *, same_items: bool) -> Path:
     rng = np.random.default_rng(29)
     lines = ["item,when,Kim,Lee"]
@@ -333,21 +246,6 @@ def three_groups(folder: Path, *, same_items: bool) -> Path:
     path = folder / "three.csv"
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
-
-
-def test_three_groups_of_other_items_are_tested_for_equality(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    path = three_groups(tmp_path, same_items=False)
-    names = ("--by", "when", "--coefficients", "scott_pi")
-    document = record(masrel, path, *names, command="compare")
-    estimates, tests = document["estimates"], document["equality"]
-    assert [test["test"] for test in tests] == ["equality_test", "donner_test"]
-    precision = np.array([e["standard_error"] for e in estimates]) ** -2.0
-    values = np.array([e["value"] for e in estimates])
-    away = values - precision @ values / precision.sum()
-    assert tests[0]["statistic"] == pytest.approx(precision @ away**2, rel=1e-12)
-    assert tests[0]["df"] == [2.0]
 
 
 def test_three_groups_of_the_same_items_are_tested_by_hotellings_t2(

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from masrel.agreement import limits_of_agreement, lin_ccc
+from masrel.agreement import limits_of_agreement
 from tests.cli.process import Caller
 
 PAIRS = [(9, 8), (5, 7), (4, 4), (8, 7), (6, 6), (5, 7)]
@@ -31,17 +31,6 @@ def test_table_and_record_are_those_of_the_library(masrel: Caller, pairs: Path) 
     assert (record["lower"], record["upper"]) == (limits.lower, limits.upper)
     assert record["outer"] == list(limits.outer)
     assert record["upper_interval"]["high"] == limits.upper_interval.high
-
-
-def test_limits_come_with_coefficients_of_measurements(
-    masrel: Caller, pairs: Path
-) -> None:
-    document = json.loads(masrel("limits", pairs, "--json", "-").out)
-    assert document["format"] == "masrel limits 1"
-    _, concordance = document["estimates"]
-    assert [e["coefficient"] for e in document["estimates"]] == ["icc_a1", "lin_ccc"]
-    assert concordance["value"] == lin_ccc(PAIRS).value
-    assert concordance["interval"]["low"] == lin_ccc(PAIRS).interval.low
 
 
 def test_estimates_in_small_units_keep_their_digits(

@@ -88,31 +88,6 @@ def test_weights_are_those_of_the_declared_scale(
         assert document["weights"] == weights
 
 
-def test_numbers_weigh_by_value_and_ten_comes_after_two(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    # (1 1), (1 2), (10 10): D_o = (1/9)/3, D_e = (2 + 18 + 9 + 8)/81: 1 - 3/37
-    path = tmp_path / "ten.csv"
-    path.write_text("item,A,B\nx,1,1\ny,1,2\nz,10,10\n", encoding="utf-8")
-    asked = ("--coefficients", "cohen_kappa", "--weights", "linear", "--json", "-")
-    (found,) = estimates(masrel("agree", path, *asked))
-    assert found["value"] == pytest.approx(34 / 37, abs=1e-14)
-
-
-def test_a_word_is_the_one_that_is_certain(masrel: Caller, wide: Path) -> None:
-    # kappa 9/17 = 0.529 ± 0.274: above 0 with 97 %, above 0.2 with 88 % of [-1, 1]
-    (row,) = csv.DictReader(
-        io.StringIO(
-            masrel(
-                *("agree", wide, "--coefficients", "fleiss_kappa"),
-                *("--words", "landis_koch", "--csv"),
-            ).out
-        )
-    )
-    assert float(row["value"]) == pytest.approx(9 / 17, abs=1e-14)
-    assert row["words"] == "slight"
-
-
 # How it is shown.
 
 
@@ -170,19 +145,6 @@ def test_latex_is_one_balanced_table_of_escaped_text(
     assert r"a\_b\&c\% & Percent agreement & " in out
     assert r"50$\sim$\textasciicircum{}\$\#\{\}\textbackslash{} & Fleiss'" in out
     assert r"Fleiss' $\kappa$ & $-$" in out
-
-
-def test_each_session_is_estimated_for_itself(masrel: Caller, sessions: Path) -> None:
-    found = estimates(
-        masrel(
-            *("agree", sessions, "--by", "session", "--json", "-"),
-            *("--coefficients", "percent_agreement"),
-        )
-    )
-    # the second rater differs on 1, 2 and 3 of 4 items
-    assert [(e["session"], e["value"]) for e in found] == [
-        (name, 1 - n / 4) for n, name in enumerate(NAMES, start=1)
-    ]
 
 
 def test_json_in_a_file_leaves_the_table_on_stdout(
@@ -243,17 +205,6 @@ def test_a_convention_has_the_error_and_the_interval_of_its_program(
     assert json.loads(done.out)["options"]["convention"] == convention
 
 
-def test_what_is_usual_and_has_no_such_error_keeps_its_value(
-    masrel: Caller, wide: Path
-) -> None:
-    percent, kappa = estimates(
-        masrel("agree", wide, "--convention", "spss", "--json", "-")
-    )
-    assert percent["interval"] is None
-    assert "no interval" in percent["notes"][0]
-    assert kappa["interval"]["method"] == "SPSS's error, normal"
-
-
 # Metrics of alpha.
 
 
@@ -273,19 +224,6 @@ def test_a_metric_is_of_alpha(masrel: Caller, tmp_path: Path) -> None:
     assert "Krippendorff's α, interval metric" in done.out
     said = refused(masrel(*call[:4], "--coefficients", "fleiss_kappa,gwet_ac"))
     assert "--metric ratio: is of krippendorff_alpha, which is not among" in said
-
-
-def test_grades_of_several_labels_are_sets(masrel: Caller, tmp_path: Path) -> None:
-    path = tmp_path / "sets.csv"
-    path.write_text("item,A,B\nx,a,a;b\ny,b;a,b;c\nz,c;b,b;c\n", encoding="utf-8")
-    sets = [[{"a"}, {"a", "b"}], [{"a", "b"}, {"b", "c"}], [{"b", "c"}, {"b", "c"}]]
-    metrics: list[Metric] = ["jaccard", "masi"]
-    for metric in metrics:
-        (of_alpha,) = estimates(
-            masrel("agree", path, "--metric", metric, "--json", "-")
-        )
-        alpha = krippendorff_alpha(sets, metric=metric)
-        assert of_alpha["value"] == pytest.approx(alpha.value, abs=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -315,19 +253,6 @@ def test_weights_of_a_file_are_those_of_a_matrix(
     assert of_kappa["standard_error"] == pytest.approx(kappa.standard_error, abs=1e-14)
     assert of_kappa["weights"] == "w.csv"
     assert json.loads(done.out)["options"]["weight_matrix"] == matrix
-
-
-def test_grades_without_an_order_have_weights_by_name(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    path, weights = tmp_path / "shapes.csv", tmp_path / "w.csv"
-    path.write_text("item,Kim,Lee\n1,a,b\n2,b,b\n3,c,b\n4,a,a\n", encoding="utf-8")
-    weights.write_text(",c,b,a\nc,1,0,0\nb,0,1,.5\na,0,.5,1\n", encoding="utf-8")
-    (of_agreement, _) = estimates(
-        masrel("agree", path, "--weights", weights, "--json", "-")
-    )
-    assert of_agreement["value"] == (0.5 + 1 + 0 + 1) / 4
-    assert "--categories" in refused(masrel("agree", path, "--weights", "linear"))
 
 
 @pytest.mark.parametrize(

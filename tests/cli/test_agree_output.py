@@ -3,10 +3,8 @@
 import csv
 import io
 import json
-import os
 import re
 import shlex
-import subprocess
 import sys
 import warnings
 from pathlib import Path
@@ -68,35 +66,7 @@ def test_what_is_null_has_its_reason(masrel: Caller, tmp_path: Path) -> None:
 # A table as CSV and LaTeX.
 
 
-# After the end of a line LaTeX reads [ and * as its own; > and | are other letters in
-# its fonts.
-GROUPS = ["[0, 1)", "*", "a>b|c", "José", "Łukasz", "θ\u0307, ẋ, ē, ω\u0302"]
-
-
 # The first screen.
-
-# grades of one kind alone, an item of one rating, and what may be a missing grade
-ODD = "item,Kim,Lee,Ann\n" + "".join(f"{k},1,1,{1 if k else ''}\n" for k in range(11))
-
-
-def test_two_lines_a_table_and_a_sentence_are_shown_first(
-    masrel: Caller, wide: Path
-) -> None:
-    call = ("agree", wide, "--categories", "1,1+,2,3", "--target", "items")
-    first, second, blank, heading, *_ = masrel(*call).out.splitlines()
-    assert (
-        first
-        == f"Read {wide.name}: 4 items named by 'patient', 3 raters (Kim, Lee, Ann)."
-    )
-    assert second.startswith("Grades: 1 ×4, 1+ ×1, 2 ×3, 3 ×3.")
-    assert blank == ""
-    assert heading.startswith("Coefficient")
-    (sentence,) = " ".join(notes(masrel(*call))).strip().split(". ")
-    (_, of_kappa) = document(masrel(*call, "--json", "-"))["estimates"]
-    interval = of_kappa["interval"]
-    for number in (of_kappa["value"], interval["low"], interval["high"]):
-        assert f"{number:.3f}" in sentence
-    assert "other items like these" in sentence
 
 
 def test_how_numbers_were_made_is_behind_explain(masrel: Caller, wide: Path) -> None:
@@ -114,26 +84,6 @@ def test_how_numbers_were_made_is_behind_explain(masrel: Caller, wide: Path) -> 
     assert masrel(*call, "--csv").out == masrel(*call, "--csv", "--explain").out
 
 
-def test_what_an_honest_reader_must_know_is_shown_first(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    done = masrel("agree", written(tmp_path, ODD), "--target", "raters")
-    out = done.out.replace("\n  ", " ")
-    assert "Fleiss' κ: undefined: " in out
-    assert "10 of 11" not in out  # each has a pair
-    rows = "".join(f"{k},{k % 3},{k % 2},{k // 2 % 3}\n" for k in range(9))
-    few = f"item,Kim,Lee,Ann\n{rows}"
-    call = ("agree", written(tmp_path, few), "--target", "raters")
-    assert "may cover less than it says" in masrel(*call).out.replace("\n  ", " ")
-    call = (
-        "agree",
-        written(tmp_path, few + "9,1,,\n"),
-        "--coefficients",
-        "fleiss_kappa",
-    )
-    assert "9 of 10" in masrel(*call).out
-
-
 def test_warnings_are_lines_on_stderr_alone(masrel: Caller, tmp_path: Path) -> None:
     rows = [f"{k},{20 + 1.37 * k:.2f},{20.5 + 1.31 * k:.2f}\n" for k in range(30)]
     path = written(tmp_path, "item,Kim,Lee\n" + "".join(rows), "r.csv")
@@ -144,20 +94,6 @@ def test_warnings_are_lines_on_stderr_alone(masrel: Caller, tmp_path: Path) -> N
         assert done.err.splitlines().count(warned) == 1
         assert "warning: " not in done.out or form == ("--json", "-")
     assert warned in masrel("diagnose", path).err.splitlines()
-
-
-def test_items_are_called_what_the_reader_calls_them(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    path = written(tmp_path, SESSIONS)
-    call = ("agree", path, "--by", "session", "--coefficients", "fleiss_kappa")
-    named = (*call, "--item-name", "tapes", "--target", "items")
-    out = masrel(*named).out
-    assert "4 tapes named by" in out
-    assert re.search(r"High +Tapes +Raters", out)
-    assert "4 tapes, 3 raters" in masrel(*named, "--sentence").out
-    assert masrel(*named, "--csv").out == masrel(*call, "--csv", *named[-2:]).out
-    assert "for other tapes like these" in masrel(*named[:-2]).err
 
 
 # Notes below a table.
@@ -259,23 +195,3 @@ def test_verbs_and_options_are_guessed(masrel: Caller, wide: Path) -> None:
     done = masrel("qqq")
     assert (done.code, done.out) == (2, "")
     assert "No such command 'qqq'." in done.err
-
-
-def test_a_shell_completes_verbs_and_options(wide: Path) -> None:
-    def completed(*words: str) -> str:
-        env = {
-            **os.environ,
-            "_MASREL_COMPLETE": "bash_complete",
-            "COMP_WORDS": shlex.join(words),
-            "COMP_CWORD": str(len(words) - 1),
-        }
-        code = "import sys; sys.argv = ['masrel']; from masrel.cli import main; main()"
-        call = [sys.executable, "-c", code]
-        done = subprocess.run(
-            call, capture_output=True, text=True, env=env, check=False
-        )
-        return done.stdout
-
-    assert "plain,agree" in completed("masrel", "ag")
-    assert "plain,--coefficients" in completed("masrel", "agree", str(wide), "--co")
-    assert "plain,items" in completed("masrel", "agree", str(wide), "--target", "i")

@@ -1,7 +1,6 @@
 """masrel audit: claims as options, as a file, or of a study."""
 
 import hashlib
-import json
 from pathlib import Path
 
 import pytest
@@ -9,17 +8,7 @@ import pytest
 from masrel.lab.protocol import copy_template
 from tests.cli.process import Caller
 
-CLAIM = ("audit", "--items", 20, "--categories", 2, "--agreement", "85.0")
 STUDY = Path(__file__).parents[2] / "studies" / "hess2012"
-
-
-def test_json_has_every_reading_and_prints_nothing_else(masrel: Caller) -> None:
-    done = masrel(*CLAIM, "--kappa", "0.244", "--unrated", 1, "--json", "-")
-    (claim,) = json.loads(done.out)["claims"]
-    assert claim["is_possible"] is False
-    assert [reading["n_items"] for reading in claim["readings"]] == [20, 19]
-    assert claim["claim"]["kappa"] == "0.244"
-    assert claim["alone"]["85.0 % agreement"]["n_tables"] > 0
 
 
 def test_a_file_has_a_row_a_claim(masrel: Caller, tmp_path: Path) -> None:

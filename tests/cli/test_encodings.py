@@ -1,6 +1,5 @@
 """Streams that cannot show every letter, and any backend of matplotlib."""
 
-import json
 import os
 import shlex
 import subprocess
@@ -46,20 +45,6 @@ def test_a_table_with_kappa_is_printed(encoding: str, table: Path) -> None:
     assert "kappa" in shown or "κ" in shown
 
 
-@SLOW
-def test_json_stays_json_with_every_letter(table: Path) -> None:
-    done = called(
-        {"PYTHONIOENCODING": "cp1252"},
-        "agree",
-        table,
-        "--target",
-        "items",
-        "--json",
-        "-",
-    )
-    assert "Łucja" in json.dumps(json.loads(done.stdout), ensure_ascii=False)
-
-
 def test_letters_are_spelled_and_names_escaped() -> None:
     code = (
         "import sys, masrel.cli; sys.stdout.reconfigure(errors='masrel');"
@@ -90,21 +75,6 @@ def test_any_backend_of_matplotlib_draws(
         {"MPLBACKEND": backend}, "agree", table, "--target", "items", "--figure", figure
     )
     assert b"</svg>" in figure.read_bytes()
-
-
-@SLOW
-def test_the_backend_of_a_notebook_stays_the_one_it_has() -> None:
-    code = (
-        "import os, masrel.lab.report.figures, matplotlib as m;"
-        "print(m.get_backend(), os.environ['MPLBACKEND'])"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        check=True,
-        env={**os.environ, "MPLBACKEND": "pdf"},
-    )
-    assert done.stdout.split() == [b"pdf", b"pdf"]
 
 
 @pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-"])

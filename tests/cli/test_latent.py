@@ -3,7 +3,6 @@
 import csv
 import io
 import json
-import re
 from pathlib import Path
 
 import pytest
@@ -83,17 +82,6 @@ def test_the_figure_shows_items_thresholds_and_raters(
     drawn = figure.read_text("utf-8")
     for words in ("SIMULATED DATA", "severity", "2 | 3", "bias of raters"):
         assert words in drawn
-
-
-def test_without_a_terminal_lines_say_how_far_and_how_long(
-    masrel: Caller, wide: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("masrel.cli._options._PERIOD_S", 0.0)
-    done = masrel("latent", wide, "--items", "fixed")
-    lines = done.err.splitlines()
-    assert lines
-    for line in lines:
-        assert re.fullmatch(r"sampling: \d+ %, about \d+ (s|min) left", line)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """masrel plan: sizes, grids, a study's own plan, and what is printed of them."""
 
 import json
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -26,13 +25,6 @@ def test_the_number_of_items_is_solved_for(masrel: Caller) -> None:
     assert json.loads(less.out)["plans"][0]["expected_half_width"] > 0.2
 
 
-def test_lines_for_a_protocol_are_toml(masrel: Caller) -> None:
-    done = masrel(*KAPPA, "--raters", "2", "--items", "30", "--toml")
-    analysis = tomllib.loads(done.out)["analysis"]
-    assert analysis["level"] == 0.95
-    assert analysis["estimates"][0]["coefficient"] == "fleiss_kappa"
-
-
 def test_a_grid_has_a_curve(masrel: Caller, tmp_path: Path) -> None:
     sizes = ("--raters", "2,3", "--items", "10:30:10")
     file = tmp_path / "curve.svg"
@@ -49,12 +41,6 @@ def plans_of(masrel: Caller, *options: object) -> list[dict[str, Any]]:
     assert done.code == 0, done.err
     plans: list[dict[str, Any]] = json.loads(done.out)["plans"]
     return plans
-
-
-def test_an_aim_at_a_known_size_says_whether_it_is_reached(masrel: Caller) -> None:
-    size = ("--items", "40", "--raters", "3", "--null", "0.4")
-    (plan,) = plans_of(masrel, *KAPPA, *size, "--power", "0.9")
-    assert plan["reaches_aim"] is False
 
 
 @pytest.fixture
@@ -79,14 +65,6 @@ def changed(study: Path, *changes: tuple[str, str]) -> None:
         assert old in text
         text = text.replace(old, new)
     protocol.write_text(text, "utf-8")
-
-
-@pytest.mark.usefixtures("quick")
-def test_a_study_says_what_its_plan_can_show(masrel: Caller, study: Path) -> None:
-    done = masrel("plan", study, "--value", "0.6", "--csv")
-    assert done.code == 0
-    assert done.out.startswith("line,interval,target,value,n_items,n_raters,")
-    assert "note: percent: has no interval to be planned for" in done.err
 
 
 @pytest.mark.usefixtures("quick")

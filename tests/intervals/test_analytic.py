@@ -6,11 +6,10 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from scipy.stats import t
 
-from masrel.agreement import fleiss_kappa, percent_agreement
+from masrel.agreement import fleiss_kappa
 from masrel.errors import (
     MasrelWarning,
     UndefinedStatisticWarning,
@@ -18,41 +17,9 @@ from masrel.errors import (
 from masrel.estimates import Interval
 from masrel.intervals import analytic
 from tests.agreement.oracles import datasets
-from tests.intervals.data import SCALE, TABLE_V
+from tests.intervals.data import TABLE_V
 
 few = pytest.mark.filterwarnings("ignore::masrel.errors.SmallSampleWarning")
-
-
-@few
-@pytest.mark.parametrize(
-    ("distribution", "low", "high"),
-    [("normal", 0.398, 0.854), ("t", 0.256, 0.996)],
-)
-def test_table_v_as_other_programs_print_it(
-    distribution: str, low: float, high: float
-) -> None:
-    found = analytic(
-        "fleiss_kappa",
-        TABLE_V,
-        target="items",
-        categories=SCALE,
-        distribution=distribution,  # type: ignore[arg-type]
-    )
-    assert found.low == pytest.approx(low, abs=5e-4)
-    assert found.high == pytest.approx(high, abs=5e-4)
-    assert (found.kind, found.target, found.level) == ("confidence", "items", 0.95)
-
-
-@few
-def test_percent_agreement_has_the_t_interval_of_a_mean() -> None:
-    # Shares of agreeing pairs per item 21, 16, 28, 16 of 28: mean 81/112, sd by hand,
-    # t(3; .975) = 3.18244630528371 (any table of Student's t).
-    shares = np.array([21, 16, 28, 16]) / 28
-    error = math.sqrt(((shares - 81 / 112) ** 2).sum() / 3 / 4)
-    found = analytic(percent_agreement, TABLE_V, target="items")
-    assert found.low == pytest.approx(81 / 112 - 3.18244630528371 * error, rel=1e-12)
-    assert found.high == 1.0  # .7232 + 3.18 · .1014 is beyond it
-    assert any("cut at the end" in note for note in found.notes)
 
 
 @few
@@ -83,9 +50,7 @@ def test_no_spread_gives_no_interval_and_a_reason() -> None:
 FILE = Path(__file__).parents[1] / "oracles" / "published_errors.json"
 PUBLISHED: dict[str, dict[str, Any]] = json.loads(FILE.read_text("utf-8"))["errors"]
 DATA = {dataset["name"]: dataset for dataset in datasets()}
-TABLE = [[20, 5], [10, 15]]
 PAIRS = [["a", "a"]] * 20 + [["a", "b"]] * 5 + [["b", "a"]] * 10 + [["b", "b"]] * 15
-RATINGS = [list(row) for row in ("aaa", "aab", "bbb", "bcc", "cca", "aaa", "cbb")] * 2
 
 
 def quiet(*args: Any, **options: Any) -> Interval:
@@ -151,18 +116,6 @@ def test_irrcac_counts_a_single_rating_as_disagreement(
     by_t = half(quiet(name, ratings, **{**IRRCAC, "distribution": "t"}, level=0.2))
     # which counts such an item, too
     assert by_t / t.ppf(0.6, len(ratings) - 1) == pytest.approx(error, rel=1e-4)
-
-
-def test_irrcacs_error_of_complete_ratings_is_ours_but_for_alpha() -> None:
-    for name in ("fleiss_kappa", "gwet_ac", "percent_agreement", "conger_kappa"):
-        ours = quiet(name, RATINGS, target="items", distribution="normal")
-        assert half(quiet(name, RATINGS, **IRRCAC)) == pytest.approx(half(ours))
-    # of alpha it is that of Fleiss' kappa, as the factor for small samples is left out
-    alpha, kappa = (
-        half(quiet(name, RATINGS, **IRRCAC))
-        for name in ("krippendorff_alpha", "fleiss_kappa")
-    )
-    assert alpha == pytest.approx(kappa, rel=1e-12)
 
 
 def test_spss_prints_the_error_of_the_hypothesis_that_fleiss_kappa_is_0() -> None:

@@ -12,13 +12,11 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from masrel.agreement import COEFFICIENTS
-from masrel.errors import ParameterError, SmallSampleWarning
+from masrel.errors import ParameterError
 from masrel.intervals import (
     analytic,
-    bootstrap,
     difference,
     difference_test,
-    differences,
     estimate,
     jackknife,
 )
@@ -89,63 +87,6 @@ def test_the_jackknife_leaves_out_every_cluster_once(name: str) -> None:
     assert found.method == "cluster jackknife, t(14)"
 
 
-@pytest.mark.filterwarnings("ignore::masrel.errors.SmallSampleWarning")
-def test_an_estimate_draws_clusters_where_the_bootstrap_is_asked_for() -> None:
-    ratings, clusters = drawn(9, 4)
-    asked = {"target": "items", "clusters": clusters, "rng": 2, "n_resamples": 500}
-    found = estimate("gwet_ac", ratings, method="bootstrap", **asked)  # type: ignore[arg-type]
-    assert found.interval == bootstrap("gwet_ac", ratings, **asked)  # type: ignore[arg-type]
-
-
-def test_by_default_clusters_are_left_out_on_the_logit() -> None:
-    ratings, clusters = drawn(20, 5)
-    found = estimate("gwet_ac", ratings, target="items", clusters=list(clusters))
-    interval = found.interval
-    assert interval is not None
-    assert interval.method.startswith("cluster jackknife, t(19) on the logit")
-    assert interval.low < found.value < interval.high < 1.0
-    assert "generalises to: other clusters of items" in str(found)
-    plain = jackknife("gwet_ac", ratings, target="items", clusters=clusters)
-    # the same error, divided by the slope of the logit between -1 and 1
-    share = (1.0 + found.value) / 2.0
-    half = (plain.high - plain.low) / 2.0 / (2.0 * share * (1.0 - share))
-    middle = math.log(share / (1.0 - share))
-    expected = 2.0 / (1.0 + math.exp(-(middle - half))) - 1.0
-    assert interval.low == pytest.approx(expected, rel=1e-9)
-
-
-def test_a_difference_leaves_a_cluster_out_of_both_at_once() -> None:
-    first, clusters = drawn(18, 7)
-    second = drawn(18, 7, strength=3.0)[0]
-    found = difference(
-        "fleiss_kappa",
-        first,
-        second,
-        design="dependent",
-        categories=[0, 1, 2],
-        clusters=clusters,
-    )
-    without = [
-        differences_of(first[clusters != c], second[clusters != c]) for c in range(18)
-    ]
-    variance = 17 / 18 * float(((without - np.mean(without)) ** 2).sum())
-    assert found.standard_error == pytest.approx(math.sqrt(variance), rel=1e-9)
-    assert found.interval is not None
-    assert found.interval.unit == "clusters"
-    # the delta method gives about the same
-    delta = differences(
-        "fleiss_kappa", [first, second], clusters=clusters, categories=[0, 1, 2]
-    )
-    assert delta.errors[0, 1] == pytest.approx(found.standard_error, rel=0.1)
-
-
-def differences_of(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
-    one, other = (
-        COEFFICIENTS["fleiss_kappa"](of, categories=[0, 1, 2]) for of in (first, second)
-    )
-    return one.value - other.value
-
-
 def test_independent_clusters_add_their_variances() -> None:
     (first, of_first), (second, of_second) = drawn(12, 11), drawn(16, 13)
     labels = [f"a{c}" for c in of_first], [f"b{c}" for c in of_second]
@@ -190,19 +131,6 @@ def test_independent_clusters_add_their_variances() -> None:
         difference(
             "fleiss_kappa", first, second, design="independent", clusters=labels[0]
         )
-
-
-def test_few_clusters_are_warned_of_and_one_says_nothing() -> None:
-    ratings, clusters = drawn(6, 17)
-    for make in (analytic, jackknife):
-        with pytest.warns(SmallSampleWarning, match="6 clusters"):
-            make("fleiss_kappa", ratings, target="items", clusters=clusters)
-        with pytest.warns(match="one.* cluster"):
-            found = make(
-                "fleiss_kappa", ratings, target="items", clusters=["p"] * len(ratings)
-            )
-        assert found.reason is not None
-        assert math.isnan(found.low)
 
 
 @pytest.mark.parametrize(("n_outside", "is_rare"), [(4, True), (30, False)])

@@ -3,14 +3,11 @@
 import json
 import math
 from dataclasses import replace
-from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import stats
 
@@ -20,7 +17,6 @@ from masrel.agreement import (
     count_table,
 )
 from masrel.errors import (
-    SmallSampleWarning,
     UndefinedStatisticWarning,
 )
 from masrel.estimates import Estimate
@@ -52,60 +48,6 @@ def shares(table: list[list[int]]) -> list[float]:
     """Agreement of each item: how many pairs of its raters agree."""
     k = len(table[0])
     return [sum(row.count(g) - 1 for g in row) / (k * (k - 1)) for row in table]
-
-
-def test_two_independent_kappas_by_hand() -> None:
-    # (a a) (b b) (a b): p_o = 2/3, p_e = 4/9: 2/5. Without one: 0, 0 (one rater has one
-    # category) and 1 about 1/3: SE² = (2/3)(1/9 + 1/9 + 4/9) = 4/9. The other is 1
-    # whichever is left out. So -3/5 ± t · 2/3 with (4/9)²/((4/9)²/2) = 2 degrees, whose
-    # quantile of two sides is L √(2/(1 - L²)) at level L: √(2/3) at 1/2.
-    first = [["a", "a"], ["b", "b"], ["a", "b"]]
-    second = [["a", "a"], ["b", "b"], ["a", "a"], ["b", "b"]]
-    with pytest.warns(SmallSampleWarning):
-        found = difference(
-            "cohen_kappa", first, second, design="independent", level=0.5
-        )
-    assert found.value == float(Fraction(2, 5)) - 1.0
-    assert found.standard_error == pytest.approx(2 / 3, rel=1e-14)
-    assert found.interval is not None
-    half = math.sqrt(2 / 3) * 2 / 3
-    assert found.interval.low == pytest.approx(-0.6 - half, rel=1e-12)
-    assert found.interval.high == pytest.approx(-0.6 + half, rel=1e-12)
-    assert (found.n_items, found.n_raters) == (3, 2)
-    # 2/3 - 1 and 4/9 - 1/2
-    assert found.observed == pytest.approx(-1 / 3, rel=1e-15)
-    assert found.chance == pytest.approx(-1 / 18, rel=1e-14)
-
-
-@pytest.mark.filterwarnings("ignore::masrel.errors.MasrelWarning")
-@given(
-    rows=st.lists(st.tuples(*[st.integers(0, 2)] * 4), min_size=4, max_size=12),
-    design=st.sampled_from(["dependent", "independent"]),
-    name=st.sampled_from(["fleiss_kappa", "gwet_ac", "percent_agreement"]),
-)
-def test_p_is_one_less_the_level_of_the_interval_that_ends_at_0(
-    rows: list[tuple[int, ...]], design: Design, name: str
-) -> None:
-    first, second = ([row[at : at + 2] for row in rows] for at in (0, 2))
-    test = difference_test(name, first, second, design=design, categories=CATEGORIES)
-    assume(test.reason is None and 1e-6 < test.p_value < 1 - 1e-6)
-    found = difference(
-        name,
-        first,
-        second,
-        design=design,
-        categories=CATEGORIES,
-        level=1 - test.p_value,
-    )
-    assert found.interval is not None
-    nearer = min(found.interval.low, found.interval.high, key=abs)
-    assert nearer == pytest.approx(0.0, abs=1e-9)
-    for level, holds in ((0.95, test.p_value > 0.05), (0.5, test.p_value > 0.5)):
-        interval = difference(
-            name, first, second, design=design, categories=CATEGORIES, level=level
-        ).interval
-        assert interval is not None
-        assert (interval.low < 0.0 < interval.high) == holds
 
 
 def test_of_percent_agreement_of_the_same_items_it_is_the_paired_t_test() -> None:
@@ -184,32 +126,6 @@ def test_every_coefficient_is_left_out_of_item_by_item(
     assert found.weights == weights
 
 
-def test_a_difference_lies_within_what_two_coefficients_can_differ_by() -> None:
-    # One pair of four agrees, and three of four: of so few items t · SE goes beyond -2
-    # of kappa, and beyond -1 of a share.
-    first = [["a", "b"], ["b", "a"], ["a", "b"], ["b", "b"]]
-    second = [["a", "a"], ["b", "b"], ["a", "a"], ["b", "a"]]
-    with pytest.warns(SmallSampleWarning):
-        found = difference("fleiss_kappa", first, second, design="independent")
-    assert found.interval is not None
-    assert found.interval.low == -2.0
-    with pytest.warns(SmallSampleWarning):
-        share = difference("percent_agreement", first, second, design="independent")
-    assert share.interval is not None
-    assert share.interval.low == -1.0
-
-
-def test_the_same_ratings_do_not_differ_and_it_says_so() -> None:
-    first, _ = two(20)
-    with pytest.warns(UndefinedStatisticWarning, match="leaves the difference as it"):
-        found = difference(
-            "fleiss_kappa", first, first, design="dependent", categories=CATEGORIES
-        )
-    assert (found.value, found.standard_error) == (0.0, 0.0)
-    assert found.interval is not None
-    assert "leaves the difference as it is" in (found.interval.reason or "")
-
-
 def test_what_only_rounding_sets_apart_does_not_differ() -> None:
     # Conger's κ of the same ratings in another order of the raters
     first, _ = two(20)
@@ -219,23 +135,6 @@ def test_what_only_rounding_sets_apart_does_not_differ() -> None:
             "conger_kappa", first, second, design="dependent", categories=CATEGORIES
         )
     assert found.standard_error == 0.0
-
-
-@pytest.mark.filterwarnings("ignore::masrel.errors.UndefinedStatisticWarning")
-def test_with_one_item_left_out_undefined_has_a_value_and_no_interval() -> None:
-    # Without its last item the first has one category only: 0/0.
-    found = difference(
-        "fleiss_kappa",
-        [["a", "a"]] * 11 + [["a", "b"]],
-        [["a", "a"], ["b", "b"]] * 6,
-        design="dependent",
-        categories=["a", "b"],
-    )
-    # 11/12 of pairs, shares 23/24 and 1/24: kappa -1/23; the other is 1
-    assert found.value == pytest.approx(-1 / 23 - 1, rel=1e-14)
-    assert math.isnan(found.standard_error)
-    assert found.interval is not None
-    assert "one item left out" in (found.interval.reason or "")
 
 
 FILE = Path(__file__).parents[1] / "oracles" / "several_kappas.json"
@@ -362,21 +261,6 @@ def test_differences_of_two_are_their_difference_to_the_last_digit(name: str) ->
     )
 
 
-def test_two_sets_have_one_interval_however_it_is_made() -> None:
-    # of one difference all three methods are Student's t, and Hotelling's F is t²
-    tables = sets(7, 25, 2)
-    made = [
-        differences("fleiss_kappa", tables, categories=[0, 1, 2], simultaneous=method)
-        for method in ("max_t", "bonferroni", "scheffe")
-    ]
-    t = float(stats.t.ppf(0.975, 24))
-    for found in made:
-        assert found.quantile == pytest.approx(t, rel=1e-12)
-        assert found.p_values[0, 1] == pytest.approx(found.equality.p_value, rel=1e-9)
-        assert found.values[0, 1] == -found.values[1, 0]
-        assert found.low[0, 1] == -found.high[1, 0]
-
-
 @pytest.mark.parametrize(("g", "near"), [(3, 1e-8), (4, 1e-3), (7, 1e-3)])
 def test_max_t_of_independent_means_is_tukeys_range(g: int, near: float) -> None:
     # g coefficients of items of their own, all in one table with gaps: independent and
@@ -391,16 +275,6 @@ def test_max_t_of_independent_means_is_tukeys_range(g: int, near: float) -> None
     # as many degrees as the fewest items of a set leave
     expected = stats.studentized_range.ppf(0.95, g, 11) / np.sqrt(2.0)
     assert found.quantile == pytest.approx(expected, rel=near)
-
-
-def test_a_set_that_is_there_twice_has_no_test() -> None:
-    first, second = sets(19, 30, 2)
-    with pytest.warns(UndefinedStatisticWarning, match="never differ"):
-        found = differences("cohen_kappa", [first, second, first])
-    assert found.equality.reason is not None
-    assert np.isnan(found.low[0, 2])
-    assert found.values[0, 2] == 0.0
-    assert found.low[0, 1] < found.values[0, 1] < found.high[0, 1]
 
 
 def over_n(table: list[list[int]]) -> Estimate:

@@ -43,31 +43,6 @@ def test_one_agreeing_pair_by_hand(n_categories: int, a: float) -> None:
     assert ends(result) == pytest.approx(by_hand, abs=1e-12)
 
 
-# Apart it is 2 π_1 π_2 A / (A + 1), and A / (A + 1) = 1 - ρ: the prior of π is lost.
-@pytest.mark.parametrize("a", [1.0, 1 / 6])
-def test_one_disagreeing_pair_by_hand(a: float) -> None:
-    result = posterior(
-        "fleiss_kappa",
-        [["0", "1"]],
-        target="items",
-        categories=SCALE,
-        concentration=a,
-        level=0.9,
-    )
-    by_hand = [1.0 - math.sqrt(1.0 - share) for share in (0.05, 0.95)]
-    assert ends(result) == pytest.approx(by_hand, abs=1e-12)
-
-
-# With Jeffreys' prior that is (1 - ρ) (ρ (1 - ρ))^(-1/2): a Beta(1/2, 3/2), whose
-# distribution function at sin² φ is (2 φ + sin 2φ) / π.
-def test_one_disagreeing_pair_with_jeffreys_prior_by_hand() -> None:
-    result = posterior("fleiss_kappa", [["0", "1"]], target="items", prior="jeffreys")
-    for end, share in zip(ends(result), (0.025, 0.975), strict=True):
-        angle = math.asin(math.sqrt(end))
-        below = (2.0 * angle + math.sin(2.0 * angle)) / math.pi
-        assert below == pytest.approx(share, abs=1e-12)
-
-
 # m items of one rating, all in category 1 of 2, multiply the chance of the agreeing
 # pair by π_1^m: ρ E π_1^(m+1) + (1 - ρ) E π_1^(m+2), with E π_1^t = 1 / (t + 1).
 @pytest.mark.parametrize("m", [0, 1, 7])

@@ -69,42 +69,6 @@ def test_the_density_integrates_to_one(table: Table) -> None:
 
 
 @pytest.mark.parametrize(
-    ("ratings", "what"),
-    [
-        ([["a"] * 3] * 12, "all ratings are in one category"),
-        ([["a"] * 3, ["b"] * 3] * 6, "agreement is perfect in these data"),
-        ([["a", "b", "b"], ["b"] * 3], "2 items are few"),
-        ([["a", "b", "b"]], "1 item is few"),
-    ],
-)
-def test_where_the_prior_weighs_another_stands_beside(
-    ratings: list[list[str]], what: str
-) -> None:
-    result = exact(ratings, ["a", "b", "c"])
-    (note,) = result.notes
-    mine = (
-        f"{result.low:.3f} to {result.high:.3f} with ρ ~ U(0, 1), π ~ Dirichlet(1, ..."
-    )
-    assert note.startswith(f"{what}, so the prior weighs: {mine}")
-    others = [
-        posterior(
-            "fleiss_kappa",
-            ratings,
-            target="items",
-            categories=["a", "b", "c"],
-            **options,
-        )  # type: ignore[arg-type]
-        for options in ({"prior": "jeffreys"}, {"concentration": 1 / 3})
-    ]
-    moves = [
-        max(abs(other.low - result.low), abs(other.high - result.high))
-        for other in others
-    ]
-    other = others[int(np.argmax(moves))]
-    assert f"but {other.low:.3f} to {other.high:.3f} with " in note
-
-
-@pytest.mark.parametrize(
     ("ratings", "reason"),
     [
         ([["a", None], [None, "b"]], "no item has ratings of two raters"),

@@ -8,14 +8,10 @@ from scipy import stats
 
 from masrel.agreement import COEFFICIENTS, IccForm, icc
 from masrel.errors import (
-    MasrelError,
     ParameterError,
-    RatingsError,
-    SmallSampleWarning,
-    UndefinedStatisticWarning,
 )
 from masrel.estimates import Interval
-from masrel.intervals import analytic, bootstrap, difference, estimate, jackknife
+from masrel.intervals import analytic, difference, estimate, jackknife
 
 FORMS: dict[str, IccForm] = {
     name: form
@@ -60,43 +56,6 @@ def test_the_jackknife_is_of_the_coefficient_without_each(
         value = chosen.value
         assert np.tanh((low + high) / 2.0) == pytest.approx(value, rel=1e-9)
         assert (high - low) / 2.0 == pytest.approx(t * error / (1 - value**2), rel=1e-9)
-
-
-@pytest.mark.parametrize("name", ["icc_1", "icc_ck", "icc_a1"])
-def test_the_bootstrap_has_the_quantiles_of_a_loop(name: str) -> None:
-    # Quantiles of 1 500 resamples each are off by some .01; four times as much is let.
-    found = bootstrap(name, RATINGS, target="items", n_resamples=1500, rng=1)
-    rng = np.random.default_rng(2)
-    values = [
-        icc(RATINGS[rng.integers(0, 24, 24)], form=FORMS[name]).value
-        for _ in range(1500)
-    ]
-    low, high = np.quantile(values, [0.025, 0.975])
-    assert (found.low, found.high) == pytest.approx((low, high), abs=0.04)
-    # and where all resamples of few items are taken, of their coefficient
-    three = RATINGS[:3]
-    with pytest.warns(SmallSampleWarning):
-        exact = bootstrap(name, three, target="items")
-    assert exact.distribution is not None
-    values = {
-        round(icc(three[list(rows)], form=FORMS[name]).value, 9)
-        for rows in np.ndindex(3, 3, 3)
-        if len(set(rows)) > 1
-    }
-    shown = {round(float(x), 9) for x in exact.distribution.values}
-    assert values <= shown
-
-
-def test_the_error_of_clusters_is_the_jackknifes_of_many() -> None:
-    rng = np.random.default_rng(6)
-    ratings = rng.normal(size=(600, 1)) + rng.normal(size=(600, 3))
-    clusters = np.repeat(np.arange(300), 2)
-    for name in FORMS:
-        options: Any = {"target": "items", "clusters": clusters}
-        one, other = (of(name, ratings, **options) for of in (analytic, jackknife))
-        assert half(one) == pytest.approx(half(other), rel=0.03)
-        alone = analytic(name, ratings, target="items")
-        assert half(alone) == pytest.approx(half(one), rel=0.2)
 
 
 def test_clustered_intervals_cover() -> None:
@@ -150,24 +109,6 @@ def test_the_interval_that_comes_with_it_answers_with_a_note() -> None:
     assert by_f == icc(RATINGS, interval="F").interval
     by_error = estimate("icc_a1", RATINGS, target="items", method="analytic").interval
     assert by_error == analytic("icc_a1", RATINGS, target="items")
-
-
-def test_what_has_no_such_interval_is_said() -> None:
-    with pytest.raises(RatingsError, match="leave out the items that not every rater"):
-        estimate("icc_a1", GAP, target="items", clusters=PATIENTS)
-    for asked in (
-        {"target": "both", "clusters": PATIENTS},
-        {"target": "raters", "method": "jackknife"},
-    ):
-        with pytest.raises(ParameterError, match='it needs "items"'):
-            estimate("icc_a1", RATINGS, **asked)  # type: ignore[arg-type]
-    nothing = [[None, None], [None, None]]
-    with pytest.warns(UndefinedStatisticWarning):
-        assert jackknife("icc_a1", nothing, target="items").reason
-    with pytest.raises(MasrelError, match="weights: ICC"):
-        jackknife("icc_a1", RATINGS, target="items", weights="linear")
-    with pytest.raises(RatingsError, match="declared scale in order"):
-        jackknife("icc_a1", [["a", "b"], ["b", "b"]], target="items")
 
 
 def test_two_sets_of_raters_are_compared() -> None:

@@ -1,7 +1,6 @@
 """Jackknife intervals against explicit loops of the public functions."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -9,16 +8,12 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from masrel.agreement import (
-    conger_kappa,
     fleiss_kappa,
-    krippendorff_alpha,
-    light_kappa,
     stratified_kappa,
 )
 from masrel.errors import (
     UndefinedStatisticWarning,
 )
-from masrel.estimates import Estimate
 from masrel.intervals import bootstrap, jackknife
 from tests.intervals.data import SCALE, TABLE_V, dirichlet_multinomial
 
@@ -81,23 +76,6 @@ def test_thousands_of_measurements_are_left_out_item_by_item() -> None:
     assert (drawn.low, drawn.high) == pytest.approx(
         (centre - half, centre + half), abs=0.2 * half
     )
-
-
-@few
-@pytest.mark.parametrize(
-    "statistic", [fleiss_kappa, conger_kappa, light_kappa, krippendorff_alpha]
-)
-def test_thousands_of_measurements_are_left_out_rater_by_rater(
-    statistic: Callable[..., Estimate],
-) -> None:
-    x = _measured(3000)
-    x[5, 1] = math.nan
-    values = [
-        statistic(np.delete(x, r, axis=1), weights="quadratic").value for r in range(3)
-    ]
-    half = stats.t.ppf(0.975, 2) * math.sqrt(variance(values))
-    found = jackknife(statistic, x, target="raters", weights="quadratic")
-    assert (found.high - found.low) / 2 == pytest.approx(half, rel=1e-9)
 
 
 @few

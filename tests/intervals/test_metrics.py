@@ -2,7 +2,6 @@
 
 import itertools
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -66,14 +65,3 @@ def test_many_grades_hold_the_ordinal_metric_and_say_so() -> None:
     assert not any("metric" in note for note in few.notes)
     of_delta = analytic("krippendorff_alpha", RATINGS, target="items", metric="ordinal")
     assert any("metric" in note for note in of_delta.notes)
-
-
-def test_the_interval_metric_is_quadratic_weights() -> None:
-    for target in ("items", "raters", "both"):
-        options: dict[str, Any] = {"target": target, "categories": range(1, 6)}
-        by_metric = jackknife(krippendorff_alpha, RATINGS, metric="interval", **options)
-        weighted = jackknife(
-            krippendorff_alpha, RATINGS, weights="quadratic", **options
-        )
-        assert by_metric.low == pytest.approx(weighted.low, rel=1e-9)
-        assert by_metric.high == pytest.approx(weighted.high, rel=1e-9)

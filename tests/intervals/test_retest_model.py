@@ -7,11 +7,10 @@ import pytest
 from numpy.typing import NDArray
 
 from masrel.agreement import stratified_kappa
-from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
+from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.intervals import retest_model
 
 Floats = NDArray[np.float64]
-Table = NDArray[np.int64]
 
 
 def drawn_pairs(
@@ -61,16 +60,6 @@ def test_three_raters_and_four_models_say_how_little_is_known() -> None:
     assert result.raters[0].interval.target == "items"
 
 
-def test_jeffreys_prior_is_what_the_other_prior_was() -> None:
-    study = drawn_pairs(
-        np.random.default_rng(1), np.full(3, 0.6), np.ones((3, 2)) / 2, 5
-    )
-    flat = retest_model(study, categories=[0, 1])
-    other = retest_model(study, categories=[0, 1], prior="jeffreys")
-    assert other.prior == flat.other_prior
-    assert other.kappa.interval.low == pytest.approx(flat.other_kappa.interval.low)
-
-
 def test_gaps_and_raters_without_pairs_are_left_out() -> None:
     full = [["a", "a"], ["b", "b"], ["a", "b"]]
     gaps = [["a", None], ["b", "b"], [None, None]]
@@ -95,8 +84,3 @@ def test_where_there_is_nothing_to_learn_it_is_undefined() -> None:
 def test_what_is_no_question_is_refused(options: dict[str, object]) -> None:
     with pytest.raises(ParameterError):
         retest_model([[["a", "a"], ["b", "b"]]], **options)  # type: ignore[arg-type]
-
-
-def test_what_are_no_pairs_is_refused() -> None:
-    with pytest.raises(RatingsError):
-        retest_model("aabb")

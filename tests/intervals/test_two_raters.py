@@ -1,16 +1,12 @@
 """The posterior of two raters' table: by hand, by other integrals, by drawing it."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.special import betainc, betaincinv, roots_jacobi
 
-from masrel.agreement import COEFFICIENTS
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Interval
 from masrel.intervals import posterior
@@ -18,11 +14,6 @@ from masrel.intervals import posterior
 Floats = NDArray[np.float64]
 
 TAILS = (0.025, 0.975)
-COEFFICIENTS_OF_PAIRS = [
-    name
-    for name, entry in COEFFICIENTS.items()
-    if entry.formula is not None and entry.shape == "ratings" and entry.weighted
-]
 
 
 def pairs(table: list[list[int]]) -> list[list[str]]:
@@ -69,24 +60,6 @@ def test_raters_who_never_agree_are_as_uncertain_as_draws_say(n: int, row: int) 
 
 def ends(result: Interval) -> tuple[float, float]:
     return result.low, result.high
-
-
-def test_raters_who_are_told_apart_in_vain_change_nothing() -> None:
-    entry = COEFFICIENTS["brennan_prediger"]
-    found = [
-        ends(posterior(of, pairs([[2, 3], [1, 1]]), target="items", model="table"))
-        for of in (entry, replace(entry, tells_raters_apart=True))
-    ]
-    assert found[0] == pytest.approx(found[1], abs=1e-9)
-
-
-# One pair in agreement, each of 2 × 2 cells of prior 1/2: the share of agreeing pairs
-# is Beta(1/2 + 1/2 + 1, 1/2 + 1/2), whose distribution function is x²; and
-# Brennan-Prediger's coefficient is 2 x - 1.
-def test_one_agreeing_pair_by_hand() -> None:
-    result = table_posterior("brennan_prediger", [[1, 0], [0, 0]], concentration=0.5)
-    by_hand = [2.0 * math.sqrt(share) - 1.0 for share in TAILS]
-    assert ends(result) == pytest.approx(by_hand, abs=1e-11)
 
 
 TABLE = [[8, 2, 0], [1, 9, 3], [0, 2, 7]]
@@ -219,34 +192,6 @@ def test_seeds_repeat_and_are_recorded() -> None:
     assert one.low != two.low
 
 
-counts = st.integers(0, 12)
-tables_of_two = st.lists(counts, min_size=4, max_size=4).filter(any)
-
-
-@settings(max_examples=15)
-@given(tables_of_two, st.sampled_from(COEFFICIENTS_OF_PAIRS))
-def test_renaming_raters_or_categories_changes_nothing(
-    cells: list[int], coefficient: str
-) -> None:
-    a, b, c, d = cells
-    result = table_posterior(coefficient, [[a, b], [c, d]])
-    for other in ([[a, c], [b, d]], [[d, c], [b, a]]):
-        assert ends(table_posterior(coefficient, other)) == pytest.approx(
-            ends(result), abs=1e-8
-        )
-
-
-def test_the_place_of_a_probability_is_its_quantile_at_every_level() -> None:
-    for level in (0.01, 0.9, 1.0 - 1e-9):
-        prior = np.array([[20, 5], [10, 15]]) + 2.0
-        result = table_posterior(
-            "cohen_kappa", [[20, 5], [10, 15]], concentration=2.0, level=level
-        )
-        shares = [0.5 - 0.5 * level, 0.5 + 0.5 * level]
-        again = [cohen_probability(prior, end) for end in ends(result)]
-        assert again == pytest.approx(shares, abs=1e-10)
-
-
 def test_items_of_a_single_rating_are_left_out() -> None:
     ratings: list[list[str | None]] = [list(row) for row in pairs([[20, 5], [10, 15]])]
     whole = posterior("cohen_kappa", ratings, target="items", model="table")
@@ -287,21 +232,6 @@ def test_where_nothing_can_be_said_it_is_undefined(
         )
     assert math.isnan(result.low)
     assert (result.reason, result.kind) == (reason, "credible")
-
-
-def test_of_two_raters_others_than_fleiss_kappa_have_the_table_by_default() -> None:
-    rows = [[1, 1], [1, 2], [2, 2]] * 4
-    for coefficient, weights in (
-        ("cohen_kappa", "identity"),
-        ("scott_pi", "quadratic"),
-    ):
-        by_table = posterior(
-            coefficient, rows, target="items", weights=weights, model="table"
-        )
-        by_default = posterior(coefficient, rows, target="items", weights=weights)
-        assert by_default == by_table
-        assert "table of two raters" in by_default.method
-    assert "Dirichlet-multinomial" in posterior("scott_pi", rows, target="items").method
 
 
 @pytest.mark.parametrize(

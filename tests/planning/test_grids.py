@@ -44,16 +44,6 @@ def test_one_size_can_be_solved_for_in_every_cell() -> None:
     assert (unreached.reaches_aim, unreached.n_raters) == (False, 60)
 
 
-def test_grids_aim_at_chances_as_a_single_plan_does() -> None:
-    ranges: dict[str, Any] = {"value": 0.6, "n_items": [40, 80], "n_raters": [2, 3]}
-    plans = plan_grid(replace(SOLVED, assurance=0.8), **ranges)
-    assert [p.reaches_aim for p in plans] == [p.assurance >= 0.8 for p in plans]
-    inside = replace(SOLVED, half_width=None, lower=0.3, upper=0.9)
-    powers = plan_grid(replace(inside, power=0.5), **ranges)  # equivalence
-    plans = plan_grid(inside, **ranges)
-    assert [plan.power for plan in powers] == [plan.assurance for plan in plans]
-
-
 @pytest.mark.parametrize(
     ("study", "options", "name"),
     [
@@ -67,12 +57,6 @@ def test_grids_aim_at_chances_as_a_single_plan_does() -> None:
 def test_bad_grids_are_refused(study: Study, options: Any, name: str) -> None:
     with pytest.raises(ParameterError, match=f"^{name}: "):
         plan_grid(study, **options)
-
-
-def test_a_missing_dask_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(ParameterError, match=r'pip install "masrel\[dask\]"'):
-        plan_grid(STUDY, **RANGES, executor="dask")
 
 
 @pytest.fixture

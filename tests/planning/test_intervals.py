@@ -87,16 +87,3 @@ def test_weights_go_by_the_scale_where_it_is_named() -> None:
     assert abs(uneven.expected_half_width - half) > 1e-3
     with pytest.raises(ParameterError, match="categories: needs 3 that differ"):
         precision(Study("cohen_kappa", **{**common, "categories": [0, 1, 1]}))
-
-
-def test_the_coverage_of_one_side_is_that_of_its_bound() -> None:
-    asked = {"n_raters": 3, "n_items": 60, "value": 0.7, "categories": 2, "rng": 3,
-             "model": "mixture", "target": "items", "interval": "t"}  # fmt: skip
-    # the ends of an interval at 90 % are bounds at 95 %
-    both = precision(Study("fleiss_kappa", level=0.9, **asked)).coverage  # type: ignore[arg-type]
-    lower, upper = (
-        precision(Study("fleiss_kappa", sides=1, **side, **asked)).coverage  # type: ignore[arg-type]
-        for side in ({"null": 0.5}, {"null": 0.9})
-    )
-    assert min(lower, upper) > both
-    assert lower + upper - 1.0 == pytest.approx(both, abs=1e-12)

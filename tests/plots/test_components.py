@@ -29,12 +29,6 @@ def test_gaps_are_said_to_need_restricted_likelihood() -> None:
     assert axes.patches[0].get_width() == pytest.approx(icc(gaps).value)
 
 
-def test_what_mean_squares_estimate_below_0_is_0_and_is_said_to_be() -> None:
-    axes = components([[1, 2], [2, 1], [1, 2]], ax=blank())
-    assert [bar.get_width() for bar in axes.patches] == [0.0, 0.0, 1.0]
-    assert "items and raters: less than 0 by mean squares" in axes.get_xlabel()
-
-
 def test_without_variances_the_reason_stands_in_their_place() -> None:
     with pytest.warns(UndefinedStatisticWarning, match="fewer than two items"):
         axes = components([[1, 2]], ax=blank())

@@ -36,12 +36,6 @@ def test_letters_without_a_font_are_said_in_one_sentence_with_the_way_out() -> N
     assert warning.filename == __file__
 
 
-def test_letters_that_another_font_has_are_drawn_with_it() -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        forest(estimate(), [f"DejaVu has no {letter_of_another_font()}"], ax=blank())
-
-
 @pytest.mark.parametrize(("form", "is_said"), [("png", True), ("inline", False)])
 def test_a_page_has_the_letters_of_its_reader(form: str, is_said: bool) -> None:
     rows = (forest_row("경미", estimate()),)

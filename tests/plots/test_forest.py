@@ -69,25 +69,6 @@ def test_what_leaves_the_axis_is_an_arrow_at_its_end(
     assert min(x for _, points in lines(axes) for x, _ in points) >= left
 
 
-def test_zero_is_marked_where_chance_gives_it_alone() -> None:
-    share = estimate(coefficient="percent_agreement")
-    several = [share, estimate(), estimate(), share, estimate()]
-    at_zero = [
-        np.asarray(line.get_xydata())[:, 1].tolist()
-        for line in forest(several, ax=blank()).lines
-        if set(line.get_xdata()) == {0.0}
-    ]
-    assert len(at_zero) == 2  # of two rows that are neighbours, and of the last
-    (top, bottom), (again, end) = at_zero
-    assert bottom - top == pytest.approx(2.0 * (end - again))
-
-
-def test_a_heading_stands_once_above_its_rows() -> None:
-    groups = ["test", "test", "retest"]
-    texts = texts_of(forest([estimate()] * 3, groups=groups, ax=blank()))
-    assert (texts.count("test"), texts.count("retest")) == (1, 1)
-
-
 @pytest.mark.parametrize("names", [{"labels": ["a"]}, {"groups": ["a"] * 3}])
 def test_names_of_others_are_refused(names: dict[str, list[str]]) -> None:
     with pytest.raises(ParameterError, match="needs one for each of 2 estimates, got"):
@@ -159,23 +140,6 @@ def test_few_values_are_stems_as_high_as_their_shares() -> None:
     assert stems(axes) == pytest.approx({-0.2: 0.4, 0.5: 1.0, 1.0: 0.6})
 
 
-def test_values_that_differ_by_rounding_are_one_and_infinite_ones_are_none() -> None:
-    split = one(spread([0.2, 0.5, 0.5 + 1e-13], [0.5, 0.25, 0.25]))
-    assert stems(split) == pytest.approx({0.2: 1.0, 0.5: 1.0})
-    odd = one(spread([-np.inf, 0.2, 0.4, np.inf], [0.1, 0.4, 0.4, 0.1]))
-    assert stems(odd) == pytest.approx({0.2: 1.0, 0.4: 1.0})
-
-
-def test_a_point_mass_among_many_values_stays_a_line_where_it_is() -> None:
-    others = np.linspace(0.001, 0.9, 200)
-    axes = one(spread([*others, 1.0], [0.5 / 200] * 200 + [0.5]))
-    assert stems(axes) == {1.0: 1.0}
-    # the bars hold the other half, in the unit of the stem, which is a half high
-    (line,) = (of for of in axes.collections if isinstance(of, LineCollection))
-    (low, high) = line.get_segments()[0][:, 1]
-    assert bars(axes)[1].sum() == pytest.approx(low - high)
-
-
 @pytest.mark.parametrize(
     ("spread_of", "width"), [(0.1, 0.02), (0.02, 0.005), (1e-5, 1e-3)]
 )
@@ -189,11 +153,6 @@ def test_bars_hold_every_resample_and_are_narrow_where_it_is_narrow(
     np.testing.assert_allclose(np.diff(edges), width)
     expected = np.histogram(values, edges)[0]
     np.testing.assert_allclose(heights / heights.max(), expected / expected.max())
-
-
-def test_no_bar_goes_beyond_perfect_agreement() -> None:
-    edges, _ = bars(one(spread(np.linspace(0.5, 1.0, 101), [1 / 101] * 101)))
-    assert edges[-1] == pytest.approx(1.0)
 
 
 def test_a_density_keeps_its_shape_and_a_faint_tail_needs_no_room() -> None:

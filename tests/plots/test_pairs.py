@@ -38,11 +38,6 @@ def test_what_changes_without_each_rater_stands_in_the_raters_row() -> None:
     np.testing.assert_array_equal(dots.get_xdata(), found.changes[order])
 
 
-def test_two_raters_have_no_panel_as_none_can_go() -> None:
-    axes = pairs(diagnosis(2), ax=blank())
-    assert not any("change" in of.get_xlabel() for of in axes.child_axes)
-
-
 @pytest.mark.parametrize(
     ("n_raters", "reference"), [(2, None), (8, LONG), (16, LONG), (30, None)]
 )

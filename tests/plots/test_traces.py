@@ -9,7 +9,7 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 
 from masrel.errors import ParameterError
-from masrel.lab.elbow import STANDARD_MODELS, ConstantSpeed, Trace, outline, trace
+from masrel.lab.elbow import STANDARD_MODELS, ConstantSpeed, Trace, trace
 from masrel.plots import traces
 from tests.plots.made import blank, overlaps, texts_of
 
@@ -60,16 +60,6 @@ def test_phases_differ_in_colour_and_in_style_and_the_legend_has_those_there_are
     assert slow.get_legend() is None
 
 
-def test_no_line_joins_one_stretch_to_the_next() -> None:
-    several = [stretch(speed) for speed in (60.0, 120.0)]
-    lines = traces(several, ax=blank()).lines
-    assert not any(
-        (np.diff(of.get_xdata()) < 0.0).any()
-        for of in lines
-        if of.get_marker() == "None"
-    )
-
-
 @pytest.mark.parametrize("speeds", [(60, 92, 120), range(60, 120, 4), (92,) * 5])
 @pytest.mark.parametrize("quantity", ["torque", "angle"])
 def test_names_lie_on_none_other(speeds: tuple[int, ...], quantity: str) -> None:
@@ -77,12 +67,6 @@ def test_names_lie_on_none_other(speeds: tuple[int, ...], quantity: str) -> None
     axes = traces([stretch(of) for of in speeds], labels=labels, quantity=quantity)
     assert overlaps(axes) == []
     assert sorted(of for of in texts_of(axes) if of in labels) == sorted(labels)
-
-
-def test_points_of_the_exact_law_are_drawn_as_well() -> None:
-    motion = ConstantSpeed(start=radians(30), end=radians(146), speed=radians(92))
-    line = outline(STANDARD_MODELS["HM3"], motion, n_points=50)
-    assert drawn(traces(line, ax=blank()))[:, 1].max() == line.torque.max()
 
 
 @pytest.mark.parametrize(

@@ -217,22 +217,6 @@ def test_a_column_of_such_a_name_is_no_rater(tmp_path: Path, name: str) -> None:
         assert not file.warnings
 
 
-def test_a_reference_is_not_advised_away(tmp_path: Path) -> None:
-    text = "item,gold,Kim,Kim_conf\n1,a,a,50%\n2,b,b,60%\n3,a,b,70%\n4,b,b,80%\n"
-    with pytest.raises(RatingsError, match="--ignore Kim_conf leaves") as refused:
-        read(tmp_path, text, reference="gold")
-    assert "gold" not in str(refused.value)
-
-
-@pytest.mark.parametrize(
-    "cells", [["n/a", "?", "", "x", "-"], ["True", "True", "False", "True", "False"]]
-)
-def test_a_name_comes_before_what_cells_are(tmp_path: Path, cells: list[str]) -> None:
-    for name in ("comment", "agree"):
-        with pytest.raises(RatingsError, match=f"--ignore {name} leaves"):
-            read(tmp_path, beside(name, cells))
-
-
 @pytest.mark.parametrize(
     ("text", "is_refused"),
     [
@@ -392,17 +376,6 @@ def test_sides_of_a_table_with_names_of_raters(
         read(tmp_path, text)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        ",rater 1,rater 2\nitem 1,1,1\nitem 2,2,1\n",
-        ",Kim a,Kim b\nLee a,x,y\nLee b,y,x\n",
-    ],
-)
-def test_numbered_items_and_raters_are_no_sides(tmp_path: Path, text: str) -> None:
-    assert read(tmp_path, text).read["n_items"] == 2
-
-
 # ---- criteria beside each other ----
 
 BOTH = ["1,1,3,2", "2,2,1,1", "2,1,3,3", "3,3,2,1"]
@@ -470,22 +443,6 @@ def test_criteria(
 
 
 @pytest.mark.parametrize(
-    ("names", "options", "raters"),
-    [
-        # who rates is named, and what is of others is left aside
-        ("tone_Ines,tone_Omar,gait_Ines,x", {"raters": "Ines,Omar"}, [2, 1]),
-        ("tone_Ines,tone_Omar,tone_Yun,gait_Ines", {"raters": "Ines,Yun"}, [2, 1]),
-        ("tone_Ines,x,gait_Ines,y", {"raters": "Ines", "ignore": "x,y"}, [1, 1]),
-    ],
-)
-def test_criteria_of_raters_who_are_named(
-    tmp_path: Path, names: str, options: dict[str, Any], raters: list[int]
-) -> None:
-    file = read(tmp_path, criteria(names), by_criterion=True, **options)
-    assert [len(part.raters) for part in file.parts] == raters
-
-
-@pytest.mark.parametrize(
     "names",
     [
         "R1_a,R2_b,R3_c,R4_d",
@@ -518,26 +475,3 @@ def test_criteria_that_are_refused(
 ) -> None:
     with pytest.raises((RatingsError, ParameterError), match=words):
         read(tmp_path, criteria(names), by_criterion=True, **options)
-
-
-def test_criteria_of_other_grades_are_refused(tmp_path: Path) -> None:
-    text = criteria(TURNED, ["1,1,u,v", "1,2,v,v", "2,2,u,u"])
-    with pytest.raises(RatingsError, match="'tone' has no grade in common"):
-        read(tmp_path, text, by_criterion=True)
-
-
-def test_criteria_are_told_apart_from_timings(tmp_path: Path) -> None:
-    # columns of which most share no grade are no criteria
-    rows = ["1,2,0.1,x", "2,1,0.7,y", "1,1,2.2,z"]
-    with pytest.raises(RatingsError, match=r"in common.*--ignore"):
-        read(tmp_path, criteria("Q1_a,Q2_a,Q1_b,Q2_b", rows))
-
-
-def test_criteria_are_compared(tmp_path: Path, masrel: Caller) -> None:
-    path = tmp_path / "r.csv"
-    path.write_text(criteria(TURNED))
-    done = masrel("compare", path, "--by-criterion", "--json", "-")
-    (row, *_) = json.loads(done.out)["differences"]
-    assert (row["first"], row["second"], row["value"]) == ("tone", "gait", 0.25)
-    assert row["design"] == "dependent"
-    assert "--by: needs" in masrel("compare", path, "--raters", TURNED).err

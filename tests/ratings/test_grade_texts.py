@@ -7,7 +7,6 @@ import pytest
 
 from masrel.errors import ParameterError, RatingsError
 from masrel.ratings import RatingsFile, Reading, read_ratings
-from tests.cli.process import Caller
 
 
 def read(
@@ -197,17 +196,3 @@ def test_numbers_of_items_with_thousands(
 def test_options_that_contradict_each_other(options: dict[str, Any]) -> None:
     with pytest.raises(ParameterError, match=f"--{next(iter(options))[:3]}"):
         Reading(**options)
-
-
-def test_a_metric_of_sets_is_not_nominal_in_silence(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    path = tmp_path / "r.csv"
-    path.write_text('item,K,L\na,"x, y",x\nb,y,y\nc,"x,y","y,x"\nd,y,x\n', "utf-8")
-    call = ("agree", path, "--metric", "jaccard")
-    asked = masrel(*call)
-    assert (asked.code, "--set-separator" in asked.err) == (2, True)
-    # of 8: x 2, y 3, xy 3; D_o = (1/2 + 1)/4, D_e = (6 + 6/2 + 9/2)/28
-    for more in ((), ("--stream",)):
-        done = masrel(*call, "--set-separator", ",", *more, "--sentence")
-        assert ".22" in done.out

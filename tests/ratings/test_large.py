@@ -137,25 +137,6 @@ def test_both_ways_are_one(tmp_path: Path, name: str, ending: str) -> None:
     assert_same(*both(written(tmp_path / f"r.{ending}", columns), **options))
 
 
-def test_cells_of_every_type_are_the_texts_they_are(tmp_path: Path) -> None:
-    columns = {
-        "id": pyarrow.array([3, 1, 2, 9], pyarrow.int32()),
-        "A": pyarrow.array([1.0, None, 2.5, float("nan")], pyarrow.float32()),
-        "B": pyarrow.array([1, 2, None, 1], pyarrow.int64()),
-        "C": pyarrow.array(["1", "2.50", "NA", None]).dictionary_encode(),
-        "D": pyarrow.array([1, 2, 1, 2], pyarrow.uint16()),
-    }
-    assert_same(*both(written(tmp_path / "wide.parquet", columns)))
-
-
-def test_names_of_rows_that_pandas_keeps_are_items(tmp_path: Path) -> None:
-    pandas = pytest.importorskip("pandas")
-    frame = pandas.DataFrame(made(5), columns=list("ABCD"))
-    frame.index = [f"p{k}" for k in range(400)]
-    frame.to_parquet(tmp_path / "wide.parquet")
-    assert_same(*both(tmp_path / "wide.parquet"))
-
-
 @pytest.mark.parametrize("ending", ["parquet", "csv"])
 @pytest.mark.parametrize(
     ("names", "codes"),
@@ -200,13 +181,6 @@ def test_many_items_are_told_apart_without_their_names(
     streamed, whole = both(path, **options)
     assert streamed.warnings[-1].code == "stream"
     assert_same(replace(streamed, warnings=whole.warnings), whole)
-
-
-def test_simulated_ratings_are_labelled(tmp_path: Path) -> None:
-    columns = long_columns(None, list(range(400)))
-    columns["source"] = ["rater"] * (len(columns["rater"]) - 1) + ["simulated"]
-    streamed, _ = both(written(tmp_path / "long.parquet", columns))
-    assert streamed.simulated
 
 
 @pytest.mark.parametrize(
@@ -266,51 +240,7 @@ def test_a_second_line_of_names_is_refused(
         read_ratings(path, Reading(stream=True))
 
 
-def test_a_row_of_which_some_cells_are_names_is_a_row(tmp_path: Path) -> None:
-    path = tmp_path / "long.csv"
-    path.write_text("item,rater,grade\n1,A,a\n1,B,grade\n2,rater,grade\n2,A,a\n")
-    assert_same(*both(path))
-
-
 HEAD = "id,A,B\n" + "".join(f"p{k},{k % 3},{k // 2 % 3}\n" for k in range(500))
-
-
-@pytest.mark.parametrize("end", ["\n", "\r\n"])
-@pytest.mark.parametrize("comment", ["", "# of a trial\n"])
-def test_a_text_with_lines_that_end_so(tmp_path: Path, end: str, comment: str) -> None:
-    path = tmp_path / "wide.csv"
-    path.write_bytes((comment + HEAD).replace("\n", end).encode())
-    streamed, whole = both(path)
-    assert whole.read["n_ratings"] == 1000
-    assert_same(streamed, whole)
-
-
-@pytest.mark.parametrize(
-    ("above", "options"),
-    [
-        ("Table S3.\n", {"skip": 1}),
-        (",Kim,Kim\n", {"header": (1, 2)}),
-    ],
-)
-def test_lines_above_are_told_by_options(
-    tmp_path: Path, above: str, options: dict[str, Any]
-) -> None:
-    path = tmp_path / "wide.csv"
-    path.write_text(above + HEAD)
-    assert_same(*both(path, **options))
-
-
-def test_a_text_with_notes_below_is_read_as_a_whole(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(_large, "_HEAD_BYTES", 1000)
-    monkeypatch.setattr("masrel.ratings._reader._LARGE_TEXT", 1000)
-    path = tmp_path / "wide.csv"
-    path.write_text(HEAD + "\nSource: the registry\n")
-    file = read_ratings(path)
-    assert not is_streamed(file)
-    assert file.read["n_ratings"] == 1000
-    assert [finding.code for finding in file.warnings] == ["note below"]
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
@@ -348,20 +278,6 @@ def test_what_needs_the_whole_file_is_no_stream(
         read_ratings(path, Reading(stream=True, **options))
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [({}, "is damaged, or no .parquet file"), ({"skip": 1}, "--stream: needed")],
-)
-def test_a_damaged_file_and_one_whose_names_are_in_no_line(
-    tmp_path: Path, options: dict[str, Any], words: str
-) -> None:
-    path = written(tmp_path / "long.parquet", long_columns(None, list(range(400))))
-    data = path.read_bytes()
-    path.write_bytes(data[:40] + bytes(40) + data[80:])
-    with pytest.raises(RatingsError, match=words):
-        read_ratings(path, Reading(stream=True, **options))
-
-
 def test_a_packed_file_is_no_stream(tmp_path: Path) -> None:
     path = tmp_path / "wide.csv.gz"
     path.write_bytes(gzip.compress(b"id,A,B\np1,1,2\n"))
@@ -373,21 +289,6 @@ def test_a_packed_file_is_no_stream(tmp_path: Path) -> None:
 
 
 class TestSize:
-    def test_large_are_streams(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        grades = made(1)
-        columns = {"id": np.arange(400)}
-        columns |= {name: grades[:, j] for j, name in enumerate("ABCD")}
-        for ending, limit in (
-            ("parquet", "_large._LARGE_TABLE"),
-            ("csv", "_reader._LARGE_TEXT"),
-        ):
-            path = written(tmp_path / f"wide.{ending}", columns)
-            assert not is_streamed(read_ratings(path))
-            monkeypatch.setattr(f"masrel.ratings.{limit}", 1000)
-            assert is_streamed(read_ratings(path))
-
     def test_more_grades_than_a_stream_counts_are_read_as_a_whole(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -410,14 +311,6 @@ class TestSize:
             read_ratings(path, Reading(stream=True))
         monkeypatch.setattr(_large, "_LARGE_TABLE", 1000)
         assert not is_streamed(read_ratings(path))
-
-
-def test_progress_ends_with_the_whole_file(tmp_path: Path) -> None:
-    path = written(tmp_path / "long.parquet", long_columns(None, list(range(400))))
-    steps: list[tuple[int, int]] = []
-    read_ratings(path, Reading(stream=True), progress=lambda *step: steps.append(step))
-    size = path.stat().st_size
-    assert steps[-1] == (size, size)
 
 
 def test_ctrl_c_leaves_no_file_behind(

@@ -145,13 +145,6 @@ def test_a_refusal_names_the_option_that_reads_the_table(
     assert done.code == 0, done.err
 
 
-def test_a_title_of_rows_without_names(tmp_path: Path) -> None:
-    text = f"Title\n\n{ROWS}"
-    with pytest.raises(RatingsError, match="--skip 2 "):
-        read(tmp_path, text, ".csv", no_header=True)
-    assert read(tmp_path, text, ".csv", no_header=True, skip=2).read["n_items"] == 3
-
-
 @pytest.mark.parametrize(
     ("text", "options", "words"),
     [
@@ -190,32 +183,6 @@ def test_where_no_names_are(
 def test_options_that_contradict(options: dict[str, Any], words: str) -> None:
     with pytest.raises(ParameterError, match=words):
         Reading(**options)
-
-
-def test_a_lone_rating_is_no_note(tmp_path: Path) -> None:
-    text = "Kim,Lee\nmild,low\nlow,low\n\nmild,\n"
-    assert read(tmp_path, text, ".csv", no_item=True).read["grades"]["mild"] == 2
-
-
-@pytest.mark.parametrize(
-    ("options", "raters"),
-    [
-        ({"raters": "V1,V2"}, ["V1", "V2"]),
-        ({"ignore": "Q"}, ["V1", "V2"]),
-    ],
-)
-def test_names_of_columns_that_are_not_used(
-    tmp_path: Path, options: dict[str, Any], raters: list[str]
-) -> None:
-    text = 'item,Q,V1,Q,V2\na,x,1,"two\nlines",2\nb,y,2,z,2\n'
-    assert read(tmp_path, text, ".csv", **options).read["raters"] == raters
-    text = text.replace("Q,V2", ",V2")  # no name at all
-    assert read(tmp_path, text, ".csv", raters="V1,V2").read["raters"] == ["V1", "V2"]
-
-
-def test_names_on_two_lines_are_on_one(tmp_path: Path) -> None:
-    file = read(tmp_path, 'item,"Rater\r\n Ines",Omar\na,1,2\nb,1,1\n', ".csv")
-    assert file.read["raters"] == ["Rater Ines", "Omar"]
 
 
 def packed(path: Path, text: str) -> None:

@@ -3,7 +3,6 @@
 import gzip
 import hashlib
 import io
-import json
 import os
 import re
 import sys
@@ -13,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from masrel.agreement import CodedRatings, CountedRatings, fleiss_kappa
+from masrel.agreement import CountedRatings, fleiss_kappa
 from masrel.errors import ParameterError, RatingsError
 from masrel.ratings import RatingsFile, Reading, read_ratings
 from masrel.scales import MODIFIED_ASHWORTH
@@ -381,31 +380,6 @@ def test_scales(
     assert file.read["scale"]["declared"] is bool(options)
 
 
-ANGLES = "".join(f"i{k},{k + 0.25},{k + 0.5}\n" for k in range(40))
-BORG = "".join(f"i{k},{k},{k + 1}\n" for k in range(6, 20))
-
-
-@pytest.mark.parametrize(
-    ("text", "code", "is_warned"),
-    [
-        ("item,A,B\n" + ANGLES, "measurements", True),
-        # 15 grades of Borg's scale once or twice each
-        ("item,A,B\n" + BORG, "measurements", False),
-    ],
-)
-def test_what_is_warned_of(
-    tmp_path: Path, text: str, code: str, is_warned: bool
-) -> None:
-    warnings = read(tmp_path, text).warnings
-    assert (code in [warning.code for warning in warnings]) is is_warned
-
-
-def test_measurements_of_a_declared_scale_are_grades(tmp_path: Path) -> None:
-    declared = sorted(set(re.findall(r"[\d.]+(?=[,\n])", ANGLES)), key=float)
-    categories = [number for number in declared if "." in number]
-    assert not read(tmp_path, "item,A,B\n" + ANGLES, categories=categories).warnings
-
-
 @pytest.mark.parametrize("stream", [False, True])
 def test_the_hash_is_that_of_the_file(tmp_path: Path, stream: bool) -> None:
     if stream:
@@ -436,32 +410,6 @@ def test_standard_input_and_pipes(
         writer.start()
         assert grades_of(read_ratings(tmp_path / "pipe")) == [TABLE]
         writer.join()
-
-
-def test_many_columns_and_rows(tmp_path: Path) -> None:
-    header = ",".join(["item", *(f"r{k}" for k in range(1200))])
-    rows = [
-        f"i{k}," + ",".join(str((k + j) % 3) for j in range(1200)) for k in range(30)
-    ]
-    ratings = read(tmp_path, "\n".join([header, *rows])).parts[0].ratings
-    assert isinstance(ratings, CodedRatings)
-    assert ratings.codes.tolist() == [
-        [(k + j) % 3 for j in range(1200)] for k in range(30)
-    ]
-
-
-def test_options_are_repeated_on_the_command_line(
-    tmp_path: Path, masrel: Caller
-) -> None:
-    path = tmp_path / "r.csv"
-    path.write_text('id,"Kim, A",Lee,Oh,age\nA,1,1,9,61\nB,2,x,2,61\n')
-    done = masrel(
-        *("agree", path, "--raters", "Kim, A,Lee", "--raters", "Oh"),
-        *("--missing", "9", "--missing", "x,y", "--json", "-"),
-    )
-    record = json.loads(done.out)["read"]
-    assert record["raters"] == ["Kim, A", "Lee", "Oh"]
-    assert record["missing"] == {"9": 1, "x": 1}
 
 
 @pytest.mark.parametrize(

@@ -132,6 +132,12 @@ def floats(path: Path) -> None:
     arrow(path, {"item": ["A", "B"], "Kim": single, "Lee": [0.1, 2.5]})
 
 
+def sas(path: Path) -> None:
+    pytest.importorskip("pyreadstat")
+    packed = Path(__file__).parent / "sas" / "hadley.sas7bdat.gz"
+    path.write_bytes(gzip.decompress(packed.read_bytes()))
+
+
 BLANKS = [[], [], *[["", *row[:2], None, row[2]] for row in WIDE]]
 BLANKS[5] = [*BLANKS[5][:2], "n/a", *BLANKS[5][3:]]  # row 6 of the sheet
 ERRORS = [*WIDE, ["D", "#N/A", "=1/0"], ["E", "1", "#N/A"], ["F", "1", 't="e"']]
@@ -251,6 +257,10 @@ READ: dict[str, tuple[str, Write, dict[str, Any], Any, dict[str, Any]]] = {
         "dta",
         partial(statistical, frame=STATA, missing_user_values={"grade": ["a"]}),
         *({}, EXPECTED, {}),
+    ),
+    "SAS": (
+        *("sas7bdat", sas, {"item": "id", "ignore": ["workshop", "gender"]}),
+        *({"1": 6, "2": 4, "3": 4, "4": 8, "5": 9}, {"n_missing": 1}),
     ),
     "an encoding": ("sav", statistical, {"encoding": "UTF-8"}, EXPECTED, {}),
 }
@@ -380,11 +390,6 @@ def test_names_in_each_other(
     assert grades(file) == (expected or OF_NESTED)
 
 
-def test_lines_of_nested_json(tmp_path: Path) -> None:
-    text(tmp_path / "r.jsonl", "\n".join(map(json.dumps, OBJECTS)))
-    assert grades(read_ratings(tmp_path / "r.jsonl")) == OF_NESTED
-
-
 @pytest.mark.parametrize(
     ("value", "words"),
     [
@@ -464,23 +469,6 @@ def test_what_is_refused(
     with pytest.raises((RatingsError, ParameterError), match=words) as refusal:
         read_ratings(path, Reading(**options))
     assert "\n" not in str(refusal.value)
-
-
-def test_a_table_of_sas(tmp_path: Path) -> None:
-    pytest.importorskip("pyreadstat")
-    packed = Path(__file__).parent / "sas" / "hadley.sas7bdat.gz"
-    rows = ("1151", "2141", "2243", "31 3", "4524", "5455", "5344", "4555")
-    answers = {
-        (f"{item}", f"q{k}"): None if cell == " " else cell
-        for item, row in enumerate(rows, start=1)
-        for k, cell in enumerate(row, start=1)
-    }
-    options: dict[str, Any] = {"item": "id", "ignore": ["workshop", "gender"]}
-    assert grades(read_ratings(packed, Reading(**options))) == answers
-    path = tmp_path / "r.sas7bdat"
-    path.write_bytes(gzip.decompress(packed.read_bytes())[:70_000])
-    with pytest.raises(RatingsError, match=r"r\.sas7bdat: is damaged"):
-        read_ratings(path, Reading(**options))
 
 
 LIBRARIES = {

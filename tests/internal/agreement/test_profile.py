@@ -46,13 +46,3 @@ def test_ends_are_where_the_deviance_is_a_quantile_higher(
             assert above <= stats.chi2.ppf(level, 1) + 1e-6
         else:
             assert above == pytest.approx(stats.chi2.ppf(level, 1), abs=2e-4)
-
-
-def test_many_tables_have_the_ends_of_each() -> None:
-    rng = np.random.default_rng(1)
-    squares = tuple(scale * rng.chisquare(4, (3, 5)) for scale in (3.0, 2.0, 0.5))
-    low, high = profile_ends(20, 3, squares, 0.9)
-    assert low.shape == (3, 5)
-    for place in np.ndindex(3, 5):
-        one = profile_ends(20, 3, tuple(of[place] for of in squares), 0.9)  # type: ignore[arg-type]
-        assert one == pytest.approx((low[place], high[place]), abs=1e-12)

@@ -105,16 +105,6 @@ def positions(density: LatentDensity, n: int) -> Floats:
     return density.start() + scatter
 
 
-def test_items_that_ratings_tell_apart_are_placed_by_them() -> None:
-    like = LatentDensity.of(RATINGS, 5, LatentPrior())
-    # the grades of the first lie around 0 | 1, of the second around 2 | 3, of the third
-    # around 3 | 4; the last has one grade
-    assert like.placed.tolist() == [True, True, True, False]
-    assert like.threshold_weights.tolist() == [
-        [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1], [0, 0, 0, 0],
-    ]  # fmt: skip
-
-
 @pytest.mark.parametrize("prior", PRIORS)
 @pytest.mark.parametrize("n_categories", [3, 5, 6])
 def test_density_is_the_textbook_one(prior: LatentPrior, n_categories: int) -> None:
@@ -127,16 +117,6 @@ def test_density_is_the_textbook_one(prior: LatentPrior, n_categories: int) -> N
 
 
 @pytest.mark.parametrize("prior", PRIORS)
-def test_two_grades_have_one_threshold(prior: LatentPrior) -> None:
-    codes = np.array([[0, 1], [1, 1]])
-    density = LatentDensity.of(codes, 2, prior)
-    assert density.n_dimensions == 2 + 4 + 3 + 1
-    x = positions(density, 6)
-    off = density.log_density(x) - [textbook(row, codes, 2, prior) for row in x]
-    assert np.ptp(off) < 1e-6
-
-
-@pytest.mark.parametrize("prior", PRIORS)
 @pytest.mark.parametrize("n_categories", [2, 3, 6])
 def test_slopes_are_those_of_the_density(prior: LatentPrior, n_categories: int) -> None:
     codes = np.minimum(RATINGS, n_categories - 1)
@@ -145,15 +125,6 @@ def test_slopes_are_those_of_the_density(prior: LatentPrior, n_categories: int) 
     for k, h in enumerate(1e-5 * np.eye(density.n_dimensions)):
         numerical = (density.log_density(x + h) - density.log_density(x - h)) / 2e-5
         assert density.gradient(x)[:, k] == pytest.approx(numerical, rel=1e-6, abs=1e-6)
-
-
-def test_thresholds_ascend_around_the_one_that_halves_the_ratings() -> None:
-    density = LatentDensity.of(np.array([[4, 4, 3], [4, 3, 3]]), 6, LatentPrior())
-    assert density.middle == 3  # three ratings below it, three above
-    x = positions(density, 5)
-    traits = density.traits(x)
-    assert (np.diff(traits.thresholds, axis=1) > 0).all()
-    assert traits.thresholds[:, 3] == pytest.approx(x[:, -5])
 
 
 def test_far_out_the_density_is_zero_and_not_nan() -> None:

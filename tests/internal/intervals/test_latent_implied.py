@@ -4,19 +4,15 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy import stats
 
 from masrel.intervals.latent._implied import (
-    Agreement,
     agreement_on_items,
     agreement_on_new_items,
     grade_probabilities,
     replicate,
 )
 from masrel.intervals.latent._model import Traits
-
-Floats = NDArray[np.float64]
 
 
 def one(
@@ -48,15 +44,6 @@ CASES = [
     (0.97, 0.9, 1.0, [0.1]),
     (0.8, 0.4, 1.9, [-1.1, 0.2, 0.4]),
 ]
-
-
-@pytest.mark.parametrize("rho", [0.05, 0.5, 0.9, 0.98])
-def test_two_halves_have_the_arcsine_of_the_correlation(rho: float) -> None:
-    # Sheppard: both of two normals with correlation ρ below 0: 1/4 + asin(ρ) / (2 π).
-    result = agreement_on_new_items(one(rho, 0.4, 1e-9, [0.0]))
-    assert result.observed[0] == pytest.approx(0.5 + math.asin(rho) / math.pi, abs=1e-7)
-    assert result.chance[0] == pytest.approx(0.5)
-    assert result.kappa[0] == pytest.approx(2 * math.asin(rho) / math.pi, abs=2e-7)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -108,16 +95,3 @@ def test_these_items_agree_with_simulated_raters(
     for k in range(len(tau) + 1):
         share = float((codes[:, 1] == k).mean())
         assert p[1, k] == pytest.approx(share, abs=4.5 * 0.5 / math.sqrt(2 * n))
-
-
-def test_alike_items_have_kappa_0_and_sure_raters_kappa_1() -> None:
-    alike = agreement_on_items(one(0.5, 0.5, 0.3, [-1.0, 1.0], (0.2, 0.2)))
-    assert alike.kappa[0] == pytest.approx(0.0, abs=1e-15)
-    sure = one(1 - 1e-14, 0.5, 0.3, [-1.0, 1.0], (-2.0, 0.0, 2.0))
-    assert agreement_on_items(sure).kappa[0] == pytest.approx(1.0)
-    assert agreement_on_new_items(sure).kappa[0] == pytest.approx(1.0, abs=1e-4)
-
-
-def test_where_all_are_in_one_category_kappa_is_0_and_not_nan() -> None:
-    result = Agreement.of(np.array([[1.0, 0.0, 0.0]]), np.array([0.0]))
-    assert result.kappa.tolist() == [0.0]

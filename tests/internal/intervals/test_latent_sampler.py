@@ -7,12 +7,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from masrel.errors import ConvergenceError
 from masrel.intervals import LatentPrior
 from masrel.intervals.latent._model import LatentDensity, grade_shares
 from masrel.intervals.latent._sampler import (
     Chains,
-    hamiltonian_proposal,
     quantile_error,
     sample_smooth,
 )
@@ -66,41 +64,6 @@ def test_quantiles_of_a_normal_are_within_their_errors_and_repeat() -> None:
     assert drawn(1).positions.tobytes() == result.positions.tobytes()
 
 
-def test_a_leapfrog_back_leads_home_and_keeps_volume() -> None:
-    density, step = Normal(), 0.3
-
-    class Fixed:
-        """Random numbers that are handed in."""
-
-        def __init__(self, momentum: Floats) -> None:
-            self.momentum = momentum
-
-        def standard_normal(self, _: object) -> Floats:
-            return self.momentum
-
-        def uniform(self, size: tuple[int, int]) -> Floats:
-            return np.full(size, 0.3)
-
-    def moved(x: Floats, p: Floats) -> tuple[Floats, Floats]:
-        # the way from (x, p), whose end's momentum shows by going on backwards
-        propose = hamiltonian_proposal(density.gradient, np.eye(3), step)
-        return propose(x[None], Fixed(p[None]))  # type: ignore[arg-type]
-
-    x, p = np.array([0.3, -0.2, 0.05]), np.array([0.5, 1.0, -0.7])
-    length, leaps = 1.15 * step * 0.27 ** (0.3**1.5), 7
-    end, momentum = x.copy(), p.copy()
-    for _ in range(leaps):  # Neal's eqs. 5.18 to 5.20, one by one
-        momentum = momentum + 0.5 * length * density.gradient(end[None])[0]
-        end = end + length * momentum
-        momentum = momentum + 0.5 * length * density.gradient(end[None])[0]
-    there, factor = moved(x, p)
-    assert there[0] == pytest.approx(end)
-    assert factor[0] == pytest.approx(0.5 * (p @ p) - 0.5 * (momentum @ momentum))
-    back, factor_back = moved(end, -momentum)
-    assert back[0] == pytest.approx(x)
-    assert factor_back[0] == pytest.approx(-factor[0])
-
-
 def prior_only(prior: LatentPrior) -> LatentDensity:
     """Four grades, two items, two raters, and no rating."""
     return LatentDensity.of(np.full((2, 2), -1), 4, prior)
@@ -150,21 +113,3 @@ def test_sampling_without_data_gives_the_prior_back(
     # 4.5 errors, 40 times: once in 3700 runs of other seeds
     for k, law in enumerate(laws):
         assert misses(result.values["unknowns"][..., k], law.ppf) < 4.5
-
-
-def test_progress_counts_every_step_and_few_positions_are_kept() -> None:
-    seen: list[tuple[int, int]] = []
-
-    def strange(position: Floats) -> dict[str, Floats]:
-        # never converged: each chain has a value of its own
-        each = np.arange(len(position))[:, None, None]
-        return {"strange": each + 0.01 * position[:, :, :1]}
-
-    rng = np.random.default_rng(1)
-    with pytest.raises(ConvergenceError):
-        sample_smooth(
-            Normal(), strange, rng.normal(size=(8, 3)),
-            generator=rng, n_steps=500, max_steps=4000,
-            progress=lambda *counts: seen.append(counts),
-        )  # fmt: skip
-    assert seen[-1][0] == 180 + 4000

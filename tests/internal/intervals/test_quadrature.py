@@ -24,7 +24,7 @@ def stirling(n: int) -> list[int]:
     return row
 
 
-@pytest.mark.parametrize(("n", "m"), [(5, 2), (40, 40), (700, 300)])
+@pytest.mark.parametrize(("n", "m"), [(5, 2), (40, 40), (300, 120)])
 def test_a_product_has_every_digit_of_its_integers(n: int, m: int) -> None:
     # times t!, as moments are, which no float holds
     of_n, of_m = (

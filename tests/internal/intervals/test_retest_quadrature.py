@@ -48,16 +48,6 @@ def test_shares_integrate_out_as_by_brute_force(table: Table) -> None:
         assert ours == pytest.approx(textbook_likelihood(table, kappa), rel=1e-8)
 
 
-def test_one_pair_by_hand() -> None:
-    # Equal grades of two categories: Σ_k ∫ (κ π_k + (1 - κ) π_k²) over one k:
-    # κ E[π] + (1 - κ) E[π²] = κ / 2 + (1 - κ) / 3.
-    equal = np.exp(_RaterPairs.of(np.array([[1, 0], [0, 0]]), 1.0).log_weights)
-    assert equal == pytest.approx([1 / 2, 1 / 3])
-    # Unequal: (1 - κ) E[π (1 - π)] = (1 - κ) / 6.
-    unequal = np.exp(_RaterPairs.of(np.array([[0, 1], [0, 0]]), 1.0).log_weights)
-    assert unequal == pytest.approx([1 / 6])
-
-
 def weighted_draws(
     tables: list[Table], rng: np.random.Generator, n: int
 ) -> tuple[Floats, Floats]:
