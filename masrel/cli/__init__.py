@@ -58,7 +58,7 @@ GROUPS = {
         "analyze": "Compute the agreement tables a study asks for.",
         "grading": "Regress grades on the models' parameters and the speed.",
         "report": "Write the report of a study.",
-        "export": "Write a study as BIDS, Psych-DS, a data package or an RO-Crate.",
+        "export": "Write a study as BIDS or as an RO-Crate.",
         "checklist": "Fill a reporting guideline, GRRAS or COSMIN, from the record.",
         "verify": "Hold every file of a study against the one before it.",
         "withdraw": "Record that a rater has left; the grades are kept.",

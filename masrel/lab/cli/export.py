@@ -16,8 +16,8 @@ from masrel.lab.protocol import StudyPaths, read_protocol
     "--as",
     "form",
     required=True,
-    type=click.Choice(["bids", "psych-ds", "datapackage", "ro-crate"]),
-    help="BIDS, Psych-DS, a data package of Frictionless, or an RO-Crate.",
+    type=click.Choice(["bids", "ro-crate"]),
+    help="BIDS, or an RO-Crate.",
 )
 @click.option(
     "-o",

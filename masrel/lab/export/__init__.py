@@ -1,7 +1,7 @@
 """A study in forms that archives and other programs read.
 
-In: a study with ratings. Out: a folder in the form of BIDS, Psych-DS, Frictionless or
-RO-Crate, without what is private.
+In: a study with ratings. Out: a folder in the form of BIDS or RO-Crate, without what is
+private.
 """
 
 from masrel.lab.export._exporting import EXPORT_FORMS, export_study
