@@ -4,9 +4,14 @@ In: a study. Out: the items of a guideline, each with what masrel knows of it an
 files that say so; what only the authors know is left to them.
 """
 
-from masrel.lab.checklist._checklist_forms import checklist_markdown, write_checklist
-from masrel.lab.checklist._filling import GUIDELINES, Checklist, fill_checklist
-from masrel.lab.checklist._guidelines import ChecklistItem
+from masrel.lab.checklist._guidelines import (
+    GUIDELINES,
+    Checklist,
+    ChecklistItem,
+    checklist_markdown,
+    fill_checklist,
+    write_checklist,
+)
 
 __all__ = [
     "GUIDELINES",

@@ -1,26 +1,28 @@
-"""Guidelines: the items of each, and what the record of a study says to them.
+"""Checklists of guidelines: what is asked for, what the record says, and their forms.
 
 Kottner et al. (2011), GRRAS: 15 items. Mokkink et al. (2020), COSMIN: six design
 standards of studies on reliability, which the author grades and masrel does not.
-Topics are in our words.
+Topics are in our words; ``templates/facts.txt`` has what the record says to each.
 """
 
-import statistics
+import hashlib
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from importlib.resources import files
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from masrel._input import listed
-from masrel.lab.checklist._facts import StudyFacts, days_between
-from masrel.lab.ratings import Rating
-from masrel.lab.report._design import beside_presentations, stretches_asked_for
-from masrel.lab.report._sample_size import size_sentence
-from masrel.lab.report._sentences import TARGETS, coefficient_name
-from masrel.lab.schedule._orders import orders_in_words
-from masrel.tables._estimate_words import sentence
-from masrel.tables._tables import counted, number, percent
+import masrel
+from masrel._files import write_file
+from masrel.errors import ParameterError
+from masrel.lab._bounded_files import MAX_TABLE, read_regular
+from masrel.lab.checklist._facts import StudyFacts, gather_facts, words_of
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.report._pandoc import converted
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 State = Literal["filled", "in part", "authors"]
 """Who fills an item: the record, both, or the authors alone."""
@@ -54,6 +56,40 @@ class ChecklistItem:
     sources: tuple[Path, ...] = ()
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Checklist:
+    """A guideline with what the record of a study says to each of its items.
+
+    Attributes
+    ----------
+    guideline : str
+        Its short name, of `GUIDELINES`.
+    title : str
+        Its name.
+    reference : str
+        Where it is published.
+    study : str
+        The title of the study.
+    items : tuple of ChecklistItem
+        In the guideline's order.
+    notes : tuple of str
+        What a reader must know before the items.
+    files : mapping of str to str
+        SHA-256 of each file that an item names.
+    masrel_version : str
+        The version that filled it.
+    """
+
+    guideline: str
+    title: str
+    reference: str
+    study: str
+    items: tuple[ChecklistItem, ...]
+    notes: tuple[str, ...]
+    files: Mapping[str, str] = field(hash=False)
+    masrel_version: str
+
+
 _Source = Literal["protocol", "logs", "ratings"]
 
 
@@ -62,391 +98,342 @@ class _Entry:
     """An item, what fills it, and what only the authors know."""
 
     topic: str
-    # None where the record says nothing of it
-    facts: Callable[[StudyFacts], tuple[str, ...]] | None = None
+    facts: tuple[str, ...] = ()  # macros of the template; none where nothing is known
     sources: tuple[_Source, ...] = ("protocol",)
     to_add: str = ""  # beside the facts
-
-
-def grras_items(facts: StudyFacts) -> tuple[ChecklistItem, ...]:
-    """Return the 15 items."""
-    return tuple(
-        _item(facts, str(number), entry) for number, entry in enumerate(_ITEMS, start=1)
-    )
-
-
-def _item(facts: StudyFacts, number: str, entry: _Entry) -> ChecklistItem:
-    to_add, known = entry.to_add, entry.facts
-    if "ratings" in entry.sources and facts.ratings is None:
-        to_add, known = "There are no ratings yet.", None
-    elif known is None:
-        to_add = "For the authors to say."
-    elif "logs" in entry.sources and not facts.sessions:
-        to_add = "What no log of a session says."
-    if known is None:
-        return ChecklistItem(
-            number=number, topic=entry.topic, state="authors", to_add=to_add
-        )
-    tables = (facts.paths.ratings_file, facts.paths.published_file)
-    files: dict[_Source, list[Path]] = {
-        "protocol": [facts.paths.protocol],
-        "logs": [session.log for session in facts.sessions],
-        "ratings": [table for table in tables if table.is_file()][:1],
-    }
-    return ChecklistItem(
-        number=number,
-        topic=entry.topic,
-        state="in part" if to_add else "filled",
-        facts=known(facts),
-        to_add=to_add,
-        sources=tuple(facts.relative(f) for key in entry.sources for f in files[key]),
-    )
-
-
-def _order_of_presentations(facts: StudyFacts) -> tuple[str, ...]:
-    """Say how the order of presentations comes about."""
-    order = "an order of their own, all orders equally likely"
-    if facts.protocol.schedule.scheme != "random-order":
-        order = orders_in_words(facts.protocol.schedule)
-    return (
-        f"In each session a rater meets the models in {order}; "
-        f"{counted(facts.n_schedules, 'schedule')} drawn.",
-    )
-
-
-def _blinding(facts: StudyFacts) -> tuple[str, ...]:
-    """Say what hides the models from the raters, and what was unblinded."""
-    if not facts.n_schedules:
-        return ("No schedule is drawn: the record says nothing of blinding.",)
-    concealed = (
-        f"orders and codes of {facts.n_concealed} of {facts.n_schedules} schedules "
-        "come from a secret that is not published"
-    )
-    unblinded = [text for text in facts.remarks if "unblinded" in text]
-    known = unblinded or ["The record has no unblinding."]
-    return (
-        f"Raters meet models by codes that differ by rater and session; {concealed}.",
-        *known,
-    )
-
-
-def _independence(facts: StudyFacts) -> tuple[str, ...]:
-    """Say what keeps the grades of one rater from another."""
-    if not facts.sessions:
-        return ("There are no session logs: the record says nothing of it.",)
-    n_sheets = sum(dict(each.header)["grades"] == "paper" for each in facts.sessions)
-    on_paper = (
-        f"{counted(n_sheets, 'session')} on paper: sheets with codes, and no models; "
-        "the log has who typed them.",
-    )
-    return (
-        "Every session is of one rater, with codes and an order of its own; masrel "
-        "shows no rater the grades of another, and a grade once given is changed by a "
-        "correction only, of which the log has who, when and why.",
-        *(on_paper if n_sheets else ()),
-        f"{counted(len(facts.corrections), 'correction')} of a grade.",
-    )
-
-
-def _dates(facts: StudyFacts) -> tuple[str, ...]:
-    """Say when the sessions were, and how far a rater's are from each other."""
-    if not facts.sessions:
-        return ("There are no session logs: dates and intervals are not known.",)
-    days = [session.day for session in facts.sessions]
-    span = f"Sessions began from {min(days)} to {max(days)} (UTC)."
-    between = sorted(days_between(facts).elements())
-    if not between:
-        return (span, "No rater has two sessions.")
-    middle = between[(len(between) - 1) // 2]
-    return (
-        span,
-        f"Days between a rater's session and the next: {between[0]} to {between[-1]}, "
-        f"median {middle}.",
-    )
-
-
-def _conditions(facts: StudyFacts) -> tuple[str, ...]:
-    """Say what was the same in all sessions, and what was not."""
-    if not facts.sessions:
-        return ("There are no session logs: conditions are not known.",)
-    texts = []
-    for position, (name, _) in enumerate(facts.sessions[0].header):
-        counts = Counter(session.header[position][1] for session in facts.sessions)
-        each = "; ".join(f"{value} in {n}" for value, n in counts.items())
-        texts.append(
-            f"{_NAMES[name]}: {next(iter(counts))} in all sessions."
-            if len(counts) == 1
-            else f"{_NAMES[name]} differs: {each}."
-        )
-    return tuple(texts)
-
-
-_NAMES = {
-    "device": "Device",
-    "grades": "Grades from",
-    "clock": "Clock of the device",
-    "masrel_version": "Version of masrel",
-    "presented_sha256": "SHA-256 of what is presented",
-}
-
-
-def _rater_characteristics(facts: StudyFacts) -> tuple[str, ...]:
-    """Say what the public fields of the raters hold, and which are not public."""
-    texts, hidden = [], []
-    for name, field in facts.protocol.rater_fields.items():
-        known = [rater.values[name] for rater in facts.raters]
-        values = [value for value in known if value is not None]
-        title = field.title or name
-        if not field.public:
-            hidden.append(title)
-        elif field.type in ("whole", "number"):
-            texts.append(f"{title}: {_range(values, field.unit)}.")
-        else:
-            tally = Counter(map(str, values))
-            counts = ", ".join(f"{n} {value}" for value, n in tally.items())
-            texts.append(f"{title}: {counts or 'not known'}.")
-    if hidden:
-        texts.append(f"Kept, and not public: {listed(hidden)}.")
-    return tuple(texts)
-
-
-def _range(values: Sequence[object], unit: str) -> str:
-    numbers = [float(value) for value in values if isinstance(value, int | float)]
-    if not numbers:
-        return "not known"
-    ends = f"{number(min(numbers), None)} to {number(max(numbers), None)} {unit}"
-    return f"{ends.strip()}, median {number(statistics.median(numbers), None)}"
-
-
-def _rater_flow(facts: StudyFacts) -> str:
-    """Say how many raters were planned, and what became of them."""
-    status = Counter(rater.status for rater in facts.raters)
-    parts = [f"{n} {name}" for name, n in status.items() if name != "planned"]
-    n_late = sum(rater.is_late for rater in facts.raters)
-    late = f" {n_late} joined after the first draw of schedules." if n_late else ""
-    n_begun = ", ".join(parts) or "none has begun"
-    return f"{counted(len(facts.raters), 'rater')} planned: {n_begun}.{late}"
-
-
-def _device(facts: StudyFacts) -> tuple[str, ...]:
-    protocol = facts.protocol
-    grades = ", ".join(protocol.scale.grades)
-    kinds = Counter(model.kind for model in protocol.models)
-    models = ", ".join(f"{n} of kind {kind}" for kind, n in kinds.items())
-    return (
-        f"Scale {protocol.scale.name}, grades {grades}.",
-        f"A haptic simulator of the elbow, device {protocol.device.backend!r} at "
-        f"{protocol.device.rate_hz} Hz, presents {models}.",
-    )
-
-
-def _raters(facts: StudyFacts) -> tuple[str, ...]:
-    n_raters = counted(len(facts.protocol.raters), "rater")
-    return (f"{n_raters} in the protocol.", *_rater_characteristics(facts))
-
-
-def _sizes(facts: StudyFacts) -> tuple[str, ...]:
-    protocol = facts.protocol
-    n_models, repeats = len(protocol.models), protocol.schedule.repeats
-    sessions = "; ".join(
-        f"{counted(len(each.raters), 'rater')} in session {each.id}"
-        for each in protocol.sessions
-    )
-    planned = sum(len(each.raters) for each in protocol.sessions) * n_models * repeats
-    return (
-        f"Planned: {counted(n_models, 'model')}, each presented "
-        f"{counted(repeats, 'time')} a session; {sessions}; {planned} ratings.",
-        *(size_sentence(protocol, size) for size in protocol.analysis.sample_sizes),
-        "The plan stands in the protocol, whose hash every drawn schedule has.",
-    )
-
-
-def _sampling(facts: StudyFacts) -> tuple[str, ...]:
-    roles = Counter(model.role for model in facts.protocol.models)
-    return (
-        f"Subjects are haptic models: {roles['standard']} that the study is about and "
-        f"{counted(roles['dummy'], 'dummy').replace('dummys', 'dummies')} that hide "
-        "them.",
-    )
-
-
-def _process(facts: StudyFacts) -> tuple[str, ...]:
-    stretches = stretches_asked_for(facts.protocol.presentation)
-    beside = beside_presentations(facts.protocol.occasions).strip()
-    return (
-        *_order_of_presentations(facts),
-        *_blinding(facts),
-        stretches or "Before each grade a rater stretches the arm once.",
-        *([beside] if beside else []),
-        *_dates(facts),
-    )
-
-
-def _analysis(facts: StudyFacts) -> tuple[str, ...]:
-    plan = facts.protocol.analysis
-    lines = tuple(
-        f"{line.id}: {coefficient_name(line.coefficient, line.weights)} of the "
-        f"{line.models} models, {' and '.join(line.sessions)}, "
-        + (
-            "without an interval."
-            if line.interval == "none"
-            else f"with an interval ({line.interval}) for {TARGETS[line.target]}."
-        )
-        for line in plan.estimates
-    )
-    if not lines:
-        return ("The protocol plans no estimate.",)
-    level = f"Intervals have the level {percent(plan.level)} %; computed by masrel."
-    return (*lines, level)
-
-
-def _actual(facts: StudyFacts) -> tuple[str, ...]:
-    if facts.ratings is None:
-        return ()
-    sessions: dict[str, list[Rating]] = {}
-    for row in facts.ratings.rows:
-        sessions.setdefault(row.session, []).append(row)
-    lines = tuple(
-        f"Session {session}: {counted(len({row.rater for row in rows}), 'rater')}, "
-        f"{counted(len({row.model for row in rows}), 'model')}, "
-        f"{counted(len(rows), 'rating')}, "
-        f"{sum(row.grade is None for row in rows)} missing."
-        for session, rows in sessions.items()
-    )
-    flow = (_rater_flow(facts),) if facts.sessions else ()
-    return (*flow, *lines, *facts.remarks)
-
-
-def _subjects(facts: StudyFacts) -> tuple[str, ...]:
-    grades = Counter(
-        model.intended_grade
-        for model in facts.protocol.models
-        if model.intended_grade is not None
-    )
-    intended = ", ".join(f"{n} of grade {grade}" for grade, n in grades.items())
-    return (
-        f"Models by the grade they were made to have: {intended or 'none has one'}; "
-        "the parameters of each are in the protocol.",
-        *_rater_characteristics(facts),
-    )
-
-
-def _estimates(facts: StudyFacts) -> tuple[str, ...]:
-    if facts.analysis is None:
-        return ()
-    return tuple(
-        f"{planned.line.id}: {sentence(planned.estimate)}"
-        if planned.estimate is not None
-        else f"{planned.line.id}: not in these data ({planned.reason})."
-        for planned in facts.analysis.estimates
-    )
-
-
-def _details(facts: StudyFacts) -> tuple[str, ...]:
-    n_corrections = len(facts.corrections)
-    return (
-        "Every rating, one row each, is in the table of ratings; masrel report makes "
-        "tables of grades by model and of every estimate.",
-        f"{counted(n_corrections, 'correction')} of a grade.",
-    )
-
-
-_ITEMS = (
-    _Entry(topic="Title or abstract names agreement or reliability"),
-    _Entry(
-        topic="Device or scale",
-        facts=_device,
-        to_add="Why this scale and this device; what is known of both.",
-    ),
-    _Entry(topic="Subjects: the population that is of interest"),
-    _Entry(
-        topic="Raters: the population that is of interest",
-        facts=_raters,
-        to_add="Whom these raters stand for: profession, experience, training.",
-    ),
-    _Entry(topic="What is known already, and why this study is needed"),
-    _Entry(topic="Planned subjects, raters, replicates", facts=_sizes),
-    _Entry(
-        topic="How subjects and raters were sampled",
-        facts=_sampling,
-        to_add="How the raters were recruited, and how the models were chosen.",
-    ),
-    _Entry(
-        topic="The process of measurement and rating",
-        facts=_process,
-        sources=("protocol", "logs"),
-    ),
-    _Entry(
-        topic="Whether ratings were independent", facts=_independence, sources=("logs",)
-    ),
-    _Entry(topic="Statistical analysis", facts=_analysis),
-    _Entry(topic="Actual numbers", facts=_actual, sources=("ratings",)),
-    _Entry(
-        topic="Characteristics of raters and subjects",
-        facts=_subjects,
-        to_add="Characteristics of the raters, as far as the protocol has none.",
-    ),
-    _Entry(
-        topic="Estimates with their uncertainty",
-        facts=_estimates,
-        sources=("ratings",),
-    ),
-    _Entry(topic="Relevance for practice"),
-    _Entry(topic="Detailed results", facts=_details, sources=("ratings",)),
-)
-"""The items of the guideline in its order."""
 
 
 _GRADE = "Very good, adequate, doubtful or inadequate: the authors grade this."
 
 
-def cosmin_items(facts: StudyFacts) -> tuple[ChecklistItem, ...]:
-    """Return the six design standards, each with its facts and without a grade."""
-    protocol = facts.relative(facts.paths.protocol)
-    logs = tuple(facts.relative(session.log) for session in facts.sessions)
-    standards = {
-        "Patients were stable between the measurements": _stability(facts),
-        "The time between the measurements was appropriate": _dates(facts),
-        "The conditions of the measurements were similar": _conditions(facts),
-        "Measurements were made without knowledge of other scores": (
-            *_order_of_presentations(facts),
-            *_independence(facts),
+def _standard(topic: str, *facts: str) -> _Entry:
+    sources: tuple[_Source, ...] = ("protocol", "logs")
+    return _Entry(topic=topic, facts=facts, sources=sources, to_add=_GRADE)
+
+
+_GUIDELINES: dict[str, tuple[str, str, tuple[_Entry, ...]]] = {
+    "grras": (
+        "Guidelines for Reporting Reliability and Agreement Studies (GRRAS)",
+        "Kottner et al. 2011, J Clin Epidemiol 64:96-106, "
+        "doi 10.1016/j.jclinepi.2010.03.002",
+        (
+            _Entry(topic="Title or abstract names agreement or reliability"),
+            _Entry(
+                topic="Device or scale",
+                facts=("device",),
+                to_add="Why this scale and this device; what is known of both.",
+            ),
+            _Entry(topic="Subjects: the population that is of interest"),
+            _Entry(
+                topic="Raters: the population that is of interest",
+                facts=("raters", "characteristics"),
+                to_add="Whom these raters stand for: profession, experience, training.",
+            ),
+            _Entry(topic="What is known already, and why this study is needed"),
+            _Entry(topic="Planned subjects, raters, replicates", facts=("sizes",)),
+            _Entry(
+                topic="How subjects and raters were sampled",
+                facts=("sampling",),
+                to_add="How the raters were recruited, and how the models were chosen.",
+            ),
+            _Entry(
+                topic="The process of measurement and rating",
+                facts=("order", "blinding", "stretches", "dates"),
+                sources=("protocol", "logs"),
+            ),
+            _Entry(
+                topic="Whether ratings were independent",
+                facts=("independence",),
+                sources=("logs",),
+            ),
+            _Entry(topic="Statistical analysis", facts=("analysis",)),
+            _Entry(
+                topic="Actual numbers",
+                facts=("numbers", "remarks"),
+                sources=("ratings",),
+            ),
+            _Entry(
+                topic="Characteristics of raters and subjects",
+                facts=("subjects", "characteristics"),
+                to_add="Characteristics of the raters, as far as the protocol has "
+                "none.",
+            ),
+            _Entry(
+                topic="Estimates with their uncertainty",
+                facts=("estimates",),
+                sources=("ratings",),
+            ),
+            _Entry(topic="Relevance for practice"),
+            _Entry(topic="Detailed results", facts=("details",), sources=("ratings",)),
         ),
-        "Scores were given without knowledge of other scores": _blinding(facts),
-        "No other important flaws in design or conduct": _flaws(facts),
-    }
-    return tuple(
-        ChecklistItem(
-            number=str(number),
-            topic=topic,
-            state="in part",
-            facts=texts,
-            to_add=_GRADE,
-            sources=(protocol, *logs),
+    ),
+    "cosmin": (
+        "COSMIN Risk of Bias tool: studies on reliability",
+        "Mokkink et al. 2020, BMC Med Res Methodol 20:293, "
+        "doi 10.1186/s12874-020-01179-5",
+        (
+            _standard("Patients were stable between the measurements", "stability"),
+            _standard("The time between the measurements was appropriate", "dates"),
+            _standard("The conditions of the measurements were similar", "conditions"),
+            _standard(
+                "Measurements were made without knowledge of other scores",
+                "order",
+                "independence",
+            ),
+            _standard(
+                "Scores were given without knowledge of other scores", "blinding"
+            ),
+            _standard(
+                "No other important flaws in design or conduct", "flaws", "remarks"
+            ),
+        ),
+    ),
+}
+
+GUIDELINES = tuple(_GUIDELINES)
+"""Names of the guidelines."""
+
+
+def fill_checklist(study: StudyPaths, protocol: Protocol, guideline: str) -> Checklist:
+    """Fill the checklist of a reporting guideline from the record of a study.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is; it may have no ratings yet.
+    protocol : Protocol
+        The study's protocol.
+    guideline : {"grras", "cosmin"}
+        Kottner et al. (2011), 15 items; or the design standards of Mokkink et al.
+        (2020), 6 items, to which no grade is given.
+
+    Returns
+    -------
+    Checklist
+        Every item with what the record says of it.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such guideline.
+    RatingsError
+        If the ratings are damaged, or not what the session logs say.
+    SessionLogError
+        If a log is damaged.
+    ScheduleError
+        If a schedule is damaged, or that of a log is missing or stale.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from masrel.lab.protocol import StudyPaths, read_protocol
+    >>> study = StudyPaths(Path("studies/hess2012"))
+    >>> filled = fill_checklist(study, read_protocol(study.protocol), "grras")
+    >>> [item.number for item in filled.items if item.state == "filled"]
+    ['6', '10', '11', '13', '15']
+    """
+    if guideline not in _GUIDELINES:
+        raise ParameterError(
+            f"guideline: needed one of {', '.join(_GUIDELINES)}, got {guideline!r}"
         )
-        for number, (topic, texts) in enumerate(standards.items(), start=1)
+    title, reference, entries = _GUIDELINES[guideline]
+    facts = gather_facts(study, protocol)
+    say = _environment().overlay(finalize=_in_one_line).get_template("facts.txt")
+    macros = say.make_module(words_of(facts, protocol))
+    items = tuple(
+        _item(facts, str(number), entry, lambda name: str(getattr(macros, name)()))
+        for number, entry in enumerate(entries, start=1)
+    )
+    named = sorted({file for item in items for file in item.sources})
+    return Checklist(
+        guideline=guideline,
+        title=title,
+        reference=reference,
+        study=protocol.study.title,
+        items=items,
+        notes=_notes(facts),
+        files={
+            file.as_posix(): hashlib.sha256(
+                read_regular(study.root / file, most=MAX_TABLE)
+            ).hexdigest()
+            for file in named
+        },
+        masrel_version=masrel.__version__,
     )
 
 
-def _stability(facts: StudyFacts) -> tuple[str, ...]:
-    text = (
-        "Subjects are haptic models with constant parameters: what is presented is the "
-        "same for every rater in every session as long as its hash is."
+def _item(
+    facts: StudyFacts, number: str, entry: _Entry, say: Callable[[str], str]
+) -> ChecklistItem:
+    to_add, names = entry.to_add, entry.facts
+    if "ratings" in entry.sources and facts.ratings is None:
+        to_add, names = "There are no ratings yet.", ()
+    elif not names:
+        to_add = "For the authors to say."
+    elif "logs" in entry.sources and not (facts.sessions or to_add):
+        to_add = "What no log of a session says."
+    if not names:
+        return ChecklistItem(
+            number=number, topic=entry.topic, state="authors", to_add=to_add
+        )
+    lines = (line.strip() for name in names for line in say(name).split("\n"))
+    return ChecklistItem(
+        number=number,
+        topic=entry.topic,
+        state="in part" if to_add else "filled",
+        facts=tuple(line for line in lines if line),
+        to_add=to_add,
+        sources=tuple(file for key in entry.sources for file in facts.files[key]),
     )
-    same = [text for text in _conditions(facts) if text.startswith("SHA-256")]
-    return (text, *same)
 
 
-def _flaws(facts: StudyFacts) -> tuple[str, ...]:
-    n_missing = "There are no ratings yet."
-    if facts.ratings is not None:
-        n_absent = counted(facts.ratings.n_missing, "grade")
-        n_missing = f"{n_absent} missing of {len(facts.ratings.rows)}."
-    open_sessions = [s for s in facts.sessions if not s.is_complete]
-    n_faults = sum(session.n_faults for session in facts.sessions)
+def _in_one_line(value: object) -> object:
+    # a line of a template is a fact, whatever a protocol's texts hold
+    return " ".join(value.splitlines()) if isinstance(value, str) else value
+
+
+def _notes(facts: StudyFacts) -> tuple[str, ...]:
+    if facts.ratings is None:
+        return ("No session has begun: what follows is the plan.",)
+    if not facts.ratings.simulated:
+        return ()
+    if facts.ratings.n_from_persons:
+        return ("SIMULATED DEVICE: not all of these grades were given on hardware.",)
+    return ("SIMULATED DATA: no person gave these grades.",)
+
+
+_HEADINGS = ("Item", "Asks for", "State", "What the record says", "Files")
+
+_STATES: dict[State, str] = {
+    "filled": "filled from the record",
+    "in part": "filled in part",
+    "authors": "for the authors alone",
+}
+
+
+def write_checklist(checklist: Checklist, path: Path) -> None:
+    """Write a checklist as a file whose form its ending says.
+
+    Parameters
+    ----------
+    checklist : Checklist
+        What `fill_checklist` returned.
+    path : Path
+        A file that ends in ``.html``, ``.md`` or ``.docx``. The same checklist gives
+        the same bytes.
+
+    Raises
+    ------
+    ParameterError
+        If the ending is another, the file is a study's primary record, or pandoc
+        is needed and is not installed.
+    OSError
+        If the file cannot be written.
+    """
+    if path.suffix not in _FORMS:
+        raise ParameterError(
+            f"output: needed a file that ends in {', '.join(_FORMS)}, got {path}"
+        )
+    write_file(path, _FORMS[path.suffix](checklist))
+
+
+def checklist_markdown(checklist: Checklist) -> str:
+    """Return a checklist as Markdown.
+
+    Parameters
+    ----------
+    checklist : Checklist
+        What `fill_checklist` returned.
+
+    Returns
+    -------
+    str
+        A section for each item, then the files with their hashes.
+    """
+    lines = [f"# {_plain(checklist.study)}", ""]
+    lines += [f"{_plain(text)}\n" for text in _introduction(checklist)]
+    for item in checklist.items:
+        lines += [f"## {item.number}. {_plain(item.topic)}", ""]
+        lines += [f"*{_STATES[item.state]}*", ""]
+        lines += [f"- {_plain(fact)}" for fact in item.facts]
+        lines += [f"- **Authors:** {_plain(item.to_add)}"] * bool(item.to_add)
+        lines += ["", f"Files: {names}"] if (names := _numbers(checklist, item)) else []
+        lines.append("")
+    lines += ["## Files", ""]
+    lines += [
+        f"{number}. {_plain(file)}: `{digest}`"
+        for number, (file, digest) in enumerate(checklist.files.items(), start=1)
+    ]
+    return "\n".join([*lines, "", f"Made by masrel {checklist.masrel_version}.", ""])
+
+
+_ESCAPES = str.maketrans({letter: f"\\{letter}" for letter in "\\`*_|<>[]#"})
+
+
+def _plain(text: str) -> str:
+    return " ".join(text.translate(_ESCAPES).split())
+
+
+def _introduction(checklist: Checklist) -> tuple[str, ...]:
+    head = f"{checklist.title}: {checklist.reference}. Topics are in our words."
+    return (head, *checklist.notes, _summary(checklist))
+
+
+def _summary(checklist: Checklist) -> str:
+    counts = Counter(item.state for item in checklist.items)
+    parts = [f"{counts[state]} {text}" for state, text in _STATES.items()]
+    return f"Of {len(checklist.items)} items {', '.join(parts)}."
+
+
+def _numbers(checklist: Checklist, item: ChecklistItem) -> str:
+    # of the files an item names, such as "1, 3-24" where they follow each other
+    places = list(checklist.files)
+    ranges: list[list[int]] = []
+    for number in sorted(places.index(file.as_posix()) + 1 for file in item.sources):
+        if ranges and number == ranges[-1][-1] + 1:
+            ranges[-1].append(number)
+        else:
+            ranges.append([number])
+    return ", ".join(
+        f"{each[0]}–{each[-1]}" if len(each) > 2 else ", ".join(map(str, each))
+        for each in ranges
+    )
+
+
+def _environment() -> "Environment":
+    # Imported here: what is only imported loads no templates.
+    from jinja2 import (
+        Environment,
+        PackageLoader,
+        StrictUndefined,
+        select_autoescape,
+    )
+
+    return Environment(
+        loader=PackageLoader("masrel.lab.checklist"),
+        autoescape=select_autoescape(["html"]),
+        undefined=StrictUndefined,
+        keep_trailing_newline=True,
+    )
+
+
+def _html(checklist: Checklist) -> str:
+    style = files("masrel.pages").joinpath("templates/page.css")
     return (
-        n_missing,
-        f"{counted(len(open_sessions), 'session')} begun and not complete; "
-        f"{counted(n_faults, 'presentation')} stopped by a fault of the device.",
-        *facts.remarks,
+        _environment()
+        .get_template("checklist.html")
+        .render(
+            list=checklist,
+            headings=_HEADINGS,
+            summary=_summary(checklist),
+            style=style.read_text(encoding="utf-8"),
+            files=lambda item: _numbers(checklist, item),
+        )
     )
+
+
+_FORMS: dict[str, Callable[[Checklist], str | bytes]] = {
+    ".html": _html,
+    ".md": checklist_markdown,
+    ".docx": lambda made: converted(checklist_markdown(made), "docx", pictures={}),
+}
