@@ -8,9 +8,11 @@ of a device.
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from masrel.lab.elbow.identification._clusters import FittedParameter, Step
     from masrel.lab.elbow.identification._friction import FrictionFit, fit_friction
     from masrel.lab.elbow.identification._identify import (
         ComparedFit,
+        ElbowFit,
         compare_fits,
         fit,
     )
@@ -25,7 +27,6 @@ if TYPE_CHECKING:
         model_document,
     )
     from masrel.lab.elbow.identification._reading import Movement, read_movement
-    from masrel.lab.elbow.identification._results import ElbowFit, FittedParameter, Step
 
 __all__ = [
     "ComparedFit",
@@ -48,10 +49,13 @@ __all__ = [
 
 _HOMES = {
     "ComparedFit": "_identify",
+    "ElbowFit": "_identify",
+    "FittedParameter": "_clusters",
     "FrictionFit": "_friction",
     "LackOfFit": "_lack_of_fit",
     "Movement": "_reading",
     "PhaseResidual": "_lack_of_fit",
+    "Step": "_clusters",
     "StructureTest": "_lack_of_fit",
     "as_toml": "_model_file",
     "compare_fits": "_identify",
@@ -69,6 +73,4 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     import importlib
 
-    return getattr(
-        importlib.import_module(f"{__name__}.{_HOMES.get(name, '_results')}"), name
-    )
+    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)

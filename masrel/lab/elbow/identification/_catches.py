@@ -1,4 +1,4 @@
-"""The catch of a stretch: when it begins and ends, and what is read off it.
+"""Stretches of a recording, and the catch of each: when it begins and ends.
 
 Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
 https://doi.org/10.1109/TNSRE.2012.2195330, section II and equations (1) to (5).
@@ -7,24 +7,39 @@ https://doi.org/10.1109/TNSRE.2012.2195330, section II and equations (1) to (5).
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import savgol_filter
 
+from masrel.errors import RecordingError
 from masrel.lab.elbow.identification._clusters import Rows
-from masrel.lab.elbow.identification._stretches import (
-    Pace,
-    Part,
-    Stretch,
-    filtered_part,
-    part_of,
-    state_at_break,
+from masrel.lab.elbow.identification._reading import (
+    MIN_TRAVEL,
+    Movement,
+    Samples,
+    even_samples,
 )
 from masrel.lab.elbow.parameters import ElbowParameters
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
+_Bools = NDArray[np.bool_]
+
+Pace = Literal["slow", "fast"]
+
+_ORDER = 3  # of the polynomials that are fitted in the window of the filter
+_MIN_LENGTH = 7  # of that window, samples
+
+# Reach of the fit of the speed at a catch, to either side, s.
+_REACH = 0.1
+
+# A joint that extends slower rests: an encoder's steps make less than this, rad/s.
+_MOVING = math.radians(2.0)
+
+# A shorter rest, without going back, does not end a stretch, s.
+_MIN_REST = 0.1
 
 # Candidates of the first search, whatever the number of samples.
 _COARSE = 150
@@ -52,6 +67,249 @@ SLOW_WINDOW, _FAST_WINDOW = 0.25, 0.1
 # Windows of the filter of the angle after a catch, s: where its acceleration is a
 # regressor, an encoder's steps must not be.
 _AFTER_WINDOW, _PUSHED_WINDOW = 0.06, 0.09
+
+
+def window_length(window: float, period: float) -> int:
+    """Return the samples of a filter's window: odd, enough for its polynomial."""
+    return max(2 * round(0.5 * window / period) + 1, _MIN_LENGTH)
+
+
+def differentiate(
+    angle: _Floats, period: float, window: float
+) -> tuple[_Floats, _Floats, _Floats]:
+    """Return smoothed angle, velocity, acceleration, without delay.
+
+    They are those of the cubic fitted to each window (Savitzky and Golay 1964), and of
+    the first and last window at the ends; fewer samples than a window are one window.
+
+    >>> t = np.arange(200) / 1000.0
+    >>> angle, velocity, acceleration = differentiate(t**2, 0.001, 0.06)
+    >>> bool(np.allclose(velocity, 2 * t)), bool(np.allclose(acceleration, 2.0))
+    (True, True)
+    """
+    length = min(window_length(window, period), angle.size - 1 + angle.size % 2)
+    order = min(_ORDER, length - 1)
+    smooth, velocity, acceleration = (
+        savgol_filter(angle, length, order, deriv=deriv, delta=period)
+        if deriv <= order
+        else np.zeros_like(angle)
+        for deriv in range(3)
+    )
+    return smooth, velocity, acceleration
+
+
+def filter_alike(
+    angle: _Floats, torque: _Floats, period: float, window: float
+) -> tuple[_Floats, _Floats, _Floats, _Floats]:
+    """Return angle, velocity, acceleration and torque after one filter.
+
+    They are of the inner samples: those with a whole window, but for the first and last
+    of them. A weighted mean over a symmetric window (Hann's) commutes with d/dt:
+    whatever the hand does, a linear law holds for the means as for the values, so that
+    the window can be as long as an encoder's steps at a slow speed need. Noise in a
+    regressor would pull b towards 0.
+
+    >>> t = np.arange(1000) / 1000.0
+    >>> angle = np.sin(9.0 * t)
+    >>> law = 2.0 * 9.0 * np.cos(9.0 * t) + 3.0 * angle
+    >>> x, v, _, torque = filter_alike(angle, law, 0.001, 0.25)
+    >>> bool(np.allclose(torque, 2.0 * v + 3.0 * x, atol=1e-3))
+    True
+    """
+    weights = np.hanning(window_length(window, period) + 2)[1:-1]
+    weights /= weights.sum()
+    means = np.convolve(angle, weights, mode="valid")
+    resistance = np.convolve(torque, weights, mode="valid")
+    velocity = (means[2:] - means[:-2]) / (2.0 * period)
+    acceleration = (means[2:] - 2.0 * means[1:-1] + means[:-2]) / period**2
+    return means[1:-1], velocity, acceleration, resistance[1:-1]
+
+
+def state_at_break(
+    time: _Floats, angle: _Floats, at: float
+) -> tuple[float, float, float]:
+    """Return angle, velocity and acceleration when a hand meets resistance.
+
+    At a catch torque steps: angle and velocity are continuous, acceleration is not, and
+    a filter that knows nothing of it would put part of the later slowing before it. Two
+    cubics that share angle and velocity at the instant are fitted to the 0.1 s before
+    and after; the acceleration is the one just before.
+
+    >>> t = np.arange(0.0, 0.4, 0.001)
+    >>> angle = t - 2.0 * np.maximum(t - 0.2, 0.0) ** 2
+    >>> [round(x, 9) + 0.0 for x in state_at_break(t, angle, 0.2)]
+    [0.2, 1.0, 0.0]
+    """
+    near = (time >= at - _REACH) & (time <= at + _REACH)
+    since = (time[near] - at) / _REACH
+    early, late = np.minimum(since, 0.0), np.maximum(since, 0.0)
+    columns = [np.ones_like(since), since, early**2, late**2, early**3, late**3]
+    values = np.linalg.lstsq(np.stack(columns, axis=1), angle[near], rcond=None)[0]
+    return (
+        float(values[0]),
+        float(values[1]) / _REACH,
+        2.0 * float(values[2]) / _REACH**2,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stretch:
+    """One extension of the joint in a recording; SI units."""
+
+    recording: Samples = field(repr=False)
+    samples: Samples = field(repr=False)  # of the extension alone
+    angle: _Floats = field(compare=False, repr=False)  # smoothed, like the next two
+    velocity: _Floats = field(compare=False, repr=False)
+    acceleration: _Floats = field(compare=False, repr=False)
+    pace: Pace
+    peak_speed: float
+    rest_angle: float  # the smallest of the 0.5 s before
+
+
+def find_stretches(
+    movement: Movement, *, window: float, slow_below: float
+) -> tuple[list[Stretch], float]:
+    """Return where the joint is extended by 15 degrees or more, and the noise at rest.
+
+    A stretch whose speed stays below `slow_below` is slow. The noise is the standard
+    deviation of the torque about a line in each rest of 0.1 s or more, N·m. Refuses a
+    recorded velocity that is not the derivative of the angle.
+    """
+    samples = even_samples(movement)
+    angle, velocity, acceleration = differentiate(samples.angle, samples.period, window)
+    if movement.velocity is not None:
+        recorded = np.interp(samples.time, movement.time, movement.velocity)
+        ratio = float(recorded @ velocity) / float(velocity @ velocity)
+        if not 0.8 <= ratio <= 1.25:
+            raise RecordingError(
+                f"{movement.name}: the velocity is {ratio:.3g} times the derivative of "
+                "the angle; is its unit right?"
+            )
+    stretches = []
+    for start, stop in _runs(samples, angle, velocity):
+        part = slice(start, stop)
+        if angle[stop - 1] - angle[start] >= MIN_TRAVEL:
+            rest = slice(max(0, start - round(0.5 / samples.period)), start + 1)
+            before = samples.angle[rest]
+            peak_speed = float(velocity[part].max())
+            stretches.append(
+                Stretch(
+                    recording=samples,
+                    samples=samples.cut(part),
+                    angle=angle[part],
+                    velocity=velocity[part],
+                    acceleration=acceleration[part],
+                    pace="slow" if peak_speed < slow_below else "fast",
+                    peak_speed=peak_speed,
+                    rest_angle=float(np.median(before[before <= before.min() + 1e-9])),
+                )
+            )
+    return stretches, _rest_noise(samples, velocity)
+
+
+def _spans(mask: _Bools) -> list[tuple[int, int]]:
+    # first sample of each run that is marked, and the first after it
+    edges = np.flatnonzero(np.diff(mask, prepend=False, append=False)).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def _runs(samples: Samples, angle: _Floats, velocity: _Floats) -> list[tuple[int, int]]:
+    # a short rest, without going back, belongs to the extension around it
+    runs: list[tuple[int, int]] = []
+    for start, stop in _spans(velocity > _MOVING):
+        first = start
+        if runs and (start - runs[-1][1]) * samples.period < _MIN_REST:
+            if angle[start] >= angle[runs[-1][1] - 1] - _MOVING * _MIN_REST:
+                first, _ = runs.pop()
+        runs.append((first, stop))
+    return runs
+
+
+def _rest_noise(samples: Samples, velocity: _Floats) -> float:
+    still = (np.abs(velocity) < 0.5 * _MOVING) & ~samples.in_gap & ~samples.saturated
+    squares, df = 0.0, 0
+    for start, stop in _spans(still):
+        if (stop - start) * samples.period >= _MIN_REST:
+            torque = samples.torque[start:stop]
+            since = np.arange(torque.size) - 0.5 * (torque.size - 1)
+            left = torque - torque.mean()
+            left = left - since * (float(since @ left) / float(since @ since))
+            squares, df = squares + float(left @ left), df + torque.size - 2
+    return math.sqrt(squares / df) if df > 0 else math.nan
+
+
+class Part(NamedTuple):
+    """Samples of a trial that are used, each column of shape (n_samples,), SI units.
+
+    Angle and its derivatives are smoothed within the part, before a catch the torque as
+    well; `measured` is the torque as recorded.
+    """
+
+    time: _Floats
+    angle: _Floats
+    velocity: _Floats
+    acceleration: _Floats
+    jerk: _Floats
+    torque: _Floats
+    measured: _Floats
+
+    def keep(self, which: _Bools) -> "Part":
+        """Return the samples that are marked."""
+        return Part(*(column[which] for column in self))
+
+    def then(self, later: "Part") -> "Part":
+        """Return both parts as one."""
+        return Part(*map(np.concatenate, zip(self, later, strict=True)))
+
+
+def filtered_part(stretch: Stretch, ends: tuple[int, int], window: float) -> Part:
+    """Return the samples between the ends whose window has no gap and is not saturated.
+
+    Angle and torque go through one filter, as a linear law allows.
+    """
+    samples = stretch.samples
+    margin = window_length(window, samples.period) // 2 + 1
+    start, stop = ends
+    if stop - start <= 2 * margin:
+        return part_of(stretch, slice(0, 0))
+    part, inner = slice(start, stop), slice(start + margin, stop - margin)
+    angle, velocity, acceleration, torque = filter_alike(
+        samples.angle[part], samples.torque[part], samples.period, window
+    )
+    unusable = (samples.in_gap | samples.saturated)[part]
+    touched = np.convolve(unusable, np.ones(2 * margin + 1), mode="valid") > 0.5
+    whole = Part(
+        samples.time[inner],
+        angle,
+        velocity,
+        acceleration,
+        _slope(acceleration, samples.period),
+        torque,
+        samples.torque[inner],
+    )
+    return whole.keep(~touched)
+
+
+def part_of(stretch: Stretch, which: slice, *, anew: float | None = None) -> Part:
+    """Return samples of a stretch with torque as measured.
+
+    With `anew` the angle is smoothed within the part alone, by a window of so many
+    seconds, so that it knows nothing of the motion beyond.
+    """
+    samples = stretch.samples.cut(which)
+    angle, velocity, acceleration = (
+        x[which] for x in (stretch.angle, stretch.velocity, stretch.acceleration)
+    )
+    if anew is not None:
+        angle, velocity, acceleration = differentiate(
+            samples.angle, samples.period, anew
+        )
+    jerk, torque = _slope(acceleration, samples.period), samples.torque
+    return Part(samples.time, angle, velocity, acceleration, jerk, torque, torque)
+
+
+def _slope(values: _Floats, period: float) -> _Floats:
+    return np.gradient(values, period) if values.size > 1 else np.zeros_like(values)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -165,22 +423,17 @@ def fast_trial(
     The catch is looked for; where a fit has it begin (`instant`) goes before if that is
     near.
     """
-    samples = stretch.samples
-    onset, stop = _fast_part(stretch, constants.speed_threshold, window)
+    samples, velocity = stretch.samples, stretch.velocity
+    onset = int(np.argmax(velocity >= constants.speed_threshold))
+    fastest = int(np.argmax(velocity))
+    slow = np.flatnonzero(velocity[fastest:] < constants.speed_threshold)
+    stop = fastest + int(slow[0]) if slow.size else velocity.size
+    # the filter sees a hand stop half a window late or early
+    stop = max(fastest, stop - round(0.5 * window / samples.period))
     none = _trial(stretch, name, part_of(stretch, slice(0, 0)), "")
     if samples.in_gap[:stop].any():
         return replace(none, remark="not used: a gap in the recording")
-    changes = _changes(stretch, name, (onset, stop), constants, law)
-    catch = None
-    if changes.catch is not None:
-        half = 0.5 * samples.period  # between two samples
-        start = float(samples.time[changes.catch]) - half
-        end = None if changes.end is None else float(samples.time[changes.end]) - half
-        if instant is not None and abs(instant - start) < _NEAR:
-            start = instant
-        catch = _catch_at(
-            stretch, (onset, stop), (start, end), constants, changes.residual_sd
-        )
+    catch = _catch(stretch, name, (onset, stop), constants, law, instant)
     if catch is None:
         why = "not used: no catch that stands out of the noise"
         return replace(none, remark=why)
@@ -197,68 +450,55 @@ def fast_trial(
     return replace(trial, after=after)
 
 
-def _fast_part(stretch: Stretch, limit: float, window: float) -> tuple[int, int]:
-    # sample of movement onset, and the first at which the hand is slow again
-    velocity = stretch.velocity
-    fastest = int(np.argmax(velocity))
-    slow = np.flatnonzero(velocity[fastest:] < limit)
-    stop = fastest + int(slow[0]) if slow.size else velocity.size
-    # the filter sees a hand stop half a window late or early
-    stop = max(fastest, stop - round(0.5 * window / stretch.samples.period))
-    return int(np.argmax(velocity >= limit)), stop
-
-
-def _changes(
+def _catch(
     stretch: Stretch,
     name: str,
     ends: tuple[int, int],
     constants: ElbowParameters,
     law: Law,
-) -> "Changes":
-    onset, stop = ends
+    instant: float | None,
+) -> Catch | None:
+    # between the samples of movement onset and of the hand's being slow again; None if
+    # the torque does not say so, or the joint hardly moves there
+    samples, (first, stop) = stretch.samples, ends
     part = part_of(stretch, slice(0, stop))
     times = constants.peak_duration, law.catch_rise + 3.0 * law.lag, 3.0 * law.lag
-    peak, gap, last_gap = (round(time / stretch.samples.period) for time in times)
-    return find_changes(
+    peak, gap, last_gap = (round(time / samples.period) for time in times)
+    at, until, residual_sd = find_changes(
         part.torque - law.arm(part, name),
         law.pre_catch(part),
         part.angle,
-        first=onset,
+        first=first,
         lengths=(peak, gap, last_gap),
         additive=constants.post_catch == "additive",
         pushed=law.inertia * part.acceleration,
     )
-
-
-def _catch_at(
-    stretch: Stretch,
-    part: tuple[int, int],
-    instants: tuple[float, float | None],
-    constants: ElbowParameters,
-    residual_sd: float,
-) -> Catch | None:
-    # motion and travel of a catch; None if the joint hardly moves there
-    samples, (instant, end) = stretch.samples, instants
-    fast = samples.cut(slice(part[1]))
-    angle, speed, acceleration = state_at_break(fast.time, fast.angle, instant)
-    onset, onset_angle = _onset(stretch, part[0], constants.speed_threshold)
-    last = float(fast.time[-1]) if end is None else end
-    if not (instant > onset and angle > onset_angle and speed > 0.0 and last > instant):
+    if at is None:
         return None
-    mean_speed = (angle - onset_angle) / (instant - onset)
+    half = 0.5 * samples.period  # between two samples
+    time = float(samples.time[at]) - half
+    end = None if until is None else float(samples.time[until]) - half
+    if instant is not None and abs(instant - time) < _NEAR:
+        time = instant
+    angle, speed, acceleration = state_at_break(part.time, samples.angle[:stop], time)
+    onset, onset_angle = _onset(stretch, first, constants.speed_threshold)
+    last = float(part.time[-1]) if end is None else end
+    if not (time > onset and angle > onset_angle and speed > 0.0 and last > time):
+        return None
+    mean_speed = (angle - onset_angle) / (time - onset)
     travel = float(np.interp(last, samples.time, stretch.angle)) - angle
-    peak_end = instant + constants.peak_duration
+    peak_end = time + constants.peak_duration
     return Catch(
-        time=instant,
+        time=time,
         angle=angle,
         speed=speed,
         acceleration=acceleration,
         mean_speed=mean_speed,
         # d/dθ of (θ - θ_on)/(t - t_on), with dt = dθ/ω
-        speed_gain=(1.0 - mean_speed / speed) / (instant - onset),
+        speed_gain=(1.0 - mean_speed / speed) / (time - onset),
         end=end,
         travel=travel,
-        mean_catch_speed=travel / (last - instant),
+        mean_catch_speed=travel / (last - time),
         within_peak=end is not None and end < peak_end - 2.0 * samples.period,
         residual_sd=residual_sd,
     )
@@ -371,40 +611,6 @@ def catch_levels(
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Changes:
-    """Where the torque of one stretch changes, as places of its samples."""
-
-    catch: int | None = None
-    end: int | None = None
-    residual_sd: float = math.nan
-
-
-class _Running(NamedTuple):
-    # sums of values and of their squares before each place: any stretch of them in O(1)
-    one: _Floats
-    two: _Floats
-
-    @classmethod
-    def of(cls, values: _Floats) -> "_Running":
-        return cls(*np.cumsum([np.append(0.0, values), np.append(0.0, values**2)], 1))
-
-    def about_mean(self, low: _Ints, high: _Ints) -> _Floats:
-        # Σ(x - mean)² over the samples from low to before high; 0 of none
-        one, two = self.one[high] - self.one[low], self.two[high] - self.two[low]
-        return np.asarray(two - one**2 / np.maximum(high - low, 1))
-
-
-class _Sums(NamedTuple):
-    torque: _Running
-    rest: _Running  # torque - pre-catch law
-    angle: _Running
-    later: _Running  # torque - what the law adds after the catch
-    later_angle: _Floats  # of their products
-    offset: _Floats  # what the law adds at each place
-    at: _Floats  # the angle there
-
-
 def find_changes(
     torque: _Floats,
     pre_catch: _Floats,
@@ -414,16 +620,16 @@ def find_changes(
     lengths: tuple[int, int, int],
     additive: bool,
     pushed: _Floats | float = 0.0,
-) -> Changes:
-    """Return the catch of a stretch, by least squares over all pairs of instants.
+) -> tuple[int | None, int | None, float]:
+    """Return the samples where a catch begins and ends, and the residuals' deviation.
 
-    Every level is free: the pre-catch law up to a constant, one level during the peak,
-    one after it, and a climb in proportion to the angle travelled after the end of the
-    catch. No catch is before sample `first`. `lengths` are the samples of the peak, and
-    those after its start and its end that are left out, where torque takes time.
-    `additive` says that post-catch adds to the pre-catch law instead of going on from
-    the residual torque; `pushed` is m·θ̈ of (5), which post-catch has and the catch has
-    not.
+    By least squares over all pairs of instants, where every level is free: the
+    pre-catch law up to a constant, one level during the peak, one after it, and a climb
+    in proportion to the angle travelled after the end of the catch. No catch is before
+    sample `first`. `lengths` are the samples of the peak, and those after its start and
+    its end that are left out, where torque takes time. `additive` says that post-catch
+    adds to the pre-catch law instead of going on from the residual torque; `pushed` is
+    m·θ̈ of (5), which post-catch has and the catch has not.
 
     A catch whose rise, or an end whose climb, is below `MIN_SIGNAL` standard deviations
     of the residuals is none; nor is an end that takes less than `MIN_GAIN` residual
@@ -432,20 +638,12 @@ def find_changes(
     """
     n = torque.size
     if n - 2 <= first + 1:
-        return Changes()
+        return None, None, math.nan
     angle = angle - angle.mean()
     torque, pre_catch = torque - torque.mean(), pre_catch - pre_catch.mean()
     rest = torque - pre_catch
     later = rest if additive else torque - pushed
-    sums = _Sums(
-        torque=_Running.of(torque),
-        rest=_Running.of(rest),
-        angle=_Running.of(angle),
-        later=_Running.of(later),
-        later_angle=np.append(0.0, np.cumsum(later * angle)),
-        offset=pre_catch if additive else np.zeros(n),
-        at=np.append(angle, angle[-1]),
-    )
+    sums = _Sums.of(torque, rest, angle, later, pre_catch if additive else 0.0 * rest)
     # First both coarsely, then the catch to the sample, then the end to the sample.
     step = max(1, n // _COARSE)
     starts, ends = np.arange(first + 1, n - 2, step), np.arange(first + 2, n - 1, step)
@@ -460,21 +658,50 @@ def find_changes(
         ends = np.arange(first + 2, n - 1) if finer else ends
     least = float(squares[place])
     if not math.isfinite(least) or catch >= end:
-        return Changes()
+        return None, None, math.nan
     sd = math.sqrt(max(least, 0.0) / max(n - 6, 1))
     step = min(catch + peak, end)
     rise = torque[catch:step].mean() - rest[:catch].mean() - pre_catch[catch]
     if rise < MIN_SIGNAL * sd:
-        return Changes(residual_sd=sd)
+        return None, None, sd
     if end < n:
         _, along, length = _hinge(sums, np.array(step), np.array(end), 0.0)
         climb = (angle[-1] - angle[end]) * along / length if length > 0.0 else 0.0
         endless = _squares(sums, starts, np.array([n]), lengths)[:, 0]
         seen = additive or climb >= MIN_SIGNAL * sd
         if seen and float(endless.min()) - least >= MIN_GAIN * sd**2:
-            return Changes(catch=catch, end=end, residual_sd=sd)
+            return catch, end, sd
         catch = int(starts[int(np.argmin(endless))])
-    return Changes(catch=catch, residual_sd=sd)
+    return catch, None, sd
+
+
+_ONE, _TORQUE, _REST, _ANGLE, _LATER = range(5)
+
+
+class _Sums(NamedTuple):
+    # sums of the products of two of: 1, torque, torque - pre-catch law, angle, and
+    # torque - what the law adds after the catch; those of any stretch take no loop
+    before: _Floats  # each place, (5, 5, n + 1)
+    at: _Floats  # the angle at each place
+    offset: _Floats  # what the law adds there
+
+    @classmethod
+    def of(cls, *columns: _Floats) -> "_Sums":
+        *varying, offset = columns
+        rows = np.stack([np.ones_like(offset), *varying])
+        products = np.cumsum(rows[:, None] * rows, axis=2)
+        at = np.append(rows[_ANGLE], rows[_ANGLE, -1])
+        return cls(np.pad(products, [(0, 0), (0, 0), (1, 0)]), at, offset)
+
+    def between(self, i: int, j: int, low: _Ints, high: _Ints | int = -1) -> _Floats:
+        before = self.before[i, j]
+        return np.asarray(before[high] - before[low])
+
+    def about_mean(self, i: int, low: _Ints, high: _Ints) -> _Floats:
+        # Σ(x - mean)² over the samples from low to before high; 0 of none
+        total = self.between(_ONE, i, low, high)
+        mean = total / np.maximum(high - low, 1)
+        return np.asarray(self.between(i, i, low, high) - total * mean)
 
 
 def _squares(
@@ -487,11 +714,10 @@ def _squares(
     i, e = starts[:, None], ends[None, :]
     step = np.minimum(i + peak, e)  # down, from the peak
     low = np.minimum(i + gap, step)
-    total = sums.rest.about_mean(np.zeros_like(i), i)
-    total = total + sums.torque.about_mean(low, np.maximum(step - 1, low))
+    total = sums.about_mean(_REST, np.zeros_like(i), i)
+    total = total + sums.about_mean(_TORQUE, low, np.maximum(step - 1, low))
     after = np.minimum(step + max(last_gap, 1), sums.offset.size)
-    end = np.maximum(e, after)
-    whole, along, length = _hinge(sums, after, end, sums.offset[i])
+    whole, along, length = _hinge(sums, after, np.maximum(e, after), sums.offset[i])
     usable = (length > 0.0) & (along > 0.0)
     total += whole - np.where(usable, along**2 / np.where(usable, length, 1.0), 0.0)
     # an end just before that of the peak is the same as one just after it
@@ -505,15 +731,13 @@ def _hinge(
     # Of torque from `low` on, about its mean: its squares, its products with the angle
     # travelled since `end`, and the squares of that.
     n = sums.offset.size
-    count, m, at = np.maximum(n - low, 1), n - end, sums.at[end]
-    before, after, angle = sums.torque, sums.later, sums.angle
-    later = after.one[n] - after.one[end]
-    squares = after.two[n] - after.two[end] + offset * (2.0 * later + offset * m)
-    squares = squares + before.two[end] - before.two[low]
+    m, at, count = n - end, sums.at[end], np.maximum(n - low, 1)
+    later, moved = sums.between(_ONE, _LATER, end), sums.between(_ONE, _ANGLE, end)
+    squares = sums.between(_LATER, _LATER, end) + offset * (2.0 * later + offset * m)
+    squares = squares + sums.between(_TORQUE, _TORQUE, low, end)
     later = later + offset * m
-    total = before.one[end] - before.one[low] + later
-    moved = angle.one[n] - angle.one[end]
+    total = sums.between(_ONE, _TORQUE, low, end) + later
     h = moved - m * at  # Σ max(θ - θ_e, 0)
-    h2 = angle.two[n] - angle.two[end] - 2.0 * at * moved + m * at**2
-    cross = sums.later_angle[n] - sums.later_angle[end] + offset * moved - at * later
+    h2 = sums.between(_ANGLE, _ANGLE, end) - 2.0 * at * moved + m * at**2
+    cross = sums.between(_ANGLE, _LATER, end) + offset * moved - at * later
     return squares - total**2 / count, cross - total * h / count, h2 - h**2 / count

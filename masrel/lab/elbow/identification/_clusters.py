@@ -10,12 +10,13 @@ Pustejovsky, J. E., Tipton, E. (2018). Journal of Business & Economic Statistics
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 _Floats = NDArray[np.float64]
 
@@ -193,3 +194,115 @@ def left_out_steps(trials: Sequence[Rows]) -> _Floats:
     errors = np.linalg.solve(matrix[determined], y[determined][..., None])[..., 0]
     steps[determined] = -np.einsum("gri,gr->gi", x[determined], errors) @ inverse
     return steps
+
+
+UNDETERMINED = "these trials do not determine it"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FittedParameter:
+    """One parameter with its confidence interval.
+
+    Attributes
+    ----------
+    name : str
+        Its name in `ElbowParameters`, among what an arm has, or in the friction law.
+    value : float
+        SI units; ``nan`` when these trials do not determine it.
+    standard_error : float
+        Clustered by trial; ``nan`` when undefined.
+    df : float
+        Degrees of freedom of its t.
+    low, high : float
+        Confidence interval; ``nan`` when undefined.
+    level : float
+        Its level.
+    n_trials : int
+        Trials that say something of it.
+    reason : str or None
+        Why the value or its interval is undefined, or None.
+    """
+
+    name: str
+    value: float = math.nan
+    standard_error: float = math.nan
+    df: float = math.nan
+    low: float = math.nan
+    high: float = math.nan
+    level: float
+    n_trials: int = 0
+    reason: str | None = None
+
+    def covers(self, truth: float) -> bool:
+        """Say whether the interval holds a value.
+
+        Parameters
+        ----------
+        truth : float
+            A value, SI units.
+
+        Returns
+        -------
+        bool
+            False when the interval is undefined.
+        """
+        return self.low <= truth <= self.high
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step:
+    """One of the fits that the source made, on its own.
+
+    Attributes
+    ----------
+    name : str
+        What was fitted.
+    estimates : tuple of FittedParameter
+        Its parameters.
+    residual_sd : float
+        Standard deviation of its residuals, in the unit of what was fitted.
+    """
+
+    name: str
+    estimates: tuple[FittedParameter, ...]
+    residual_sd: float
+
+    def __getitem__(self, name: str) -> FittedParameter:
+        return next(e for e in self.estimates if e.name == name)
+
+
+def fitted(
+    names: Sequence[str],
+    fit: ClusteredFit,
+    level: float,
+    reasons: Mapping[str, str] | None = None,
+) -> tuple[FittedParameter, ...]:
+    """Return the values of a clustered fit with intervals from t."""
+    estimates = []
+    for place, name in enumerate(names):
+        value = float(fit.values[place])
+        error = math.sqrt(max(fit.covariance[place, place], 0.0))
+        df = float(fit.df[place])
+        half = float(stdtrit(df, 0.5 + 0.5 * level)) * error
+        reason = None
+        if math.isnan(value):
+            reason = (reasons or {}).get(name, UNDETERMINED)
+        elif fit.n_trials[place] < 2 or not half > 0.0:
+            error = half = df = math.nan
+            reason = "an interval by trial needs two trials that differ"
+            if fit.n_trials[place] >= 2:
+                reason = "these trials fit exactly: an interval needs more that differ"
+        estimates.append(
+            FittedParameter(
+                name=name,
+                value=value,
+                standard_error=error,
+                df=df,
+                low=value - half,
+                high=value + half,
+                level=level,
+                n_trials=int(fit.n_trials[place]),
+                reason=reason,
+            )
+        )
+    return tuple(estimates)

@@ -21,7 +21,7 @@ from scipy.optimize import least_squares
 from scipy.signal import lfilter
 from scipy.special import erfcx, log_ndtr
 
-from masrel.lab.elbow.identification._catches import Catch, Law, Trial
+from masrel.lab.elbow.identification._catches import Catch, Law, Part, Trial
 from masrel.lab.elbow.identification._clusters import (
     ClusteredFit,
     Rows,
@@ -30,7 +30,6 @@ from masrel.lab.elbow.identification._clusters import (
     solve,
     triangle,
 )
-from masrel.lab.elbow.identification._stretches import Part
 from masrel.lab.elbow.parameters import ElbowParameters
 
 _Floats = NDArray[np.float64]

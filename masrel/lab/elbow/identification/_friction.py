@@ -15,14 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.errors import RecordingError, RecordingWarning
-from masrel.lab.elbow.identification._clusters import Rows, solve
+from masrel.lab.elbow.identification._catches import filter_alike, window_length
+from masrel.lab.elbow.identification._clusters import (
+    FittedParameter,
+    Rows,
+    fitted,
+    solve,
+)
 from masrel.lab.elbow.identification._reading import (
     Movement,
     even_samples,
     read_movement,
 )
-from masrel.lab.elbow.identification._results import FittedParameter, fitted
-from masrel.lab.elbow.identification._stretches import filter_alike, window_length
 
 _Floats = NDArray[np.float64]
 

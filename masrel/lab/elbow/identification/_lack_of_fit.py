@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc, stdtr
 
+from masrel.lab.elbow.identification._catches import Part
 from masrel.lab.elbow.identification._clusters import Rows, partial_out, solve
 from masrel.lab.elbow.identification._equations import LINEAR, Equations, Solution
-from masrel.lab.elbow.identification._stretches import Part
 
 _Floats = NDArray[np.float64]
 

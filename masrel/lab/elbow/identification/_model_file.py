@@ -10,7 +10,8 @@ from masrel.errors import ParameterError
 from masrel.lab.elbow.parameters import ElbowParameters
 
 if TYPE_CHECKING:
-    from masrel.lab.elbow.identification._results import ElbowFit, FittedParameter
+    from masrel.lab.elbow.identification._clusters import FittedParameter
+    from masrel.lab.elbow.identification._identify import ElbowFit
 
 
 DEGREES = 180.0 / math.pi  # of a radian

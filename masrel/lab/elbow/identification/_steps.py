@@ -23,7 +23,13 @@ from masrel.lab.elbow.identification._catches import (
     CatchLevels,
     Trial,
 )
-from masrel.lab.elbow.identification._clusters import Rows, solve
+from masrel.lab.elbow.identification._clusters import (
+    FittedParameter,
+    Rows,
+    Step,
+    fitted,
+    solve,
+)
 from masrel.lab.elbow.identification._equations import (
     DetectionLimit,
     Equations,
@@ -31,7 +37,6 @@ from masrel.lab.elbow.identification._equations import (
     line_row,
     mills,
 )
-from masrel.lab.elbow.identification._results import FittedParameter, Step, fitted
 from masrel.lab.elbow.parameters import ElbowParameters
 
 _Floats = NDArray[np.float64]

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 
 from masrel.lab.elbow.identification._clusters import (
     Rows,
+    fitted,
     left_out_steps,
     partial_out,
     solve,
     triangle,
 )
-from masrel.lab.elbow.identification._results import fitted
 
 
 def without_own(own: np.ndarray, design: np.ndarray, target: np.ndarray) -> Rows:

@@ -6,7 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from masrel.lab.elbow.identification._catches import Law, Trial, fast_trial
+from masrel.lab.elbow.identification._catches import (
+    Law,
+    Trial,
+    fast_trial,
+    find_stretches,
+)
 from masrel.lab.elbow.identification._equations import (
     DetectionLimit,
     Equations,
@@ -14,7 +19,6 @@ from masrel.lab.elbow.identification._equations import (
     beyond,
 )
 from masrel.lab.elbow.identification._model_file import QUANTITIES
-from masrel.lab.elbow.identification._stretches import find_stretches
 from masrel.lab.elbow.parameters import STANDARD_MODELS, ElbowParameters
 from tests.lab.elbow.identification.synthesis import recording
 

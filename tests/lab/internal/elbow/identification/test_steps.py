@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from masrel.lab.elbow.identification._catches import Catch
+from masrel.lab.elbow.identification._clusters import FittedParameter
 from masrel.lab.elbow.identification._equations import DetectionLimit, beyond, line_row
-from masrel.lab.elbow.identification._results import FittedParameter
 from masrel.lab.elbow.identification._steps import (
     Travels,
     fit_catch_line,
