@@ -5,11 +5,9 @@ from math import radians
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
 from hypothesis import strategies as st
 
 from masrel.lab.elbow import ConstantSpeed, ElbowParameters, MinimumJerk, Motion
-from masrel.lab.elbow._motion import Piece
 
 PUBLISHED = Path(__file__).parents[3] / "studies/hess2012/ratings/published.csv"
 
@@ -73,39 +71,3 @@ def motions(draw: st.DrawFn) -> Motion:
     start = draw(st.floats(0.0, 60.0))
     end = draw(st.floats(80.0, 175.0))
     return kind(draw(st.floats(5.0, 200.0)), start_deg=start, end_deg=end)
-
-
-class CountedMotion(Motion):
-    """A motion that counts how often, and at how many times, it is asked."""
-
-    def __init__(self, motion: Motion) -> None:
-        self._motion = motion
-        self.n_calls = 0
-        self.n_pieces = 0
-        self.largest = 0  # times in one call
-
-    def __getattribute__(self, name: str) -> object:
-        if name in ("start", "end", "duration", "origin"):
-            return getattr(self._motion, name)
-        return super().__getattribute__(name)
-
-    def _count(self, time: object) -> None:
-        self.n_calls += 1
-        self.largest = max(self.largest, int(np.size(time)))
-
-    def angle(self, time, origin=0.0):
-        self._count(time)
-        return self._motion.angle(time, origin)
-
-    def velocity(self, time):
-        self._count(time)
-        return self._motion.velocity(time)
-
-    def acceleration(self, time):
-        self._count(time)
-        return self._motion.acceleration(time)
-
-    def pieces(self) -> list[Piece]:
-        pieces = list(self._motion.pieces())
-        self.n_pieces += len(pieces)
-        return pieces

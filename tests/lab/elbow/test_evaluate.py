@@ -28,7 +28,7 @@ from masrel.lab.elbow import (
 )
 from masrel.lab.elbow._scenes import EVENTS, LOADS
 from tests.lab.elbow.scenes import KINDS, corner_cases, random_scene
-from tests.lab.elbow.stretches import constant, minimum_jerk, table_v
+from tests.lab.elbow.stretches import constant
 
 HM3 = STANDARD_MODELS["HM3"]
 ANGLES = ("catch_angle", "catch_speed", "mean_speed")
@@ -108,16 +108,6 @@ def test_corner_cases_are_those_of_one_scene() -> None:
         assert table.column("peak_torque")[i] == pytest.approx(peak, rel=1e-13)
 
 
-def test_table_v_in_one_call() -> None:
-    rows = table_v()
-    joints = [STANDARD_MODELS[row.model] for row in rows]
-    motions = [constant(row.speed_deg_s) for row in rows]
-    table = evaluate(joints, motions, ("catch_end", "end"))
-    reaches = np.isfinite(table.column("catch_end"))
-    assert reaches.tolist() == [row.model != "HM1" for row in rows]
-    assert table.n_alone == 0
-
-
 def test_slow_stretches_turn_where_one_by_one_they_do() -> None:
     # pre-catch to the end, its torque a quintic that turns twice
     speeds = np.radians(np.random.default_rng(1).uniform(2.0, 9.0, 50))
@@ -160,15 +150,6 @@ def test_copies_of_a_joint_give_what_it_gives(
     of_each = evaluate([joint, again, HM3], constant(92.0), LOADS).values
     np.testing.assert_array_equal(of_each[0], of_each[1])
     assert (of_each[0] != of_each[2]).all()
-
-
-@pytest.mark.parametrize("chunk", [1, 7, 1000])
-def test_chunks_change_nothing(chunk: int) -> None:
-    joints, motions = drawn("minimum jerk", 40, wide=False)
-    whole = evaluate(joints, motions, (*EVENTS, *LOADS))
-    cut = evaluate(joints, motions, (*EVENTS, *LOADS), chunk=chunk)
-    np.testing.assert_allclose(cut.values, whole.values, rtol=1e-14)
-    assert whole.n_alone == cut.n_alone
 
 
 def test_memory_is_that_of_a_chunk() -> None:
@@ -286,11 +267,3 @@ def test_wrong_columns_are_refused_with_their_row(call, message: str) -> None:
 def test_wrong_calls_are_refused(call, said: str) -> None:
     with pytest.raises(ParameterError, match=said):
         call()
-
-
-def test_the_names_are_those_of_the_functions() -> None:
-    found = events(HM3, minimum_jerk(92.0))
-    assert all(hasattr(found, name) for name in EVENTS)
-    assert set(LOADS) == set(FUNCTIONS)
-    assert isinstance(constant(1.0), ConstantSpeed)
-    assert isinstance(minimum_jerk(1.0), MinimumJerk)

@@ -58,23 +58,6 @@ def test_minimum_jerk_has_the_values_of_the_quintic(
     assert float(REACH.acceleration(time)) == acceleration
 
 
-def test_minimum_jerk_is_stationary_for_the_integral_of_squared_jerk() -> None:
-    # Its sixth derivative is 0 (Euler-Lagrange): the sixth difference of 7 points of a
-    # quintic vanishes, up to 2⁶ roundings of 2.5.
-    angle = REACH.angle(np.linspace(0.0, 2.0, 7))
-    assert abs(float(np.diff(angle, 6)[0])) < 64 * 2.5 * np.finfo(float).eps
-
-
-@given(motion=motions())
-def test_mean_speed_is_travel_over_duration(motion: Motion) -> None:
-    asked = motion.speed if isinstance(motion, ConstantSpeed) else motion.mean_speed
-    first, last = motion.angle(np.array([0.0, motion.duration]))
-    assert first == motion.start
-    # end - start and the sum in angle() each round once: a few ulp of at most π
-    assert last == pytest.approx(motion.end, abs=2e-15)
-    assert (last - first) / motion.duration == pytest.approx(asked, rel=1e-14)
-
-
 @given(motion=motions(), share=st.floats(0.001, 0.999))
 def test_times_at_undoes_angle(motion: Motion, share: float) -> None:
     angle = motion.start + share * (motion.end - motion.start)
@@ -143,27 +126,6 @@ def test_samples_are_those_of_the_pieces(kind: str, seed: int) -> None:
     assert float(motion.angle(motion.duration)) == pytest.approx(motion.end, abs=1e-14)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@given(seed=st.integers(0, 30), share=st.floats(0.0, 1.0), origin=st.floats(0.0, 2.0))
-def test_an_origin_is_taken_off_the_angle(
-    kind: str, seed: int, share: float, origin: float
-) -> None:
-    motion = any_motion(seed, kind)
-    time = share * motion.duration
-    apart = float(motion.angle(time, origin)) - (float(motion.angle(time)) - origin)
-    assert abs(apart) < 2e-15
-    start = float(motion.angle(0.0, motion.start))
-    assert abs(start) < 1e-16
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_many_times_at_once_give_the_same_bits_as_one_by_one(kind: str) -> None:
-    motion = any_motion(3, kind)
-    times = np.linspace(0.0, motion.duration, 37)
-    for law in (motion.angle, motion.velocity, motion.acceleration):
-        assert law(times).tolist() == [float(law(time)) for time in times.tolist()]
-
-
 # Trapezoid
 
 
@@ -196,12 +158,6 @@ def test_a_trapezoid_may_be_a_triangle_and_no_less() -> None:
         Trapezoid(start=0.5, end=2.5, speed=1.0, acceleration_rate=0.49)
 
 
-@pytest.mark.parametrize("rate", [0.0, -1.0, nan, inf])
-def test_ramps_must_rise(rate: float) -> None:
-    with pytest.raises(ParameterError, match=r"^acceleration_rate: needs more than 0"):
-        Trapezoid(start=0.5, end=2.5, speed=1.0, acceleration_rate=rate)
-
-
 # Recorded
 
 
@@ -222,15 +178,6 @@ def test_cubics_between_samples_are_those_of_scipy(
     assert motion.velocity(at) == pytest.approx(peer(at, 1), abs=1e-10 * steepest)
 
 
-def test_two_samples_are_enough() -> None:
-    for interpolation in ("pchip", "linear"):
-        motion = Recorded(
-            time=[0.0, 2.0], angle=[0.5, 2.5], interpolation=interpolation
-        )
-        assert float(motion.angle(0.5)) == 1.0
-        assert (motion.start, motion.end) == (0.5, 2.5)
-
-
 @pytest.mark.parametrize(
     ("time", "angle", "said"),
     [
@@ -247,12 +194,6 @@ def test_two_samples_are_enough() -> None:
 def test_wrong_samples_are_refused_with_their_place(time, angle, said: str) -> None:
     with pytest.raises(ParameterError, match=said):
         Recorded(time=time, angle=angle)
-
-
-def test_an_unknown_interpolation_is_refused() -> None:
-    said = "interpolation: needs one of pchip, linear, got 'cubic'"
-    with pytest.raises(ParameterError, match=said):
-        Recorded(time=[0.0, 1.0], angle=[0.5, 0.6], interpolation="cubic")  # type: ignore[arg-type]
 
 
 # Composed
@@ -272,27 +213,6 @@ def test_a_part_is_the_whole_between_two_times() -> None:
     assert (part.start, part.end, part.duration) == (0.5625, 2.4375, 2.0)
     assert float(part.velocity(0.0)) == 0.5
     assert [piece.length for piece in part.pieces()] == [0.25, 1.5, 0.25]
-
-
-def test_an_interruption_by_hand() -> None:
-    motion = interrupted(LINE, at=0.5, pause=3.0)
-    assert motion.duration == 5.0
-    times = np.array([0.25, 0.5, 2.0, 3.5, 4.0, 5.0])
-    assert motion.angle(times).tolist() == [0.75, 1.0, 1.0, 1.0, 1.5, 2.5]
-    # where the speed jumps the later one holds
-    assert motion.velocity(times).tolist() == [1.0, 0.0, 0.0, 1.0, 1.0, 1.0]
-    assert motion.acceleration(times).tolist() == [0.0] * 6
-
-
-def test_a_long_rest_costs_no_more_digits_than_its_time_has() -> None:
-    # 1e5 s have an ulp of 1.5e-11 s, and the reach is as much too early or too late
-    motion = Joined(
-        [Hold(start=0.5, duration=0.1), Hold(start=0.5, duration=1e5), REACH]
-    )
-    begin = 100000.1
-    left = begin - 1e5 - 0.1  # what the float of the time is more than 1e5 + 0.1
-    at = float(motion.angle(begin + 1.0))
-    assert at == pytest.approx(float(REACH.angle(1.0 + left)), abs=3e-11)
 
 
 @pytest.mark.parametrize(

@@ -1,31 +1,29 @@
-"""Torque at any time and its peak: by hand, at its jumps, and on dense grids."""
+"""Torque, its peak, work and impulse: by hand, by quadrature, by an ODE solver."""
 
 from dataclasses import replace
 from itertools import pairwise
-from math import nan, nextafter, pi, radians
+from math import isnan, nan, nextafter, pi
 
+import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from masrel.errors import ParameterError
 from masrel.lab.elbow import (
     STANDARD_MODELS,
     ElbowParameters,
+    Events,
     MinimumJerk,
     Motion,
     events,
+    impulse,
     peak_torque,
+    residual_torque,
     torque,
-    trace,
+    work,
 )
-from tests.lab.elbow.stretches import (
-    CountedMotion,
-    constant,
-    joints,
-    minimum_jerk,
-    motions,
-)
+from tests.lab.elbow.ode import Ode
+from tests.lab.elbow.scenes import KINDS, random_scene
+from tests.lab.elbow.stretches import constant, minimum_jerk
 
 HM3, HM4 = STANDARD_MODELS["HM3"], STANDARD_MODELS["HM4"]
 
@@ -126,28 +124,6 @@ def test_inertia_adds_to_pre_catch_by_hand() -> None:
     assert one(joint, motion, 0.5) == pytest.approx(expected, rel=1e-15)
 
 
-@given(rest_deg=st.floats(0.0, 90.0), share=st.floats(0.0, 1.0))
-def test_a_rest_angle_shifts_every_torque_by_the_spring(
-    rest_deg: float, share: float
-) -> None:
-    motion = constant(92.0)
-    time = share * events(HM3, motion).end
-    moved = one(replace(HM3, rest_angle=radians(rest_deg)), motion, time)
-    shift = 3.15 * (30.0 - rest_deg) * DEG
-    assert moved == pytest.approx(one(HM3, motion, time) + shift, abs=1e-13)
-
-
-@given(joint=joints(inertia=False), share=st.floats(0.0, 1.0), speed=st.floats(1, 19.9))
-def test_a_slow_stretch_is_a_damper_and_a_spring(
-    joint: ElbowParameters, share: float, speed: float
-) -> None:
-    motion = constant(speed)
-    time = share * events(joint, motion).end
-    travel = float(motion.angle(time)) - motion.start
-    expected = joint.damping * radians(speed) + joint.stiffness * travel
-    assert one(joint, motion, time) == pytest.approx(expected, rel=1e-14)
-
-
 # What section III.C says of the four traces, at one speed
 
 
@@ -169,39 +145,6 @@ def test_higher_grades_resist_more_catch_sooner_and_shorter(speed_deg_s: float) 
 # Jumps and continuity
 
 
-def jump(joint: ElbowParameters, motion: Motion, time: float) -> float:
-    before, after = torque(joint, motion, [nextafter(time, 0.0), time])
-    return float(after - before)
-
-
-@given(joint=joints(inertia=False), motion=motions())
-def test_torque_jumps_at_catch_and_end_of_peak_as_the_law_says(
-    joint: ElbowParameters, motion: Motion
-) -> None:
-    found = events(joint, motion)
-    if found.catch is None:
-        assert {span.name for span in found.phases} == {"pre-catch"}
-        assert found.peak_end is None
-        return
-    rise = joint.catch_torque_constant * found.catch_speed  # H·v_c
-    fall = -(1.0 - joint.residual_ratio) * rise
-    if found.catch > 0.0:
-        assert jump(joint, motion, found.catch) == pytest.approx(rise, abs=1e-9)
-    if found.peak_end == found.catch + joint.peak_duration:
-        falls = jump(joint, motion, found.peak_end)
-        if found.peak_end != found.catch_end:
-            assert falls == pytest.approx(fall, abs=1e-9)
-    if found.catch_end is None or found.post_catch_end == found.catch_end:
-        return
-    cut_short = found.peak_end == found.catch_end
-    expected = fall if cut_short else 0.0
-    if joint.post_catch == "additive":  # the pre-catch law has gone on meanwhile
-        speed = float(motion.velocity(found.catch_end))
-        expected += joint.stiffness * joint.catch_travel
-        expected += joint.damping * (speed - found.catch_speed)
-    assert jump(joint, motion, found.catch_end) == pytest.approx(expected, abs=1e-9)
-
-
 # Peak
 
 
@@ -215,35 +158,7 @@ def test_the_largest_may_be_the_last_of_a_phase() -> None:
     assert one(HM3, motion, end) < 0.7 * last
 
 
-@pytest.mark.parametrize("speed_deg_s", [190.0, 22.0])
-@pytest.mark.parametrize("kind", [constant, minimum_jerk])
-def test_peak_torque_makes_no_trace(kind, speed_deg_s: float) -> None:
-    # A trace of 5.3 s at 1 kHz is of 5300 samples; the peak asks for none.
-    motion = CountedMotion(kind(speed_deg_s))
-    peak_torque(HM3, motion)
-    assert motion.n_calls == 0
-    trace(HM3, motion)
-    assert motion.largest > 600  # the counter does count
-
-
 # Calls
-
-
-def test_at_an_event_the_later_phase_holds() -> None:
-    for row in (60.0, 71.3, 92.0, 110.0, 131.0):
-        motion = constant(row)
-        found = events(HM3, motion)
-        at = torque(HM3, motion, [found.catch, found.peak_end, found.catch_end])
-        after = torque(
-            HM3,
-            motion,
-            [time + 1e-13 for time in (found.catch, found.peak_end, found.catch_end)],
-        )
-        assert at == pytest.approx(after, abs=1e-11)
-
-
-def test_no_times_give_no_torque() -> None:
-    assert torque(HM3, constant(92.0), []).shape == (0,)
 
 
 @pytest.mark.parametrize("times", [[-0.001], [0.0, 1.3], [nan]])
@@ -251,3 +166,118 @@ def test_times_outside_the_stretch_are_refused(times: list[float]) -> None:
     said = r"^times: need 0 to 1\.26087 s, the end of the stretch, got "
     with pytest.raises(ParameterError, match=said):
         torque(HM3, constant(92.0), times)
+
+
+# HM3 at 92 deg/s (as above): 282.24 at the end of pre-catch, which rises from
+# 115.92 over 52.8 deg; 539.84 for 9.2 deg of the peak; 436.80 for 20.8 deg more;
+# from there to 629.36 over 33.2 deg. In N·m·deg/rad times deg:
+#   (115.92 + 282.24)/2 · 52.8 + 539.84 · 9.2 + 436.80 · 20.8
+#   + (436.80 + 629.36)/2 · 33.2 = 10511.424 + 4966.528 + 9085.44 + 17698.256
+WORK = 42261.648
+
+
+def test_work_and_impulse_of_hm3_at_92_deg_s_by_hand() -> None:
+    motion = constant(92.0)
+    assert work(HM3, motion) == pytest.approx(WORK * DEG**2, rel=1e-14)
+    # at constant speed the impulse is the work over the speed
+    assert impulse(HM3, motion) == pytest.approx(WORK * DEG / 92.0, rel=1e-14)
+    assert residual_torque(HM3, motion) == pytest.approx(436.80 * DEG, rel=1e-14)
+    assert peak_torque(HM3, motion) == pytest.approx(629.36 * DEG, rel=1e-14)
+
+
+def test_section_iii_c_reads_q_as_the_decrease() -> None:
+    # 1 - 0.6 of 257.6 above 282.24
+    joint = replace(HM3, residual_reading="decrease")
+    found = residual_torque(joint, constant(92.0))
+    assert found == pytest.approx((282.24 + 0.4 * 257.6) * DEG, rel=1e-14)
+    assert joint.residual_share == pytest.approx(0.4)
+
+
+def test_a_smoothed_onset_takes_half_its_rise_off_the_impulse() -> None:
+    # 3y² - 2y³ has a mean of 1/2: half of H·v_c = 257.6 is missing for 0.02 s
+    smooth = replace(HM3, catch_rise=0.02)
+    missing = impulse(HM3, constant(92.0)) - impulse(smooth, constant(92.0))
+    assert missing == pytest.approx(0.5 * 0.02 * 257.6 * DEG, rel=1e-12)
+    found = events(smooth, constant(92.0))
+    times = [found.catch, found.catch + 0.005, found.catch + 0.02]
+    levels = torque(smooth, constant(92.0), times)
+    # y = 1/4: 3/16 - 2/64 = 10/64
+    expected = [282.24, 282.24 + 257.6 * 10 / 64, 539.84]
+    assert levels / DEG == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_stretch_without_a_catch_has_no_residual() -> None:
+    assert isnan(residual_torque(HM3, constant(10.0)))
+
+
+def marks_of(joint: ElbowParameters, motion: Motion, found: Events) -> list[float]:
+    marks = {0.0, found.end}
+    for stretch in found.stretches:
+        marks |= {stretch.onset, stretch.catch, stretch.peak_end, stretch.catch_end}
+        marks |= {stretch.post_catch_end}
+        if stretch.catch is not None:
+            marks.add(min(stretch.catch + joint.catch_rise, found.end))
+    time = 0.0
+    for piece in motion.pieces():
+        time += float(piece.length)
+        marks.add(min(time, found.end))
+    return sorted(mark for mark in marks if mark is not None)
+
+
+def by_quadrature(
+    joint: ElbowParameters, motion: Motion
+) -> tuple[float, float, float, float]:
+    """Work, impulse, their scale, and the largest torque seen."""
+    # Ten points a smooth part: exact to degree 19; τω has degree 9 at most.
+    found = events(joint, motion)
+    shares, weights = np.polynomial.legendre.leggauss(10)
+    done = pushed = scale = 0.0
+    largest = -np.inf
+    for low, high in pairwise(marks_of(joint, motion, found)):
+        if high <= low:
+            continue
+        times = 0.5 * (low + high) + 0.5 * (high - low) * shares
+        tau = torque(joint, motion, times)
+        omega = motion.velocity(times)
+        width = 0.5 * (high - low)
+        done += width * float(weights @ (tau * omega))
+        pushed += width * float(weights @ tau)
+        scale += width * float(weights @ (np.abs(tau) * (1.0 + np.abs(omega))))
+        dense = torque(joint, motion, np.linspace(low, high, 99)[1:-1])
+        largest = max(largest, float(dense.max()))
+    return done, pushed, scale, largest
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_integrals_agree_with_quadrature_and_peaks_with_dense_grids(kind: str) -> None:
+    for seed in range(12):
+        rng = np.random.default_rng([seed, KINDS.index(kind), 7])
+        joint, motion = random_scene(rng, kind, wide=False)
+        if motion.start >= joint.range_end:
+            continue
+        done, pushed, scale, largest = by_quadrature(joint, motion)
+        assert work(joint, motion) == pytest.approx(done, abs=1e-12 * scale + 1e-15)
+        assert impulse(joint, motion) == pytest.approx(
+            pushed, abs=1e-12 * scale + 1e-15
+        )
+        peak = peak_torque(joint, motion)
+        assert peak >= largest - 1e-12 * abs(largest) - 1e-15
+        ends = 0.2 * (abs(peak) + 1.0)  # a hundredth of a phase from its end
+        assert peak - largest <= ends
+
+
+# An ODE solver that detects events: θ' = ω(t), with the work and the impulse as further
+# states, restarted at every event of Fig. 7, with a tolerance of 1e-11.
+@pytest.mark.parametrize("model", STANDARD_MODELS)
+@pytest.mark.parametrize("motion", [constant(97.0), minimum_jerk(97.0)])
+def test_an_ode_solver_finds_the_same(model: str, motion: Motion) -> None:
+    joint = STANDARD_MODELS[model]
+    exact = events(joint, motion)
+    ode = Ode(joint, motion, rtol=1e-11, max_step=0.01)
+    for name in ("onset", "catch", "catch_end", "post_catch_end"):
+        value = getattr(exact, name)
+        assert (name in ode.found) == (value is not None), name
+        if value is not None:
+            assert ode.found[name] == pytest.approx(value, abs=1e-8), name
+    assert ode.state[1] == pytest.approx(work(joint, motion), abs=1e-7)
+    assert ode.state[2] == pytest.approx(impulse(joint, motion), abs=1e-7)

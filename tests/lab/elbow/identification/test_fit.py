@@ -93,25 +93,6 @@ def test_slow_trials_are_fitted_as_numpy_fits_them(found: ElbowFit) -> None:
     assert found.relative_error == pytest.approx(float(error), rel=1e-8)
 
 
-def test_every_trial_is_there_with_what_was_seen_of_it(found: ElbowFit) -> None:
-    assert [t.pace for t in found.trials] == ["slow"] * 8 + ["fast"] * 16
-    for trial, law in zip(found.trials, found.fitted_torque, strict=True):
-        after = 0 if trial.after is None else trial.after.time.size
-        assert law.shape == (trial.pre_catch.time.size + after,)
-    assert found.torque_sd == pytest.approx(0.1, rel=0.05)  # the noise that was made
-    assert found.simulated
-    assert found.n_evaluations <= 50  # counted, not timed
-
-
-def test_offsets_of_the_torque_sensor_change_nothing(
-    movements: list[Movement], found: ElbowFit
-) -> None:
-    shifted = [replace(m, torque=m.torque + 0.1 * i) for i, m in enumerate(movements)]
-    for one, two in zip(found.estimates, fit(shifted).estimates, strict=True):
-        assert two.value == pytest.approx(one.value, rel=1e-5)
-        assert two.low == pytest.approx(one.low, rel=1e-4)
-
-
 def test_only_slow_trials_say_what_they_cannot(movements: list[Movement]) -> None:
     made = fit(movements[:8])
     assert made["damping"].value == pytest.approx(HM3.damping, rel=0.05)
@@ -153,18 +134,6 @@ def test_catches_that_outlast_their_stretch_count_as_longer() -> None:
     )
     (step,) = [s for s in found.steps if s.name.startswith("catch travel")]
     assert made == step["catch_travel"]
-
-
-@pytest.mark.parametrize("speeds", [(60.0, 120.0), (70.0, 130.0)])
-def test_the_correlation_is_one(speeds: tuple[float, float]) -> None:
-    joint = HM3 if speeds[0] == 60.0 else HM2  # with travels that are censored
-    found = fit(study(joint, seed=3, scatter=SCATTER, fast=speeds))
-    matrix, names = found.correlation, [estimate.name for estimate in found.estimates]
-    np.testing.assert_allclose(np.diag(matrix), 1.0, rtol=1e-12)
-    np.testing.assert_allclose(matrix, matrix.T, rtol=1e-9, atol=1e-12)
-    assert np.linalg.eigvalsh(matrix).min() > -1e-9
-    line = names.index("catch_angle_constant"), names.index("catch_slope")
-    assert matrix[line] > 0.8  # a line's height at 0 and its slope
 
 
 def test_one_catch_that_ends_says_nothing_of_how_travels_differ() -> None:
@@ -238,10 +207,6 @@ def test_what_cannot_be_fitted_is_refused(
 ) -> None:
     with pytest.raises(RecordingError, match=said):
         fit(change(movements))
-
-
-def test_the_limit_of_slow_stretches_can_be_raised(movements: list[Movement]) -> None:
-    assert len(fit(movements[:8], slow_below=math.radians(40.0)).trials) == 8
 
 
 def test_slow_stretches_of_which_none_can_be_used_are_not_called_fast() -> None:
@@ -340,23 +305,6 @@ def test_options_outside_their_range_are_refused(
 ) -> None:
     with pytest.raises(ParameterError, match=said):
         fit(movements[:2], **options)
-
-
-def test_what_is_not_told_from_none_is_taken_as_none(
-    movements: list[Movement],
-) -> None:
-    made = fit(movements, lag="fitted")
-    assert math.isnan(made["lag"].value)
-    assert "which these samples do not tell from nothing" in str(made["lag"].reason)
-    assert made.arm["lag"] == 0.0
-
-
-def test_a_known_zero_is_where_a_recording_begins_to_drift() -> None:
-    plain = study(HM3, seed=5001)
-    drifting = [replace(m, torque=m.torque + 0.3 * m.time) for m in plain]
-    one, two = fit(plain, offset="off"), fit(drifting, offset="off", drift=0.3)
-    for name in NAMES:
-        assert two[name].value == pytest.approx(one[name].value, rel=1e-6), name
 
 
 # 5 studies of 8 parameters: at 95 % coverage 2 of 40 miss on average. Were they

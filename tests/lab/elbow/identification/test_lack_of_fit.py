@@ -118,13 +118,6 @@ def test_the_right_law_fits_and_what_is_left_is_noise() -> None:
         assert phase.autocorrelation == pytest.approx(0.0, abs=0.1)
 
 
-def test_a_camera_s_60_samples_a_second_are_enough() -> None:
-    made = quiet_fit(study(HM3, seed=9001, rate=60.0))
-    assert made.lack_of_fit.verdict == "fits"
-    held = [made[name].covers(getattr(HM3, name)) for name in NAMES]
-    assert sum(held) >= 7
-
-
 def test_what_is_left_after_the_catch_alone_is_announced_with_few_trials() -> None:
     lack = quiet_fit(study(HM3, seed=3, n_slow=2, n_fast=2, arm=Arm(rise=0.08)))
     assert lack.lack_of_fit.verdict == "does not fit"
@@ -153,25 +146,6 @@ def test_stretches_that_do_not_tell_k_for_their_drifts_say_so() -> None:
     with pytest.raises(RecordingError, match="each drifts in its own way"):
         fit(movements)
     assert fit(movements, drift="fitted")["stiffness"].covers(HM3.stiffness)
-
-
-def test_few_trials_are_undecided() -> None:
-    lack = quiet_fit(study(HM3, seed=3, n_slow=2, n_fast=2)).lack_of_fit
-    assert lack.verdict == "undecided"
-    assert "too few trials to tell" in lack.sentence
-    assert lack.tests == ()
-
-
-@pytest.mark.slow
-def test_a_fixed_value_does_what_a_fitted_one_does() -> None:
-    movements = study(HM3, seed=5001, arm=WRONG["gravity"])
-    fixed = fit(movements, gravity=0.5)
-    assert fixed.lack_of_fit.verdict == "fits"
-    assert "gravity" not in [estimate.name for estimate in fixed.estimates]
-    fitted = fit(movements, gravity="fitted")
-    for name in NAMES:
-        half = 0.5 * (fitted[name].high - fitted[name].low)
-        assert abs(fixed[name].value - fitted[name].value) < 2.0 * half
 
 
 def motor(kind: str, seed: int, fast: str = "hand") -> list[Movement]:
@@ -225,12 +199,6 @@ def test_constant_speeds_are_identified_where_the_zero_is_known(
     assert made.offsets == (0.0,) * 20
 
 
-def test_a_motor_that_speeds_up_tells_b() -> None:
-    made = fit(motor("trapezoid", 1))
-    assert made["damping"].covers(HM3.damping)
-    assert made["damping"].value == pytest.approx(HM3.damping, rel=0.01)
-
-
 def test_a_residual_above_its_peak_is_not_the_law() -> None:
     movements = []
     for m in study(HM3, seed=1):
@@ -275,22 +243,14 @@ def without_rest(movement: Movement) -> Movement:
     )
 
 
-@pytest.mark.parametrize("rests", [True, False], ids=["at rest", "never at rest"])
-@pytest.mark.parametrize(
-    ("size", "verdict"), [(0.0, "fits"), (0.2, "no evidence either way")]
-)
-def test_what_is_left_must_be_noise_to_fit(
-    size: float, verdict: str, rests: bool
-) -> None:
+def test_what_is_left_must_be_noise_to_fit() -> None:
+    # none is known where no recording rests
     rng = np.random.default_rng(1)
-    movements = [wavering(m, rng, size) for m in study(HM3, seed=5000)]
-    if not rests:
-        movements = [without_rest(movement) for movement in movements]
-    lack = quiet_fit(movements).lack_of_fit
-    assert math.isnan(lack.rest_sd) is not rests
+    movements = [wavering(m, rng, 0.2) for m in study(HM3, seed=5000)]
+    lack = quiet_fit([without_rest(movement) for movement in movements]).lack_of_fit
+    assert math.isnan(lack.rest_sd)
     assert lack.tests[0].adjusted > lack.level
-    assert lack.verdict == verdict
-    assert lack.sentence.startswith(verdict.capitalize())
+    assert lack.sentence.startswith("No evidence either way")
 
 
 def counts(case: dict[str, object], seeds: range, **options: object) -> Counter[str]:

@@ -137,12 +137,6 @@ def test_a_sensor_at_the_end_of_its_range_is_said_and_marked() -> None:
     assert not Movement(name="levels", torque=levels, **columns).saturated.any()
 
 
-def test_times_rounded_as_they_are_written_are_of_50_hz_still() -> None:
-    time = np.round(np.arange(200) * 0.020001, 6)  # 49.9975 a second
-    angle = np.linspace(0.5, 1.5, 200)
-    assert Movement(name="film", time=time, angle=angle, torque=angle).time.size == 200
-
-
 HEAD = "time_s,angle_deg,torque_nm\n"
 
 

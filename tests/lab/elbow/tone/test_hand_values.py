@@ -93,46 +93,6 @@ def test_clonus_stops_where_the_arm_is_moved_back(
     assert np.all(model.torque(motion, times[times > stop.time]) == 1.5)
 
 
-def test_clonus_goes_on_where_a_beat_throws_the_arm_back() -> None:
-    # by 8 deg at 60 deg/s, as in a soft hand, and forth again: one train of beats
-    there = ConstantSpeed(start=START, end=END, speed=radians(90))
-    thrown = ConstantSpeed(start=END - radians(8), end=END, speed=radians(60))
-    hold = Hold(start=END, duration=0.5)
-    motion = Joined([there, hold, Reversed(motion=thrown), thrown, hold])
-    model = Clonus.of_tardieu(4)
-    assert [e.name for e in model.events(motion) if e.name != "beat"] == ["trigger"]
-    times, torque, phase = stepped(model, motion)
-    assert np.flatnonzero(np.diff(phase)).size == 1
-    (trigger,) = (e for e in model.events(motion) if e.name == "trigger")
-    near = np.abs((times - trigger.time - 0.06) % 0.2 - 0.04) < 1e-3
-    assert np.all(torque[near & (times > trigger.time + 0.06)] > 5.4)
-
-
-PEAKS = [
-    (LeadPipe.of_updrs(3), 3.6243),
-    (Cogwheel(gap_edge=0.0), 3.5979),
-    (ClaspKnife(), 3.9472),
-    (ThresholdReflex.of_mas("2"), 5.0168),
-    (ThresholdReflex.stiffening_with_speed(), 7.2),
-]
-
-
-@pytest.mark.parametrize(("model", "peak"), PEAKS, ids=[m.kind for m, _ in PEAKS])
-def test_peak_of_samples(model: ToneModel, peak: float) -> None:
-    _, torque, _ = stepped(model, m1())
-    assert torque.max() == pytest.approx(peak, abs=5e-5)
-
-
-def test_exact_peak_of_the_clasp_knife_is_where_it_gives_way() -> None:
-    (release,) = (e for e in ClaspKnife().events(m1()) if e.name == "release")
-    assert ClaspKnife().torque(m1(), [release.time]) == pytest.approx(3.9419, abs=5e-5)
-
-
-def test_the_stiffening_reflex_meets_its_limit() -> None:
-    times, torque, _ = stepped(ThresholdReflex.stiffening_with_speed(), m1())
-    assert times[np.argmax(torque == 7.2)] == pytest.approx(1.098, abs=1e-9)
-
-
 EVENTS: list[tuple[ToneModel, str, list[tuple[float, float]]]] = [
     (LeadPipe(), "slip", [(2 / 90, 32.0), (29 / 18 + 4 / 60, 126.0)]),
     (LeadPipe(), "stick", [(29 / 18, 130.0)]),

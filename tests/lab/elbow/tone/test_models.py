@@ -1,17 +1,13 @@
 """What holds for every model of tone: one list of properties, one table of joints."""
 
-import dataclasses
-import inspect
-import re
 from math import inf, nan, radians
 
 import numpy as np
 import pytest
 
 from masrel.errors import ParameterError
-from masrel.lab.elbow import MODELS, ConstantSpeed, Hold, Joined, MinimumJerk, Motion
-from masrel.lab.elbow._motion import Piece, piece_of
-from masrel.lab.elbow.tone import Dystonia, LeadPipe, ToneModel
+from masrel.lab.elbow import MODELS, ConstantSpeed, Hold, Joined, MinimumJerk
+from masrel.lab.elbow.tone import Dystonia, ToneModel
 from tests.lab.elbow.tone.joints import (
     END,
     JOINTS,
@@ -19,7 +15,6 @@ from tests.lab.elbow.tone.joints import (
     m1,
     random_motion,
     stepped,
-    work_of_a_cycle,
 )
 
 EVERY = pytest.mark.parametrize("model", JOINTS.values(), ids=JOINTS.keys())
@@ -42,46 +37,12 @@ def test_every_registered_model_is_tested() -> None:
 
 
 @EVERY_KIND
-def test_the_defaults_are_a_valid_joint(law: type[ToneModel]) -> None:
-    assert law().kind == law.kind
-    assert dataclasses.replace(law()) == law()
-
-
-@EVERY_KIND
 def test_a_parameter_outside_its_range_is_refused_by_name(law: type[ToneModel]) -> None:
     for name, known in law.quantities().items():
         for value in (nan, inf, "much", True, *OUTSIDE[known.needs]):
             with pytest.raises(ParameterError, match=f"^{name}: needs .*got ") as error:
                 law(**{name: value})
             assert "\n" not in str(error.value)
-
-
-@EVERY_KIND
-def test_numbers_far_out_of_a_joint_give_a_torque_all_the_same(
-    law: type[ToneModel],
-) -> None:
-    for name, known in law.quantities().items():
-        for value in (1e-300, 1e300):
-            if known.needs in ("share", "angle", "frequency") and value > 1.0:
-                continue
-            try:
-                model = law(**{name: value})
-            except ParameterError:  # with the others it makes no sense
-                continue
-            _, torque, _ = stepped(model, m1(), 100.0)
-            assert not np.isnan(torque).any(), name
-            assert model.events(m1()) is not None
-
-
-@EVERY_KIND
-def test_a_value_of_no_source_is_said_to_be_our_choice(law: type[ToneModel]) -> None:
-    text = inspect.cleandoc(law.__doc__ or "")
-    attributes = text.split("Attributes\n----------\n")[1].split("\n\nRaises")[0]
-    entries = re.split(r"\n(?=\w)", attributes)
-    for name, known in law.quantities().items():
-        (entry,) = (e for e in entries if name in e.split(" :")[0].split(", "))
-        is_marked = "choice of ours, not from a source" in re.sub(r"\s+", " ", entry)
-        assert is_marked == known.is_choice, name
 
 
 @EVERY
@@ -101,47 +62,6 @@ def test_the_largest_torque_is_not_much_more_than_is_reached(model: ToneModel) -
     held = Joined([there, Hold(start=model.range_end, duration=2.0)])
     _, torque, _ = stepped(model, held)
     assert torque.max() > 0.45 * model.largest_torque(start_angle=START, speed=speed)
-
-
-@EVERY
-def test_no_sample_is_steeper_than_the_largest_slope(model: ToneModel) -> None:
-    if isinstance(model, Dystonia):
-        model = dataclasses.replace(model, episode_duration=0.0)
-    if not model.is_passive and model.catch_event is None:
-        return  # it changes in time
-    stretch = ConstantSpeed(start=START, end=radians(80), speed=radians(8))
-    times, torque, _ = stepped(model, stretch)
-    over_angle, _ = model.largest_slope(speed=radians(8))
-    travel = np.diff(stretch.angle(times))
-    assert np.all(np.abs(np.diff(torque)) <= over_angle * travel + 1e-9)
-
-
-@EVERY
-def test_time_may_begin_anywhere(model: ToneModel) -> None:
-    motion = m1()
-    times, torque, _ = stepped(model, motion)
-    joint = model.stepper(motion.start)
-    samples = zip(
-        (times + 7.0).tolist(),
-        motion.angle(times).tolist(),
-        motion.velocity(times).tolist(),
-        strict=True,
-    )
-    later = np.array([joint.step(*sample) for sample in samples])
-    # a latch or a gap may close one sample later, by rounding
-    assert np.mean(np.abs(later - torque) > 1e-9) < 0.01
-
-
-@EVERY
-def test_a_missed_tick_is_survived(model: ToneModel) -> None:
-    motion = random_motion(np.random.default_rng(3))
-    rng = np.random.default_rng(4)
-    times = np.arange(int(motion.duration * 1000)) / 1000
-    times = times[rng.random(times.size) > 0.05]
-    joint = model.stepper(motion.start)
-    angle, velocity = motion.angle(times).tolist(), motion.velocity(times).tolist()
-    samples = zip(times.tolist(), angle, velocity, strict=True)
-    assert all(np.isfinite(joint.step(*sample)) for sample in samples)
 
 
 @EVERY
@@ -190,24 +110,6 @@ def test_events_are_in_order_and_at_their_angles(model: ToneModel) -> None:
             assert event.angle == float(motion.angle(event.time))
 
 
-class Wave(Motion):
-    """60 deg and a cubic in time on it, one piece that turns twice."""
-
-    start, end, duration = radians(60), radians(60), 6.0
-
-    def pieces(self) -> list[Piece]:
-        # 300·x·(x - 1/2)·(x - 1) deg, x = t/6
-        cubic = (0.0, radians(25), -radians(12.5), radians(300) / 216)
-        return [piece_of(0.0, self.duration, cubic)]
-
-
-def test_a_piece_may_turn() -> None:
-    model, motion = LeadPipe.of_updrs(3), Wave()
-    times, torque, _ = stepped(model, motion, 2000.0)
-    assert np.abs(torque - model.torque(motion, times)).max() < 1e-3
-    assert [e.name for e in model.events(motion)] == ["slip", "stick"] * 2 + ["slip"]
-
-
 @EVERY
 def test_a_release_gives_up_what_was_triggered(model: ToneModel) -> None:
     motion = m1()
@@ -229,20 +131,6 @@ def test_a_release_gives_up_what_was_triggered(model: ToneModel) -> None:
 
 
 @EVERY
-def test_what_is_released_stays_so_while_the_stretch_goes_on(model: ToneModel) -> None:
-    joint, speed = model.stepper(START), radians(150)
-    samples = iter([(i / 1000, START + speed * i / 1000, speed) for i in range(600)])
-    for sample in samples:
-        joint.step(*sample)
-        if joint.phase:
-            break
-    joint.release()
-    for sample in samples:
-        joint.step(*sample)
-        assert joint.phase == 0
-
-
-@EVERY
 def test_a_passive_joint_never_gives_more_than_it_took(model: ToneModel) -> None:
     # Stored energy at the start is at most what leads the arm to where nothing is.
     if not model.is_passive:
@@ -261,19 +149,6 @@ def test_a_passive_joint_never_gives_more_than_it_took(model: ToneModel) -> None
         )
         stored = float(np.interp(START, grid, potential) - potential.min())
         assert taken.min() >= -stored - 1e-3
-
-
-@EVERY
-def test_work_of_a_cycle(model: ToneModel) -> None:
-    """Not below 0 unless the law is active by nature."""
-    if model.kind in ("clonus", "dystonia") or model is JOINTS["stiffening"]:
-        return
-    for rate_hz in (0.5, 1.0, 3.0):
-        assert work_of_a_cycle(model, rate_hz, 1000) >= 0.0
-
-
-def test_the_reflex_that_stiffens_gives_energy_in_a_cycle() -> None:
-    assert work_of_a_cycle(JOINTS["stiffening"], 5.0) < -0.5
 
 
 @EVERY

@@ -1,6 +1,6 @@
 """Places of polynomials: products of known factors, touching roots, ties."""
 
-from math import isnan, nan, prod
+from math import isnan, prod
 
 import numpy as np
 import pytest
@@ -8,13 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from masrel.lab.elbow._polynomials import (
-    bernstein,
     first_above,
-    integral,
     largest,
     product,
-    reversed_from,
-    shifted,
     split_at_roots,
     value,
 )
@@ -84,23 +80,3 @@ def test_a_place_nearer_to_the_end_than_a_tie_is_none() -> None:
     assert first_above([-1.0 + 1e-12, 1.0], 0.0, 1.0) == pytest.approx(1.0)
     cubic = with_roots(1.0 - 1e-15, 3.0, 4.0)
     assert isnan(first_above(cubic, 0.0, 1.0))
-
-
-@pytest.mark.parametrize("p", [[-1.0, 4.0], [-1.0, 2.0, 8.0], [-1.0, 0.0, 0.0, 8.0]])
-def test_closed_forms_and_newton_find_the_same_kind_of_place(p: list[float]) -> None:
-    x = first_above(p, 0.0, 1.0)
-    assert value(p, x) == pytest.approx(0.0, abs=1e-15)
-    columns = [np.array([c, c]) for c in p]
-    at = first_above(columns, np.zeros(2), np.ones(2), among=np.array([True, False]))
-    assert at == pytest.approx([x, nan], rel=1e-15, nan_ok=True)
-
-
-@given(p=st.lists(st.floats(-3.0, 3.0), min_size=1, max_size=6), x=st.floats(0.0, 2.0))
-def test_changes_of_variable_keep_the_values(p: list[float], x: float) -> None:
-    assert value(shifted(p, 0.7), x) == pytest.approx(value(p, 0.7 + x), abs=1e-9)
-    assert value(reversed_from(p, 0.7), x) == pytest.approx(value(p, 0.7 - x), abs=1e-9)
-    b = bernstein(p, 2.0)
-    assert min(b) - 1e-9 <= value(p, x) <= max(b) + 1e-9
-    assert value(integral(p), 1.0) == pytest.approx(
-        sum(c / (i + 1) for i, c in enumerate(p))
-    )

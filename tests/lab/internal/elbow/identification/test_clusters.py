@@ -16,7 +16,6 @@ from masrel.lab.elbow.identification._clusters import (
     left_out_steps,
     partial_out,
     solve,
-    triangle,
 )
 
 
@@ -85,14 +84,6 @@ def test_with_one_row_a_trial_it_is_hc2_of_statsmodels() -> None:
     assert fit.residual_sd == pytest.approx(math.sqrt(peer.mse_resid), rel=1e-12)
 
 
-@pytest.mark.parametrize("n_rows", [3, 9, 256, 257, 5000])
-def test_the_triangle_of_blocks_is_that_of_the_whole(n_rows: int) -> None:
-    table = np.random.default_rng(n_rows).standard_normal((n_rows, 5))
-    r = triangle(table)
-    np.testing.assert_allclose(r.T @ r, table.T @ table, rtol=1e-10, atol=1e-10)
-    assert r.shape == (min(n_rows, 5), 5)
-
-
 def test_what_leaving_a_trial_out_does_is_what_a_fit_without_it_says() -> None:
     rows = trials(6, [7, 9, 6, 8])
     fit = solve(rows)
@@ -102,20 +93,6 @@ def test_what_leaving_a_trial_out_does_is_what_a_fit_without_it_says() -> None:
     for i, step in enumerate(left_out_steps(at_zero)):
         others = solve([r for j, r in enumerate(rows) if j != i])
         np.testing.assert_allclose(fit.values + step, others.values, rtol=1e-9)
-
-
-def test_a_mean_of_trials_of_unlike_size_by_hand() -> None:
-    # Trials of 1, 1 and 2 equal rows, values 0, 3 and 3: mean 9/4. With h_g = n_g/4,
-    # CR2 gives Σ n_g² e_g²/(1 - n_g/4)/16: 1·(81/16)/(3/4) + 1·(9/16)/(3/4) +
-    # 4·(9/16)/(1/2), all over 16.
-    rows = [
-        Rows(design=np.ones((n, 1)), target=np.full(n, y))
-        for n, y in ((1, 0.0), (1, 3.0), (2, 3.0))
-    ]
-    fit = solve(rows)
-    by_hand = (81 / 16 / 0.75 + 9 / 16 / 0.75 + 4 * 9 / 16 / 0.5) / 16
-    assert fit.values[0] == pytest.approx(2.25, rel=1e-15)
-    assert fit.covariance[0, 0] == pytest.approx(by_hand, rel=1e-12)
 
 
 def test_what_no_row_tells_is_undefined_and_the_rest_is_not() -> None:
@@ -134,15 +111,6 @@ def test_what_no_row_tells_is_undefined_and_the_rest_is_not() -> None:
     assert np.isfinite(lone.values).all()
     assert np.isnan(lone.covariance).all()
     assert np.isnan(lone.df).all()
-
-
-def test_parameters_taken_out_are_as_a_dummy_a_trial_of_statsmodels() -> None:
-    rows = trials(5, [7, 9, 6, 8])
-    x, y = (np.concatenate(each) for each in zip(*rows, strict=True))
-    dummies = np.eye(4)[np.repeat(np.arange(4), [7, 9, 6, 8])]
-    peer = sm.OLS(y, np.hstack([x, dummies])).fit()
-    fit = solve([without_own(np.ones((r.target.size, 1)), *r) for r in rows])
-    np.testing.assert_allclose(fit.values, peer.params[:2], rtol=1e-10)
 
 
 def test_what_own_parameters_explain_but_for_rounding_tells_nothing() -> None:
