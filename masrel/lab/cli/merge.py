@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from masrel.lab.protocol import StudyPaths
+from masrel.lab.protocol import StudyPaths, read_protocol
 
 
 @click.command("merge")
@@ -27,8 +27,8 @@ def merge(studies: tuple[Path, ...], output: Path) -> None:
     from masrel.lab.merging import merge_studies
 
     merged = merge_studies([StudyPaths(study) for study in studies], output)
-    n_sessions = len(merged.study.logs())
+    n_raters = len(read_protocol(merged.protocol).raters)
     click.echo(
-        f"{output}: {len(studies)} studies with {len(merged.protocol.raters)} raters "
-        f"and {n_sessions} session logs, verified. Next: masrel ratings {output}"
+        f"{output}: {len(studies)} studies with {n_raters} raters and "
+        f"{len(merged.logs())} session logs, verified. Next: masrel ratings {output}"
     )
