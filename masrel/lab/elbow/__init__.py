@@ -7,15 +7,19 @@ what moving the arm takes, or the trace a controller would command.
 from typing import TYPE_CHECKING
 
 from masrel.lab.elbow._events import Events, PhaseSpan, StretchEvents, events
-from masrel.lab.elbow._motion import Motion
+from masrel.lab.elbow._law import SampledJoint
 from masrel.lab.elbow._scenes import Columns, SceneTable, evaluate
 from masrel.lab.elbow._torque import (
+    Outline,
+    Trace,
     impulse,
+    outline,
     peak_torque,
     residual_torque,
     times_at,
     torque,
     torque_at,
+    trace,
     work,
 )
 from masrel.lab.elbow.joint_model import JointModel, Stepper
@@ -25,6 +29,7 @@ from masrel.lab.elbow.motions import (
     Hold,
     Joined,
     MinimumJerk,
+    Motion,
     Part,
     Recorded,
     Reversed,
@@ -32,8 +37,6 @@ from masrel.lab.elbow.motions import (
     interrupted,
 )
 from masrel.lab.elbow.parameters import STANDARD_MODELS, ElbowParameters
-from masrel.lab.elbow.sampled import SampledJoint
-from masrel.lab.elbow.trace import Outline, Trace, outline, trace
 
 if TYPE_CHECKING:
     from masrel.lab.elbow.identification import (

@@ -15,7 +15,7 @@ import numpy as np
 
 from masrel.errors import ParameterError
 from masrel.lab.elbow import _law
-from masrel.lab.elbow._motion import Motion, Piece
+from masrel.lab.elbow._law import CATCH, POST_CATCH, PRE_CATCH
 from masrel.lab.elbow._polynomials import (
     NOTHING,
     TIE,
@@ -33,12 +33,11 @@ from masrel.lab.elbow._polynomials import (
     split_at_roots,
     value,
 )
+from masrel.lab.elbow.motions import Motion, Piece
 from masrel.lab.elbow.parameters import ElbowParameters
 from masrel.lab.recording import PHASES, Phase
 
 __all__ = ["Events", "PhaseSpan", "StretchEvents", "events"]
-
-PRE_CATCH, CATCH, POST_CATCH = range(3)  # positions in PHASES
 
 
 class PhaseSpan(NamedTuple):

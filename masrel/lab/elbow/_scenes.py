@@ -16,10 +16,15 @@ from numpy.typing import ArrayLike
 
 from masrel.errors import ParameterError
 from masrel.lab.elbow._events import Timeline, check_starts
-from masrel.lab.elbow._motion import Floats, Motion
 from masrel.lab.elbow._polynomials import Number
 from masrel.lab.elbow._torque import load
-from masrel.lab.elbow.motions import ConstantSpeed, MinimumJerk, Trapezoid
+from masrel.lab.elbow.motions import (
+    ConstantSpeed,
+    Floats,
+    MinimumJerk,
+    Motion,
+    Trapezoid,
+)
 from masrel.lab.elbow.parameters import READINGS, ElbowParameters
 
 __all__ = ["EVENTS", "LOADS", "Columns", "SceneTable", "evaluate"]

@@ -1,12 +1,21 @@
-"""What a joint offers to whoever presents it, whatever its law.
+"""What a joint offers to whoever presents it, and what the laws of tone share.
 
 A controller steps it at samples, a figure draws it, and the limits of a device are
 compared with the largest torque and slope that it can ask for.
 """
 
-from typing import ClassVar, Protocol
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar, Literal, Protocol
 
-__all__ = ["JointModel", "Stepper"]
+import numpy as np
+
+from masrel.errors import ParameterError
+from masrel.lab.elbow.motions import _SAME_TIME, Floats, Motion
+
+__all__ = ["JointModel", "Quantity", "Stepper", "ToneEvent", "ToneModel"]
 
 
 class Stepper(Protocol):
@@ -126,3 +135,245 @@ class JointModel(Protocol):
             Over angle, N·m/rad, and over angular velocity, N·m·s/rad.
         """
         ...
+
+
+Needs = Literal["positive", "not negative", "share", "angle", "frequency"]
+
+_RANGES: dict[Needs, tuple[str, Callable[[float], bool]]] = {
+    "positive": ("more than 0", lambda value: value > 0.0),
+    "not negative": ("0 or more", lambda value: value >= 0.0),
+    "share": ("0 to 1", lambda value: 0.0 <= value <= 1.0),
+    "angle": ("0 to 180 degrees", lambda value: 0.0 <= value <= math.pi),
+    "frequency": ("more than 0, at most 100", lambda value: 0.0 < value <= 100.0),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quantity:
+    """What is known of a parameter besides its value.
+
+    Attributes
+    ----------
+    unit : str
+        Its unit in Python: "rad", "N·m/rad"; "" for a plain number.
+    needs : {"positive", "not negative", "share", "angle", "frequency"}
+        The range that it has to lie in.
+    is_choice : bool
+        Whether its default is a choice of ours, not from a source.
+    """
+
+    unit: str
+    needs: Needs
+    is_choice: bool
+
+
+def quantity(
+    default: float | None, unit: str, needs: Needs, *, is_choice: bool = True
+) -> Any:
+    """Return the field of a parameter with its unit and range."""
+    known = Quantity(unit=unit, needs=needs, is_choice=is_choice)
+    return field(default=default, metadata={"quantity": known})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToneEvent:
+    """Something that happens to a joint along a motion.
+
+    Attributes
+    ----------
+    name : str
+        What, in the words of the model's page.
+    time : float
+        When, s.
+    angle : float
+        Where, rad.
+    """
+
+    name: str
+    time: float
+    angle: float
+
+
+class ToneStepper:
+    """A law that sees one sample at a time; one with a memory adds it."""
+
+    __slots__ = ("is_given_up", "model", "phase", "rest")
+
+    def __init__(self, model: Any, start_angle: float) -> None:
+        self.model, self.rest = model, model.rest_from(start_angle)
+        self.is_given_up = False
+        self.phase = 0
+        self.begin()
+
+    def begin(self) -> None:
+        """Have seen nothing yet."""
+
+    def release(self) -> None:
+        """Give up at once what has been triggered; a law says until when."""
+        self.is_given_up = True
+        self.phase = 0
+
+    def remember(
+        self, _time_s: float, _angle: float, _velocity: float, /
+    ) -> tuple[float, ...]:
+        """Take a sample in -> what the law's torque depends on besides."""
+        return ()
+
+    def step(self, time_s: float, angle: float, velocity: float) -> float:
+        """Decide the torque of one sample, N·m."""
+        memory = self.remember(time_s, angle, velocity)
+        torque: float = self.model._law(angle, velocity, self.rest, *memory)
+        return torque
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToneModel(JointModel, ABC):
+    """A law of tone: what every model in `masrel.lab.elbow.tone` is.
+
+    Attributes
+    ----------
+    kind : str
+        Name of the law in `masrel.lab.elbow.MODELS`.
+    is_passive : bool
+        Whether it never gives back more than it took, whatever the motion.
+    catch_event : str or None
+        Name of the event where the phase "catch" begins; None if nothing catches.
+    range_end : float
+        End of the range of motion, rad.
+    speed_threshold : float
+        Speed from which the arm counts as moving, rad/s.
+
+    Raises
+    ------
+    ParameterError
+        If a parameter is not finite or outside its range; the message names it.
+    """
+
+    kind: ClassVar[str]
+    is_passive: ClassVar[bool] = False
+    catch_event: ClassVar[str | None] = None
+    _stepper: ClassVar[type[ToneStepper]] = ToneStepper
+
+    range_end: float = quantity(math.radians(146.0), "rad", "angle", is_choice=False)
+    speed_threshold: float = quantity(
+        math.radians(20.0), "rad/s", "positive", is_choice=False
+    )
+
+    def __post_init__(self) -> None:
+        for name, known in self.quantities().items():
+            value = getattr(self, name)
+            if value is None and name in self._may_be_none():
+                continue
+            is_number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not is_number or not math.isfinite(value):
+                raise ParameterError(f"{name}: needs a finite number, got {value!r}")
+            needed, is_met = _RANGES[known.needs]
+            if not is_met(value):
+                raise ParameterError(
+                    f"{name}: needs {needed}, got {value:g} {known.unit}".rstrip()
+                )
+        self._check_together()
+
+    def _check_together(self) -> None:
+        # A model whose parameters have to go together refuses here those that do not.
+        return
+
+    @classmethod
+    def quantities(cls) -> dict[str, Quantity]:
+        """Return unit, range and origin of every parameter, by name."""
+        return {entry.name: entry.metadata["quantity"] for entry in fields(cls)}
+
+    @classmethod
+    def _may_be_none(cls) -> frozenset[str]:
+        return frozenset(entry.name for entry in fields(cls) if entry.default is None)
+
+    def stepper(self, start_angle: float) -> ToneStepper:
+        """Return the joint as a state machine that has not seen a sample yet."""
+        return self._stepper(self, start_angle)
+
+    def rest_from(self, start_angle: float) -> float:
+        """Return where the spring has no torque, rad: where it starts unless set."""
+        rest: float | None = getattr(self, "rest_angle", None)
+        return start_angle if rest is None else rest
+
+    @abstractmethod
+    def events(self, motion: Motion) -> tuple[ToneEvent, ...]:
+        """Return what happens along a motion, as roots of it: nothing is stepped.
+
+        Parameters
+        ----------
+        motion : Motion
+            A movement, SI units; it may hold and return.
+
+        Returns
+        -------
+        tuple of ToneEvent
+            In order of their times.
+        """
+
+    def torque(self, motion: Motion, times: Sequence[float] | Floats) -> Floats:
+        """Return the torque along a motion, its events at their own times.
+
+        Parameters
+        ----------
+        motion : Motion
+            A movement, SI units; it may hold and return.
+        times : array_like of float, shape (n,)
+            Times, s; from the end of the motion on, those of its end.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Torque that resists extension, N·m.
+
+        Raises
+        ------
+        ParameterError
+            If a time is before 0 or nan.
+        """
+        moments = np.asarray(times, dtype=np.float64)
+        if moments.size and not 0.0 <= moments.min() <= moments.max():
+            raise ParameterError("times: needs 0 s or later, got an earlier one or nan")
+        moments = np.minimum(moments, motion.duration)
+        angle, velocity = motion.angle(moments), motion.velocity(moments)
+        columns = (angle, velocity, *self._memory(motion, moments))
+        rest = self.rest_from(motion.start)
+        rows = zip(*columns, strict=True)
+        return np.array([self._law(a, v, rest, *memory) for a, v, *memory in rows])
+
+    @abstractmethod
+    def _law(
+        self, angle: float, velocity: float, rest: float, /, *memory: float
+    ) -> float:
+        """Return the torque, N·m."""
+
+    def _memory(self, _motion: Motion, _times: Floats, /) -> list[Floats]:
+        """Return what `_law` depends on besides, at times of a motion (n,) each."""
+        return []
+
+
+def events_at(
+    motion: Motion, times: Iterable[tuple[str, float]]
+) -> tuple[ToneEvent, ...]:
+    """Return events of these names and times, in order.
+
+    What would begin at the very end of the motion, or later, is none.
+    """
+    last = motion.duration - _SAME_TIME
+    inside = sorted((e for e in times if e[1] < last), key=lambda event: event[1])
+    angles = motion.angle(np.array([time for _, time in inside])).tolist()
+    return tuple(
+        ToneEvent(name=name, time=time, angle=angle)
+        for (name, time), angle in zip(inside, angles, strict=True)
+    )
+
+
+def grade_of(table: dict[str, Any], grade: object, name: str) -> Any:
+    """Return the row of a grade, refusing one that the table does not have."""
+    row = table.get(str(grade))
+    if row is None or isinstance(grade, bool):
+        *others, last = table
+        raise ParameterError(
+            f"{name}: needs {', '.join(others)} or {last}, got {grade!r}"
+        )
+    return row

@@ -5,36 +5,19 @@ from dataclasses import dataclass
 
 from masrel.errors import ParameterError
 from masrel.lab.elbow._events import events
-from masrel.lab.elbow.joint_model import JointModel
+from masrel.lab.elbow.joint_model import JointModel, ToneModel
 from masrel.lab.elbow.motions import ConstantSpeed
 from masrel.lab.elbow.parameters import ElbowParameters
-from masrel.lab.elbow.tone import (
-    ClaspKnife,
-    Clonus,
-    Cogwheel,
-    Contracture,
-    Dystonia,
-    LeadPipe,
-    ThresholdReflex,
-    ToneModel,
-)
+from masrel.lab.elbow.tone import LAWS
 
 __all__ = ["MODELS", "Tardieu", "tardieu"]
 
 _SPEEDS = (math.radians(10.0), math.radians(100.0), math.radians(150.0))
 
-_LAWS: tuple[type[JointModel], ...] = (
-    ElbowParameters,
-    LeadPipe,
-    Cogwheel,
-    ClaspKnife,
-    Contracture,
-    Dystonia,
-    Clonus,
-    ThresholdReflex,
-)
-
-MODELS: dict[str, type[JointModel]] = {law.kind: law for law in _LAWS}
+MODELS: dict[str, type[JointModel]] = {
+    ElbowParameters.kind: ElbowParameters,
+    **{law.kind: law for law in LAWS},
+}
 """Every law by the name of its kind; `kind = "..."` of a protocol file."""
 
 

@@ -1,26 +1,31 @@
-"""Kinds of movements: given by a formula or by samples, and made of others.
+"""Movements of the arm: rows of polynomial pieces, and where they reach what.
 
-The formulas of single stretches take columns in place of their numbers too.
+Kinds are given by a formula or by samples, and made of others. The formulas of single
+stretches take columns in place of their numbers too.
 """
 
 import math
-from collections.abc import Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from operator import attrgetter
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from masrel.errors import ParameterError
-from masrel.lab.elbow._motion import Floats, Motion, Piece, Rows, piece_of, rows_of
 from masrel.lab.elbow._polynomials import (
+    Number,
+    Polynomial,
     bernstein,
     derivative,
     reversed_from,
     shifted,
     some,
+    split_at_roots,
+    value,
 )
 
 __all__ = [
@@ -29,12 +34,16 @@ __all__ = [
     "Interpolation",
     "Joined",
     "MinimumJerk",
+    "Motion",
     "Part",
     "Recorded",
     "Reversed",
     "Trapezoid",
     "interrupted",
 ]
+
+Floats = NDArray[np.float64]
+
 
 _SAME_ANGLE = 1e-9
 # rad: nearer angles are the same but for rounding, and movements join there
@@ -43,6 +52,137 @@ Interpolation = Literal["pchip", "linear"]
 """What lies between two samples: a cubic that never overshoots, or a line."""
 
 _UNITS = {"speed": "deg/s", "mean_speed": "deg/s", "acceleration_rate": "deg/s²"}
+
+_SAME_TIME = 1e-12  # s: nearer times are the same but for rounding
+_SLACK = 1e-12  # rad, rad/s: by so little less than 0 is 0 but for rounding
+
+
+class Piece(NamedTuple):
+    """A time in which the angle is a polynomial of at most fifth degree."""
+
+    start: float  # s
+    length: float  # s
+    angle: Polynomial  # rad from the motion's origin, over s since the start
+    # between these the speed is, rad/s
+    slowest: float
+    fastest: float
+
+
+def piece_of(start: float, length: float, angle: Polynomial) -> Piece:
+    """Return a piece, its speed bounded by Bernstein coefficients."""
+    speeds = bernstein(derivative(angle), length)
+    return Piece(start, length, angle, min(speeds), max(speeds))
+
+
+class Rows(NamedTuple):
+    """The same pieces as arrays."""
+
+    start: Floats  # (n_pieces,), s
+    angle: Floats  # (n_coefficients, n_pieces)
+
+
+def rows_of(pieces: Sequence[Piece]) -> Rows:
+    """Return some pieces as arrays."""
+    width = max(len(piece.angle) for piece in pieces)
+    padded = [[*p.angle, *[0.0] * (width - len(p.angle))] for p in pieces]
+    return Rows(np.array([p.start for p in pieces]), np.array(padded).T)
+
+
+class Motion(ABC):
+    """A movement as a function of time, made of polynomial pieces; SI units.
+
+    It may go either way and rest. Samples, events and loads come from its pieces.
+    """
+
+    __slots__ = ()
+
+    # Every kind has these, as fields or properties of its own; a property here would be
+    # the default of a field.
+    if TYPE_CHECKING:
+
+        @property
+        def start(self) -> float:
+            """Angle where it starts, rad."""
+
+        @property
+        def end(self) -> float:
+            """Angle where it ends, rad."""
+
+        @property
+        def duration(self) -> float:
+            """How long it takes, s."""
+
+    origin = property(attrgetter("start"), doc="Angle the pieces count from, rad.")
+
+    @abstractmethod
+    def pieces(self) -> Sequence[Piece]:
+        """Return the pieces in order of time."""
+
+    def rows(self) -> Rows:
+        """Return the pieces as arrays."""
+        return rows_of(self.pieces())
+
+    def angle(self, time: Floats | float, origin: float = 0.0) -> Floats:
+        """Return angles at times within the duration.
+
+        Parameters
+        ----------
+        time : float or ndarray of any shape
+            Times, s.
+        origin : float, optional
+            Angle to count from, rad. A difference of near angles keeps its digits so,
+            which it would lose if `origin` were subtracted afterwards.
+
+        Returns
+        -------
+        ndarray, shape of `time`
+            Angles, rad; the same bits for one time as for many at once.
+        """
+        first, travel = self._at(time, 0)
+        return np.asarray(((self.origin - origin) + first) + travel)
+
+    def velocity(self, time: Floats | float) -> Floats:
+        """Return angular velocities at times within the duration.
+
+        Parameters
+        ----------
+        time : float or ndarray of any shape
+            Times, s.
+
+        Returns
+        -------
+        ndarray, shape of `time`
+            Velocities, rad/s, positive in extension. Where it jumps, the later one.
+        """
+        return self._at(time, 1)[1]
+
+    def acceleration(self, time: Floats | float) -> Floats:
+        """Return angular accelerations at times within the duration.
+
+        Parameters
+        ----------
+        time : float or ndarray of any shape
+            Times, s.
+
+        Returns
+        -------
+        ndarray, shape of `time`
+            Accelerations, rad/s². Where it jumps, the later one.
+        """
+        return self._at(time, 2)[1]
+
+    def _at(self, time: Floats | float, order: int) -> tuple[Floats, Floats]:
+        # where the piece of each time begins, rad, and what came since, or a derivative
+        rows, times = self.rows(), np.asarray(time)
+        place = np.maximum(np.searchsorted(rows.start, times, side="right") - 1, 0)
+        since, total = times - rows.start[place], np.zeros(times.shape)
+        p: Polynomial = [*0.0 * rows.angle[:1], *rows.angle[1:]]
+        for _ in range(order):
+            p = derivative(p)
+        for column in p[::-1]:
+            if np.ndim(column):
+                total = total * since + column[place]
+        return rows.angle[0][place], total
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -654,3 +794,116 @@ def interrupted(motion: Motion, *, at: float, pause: float) -> Joined:
     rest = Hold(start=first.end, duration=pause)
     last = Part(motion=motion, begin=at, finish=motion.duration)
     return Joined([first, rest, last])
+
+
+@dataclass(frozen=True, slots=True)
+class OneWay:
+    """A part of a motion in which the arm extends (1), flexes (-1) or rests (0)."""
+
+    start: float  # s
+    length: float  # s
+    angle: Polynomial  # rad, over s since its start
+    direction: int
+
+    @property
+    def end(self) -> float:
+        """When it ends, s."""
+        return self.start + self.length
+
+    def angle_at(self, time: Number) -> Number:
+        """Return the angle at one or many times of the part, rad."""
+        return value(self.angle, time - self.start)
+
+    def beyond(self, angle: float, lead: float = 0.0) -> Polynomial:
+        """Return θ + lead·ω less an angle, rad."""
+        over = [self.angle[0] - angle, *self.angle[1:]]
+        for i, speed in enumerate(derivative(self.angle) if lead else ()):
+            over[i] += lead * speed
+        return over
+
+    def faster(self, speed: float, way: int) -> Polynomial:
+        """Return ω one way less a speed, rad/s."""
+        over = [way * c for c in derivative(self.angle)]
+        over[0] -= speed
+        return over
+
+    def reached(self, *levels: Polynomial, after: float = -math.inf) -> float | None:
+        """Return when all polynomials are first 0 or more; None if never.
+
+        Not before the time `after`, which counts itself.
+        """
+        first = max(0.0, after - self.start)
+        places = {
+            place for level in levels for place in split_at_roots(level, self.length)
+        }
+        for place in sorted({first, *places}):
+            if place >= first and all(_is_met(level, place) for level in levels):
+                return self.start + place
+        return None
+
+
+def one_way(motion: Motion) -> Iterator[OneWay]:
+    """Give the parts of a motion that go one way, in order."""
+    for piece in motion.pieces():
+        angle = [motion.origin + piece.angle[0], *piece.angle[1:]]
+        for low, high in pairwise(split_at_roots(derivative(angle), piece.length)):
+            part = shifted(angle, low) if low else angle
+            travel = value(part, high - low) - part[0]
+            direction = 0 if abs(travel) < _SLACK else (1 if travel > 0.0 else -1)
+            yield OneWay(piece.start + low, high - low, part, direction)
+
+
+def spans(
+    motion: Motion, level: Callable[[OneWay], Polynomial]
+) -> list[tuple[float, float]]:
+    """Return between which times a polynomial of each part is 0 or more, s."""
+    result: list[tuple[float, float]] = []
+    for part in one_way(motion):
+        values = level(part)
+        for low, high in pairwise(split_at_roots(values, part.length)):
+            if not _is_met(values, 0.5 * (low + high)):
+                continue
+            begun, until = part.start + low, part.start + high
+            if result and begun - result[-1][1] < _SAME_TIME:
+                result[-1] = (result[-1][0], until)
+            else:
+                result.append((begun, until))
+    return result
+
+
+def movements(motion: Motion, speed: float) -> list[tuple[float, float]]:
+    """Return between which times the arm goes one way at least so fast, s."""
+    extends = spans(motion, lambda part: part.faster(speed, 1))
+    return sorted(extends + spans(motion, lambda part: part.faster(speed, -1)))
+
+
+def latched(
+    motion: Motion,
+    closes: Callable[[OneWay], Sequence[Polynomial]],
+    opens: Callable[[float], float],
+) -> list[tuple[float, float]]:
+    """Return between which times a latch is closed, s; the last may never open.
+
+    It closes where all polynomials of a part are 0 or more, and opens where the arm is
+    back at an angle, of the farthest that it has been since, rad.
+    """
+    result: list[tuple[float, float]] = []
+    closed: float | None = None
+    farthest = -math.inf
+    for part in one_way(motion):
+        since = part.start
+        if closed is not None and part.direction < 0:
+            opened = part.reached([-c for c in part.beyond(opens(farthest))])
+            if opened is not None:
+                result.append((closed, opened))
+                closed, since, farthest = None, opened, -math.inf
+        if closed is None:
+            closed = part.reached(*closes(part), after=since)
+        if closed is not None and part.direction > 0:
+            farthest = max(farthest, float(part.angle_at(part.end)))
+    return result if closed is None else [*result, (closed, math.inf)]
+
+
+def _is_met(level: Polynomial, place: float) -> bool:
+    # 0 or more, but for rounding
+    return bool(value(level, place) >= -_SLACK)

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Literal
 
 from masrel.errors import ParameterError
 from masrel.lab.elbow import _law
-from masrel.lab.elbow.sampled import SampledJoint
+from masrel.lab.elbow._law import SampledJoint
 
 __all__ = ["STANDARD_MODELS", "ElbowParameters", "PostCatch", "ResidualReading"]
 

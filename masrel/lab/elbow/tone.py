@@ -15,23 +15,26 @@ from typing import ClassVar, Self
 import numpy as np
 
 from masrel.errors import ParameterError
-from masrel.lab.elbow._motion import Floats, Motion
+from masrel.lab.elbow._law import CATCH, POST_CATCH, PRE_CATCH
 from masrel.lab.elbow._polynomials import Polynomial
-from masrel.lab.elbow._tone import (
-    OneWay,
+from masrel.lab.elbow.joint_model import (
     Quantity,
     ToneEvent,
     ToneModel,
     ToneStepper,
     events_at,
     grade_of,
+    quantity,
+)
+from masrel.lab.elbow.motions import (
+    Floats,
+    Motion,
+    OneWay,
     latched,
     movements,
     one_way,
-    quantity,
     spans,
 )
-from masrel.lab.recording import PHASES
 
 __all__ = [
     "ClaspKnife",
@@ -45,8 +48,6 @@ __all__ = [
     "ToneEvent",
     "ToneModel",
 ]
-
-_PRE_CATCH, _CATCH, _POST_CATCH = range(len(PHASES))
 
 # F N·m, K N·m/rad, B N·m·s/rad by the UPDRS score of rigidity: choices of ours
 _BY_UPDRS = {
@@ -359,16 +360,16 @@ class _ClaspKnife(ToneStepper):
     ) -> tuple[float, ...]:
         model = self.model
         if angle < model.arming_angle:
-            self.phase, self.is_given_up = _PRE_CATCH, False
+            self.phase, self.is_given_up = PRE_CATCH, False
         if self.is_given_up:
             return (0.0,)
-        if self.phase == _PRE_CATCH:
+        if self.phase == PRE_CATCH:
             force = model._reflex(angle, velocity)
             if angle < model.arming_angle or force < model.firing_torque:
                 return (1.0,)
             self._fired = time_s
         since = time_s - self._fired
-        self.phase = _CATCH if since < model.release_delay else _POST_CATCH
+        self.phase = CATCH if since < model.release_delay else POST_CATCH
         return (model._scale(since),)
 
 
@@ -745,13 +746,13 @@ class _Clonus(ToneStepper):
         is_far = angle >= model.trigger_angle
         if self.is_given_up:
             self.is_given_up = is_far and velocity > -model.speed_threshold
-        elif self.phase == _CATCH:
+        elif self.phase == CATCH:
             self._farthest = max(self._farthest, angle)
             if angle < model._given_up(self._farthest):
-                self.phase = _PRE_CATCH
+                self.phase = PRE_CATCH
         elif is_far and velocity >= model.trigger_speed:
-            self.phase, self._begun, self._farthest = _CATCH, time_s, angle
-        idle = self.phase == _PRE_CATCH
+            self.phase, self._begun, self._farthest = CATCH, time_s, angle
+        idle = self.phase == PRE_CATCH
         return (-math.inf if idle else time_s - self._begun - model.delay,)
 
 
@@ -911,7 +912,7 @@ class _ThresholdReflex(ToneStepper):
             self.is_given_up = False
         elif self.is_given_up:
             reflex = 0.0
-        self.phase = _CATCH if reflex > 0.0 else _PRE_CATCH
+        self.phase = CATCH if reflex > 0.0 else PRE_CATCH
         return (reflex,)
 
 
@@ -1053,3 +1054,14 @@ class ThresholdReflex(ToneModel):
         velocity = np.where(moved, motion.velocity(late), 0.0)
         samples = zip(motion.angle(late), velocity, strict=True)
         return [np.array([self._reflex(*sample) for sample in samples])]
+
+
+LAWS: tuple[type[ToneModel], ...] = (
+    LeadPipe,
+    Cogwheel,
+    ClaspKnife,
+    Contracture,
+    Dystonia,
+    Clonus,
+    ThresholdReflex,
+)

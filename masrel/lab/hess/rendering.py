@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.errors import ParameterError
-from masrel.lab.elbow._motion import Motion
+from masrel.lab.elbow._torque import _stepped
 from masrel.lab.elbow.joint_model import JointModel
-from masrel.lab.elbow.trace import _stepped
+from masrel.lab.elbow.motions import Motion
 from masrel.lab.hess._clock import SimulatedClock
 from masrel.lab.hess._recorder import Presented
 from masrel.lab.hess._signals import passive_damping

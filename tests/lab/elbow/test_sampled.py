@@ -12,7 +12,7 @@ from masrel.lab.elbow import (
     SampledJoint,
     events,
 )
-from masrel.lab.elbow.sampled import CATCH, POST_CATCH, PRE_CATCH
+from masrel.lab.elbow._law import CATCH, POST_CATCH, PRE_CATCH
 from tests.lab.elbow.stretches import constant, minimum_jerk
 
 HM3 = STANDARD_MODELS["HM3"]

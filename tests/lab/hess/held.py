@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.lab.elbow import STANDARD_MODELS
-from masrel.lab.elbow.trace import _stepped
+from masrel.lab.elbow._torque import _stepped
 from masrel.lab.hess import (
     Controller,
     DeviceLimits,

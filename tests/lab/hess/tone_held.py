@@ -8,6 +8,7 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel.lab.elbow._torque import _stepped
 from masrel.lab.elbow.tone import (
     ClaspKnife,
     Clonus,
@@ -18,7 +19,6 @@ from masrel.lab.elbow.tone import (
     ThresholdReflex,
     ToneModel,
 )
-from masrel.lab.elbow.trace import _stepped
 from masrel.lab.hess import (
     Controller,
     DeviceLimits,
