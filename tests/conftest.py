@@ -8,8 +8,8 @@ from hypothesis import settings
 
 from tests.faults import Faults
 
-# derandomize: a failure repeats; 50 examples a property; a slow machine is no failure.
-settings.register_profile("masrel", derandomize=True, deadline=None, max_examples=50)
+# derandomize: a failure repeats; 30 examples a property; a slow machine is no failure.
+settings.register_profile("masrel", derandomize=True, deadline=None, max_examples=30)
 settings.load_profile("masrel")
 
 # What a shell starts in the background ignores Ctrl-C, which tests send.

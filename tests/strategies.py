@@ -13,10 +13,11 @@ def tables(
     *,
     n_raters: tuple[int, int] = (2, 6),
     missing: bool = True,
+    max_items: int = 12,
 ) -> Table:
-    """Draw 1 to 12 items by some raters, over 2 to 6 categories."""
+    """Draw some items, 12 at most, by some raters, over 2 to 6 categories."""
     columns = draw(st.integers(*n_raters))
     grades = st.sampled_from(LABELS[: draw(st.integers(2, len(LABELS)))])
     cell = st.none() | grades if missing else grades
     row = st.lists(cell, min_size=columns, max_size=columns)
-    return draw(st.lists(row, min_size=1, max_size=12))
+    return draw(st.lists(row, min_size=1, max_size=max_items))

@@ -16,7 +16,7 @@ import pyarrow as pa
 import pytest
 
 import masrel
-from masrel.agreement import cohen_kappa, declared_weights, fleiss_kappa
+from masrel.agreement import declared_weights, fleiss_kappa
 from masrel.errors import MasrelError
 from masrel.ratings import read_ratings
 from tests.cli.conftest import masrel as command
@@ -112,8 +112,10 @@ def rows(table: pd.DataFrame) -> list[dict[Any, Any]]:
     return table.astype(object).where(table.notna(), None).to_dict("records")
 
 
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    ("case", "form"),
+    [*(("wide", form) for form in FORMS), *((case, "polars") for case in CASES)],
+)
 def test_every_form_gives_what_the_command_gives(
     command: Caller, tmp_path: Path, case: str, form: str
 ) -> None:
@@ -150,13 +152,6 @@ def test_rows_without_names_are_items_by_raters(data: Any) -> None:
     value = result.table.set_index("coefficient").loc["fleiss_kappa", "value"]
     assert value == fleiss_kappa(GRADES).value
     assert result.file.parts[0].raters == ("1", "2", "3")
-
-
-def test_rows_of_a_row_a_rating_have_numbers_for_names() -> None:
-    long = [[item, rater, g] for item, rater, g in [("a", "K", 1), ("a", "L", 2)] * 1]
-    long += [["b", "K", 1], ["b", "L", 1], ["c", "K", 2], ["c", "L", 2]]
-    file = masrel.agree(long, item="1", rater="2", grade="3").file
-    assert (file.parts[0].items, file.parts[0].raters) == (("a", "b", "c"), ("K", "L"))
 
 
 # ---- what is read of a frame ----
@@ -219,30 +214,6 @@ def test_ordered_categories_are_the_scale(frame: Any, tmp_path: Path) -> None:
         frame.to_parquet(tmp_path / "o.parquet")
         file = read_ratings(tmp_path / "o.parquet")
         assert (file.scale, file.read["scale"]["declared"]) == (result.file.scale, True)
-
-
-def test_other_categories_than_those_of_the_columns_may_be_declared() -> None:
-    frame = pd.DataFrame({"item": list("abc"), **KIM_LEE}, dtype="category")
-    two = masrel.agree(frame.astype({"Kim": ORDER}))  # one column alone has an order
-    assert two.file.scale.name == "observed"
-    declared = masrel.Reading(categories=["hi", "mid", "lo"], missing_codes="top")
-    frame = frame.astype({"Kim": ORDER, "Lee": ORDER})
-    assert masrel.agree(frame, reading=declared).file.scale.grades == (
-        "hi",
-        "mid",
-        "lo",
-    )
-    short = masrel.agree(frame, reading=masrel.Reading(missing_codes=["top"]))
-    assert short.file.scale.grades == ("lo", "mid", "hi")
-
-
-def test_names_and_grades_may_be_numbers() -> None:
-    frame = pd.DataFrame({0: ["a", "b", "c"], 1: [1, 2, 9], 2: [1, 3, 3]})
-    frame.columns = pd.Index([0, 1, 2])
-    how = masrel.Reading(item=0, raters=[1, 2], categories=[1, 2, 3], missing_codes=9)  # type: ignore[arg-type]
-    file = masrel.agree(frame, reading=how).file
-    assert file.read["grades"] == {"1": 2, "2": 1, "3": 2}
-    assert file.read["missing"] == {"9": 1}
 
 
 # ---- refusals ----
@@ -309,11 +280,6 @@ def test_one_sentence(data: Any, arguments: dict[str, Any], why: str) -> None:
     assert "\n" not in str(refused.value)
 
 
-def test_a_second_grade_needs_one_of_the_rules_there_are() -> None:
-    with pytest.raises(MasrelError, match="needed error, first, last or mean"):
-        masrel.Reading(repeated="frist")  # type: ignore[arg-type]
-
-
 def test_an_error_says_what_its_options_are_called_in_python() -> None:
     with pytest.raises(MasrelError) as refused:
         masrel.agree(FRAME.drop(columns="patient"))
@@ -342,16 +308,6 @@ def test_a_matrix_of_weights_is_in_the_order_of_the_scale(tmp_path: Path) -> Non
     assert kappas == {fleiss_kappa(GRADES, weights="linear").value}
 
 
-def test_without_a_target_one_line_says_how_to_ask() -> None:
-    plain, asked = masrel.agree(FRAME), masrel.agree(FRAME, target="items")
-    line = 'No interval; for other items like these: masrel.agree(…, target="items").'
-    assert (plain.notes[-1], plain.notes.count(line)) == (line, 1)
-    assert line not in asked.notes
-    assert asked.estimates[0].interval is not None
-    # there is none to ask for
-    assert line not in masrel.agree(FRAME, coefficients="icc_c1").notes
-
-
 def test_the_text_is_the_first_screen_of_the_command(
     command: Caller, tmp_path: Path
 ) -> None:
@@ -361,14 +317,6 @@ def test_the_text_is_the_first_screen_of_the_command(
     assert shown == command("agree", path, "--target", "items").out.rstrip("\n")
     sentence = command("agree", path, "--sentence").out.rstrip("\n")
     assert masrel.agree(path).sentence() == sentence
-
-
-def test_warnings_are_apart_from_notes() -> None:
-    result = masrel.agree(FRAME.rename(columns={"Lee": "KIM"}))
-    (finding,) = result.warnings
-    assert finding.code == "alike"
-    assert "'KIM'" in " ".join(str(result).split())
-    assert not any("KIM" in note for note in result.notes)
 
 
 def test_html_has_the_table_and_no_markup_of_the_data() -> None:
@@ -385,13 +333,6 @@ def test_what_is_read_of_a_table_can_be_pickled() -> None:
     assert file.sha256() == ""  # there are no bytes of a file
 
 
-def test_the_frame_is_left_as_it_was() -> None:
-    frame = FRAME.set_index("patient")
-    before = frame.copy(deep=True)
-    masrel.agree(frame)
-    pd.testing.assert_frame_equal(frame, before)
-
-
 def test_it_loads_no_figures_and_no_other_frames() -> None:
     code = (
         "import sys, masrel; import pandas as pd; "
@@ -403,8 +344,3 @@ def test_it_loads_no_figures_and_no_other_frames() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
     assert done.stdout.strip() == "[]"
-
-
-def test_cohens_kappa_of_two_columns_is_that_of_the_frame() -> None:
-    result = masrel.agree(FRAME, coefficients="cohen_kappa")
-    assert result.estimates[0].value == cohen_kappa(FRAME["Kim"], FRAME["Lee"]).value

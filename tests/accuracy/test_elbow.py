@@ -1,7 +1,5 @@
 """The section about the joint model, from a few scenes."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from tqdm import tqdm
@@ -27,15 +25,6 @@ def test_the_section_has_a_row_for_every_kind_and_case(text: str) -> None:
     rows = [line for line in text.splitlines() if line.startswith("|")]
     assert len(rows) == (2 + 2) + (2 + 1)  # each table with a head and a bar
     assert "Of 6 random scenes and 1 built ones, all are within" in text
-
-
-def test_the_section_is_kept_where_it_stands(text: str, tmp_path: Path) -> None:
-    page = tmp_path / "accuracy.md"
-    assert elbow.written_section(page) == ""
-    page.write_text("# Accuracy\n\nOther things.\n", encoding="utf-8")
-    assert elbow.written_section(page) == ""
-    page.write_text("# Accuracy\n\nOther things.\n" + text, encoding="utf-8")
-    assert elbow.written_section(page) == text
 
 
 def test_the_page_holds_the_section() -> None:

@@ -2,14 +2,17 @@
 
 import importlib
 import pkgutil
+from functools import cache
 
 import masrel
-from docs.make.api import MODULES, PAGE, page
+from docs.make import api
+
+page = cache(api.page)
 
 
 def test_the_page_is_what_the_packages_export() -> None:
     """If it is not: ``python -m docs.make.api``."""
-    assert PAGE.read_text(encoding="utf-8") == page()
+    assert api.PAGE.read_text(encoding="utf-8") == page()
 
 
 def test_every_name_has_a_line_that_says_what_it_is() -> None:
@@ -24,4 +27,4 @@ def test_no_package_that_exports_is_left_out() -> None:
         if info.ispkg and info.name.removeprefix("masrel.lab").count(".") == 1
     ]
     exporting = {p for p in packages if hasattr(importlib.import_module(p), "__all__")}
-    assert exporting - {"masrel.cli", "masrel.lab"} <= set(MODULES)
+    assert exporting - {"masrel.cli", "masrel.lab"} <= set(api.MODULES)

@@ -9,8 +9,6 @@ from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
-
 import masrel
 
 ROOT = Path(masrel.__file__).parent
@@ -61,23 +59,6 @@ def dialect(file: Path, text: str) -> list[str]:
         or plain.startswith(PREFIXES)
         or (plain == "times" and not is_of_seconds)
     ]
-
-
-@pytest.mark.parametrize(
-    "line",
-    [
-        "found = 1",
-        "def f(asked): ...",
-        "class _Tally: ...",
-        "most_resamples = 3",
-        "import x as own",
-        "for told in x: ...",
-        "self.given = 1",
-        "times = 1",
-    ],
-)
-def test_the_list_is_seen_wherever_a_name_is_bound(line: str) -> None:
-    assert len(dialect(ROOT / "agreement" / "example.py", line)) == 1
 
 
 def test_no_name_is_of_the_dialect() -> None:

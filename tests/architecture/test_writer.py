@@ -49,8 +49,3 @@ def test_no_other_module_writes_files() -> None:
         if lines and str(path.relative_to(PACKAGE)) not in WRITERS:
             found[str(path.relative_to(PACKAGE))] = lines
     assert found == {}
-
-
-def test_the_search_finds_writing() -> None:
-    tree = ast.parse("p.write_text('x')\nopen('f', 'r+b')\np.open('w')\nopen('f')")
-    assert list(writes(tree)) == [1, 2, 3]

@@ -53,24 +53,6 @@ def test_standard_errors_and_intervals_are_of_one_kind(error: str) -> None:
         assert len(fits) == 4
 
 
-@pytest.mark.parametrize("weights", ["linear", "quadratic"])
-def test_weighted_standard_errors_are_those_of_statsmodels(weights: str) -> None:
-    table = [[11, 2, 0], [1, 9, 3], [0, 2, 12]]
-    other = cohens_kappa(np.array(table), wt=weights)
-    for error, spread in (("delta", other.std_kappa), ("null", other.std_kappa0)):
-        claim = Claim(
-            n_items=40,
-            n_categories=3,
-            kappa=f"{other.kappa:.6f}",
-            kappa_weights=weights,
-            margins_1=(13, 13, 14),
-            margins_2=(12, 13, 15),
-            standard_error=f"{spread:.6f}",
-        )
-        fits = {r.error for r in audit_claim(claim).readings if r.n_tables}
-        assert error in fits
-
-
 def test_p_is_of_one_or_two_sides_and_of_either_error() -> None:
     other = cohens_kappa(np.array(TABLE))
     for error, sides in itertools.product(("null", "delta"), (1, 2)):
@@ -83,41 +65,11 @@ def test_p_is_of_one_or_two_sides_and_of_either_error() -> None:
     assert not any(fitting(p="<0.001").values())
 
 
-def test_a_rating_may_be_absent() -> None:
-    # 17 of 20 items; the paper says that it had 21
-    claim = Claim(
-        n_items=21, n_categories=2, agreement="85.0", kappa="0.58", n_unrated=2
-    )
-    numbers = {r.n_items: r.n_tables for r in audit_claim(claim).readings}
-    assert numbers == {21: 0, 20: 4, 19: 0}
-
-
-def test_weights_that_are_not_named_are_all_tried() -> None:
-    audit = audit_claim(
-        Claim(n_items=35, n_categories=3, agreement="65.7", kappa="0.528")
-    )
-    tried = {r.kappa_weights: r.n_tables for r in audit.readings}
-    assert tried.keys() == {"identity", "linear", "quadratic"}
-    assert (tried["identity"], tried["quadratic"]) == (0, 3340)
-    assert "by 2 of 3 readings" in audit.sentence or "by 1 of 3" in audit.sentence
-    two = audit_claim(Claim(**PLAIN))
-    assert len(two.readings) == 1  # all weights are alike of two categories
-
-
 def test_rules_that_differ_are_two_readings() -> None:
     # 9 of 16 are 56.25 %
     claim = Claim(n_items=16, n_categories=2, agreement="56.3", kappa="0.263")
     numbers = {r.rounding: r.n_tables for r in audit_claim(claim).readings}
     assert numbers == {"half_even": 0, "half_up": 4}
-
-
-def test_the_published_study_audits_its_paper() -> None:
-    study = Path(__file__).parents[2] / "studies" / "hess2012"
-    claims = read_claims(study / "ratings" / "claims.csv")
-    retest = next(claim for claim in claims if claim.name == "retest-standard")
-    audit = audit_claim(retest)
-    assert [reading.n_agreed for reading in audit.readings] == [(10,)]
-    assert audit.sentence.endswith("in them the raters agree on 10 of 12")
 
 
 def test_a_file_has_a_claim_a_row(tmp_path: Path) -> None:
@@ -135,7 +87,7 @@ def test_a_file_has_a_claim_a_row(tmp_path: Path) -> None:
 
 
 def test_an_interval_beside_its_kappa_is_of_no_table_however_many_there_are() -> None:
-    claim = Claim(n_items=38, n_categories=4, kappa="0.50", low="0.6", high="0.7")
+    claim = Claim(n_items=24, n_categories=3, kappa="0.50", low="0.6", high="0.7")
     audit = audit_claim(claim)
     assert audit.is_possible is False
     assert {reading.n_tables for reading in audit.readings} == {0}

@@ -1,10 +1,9 @@
-"""Bootstrap intervals beside other packages: time, error for the time, memory.
+"""Bootstrap intervals beside other packages: time and memory.
 
 Part of ``python -m docs.make.benchmarks.intervals``. Peers that are not
 installed are left out.
 """
 
-import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,7 +13,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.estimates import Interval
 from masrel.intervals import bootstrap
 from tests.benchmarks.peers import present
 from tests.benchmarks.sidebyside import Timing, peak_megabytes, side_by_side
@@ -231,116 +229,6 @@ def exact_cost(quick: bool) -> list[tuple[str, str, Timing]]:
         found.append((study, words, timing))
         print(study, words, f"{1e3 * timing.median:.3g} ms", flush=True)
     return found
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Point:
-    """How far the ends of one method are off after so many seconds."""
-
-    method: str
-    size: int
-    seconds: float
-    error: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Race:
-    """Points of all methods on one study, and how well the truth is known."""
-
-    name: str
-    points: list[Point]
-    floor: float | None
-
-
-def measured(
-    method: str,
-    size: int,
-    seeds: int,
-    work: Callable[[int], tuple[float, ...]],
-    truth: tuple[float, float],
-) -> Point:
-    """Root mean square error of the ends over the half width, against CPU seconds."""
-    start = time.process_time()
-    ends = [work(seed) for seed in range(1, seeds + 1)]
-    seconds = (time.process_time() - start) / seeds
-    off = (np.array(ends) - truth) / (0.5 * (truth[1] - truth[0]))
-    error = math.sqrt(float((off**2).mean()))
-    point = Point(method=method, size=size, seconds=seconds, error=error)
-    print(point, flush=True)
-    return point
-
-
-def races(quick: bool) -> list[Race]:
-    """Error against seconds for three sizes; in the first the truth is exact."""
-    studies = [((12, 8, 3), True), ((1000, 3, 2), False), ((10_000, 5, 4), False)]
-    return [
-        _race(*shape, exact=exact, quick=quick) for shape, exact in studies[: 3 - quick]
-    ]
-
-
-def _race(n: int, r: int, q: int, *, exact: bool, quick: bool) -> Race:
-    codes = made(n, r, q)
-    ours = partial(
-        bootstrap, "fleiss_kappa", codes, target="items", categories=range(q)
-    )
-    points, floor = [], None
-    if exact:
-        known = ours(exact=True)
-        truth = (known.low, known.high)
-        # what is left is rounding; the test against fractions has 1e-13
-        points = [measured("exact", 0, 5, lambda _: _ends(ours(exact=True)), truth)]
-    else:
-        known = ours(exact=False, rng=99, n_resamples=100_000 if quick else 4_000_000)
-        truth = (known.low, known.high)
-        errors = known.monte_carlo_error or (math.nan, math.nan)
-        floor = max(errors) / (0.5 * (known.high - known.low))
-    for size in (1000, 10_000) if quick else (1000, 10_000, 100_000, 1_000_000):
-        if size * 4 > 10**6 and not exact:
-            continue
-        seeds = 40 if size <= 10_000 else 20 if size <= 100_000 else 6
-
-        def drawn(seed: int, size: int = size) -> tuple[float, ...]:
-            return _ends(ours(exact=False, n_resamples=size, rng=seed))
-
-        points.append(measured("drawn", size, seeds, drawn, truth))
-    points += _peers(codes, q, truth, quick)
-    return Race(name=f"{n:,} × {r}, {q} categories", points=points, floor=floor)
-
-
-def _ends(found: Interval) -> tuple[float, float]:
-    return found.low, found.high
-
-
-def _peers(
-    codes: Codes, q: int, truth: tuple[float, float], quick: bool
-) -> list[Point]:
-    counts = counted(codes, q)
-    loops: dict[str, Callable[[int, int], tuple[float, ...]]] = {
-        "scipy, loop": lambda size, seed: scipy_loop(counts, fleiss, size, seed),
-        "scipy, vectorized": lambda size, seed: scipy_vectorized(
-            counts, "fleiss_kappa", size, seed
-        ),
-        "arch": lambda size, seed: arch_loop(counts, fleiss, size, seed),
-        "resample": lambda size, seed: resample_loop(counts, fleiss, size, seed),
-    }
-    points = []
-    sizes = (300, 1000, 3000) if len(codes) > 5000 else (1000, 10_000, 100_000)
-    for name, loop in loops.items():
-        package = name.split(",")[0]
-        if not present([package]):
-            continue
-        for size in sizes[: 1 if quick else None]:
-            seeds = max(4, min(20, 6000 * sizes[0] // (300 * size)))
-            points.append(
-                measured(
-                    name,
-                    size,
-                    seeds,
-                    lambda seed, loop=loop, size=size: loop(size, seed),  # type: ignore[misc]
-                    truth,
-                )
-            )
-    return points
 
 
 def memory(quick: bool) -> dict[str, float]:

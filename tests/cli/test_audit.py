@@ -11,20 +11,6 @@ from tests.cli.process import Caller
 STUDY = Path(__file__).parents[2] / "studies" / "hess2012"
 
 
-def test_a_file_has_a_row_a_claim(masrel: Caller, tmp_path: Path) -> None:
-    file = tmp_path / "claims.csv"
-    file.write_text(
-        "name,n_items,n_categories,agreement,kappa\nA,20,2,85.0,0.58\nB,20,2,65.0,.244\n"
-    )
-    done = masrel("audit", file, "--csv")
-    assert done.out.splitlines()[1:] == [
-        "A,20,identity,identity,either,,,4,17,published",
-        "B,20,identity,identity,either,,,0,,published",
-    ]
-    sentences = masrel("audit", file, "--sentence").out.splitlines()
-    assert [line.split()[1] for line in sentences] == ["4", "no"]
-
-
 @pytest.mark.slow
 def test_the_published_study_audits_its_paper(masrel: Caller) -> None:
     lines = masrel("audit", STUDY, "--sentence").out.splitlines()

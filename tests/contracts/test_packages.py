@@ -81,6 +81,7 @@ def answer(question: str, folder: Path) -> str:
     return done.stdout + done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("package", USES)
 def test_a_result_comes_from_the_package(package: str, folder: Path) -> None:
     module, question, part = USES[package]

@@ -28,11 +28,18 @@ PAGES = {str(page.relative_to(ROOT)): page for page in pages()}
 TEXTS = {name: page.read_text(encoding="utf-8") for name, page in PAGES.items()}
 BLOCKS = [block for name, text in TEXTS.items() for block in read(text, name)]
 
-# They take from four seconds to half a minute.
+# They take from three seconds to half a minute.
 SLOW = {
+    "docs/agreement/command_line.md",
+    "docs/ci.md",
+    "docs/conduct.md",
     "docs/coordinating.md",
+    "docs/gallery.md",
+    "docs/hardware.md",
     "docs/identification.md",
     "docs/latent_trait.md",
+    "docs/planning.md",
+    "docs/report.md",
     "docs/training.md",
 }
 
@@ -149,26 +156,11 @@ def test_a_comment_of_what_is_printed_is_renewed(
     assert renewed(page(python(*right))) == page(python(*right))
 
 
-def test_three_dots_stand_for_anything_that_is_printed() -> None:
-    example = page(python("print(id(object()))  # prints ..."))
-    assert renewed(example) == example
-
-
-def test_blocks_of_a_page_go_on_with_each_other() -> None:
-    text = page(python("x = 4"), python("print(x)"), "prints", "```text\n3\n```")
-    assert renewed(text) == text.replace("\n3\n", "\n4\n")
-
-
 def test_an_error_of_an_example_names_its_line_of_the_page() -> None:
     with pytest.raises(ZeroDivisionError) as caught:
         renewed(page(python("x = 1", "x / 0")), "a.md")
     last = caught.traceback[-1]
     assert (Path(last.path).name, last.lineno + 1) == ("a.md", 5)
-
-
-def test_a_warning_of_an_example_is_an_error() -> None:
-    with pytest.raises(UserWarning, match="odd"):
-        renewed(page(python("import warnings", "warnings.warn('odd')")))
 
 
 def test_a_command_reads_the_file_that_the_page_shows() -> None:
@@ -211,13 +203,6 @@ def test_what_is_typed_is_seen_at_the_prompt() -> None:
     assert "stop to stop: stop\nmasrel: session test of R1 was stopped" in renewed(text)
 
 
-def test_nothing_is_left_of_a_page_that_was_run() -> None:
-    before = Path.cwd()
-    renewed(page(python("open('left.txt', 'w').close()")))
-    assert Path.cwd() == before
-    assert not Path("left.txt").exists()
-
-
 @pytest.mark.parametrize(
     "block",
     [
@@ -239,10 +224,3 @@ def test_nothing_is_left_of_a_page_that_was_run() -> None:
 def test_what_is_neither_run_nor_marked_is_refused(block: str) -> None:
     with pytest.raises(PageError, match="needs"):
         read(page(block))
-
-
-def test_a_block_that_is_marked_is_not_run() -> None:
-    (block,) = read(page("<!-- not run: moves -->\n```sh\nmasrel device probe\n```"))
-    assert block.exempt == "moves"
-    text = page("<!-- not run: moves -->\n" + python("print(1)"))
-    assert renewed(text) == text

@@ -15,18 +15,6 @@ from masrel.errors import MasrelError
 from tests.golden.call import plain
 from tests.golden.drawn import Drawn
 
-POOLED = (
-    "percent_agreement", "fleiss_kappa", "conger_kappa", "brennan_prediger", "gwet_ac",
-)  # fmt: skip
-"""Coefficients whose raters can be resampled, and of which irrCAC has an error."""
-
-COUNTED = (*(name for name in POOLED if name != "conger_kappa"), "krippendorff_alpha")
-"""Coefficients that take counts of raters."""
-
-TWO_RATERS = ("cohen_kappa", "scott_pi")
-ALPHA = ("krippendorff_alpha",)
-ALIKE = ("fleiss_kappa", "krippendorff_alpha", "conger_kappa", "gwet_ac", "light_kappa")
-
 
 @dataclass(frozen=True, slots=True)
 class Table(Drawn):
@@ -50,15 +38,10 @@ class Table(Drawn):
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """A call of the package, and of which coefficients it is made.
-
-    An option "clusters" is replaced by the table's.
-    """
+    """A call of the package; an option "clusters" is replaced by the table's."""
 
     call: Callable[..., object]
     options: dict[str, Any] = field(default_factory=dict)
-    of: tuple[str, ...] = ()  # all that have intervals from sums, unless named
-    every: int = 1  # one in so many tables
 
 
 def result_of(
@@ -247,73 +230,58 @@ def _methods() -> dict[str, Method]:
     analytic, jackknife, bootstrap, posterior, estimate = map(
         _interval, ("analytic", "jackknife", "bootstrap", "posterior", "estimate")
     )
-    methods = {
-        "value": Method(_value),
-        "population": Method(_function, {"population": 1000}, COUNTED),
-        "counts": Method(_counted, of=COUNTED),
-        "cells": Method(_cells, of=TWO_RATERS),
-        "analytic": Method(analytic, ITEMS),
-        "analytic clusters": Method(analytic, CLUSTERS),
-        "jackknife clusters": Method(jackknife, CLUSTERS),
-        "estimate clusters": Method(estimate, CLUSTERS),
-        "difference clusters": Method(
-            _difference, {"design": "dependent", "clusters": True}
-        ),
-        "difference of clusters": Method(
-            _difference, {"design": "independent", "clusters": True}
+    alike = {"weights": "identity"}
+    posteriors: dict[str, dict[str, Any]] = {
+        "auto": {},
+        "table": {"model": "table"},
+        "patterns": {"model": "patterns"},
+        "alike": alike | {"model": "dirichlet-multinomial"},
+        "jeffreys": alike | {"prior": "jeffreys"},
+        "concentration": alike | {"concentration": 0.5},
+    }
+    made: dict[str, tuple[Callable[..., object], dict[str, Any]]] = {
+        "value": (_value, {}),
+        "population": (_function, {"population": 1000}),
+        "counts": (_counted, {}),
+        "cells": (_cells, {}),
+        "analytic": (analytic, ITEMS),
+        "analytic clusters": (analytic, CLUSTERS),
+        "jackknife clusters": (jackknife, CLUSTERS),
+        "estimate clusters": (estimate, CLUSTERS),
+        "difference clusters": (_difference, {"design": "dependent", "clusters": True}),
+        "difference of clusters": (
+            _difference,
+            {"design": "independent", "clusters": True},
         ),
     }
     for distribution in ("normal", "logit", "fisher"):
-        options = {**ITEMS, "distribution": distribution}
-        methods[f"analytic {distribution}"] = Method(analytic, options)
-    for convention, of in (("over_n", ()), ("irrcac", (*POOLED, *ALPHA))):
-        options = {**ITEMS, "convention": convention}
-        methods[f"analytic {convention}"] = Method(analytic, options, of)
+        options = ITEMS | {"distribution": distribution}
+        made[f"analytic {distribution}"] = analytic, options
+    for convention in ("over_n", "irrcac"):
+        made[f"analytic {convention}"] = analytic, ITEMS | {"convention": convention}
     for target in (ITEMS, RATERS, BOTH):
         (name,) = target.values()
-        methods[f"jackknife {name}"] = Method(jackknife, target)
-        methods[f"estimate {name}"] = Method(estimate, target | {"rng": 0})
+        made[f"jackknife {name}"] = jackknife, target
+        made[f"estimate {name}"] = estimate, target | {"rng": 0}
     for kind in KINDS:
         options = {**DRAWN, "kind": kind}
-        slow = 2 if kind == "studentized" else 1
-        methods |= {
-            f"bootstrap {kind}": Method(bootstrap, ITEMS | options, every=4 * slow),
-            f"bootstrap {kind} drawn": Method(
-                bootstrap, ITEMS | options | {"exact": False}, every=4
-            ),
-            f"bootstrap {kind} clusters": Method(
-                bootstrap, CLUSTERS | options, every=8
-            ),
-            f"bootstrap {kind} raters": Method(
-                bootstrap, RATERS | options, POOLED, 4 * slow
-            ),
+        made |= {
+            f"bootstrap {kind}": (bootstrap, ITEMS | options),
+            f"bootstrap {kind} drawn": (bootstrap, ITEMS | options | {"exact": False}),
+            f"bootstrap {kind} clusters": (bootstrap, CLUSTERS | options),
+            f"bootstrap {kind} raters": (bootstrap, RATERS | options),
+            f"bootstrap {kind} both": (bootstrap, BOTH | options),
         }
-        if kind != "studentized":
-            methods[f"bootstrap {kind} both"] = Method(
-                bootstrap, BOTH | options, POOLED, 8
-            )
-    for name, of, options in (
-        ("auto", (), {}),
-        ("table", TWO_RATERS, {"model": "table"}),
-        ("patterns", (), {"model": "patterns"}),
-        ("alike", ALIKE, {"model": "dirichlet-multinomial", "weights": "identity"}),
-        ("jeffreys", ALIKE[:2], {"prior": "jeffreys", "weights": "identity"}),
-        ("concentration", ALIKE[:2], {"concentration": 0.5, "weights": "identity"}),
-    ):
-        methods[f"posterior {name}"] = Method(
-            posterior, ITEMS | {"n_draws": 1000, "rng": 0} | options, of, 4
-        )
+    for name, options in posteriors.items():
+        of_draws = ITEMS | {"n_draws": 1000, "rng": 0}
+        made[f"posterior {name}"] = posterior, of_draws | options
     for metric in ("nominal", "ordinal", "interval", "ratio"):
-        methods[f"metric {metric}"] = Method(
-            estimate, ITEMS | {"metric": metric, "rng": 0}, ALPHA, 4
-        )
+        made[f"metric {metric}"] = estimate, ITEMS | {"metric": metric, "rng": 0}
     for design in ("dependent", "independent"):
-        methods[f"difference {design}"] = Method(_difference, {"design": design})
+        made[f"difference {design}"] = _difference, {"design": design}
     for way in ("max_t", "bonferroni", "scheffe"):
-        methods[f"differences {way}"] = Method(
-            _differences, {"simultaneous": way}, every=2
-        )
-    return methods
+        made[f"differences {way}"] = _differences, {"simultaneous": way}
+    return {name: Method(*call) for name, call in made.items()}
 
 
 METHODS = _methods()

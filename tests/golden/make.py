@@ -34,10 +34,9 @@ def main(arguments: list[str]) -> None:
 
 def _make_numbers(dry: bool) -> None:
     stored = numbers.load_tables()
-    if stored:
-        changed, n_drawn = numbers.compared_by_two(stored)
-        print(f"{numbers.GROUP}: {len(stored)} tables, {n_drawn} drawn ends")
-        print("\n".join(_report(changed)))
+    changed, n_drawn = numbers.compared_by_two(stored)
+    print(f"{numbers.GROUP}: {len(stored)} tables, {n_drawn} drawn ends")
+    print("\n".join(_report(changed)))
     if not dry:
         size = numbers.save_tables(numbers.freeze(stored))
         print(f"{numbers.GROUP}: {numbers.N_TABLES} tables, {size / 1e3:.0f} kB")

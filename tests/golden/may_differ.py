@@ -1,26 +1,11 @@
-"""How far golden numbers may be off, and what may differ later, by name.
-
-To let something differ, add its name to `IN_FORCE`, in the commit that changes it.
-"""
+"""How far golden numbers may be off, and which drawn ends may be others."""
 
 import math
 import re
-from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from tests.golden.compare import NUMBER, Change, Kind
-
-IN_FORCE: tuple[str, ...] = ()
-"""Names of `EXCEPTIONS`: none, as all that differed is stored anew."""
-
-EXCEPTIONS = {
-    "order of notes": "notes come in another order",
-    "wording": "notes, reasons and methods are worded otherwise: their `KINDS` stay",
-    "seeded draws": "the same seed draws other numbers, and fewer or more resamples "
-    "are taken one by one: ends are within their Monte Carlo errors",
-}
-"""What may differ and why."""
 
 VALUE = 1e-14
 """Of 1 + |κ|: κ is 1 less a ratio, and has the rounding of both."""
@@ -52,60 +37,6 @@ MOST_ERRORS, NEVER_ERRORS, ONE_OF = 4.0, 6.0, 1000
 
 MEASUREMENTS = re.compile("icc_|sem|mdc|lin_ccc|kendall_w|robinson_a")
 
-KINDS = {
-    # notes
-    "few": r"(\d+) (item|rater|cluster)s?\b.*: below (\d+)",
-    "chosen: few": r"chosen for other (.+): few items \((\d+)\)",
-    "chosen: rare": r"chosen for other (.+): categories are rare \((\d+)",
-    "chosen: still": r"chosen for other (.+): leaving any out says next to nothing",
-    "chosen": r"chosen for other (.+): (items|raters|what items|the spread|one|no|too)",
-    "chosen: clusters": r"chosen for other clusters",
-    "cut": r"cut at the ends? of the parameter space",
-    "undefined resamples": r"undefined, and left out",
-    "single ratings": r"left out, items of a single rating: (\d+)",
-    "lifted": r"is lifted halfway",
-    "extended": r"is extended from",
-    "careless": r"careless raters are not covered",
-    "held": r"ordinal metric, which depends .*, was taken from all ratings once",
-    "prior": r"so the prior weighs|rests on the prior, too",
-    "one value": r"both ends are one value",
-    "infinite": r"studentized values are infinite",
-    "pairs drawn": r"pairs of values are drawn",
-    "mean of k": r"k is the (\d+) raters",
-    "REML": r"variances by REML",
-    "drawn out": r"its interval is drawn out to the value",
-    "asked for": r"asked for other (.+): there is this interval",
-    # reasons
-    "chance is 1": r"chance agreement is 1",
-    "scale of one": r"a scale of one category|one category is declared",
-    "rater of one": r"one category is all of the raters in columns (\d+) and (\d+)",
-    "all the same": r"all ratings are the same|neither items nor ratings .* differ",
-    "rater of one grade": r"every rater gives all items one rating",
-    "only raters vary": r"no variance but between raters",
-    "ratio of 0": r"ratio weights divide|no such weights",
-    "no variance": r"the total variance is estimated as",
-    "one resample": r"every resample gives the same value",
-    "few complete": r"fewer than (two|three) items",
-    "few raters": r"fewer than two raters|too few ratings",
-    "nothing moves": r"leaves the (estimate|difference) as it is|no item moves the",
-    "never differ": r"never differ, or always",
-    "undefined": r"the estimate itself is undefined",
-    "undefined without": r"one (?:of the )?(item|rater|cluster)s? left out",
-    "no pair": r"no item has (?:both|two|ratings)",
-    "one item": r"one item with",
-    "one cluster": r"one cluster has no",
-    "no error": r"no standard error to studentize|no error: fewer",
-    "few units": r"need(?:s)? at least (\d+)",
-    "one side": r"one side of the estimate",
-    "at an end": r"not inside the ends",
-    "degrees": r"Satterthwaite's degrees",
-}  # fmt: skip
-"""Kinds of notes and reasons: by which words each is known, as it is worded today.
-
-What a pattern has in brackets is a part of the kind. Where the package has kinds of its
-own, `adapter` may word them by these.
-"""
-
 OF_DRAWS = ("cut at the end", "standard error of 0", "one value", "and left out")
 """Words of notes that come and go with what is drawn."""
 
@@ -128,10 +59,14 @@ class DrawnEnd(Change):
 
 
 def differences(
-    question: Question, stored: dict, new: dict, in_force: Collection[str] = IN_FORCE
+    question: Question, stored: dict, new: dict, *, draws_differ: bool = False
 ) -> list[Change]:
-    """Every number and text that is not what is stored; `within` where it may be."""
-    return list(_walk(question, stored, new, in_force))
+    """Every number and text that is not what is stored; `within` where it may be.
+
+    Where draws differ, the same seed draws other numbers: ends are within their Monte
+    Carlo errors.
+    """
+    return list(_walk(question, stored, new, draws_differ))
 
 
 def beyond(changes: list[Change], n_drawn: int) -> list[Change]:
@@ -143,10 +78,10 @@ def beyond(changes: list[Change], n_drawn: int) -> list[Change]:
 
 
 def _walk(
-    question: Question, stored: dict, new: dict, in_force: Collection[str]
+    question: Question, stored: dict, new: dict, draws_differ: bool
 ) -> Iterator[Change]:
     compared = (stored.keys() | new.keys()) - {"steps", "near_1"}
-    is_drawn = "seeded draws" in in_force and "mce" in compared
+    is_drawn = draws_differ and "mce" in compared
     if is_drawn:
         if "low" in compared:
             yield from _drawn_ends(question, stored, new)
@@ -156,7 +91,7 @@ def _walk(
         one, other = stored.get(key), new.get(key)
         if key not in ("notes", "reason", "why", "method"):
             yield from _numbers(question, key, one, other, stored)
-        elif not _reads_alike(key, one, other, in_force, is_drawn):
+        elif not _reads_alike(one, other, is_drawn):
             yield Change(f"{question.where}/{key}", "text", one, other)
 
 
@@ -213,19 +148,10 @@ def _drawn_ends(question: Question, stored: dict, new: dict) -> Iterator[Change]
         yield DrawnEnd(where, "interval end", one, other, n <= MOST_ERRORS, n)
 
 
-def _reads_alike(
-    key: str, stored: object, new: object, in_force: Collection[str], drawn: bool
-) -> bool:
+def _reads_alike(stored: object, new: object, drawn: bool) -> bool:
     texts = [[of] if isinstance(of, str) else list(of or ()) for of in (stored, new)]
     if drawn:
-        texts = [[of for of in notes if not _is_of_draws(of)] for notes in texts]
-    if "wording" in in_force:
-        if key == "method":
-            return True
-        one, other = (Counter(map(kind_of, of)) for of in texts)
-        return one == other
-    if "order of notes" in in_force or drawn:
-        texts = [sorted(of) for of in texts]
+        texts = [sorted(of for of in notes if not _is_of_draws(of)) for notes in texts]
     if len(texts[0]) != len(texts[1]):
         return False
     return all(_text_alike(*pair, drawn) for pair in zip(*texts, strict=True))
@@ -246,11 +172,3 @@ def _text_alike(one: str, other: str, drawn: bool) -> bool:
         a == b or ("." in a and (drawn or abs(float(a) - float(b)) < 1.1e-3))
         for a, b in pairs
     )
-
-
-def kind_of(text: str) -> tuple[str, ...]:
-    """What kind of note or reason it is, and whom or how many it is about."""
-    for kind, words in KINDS.items():
-        if match := re.search(words, text):
-            return (kind, *(part for part in match.groups() if part))
-    return (NUMBER.sub("#", text),)

@@ -12,12 +12,11 @@ from concurrent.futures import ProcessPoolExecutor
 from itertools import accumulate
 from multiprocessing import get_context
 
-from masrel.agreement import COEFFICIENTS
-from tests.golden.adapter import METHODS, Table, drawn_values, result_of
+from tests.golden.adapter import Table, drawn_values, result_of
 from tests.golden.call import Stream
 from tests.golden.compare import Change
 from tests.golden.drawn import pick, shares_of
-from tests.golden.may_differ import IN_FORCE, MOST_ERRORS, Question, differences
+from tests.golden.may_differ import MOST_ERRORS, Question, differences
 from tests.golden.store import load, save
 
 N_TABLES = 2000
@@ -31,9 +30,6 @@ NAMED = (
     "identity", "linear", "quadratic", "ordinal", "radical", "ratio", "circular",
     "bipolar",
 )  # fmt: skip
-
-OF_ALL = ("analytic", "jackknife items")
-"""Methods by which all coefficients of a table are computed; by others one is."""
 
 LEVELS = [0.8, 0.8, 0.9, 0.9, 0.95, 0.95, 0.95, 0.99]
 
@@ -136,51 +132,6 @@ def _matrix(stream: Stream, n: int) -> list[list[float]]:
     return w
 
 
-def first_plan(seed: int) -> dict[str, list[str]]:
-    """Coefficients that each method computes of a table that is not yet stored."""
-    of, stream = table(seed), Stream(f"plan {seed}")
-    n_raters, plan = len(of.rows[0]), {}
-    # what does not apply is a refusal: seen in a few tables of every method
-    refused = stream.chance(0.02)
-    for name, method in METHODS.items():
-        known = list(method.of or COEFFICIENTS)
-        if not refused and not method.of:
-            known = [c for c in known if _applies(name, c)]
-        if not refused and n_raters > 2:
-            known = [c for c in known if COEFFICIENTS[c].n_raters != (2, 2)]
-        if not known or stream.below(method.every):
-            continue
-        if name == "value":
-            plan[name] = _affordable(of, known, stream)
-        else:
-            plan[name] = known if name in OF_ALL else [str(stream.one_of(known))]
-    return plan
-
-
-def _affordable(of: Table, names: list[str], stream: Stream) -> list[str]:
-    # of measurements with gaps, which are fitted by steps, three coefficients a table
-    slow = [name for name in names if not _is_kappa(name)]
-    if not of.has_gaps:
-        return names
-    kept = {stream.one_of(slow) for _ in range(3)}
-    return [name for name in names if name not in slow or name in kept]
-
-
-def _applies(method: str, coefficient: str) -> bool:
-    entry, (first, *rest) = COEFFICIENTS[coefficient], method.split()
-    if first == "value":
-        return True
-    if first == "estimate" and not _is_kappa(coefficient):
-        return entry.interval_target in rest and coefficient != "kendall_w"
-    return _is_kappa(coefficient) and (entry.shape == "ratings" or first != "posterior")
-
-
-def _is_kappa(coefficient: str) -> bool:
-    # a function of sums over items without an interval of its own
-    entry = COEFFICIENTS[coefficient]
-    return entry.formula is not None and not entry.has_interval
-
-
 def rounded(answer: dict) -> dict:
     """Drawn ends with as many digits as are stored."""
     if "mce" not in answer:
@@ -265,11 +216,8 @@ def save_tables(made: dict[str, dict]) -> int:
 
 
 def freeze(stored: dict[str, dict]) -> dict[str, dict]:
-    """Every table anew on two processes, by its stored plan if there is one."""
-    plans = [
-        stored[f"{seed:04}"]["answers"] if stored else first_plan(seed)
-        for seed in range(N_TABLES)
-    ]
+    """Every table anew on two processes: the same coefficients by the same methods."""
+    plans = [of["answers"] for of in stored.values()]
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         made = pool.map(frozen, range(N_TABLES), plans, chunksize=20)
         return {f"{seed:04}": of for seed, of in enumerate(made)}
@@ -290,12 +238,12 @@ def replayed(stored: dict[str, dict]) -> Iterator[tuple[Question, dict, dict]]:
 
 
 def compared(
-    stored: dict[str, dict], in_force: Collection[str] = IN_FORCE
+    stored: dict[str, dict], *, draws_differ: bool = False
 ) -> tuple[list[Change], int]:
     """What differs of some tables, and how many of their ends were drawn."""
     changes, n_drawn = [], 0
     for question, answer, new in replayed(stored):
-        changes += differences(question, answer, new, in_force)
+        changes += differences(question, answer, new, draws_differ=draws_differ)
         n_drawn += len(answer.get("mce", ()))
     return changes, n_drawn
 

@@ -40,8 +40,7 @@ def table_posterior(
     )
 
 
-@pytest.mark.parametrize("n", [1, 2, 9, 50])
-@pytest.mark.parametrize("row", [0, 1])
+@pytest.mark.parametrize(("n", "row"), [(1, 0), (9, 1)])
 def test_raters_who_never_agree_are_as_uncertain_as_draws_say(n: int, row: int) -> None:
     # κ is 0 where one rater has one category and the other the other one, and its
     # density has no end there: no step from it leads anywhere.
@@ -121,9 +120,7 @@ def test_two_categories_by_another_integral(table: list[list[int]]) -> None:
     assert result.n_resamples is None
 
 
-def drawn_values(
-    coefficient: str, prior: Floats, v: Floats, n: int = 200_000
-) -> Floats:
+def drawn_values(coefficient: str, prior: Floats, v: Floats, n: int = 60_000) -> Floats:
     """Draw whole tables of chances, and the coefficient of each by its definition."""
     q = len(prior)
     rng = np.random.default_rng(7)

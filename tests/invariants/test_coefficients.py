@@ -53,7 +53,9 @@ def shaped(entry: Coefficient, table: Table) -> object:
 def for_entry(entry: Coefficient) -> st.SearchStrategy[Table]:
     if entry.shape == "pairs":
         return st.integers(1, 3).flatmap(lambda r: tables(n_raters=(2 * r, 2 * r)))
-    return tables(n_raters=(entry.n_raters[0], entry.n_raters[1] or 6))
+    few = entry.has_interval and entry.name != "kendall_w"  # with gaps it is fitted
+    n_raters = entry.n_raters[0], entry.n_raters[1] or (3 if few else 6)
+    return tables(n_raters=n_raters, max_items=5 if few else 12)
 
 
 def weights_for(entry: Coefficient) -> st.SearchStrategy[WeightName]:
@@ -212,7 +214,7 @@ def test_an_interval_that_comes_with_an_estimate_holds_it(entry: Coefficient) ->
     # levels far below 0.5 an interval from F need not hold its estimate.
     rng = random.Random(3)
     n_intervals = 0
-    for _ in range(600):
+    for _ in range(200):
         n_items, n_raters = rng.randint(2, 6), rng.randint(2, 5)
         levels = rng.choice([2, 3, 9])
         table = [
@@ -231,7 +233,7 @@ def test_an_interval_that_comes_with_an_estimate_holds_it(entry: Coefficient) ->
             n_intervals += 1
             slack = 1e-12 * max(1.0, abs(result.value))
             assert interval.low - slack <= result.value <= interval.high + slack
-    assert n_intervals > 300
+    assert n_intervals > 100
 
 
 def _public(names: Mapping[str, object]) -> set[str]:

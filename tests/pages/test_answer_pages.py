@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.figure import Figure
 
 import masrel
 from masrel import Estimating, Reading
@@ -242,53 +241,12 @@ def test_other_commands_have_pages_that_begin_with_their_tables(
     assert methods in words[words.rindex("Methods, to paste") :]
 
 
-def test_a_reference_is_held_against_the_others(
-    tmp_path: Path, masrel_command: Caller
-) -> None:
-    file, written = tmp_path / "gold.csv", tmp_path / "page.html"
-    file.write_text("item,Kim,Lee,gold\n1,a,a,a\n2,b,a,b\n3,b,b,b\n4,a,b,a\n")
-    masrel_command("diagnose", file, "--reference", "gold", "--html", written)
-    page = Page(written.read_text("utf-8"))
-    assert "Grades of the other raters by those of gold: 6 of 8 pairs" in page.text
-    # without a command to hold them against it, they are left out
-    result = masrel.agree(file, reading=Reading(reference="gold"))
-    assert "by those of gold" not in result.to_html()
-
-
-def test_a_table_too_wide_for_paper_is_in_parts_with_its_names(
-    tmp_path: Path, masrel_command: Caller
-) -> None:
-    grades = [f"category {letter}" for letter in "abcdefghijklmnopqr"]
-    rows = [f"{row},{grades[row % 18]},{grades[(row * row) % 18]}" for row in range(90)]
-    file, written = tmp_path / "many.csv", tmp_path / "page.html"
-    file.write_text("\n".join(["item,Kim,Lee", *rows]))
-    masrel_command("diagnose", file, "--html", written)
-    page = Page(written.read_text("utf-8"))
-    heads = [page.heads(table) for table in range(page.text.count("<thead>"))]
-    parts = [of for of in heads if "Another rater said" in of]
-    assert len(parts) > 1
-    assert all(of[:2] == ["Rater", "Another rater said"] for of in parts)
-    assert [name for of in parts for name in of if name in grades] == grades
-
-
 def test_clusters_leave_intervals_of_single_items_out() -> None:
     frame = ratings(3).assign(patient=[f"p{row // 3}" for row in range(12)])
     reading = Reading(clusters="patient")
     pictures = page_of(frame, reading=reading).pictures
     assert not any("with 95 % confidence intervals" in text for text in pictures)
     assert any("with 95 %" in of for of in page_of(ratings(3), target="items").pictures)
-
-
-def test_letters_that_no_font_has_are_text_on_a_page() -> None:
-    page = page_of(ratings(3).rename(columns={"A": "김민지"}))
-    assert len(re.findall(">김민지<", page.text)) > 2
-
-
-def test_a_page_made_in_python_says_its_options() -> None:
-    reading = Reading(missing_codes=("9",))
-    words = page_of(ratings(3), target="items", reading=reading).words
-    assert "missing_codes ['9']" in words
-    assert "target items" in words
 
 
 @pytest.mark.parametrize("name", ["-", "page.txt", "page"])
@@ -312,13 +270,6 @@ def test_simulated_ratings_are_labelled_everywhere() -> None:
     assert all(">SIMULATED DATA<" in of for of in figures if "<svg" in of)
 
 
-@pytest.mark.parametrize("name", ["forest", "pairs", "grades", "categories", "items"])
-def test_a_picture_is_drawn_on_the_axes_of_the_caller(name: str) -> None:
-    ax = Figure().add_subplot()
-    assert masrel.agree(ratings(4), target="items").plot(name, ax=ax) is ax
-    assert ax.has_data()
-
-
 @pytest.mark.parametrize(
     ("name", "group", "message"),
     [
@@ -332,7 +283,3 @@ def test_what_the_ratings_have_not_is_refused(
 ) -> None:
     with pytest.raises(ParameterError, match=re.escape(message)):
         masrel.agree(ratings(4)).plot(name, group=group)
-
-
-def test_a_thousand_items_by_five_raters_take_little_room() -> None:
-    assert len(page_of(ratings(5, 1000), target="items").text) < 700_000

@@ -9,13 +9,6 @@ import numpy as np
 from docs.make.benchmarks.parts import write_part
 from tests.benchmarks.bootstrap import OURS, Comparison
 from tests.benchmarks.jackknives import FROM_COUNTS, FROM_RATINGS
-from tests.benchmarks.posteriors import (
-    EVOLUTION,
-    INTERVAL,
-    QUADRATURE,
-    STRETCH,
-    Posterior,
-)
 from tests.benchmarks.sidebyside import Timing
 
 
@@ -25,7 +18,6 @@ class Results:
 
     comparisons: Sequence[Comparison]
     exact: Sequence[tuple[str, str, Timing]]
-    posteriors: Sequence[Posterior]
     jackknives: Mapping[str, Mapping[str, Timing]]
     megabytes: Mapping[str, float]
 
@@ -46,7 +38,6 @@ def write_page(
         "",
         *_bootstrap(results),
         *_exact(results),
-        *_posterior(results),
         *_jackknife(results),
         *_memory(results),
     ]
@@ -84,13 +75,6 @@ def _bootstrap(results: Results) -> list[str]:
         "",
         "At 10 000 items peers draw 500 resamples, times 20.",
         "",
-        "![Work against error of the bootstrap](figures/benchmark_bootstrap.png)",
-        "",
-        "Root mean square over seeds and both ends. In a the truth is the exact "
-        "interval (★ and dashed: how long it takes; it draws",
-        "nothing, and tests hold it to fractions within 1e-13), in b and c four "
-        "million resamples.",
-        "",
     ]
 
 
@@ -105,52 +89,6 @@ def _exact(results: Results) -> list[str]:
         what = words.removeprefix("exact bootstrap distribution, ")
         text.append(f"| {study} | {what} | {_time(timing)} |")
     return [*text, ""]
-
-
-def _posterior(results: Results) -> list[str]:
-    text = [
-        "### Posterior of ρ",
-        "",
-        "`posterior()` gives the interval, the density and, for few items, the "
-        "interval under two other priors; its quadrature is",
-        "one posterior's ends. emcee samples the same density, vectorized, on the "
-        "same compressed counts, until the effective size",
-        "of ρ is 2000 by its autocorrelation time, the first third left out: as it "
-        "comes (stretch move, 32 walkers), and with the",
-        "differential-evolution move and 80 walkers.",
-        "",
-        "| study | `posterior()` | its quadrature | emcee, as it comes | ratio to "
-        "both | emcee, evolution | ratio to both |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    for one in results.posteriors:
-        cells = [one.race.name, *(_time(one.times[k]) for k in (INTERVAL, QUADRATURE))]
-        for way in (STRETCH, EVOLUTION):
-            ratios = [_ratio(one.times, way, ours) for ours in (INTERVAL, QUADRATURE)]
-            cells += [_time(one.times[way]), "; ".join(ratios)]
-        text.append("| " + " | ".join(cells) + " |")
-    errors = [
-        f"- {one.race.name}: {max(one.errors[INTERVAL], 1e-16):.0e} beside "
-        f"{one.errors[STRETCH]:.1g} and {one.errors[EVOLUTION]:.1g}"
-        for one in results.posteriors
-    ]
-    return [
-        *text,
-        "",
-        "Error of an end over the half width, exact beside both of emcee's (where "
-        "the last is above 0.04, a third of so few steps",
-        "has not forgotten where the walkers started):",
-        "",
-        *errors,
-        "",
-        "![Work against error of the posterior](figures/benchmark_posterior.png)",
-        "",
-        "The truth is another integral of the same posterior, by panels of "
-        "Gauss-Legendre. Importance sampling has a multivariate t",
-        "at the mode as its proposal, five degrees, and scrambled Sobol points "
-        "(2^10 to 2^16). emcee makes 150 to 15 000 steps.",
-        "",
-    ]
 
 
 def _jackknife(results: Results) -> list[str]:

@@ -1,7 +1,7 @@
-"""Intervals beside other packages: work against error, ratios of time, memory.
+"""Intervals beside other packages: ratios of time, and memory.
 
 ``python -m docs.make.benchmarks.intervals [--quick]`` writes its part of
-``docs/benchmarks.md`` and its figures. Times gate nothing.
+``docs/benchmarks.md``. Times gate nothing.
 """
 
 import argparse
@@ -11,10 +11,9 @@ from pathlib import Path
 
 import masrel
 from docs.make.benchmarks.interval_page import Results, write_page
-from tests.benchmarks.bootstrap import by_items, exact_cost, memory, races
+from tests.benchmarks.bootstrap import by_items, exact_cost, memory
 from tests.benchmarks.jackknives import jackknives
 from tests.benchmarks.peers import present
-from tests.benchmarks.posteriors import posteriors
 from tests.benchmarks.sidebyside import one_thread
 
 DOCS = Path(__file__).parents[2]
@@ -31,19 +30,11 @@ def main() -> None:
             jackknives=jackknives(quick),
             comparisons=by_items(quick),
             exact=exact_cost(quick),
-            posteriors=posteriors(quick),
             megabytes=memory(quick),
         )
-        of_bootstrap = races(quick)
     if quick:
         return
-    from docs.make.benchmarks.interval_figures import draw_races
-
-    figures = DOCS / "figures"
-    draw_races(of_bootstrap, figures / "benchmark_bootstrap.png")
-    of_posterior = [one.race for one in results.posteriors]
-    draw_races(of_posterior, figures / "benchmark_posterior.png")
-    packages = ["numpy", "scipy", "arch", "resample", "statsmodels", "emcee"]
+    packages = ["numpy", "scipy", "arch", "resample", "statsmodels"]
     machine = f"{platform.machine()}, Python {platform.python_version()}"
     versions = {"masrel": masrel.__version__, **present(packages)}
     write_page(DOCS / "benchmarks.md", results, versions, machine)
