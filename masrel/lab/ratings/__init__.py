@@ -28,7 +28,6 @@ if TYPE_CHECKING:
         StudyData,
         in_person_of,
         read_study_data,
-        table_differences,
     )
     from masrel.lab.ratings.study_file import read_study_ratings
     from masrel.lab.ratings.table import (
@@ -75,7 +74,6 @@ __all__ = [
     "read_study_ratings",
     "retest_pairs",
     "study_remarks",
-    "table_differences",
     "write_answers",
     "write_ratings",
 ]
@@ -101,7 +99,6 @@ _HOMES = {
         "StudyData",
         "in_person_of",
         "read_study_data",
-        "table_differences",
     ),
     "study_file": ("read_study_ratings",),
 }

@@ -1,9 +1,8 @@
 """A study's ratings: from its logs where it has some, from a file where it has not."""
 
-import csv
-import io
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 
 from masrel.errors import RatingsError
@@ -20,8 +19,6 @@ from masrel.lab.ratings.in_person import InPerson, read_in_person
 from masrel.lab.ratings.logs import ratings_from_logs
 from masrel.lab.ratings.study_file import read_study_ratings
 from masrel.lab.ratings.table import _FORMAT, Ratings, _texts
-
-_KEY = ("session", "rater", "model", "repeat")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,7 +139,7 @@ def _file_of(study: StudyPaths) -> Path:
 
 def _refuse_other_table(path: Path, ratings: Ratings) -> None:
     """Refuse a study's ``ratings.csv`` that is not what its logs say."""
-    differences = list(table_differences(path, ratings))
+    differences = list(_table_differences(path, _texts(ratings), newest=_FORMAT))
     if differences:
         more = f", and {len(differences) - 1} more" if len(differences) > 1 else ""
         raise RatingsError(
@@ -151,69 +148,41 @@ def _refuse_other_table(path: Path, ratings: Ratings) -> None:
         )
 
 
-def table_differences(path: Path, ratings: Ratings) -> Iterator[str]:
-    """Yield how a study's ``ratings.csv`` differs from what its logs say.
+def _table_differences(
+    path: Path, texts: Iterable[str], *, newest: int
+) -> Iterator[str]:
+    """Yield how a study's table differs, line by line, from what its logs say.
 
-    Parameters
-    ----------
-    path : Path
-        The file; one that is not there differs in nothing.
-    ratings : Ratings
-        What `ratings_from_logs` returned.
-
-    Yields
-    ------
-    str
-        Each cell and row that differs, in words.
+    `texts` are all that a table of these logs has ever been, and `newest` is the
+    version of its format. A file that is not there differs in nothing.
     """
     if not path.is_file():
         return
     text = read_regular(path, most=MAX_TABLE).decode("utf-8", errors="replace")
-    if text in _texts(ratings):
+    known = list(texts)
+    if text in known:
         return
-    problem = format_problem(csv_format(text), newest=_FORMAT)
+    problem = format_problem(csv_format(text), newest=newest)
     if problem is not None:
         yield problem
         return
-    texts = list(_texts(ratings))
-    logged = next((t for t in texts if _names(t) == _names(text)), texts[0])
-    try:
-        rows, needed = _rows(text), _rows(logged)
-    except csv.Error as error:
-        yield f"it is no table ({error})"
-        return
-    if rows == needed:
-        yield "the ratings are the same, but not what stands around them"
-    yield from _differences(rows, needed)
+    names = _names(text)
+    needed = next((each for each in known if _names(each) == names), known[0])
+    lines = zip_longest(text.split("\n"), needed.split("\n"), fillvalue="no line")
+    for number, (got, row) in enumerate(lines, start=1):
+        if got != row:
+            where, pair = f"line {number}", (row, got)
+            cells = row.split(","), got.split(",")
+            if len(cells[0]) == len(cells[1]) == len(names):
+                columns = zip(names, zip(*cells, strict=True), strict=True)
+                column, pair = next(
+                    each for each in columns if each[1][0] != each[1][1]
+                )
+                where += f", column {column!r}"
+            yield f"{where}: needed {pair[0]!r}, as the logs say, got {pair[1]!r}"
 
 
-def _names(text: str) -> str | None:
-    # the line of the names of a table's columns
-    return next((line for line in text.splitlines() if line[:1] != "#"), None)
-
-
-def _rows(text: str) -> dict[tuple[str, ...], Mapping[str, str]]:
-    lines = io.StringIO("".join(f"{x}\n" for x in text.splitlines() if x[:1] != "#"))
-    rows = csv.DictReader(lines, restkey="", restval="")
-    return {tuple(str(row.get(name)) for name in _KEY): row for row in rows}
-
-
-def _differences(
-    rows: Mapping[tuple[str, ...], Mapping[str, str]],
-    needed: Mapping[tuple[str, ...], Mapping[str, str]],
-) -> Iterator[str]:
-    for key, row in needed.items():
-        session, rater, model, repeat = key
-        where = f"{model}, repeat {repeat}, by {rater} in session {session}"
-        got = rows.get(key)
-        if got is None:
-            yield f"there is no row of {where}"
-            continue
-        for name, value in row.items():
-            if got.get(name) != value:
-                yield f"{name} of {where} is {got.get(name)}, in the log {value}"
-    for session, rater, model, repeat in sorted(rows.keys() - needed.keys()):
-        yield (
-            f"there is a row of {model}, repeat {repeat}, by {rater} in session "
-            f"{session}, in the logs there is none"
-        )
+def _names(text: str) -> list[str]:
+    # of a table's columns
+    line = next((line for line in text.split("\n") if line[:1] != "#"), "")
+    return line.split(",")

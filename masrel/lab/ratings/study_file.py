@@ -208,8 +208,8 @@ def _extra_values(texts: Mapping[str, str], problems: _Problems) -> dict[str, An
     }
     for name in ("mean_speed_deg_s", "min_speed_deg_s", "max_speed_deg_s"):
         values[name] = _speed(name, texts.get(name, ""), problems)
-    texts_of = {"source": SOURCES, "felt": (*FELT, None), "grip_lost": (*_YES_NO, None)}
-    for name, known in texts_of.items():
+    _texts = {"source": SOURCES, "felt": (*FELT, None), "grip_lost": (*_YES_NO, None)}
+    for name, known in _texts.items():
         if values[name] not in known:
             names = listed(text for text in known if text is not None)
             problems.append((name, f"needed one of {names}, got {values[name]!r}"))

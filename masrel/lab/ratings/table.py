@@ -555,7 +555,7 @@ def ratings_csv(ratings: Ratings) -> str:
 
 
 def _texts(ratings: Ratings) -> Iterator[str]:
-    """Yield every text that a table of these ratings of logs has ever had."""
+    """Yield every text that a table of these ratings of logs has ever been."""
     yield ratings_csv(ratings)
     head = _head(ratings)
     yield head + _body(ratings, RATING_COLUMNS[:_N_FORMERLY])

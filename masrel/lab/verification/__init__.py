@@ -4,16 +4,15 @@ In: the folder of a study, and the hashes that were kept outside it. Out: what i
 and every finding, each with its file.
 """
 
-from masrel.lab.verification._finding import Finding
-from masrel.lab.verification._sessions import SessionRecord
-from masrel.lab.verification._trainings import VerifiedTraining
-from masrel.lab.verification.anchors import (
+from masrel.lab.verification._log_findings import (
     Anchor,
+    Finding,
     anchor_findings,
     anchors_of,
     read_anchors,
     write_anchors,
 )
+from masrel.lab.verification._sessions import SessionRecord, VerifiedTraining
 from masrel.lab.verification.record import Verification, verify_sessions, verify_study
 
 __all__ = [

@@ -1,30 +1,84 @@
-"""What can be wrong with any log, of a session or a training, and its recordings."""
+"""What can be wrong with any log and its recordings, and anchors kept elsewhere.
+
+An anchor is the hash of a log's last line, kept where the study is not.
+"""
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import TypeVar
+from typing import Literal, TypeVar
 
-from masrel.errors import SessionLogError
+from masrel._files import write_file
+from masrel.errors import ParameterError, SessionLogError
 from masrel.lab._bounded_files import (
     MAX_RECORDING,
     MAX_SMALL,
+    MAX_TABLE,
+    csv_format,
     format_problem,
     parse_json,
     read_regular,
 )
-from masrel.lab._event_log import Event
-from masrel.lab.recording import _FORMAT
+from masrel.lab._event_log import Event, line_hashes, read_log
+from masrel.lab.protocol import StudyPaths
+from masrel.lab.recording import _FORMAT as _RECORDING_FORMAT
 from masrel.lab.schedule import Presentation
-from masrel.lab.verification._finding import Finding, broken, doubt
 
 _Checked = TypeVar("_Checked")
 
 # Facts of a recording that the schedule has too, and those that the log has
 _FROM_SCHEDULE = ("code", "position", "model", "repeat")
 _FROM_LOG = ("attempt", "mean_speed_deg_s", "n_missed_ticks", "fault", "simulated")
+
+_FORMAT = 1
+_LINE = re.compile(r"([0-9a-f]{64})  (\d{1,9})  (\S.*)")
+_HEAD = (
+    f"# format: {_FORMAT}\n"
+    "# SHA-256 of a line of a log, the line's number, and the log.\n"
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """One thing that is not as it should be.
+
+    Attributes
+    ----------
+    weight : {"broken", "doubt"}
+        A doubt may have an innocent reason; a record with doubts alone is whole.
+    path : Path
+        The file or folder that it is about.
+    message : str
+        What was needed and what is there; it begins with the path.
+    """
+
+    weight: Literal["broken", "doubt"]
+    path: Path
+    message: str
+
+
+def broken(path: Path, message: str) -> Finding:
+    """Return a finding whose message does not begin with its path yet."""
+    return Finding(weight="broken", path=path, message=f"{path}: {message}")
+
+
+def doubt(path: Path, message: str) -> Finding:
+    """Return a finding that may have an innocent reason."""
+    return Finding(weight="doubt", path=path, message=f"{path}: {message}")
+
+
+def unlike(
+    path: Path, where: str, needed: Mapping[str, object], got: Mapping[str, object]
+) -> Iterator[Finding]:
+    """Yield what a line of a log says otherwise than it has to."""
+    for name, value in needed.items():
+        if got.get(name) != value:
+            message = f"{where}: {name}: needed {value}, got {got.get(name)!r}"
+            yield broken(path, message)
 
 
 def checked_log(
@@ -46,36 +100,21 @@ def time_findings(events: Sequence[Event], log: Path) -> Iterator[Finding]:
     """Yield events whose time of day is none, or before that of the last one."""
     before = None
     for event in events:
-        where, time = f"line {event.line}: {event.kind}", _time(event)
-        if time is None:
+        where = f"line {event.line}: {event.kind}"
+        try:
+            time = datetime.fromisoformat(event.time_utc)
+        except ValueError:
+            time = datetime.min  # has no zone either
+        if time.tzinfo is None:
             yield broken(log, f"{where}: needed a time in UTC, got {event.time_utc!r}")
-        elif before is not None and time < before:
+            continue
+        if before is not None and time < before:
             yield doubt(
                 log,
                 f"{where}: at {event.time_utc}, earlier than the line before: has the "
                 "clock been set back?",
             )
-        before = time or before
-
-
-def _time(event: Event) -> datetime | None:
-    try:
-        time = datetime.fromisoformat(event.time_utc)
-    except ValueError:
-        return None
-    return time if time.tzinfo is not None else None
-
-
-def recording_findings(
-    path: Path, shown: Presentation, of: Mapping[str, str], event: Event, where: str
-) -> Iterator[Finding]:
-    """Yield what is wrong with the recording that an event names."""
-    # of: study, rater and session; where: the event's line and log, in words
-    facts, findings = hashed_facts(path, event, where)
-    yield from findings
-    if facts is not None:
-        path = path.with_suffix(".json")
-        yield from _fact_findings(path, facts, shown, of, event, where)
+        before = time
 
 
 def hashed_facts(
@@ -100,14 +139,16 @@ def hashed_facts(
     return data, findings
 
 
-def _fact_findings(
-    path: Path,
-    data: bytes,
-    shown: Presentation,
-    of: Mapping[str, str],
-    event: Event,
-    where: str,
+def recording_findings(
+    path: Path, shown: Presentation, of: Mapping[str, str], event: Event, where: str
 ) -> Iterator[Finding]:
+    """Yield what is wrong with the recording that an event names."""
+    # of: study, rater and session; where: the event's line and log, in words
+    data, findings = hashed_facts(path, event, where)
+    yield from findings
+    if data is None:
+        return
+    path = path.with_suffix(".json")
     # what a file says that was not hashed once must at least agree with what was
     try:
         facts = parse_json(data)
@@ -116,7 +157,7 @@ def _fact_findings(
     if not isinstance(facts, dict):
         yield broken(path, "needed a JSON object, got none")
         return
-    problem = format_problem(facts.get("format", 1), newest=_FORMAT)
+    problem = format_problem(facts.get("format", 1), newest=_RECORDING_FORMAT)
     if problem is not None:
         yield broken(path, problem)
     needed: dict[str, object] = {
@@ -132,4 +173,176 @@ def _fact_findings(
                 path,
                 f"{name}: needed {json.dumps(value)}, as {where} and its "
                 f"schedule have it, got {json.dumps(got)}",
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Anchor:
+    """The hash of one line of a log: all lines up to it follow from it.
+
+    Attributes
+    ----------
+    log : str
+        The log, as a path below the study with forward slashes.
+    line : int
+        The line, from 1.
+    sha256 : str
+        SHA-256 of the line without its newline, 64 hexadecimal digits.
+    """
+
+    log: str
+    line: int
+    sha256: str
+
+    def __str__(self) -> str:
+        return f"{self.sha256}  {self.line}  {self.log}"
+
+
+def anchors_of(study: StudyPaths) -> tuple[Anchor, ...]:
+    """Return an anchor for every log of a study that has a line and a chain that holds.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+
+    Returns
+    -------
+    tuple of Anchor
+        Of the last line of each: of the study's conduct, then of every session, then of
+        every training and rehearsal. A log whose chain does not hold has none.
+
+    Raises
+    ------
+    OSError
+        If a log cannot be read.
+    """
+    anchors = []
+    for log in _logs(study):
+        try:
+            read_log(log)
+        except SessionLogError:
+            continue  # its last line says nothing of those before it
+        hashes = line_hashes(log)
+        if hashes:
+            name = log.relative_to(study.root).as_posix()
+            anchors.append(Anchor(log=name, line=len(hashes), sha256=hashes[-1]))
+    return tuple(anchors)
+
+
+def _logs(study: StudyPaths) -> list[Path]:
+    beside = [
+        *sorted(study.training.glob("*.jsonl")),
+        *sorted(study.rehearsals.glob("*/*.jsonl")),
+    ]
+    logs = [log for log in beside if log.is_file()]
+    return [*study.conduct_logs(), *study.logs(), *logs]
+
+
+def read_anchors(path: Path) -> tuple[Anchor, ...]:
+    """Read a file of anchors.
+
+    Parameters
+    ----------
+    path : Path
+        A file that `write_anchors` wrote, or several of them one after another.
+
+    Returns
+    -------
+    tuple of Anchor
+        In the order of the file.
+
+    Raises
+    ------
+    ParameterError
+        If a line is not an anchor, or there is none.
+    OSError
+        If the file cannot be read.
+    """
+    anchors = []
+    text = read_regular(path, most=MAX_TABLE).decode("utf-8", errors="replace")
+    for number, line in enumerate(text.splitlines(), start=1):
+        problem = format_problem(csv_format(line), newest=_FORMAT)
+        if problem is not None:
+            raise ParameterError(f"{path}: line {number}: {problem}")
+        if line.startswith("#") or not line.strip():
+            continue
+        match = _LINE.fullmatch(line.strip())
+        if match is None:
+            raise ParameterError(
+                f"{path}: line {number}: needed a SHA-256, the number of a line and a "
+                f"log, two blanks between them, got {line[:80]!r}"
+            )
+        sha256, place, log = match.groups()
+        anchors.append(Anchor(log=log, line=int(place), sha256=sha256))
+    if not anchors:
+        raise ParameterError(f"{path}: needed anchors, got none")
+    return tuple(anchors)
+
+
+def write_anchors(anchors: Iterable[Anchor], path: Path) -> None:
+    """Write anchors, a line each, for a place that the study's coordinator cannot edit.
+
+    Parameters
+    ----------
+    anchors : iterable of Anchor
+        What `anchors_of` returned.
+    path : Path
+        The file.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    write_file(path, _HEAD + "".join(f"{anchor}\n" for anchor in anchors))
+
+
+def anchor_findings(
+    study: StudyPaths, anchors: Iterable[Anchor]
+) -> tuple[Finding, ...]:
+    """Hold the logs of a study against hashes that were kept elsewhere.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    anchors : iterable of Anchor
+        The hashes.
+
+    Returns
+    -------
+    tuple of Finding
+        A log that is gone, is shorter than it was, or has another line there. Logs
+        that have grown since are fine.
+
+    Raises
+    ------
+    OSError
+        If a log cannot be read.
+    """
+    return tuple(_findings(study, anchors))
+
+
+def _findings(study: StudyPaths, anchors: Iterable[Anchor]) -> Iterator[Finding]:
+    logs = {log.relative_to(study.root).as_posix(): log for log in _logs(study)}
+    hashes: dict[str, tuple[str, ...]] = {}
+    for anchor in anchors:
+        path = study.root / anchor.log
+        if anchor.log not in logs:
+            yield broken(path, "needed the log that an anchor names, got no file")
+            continue
+        if anchor.log not in hashes:
+            hashes[anchor.log] = line_hashes(logs[anchor.log])
+        of_log = hashes[anchor.log]
+        if len(of_log) < anchor.line:
+            yield broken(
+                path, f"needed {anchor.line} lines, as anchored, got {len(of_log)}"
+            )
+        elif of_log[anchor.line - 1] != anchor.sha256:
+            yield broken(
+                path,
+                f"line {anchor.line}: needed the anchored SHA-256 {anchor.sha256}, "
+                f"got {of_log[anchor.line - 1]}: this line or one before it was "
+                "changed, and the chain computed anew",
             )

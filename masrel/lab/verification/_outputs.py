@@ -3,9 +3,8 @@
 import hashlib
 import json
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +12,6 @@ from masrel.errors import MasrelError, MasrelWarning
 from masrel.lab._bounded_files import (
     MAX_RECORDING,
     MAX_TABLE,
-    csv_format,
     format_problem,
     parse_json,
     read_regular,
@@ -21,7 +19,7 @@ from masrel.lab._bounded_files import (
 from masrel.lab.conduct import excluded_raters
 from masrel.lab.conduct._study_log import conduct_hash
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.verification._finding import Finding, broken, doubt
+from masrel.lab.verification._log_findings import Finding, broken, doubt
 
 if TYPE_CHECKING:
     from masrel.lab.analysis import Analysis
@@ -48,9 +46,7 @@ def output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
         if study.logs():
             # recordings have been held against the logs before
             ratings = _of_logs(study, protocol, check_recordings=False)
-            yield from _table_findings(table, ratings)
-            yield from _answers_findings(study, protocol)
-            yield from _raters_findings(study, protocol)
+            yield from _table_findings(study, protocol, ratings)
         else:
             ratings = read_study_data(study, protocol).ratings
             if table.is_file():
@@ -85,52 +81,32 @@ def _analysis_of(
         )
 
 
-def _answers_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
-    from masrel.lab.ratings import answers_csv, answers_from_logs
-
-    path = study.answers_file
-    if path.is_file():
-        text = read_regular(path, most=MAX_TABLE).decode("utf-8", errors="replace")
-        if text != answers_csv(answers_from_logs(study, protocol)):
-            yield broken(
-                path, "is not what the logs say; masrel ratings writes it anew"
-            )
-
-
-def _raters_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
+def _table_findings(
+    study: StudyPaths, protocol: Protocol, ratings: "Ratings"
+) -> Iterator[Finding]:
     from masrel.lab.progress._standing import raters_text
+    from masrel.lab.ratings import answers_csv, answers_from_logs
+    from masrel.lab.ratings.study_data import _table_differences
+    from masrel.lab.ratings.table import _FORMAT, _texts
 
-    path = study.raters_file
-    if not path.is_file():
-        return
-    text = read_regular(path, most=MAX_TABLE).decode("utf-8", errors="replace")
-    problem = format_problem(csv_format(text), newest=1)
-    needed = raters_text(study, protocol)
-    if problem is not None:
-        yield broken(path, problem)
-    elif text != needed:
-        lines, needed_lines = text.splitlines(), needed.splitlines()
-        pairs = zip_longest(lines, needed_lines, fillvalue="no line")
-        line, (got, row) = next(
-            (number, pair)
-            for number, pair in enumerate(pairs, start=1)
-            if pair[0] != pair[1]
-        )
-        yield broken(
-            path,
-            f"line {line}: needed {row[:80]!r}, as protocol and logs say, got "
-            f"{got[:80]!r}; masrel ratings writes it anew",
-        )
-
-
-def _table_findings(path: Path, ratings: "Ratings") -> Iterator[Finding]:
-    from masrel.lab.ratings import table_differences
-
-    differences = list(table_differences(path, ratings))
-    for difference in differences[:_SHOWN]:
-        yield broken(path, difference)
-    if len(differences) > _SHOWN:
-        yield broken(path, f"there are {len(differences) - _SHOWN} more differences")
+    made: dict[Path, tuple[Callable[[], Iterable[str]], int]] = {
+        study.ratings_file: (lambda: _texts(ratings), _FORMAT),
+        study.answers_file: (
+            lambda: [answers_csv(answers_from_logs(study, protocol))],
+            1,
+        ),
+        study.raters_file: (lambda: [raters_text(study, protocol)], 1),
+    }
+    for path, (texts, newest) in made.items():
+        if not path.is_file():
+            continue
+        differences = list(_table_differences(path, texts(), newest=newest))
+        for difference in differences[:_SHOWN]:
+            yield broken(path, f"{difference}; masrel ratings writes it anew")
+        if len(differences) > _SHOWN:
+            yield broken(
+                path, f"there are {len(differences) - _SHOWN} more differences"
+            )
 
 
 def _of_same_table(

@@ -1,27 +1,33 @@
-"""Session logs, what they say happened, and the recordings they name."""
+"""Logs of sessions, rehearsals and trainings, and the recordings that they name."""
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Generic, Literal, TypeVar
 
-from masrel.errors import ParameterError
+from masrel.errors import ParameterError, ScheduleError
 from masrel.lab._bounded_files import MAX_SMALL, read_regular
-from masrel.lab._event_log import Event
-from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab._event_log import Event, read_log
+from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
 from masrel.lab.protocol._values import checked_answer
-from masrel.lab.run._rehearsal import practice_presentations
+from masrel.lab.run._rehearsal import (
+    RehearsalPaths,
+    drawn_rehearsal,
+    practice_presentations,
+)
 from masrel.lab.run._state import SessionState, read_session
-from masrel.lab.schedule import Presentation, Schedule
-from masrel.lab.verification._finding import Finding, broken
+from masrel.lab.schedule import Presentation, Schedule, read_schedule
 from masrel.lab.verification._log_findings import (
+    Finding,
+    broken,
     checked_log,
+    doubt,
+    hashed_facts,
     recording_findings,
     time_findings,
+    unlike,
 )
-
-Stage = Literal["not begun", "begun", "complete", "unreadable"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +51,7 @@ class SessionRecord:
 
     session: str
     rater: str
-    stage: Stage
+    stage: Literal["not begun", "begun", "complete", "unreadable"]
     n_presentations: int = 0
     n_graded: int = 0
     n_skipped: int = 0
@@ -55,72 +61,173 @@ class SessionRecord:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CheckedSession:
-    """A session, what is wrong with it, and the files it speaks for."""
+class VerifiedTraining:
+    """One rater's training, as its log has it.
 
-    record: SessionRecord
+    Attributes
+    ----------
+    rater : str
+        Whose training.
+    stage : {"begun", "passed", "not passed", "unreadable"}
+        How far it came.
+    n_graded, n_recordings : int
+        Presentations with a grade, and recordings that the log names.
+    """
+
+    rater: str
+    stage: Literal["begun", "passed", "not passed", "unreadable"]
+    n_graded: int = 0
+    n_recordings: int = 0
+
+
+_Record = TypeVar("_Record", SessionRecord, VerifiedTraining)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckedLog(Generic[_Record]):
+    """How far a log came, what is wrong with it, and the files it speaks for."""
+
+    record: _Record
     findings: tuple[Finding, ...]
     files: frozenset[Path]
 
 
+def _checked(
+    record: _Record,
+    findings: Sequence[Finding],
+    log: Path,
+    recordings: Sequence[Path] = (),
+) -> CheckedLog[_Record]:
+    files = {log, *recordings, *(path.with_suffix(".json") for path in recordings)}
+    return CheckedLog(record=record, findings=tuple(findings), files=frozenset(files))
+
+
 def check_session(
-    study: StudyPaths,
-    protocol: Protocol,
-    schedule: Schedule | None,
-    session: str,
-    rater: str,
-) -> CheckedSession:
+    study: StudyPaths, protocol: Protocol, session: str, rater: str
+) -> CheckedLog[SessionRecord]:
     """Hold a log against its schedule, and its recordings against the log."""
-    log = study.log_file(rater, session)
-    events, state, finding = checked_log(log, read_session)
+    file, log = study.schedule_file(rater, session), study.log_file(rater, session)
+    schedule, findings = None, []
+    if file.exists():
+        try:
+            schedule = read_schedule(file)
+        except ScheduleError:
+            pass  # one of `schedule_problems`
+    elif log.exists():
+        needed = "needed the schedule of a session that has begun, got no file"
+        findings.append(broken(file, needed))
+    events, state, problem = checked_log(log, read_session)
+    if problem is not None:
+        findings.append(problem)
     if state is None or schedule is None:
-        stage: Stage = "not begun" if finding is None and not events else "unreadable"
-        return CheckedSession(
-            record=SessionRecord(session=session, rater=rater, stage=stage),
-            findings=() if finding is None else (finding,),
-            files=frozenset([log]),
+        is_none = problem is None and not events
+        stage: Literal["not begun", "unreadable"] = (
+            "not begun" if is_none else "unreadable"
         )
-    file = study.schedule_file(rater, session)
+        record = SessionRecord(session=session, rater=rater, stage=stage)
+        return _checked(record, findings, log)
     checksum = hashlib.sha256(read_regular(file, most=MAX_SMALL)).hexdigest()
-    return check_against_schedule(
-        study, protocol, schedule, events, state, schedule_sha256=checksum
+    return _against_schedule(study, protocol, schedule, events, state, checksum)
+
+
+def check_rehearsal(
+    study: StudyPaths, protocol: Protocol, log: Path
+) -> CheckedLog[SessionRecord]:
+    """Hold a rehearsal's log against its draw, and its recordings against the log."""
+    number = int(log.parent.name) if log.parent.name.isdecimal() else 0
+    paths = RehearsalPaths(study.root, number)
+    events, state, problem = checked_log(log, read_session)
+    problems = [] if problem is None else [problem]
+    if state is not None:
+        rater, session = str(state.header["rater"]), str(state.header["session"])
+        header = {"rehearsal": False, **state.header}
+        needed = {"study": protocol.study.id, "rehearsal": True}
+        problems += unlike(log, "line 1", needed, header)
+        if not problems and log != paths.log_file(rater, session):
+            problems = [
+                broken(
+                    log,
+                    f"is the log of a rehearsal of rater {rater} in session {session} "
+                    "by its first event: needed the one its name and folder say",
+                )
+            ]
+    if state is None or problems:
+        name = log.stem.removeprefix("rehearsal_")
+        record = SessionRecord(
+            session=name, rater="", rehearsal=number, stage="unreadable"
+        )
+        return _checked(record, problems[:1], log)
+    is_changed = state.header["presented_sha256"] != presented_hash(protocol)
+    try:
+        drawn = None if is_changed else drawn_rehearsal(paths, protocol, rater, session)
+    except ScheduleError:  # such as of a rater who was taken off
+        drawn = None
+    if drawn is not None and drawn[1] == state.header["schedule_sha256"]:
+        return _against_schedule(paths, protocol, drawn[0], events, state, drawn[1])
+    why = (
+        "models or settings that the protocol had before a change"
+        if is_changed
+        else "a secret, a rater or a session that the study does not have now"
     )
+    findings = [
+        doubt(log, f"is of {why}: what was presented when cannot be drawn again"),
+        *time_findings(events, log),
+    ]
+    for event in state.all_presented:
+        path = paths.sessions / str(event.fields["recording"])
+        findings += hashed_facts(path, event, f"line {event.line} of {log}")[1]
+    return _checked_session(paths, events, state, findings, len(state.presented))
 
 
-def check_against_schedule(
+def _against_schedule(
     study: StudyPaths,
     protocol: Protocol,
     schedule: Schedule,
     events: Sequence[Event],
     state: SessionState,
-    *,
-    schedule_sha256: str,
-) -> CheckedSession:
-    """Hold the events of a log against a schedule that has this hash."""
+    checksum: str,
+) -> CheckedLog[SessionRecord]:
+    # checksum: of the schedule's file
     log = study.log_file(schedule.rater, schedule.session)
-    findings = [
-        *_head_findings(protocol, schedule, state, log, schedule_sha256),
-        *_event_findings(protocol, schedule, events, log),
-        *_answer_findings(protocol, events, log),
-        *time_findings(events, log),
-    ]
-    shown = _all_shown(protocol, schedule)
+    needed = {
+        "study": protocol.study.id,
+        "rater": schedule.rater,
+        "session": schedule.session,
+        "presented_sha256": schedule.presented_sha256,
+        "schedule_sha256": checksum,
+    }
+    findings = [*unlike(log, "line 1", needed, state.header)]
+    n_presentations = len(schedule.presentations)
+    if state.is_complete and len(state.settled) != n_presentations:
+        findings.append(
+            broken(
+                log,
+                f"is complete: needed {n_presentations} presentations graded or "
+                f"skipped, got {len(state.settled)}",
+            )
+        )
+    # every presentation by its code, also for practice
+    every = (*practice_presentations(protocol), *schedule.presentations)
+    shown = {presentation.code: presentation for presentation in every}
+    findings += _event_findings(protocol, shown, events, log)
+    findings += _answer_findings(protocol, events, log)
+    findings += time_findings(events, log)
+    of = {name: str(needed[name]) for name in ("study", "rater", "session")}
     for event in state.all_presented:
-        findings += _recording_findings(study, schedule, shown, log, event)
-    return checked_session(
-        study, events, state, findings, n_presentations=len(schedule.presentations)
-    )
+        code = str(event.fields["code"])
+        folder = study.recording_file(schedule.rater, schedule.session, code).parent
+        path = study.sessions / str(event.fields["recording"])
+        findings += _recording_findings(path, folder, code, shown, of, event, log)
+    return _checked_session(study, events, state, findings, n_presentations)
 
 
-def checked_session(
+def _checked_session(
     study: StudyPaths,
     events: Sequence[Event],
     state: SessionState,
     findings: Sequence[Finding],
-    *,
     n_presentations: int,
-) -> CheckedSession:
-    """Return how far a session came by its log, with what is wrong with it."""
+) -> CheckedLog[SessionRecord]:
     rater, session = str(state.header["rater"]), str(state.header["session"])
     recordings = [
         study.sessions / str(event.fields["recording"]) for event in state.all_presented
@@ -134,44 +241,9 @@ def checked_session(
         n_skipped=len(state.skipped),
         n_corrections=sum(event.kind == "correction" for event in events),
         n_recordings=len(recordings),
+        rehearsal=study.number if isinstance(study, RehearsalPaths) else None,
     )
-    facts = (recording.with_suffix(".json") for recording in recordings)
-    files = frozenset([study.log_file(rater, session), *recordings, *facts])
-    return CheckedSession(record=record, findings=tuple(findings), files=files)
-
-
-def _head_findings(
-    protocol: Protocol,
-    schedule: Schedule,
-    state: SessionState,
-    log: Path,
-    schedule_sha256: str,
-) -> Iterator[Finding]:
-    needed = {
-        "study": protocol.study.id,
-        "rater": schedule.rater,
-        "session": schedule.session,
-        "presented_sha256": schedule.presented_sha256,
-        "schedule_sha256": schedule_sha256,
-    }
-    for name, value in needed.items():
-        if state.header[name] != value:
-            yield broken(
-                log, f"line 1: {name}: needed {value}, got {state.header[name]}"
-            )
-    n_presentations = len(schedule.presentations)
-    if state.is_complete and len(state.settled) != n_presentations:
-        yield broken(
-            log,
-            f"is complete: needed {n_presentations} presentations graded or skipped, "
-            f"got {len(state.settled)}",
-        )
-
-
-def _all_shown(protocol: Protocol, schedule: Schedule) -> dict[str, Presentation]:
-    # every presentation by its code, also for practice
-    both = (*practice_presentations(protocol), *schedule.presentations)
-    return {shown.code: shown for shown in both}
+    return _checked(record, findings, study.log_file(rater, session), recordings)
 
 
 def _answer_findings(
@@ -197,58 +269,122 @@ def _answer_findings(
 
 
 def _event_findings(
-    protocol: Protocol, schedule: Schedule, events: Sequence[Event], log: Path
+    protocol: Protocol,
+    shown: dict[str, Presentation],
+    events: Sequence[Event],
+    log: Path,
 ) -> Iterator[Finding]:
-    codes = _all_shown(protocol, schedule)
-    positions = {code: shown.position for code, shown in codes.items()}
-    attempts = dict.fromkeys(positions, 0)
+    attempts = dict.fromkeys(shown, 0)
     for event in events:
         fields, where = event.fields, f"line {event.line}: {event.kind}"
         code, grade = fields.get("code"), fields.get("grade")
-        if code is not None and code not in positions:
+        if code is not None and code not in shown:
             yield broken(log, f"{where}: needed a code of the schedule, got {code!r}")
             continue
-        if "position" in fields and fields["position"] != positions[str(code)]:
-            yield broken(
-                log,
-                f"{where}: position of {code}: needed {positions[str(code)]}, "
-                f"got {fields['position']!r}",
-            )
+        needed: dict[str, object] = {}
+        if "position" in fields:
+            needed["position"] = shown[str(code)].position
         if event.kind in ("presented", "practised"):
             attempts[str(code)] += 1
-            if fields["attempt"] != attempts[str(code)]:
-                yield broken(
-                    log,
-                    f"{where}: attempt at {code}: needed {attempts[str(code)]}, "
-                    f"got {fields['attempt']!r}",
-                )
+            needed["attempt"] = attempts[str(code)]
+        yield from unlike(log, f"{where}: {code}", needed, fields)
         if grade is not None and grade not in protocol.scale.grades:
-            yield broken(
-                log,
-                f"{where}: grade of {code}: needed one of "
-                f"{', '.join(protocol.scale.grades)}, got {grade!r}",
-            )
+            yield _off_scale(protocol, log, f"{where}: grade of {code}", grade)
+
+
+def _off_scale(protocol: Protocol, log: Path, where: str, grade: object) -> Finding:
+    grades = ", ".join(protocol.scale.grades)
+    return broken(log, f"{where}: needed one of {grades}, got {grade!r}")
 
 
 def _recording_findings(
-    study: StudyPaths,
-    schedule: Schedule,
-    all_shown: Mapping[str, Presentation],
-    log: Path,
+    path: Path,
+    folder: Path,
+    code: str,
+    shown: dict[str, Presentation],
+    of: dict[str, str],
     event: Event,
+    log: Path,
 ) -> Iterator[Finding]:
-    fields, where = event.fields, f"line {event.line} of {log}"
-    path = study.sessions / str(fields["recording"])
-    code, attempt = str(fields["code"]), fields["attempt"]
-    shown = all_shown.get(code)
+    # of a recording that has to lie in this folder under its code
+    attempt = event.fields["attempt"]
     name = code if attempt == 1 else f"{code}-{attempt}"
-    folder = study.recording_file(schedule.rater, schedule.session, code).parent
-    if shown is None or path != folder / f"{name}.npz":
+    if code not in shown or path != folder / f"{name}.npz":
         yield broken(log, f"line {event.line}: {path} is not where {name} is recorded")
         return
-    of = {
-        "study": schedule.study,
-        "rater": schedule.rater,
-        "session": schedule.session,
-    }
-    yield from recording_findings(path, shown, of, event, where)
+    where = f"line {event.line} of {log}"
+    yield from recording_findings(path, shown[code], of, event, where)
+
+
+def check_training(
+    study: StudyPaths, protocol: Protocol, log: Path
+) -> CheckedLog[VerifiedTraining]:
+    """Hold a training's log against the protocol, and its recordings against it."""
+    rater = log.stem
+    events, _, problem = checked_log(log, _read_training)
+    if problem is not None:
+        return _checked(
+            VerifiedTraining(rater=rater, stage="unreadable"), [problem], log
+        )
+    head, of_study = events[0].fields, {"study": protocol.study.id, "rater": rater}
+    findings = [*unlike(log, "line 1", of_study, head)]
+    if head["presented_sha256"] != presented_hash(protocol):
+        message = "is of models or settings that the protocol had before a change"
+        findings.append(doubt(log, message))
+    findings += _training_findings(protocol, events, log)
+    findings += time_findings(events, log)
+    presented = [event for event in events if event.kind == "presented"]
+    recordings = [study.training / str(e.fields["recording"]) for e in presented]
+    of = {**of_study, "session": "training"}
+    for event, path in zip(presented, recordings, strict=True):
+        place = event.fields["position"]
+        if not isinstance(place, int):
+            continue  # said of the event
+        code, model = f"{place:03d}", str(event.fields["model"])
+        shown = Presentation(position=place, code=code, model=model, repeat=place)
+        folder = log.with_suffix("")
+        findings += _recording_findings(
+            path, folder, code, {code: shown}, of, event, log
+        )
+    ends = [event.fields["passed"] for event in events if event.kind == "complete"]
+    record = VerifiedTraining(
+        rater=rater,
+        stage="begun" if not ends else "passed" if ends[0] else "not passed",
+        n_graded=sum(event.kind == "grade" for event in events),
+        n_recordings=len(presented),
+    )
+    return _checked(record, findings, log, recordings)
+
+
+def _read_training(log: Path) -> tuple[tuple[Event, ...], None]:
+    from masrel.lab.training._lessons import check_events  # loads scipy
+
+    events = read_log(log)
+    check_events(log, events)
+    return events, None
+
+
+def _training_findings(
+    protocol: Protocol, events: Sequence[Event], log: Path
+) -> Iterator[Finding]:
+    # of models that have changed since, only what does not depend on them
+    intended = {model.id: model.intended_grade for model in protocol.models}
+    is_same = events[0].fields["presented_sha256"] == presented_hash(protocol)
+    position, attempt, model = 0, 0, None
+    for event in events:
+        fields, where = event.fields, f"line {event.line}: {event.kind}"
+        needed: dict[str, object] = {}
+        if event.kind == "presented":
+            is_new = fields["position"] != position
+            position, attempt = position + is_new, 1 if is_new else attempt + 1
+            model = fields["model"] if is_new else model
+            needed = {"position": position, "attempt": attempt, "model": model}
+        elif event.kind == "grade":
+            needed = {"position": position, "model": model}
+            if is_same:
+                needed["intended"] = intended.get(str(model))
+            if is_same and fields["grade"] not in protocol.scale.grades:
+                yield _off_scale(protocol, log, where, fields["grade"])
+        elif event.kind == "complete":
+            needed = {"n_presentations": position}
+        yield from unlike(log, where, needed, fields)

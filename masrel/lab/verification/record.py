@@ -2,26 +2,24 @@
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from masrel.errors import ProtocolError, ScheduleError, SessionLogError
+from masrel.errors import ProtocolError, SessionLogError
 from masrel.lab._once import read_once
 from masrel.lab.conduct._allotment import allotment_problems
 from masrel.lab.conduct._study_log import merged_log_problems
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
-from masrel.lab.schedule import read_schedule, schedule_problems
-from masrel.lab.verification._finding import Finding, broken, doubt
+from masrel.lab.schedule import schedule_problems
+from masrel.lab.verification._log_findings import Finding, broken, doubt
 from masrel.lab.verification._outputs import output_findings
-from masrel.lab.verification._rehearsals import check_rehearsal
 from masrel.lab.verification._sessions import (
-    CheckedSession,
+    CheckedLog,
     SessionRecord,
-    check_session,
-)
-from masrel.lab.verification._trainings import (
-    CheckedTraining,
     VerifiedTraining,
+    check_rehearsal,
+    check_session,
     check_training,
 )
 
@@ -124,7 +122,7 @@ def verify_sessions(study: StudyPaths, protocol: Protocol) -> Verification:
         If a file that is there cannot be read.
     """
     checked = [
-        _checked(study, protocol, session.id, rater)
+        check_session(study, protocol, session.id, rater)
         for session in protocol.sessions
         for rater in session.raters
     ]
@@ -168,25 +166,8 @@ def _of_problems(path: Path, problems: Iterable[str]) -> tuple[Finding, ...]:
     )
 
 
-def _checked(
-    study: StudyPaths, protocol: Protocol, session: str, rater: str
-) -> CheckedSession:
-    path, schedule = study.schedule_file(rater, session), None
-    findings: tuple[Finding, ...] = ()
-    if path.exists():
-        try:
-            schedule = read_schedule(path)
-        except ScheduleError:
-            pass  # one of `schedule_problems`
-    elif study.log_file(rater, session).exists():
-        needed = "needed the schedule of a session that has begun, got no file"
-        findings = (broken(path, needed),)
-    checked = check_session(study, protocol, schedule, session, rater)
-    return replace(checked, findings=(*findings, *checked.findings))
-
-
 def _unnamed(
-    folder: Path, checked: Sequence[CheckedSession | CheckedTraining], whose: str
+    folder: Path, checked: Sequence[CheckedLog[Any]], whose: str
 ) -> Iterator[Finding]:
     # what lies in a folder of logs and no log speaks for
     named = {str(path) for of_log in checked for path in of_log.files}
