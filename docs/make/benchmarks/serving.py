@@ -24,7 +24,7 @@ from tests.benchmarks.bench_serve import (
     long_study,
     quantile_ms,
 )
-from tests.lab.serve.desks import small_study
+from tests.lab.serve.pages import small_study
 
 DOCS = Path(__file__).parents[2]
 FLOOD_HZ = 1000.0

@@ -61,9 +61,8 @@ def serve(study: Path, port: int, host: str, tls: tuple[Path, Path] | None) -> N
     import asyncio
 
     from masrel.lab.serve._access import Access
-    from masrel.lab.serve._addresses import hosts, is_loopback
-    from masrel.lab.serve._desk import Desk
-    from masrel.lab.serve._server import alone, encryption, listen
+    from masrel.lab.serve._manager import SessionManager
+    from masrel.lab.serve._server import alone, encryption, hosts, is_loopback, listen
     from masrel.lab.serve._server import serve as serve_pages
 
     paths = StudyPaths(study)
@@ -81,7 +80,7 @@ def serve(study: Path, port: int, host: str, tls: tuple[Path, Path] | None) -> N
                 err=True,
             )
         serving = serve_pages(
-            Desk(paths), access, listener, context, show=lambda: _show(access)
+            SessionManager(paths), access, listener, context, show=lambda: _show(access)
         )
         if not asyncio.run(serving):
             raise KeyboardInterrupt
@@ -89,8 +88,7 @@ def serve(study: Path, port: int, host: str, tls: tuple[Path, Path] | None) -> N
 
 def _show(access: "Access") -> None:
     """Print addresses that nobody has opened yet."""
-    from masrel.lab.serve._access import ROLES
-    from masrel.lab.serve._addresses import qr_lines
+    from masrel.lab.serve._access import ROLES, qr_lines
 
     for role in ROLES:
         address = access.new_address(role)

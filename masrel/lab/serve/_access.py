@@ -2,6 +2,7 @@
 
 import hashlib
 import hmac
+import io
 import json
 import re
 import secrets
@@ -11,6 +12,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
+
+import segno
 
 from masrel._files import make_folder, write_files
 from masrel.errors import MasrelError, ParameterError
@@ -78,7 +81,10 @@ class Access:
         self.hosts = hosts | {origin.partition("://")[2]}
         self.say, self._now, self._ticks = say, now, ticks
         self._key = _find_key(study.serve_key_file, study.root)
-        self._tablets = _Tablets(study.serve_key_file.with_name("tablets"), study.root)
+        self._root = study.root
+        self._tablets_file = study.serve_key_file.with_name("tablets")
+        # kept, so that a restart gives none to another rater
+        self._raters = _read_tablets(self._tablets_file)  # by tablet
         self._tokens: list[_Token] = []
         self._used: deque[_Token] = deque(maxlen=_MAX_WAITING * len(ROLES))
         self._ends: OrderedDict[str, float] = OrderedDict()  # in ticks, by cookie
@@ -161,7 +167,14 @@ class Access:
 
     def is_of_rater(self, tablet: str, rater: str) -> bool:
         """Return whether a tablet is this rater's, who gets it if it is nobody's."""
-        return self._tablets.rater(tablet, rater) == rater
+        if tablet not in self._raters:
+            self._raters[tablet] = rater
+            if len(self._raters) > _MAX_KNOWN:
+                del self._raters[next(iter(self._raters))]
+            text = json.dumps({"format": 1, "tablets": self._raters}, indent=1)
+            files = {self._tablets_file: f"{text}\n"}
+            write_files(files, within=self._root, mode=0o600)
+        return self._raters[tablet] == rater
 
     def _signed(self, visitor: Visitor, issued: int) -> str:
         return self._mac("cookie", visitor.role, visitor.tablet, issued)
@@ -195,27 +208,10 @@ def _same(
     return same[0] if same and same[0].role == role else None
 
 
-class _Tablets:
-    """Whose tablet each one is, kept so that a restart gives none to another rater."""
-
-    def __init__(self, file: Path, within: Path) -> None:
-        self._file, self._within = file, within
-        self._raters: dict[str, str] = {}
-        if file.is_file():
-            self._raters = _read_tablets(file)
-
-    def rater(self, tablet: str, rater: str) -> str:
-        """Return whose tablet it is: this rater's if it was nobody's."""
-        if tablet not in self._raters:
-            self._raters[tablet] = rater
-            if len(self._raters) > _MAX_KNOWN:
-                del self._raters[next(iter(self._raters))]
-            text = json.dumps({"format": 1, "tablets": self._raters}, indent=1)
-            write_files({self._file: f"{text}\n"}, within=self._within, mode=0o600)
-        return self._raters[tablet]
-
-
 def _read_tablets(file: Path) -> dict[str, str]:
+    """Return whose tablet each one is."""
+    if not file.is_file():
+        return {}
     try:
         document = parse_json(read_regular(file, most=MAX_SMALL))
         return {str(tablet): str(of) for tablet, of in document["tablets"].items()}
@@ -241,3 +237,16 @@ def _find_key(file: Path, root: Path) -> bytes:
         f"{file}: needed a line 'format: 1' and a line 'key: ' with {2 * _N_BYTES} "
         "hexadecimal digits, got another text; without this file a new key is drawn"
     )
+
+
+def qr_lines(address: str) -> str:
+    """Return an address as a QR code for a terminal."""
+    lines = io.StringIO()
+    segno.make(address, error="l", micro=False).terminal(lines, compact=True)
+    return lines.getvalue()
+
+
+def qr_svg(address: str) -> str:
+    """Return an address as a QR code for a page: what its `src` is, dark on light."""
+    code = segno.make(address, error="l", micro=False)
+    return str(code.svg_data_uri(scale=6, border=3, dark="black", light="white"))

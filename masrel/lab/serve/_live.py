@@ -5,7 +5,7 @@ began; whoever maps it too reads what is there, and nobody waits for anybody.
 """
 
 import mmap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from masrel.lab._bounded_files import parse_json
@@ -69,3 +69,30 @@ class SampleTail:
         """Let go of the file."""
         self._values.release()
         self._map.close()
+
+
+class LiveTail:
+    """The samples of whatever is presented now."""
+
+    def __init__(self) -> None:
+        self._file: Path | None = None
+        self._tail: SampleTail | None = None
+
+    def news(self, file: Path | None) -> Iterator[SampleTail | None]:
+        """Yield None where a presentation begins, and then its samples."""
+        if self._tail is not None:
+            yield self._tail  # also the last ones of one that is over
+            if file != self._file:
+                self.close()
+        elif file is not None:
+            try:
+                self._tail, self._file = SampleTail(file), file
+            except (OSError, ValueError):
+                return
+            yield None
+
+    def close(self) -> None:
+        """Let go of the samples."""
+        if self._tail is not None:
+            self._tail.close()
+        self._file = self._tail = None

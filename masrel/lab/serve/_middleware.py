@@ -1,19 +1,24 @@
-"""What every request passes before a page sees it, and every answer on its way out."""
+"""HTTP middleware: senders, roles, limits of requests, and headers of every answer."""
 
+import functools
 import json
 import time
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
 
 import anyio
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.requests import cookie_parser
-from starlette.responses import JSONResponse, Response
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect, Request, cookie_parser
+from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from masrel.lab._bounded_files import parse_json
 from masrel.lab.serve._access import ROLES, Access, AccessError, Role, Visitor
-from masrel.lab.serve._page_templates import page
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 _MAX_BODY = 65_536
 _MAX_HEADERS = 16_384
@@ -27,7 +32,7 @@ _TO_END_S = 1.0  # for the last bytes of such a stream
 _WITH_COOKIE, _WITHOUT = (120, 30.0), (60, 10.0)
 _MAX_CLIENTS = 1024
 
-_PAGES = {"/rater": "rater", "/coordinator": "coordinator"}
+_PAGES = ("/rater", "/coordinator")
 _STOPS = ("/rater/stop", "/coordinator/stop")
 
 _POLICY = (
@@ -47,16 +52,12 @@ _HEADERS = {
 }
 
 
-class _RefusedError(Exception):
-    """A request that no page sees, and why."""
-
-    def __init__(self, status: int, why: str) -> None:
-        super().__init__(why)
-        self.status, self.why = status, why
-
-
 class Middleware:
-    """Lets through what its sender may ask, and answers the rest in one sentence."""
+    """Lets through what its sender may ask, and answers the rest in one sentence.
+
+    A page is given ``role``, ``tablet`` and ``csrf`` of who asks in the state of its
+    request, and in ``fields`` the object that was sent.
+    """
 
     def __init__(
         self,
@@ -78,13 +79,14 @@ class Middleware:
         """Answer a request."""
         if scope["type"] != "http":
             return
-        send = _with_headers(scope["path"], send)
+        policy = _OF_REPORT if scope["path"].startswith("/report/") else _OF_PAGES
+        send = _with_headers(send, {**_HEADERS, "Content-Security-Policy": policy})
         try:
             visitor = self._visitor(scope)
             if scope["method"] == "POST":
-                receive = await _checked_body(scope, receive)
-        except _RefusedError as refused:
-            answer = _refusal(scope, refused.status, refused.why)
+                scope["state"]["fields"] = await _sent_fields(Request(scope, receive))
+        except HTTPException as refused:
+            answer = _refusal(scope, refused.status_code, refused.detail)
             await answer(scope, receive, send)
             return
         if _opens(scope):
@@ -93,7 +95,7 @@ class Middleware:
             await self._streams.run(visitor.tablet, self._app, scope, receive, send)
         else:
             if visitor is not None and scope["path"] in _PAGES:
-                send = _with_cookie(self._access.cookie(visitor), send)
+                send = _with_headers(send, {"Set-Cookie": self._access.cookie(visitor)})
             await self._app(scope, receive, send)
 
     def _visitor(self, scope: Scope) -> Visitor | None:
@@ -103,17 +105,22 @@ class Middleware:
         self._check_sender(scope, headers)
         cookies = cookie_parser(headers.get("cookie", ""))
         visitors = {each: self._access.visitor(each, cookies) for each in ROLES}
+        others = [each for each in visitors.values() if each is not None]
         role = _role(scope["path"])
         visitor = visitors[role] if role else None
-        self._check_budget(
-            scope, visitor or next(filter(None, visitors.values()), None)
-        )
+        self._check_budget(scope, visitor or next(iter(others), None))
         if role is None or (visitor is None and _opens(scope)):
             if scope["method"] == "POST":
-                raise _RefusedError(405, "Nothing can be sent to this address.")
+                raise HTTPException(405, "Nothing can be sent to this address.")
             return None
+        if visitor is None and others:
+            raise HTTPException(403, f"This is for the {role} alone.")
         if visitor is None:
-            raise _nobody(role, other=any(visitors.values()))
+            raise HTTPException(
+                401,
+                "This page needs an address that lets this browser in, as masrel serve "
+                "prints it and the coordinator's page makes it.",
+            )
         csrf = self._access.csrf(visitor)
         if scope["method"] == "POST":
             self._check_page(headers, visitor)
@@ -124,20 +131,20 @@ class Middleware:
     def _check_sender(self, scope: Scope, headers: Headers) -> None:
         """Refuse what a page of somebody else makes a browser send."""
         if scope["method"] not in ("GET", "HEAD", "POST"):
-            raise _RefusedError(405, "This address knows GET and POST only.")
+            raise HTTPException(405, "This address knows GET and POST only.")
         if headers.get("host", "").lower() not in self._access.hosts:
             # a foreign name that its owner has made to mean this computer
             where = self._access.origin
-            raise _RefusedError(421, f"These pages are at {where} and nowhere else.")
+            raise HTTPException(421, f"These pages are at {where} and nowhere else.")
         origin, site = headers.get("origin"), headers.get("sec-fetch-site")
         if origin is None and scope["method"] == "POST":
-            raise _RefusedError(403, "What is sent needs the header Origin.")
+            raise HTTPException(403, "What is sent needs the header Origin.")
         is_link = headers.get("sec-fetch-mode") == "navigate"
         if (origin is not None and origin not in self._access.origins) or (
             site in ("cross-site", "same-site")
             and not (is_link and scope["method"] == "GET")
         ):
-            raise _RefusedError(403, "This was sent by a page of somebody else.")
+            raise HTTPException(403, "This was sent by a page of somebody else.")
 
     def _check_budget(self, scope: Scope, visitor: Visitor | None) -> None:
         """Refuse more requests than a person makes; an emergency stop never is."""
@@ -146,14 +153,14 @@ class Middleware:
                 return
         elif self._without.allow(_client(scope)):
             return
-        raise _RefusedError(429, "These are too many requests; wait a second.")
+        raise HTTPException(429, "These are too many requests; wait a second.")
 
     def _check_page(self, headers: Headers, visitor: Visitor) -> None:
         """Refuse what was not sent by a page that this server has made."""
         if not self._access.is_csrf(visitor, headers.get("x-masrel-csrf", "")):
-            raise _RefusedError(403, "What is sent needs the header X-Masrel-CSRF.")
+            raise HTTPException(403, "What is sent needs the header X-Masrel-CSRF.")
         if headers.get("content-type", "").partition(";")[0] != "application/json":
-            raise _RefusedError(415, "What is sent needs to be application/json.")
+            raise HTTPException(415, "What is sent needs to be application/json.")
 
     def _open(self, scope: Scope, visitor: Visitor | None) -> Response:
         """Let a browser in by its one-time address."""
@@ -169,7 +176,8 @@ class Middleware:
         # A page that goes on by itself: a redirection of a link from elsewhere would
         # be without the cookie, which is strict, and this takes the token from the
         # history.
-        return _page_answer("opened.html", 200, self._access.cookie(new), role=role)
+        headers = {"Set-Cookie": self._access.cookie(new)}
+        return HTMLResponse(page("opened.html", role=role), headers=headers)
 
 
 def _role(path: str) -> Role | None:
@@ -201,93 +209,72 @@ def _is_preview(scope: Scope) -> bool:
     return "sec-purpose" in Headers(scope=scope)
 
 
-def _nobody(role: Role, *, other: bool) -> _RefusedError:
-    if other:
-        return _RefusedError(403, f"This is for the {role} alone.")
-    return _RefusedError(
-        401,
-        "This page needs an address that lets this browser in, as masrel serve prints "
-        "it and the coordinator's page makes it.",
-    )
-
-
 def _check_sizes(scope: Scope) -> None:
     if not scope["path"].isprintable():  # no file has such a name
-        raise _RefusedError(404, "There is no such page.")
+        raise HTTPException(404, "There is no such page.")
     if len(scope["path"]) > _MAX_PATH or len(scope["query_string"]) > _MAX_QUERY:
-        raise _RefusedError(414, "This address is too long.")
+        raise HTTPException(414, "This address is too long.")
     if sum(len(name) + len(value) for name, value in scope["headers"]) > _MAX_HEADERS:
-        raise _RefusedError(431, "The headers of this request are too long.")
+        raise HTTPException(431, "The headers of this request are too long.")
 
 
-async def _checked_body(scope: Scope, receive: Receive) -> Receive:
-    """Read what was sent, within its limit, and return what gives it once more."""
-    long = _RefusedError(413, f"What is sent needs at most {_MAX_BODY} bytes.")
-    length = Headers(scope=scope).get("content-length", "0")
+async def _sent_fields(request: Request) -> dict[str, object]:
+    """Return the object in JSON that was sent, which has a limit."""
+    long = HTTPException(413, f"What is sent needs at most {_MAX_BODY} bytes.")
+    length = request.headers.get("content-length", "0")
     if not length.isdecimal() or len(length) > 9 or int(length) > _MAX_BODY:
         raise long
-    body, more = b"", True
-    while more:
-        message = await receive()
-        if message["type"] == "http.disconnect":
-            raise _RefusedError(400, "The connection ended before its request.")
-        body += message.get("body", b"")
-        more = message.get("more_body", False)
-        if len(body) > _MAX_BODY:
-            raise long
+    body = b""
     try:
+        async for piece in request.stream():
+            body += piece
+            if len(body) > _MAX_BODY:
+                raise long
         document = parse_json(body)
         # neither NaN nor half a letter, which no answer and no log can hold
         json.dumps(document, allow_nan=False, ensure_ascii=False).encode()
+    except ClientDisconnect:
+        why = "The connection ended before its request."
+        raise HTTPException(400, why) from None
     except ValueError:
         document = None
     if not isinstance(document, dict):
-        raise _RefusedError(400, "What is sent needs to be an object in JSON.")
-    whole: list[Message] = [{"type": "http.request", "body": body}]
-
-    async def again() -> Message:
-        return whole.pop() if whole else await receive()
-
-    return again
+        raise HTTPException(400, "What is sent needs to be an object in JSON.")
+    return document
 
 
 def _refusal(scope: Scope, status: int, why: str) -> Response:
     """Return why a request is refused, as a page where a person would see it."""
+    headers = {"Retry-After": "1"} if status == 429 else {}
     if scope["path"] in ("/", *_PAGES) or scope["path"].startswith("/report/"):
-        answer = _page_answer("refused.html", status, why=why)
-    else:
-        answer = JSONResponse({"why": why}, status_code=status)
-    if status == 429:
-        answer.headers["Retry-After"] = "1"
-    return answer
+        return HTMLResponse(page("refused.html", why=why), status, headers)
+    return JSONResponse({"why": why}, status, headers)
 
 
-def _page_answer(
-    name: str, status: int, cookie: str | None = None, **context: object
-) -> Response:
-    answer = Response(page(name, **context), status_code=status, media_type="text/html")
-    if cookie is not None:
-        answer.headers["Set-Cookie"] = cookie
-    return answer
+def page(name: str, **context: object) -> str:
+    """Return a page as HTML, with everything escaped that comes from a study."""
+    return _environment().get_template(name).render(**context)
 
 
-def _with_headers(path: str, send: Send) -> Send:
-    """Return what sends an answer with the headers that every one has."""
-    policy = _OF_REPORT if path.startswith("/report/") else _OF_PAGES
+@functools.cache
+def _environment() -> "Environment":
+    # Imported here: what only serves files loads no templates.
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    return Environment(
+        loader=PackageLoader("masrel.lab.serve"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        keep_trailing_newline=True,
+    )
+
+
+def _with_headers(send: Send, headers: Mapping[str, str]) -> Send:
+    """Return what sends an answer with more headers."""
 
     async def sent(message: Message) -> None:
         if message["type"] == "http.response.start":
-            headers = MutableHeaders(scope=message)
-            headers.update({**_HEADERS, "Content-Security-Policy": policy})
-        await send(message)
-
-    return sent
-
-
-def _with_cookie(cookie: str, send: Send) -> Send:
-    async def sent(message: Message) -> None:
-        if message["type"] == "http.response.start":
-            MutableHeaders(scope=message).append("Set-Cookie", cookie)
+            MutableHeaders(scope=message).update(headers)
         await send(message)
 
     return sent

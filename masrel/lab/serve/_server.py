@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import errno
 import fcntl
+import ipaddress
 import logging
 import os
 import signal
@@ -23,9 +24,9 @@ from masrel.errors import ParameterError
 from masrel.lab.hess._clock import off_the_loop
 from masrel.lab.protocol import StudyPaths
 from masrel.lab.serve._access import Access
-from masrel.lab.serve._app import make_app
-from masrel.lab.serve._desk import Desk
+from masrel.lab.serve._manager import SessionManager
 from masrel.lab.serve._middleware import Middleware
+from masrel.lab.serve._role_pages import make_app
 
 _REQUEST_S = 10.0  # in which a request must have come in whole
 _IDLE_S = 30  # that a connection may wait for its next request
@@ -34,6 +35,11 @@ _MAX_OF_ONE = 48  # of one computer; a browser opens six
 _MAX_HEAD = 32_768  # bytes before a request's head is whole
 _TO_END_S = 3  # for answers that are on their way
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
+
+# Addresses that are asked nothing: which of its own a computer would call them from
+_NETWORKS = ("192.168.255.254", "10.255.255.254", "172.31.255.254", "169.254.255.254")
+_ANY = ("0.0.0.0", "::")
+_LOOPBACK = ("127.0.0.1", "localhost")
 
 
 class _Connection(H11Protocol):
@@ -166,6 +172,39 @@ def _cannot_listen(host: str, port: int, error: OSError) -> str:
     return f"--host {host} --port {port}: {error.strerror or error}"
 
 
+def is_loopback(host: str) -> bool:
+    """Return whether only this computer itself can call an address."""
+    with contextlib.suppress(ValueError):
+        return ipaddress.ip_address(host.partition("%")[0]).is_loopback
+    return False
+
+
+def hosts(listener: socket.socket, host: str, *, encrypted: bool) -> list[str]:
+    """Return by which names and ports a browser may call, the best one first."""
+    address, port = listener.getsockname()[:2]
+    if address in _ANY:
+        names = [*_own_addresses(), *_LOOPBACK]
+    elif is_loopback(address):
+        names = [host, address, "localhost"]
+    else:
+        names = [host, address]
+    usual = port == (443 if encrypted else 80)  # which browsers leave out
+    names = [f"[{name}]" if ":" in name else name.lower() for name in names]
+    return [name if usual else f"{name}:{port}" for name in dict.fromkeys(names)]
+
+
+def _own_addresses() -> list[str]:
+    addresses = []
+    for network in _NETWORKS:
+        with (
+            contextlib.suppress(OSError),
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as caller,
+        ):
+            caller.connect((network, 9))  # sends nothing
+            addresses.append(str(caller.getsockname()[0]))
+    return [each for each in dict.fromkeys(addresses) if not is_loopback(each)]
+
+
 @contextmanager
 def alone(study: StudyPaths) -> Iterator[None]:
     """Refuse a second server of a study: each would have its tablets and sessions.
@@ -191,7 +230,7 @@ def alone(study: StudyPaths) -> Iterator[None]:
 
 
 async def serve(
-    desk: Desk,
+    manager: SessionManager,
     access: Access,
     listener: socket.socket,
     context: ssl.SSLContext | None,
@@ -203,16 +242,16 @@ async def serve(
     The first signal waits for the session that runs, the second does not. `show` is
     called at the beginning, and where a person presses Enter at the terminal.
     """
-    app = make_app(desk, access)
+    app = make_app(manager, access)
     server = _Server(_configured(app, context))
     logging.getLogger("uvicorn.error").setLevel(logging.ERROR)
-    with off_the_loop() as desk.processors, _signals() as signals, _enter(show):
+    with off_the_loop() as manager.processors, _signals() as signals, _enter(show):
         show()  # whoever reads it may send a signal
         serving = asyncio.ensure_future(server.serve([listener]))
         await _first(serving, signals.get())
-        if desk.running is not None:
+        if manager.running is not None:
             access.say("The session is being stopped. Ctrl-C again: do not wait.")
-        closing = asyncio.ensure_future(desk.close())
+        closing = asyncio.ensure_future(manager.close())
         is_polite = await _first(closing, signals.get()) is closing
         app.close_streams()
         server.should_exit, server.force_exit = True, not is_polite

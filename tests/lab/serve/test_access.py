@@ -5,12 +5,12 @@ import stat
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 from starlette.types import Message, Receive, Scope, Send
 
 from masrel.errors import ParameterError
-from masrel.lab.serve._access import LIFE_S, ROLES
-from tests.lab.serve.sender import Browser, Site
+from tests.lab.serve.pages import LIFE_S, ORIGIN, ROLES, Browser, Site, scope_of
 
 
 @pytest.fixture
@@ -20,6 +20,13 @@ def site(tmp_path: Path) -> Site:
 
 def status(browser: Browser, path: str = "/rater/state") -> int:
     return browser.get(path).status_code
+
+
+def restarted(site: Site, browser: Browser) -> Browser:
+    """The same browser, when the server has been started again."""
+    site.restart()
+    browser.app = site.app
+    return browser
 
 
 @pytest.mark.parametrize("role", ROLES)
@@ -32,43 +39,44 @@ def test_an_address_leads_to_the_page_and_out_of_the_history(
     assert browser.get(f"/{role}").json()["role"] == role
 
 
-def test_a_cookie_is_no_scripts_and_no_other_sites(site: Site) -> None:
-    answer = site.browser().get(site.access.new_address("rater"))
-    flags = set(answer.headers["set-cookie"].split("; ")[1:])
-    assert flags == {"Path=/", f"Max-Age={LIFE_S}", "HttpOnly", "SameSite=Strict"}
+@pytest.mark.parametrize(
+    ("origin", "name", "more"),
+    [
+        (ORIGIN, "masrel-rater-", set()),
+        ("https://192.168.1.5:8723", "__Host-masrel-rater-", {"Secure"}),
+    ],
+)
+def test_a_cookie_is_no_scripts_and_no_other_sites_and_stays_encrypted(
+    tmp_path: Path, origin: str, name: str, more: set[str]
+) -> None:
+    site = Site(tmp_path / "study", origin=origin)
+    cookie = site.browser().get(site.access.new_address("rater")).headers["set-cookie"]
+    first, *flags = cookie.split("; ")
+    assert first.startswith(name)
+    expected = {"Path=/", f"Max-Age={LIFE_S}", "HttpOnly", "SameSite=Strict"}
+    assert set(flags) == expected | more
 
 
-def test_a_cookie_stays_in_what_is_encrypted(tmp_path: Path) -> None:
-    site = Site(tmp_path / "study", origin="https://192.168.1.5:8723")
-    answer = site.browser().get(site.access.new_address("rater"))
-    assert answer.headers["set-cookie"].startswith("__Host-masrel-rater-")
-    assert "Secure" in answer.headers["set-cookie"].split("; ")
-
-
-def test_an_address_opened_again_says_so(site: Site) -> None:
-    address = site.access.new_address("rater")
-    site.browser().get(address)
+def test_an_address_lets_in_once_and_the_browser_it_let_in_again(site: Site) -> None:
+    address, browser = site.access.new_address("rater"), site.browser()
+    browser.get(address)
+    tablet = browser.get("/rater").json()["tablet"]
     answer = site.browser().get(address)
     assert answer.status_code == 401
     assert "This address was opened before" in answer.text
-
-
-def test_the_browser_that_was_let_in_may_open_its_address_again(site: Site) -> None:
-    address = site.access.new_address("rater")
-    browser = site.browser()
-    browser.get(address)
-    before = browser.get("/rater").json()["tablet"]
     assert status(browser, address) == 200
-    assert browser.get("/rater").json()["tablet"] == before
+    assert browser.get("/rater").json()["tablet"] == tablet
+    address = site.access.new_address("rater")
+    answer = restarted(site, site.browser()).get(address)
+    assert answer.status_code == 401
+    assert "not one of this study now" in answer.text
 
 
 def test_the_oldest_of_many_addresses_lapses(site: Site) -> None:
     addresses = [site.access.new_address("rater") for _ in range(9)]
     other = site.access.new_address("coordinator")
-    assert [status(site.browser(), each) for each in (*addresses, other)] == [
-        401,
-        *[200] * 9,
-    ]
+    statuses = [status(site.browser(), each) for each in (*addresses, other)]
+    assert statuses == [401, *[200] * 9]
 
 
 @pytest.mark.parametrize("token", ["", "x", "é", "%00", "x" * 400])
@@ -80,87 +88,75 @@ def test_no_other_token_lets_in(site: Site, token: str) -> None:
 def test_every_token_is_compared(site: Site, monkeypatch: pytest.MonkeyPatch) -> None:
     # How long a guess takes says nothing of where it is right.
     compared: list[bytes] = []
-
-    def note(one: bytes, _: bytes) -> bool:
-        compared.append(one)
-        return False
-
-    monkeypatch.setattr("hmac.compare_digest", note)
-    for role in ROLES:
-        site.access.new_address(role)
+    monkeypatch.setattr("hmac.compare_digest", lambda one, _: compared.append(one))
+    for role in (*ROLES, *ROLES):
         site.access.new_address(role)
     site.browser().get("/rater?token=guess")
     assert len(set(compared)) == 4
 
 
-def test_a_browser_stays_let_in_when_the_server_is_started_again(site: Site) -> None:
-    browser = site.let_in("coordinator")
-    site.restart()
-    browser.app = site.app
-    assert status(browser, "/coordinator/state") == 200
-    assert browser.post("/coordinator/start").status_code == 200
+DAY_S = 86_400
+Passing = tuple[float, float, bool]  # seconds of both clocks, whether it opens the page
 
 
-def test_an_address_does_not_outlive_the_server(site: Site) -> None:
-    address = site.access.new_address("rater")
-    site.restart()
-    answer = site.browser().get(address)
-    assert answer.status_code == 401
-    assert "not one of this study now" in answer.text
-
-
-def test_a_cookie_ends(site: Site) -> None:
+@pytest.mark.parametrize(
+    ("passing", "expected"),
+    [
+        ([(0.0, LIFE_S - 1, False)], 200),
+        ([(0.0, LIFE_S + 1, False)], 401),
+        # opening the page lets it live on
+        ([(LIFE_S - 1, LIFE_S - 1, True)] * 3, 200),
+        # a clock that is set logs nobody out
+        *(([(days * DAY_S, 0.0, False)], 200) for days in (-3650, -1, 1, 3650)),
+    ],
+)
+def test_a_cookie_ends_after_its_life_whatever_the_clock_is_set_to(
+    site: Site, passing: list[Passing], expected: int
+) -> None:
     browser = site.let_in()
-    site.ticks.s += LIFE_S - 1
-    assert status(browser) == 200
-    site.ticks.s += 2
-    assert status(browser) == 401
-
-
-def test_opening_the_page_lets_it_live_on(site: Site) -> None:
-    browser = site.let_in()
-    for _ in range(3):
-        site.ticks.s += LIFE_S - 1
-        site.now.s += LIFE_S - 1
-        browser.get("/rater")
-    assert status(browser) == 200
-
-
-@pytest.mark.parametrize("days", [-3650, -1, 1, 3650])
-def test_a_clock_that_is_set_logs_nobody_out(site: Site, days: int) -> None:
-    browser = site.let_in()
-    site.now.s += days * 86_400
-    assert status(browser) == 200
+    for now_s, ticks_s, opens in passing:
+        site.now.s += now_s
+        site.ticks.s += ticks_s
+        if opens:
+            browser.get("/rater")
+    assert status(browser) == expected
 
 
 def test_a_clock_that_was_wrong_gives_no_more_than_a_life(site: Site) -> None:
-    site.now.s += 10 * 365 * 86_400
+    site.now.s += 3650 * DAY_S
     browser = site.let_in()
-    site.now.s -= 10 * 365 * 86_400
-    site.restart()
-    browser.app = site.app
-    assert status(browser) == 200
+    site.now.s -= 3650 * DAY_S
+    assert status(restarted(site, browser)) == 200
     site.ticks.s += LIFE_S + 1
     assert status(browser) == 401
 
 
-def test_the_key_is_its_owners_alone(site: Site) -> None:
-    key = site.study.serve_key_file
+def test_the_key_is_its_owners_alone_and_without_it_everybody_is_logged_out(
+    site: Site,
+) -> None:
+    key, browser = site.study.serve_key_file, site.let_in("coordinator")
     assert stat.S_IMODE(key.stat().st_mode) == 0o600
     assert stat.S_IMODE(key.parent.stat().st_mode) == 0o700
+    assert restarted(site, browser).post("/coordinator/start").status_code == 200
+    key.unlink()
+    assert status(restarted(site, browser), "/coordinator/state") == 401
 
 
-def test_without_the_key_everybody_is_logged_out(site: Site) -> None:
-    browser = site.let_in()
-    site.study.serve_key_file.unlink()
-    site.restart()
-    browser.app = site.app
-    assert status(browser) == 401
-
-
-def test_a_key_that_is_none_is_refused(site: Site) -> None:
-    site.study.serve_key_file.write_text("format: 1\nkey: 12\n")
-    with pytest.raises(ParameterError, match="needed a line 'format: 1'"):
+@pytest.mark.parametrize(
+    ("name", "text", "why"),
+    [
+        ("serve.txt", "format: 1\nkey: 12\n", "needed a line 'format: 1'"),
+        *(
+            ("tablets", text, "needed JSON with the rater of each")
+            for text in ("", "[]", "{}", '{"tablets": 3}')
+        ),
+    ],
+)
+def test_a_damaged_key_or_list_of_tablets_is_refused(
+    site: Site, name: str, text: str, why: str
+) -> None:
+    site.study.serve_key_file.with_name(name).write_text(text)
+    with pytest.raises(ParameterError, match=why):
         site.restart()
 
 
@@ -171,77 +167,55 @@ def test_a_tablet_is_one_raters(site: Site) -> None:
     site.restart()
     assert not site.access.is_of_rater(tablet, "R2")
     assert site.access.is_of_rater(tablet, "R1")
-
-
-def test_an_address_can_be_for_one_rater(site: Site) -> None:
     browser = site.browser()
     browser.get(site.access.new_address("rater", rater="R2"))
     tablet = browser.get("/rater").json()["tablet"]
     assert not site.access.is_of_rater(tablet, "R1")
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", '{"tablets": 3}'])
-def test_a_list_of_tablets_that_is_none_is_refused(site: Site, text: str) -> None:
-    site.study.serve_key_file.with_name("tablets").write_text(text)
-    with pytest.raises(ParameterError, match="needed JSON with the rater of each"):
-        site.restart()
+def test_requests_have_a_limit_and_an_emergency_stop_has_none(site: Site) -> None:
+    def statuses(n: int) -> list[int]:
+        return [each.status_code for each in browser.all("GET", ["/rater/state"] * n)]
 
-
-def test_an_emergency_stop_is_never_too_much(site: Site) -> None:
-    browser = site.let_in()
-    states = browser.all("GET", ["/rater/state"] * 200, headers={})
-    assert states[-1].status_code == 429
-    assert states[-1].headers["retry-after"] == "1"
-    stops = [browser.post("/rater/stop").status_code for _ in range(50)]
-    assert set(stops) == {200}
-
-
-def test_one_browser_does_not_use_up_what_others_may(site: Site) -> None:
-    rater, coordinator = site.let_in(), site.let_in("coordinator")
-    rater.all("GET", ["/rater/state"] * 200, headers={})
-    assert status(coordinator, "/coordinator/state") == 200
-
-
-def test_what_may_be_asked_comes_back_with_time(site: Site) -> None:
-    browser = site.let_in()
-    browser.all("GET", ["/rater/state"] * 200, headers={})
+    browser, coordinator = site.let_in(), site.let_in("coordinator")
+    assert statuses(200)[-1] == 429
+    assert browser.get("/rater/state").headers["retry-after"] == "1"
+    assert {browser.post("/rater/stop").status_code for _ in range(50)} == {200}
+    assert status(coordinator, "/coordinator/state") == 200  # each has its own
     site.ticks.s += 1
-    answers = browser.all("GET", ["/rater/state"] * 40, headers={})
-    assert [answer.status_code for answer in answers].count(200) == 30
+    assert statuses(40).count(200) == 30
 
 
 @pytest.mark.parametrize(
-    ("path", "expected"),
+    ("role", "path", "expected"),
     [
-        ("/rater", 200),
-        ("/rater/state", 200),
-        ("/coordinator", 403),
-        ("/static/common.js", 200),
-        ("/report/report.html", 403),
-        ("/rater?" + "x" * 600, 414),
+        ("rater", "/rater", 200),
+        ("rater", "/rater/state", 200),
+        ("rater", "/coordinator", 403),
+        ("rater", "/static/common.js", 200),
+        ("rater", "/report/report.html", 403),
+        ("coordinator", "/report/report.html", 200),
+        ("rater", "/rater?" + "x" * 600, 414),
     ],
 )
-def test_every_answer_has_the_headers(site: Site, path: str, expected: int) -> None:
-    answer = site.let_in().get(path)
+def test_every_answer_has_the_headers_and_a_report_runs_no_script(
+    site: Site, role: Any, path: str, expected: int
+) -> None:
+    answer = site.let_in(role).get(path)
     assert answer.status_code == expected
     policy = answer.headers["content-security-policy"]
     assert "default-src 'none'" in policy
     assert "frame-ancestors 'none'" in policy
-    assert "script-src 'self'" in policy or path.startswith("/report/")
+    assert ("script-src 'self'" in policy) is not path.startswith("/report/")
     assert "unsafe-eval" not in policy
     assert answer.headers["x-content-type-options"] == "nosniff"
     assert answer.headers["cache-control"] == "no-store"
     assert answer.headers["referrer-policy"] == "same-origin"
 
 
-def test_a_report_runs_no_script(site: Site) -> None:
-    answer = site.let_in("coordinator").get("/report/report.html")
-    assert "script-src" not in answer.headers["content-security-policy"]
-
-
 @pytest.mark.parametrize("method", ["PUT", "DELETE", "OPTIONS", "TRACE", "PATCH"])
 def test_other_methods_are_refused(site: Site, method: str) -> None:
-    assert site.let_in().all(method, ["/rater/state"], headers={})[0].status_code == 405
+    assert site.let_in().all(method, ["/rater/state"])[0].status_code == 405
 
 
 @pytest.mark.parametrize(
@@ -263,10 +237,10 @@ def test_a_person_reads_why_and_what_comes_from_outside_is_text(site: Site) -> N
 class Streams:
     """Streams of events of one browser, which begin when a test says so."""
 
-    def __init__(self, tmp_path: Path) -> None:
+    def __init__(self, root: Path) -> None:
         self.n_open = 0
-        self.site = Site(tmp_path / "study", self.stream)
-        self.browser = Site(tmp_path / "study").let_in()
+        self.site = Site(root, self.stream)
+        (self.cookie,) = Site(root).let_in().cookies.jar
         self.ends: list[str] = []
 
     async def stream(self, _: Scope, receive: Receive, send: Send) -> None:
@@ -285,46 +259,32 @@ class Streams:
         async def send(message: Message) -> None:
             sent.append(message)
 
-        (cookie,) = self.browser.cookies.jar
-        headers = {"host": "127.0.0.1:8723", "cookie": f"{cookie.name}={cookie.value}"}
-        scope = {
-            **{"type": "http", "method": "GET", "path": "/rater/events"},
-            **{"query_string": b"", "client": ("10.0.0.7", 1)},
-            "headers": [(k.encode(), str(v).encode()) for k, v in headers.items()],
-        }
-        await self.site.app(scope, asyncio.Event().wait, send)  # type: ignore[arg-type]
+        headers = {"cookie": f"{self.cookie.name}={self.cookie.value}"}
+        request = httpx.Request("GET", f"{ORIGIN}/rater/events", headers=headers)
+        await self.site.app(scope_of(request), asyncio.Event().wait, send)  # type: ignore[arg-type]
         self.ends.append(str(sent[-1]["type"]))
 
 
-def test_a_browsers_oldest_stream_ends_where_it_opens_too_many(tmp_path: Path) -> None:
-    streams = Streams(tmp_path)
+@pytest.mark.parametrize(("limit", "n_left"), [(4, 4), (1000, 10)])
+def test_a_browsers_oldest_stream_ends_where_it_opens_too_many(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: int, n_left: int
+) -> None:
+    # without the limit all stay
+    monkeypatch.setattr("masrel.lab.serve._middleware._MAX_STREAMS", limit)
+    streams = Streams(tmp_path / "study")
 
     async def run() -> None:
         tasks = [asyncio.create_task(streams.open()) for _ in range(10)]
         await asyncio.sleep(0.05)
-        assert streams.n_open == 4
-        assert [task.done() for task in tasks] == [True] * 6 + [False] * 4
+        assert streams.n_open == n_left
+        assert [task.done() for task in tasks] == [
+            *[True] * (10 - n_left),
+            *[False] * n_left,
+        ]
         streams.site.app.close_streams()
         await asyncio.gather(*tasks)
         assert streams.n_open == 0
         await streams.open()  # none begins any more
         assert set(streams.ends) == {"http.response.body"}
-
-    asyncio.run(run())
-
-
-def test_without_the_limit_all_streams_stay(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("masrel.lab.serve._middleware._MAX_STREAMS", 1000)
-
-    streams = Streams(tmp_path)
-
-    async def run() -> None:
-        tasks = [asyncio.create_task(streams.open()) for _ in range(10)]
-        await asyncio.sleep(0.05)
-        assert streams.n_open == 10
-        streams.site.app.close_streams()
-        await asyncio.gather(*tasks)
 
     asyncio.run(run())

@@ -1,4 +1,4 @@
-"""The verb: what it prints, what it refuses, and that it stops as it is told."""
+"""The command: what it prints, what it refuses, and that it stops as it is told."""
 
 import importlib.util
 import os
@@ -10,15 +10,14 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from masrel.lab.protocol import copy_template
-from masrel.lab.serve._server import listen
 from tests.cli.process import Caller
-from tests.lab.serve.test_server import CERTIFICATE, DATA, KEY
+from tests.lab.serve.pages import DATA, KEY, listen
 
 
 @pytest.fixture
@@ -34,10 +33,37 @@ def study(tmp_path: Path) -> Path:
     return tmp_path / "study"
 
 
-def test_no_such_study(masrel: Caller, tmp_path: Path) -> None:
+INSTALL = "install it with: pip install 'masrel[serve]'"
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        (["--port", "-1"], "Invalid value for '--port'"),
+        (["--port", "65536"], "Invalid value for '--port'"),
+        (["--port", "http"], "Invalid value for '--port'"),
+        (["--tls", str(DATA / "nothing.pem"), str(KEY)], "nothing.pem is not there"),
+    ],
+)
+def test_what_is_no_option_is_refused(
+    masrel: Caller, study: Path, options: list[str], why: str
+) -> None:
+    done = masrel("serve", study, *options)
+    assert done.code == 2
+    assert why in done.err
+
+
+def test_no_study_and_a_protocol_that_cannot_be_read(
+    masrel: Caller, study: Path, tmp_path: Path
+) -> None:
     done = masrel("serve", tmp_path / "nothing")
     assert (done.code, done.out) == (2, "")
     assert re.fullmatch(r"masrel: \S+protocol.toml: needed a protocol .*\n", done.err)
+    (study / "protocol.toml").write_text("models = 3")
+    done = masrel("serve", study)
+    assert done.code == 2
+    assert "protocol.toml" in done.err
+    assert not (study / ".key").exists()
 
 
 def test_windows_is_told_what_it_has_instead(
@@ -45,19 +71,23 @@ def test_windows_is_told_what_it_has_instead(
 ) -> None:
     monkeypatch.setattr(sys, "platform", "win32")
     done = masrel("serve", study)
-    assert (done.code, done.out) == (2, "")
-    assert (
-        done.err
-        == "masrel: serve: needs Linux or macOS, got Windows; there is masrel run\n"
-    )
+    why = "serve: needs Linux or macOS, got Windows; there is masrel run"
+    assert (done.code, done.out, done.err) == (2, "", f"masrel: {why}\n")
 
 
-def test_a_protocol_that_cannot_be_read(masrel: Caller, study: Path) -> None:
-    (study / "protocol.toml").write_text("models = 3")
+@pytest.mark.parametrize("library", ["starlette", "uvicorn", "segno"])
+def test_the_extra_is_not_installed(
+    masrel: Caller, study: Path, monkeypatch: pytest.MonkeyPatch, library: str
+) -> None:
+    there: Callable[..., object] = importlib.util.find_spec
+
+    def find(name: str, package: str | None = None) -> object:
+        return None if name == library else there(name, package)
+
+    monkeypatch.setattr("importlib.util.find_spec", find)
     done = masrel("serve", study)
     assert done.code == 2
-    assert "protocol.toml" in done.err
-    assert not (study / ".key").exists()
+    assert done.err == f"masrel: serve: needs {library}; {INSTALL}\n"
 
 
 def test_a_port_in_use(masrel: Caller, study: Path) -> None:
@@ -73,43 +103,6 @@ def test_a_port_that_only_root_may_open(masrel: Caller, study: Path) -> None:
     done = masrel("serve", study, "--port", 80)
     assert done.code == 2
     assert "--port: needed one that this user may open" in done.err
-
-
-@pytest.mark.parametrize("port", ["-1", "65536", "http"])
-def test_no_port(masrel: Caller, study: Path, port: str) -> None:
-    done = masrel("serve", study, "--port", port)
-    assert done.code == 2
-    assert "Invalid value for '--port'" in done.err
-
-
-def test_no_certificate(masrel: Caller, study: Path) -> None:
-    done = masrel("serve", study, "--tls", DATA / "nothing.pem", KEY)
-    assert done.code == 2
-    assert re.search(
-        r"--tls .*: needed two files, .*nothing.pem is not there", done.err
-    )
-
-
-def test_the_key_of_another_certificate(masrel: Caller, study: Path) -> None:
-    done = masrel("serve", study, "--tls", CERTIFICATE, DATA / "other_key.pem")
-    assert done.code == 2
-    assert "needed the key of this certificate, got that of another" in done.err
-
-
-@pytest.mark.parametrize("library", ["starlette", "uvicorn", "segno"])
-def test_the_extra_is_not_installed(
-    masrel: Caller, study: Path, monkeypatch: pytest.MonkeyPatch, library: str
-) -> None:
-    there = importlib.util.find_spec
-
-    def find(name: str, package: str | None = None) -> object:
-        return None if name == library else there(name, package)
-
-    monkeypatch.setattr("importlib.util.find_spec", find)
-    done = masrel("serve", study)
-    assert done.code == 2
-    with_what = "install it with: pip install 'masrel[serve]'"
-    assert done.err == f"masrel: serve: needs {library}; {with_what}\n"
 
 
 class Terminal:
@@ -159,16 +152,24 @@ class Terminal:
 
 
 @pytest.fixture
-def terminal(study: Path) -> Iterator[Terminal]:
-    with_terminal = Terminal(study)
-    yield with_terminal
-    with_terminal.close()
+def start() -> Iterator[Callable[..., Terminal]]:
+    """Start it, as often as a test likes."""
+    started: list[Terminal] = []
+
+    def begin(*words: object, **settings: bool) -> Terminal:
+        started.append(Terminal(*words, **settings))  # type: ignore[arg-type]
+        return started[-1]
+
+    yield begin
+    for each in started:
+        each.close()
 
 
 @pytest.mark.slow
 def test_two_addresses_each_with_a_qr_code_and_new_ones_at_enter(
-    terminal: Terminal,
+    start: Callable[..., Terminal], study: Path
 ) -> None:
+    terminal = start(study)
     text = terminal.until("Ctrl-C: stop.")
     address = r"http://127\.0\.0\.1:\d+/{}\?token=[\w-]{{22}}"
     for role in ("rater", "coordinator"):
@@ -176,45 +177,32 @@ def test_two_addresses_each_with_a_qr_code_and_new_ones_at_enter(
     assert text.count("\N{UPPER HALF BLOCK}") > 100
     terminal.enter()
     text = terminal.until("Ctrl-C: stop.", 2)
-    tokens = re.findall(r"token=([\w-]{22})", text)
-    assert len(set(tokens)) == 4
+    assert len(set(re.findall(r"token=([\w-]{22})", text))) == 4
     assert terminal.stop(signal.SIGINT) == 0
 
 
 @pytest.mark.slow
 def test_a_study_is_served_once_and_the_port_says_nothing_else(
-    masrel: Caller, terminal: Terminal, study: Path
+    masrel: Caller, start: Callable[..., Terminal], study: Path
 ) -> None:
-    port = terminal.port()
-    done = masrel("serve", study, "--port", port)
+    terminal = start(study)
+    done = masrel("serve", study, "--port", terminal.port())
     assert done.code == 2
     assert "needed a study that nobody serves, got one that another" in done.err
     assert terminal.stop(signal.SIGTERM) == 0
 
 
 @pytest.mark.slow
-def test_an_open_connection_does_not_keep_it(study: Path) -> None:
-    server = Terminal(study, at_a_terminal=False)
-    try:
-        port = server.port()
-        assert "\N{UPPER HALF BLOCK}" not in server.text
-        with socket.create_connection(("127.0.0.1", port)) as connection:
-            connection.sendall(b"GET /rater HTTP/1.1\r\n")
-            assert server.stop(signal.SIGINT) == 0
-        again = Terminal(study, at_a_terminal=False)
-        again.port()
-        assert again.stop(signal.SIGINT) == 0
-        again.close()
-    finally:
-        server.close()
-
-
-@pytest.mark.slow
-def test_what_is_risked_without_encryption_is_said_once(study: Path) -> None:
-    server = Terminal(study, "--host=0.0.0.0", at_a_terminal=False)
-    try:
-        text = server.until("Ctrl-C: stop.")
-        assert text.count("--host 0.0.0.0 without --tls: whoever is in") == 1
+def test_an_open_connection_does_not_keep_it_and_what_is_risked_is_said_once(
+    start: Callable[..., Terminal], study: Path
+) -> None:
+    server = start(study, at_a_terminal=False)
+    port = server.port()
+    assert "\N{UPPER HALF BLOCK}" not in server.text
+    with socket.create_connection(("127.0.0.1", port)) as connection:
+        connection.sendall(b"GET /rater HTTP/1.1\r\n")
         assert server.stop(signal.SIGINT) == 0
-    finally:
-        server.close()
+    again = start(study, "--host=0.0.0.0", at_a_terminal=False)
+    text = again.until("Ctrl-C: stop.")
+    assert text.count("--host 0.0.0.0 without --tls: whoever is in") == 1
+    assert again.stop(signal.SIGINT) == 0

@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 
 from masrel.lab.protocol import StudyPaths, copy_template
-from masrel.lab.serve._access import Access
-from masrel.lab.serve._server import alone
 from tests.cli.process import Caller
+from tests.lab.serve.pages import Site, alone
 
 pytestmark = pytest.mark.slow
 
@@ -44,9 +43,8 @@ def served(masrel: Caller, root: Path, *raters: str) -> StudyPaths:
 def serve(study: StudyPaths, rater: str) -> None:
     """Let a tablet in."""
     with alone(study):
-        access = Access(study, origin="http://127.0.0.1:8723")
-        address = access.new_address("rater", rater=rater)
-        access.let_in("rater", address.partition("=")[2], "127.0.0.1")
+        site = Site(study.root)
+        site.browser().get(site.access.new_address("rater", rater=rater))
 
 
 def secrets(study: StudyPaths) -> list[bytes]:

@@ -14,10 +14,19 @@ import pytest
 
 from masrel.lab.protocol import StudyPaths
 from masrel.lab.recording import read_recording
-from masrel.lab.run import Event, read_log
+from masrel.lab.run import read_log
 from tests.faults import Faults
-from tests.lab.serve.desks import OCCASIONS, PATIENCE_S, samples_in, small_study
-from tests.lab.serve.served import Served
+from tests.lab.serve.pages import (
+    ANSWERS,
+    OCCASIONS,
+    PATIENCE_S,
+    Served,
+    kinds,
+    logged,
+    processes_of,
+    samples_in,
+    small_study,
+)
 
 pytestmark = pytest.mark.skipif(
     not Path("/proc").is_dir(), reason="needs /proc to see which processes are left"
@@ -70,12 +79,7 @@ class Tablet:
             grade = self._rng.choice(GRADES)
             self.tapped.setdefault(self._code, []).append(grade)
             return {"grade": grade, "stretch": None}
-        answers: dict[str, dict[str, Any]] = {
-            "ready": {"begin": True},
-            "fault": {"again": True},
-            "question": {"answer": 60},
-        }
-        return answers.get(state["screen"], {"go_on": True})
+        return dict(ANSWERS[state["screen"]])
 
 
 def taken(study: StudyPaths) -> dict[str, int]:
@@ -86,7 +90,7 @@ def taken(study: StudyPaths) -> dict[str, int]:
 def rest(server: Served) -> None:
     """Return when the process of the session has ended by itself."""
     until = time.monotonic() + PATIENCE_S
-    while server.sessions():
+    while processes_of(server.study):
         assert time.monotonic() < until, "the session goes on without its server"
         time.sleep(0.01)
 
@@ -94,7 +98,7 @@ def rest(server: Served) -> None:
 def check_recordings(study: StudyPaths, before: dict[str, int]) -> None:
     """Hold every sample that was taken against the recordings."""
     assert not list(study.sessions.glob("*/*.partial"))
-    log = log_of(study)
+    log = read_log(study.log_file("R1", "test"))
     named = {str(e.fields["recording"]) for e in log if "recording" in e.fields}
     there = {f"test_R1/{file.name}" for file in study.sessions.glob("*/*.npz")}
     assert there == named
@@ -144,18 +148,13 @@ def run_until_killed(server: Served, tablet: Tablet, moment: Moment) -> bool:
     if not log.exists():
         return False
     check_recordings(server.study, before)
-    return log_of(server.study)[-1].kind == "complete"
-
-
-def log_of(study: StudyPaths) -> tuple[Event, ...]:
-    return read_log(study.log_file("R1", "test"))
+    return kinds(server.study)[-1] == "complete"
 
 
 def check_grades(study: StudyPaths, tablet: Tablet) -> None:
     """Hold the log against what was tapped, and what the server said was entered."""
-    log = log_of(study)
-    graded = [e for e in log if e.kind in ("grade", "practice-grade")]
-    grades = {str(e.fields["code"]): str(e.fields["grade"]) for e in graded}
+    graded = logged(study, "grade", "practice-grade")
+    grades = {str(each["code"]): str(each["grade"]) for each in graded}
     assert len(grades) == len(graded) == 5
     assert tablet.entered.items() <= grades.items()
     for code, grade in grades.items():
@@ -178,7 +177,7 @@ def test_killed_at_any_moment_no_grade_is_lost_or_doubled(
         study = small_study(tmp_path / f"study_{n_left}", OCCASIONS, quick=True)
         with closing(Served(study)) as server:
             n_left = session_killed(server, rng, n_left, faults)
-        words += [e.fields["words"] for e in log_of(study) if e.kind == "fault"]
+        words += [each["words"] for each in logged(study, "fault")]
     # who was at the arm when the server died was not left with its torque
     assert "emergency stop: server gone" in words
 

@@ -5,7 +5,7 @@ import json
 import re
 import tomllib
 from pathlib import Path
-from typing import Any, Literal, get_args, get_type_hints
+from typing import Literal, get_args, get_type_hints
 
 import pytest
 
@@ -13,60 +13,26 @@ import masrel.lab.serve
 from masrel.errors import MasrelError
 from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.protocol.definition import Study
-from masrel.lab.run import read_log
-from masrel.lab.serve._desk import Desk
-from masrel.lab.serve._words import words_in
+from masrel.lab.schedule import read_schedule
 from masrel.scales import PUBLISHED_SCALES
-from tests.lab.serve.desks import OCCASIONS, kinds, small_study
-from tests.lab.serve.tablets import Tablet, seen, with_tablets
+from tests.lab.serve.pages import (
+    OCCASIONS,
+    SessionManager,
+    Tablet,
+    kinds,
+    logged,
+    seen,
+    small_study,
+    with_tablets,
+)
 
 LANGUAGES = get_args(get_type_hints(Study)["language"])
-BROWSER = Path(masrel.lab.serve.__file__).with_name("static")
-
-THRICE = ("stretches = 1", "stretches = 3")
-QUESTIONS = """
-[[questionnaires]]
-id = "person"
-title = "About you"
-when = "session"
-
-[[questionnaires.questions]]
-id = "score"
-text = "How real?"
-type = "visual-analogue"
-low_label = "not at all"
-high_label = "as a patient"
-
-[[questionnaires.questions]]
-id = "sure"
-text = "How sure?"
-type = "whole"
-low = 0
-high = 10
-
-[[questionnaires.questions]]
-id = "hand"
-text = "Which hand?"
-type = "choice"
-choices = ["right", "left"]
-
-[[questionnaires.questions]]
-id = "remark"
-text = "<b>Anything</b> else?"
-type = "text"
-required = false
-"""
+HERE = Path(masrel.lab.serve.__file__).parent
 
 
 @pytest.fixture
 def study(tmp_path: Path) -> StudyPaths:
     return small_study(tmp_path / "study", OCCASIONS)
-
-
-def in_language(study: StudyPaths, language: str) -> None:
-    text = study.protocol.read_text()
-    changed = text.replace("[study]\n", f'[study]\nlanguage = "{language}"\n')
-    study.protocol.write_text(changed)
 
 
 # What no answer to a rater's tablet may have in it: models, what they are made of and
@@ -78,6 +44,19 @@ SECRETS = (
 )
 
 
+def check_order(study: StudyPaths, sent: list[str]) -> None:
+    """No code comes early, and with it the last one's alone, to correct its grade."""
+    schedule = read_schedule(study.schedule_file("R1", "test"))
+    codes = [each.code for each in schedule.presentations]
+    assert all(any(code in text for text in sent) for code in codes)
+    reached = -1
+    for text in sent:
+        here = [i for i, code in enumerate(codes) if code in text]
+        assert max(here, default=-1) <= reached + 1
+        assert max(here, default=-1) - min(here, default=-1) <= 1
+        reached = max(reached, *here, -1)
+
+
 @pytest.mark.parametrize(
     "clock", ["simulated", pytest.param("real", marks=pytest.mark.slow)]
 )
@@ -87,14 +66,14 @@ def test_nothing_that_a_tablet_is_sent_says_what_is_presented(
     study = small_study(tmp_path / "study", OCCASIONS, quick=True)
     tablets: list[Tablet] = []
 
-    async def act(desk: Desk, mine: Tablet, other: Tablet) -> None:
+    async def act(manager: SessionManager, mine: Tablet, other: Tablet) -> None:
         tablets.extend((mine, other))
-        await desk.start("R1", "test")
+        await manager.start("R1", "test")
         async with mine.listening(), other.listening() as events:
             await mine.until("break")
             state = await mine.until("ready")
             code, why = state["last"]["code"], "wrong button"
-            assert (await mine.post("correct", code=code, grade="3", why=why))[0] == 200
+            await mine.done("correct", code=code, grade="3", why=why)
             assert (await mine.post("correct", code="xx", grade="3", why=why))[0] == 409
             for wrong in ({"begin": 1}, {"skip": "HM"}, {}):
                 body = {"ask": state["ask"], "answer": wrong}
@@ -110,17 +89,17 @@ def test_nothing_that_a_tablet_is_sent_says_what_is_presented(
         for secret in (*SECRETS, *more):
             assert not re.search(secret, words), secret
         assert tablet.sent
+    check_order(study, tablets[0].sent)
 
 
 def test_another_raters_tablet_sees_no_state_and_cannot_act(study: StudyPaths) -> None:
-    async def act(desk: Desk, mine: Tablet, other: Tablet) -> None:
-        await desk.start("R1", "test")
+    async def act(manager: SessionManager, mine: Tablet, other: Tablet) -> None:
+        await manager.start("R1", "test")
         state = await mine.until("ready")
         shown = await other.state()
-        assert {key: shown[key] for key in ("screen", "session", "ask")} == {
-            **{"screen": "other", "session": None, "ask": None}
-        }
-        assert set(shown) == {"screen", "session", "ask", "server", "version"}
+        which = {name: shown.pop(name) for name in ("server", "version")}
+        assert shown == {"screen": "other", "session": None, "ask": None}
+        assert None not in which.values()
         body = {"ask": state["ask"], "answer": {"begin": True}}
         status, refusal = await other.post("answer", **body)
         assert (status, refusal["state"]["screen"]) == (403, "other")
@@ -128,30 +107,33 @@ def test_another_raters_tablet_sees_no_state_and_cannot_act(study: StudyPaths) -
         last = {"code": state["code"], "grade": "1", "why": "x"}
         assert (await other.post("correct", **last))[0] == 409
         assert (await mine.state())["ask"] == state["ask"]
-        await desk.leave()
+        await manager.leave()
         assert (await other.state())["screen"] == "waiting"
         assert (await mine.state())["screen"] == "over"
 
     with_tablets(study, act, "R1", "R2")
 
 
-def test_a_failed_session_says_nothing_of_its_model(
+def test_a_failed_session_says_nothing_and_a_new_tablet_is_the_first_raters_it_shows(
     study: StudyPaths, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text = "protocol.toml: models[0] (HM1): needed another angle"
     over = {"screen": "over", "how": "failed", "text": text, "rater": "R1"}
 
-    async def act(desk: Desk, tablet: Tablet, new: Tablet) -> None:
-        await desk.start("R1", "test")
+    async def act(manager: SessionManager, tablet: Tablet, new: Tablet) -> None:
+        await manager.start("R1", "test")
         await tablet.until("instructions")
-        await desk.leave()
-        monkeypatch.setattr(desk, "_over", over)
+        await manager.leave()
+        monkeypatch.setattr(manager, "_over", over)
         state = await tablet.state()
         assert (state["screen"], state["how"]) == ("over", "failed")
         assert "HM1" not in "".join(tablet.sent)
         assert (await new.state())["screen"] == "waiting"
-        await desk.start("R2", "test")
+        await manager.start("R2", "test")
         await new.until("instructions")  # it has not become the first rater's
+        await manager.leave()
+        await manager.start("R1", "test")
+        assert (await new.state())["screen"] == "other"  # but the second one's
 
     with_tablets(study, act, "R1", None)
 
@@ -159,9 +141,9 @@ def test_a_failed_session_says_nothing_of_its_model(
 def test_a_stream_says_that_it_is_there(
     study: StudyPaths, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("masrel.lab.serve._rater_routes.BEAT_S", 0.01)
+    monkeypatch.setattr("masrel.lab.serve._role_pages._BEAT_S", 0.01)
 
-    async def act(_: Desk, tablet: Tablet) -> None:
+    async def act(_: SessionManager, tablet: Tablet) -> None:
         async with tablet.listening() as events:
             while ("beat", {}) not in events:
                 await asyncio.sleep(0.01)
@@ -170,22 +152,9 @@ def test_a_stream_says_that_it_is_there(
     with_tablets(study, act, None)
 
 
-@pytest.mark.slow
-def test_a_tablet_that_is_nobodys_becomes_the_first_raters(study: StudyPaths) -> None:
-    async def act(desk: Desk, tablet: Tablet) -> None:
-        assert (await tablet.state())["screen"] == "waiting"
-        await desk.start("R2", "test")
-        await tablet.until("instructions")
-        await desk.leave()
-        await desk.start("R1", "test")
-        assert (await tablet.state())["screen"] == "other"
-
-    with_tablets(study, act, None)
-
-
 def test_two_tablets_one_acts_and_the_other_is_told(study: StudyPaths) -> None:
-    async def act(desk: Desk, one: Tablet, two: Tablet) -> None:
-        await desk.start("R1", "test")
+    async def act(manager: SessionManager, one: Tablet, two: Tablet) -> None:
+        await manager.start("R1", "test")
         async with two.listening() as events:
             state = await one.until("grade")
             first = one.post("answer", ask=state["ask"], answer={"grade": "1"})
@@ -206,56 +175,14 @@ def test_two_tablets_one_acts_and_the_other_is_told(study: StudyPaths) -> None:
     assert kinds(study).count("practice-grade") == 1
 
 
-@pytest.mark.slow
 def test_a_grade_is_on_disk_when_its_answer_comes(study: StudyPaths) -> None:
-    async def act(desk: Desk, tablet: Tablet) -> None:
-        await desk.start("R1", "test")
+    async def act(manager: SessionManager, tablet: Tablet) -> None:
+        await manager.start("R1", "test")
         for n in range(3):
             state = await tablet.until("grade")
             await tablet.answer(state, grade="1+", stretch=None)
-            log = read_log(study.log_file("R1", "test"))
-            grades = [e for e in log if e.kind in ("grade", "practice-grade")]
-            assert len(grades) == 1 + n
+            assert len(logged(study, "grade", "practice-grade")) == 1 + n
             await tablet.answer(state, grade="1+", stretch=None)  # it was offline
-
-    with_tablets(study, act, "R1")
-
-
-@pytest.mark.slow
-def test_every_kind_of_question_is_shown_and_answered(tmp_path: Path) -> None:
-    study = small_study(tmp_path / "study", QUESTIONS)
-    given = {"score": 42, "sure": 7, "hand": "left", "remark": None}
-    wrong: dict[str, Any] = {"score": 101, "sure": 2.5, "hand": "foot", "remark": 3}
-
-    async def act(desk: Desk, tablet: Tablet) -> None:
-        await desk.start("R1", "test")
-        for number, (name, value) in enumerate(given.items(), start=1):
-            state = await tablet.until("question")
-            assert (state["number"], state["n_questions"]) == (number, 4)
-            assert state["question"] == f"person.{name}"
-            body = {"ask": state["ask"], "answer": {"answer": wrong[name]}}
-            status, refusal = await tablet.post("answer", **body)
-            assert (status, refusal["state"]["ask"]) == (422, state["ask"])
-            await tablet.answer(state, answer=value)
-        await tablet.until("over")
-
-    with_tablets(study, act, "R1")
-    log = read_log(study.log_file("R1", "test"))
-    answers = {
-        e.fields["question"]: e.fields["answer"] for e in log if e.kind == "answered"
-    }
-    assert answers == given
-
-
-@pytest.mark.slow
-def test_the_break_counts_down_and_may_be_left_earlier(study: StudyPaths) -> None:
-    async def act(desk: Desk, tablet: Tablet) -> None:
-        await desk.start("R1", "test")
-        first = await tablet.until("break")
-        assert 0 < first["seconds_left"] <= 6.0
-        await asyncio.sleep(0.25)
-        assert (await tablet.state())["seconds_left"] < first["seconds_left"]
-        assert (await tablet.answer(first, go_on=True))["screen"] == "ready"
 
     with_tablets(study, act, "R1")
 
@@ -264,10 +191,11 @@ def test_the_break_counts_down_and_may_be_left_earlier(study: StudyPaths) -> Non
 def test_done_ends_what_is_presented_and_nothing_that_comes_later(
     tmp_path: Path,
 ) -> None:
-    study = small_study(tmp_path / "study", "", THRICE, quick=True)
+    thrice = ("stretches = 1", "stretches = 3")
+    study = small_study(tmp_path / "study", "", thrice, quick=True)
 
-    async def act(desk: Desk, tablet: Tablet) -> None:
-        await desk.start("R1", "test")
+    async def act(manager: SessionManager, tablet: Tablet) -> None:
+        await manager.start("R1", "test")
         async with tablet.listening() as events:
             await tablet.answer(await tablet.until("ready"), begin=True)
             shown = await tablet.until("presenting")
@@ -278,7 +206,7 @@ def test_done_ends_what_is_presented_and_nothing_that_comes_later(
             while ("stretches", {"n_over": 1}) not in events:
                 await asyncio.sleep(0.05)
             assert (await tablet.state())["screen"] == "presenting"
-            assert (await tablet.post("done", **which))[0] == 200
+            await tablet.done("done", **which)
             await tablet.until("grade")
             assert (await tablet.post("done", **which))[0] == 409
 
@@ -289,11 +217,11 @@ def test_done_ends_what_is_presented_and_nothing_that_comes_later(
 def test_the_emergency_stop_of_any_tablet_ends_a_presentation(tmp_path: Path) -> None:
     study = small_study(tmp_path / "study", quick=True)
 
-    async def act(desk: Desk, mine: Tablet, other: Tablet) -> None:
-        await desk.start("R1", "test")
+    async def act(manager: SessionManager, mine: Tablet, other: Tablet) -> None:
+        await manager.start("R1", "test")
         await mine.answer(await mine.until("ready"), begin=True)
         await mine.until("presenting")
-        assert (await other.post("stop"))[0] == 200
+        await other.done("stop")
         state = await mine.until("fault")
         assert state["why"].startswith("emergency stop")
         status, _ = await mine.post("answer", ask=state["ask"], answer={"skip": " "})
@@ -302,31 +230,32 @@ def test_the_emergency_stop_of_any_tablet_ends_a_presentation(tmp_path: Path) ->
     with_tablets(study, act, "R1", "R2", clock="real")
 
 
-def test_a_page_is_in_the_language_of_the_study(study: StudyPaths) -> None:
-    in_language(study, "de")
+def words_in(language: str) -> dict[str, str]:
+    return tomllib.loads((HERE / "words" / f"{language}.toml").read_text("utf-8"))
 
-    async def act(_: Desk, tablet: Tablet) -> None:
+
+def test_a_page_is_in_the_language_of_the_study(study: StudyPaths) -> None:
+    text = study.protocol.read_text()
+    in_german = text.replace("[study]\n", '[study]\nlanguage = "de"\n')
+    study.protocol.write_text(in_german)
+
+    async def act(_: SessionManager, tablet: Tablet) -> None:
         page = await tablet.open()
         assert '<html lang="de">' in page
         assert ">Not-Halt</button>" in page
-        assert json.loads(re.search(r'id="words">(.*?)</script>', page)[1]) == words_in(  # type: ignore[index]
-            "de"
-        )
+        words = re.search(r'id="words">(.*?)</script>', page)
+        assert words is not None
+        assert json.loads(words[1]) == words_in("de")
 
     with_tablets(study, act, None)
-
-
-def test_a_language_without_words_is_refused(study: StudyPaths) -> None:
-    in_language(study, "xx")
-    with pytest.raises(
-        MasrelError, match=r"study.language: needed .*'de'.*got 'xx'|xx"
-    ):
+    study.protocol.write_text(in_german.replace('"de"', '"xx"'))
+    with pytest.raises(MasrelError, match="xx"):
         read_protocol(study.protocol)
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_a_language_has_all_words_with_the_same_places(language: str) -> None:
-    english, words = words_in("en"), dict(words_in(language))
+    english, words = words_in("en"), words_in(language)
     meanings = words.pop("meanings", {})
     assert list(words) == list(english)
     for key, text in english.items():
@@ -334,33 +263,27 @@ def test_a_language_has_all_words_with_the_same_places(language: str) -> None:
         assert sorted(re.findall(r"\{\w+\}", words[key])) == sorted(places), key
         assert words[key].strip() == words[key] != ""
     if language != "en":  # which masrel.scales has
-        assert meanings == {
-            each.scale.name: {
-                grade: meanings[each.scale.name][grade] for grade in each.meanings
-            }
+        assert {name: set(of) for name, of in meanings.items()} == {
+            each.scale.name: set(each.meanings)
             for each in PUBLISHED_SCALES.values()
             if each.meanings
         }
 
 
 def test_there_are_words_for_all_that_the_page_says_and_for_nothing_else() -> None:
-    folder = BROWSER.with_name("words")
-    assert sorted(path.stem for path in folder.glob("*.toml")) == sorted(LANGUAGES)
-    script = "".join(path.read_text() for path in BROWSER.glob("rater*.js"))
-    page = BROWSER.with_name("templates").joinpath("rater.html").read_text()
+    files = (HERE / "words").glob("*.toml")
+    assert sorted(path.stem for path in files) == sorted(LANGUAGES)
+    script = "".join(path.read_text() for path in (HERE / "static").glob("rater*.js"))
+    page = (HERE / "templates" / "rater.html").read_text()
     used = {*re.findall(r"\bwords\.(\w+)", page), *re.findall(r'"(\w+)"', script)}
     used |= {"slow", "fast"}  # as the protocol calls them
     for how in ("complete", "stopped", "failed"):
         used |= {f"over_{how}", f"over_{how}_title"}
-    known = set(tomllib.loads((folder / "en.toml").read_text()))
-    assert known <= used
-    assert set(re.findall(r'\bw\("(\w+)"', script)) <= known
+    assert set(re.findall(r'\bw\("(\w+)"', script)) <= set(words_in("en")) <= used
 
 
 def test_scripts_make_no_markup_of_texts_and_leave_no_host() -> None:
-    for path in BROWSER.glob("*.*"):
-        text = path.read_text()
-        assert not re.search(
-            r"innerHTML|outerHTML|insertAdjacent|document\.write", text
-        )
-        assert not re.search(r"https?://|\beval\(|new Function", text), path.name
+    unsafe = r"innerHTML|outerHTML|insertAdjacent|document\.write"
+    unsafe += r"|https?://|\beval\(|new Function"
+    for path in (HERE / "static").glob("*.*"):
+        assert not re.search(unsafe, path.read_text()), path.name

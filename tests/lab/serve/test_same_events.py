@@ -16,28 +16,17 @@ from masrel.errors import SessionStoppedError
 from masrel.lab.protocol import StudyPaths, read_protocol, scale_of
 from masrel.lab.ratings import answers_from_logs, ratings_from_logs
 from masrel.lab.run import ConsoleGrades, read_log, run_session
-from masrel.lab.serve._desk import Desk
-from tests.lab.serve.desks import OCCASIONS, Page, at, small_study
+from tests.lab.serve.pages import (
+    EACH,
+    OCCASIONS,
+    Page,
+    SessionManager,
+    at,
+    correction,
+    small_study,
+)
 
-QUESTIONS = """
-[[questionnaires]]
-id = "each"
-title = "This one"
-when = "presentation"
-
-[[questionnaires.questions]]
-id = "sure"
-text = "Sure?"
-type = "choice"
-choices = ["yes", "no"]
-
-[[questionnaires.questions]]
-id = "words"
-text = "Why?"
-type = "text"
-required = false
-"""
-WHY = "the arm slipped"
+WHY = "wrong button"
 
 
 @pytest.fixture
@@ -45,7 +34,7 @@ def study(tmp_path: Path) -> StudyPaths:
     """One with every occasion; the hand is too fast for the device in one."""
     return small_study(
         tmp_path / "drawn",
-        OCCASIONS.replace("HM1", "HM3") + QUESTIONS,
+        OCCASIONS.replace("HM1", "HM3") + EACH,
         ("stretches = 1\n", "stretches = 2\n"),
         ("speed_limit_deg_s = 400.0", "speed_limit_deg_s = 120.0"),
     )
@@ -122,17 +111,16 @@ def by_the_browser(study: StudyPaths, rater: Rater) -> None:
     """Go on until the session is left, or over."""
     answers = {"How real?": 60, "Sure?": "yes", "Why?": None}
 
-    async def act(desk: Desk) -> None:
-        page = Page(desk, fault={"skip": WHY})
-        await desk.start("R1", "test")
+    async def act(manager: SessionManager) -> None:
+        page = Page(manager, fault={"skip": WHY})
+        await manager.start("R1", "test")
         while (state := await page.until(*ASKED))["screen"] != "over":
             screen, code = state["screen"], state["code"]
             if screen == "break" and rater.leaves():
-                await desk.leave()
+                await manager.leave()
                 continue
             if screen == "ready" and (wrong := rater.corrects(code)):
-                why = {"who": "R1", "why": WHY}
-                await desk.correct("R1", "test", wrong, "0", **why)
+                await manager.correct("R1", "test", correction(wrong, "0"))
             elif screen == "grade":
                 grade = rater.grade(code)
                 given = {"again": True} if grade is None else {"grade": grade}

@@ -12,131 +12,75 @@ import httpx
 import pytest
 
 from masrel.errors import ParameterError
-from masrel.lab.protocol import StudyPaths, copy_template
-from masrel.lab.run import read_log
-from masrel.lab.serve import _server
-from masrel.lab.serve._access import Access
-from masrel.lab.serve._addresses import hosts, is_loopback, qr_lines, qr_svg
-from masrel.lab.serve._desk import Desk
-from masrel.lab.serve._server import alone, encryption, listen, serve
-from tests.lab.serve.desks import Page, n_sampled, small_study
-
-DATA = Path(__file__).with_name("data")
-CERTIFICATE, KEY = DATA / "cert.pem", DATA / "key.pem"
-
-Reader, Writer = asyncio.StreamReader, asyncio.StreamWriter
-
-
-class PatientDesk(Desk):
-    """A desk that closes when a test says so."""
-
-    def __init__(self, study: StudyPaths) -> None:
-        super().__init__(study)
-        self.may_close = asyncio.Event()
-        self.may_close.set()
-        self.is_closed = False
-
-    async def close(self) -> None:
-        """Stop what runs."""
-        await self.may_close.wait()
-        await super().close()
-        self.is_closed = True
-
-
-class Running:
-    """A server that runs in this process."""
-
-    def __init__(self, root: Path, *, tls: bool = False, host: str = "127.0.0.1"):
-        if not root.exists():
-            copy_template("small", root)
-        self.context = encryption(CERTIFICATE, KEY) if tls else None
-        self.listener = listen(host, 0)
-        self.port = self.listener.getsockname()[1]
-        names = hosts(self.listener, host, encrypted=tls)
-        origin = f"{'https' if tls else 'http'}://{names[0]}"
-        paths = StudyPaths(root)
-        self.access = Access(paths, origin=origin, hosts=frozenset(names))
-        self.desk = PatientDesk(StudyPaths(root))
-        self.serving: asyncio.Task[bool] | None = None
-
-    async def __aenter__(self) -> "Running":
-        """Start it."""
-        started = asyncio.Event()
-        pages = (self.desk, self.access, self.listener, self.context)
-        self.serving = asyncio.create_task(serve(*pages, show=started.set))
-        waiting = asyncio.create_task(started.wait())
-        await asyncio.wait([self.serving, waiting], return_when=asyncio.FIRST_COMPLETED)
-        if self.serving.done():
-            waiting.cancel()
-            await self.serving
-        return self
-
-    async def __aexit__(self, *_: object) -> None:
-        """Stop it, as Ctrl-C does."""
-        if self.serving and not self.serving.done():
-            os.kill(os.getpid(), signal.SIGINT)
-            assert await self.serving
-
-    async def connect(self, host: str = "127.0.0.1") -> tuple[Reader, Writer]:
-        """Open a connection."""
-        return await asyncio.open_connection(host, self.port)
-
-    async def is_cut(self, reader: Reader, s: float = 0.4) -> bool:
-        """Return whether a connection ends within so many seconds."""
-        try:
-            await asyncio.wait_for(reader.read(), s)
-        except TimeoutError:
-            return False
-        except ConnectionError:
-            pass
-        return True
-
+from masrel.lab.protocol import StudyPaths
+from tests.lab.serve.pages import (
+    CERTIFICATE,
+    DATA,
+    Page,
+    Running,
+    alone,
+    encryption,
+    listen,
+    logged,
+    n_sampled,
+    processes_of,
+    small_study,
+)
 
 HEAD = b"GET /rater HTTP/1.1\r\nHost: 127.0.0.1\r\n"
 BODY = HEAD.replace(b"GET", b"POST") + b"Content-Length: 100\r\n\r\n"
 
 
-async def dribble(writer: Writer, begin: bytes) -> None:
-    writer.write(begin)
-    for _ in range(100):
-        await asyncio.sleep(0.02)
-        writer.write(b"x")
+async def is_cut(reader: asyncio.StreamReader, s: float = 0.4) -> bool:
+    """Whether a connection ends within so many seconds."""
+    try:
+        await asyncio.wait_for(reader.read(), s)
+    except TimeoutError:
+        return False
+    except ConnectionError:
+        pass
+    return True
 
 
-async def slow_request(running: Running, begin: bytes) -> bool:
-    """Return whether somebody who sends a letter now and then keeps a connection."""
-    reader, writer = await running.connect()
-    sending = asyncio.create_task(dribble(writer, begin))
-    is_cut = await running.is_cut(reader)
+async def slow_request(running: Running, begin: bytes, before: bytes = b"") -> bool:
+    """Whether somebody who sends a letter now and then keeps a connection."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", running.port)
+
+    async def dribble() -> None:
+        writer.write(begin)
+        for _ in range(100):
+            await asyncio.sleep(0.02)
+            writer.write(b"x")
+
+    if before:
+        writer.write(before)
+        await reader.readuntil(b"</html>")
+    sending = asyncio.create_task(dribble())
+    was_cut = await is_cut(reader)
     sending.cancel()
     writer.close()
-    return not is_cut
-
-
-async def slow_second_request(running: Running) -> bool:
-    reader, writer = await running.connect()
-    writer.write(HEAD + b"\r\n")
-    await reader.readuntil(b"</html>")
-    sending = asyncio.create_task(dribble(writer, HEAD))
-    is_cut = await running.is_cut(reader)
-    sending.cancel()
-    writer.close()
-    return not is_cut
+    return not was_cut
 
 
 async def many_connections(running: Running) -> bool:
-    pairs = [await running.connect() for _ in range(60)]
-    cut = await asyncio.gather(*(running.is_cut(reader, 0.2) for reader, _ in pairs))
+    """Whether one computer keeps 60 connections."""
+    call = asyncio.open_connection
+    pairs = [await call("127.0.0.1", running.port) for _ in range(60)]
+    cut = await asyncio.gather(*(is_cut(reader, 0.2) for reader, _ in pairs))
     for _, writer in pairs:
         writer.close()
     return not any(cut)
 
 
-ATTACKS: dict[str, tuple[Callable[[Running], Awaitable[bool]], str]] = {
-    "head": (lambda running: slow_request(running, HEAD), "_REQUEST_S"),
-    "body": (lambda running: slow_request(running, BODY), "_REQUEST_S"),
-    "second": (slow_second_request, "_REQUEST_S"),
-    "connections": (many_connections, "_MAX_OF_ONE"),
+ATTACKS: dict[str, tuple[Callable[[Running], Awaitable[bool]], str, float]] = {
+    "head": (lambda running: slow_request(running, HEAD), "_REQUEST_S", 0.1),
+    "body": (lambda running: slow_request(running, BODY), "_REQUEST_S", 0.1),
+    "second": (
+        lambda running: slow_request(running, HEAD, HEAD + b"\r\n"),
+        "_REQUEST_S",
+        0.1,
+    ),
+    "connections": (many_connections, "_MAX_OF_ONE", 48),
 }
 
 
@@ -145,9 +89,9 @@ ATTACKS: dict[str, tuple[Callable[[Running], Awaitable[bool]], str]] = {
 def test_who_only_waits_is_cut_off(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, guarded: bool
 ) -> None:
-    attack, guard = ATTACKS[name]
-    limits = {"_REQUEST_S": 0.1, "_MAX_OF_ONE": 48}
-    monkeypatch.setattr(_server, guard, limits[guard] if guarded else 1000)
+    attack, guard, limit = ATTACKS[name]
+    limit = limit if guarded else 1000
+    monkeypatch.setattr(f"masrel.lab.serve._server.{guard}", limit)
 
     async def run() -> bool:
         async with Running(tmp_path / "study") as running:
@@ -164,7 +108,7 @@ def test_nobody_else_can_call_what_listens_here(
     async def run() -> bool:
         async with Running(tmp_path / "study", host=host) as running:
             try:
-                _, writer = await running.connect("127.0.0.2")
+                _, writer = await asyncio.open_connection("127.0.0.2", running.port)
             except ConnectionRefusedError:
                 return False
             writer.close()
@@ -191,59 +135,39 @@ def test_what_a_proxy_says_of_its_client_is_not_believed(tmp_path: Path) -> None
             Running(tmp_path / "study") as running,
             httpx.AsyncClient() as client,
         ):
-            statuses = set()
-            for i in range(100):
-                named = {"X-Forwarded-For": f"10.0.0.{i}"}
-                address = f"{running.access.origin}/static/x"
-                statuses.add((await client.get(address, headers=named)).status_code)
-            return statuses
+            address = f"{running.access.origin}/static/x"
+            named = ({"X-Forwarded-For": f"10.0.0.{i}"} for i in range(100))
+            answers = [await client.get(address, headers=each) for each in named]
+            return {answer.status_code for answer in answers}
 
     assert asyncio.run(run()) == {404, 429}
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_stops_it_with_streams_open(
+def test_a_signal_stops_it_and_is_afterwards_as_it_was(
     tmp_path: Path, number: signal.Signals
 ) -> None:
+    before = signal.getsignal(number)
+
     async def run() -> bool:
         async with Running(tmp_path / "study") as running:
-            assert running.serving
-            os.kill(os.getpid(), number)
-            return await running.serving and running.desk.is_closed
+            assert signal.getsignal(number) != before
+            return await running.stopped(number) and running.manager.is_closed
 
     assert asyncio.run(run())
+    assert signal.getsignal(number) == before
 
 
 def test_a_second_signal_does_not_wait(tmp_path: Path) -> None:
     async def run() -> bool:
         async with Running(tmp_path / "study") as running:
-            assert running.serving
-            running.desk.may_close.clear()
-            os.kill(os.getpid(), signal.SIGINT)
+            running.manager.may_close.clear()
+            first = asyncio.create_task(running.stopped())
             await asyncio.sleep(0.1)
-            assert not running.serving.done()
-            os.kill(os.getpid(), signal.SIGINT)
-            return await running.serving
+            assert not first.done()
+            return await running.stopped()
 
     assert not asyncio.run(run())
-
-
-def test_signals_are_as_they_were_afterwards(tmp_path: Path) -> None:
-    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
-
-    async def run() -> None:
-        async with Running(tmp_path / "study"):
-            pass
-
-    asyncio.run(run())
-    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
-
-
-def test_a_port_in_use_is_said() -> None:
-    with listen("127.0.0.1", 0) as first:
-        port = first.getsockname()[1]
-        with pytest.raises(ParameterError, match=f"--port: needed a free one, {port}"):
-            listen("127.0.0.1", port)
 
 
 @pytest.mark.parametrize(
@@ -267,12 +191,9 @@ def test_what_is_no_certificate_with_its_key_is_said(
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root reads any")
 def test_a_key_that_may_not_be_read_is_said(tmp_path: Path) -> None:
     key = tmp_path / "key.pem"
-    key.write_bytes((DATA / "key.pem").read_bytes())
-    key.chmod(0)
-    with pytest.raises(
-        ParameterError, match=r"key\.pem: needed files that can be read"
-    ):
-        encryption(DATA / "cert.pem", key)
+    key.touch(mode=0)
+    with pytest.raises(ParameterError, match=r"key\.pem: needed files that can be"):
+        encryption(CERTIFICATE, key)
 
 
 @pytest.mark.parametrize("host", ["", "nosuch.invalid", "a" * 300, "8.8.8.8"])
@@ -283,29 +204,11 @@ def test_a_host_that_is_none_of_this_computers_is_said(host: str) -> None:
 
 def test_a_study_is_served_once(tmp_path: Path) -> None:
     study = StudyPaths(tmp_path)
-    with (
-        alone(study),
-        pytest.raises(ParameterError, match="nobody serves"),
-        alone(study),
-    ):
+    second = alone(study)
+    with alone(study), pytest.raises(ParameterError, match="nobody serves"), second:
         pass
     with alone(study):
         pass
-
-
-@pytest.mark.parametrize(
-    ("host", "loopback"),
-    [("127.0.0.1", True), ("::1", True), ("127.3.2.1", True), ("10.0.0.1", False)],
-)
-def test_what_is_loopback(host: str, loopback: bool) -> None:
-    assert is_loopback(host) is loopback
-
-
-def test_a_qr_code_is_of_the_address() -> None:
-    address = "http://192.168.178.20:8723/coordinator?token=" + "x" * 22
-    assert qr_lines(address) != qr_lines(f"{address}y")
-    assert qr_svg(address).startswith("data:image/svg+xml")
-    assert "token" not in qr_svg(address)
 
 
 @pytest.mark.slow
@@ -317,28 +220,52 @@ def test_a_signal_leaves_a_session_that_can_be_gone_on_with(
 
     async def run() -> None:
         async with Running(study.root) as running:
-            assert running.serving
-            await running.desk.start("R1", "test")
-            page = Page(running.desk)
+            await running.manager.start("R1", "test")
+            page = Page(running.manager)
             await page.until("ready" if screen == "presenting" else screen)
             if screen == "presenting":
-                await page.answer(running.desk.state())
-                await n_sampled(running.desk, 100)
-            os.kill(os.getpid(), signal.SIGTERM)
-            assert await running.serving
+                await page.answer(running.manager.state())
+                await n_sampled(running.manager, 100)
+            assert await running.stopped(signal.SIGTERM)
 
     async def go_on() -> None:
         async with Running(study.root) as running:
-            await running.desk.start("R1", "test")
-            state = await Page(running.desk).until("over")
+            await running.manager.start("R1", "test")
+            state = await Page(running.manager).until("over")
             assert state["how"] == "complete"
 
     asyncio.run(run())
     assert "The session is being stopped. Ctrl-C again" in capsys.readouterr().out
     asyncio.run(go_on())
-    grades = [
-        event.fields["code"]
-        for event in read_log(study.log_file("R1", "test"))
-        if event.kind == "grade"
-    ]
+    grades = [event["code"] for event in logged(study, "grade")]
     assert len(grades) == len(set(grades)) == 4
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processors as Linux has them")
+def test_the_server_keeps_off_the_processor_of_the_loop(tmp_path: Path) -> None:
+    study = small_study(tmp_path / "study", quick=True)
+    allowed = os.sched_getaffinity(0)
+    of_loop = {max(allowed)}
+
+    async def run() -> None:
+        async with Running(study.root) as server:
+            others = allowed - of_loop or allowed  # all share a single one
+            assert os.sched_getaffinity(0) == others
+            job = await asyncio.create_subprocess_exec("sleep", "60")
+            assert os.sched_getaffinity(job.pid) == others
+            job.kill()
+            await job.wait()
+            await server.manager.start("R1", "test")
+            page = Page(server.manager)
+            await page.until("ready")
+            (session,) = processes_of(study)
+            assert os.sched_getaffinity(session) == allowed
+            await page.answer(server.manager.state())
+            await n_sampled(server.manager, 10)
+            if os.sched_getscheduler(session) == os.SCHED_FIFO:
+                fields = Path(f"/proc/{session}/stat").read_text().rpartition(")")[2]
+                assert int(fields.split()[36]) in of_loop
+            await server.manager.leave()
+
+    asyncio.run(run())
+    assert os.sched_getaffinity(0) == allowed

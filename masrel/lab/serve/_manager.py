@@ -1,4 +1,4 @@
-"""What goes on in one study: at most one running session, and what it asks now.
+"""The session manager of a study: at most one running session, and what it asks now.
 
 Everything here runs in the event loop of the server; the session is a process of its
 own, so that nothing here can be in the way of its control loop.
@@ -7,21 +7,22 @@ own, so that nothing here can be in the way of its control loop.
 import asyncio
 import contextlib
 import hashlib
-import itertools
 import json
 import secrets
 import socket
 import sys
 import time
+from collections import deque
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from masrel.errors import MasrelError, ParameterError
+from masrel.lab.conduct._study_log import check_choice
 from masrel.lab.protocol import StudyPaths, read_protocol
-from masrel.lab.run import record_correction
+from masrel.lab.run import GradeCorrection, record_correction
 from masrel.lab.run._presenter import ClockName
-from masrel.lab.serve._channel import MAX_LINE, Message, encoded
+from masrel.lab.serve._session_process import MAX_LINE, Message, encoded
 
 _TO_END_S = 10.0  # after a polite stop, until the process is terminated
 _HELD_DOWN_S = 0.1  # within this, a button pressed again says nothing new
@@ -39,7 +40,7 @@ class AnsweredError(AskOverError):
 
 
 class AnswerRefusedError(MasrelError):
-    """An answer is none; the question is asked still."""
+    """An answer is invalid; the question is asked still."""
 
 
 @dataclass(slots=True, eq=False)
@@ -61,7 +62,8 @@ class _Running:
     answered: dict[str, tuple[object, "asyncio.Future[None]"]] = field(
         default_factory=dict
     )
-    corrections: dict[int, "asyncio.Future[None]"] = field(default_factory=dict)
+    # those that are sent and not in the log yet, in order
+    corrections: deque["asyncio.Future[None]"] = field(default_factory=deque)
     follows: "asyncio.Task[None] | None" = None
 
     @property
@@ -87,8 +89,13 @@ class _Running:
             self.pressed[message["kind"]] = self.message, now
             self.send(message)
 
+    def settle(self, problem: Exception | None) -> None:
+        """Tell who waits for an answer that it is on disk, or why it is not."""
+        for _, future in self.answered.values():
+            _end(future, problem)
 
-class Desk:
+
+class SessionManager:
     """One study: start a session, see what it asks, answer, stop.
 
     Attributes
@@ -99,21 +106,22 @@ class Desk:
         Grows with everything that pages should see.
     processors : list of int
         Those of the process of a session; if empty, those of this process.
+    at_close : list of callable
+        What is ended when this is closed.
     """
 
     def __init__(self, study: StudyPaths, *, clock: ClockName = "real") -> None:
         self.study = study
         self.version = 1
         self.processors: list[int] = []
+        self.at_close: list[Callable[[], Awaitable[None]]] = []
         self._id = secrets.token_hex(4)  # by which pages know that it is another one
         self._clock = clock
         self._running: _Running | None = None
         self._latest: _Running | None = None
         self._over: Message = {"screen": "waiting"}
-        self._numbers = itertools.count(1)
         self._changed = asyncio.Event()
         self._starting = asyncio.Lock()
-        self._ends: list[Callable[[], Awaitable[None]]] = []
         self._following: set[asyncio.Task[None]] = set()
 
     async def start(self, rater: str, session: str, *, rehearsal: bool = False) -> None:
@@ -125,8 +133,7 @@ class Desk:
             If a session runs, or the protocol has no such rater or session.
         """
         async with self._starting:
-            if self._running is not None:
-                other = self._running
+            if (other := self._running) is not None:
                 raise ParameterError(
                     "session: needed none that runs, "
                     f"got {other.session} of {other.rater}"
@@ -177,51 +184,32 @@ class Desk:
             self._end(running, {"how": "failed", "text": text})
 
     def _end(self, running: _Running, over: Message) -> None:
-        self._over = {
-            "screen": "over",
-            "how": over["how"],
-            "text": over["text"],
-            "rater": running.rater,
-        }
+        shown = {"how": over["how"], "text": over["text"], "rater": running.rater}
+        self._over = {"screen": "over", **shown}
         self._running = None
         # An answer that was taken is followed by a question, or by the end.
         is_complete = over["how"] == "complete"
-        self._settle(running, None if is_complete else AskOverError(over["text"]))
-        for future in running.corrections.values():
-            if not future.done():
-                future.set_exception(AskOverError("the session is over"))
+        running.settle(None if is_complete else AskOverError(over["text"]))
+        for future in running.corrections:
+            _end(future, AskOverError("the session is over"))
         self.note_change()
 
     def _take_in(self, running: _Running, message: Message) -> None:
-        kind = message["kind"]
-        if kind in ("ask", "presenting"):
-            running.message, running.since = message, time.monotonic()
-            self._settle(running, None)  # what was answered is in the log
-        elif kind == "refused":
-            _, future = running.answered.pop(running.ask or "", (None, None))
-            if future is not None and not future.done():
-                future.set_exception(AnswerRefusedError(message["why"]))
-        elif kind in ("corrected", "not-corrected"):
-            future = running.corrections.pop(message["id"], None)
-            if kind == "corrected":
+        match message["kind"]:
+            case "ask" | "presenting":
+                running.message, running.since = message, time.monotonic()
+                running.settle(None)  # what was answered is in the log
+            case "refused":
+                _, future = running.answered.pop(running.ask or "", (None, None))
+                _end(future, AnswerRefusedError(message["why"]))
+            case "corrected":
                 running.message = {**running.message, "last": message["last"]}
-            if future is not None and not future.done():
-                if kind == "corrected":
-                    future.set_result(None)
-                else:
-                    future.set_exception(ParameterError(message["why"]))
-        elif kind == "note":
-            running.notes.append(message["text"])
+                _end(running.corrections.popleft(), None)
+            case "not-corrected":
+                _end(running.corrections.popleft(), ParameterError(message["why"]))
+            case "note":
+                running.notes.append(message["text"])
         self.note_change()
-
-    def _settle(self, running: _Running, problem: Exception | None) -> None:
-        for _, future in running.answered.values():
-            if future.done():
-                continue
-            if problem is None:
-                future.set_result(None)
-            else:
-                future.set_exception(problem)
 
     def note_change(self) -> None:
         """Say that there is something new for pages."""
@@ -245,7 +233,7 @@ class Desk:
         AskOverError
             If it is not asked any more, or was answered otherwise.
         AnswerRefusedError
-            If it is no answer.
+            If it is invalid.
         """
         running = self._running
         if running is None:
@@ -253,8 +241,7 @@ class Desk:
         if ask not in running.answered:
             if ask != running.ask:
                 raise AskOverError("this is not asked any more")
-            future = _future()
-            running.answered[ask] = answer, future
+            running.answered[ask] = answer, _future()
             n = running.message["n"]
             running.send({"kind": "answer", "n": n, "answer": answer})
         before, future = running.answered[ask]
@@ -284,10 +271,7 @@ class Desk:
         self,
         rater: str,
         session: str,
-        code: str,
-        grade: str | None,
-        who: str,
-        why: str,
+        correction: GradeCorrection,
         *,
         rehearsal: bool = False,
     ) -> None:
@@ -299,35 +283,21 @@ class Desk:
             As `masrel.lab.run.record_correction` raises it, or if a model is presented
             in that session now.
         """
-        running = self._running
+        running, fields = self._running, asdict(correction)
         if self.running != (rater, session, rehearsal) or running is None:
             if rehearsal:
                 raise ParameterError("rehearsal: needed the one that runs to correct")
-            await asyncio.to_thread(
-                self._correct_in_log, rater, session, code, grade, who, why
-            )
+            protocol = await asyncio.to_thread(read_protocol, self.study.protocol)
+            where = (self.study, protocol, rater, session)
+            await asyncio.to_thread(record_correction, *where, **fields)
             self.note_change()
             return
         if running.message.get("kind") != "ask":
             raise ParameterError("grade: needed a presentation that is over to correct")
-        number = next(self._numbers)
         future = _future()
-        running.corrections[number] = future
-        correction = {"code": code, "grade": grade, "who": who, "why": why}
-        running.send({"kind": "correct", "id": number, **correction})
+        running.corrections.append(future)
+        running.send({"kind": "correct", **fields})
         await asyncio.shield(future)
-
-    def _correct_in_log(
-        self, rater: str, session: str, code: str, grade: str | None, who: str, why: str
-    ) -> None:
-        protocol = read_protocol(self.study.protocol)
-        record_correction(
-            *(self.study, protocol, rater, session),
-            code=code,
-            grade=grade,
-            who=who,
-            why=why,
-        )
 
     @property
     def running(self) -> tuple[str, str, bool] | None:
@@ -352,9 +322,9 @@ class Desk:
     def state(self) -> Message:
         """Return what a page shows: never which model is presented."""
         running = self._running
+        which = {"server": self._id, "version": self.version}
         if running is None:
-            shown = {"session": None, "ask": None, **self._over}
-            return {**shown, "server": self._id, "version": self.version}
+            return {"session": None, "ask": None, **self._over, **which}
         message = running.message or {"screen": "starting"}
         shown = {key: value for key, value in message.items() if key not in _INNER}
         if shown["screen"] == "break":
@@ -366,16 +336,11 @@ class Desk:
             "session": running.session,
             "rehearsal": running.rehearsal,
         }
-        state = {"session": session, "ask": running.ask, **shown}
-        return {**state, "server": self._id, "version": self.version}
-
-    def at_close(self, end: Callable[[], Awaitable[None]]) -> None:
-        """Have something ended when the desk is closed."""
-        self._ends.append(end)
+        return {"session": session, "ask": running.ask, **shown, **which}
 
     async def close(self) -> None:
         """Stop what runs: politely, and if that does not help, at once."""
-        for end in self._ends:
+        for end in self.at_close:
             await end()
         running = self._latest  # also one that is over, and whose process ends now
         if running is None or running.follows is None:
@@ -399,11 +364,17 @@ def _future() -> "asyncio.Future[None]":
     return future
 
 
+def _end(future: "asyncio.Future[None] | None", problem: Exception | None) -> None:
+    # what was told before stays
+    if future is None or future.done():
+        return
+    if problem is None:
+        future.set_result(None)
+    else:
+        future.set_exception(problem)
+
+
 def _check_session(study: StudyPaths, rater: str, session: str) -> None:
     sessions = {each.id: each.raters for each in read_protocol(study.protocol).sessions}
-    if session not in sessions:
-        known = ", ".join(sessions)
-        raise ParameterError(f"session: needed one of {known}, got {session!r}")
-    if rater not in sessions[session]:
-        known = ", ".join(sessions[session])
-        raise ParameterError(f"rater: needed one of {known}, got {rater!r}")
+    check_choice("session", session, sessions)
+    check_choice("rater", rater, sessions[session])

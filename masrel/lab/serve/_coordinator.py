@@ -1,0 +1,336 @@
+"""What a coordinator's page has done: sessions, what commands record, and long work."""
+
+import asyncio
+import contextlib
+import dataclasses
+import os
+import re
+import signal
+import sys
+from collections import deque
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from masrel.errors import MasrelError, ParameterError
+from masrel.lab._once import read_once
+from masrel.lab.conduct import (
+    allot_schedules,
+    read_conduct,
+    record_note,
+    record_standing,
+    record_unblinding,
+)
+from masrel.lab.conduct._study_log import check_choice, check_rater
+from masrel.lab.progress import next_step, rater_progress, session_progress
+from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.run import GradeCorrection, record_answer, record_skip
+from masrel.lab.run._settings import torque_problems
+from masrel.lab.serve._access import Access, qr_svg
+from masrel.lab.serve._manager import SessionManager
+
+Fields = Mapping[str, Any]
+"""What a page sends; texts, but for what is either so or not."""
+
+JOBS = ("ratings", "report", "verify", "check", "plan")
+"""Commands that a coordinator can start from the page."""
+
+_N_LINES = 60
+_N_BYTES = 4096
+_LINE_END = re.compile(r"[\r\n]+")  # a bar of progress comes back to where it began
+_N_EVENTS = 100
+_DEVICE = (
+    "backend",
+    "rate_hz",
+    "torque_limit_nm",
+    "torque_rate_limit_nm_s",
+    "speed_limit_deg_s",
+    "lowest_angle_deg",
+    "highest_angle_deg",
+    "missed_ticks_limit",
+    "watchdog_ms",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class _Action:
+    """What a page and a command record: the texts it takes, and what is said of it."""
+
+    record: Callable[..., object]
+    needed: tuple[str, ...]
+    optional: tuple[str, ...]
+    done: str  # with what it took, and what it returned as {result}
+
+
+def _draw(study: StudyPaths, protocol: Any) -> int:
+    return len(allot_schedules(study, protocol))
+
+
+def _note(*where: Any, kind: str | None, **fields: Any) -> str:
+    of_kind: Any = kind or "note"
+    record_note(*where, kind=of_kind, **fields)
+    return str(of_kind)
+
+
+def _skip(study: StudyPaths, _: Any, rater: str, session: str, **fields: Any) -> None:
+    record_skip(study, rater, session, **fields)
+
+
+def _unblind(*where: Any, **fields: Any) -> str:
+    return "; ".join(
+        f"{one.code} of {schedule.rater}, session {schedule.session}, is {one.model}"
+        for schedule, one in record_unblinding(*where, **fields)
+    )
+
+
+_SIGNED = ("who", "why")
+_SESSION = ("rater", "session")
+ACTIONS = {
+    "draw": _Action(_draw, (), (), "All {result} schedules are drawn."),
+    "note": _Action(
+        _note,
+        ("text", "who"),
+        ("kind", *_SESSION, "severity", "action", "outcome"),
+        "Recorded: {result}.",
+    ),
+    "answer": _Action(
+        record_answer,
+        (*_SESSION, "question", *_SIGNED),
+        ("answer", "code"),
+        "The answer to {question} is corrected; what it was stays in the log.",
+    ),
+    "skip": _Action(
+        _skip,
+        (*_SESSION, "code", *_SIGNED),
+        (),
+        "{code} of {rater}, session {session}, is left without a grade.",
+    ),
+    "withdraw": _Action(
+        partial(record_standing, standing="withdrawn"),
+        ("rater", *_SIGNED),
+        (),
+        "{rater} is withdrawn; the grades given before are kept.",
+    ),
+    "unblind": _Action(_unblind, ("code", *_SIGNED), _SESSION, "Recorded. {result}."),
+}
+"""What is recorded of a study, by name."""
+
+
+def text(fields: Fields, name: str) -> str | None:
+    """Return a text that may be left out."""
+    words = fields.get(name)
+    if words is not None and not isinstance(words, str):
+        raise ParameterError(f"{name}: needed text, got {words!r}")
+    return (words or "").strip() or None
+
+
+def needed(fields: Fields, *names: str) -> dict[str, Any]:
+    """Return texts that are needed."""
+    texts = {name: text(fields, name) for name in names}
+    for name, words in texts.items():
+        if words is None:
+            raise ParameterError(f"{name}: needed text, got none")
+    return texts
+
+
+class Coordinator:
+    """What the coordinator of one study does at a page.
+
+    Attributes
+    ----------
+    jobs : Jobs
+        Long work.
+    """
+
+    def __init__(self, manager: SessionManager, access: Access) -> None:
+        self._manager, self._access = manager, access
+        self._study = manager.study
+        self.jobs = Jobs(manager.study, manager.note_change)
+        manager.at_close.append(self.jobs.close)
+        self._actions: dict[str, Callable[[Fields], Awaitable[Any]]] = {
+            "start": self._start,
+            "leave": self._leave,
+            "correct": self._correct,
+            "tablet": self._tablet,
+            "job": self._job,
+        }
+
+    def knows(self, name: str) -> bool:
+        """Return whether there is such an action."""
+        return name in (*self._actions, *ACTIONS)
+
+    async def act(self, name: str, fields: Fields) -> dict[str, Any]:
+        """Do something, and return in ``text`` what was done."""
+        if name in self._actions:
+            outcome = await self._actions[name](fields)
+            return outcome if isinstance(outcome, dict) else {"text": outcome}
+        sentence = await asyncio.to_thread(self._record, ACTIONS[name], fields)
+        self._manager.note_change()
+        return {"text": sentence}
+
+    def _record(self, action: _Action, fields: Fields) -> str:
+        texts = needed(fields, *action.needed)
+        texts |= {name: text(fields, name) for name in action.optional}
+        protocol = read_protocol(self._study.protocol)
+        result = action.record(self._study, protocol, **texts)
+        return action.done.format(**texts, result=result)
+
+    async def _start(self, fields: Fields) -> str:
+        where = needed(fields, *_SESSION)
+        rehearsal = fields.get("rehearsal") is True
+        await self._manager.start(**where, rehearsal=rehearsal)
+        return "Session {session} of {rater} is started.".format(**where)
+
+    async def _leave(self, fields: Fields) -> str:  # noqa: ARG002 - as all
+        await self._manager.leave()
+        return "The session is stopped; it goes on where it was."
+
+    async def _correct(self, fields: Fields) -> str:
+        where = needed(fields, *_SESSION)
+        texts = needed(fields, "code", "grade", *_SIGNED)
+        if texts["grade"] == "NA":
+            texts["grade"] = None
+        await self._manager.correct(**where, correction=GradeCorrection(**texts))
+        return f"{texts['code']} is corrected; what it was stays in the log."
+
+    async def _tablet(self, fields: Fields) -> dict[str, Any]:
+        rater = text(fields, "rater")
+        if rater is not None:
+            check_rater(
+                await asyncio.to_thread(read_protocol, self._study.protocol), rater
+            )
+        address = self._access.new_address("rater", rater)
+        whose = rater or "the rater of the next session"
+        sentence = f"This address lets in one tablet, that of {whose}, once."
+        return {"text": sentence, "address": address, "picture": qr_svg(address)}
+
+    async def _job(self, fields: Fields) -> str:
+        command = needed(fields, "verb")["verb"]
+        check_choice("job", command, JOBS)
+        if fields.get("cancel") is True:
+            self.jobs.cancel(command)
+            return f"{command} is stopped."
+        await self.jobs.start(command)
+        return f"{command} is started."
+
+
+@dataclass(slots=True, eq=False)
+class _Job:
+    process: asyncio.subprocess.Process
+    lines: deque[str] = field(default_factory=lambda: deque(maxlen=_N_LINES))
+    code: int | None = None
+    is_cancelled: bool = False
+
+    @property
+    def status(self) -> str:
+        if self.code is None:
+            return "running"
+        if self.is_cancelled:
+            return "cancelled"
+        return "done" if self.code == 0 else "failed"
+
+
+class Jobs:
+    """Commands about a study, each a process of its own, one of a kind at a time."""
+
+    def __init__(self, study: StudyPaths, changed: Callable[[], None]) -> None:
+        self._study, self._changed = study, changed
+        self._jobs: dict[str, _Job] = {}
+        self._following: set[asyncio.Task[None]] = set()
+        self._starting = asyncio.Lock()
+
+    async def start(self, command: str) -> None:
+        """Start a command; nothing where it runs already."""
+        async with self._starting:  # two screens may ask at once
+            if self._runs(command) is not None:
+                return
+            process = await asyncio.create_subprocess_exec(
+                *(sys.executable, "-m", "masrel", command, str(self._study.root)),
+                stdin=asyncio.subprocess.DEVNULL,
+                stdout=asyncio.subprocess.PIPE,
+                stderr=asyncio.subprocess.STDOUT,
+                # Ctrl-C is for the server; it has a process group that `cancel` ends
+                start_new_session=True,
+            )
+            self._jobs[command] = job = _Job(process)
+            task = asyncio.create_task(self._follow(job))
+            self._following.add(task)
+            task.add_done_callback(self._following.discard)
+            self._changed()
+
+    def _runs(self, command: str) -> _Job | None:
+        job = self._jobs.get(command)
+        return job if job is not None and job.code is None else None
+
+    async def _follow(self, job: _Job) -> None:
+        rest, output = "", job.process.stdout
+        while output is not None and (data := await output.read(_N_BYTES)):
+            *lines, rest = _LINE_END.split(rest + data.decode(errors="replace"))
+            job.lines.extend(line for line in lines if line.strip())
+            self._changed()
+        if rest.strip():
+            job.lines.append(rest)
+        job.code = await job.process.wait()
+        self._changed()
+
+    def cancel(self, command: str) -> None:
+        """Stop a command that runs, and the processes that it has started."""
+        if (job := self._runs(command)) is not None:
+            job.is_cancelled = True
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(job.process.pid, signal.SIGTERM)
+
+    def state(self) -> dict[str, dict[str, Any]]:
+        """Return the status of each command, and what it has printed."""
+        return {
+            command: {"status": job.status, "lines": list(job.lines)}
+            for command, job in self._jobs.items()
+        }
+
+    async def close(self) -> None:
+        """Stop all of them."""
+        for command in self._jobs:
+            self.cancel(command)
+        await asyncio.gather(*self._following, return_exceptions=True)
+
+
+@read_once()
+def overview(study: StudyPaths) -> dict[str, Any]:
+    """Return sessions, raters, what happened beside them, and the device.
+
+    By the logs; no model is named.
+    """
+    protocol = read_protocol(study.protocol)
+    sessions = session_progress(study, protocol)
+    raters: list[dict[str, Any]] = []
+    events: list[dict[str, Any]] = []
+    problem, step = None, None
+    try:
+        progress = rater_progress(study, protocol, sessions)
+        raters = [{"rater": each.rater, "status": each.status} for each in progress]
+        step = dataclasses.asdict(next_step(study, sessions, progress))
+        events = [
+            {"event": event.kind, "time_utc": event.time_utc, **event.fields}
+            for event in read_conduct(study)[-_N_EVENTS:]
+        ]
+    except MasrelError as error:  # hides no session
+        problem = str(error)
+    return {
+        "study": protocol.study.id,
+        "title": protocol.study.title,
+        "sessions": [dataclasses.asdict(session) for session in sessions],
+        "raters": raters,
+        "events": events,
+        "problem": problem,
+        "next": step,
+        "grades": list(protocol.scale.grades),
+        "questions": [
+            f"{questionnaire.id}.{question.id}"
+            for questionnaire in protocol.questionnaires
+            for question in questionnaire.questions
+        ],
+        "device": {name: getattr(protocol.device, name) for name in _DEVICE},
+        "n_torque_problems": len(tuple(torque_problems(protocol))),
+        "has_report": (study.root / "report" / "report.html").is_file(),
+    }
