@@ -110,7 +110,7 @@ def _draw(
 ) -> None:
     from masrel.lab.conduct import allot_schedules
     from masrel.lab.schedule import site_of_copy
-    from masrel.lab.schedule._sites import site_of
+    from masrel.lab.schedule._secret import site_of
 
     site = site or site_of_copy(paths)
     written = set(allot_schedules(paths, protocol, site=site, redraw=redraw))

@@ -16,7 +16,7 @@ from masrel.lab.conduct._study_log import events_of_logs, open_conduct
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.schedule import Schedule, read_schedule, write_schedules
 from masrel.lab.schedule._orders import WITH_ROWS
-from masrel.lab.schedule._sites import site_of
+from masrel.lab.schedule._secret import site_of
 
 if TYPE_CHECKING:
     from masrel.lab.recording import _Fact  # loads numpy

@@ -18,7 +18,7 @@ from masrel.lab.protocol import Protocol, StudyPaths, protocol_hash
 from masrel.lab.protocol._values import FieldValue
 from masrel.lab.run._state import SessionState, read_session, replay
 from masrel.lab.schedule import read_schedule, site_of_copy
-from masrel.lab.schedule._sites import site_of
+from masrel.lab.schedule._secret import site_of
 
 SessionStage = Literal["not drawn", "drawn", "begun", "complete", "unreadable"]
 """How far a session came."""

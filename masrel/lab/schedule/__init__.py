@@ -4,16 +4,16 @@ Goes in: a protocol. Comes out: for each rater and session a schedule file that
 names the models, and a blinded sheet that does not.
 """
 
-from masrel.lab.schedule._sites import copy_for_site, site_of_copy
+from masrel.lab.schedule._secret import copy_for_site, site_of_copy
 from masrel.lab.schedule.presentation import (
     Presentation,
     Schedule,
     check_schedule,
     draw_schedule,
+    read_schedule,
 )
 from masrel.lab.schedule.sheets import (
     concealment_notes,
-    read_schedule,
     schedule_problems,
     write_schedules,
 )

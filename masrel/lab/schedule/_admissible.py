@@ -71,6 +71,26 @@ class LimitedRuns:
             yield n_runs, words * _n_compositions(size, n_runs, self.longest)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StandardsApart:
+    """Words of roles without two standards in a row."""
+
+    n_standards: int
+    n_dummies: int
+
+    def count(self) -> int:
+        """Return how many such words there are."""
+        return comb(self.n_dummies + 1, self.n_standards)
+
+    def word(self, number: int) -> list[str]:
+        """Return the word of a number below `count`."""
+        # at most one standard before each dummy, and one after the last
+        gaps = range(self.n_dummies + 1)
+        chosen = subset(number, gaps, self.n_standards)
+        word = [["standard", "dummy"] if gap in chosen else ["dummy"] for gap in gaps]
+        return [role for roles in word for role in roles][:-1]
+
+
 Cell = tuple[int | None, bool]
 """What a presentation counts as: the number of its grade, and if it is a standard."""
 

@@ -1,14 +1,18 @@
 """How even drawn schedules are: places, neighbours and runs, counted."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby, pairwise
+from itertools import chain, groupby, pairwise
 
 from masrel.errors import ScheduleError
-from masrel.lab.protocol import Model, Protocol, StudyPaths
-from masrel.lab.schedule._sites import checked_site, site_of
-from masrel.lab.schedule.presentation import Schedule, check_schedule
-from masrel.lab.schedule.sheets import read_schedule
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.schedule._secret import checked_site, site_of
+from masrel.lab.schedule.presentation import (
+    Schedule,
+    check_schedule,
+    read_schedule,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,35 +76,35 @@ def order_balance(
 def _balance(
     protocol: Protocol, schedules: Sequence[Schedule], session: str, site: str | None
 ) -> OrderBalance:
-    models = {model.id: model for model in protocol.models}
     orders = [[shown.model for shown in each.presentations] for each in schedules]
-    number = {name: index for index, name in enumerate(models)}
-    places = [[0] * len(orders[0]) for _ in models]
-    pairs = [[0] * len(models) for _ in models]
-    for order in orders:
-        for place, name in enumerate(order):
-            places[number[name]][place] += 1
-        for name, following in pairwise(order):
-            pairs[number[name]][number[following]] += 1
-    grades = {name: model.intended_grade for name, model in models.items()}
+    models = [model.id for model in protocol.models]
+    places = Counter(chain.from_iterable(map(enumerate, orders)))
+    pairs = Counter(chain.from_iterable(map(pairwise, orders)))
+    grades = {model.id: model.intended_grade for model in protocol.models}
+    standards = {
+        model.id: model.role if model.role == "standard" else None
+        for model in protocol.models
+    }
+    runs = [
+        tuple(_longest(order, kinds) for order in orders)
+        for kinds in ({model: model for model in models}, grades, standards)
+    ]
     return OrderBalance(
         session=session,
         site=site,
         models=tuple(models),
         n_schedules=len(orders),
-        places=tuple(map(tuple, places)),
-        pairs=tuple(map(tuple, pairs)),
-        model_runs=tuple(_longest(order, {m: m for m in models}) for order in orders),
-        grade_runs=tuple(_longest(order, grades) for order in orders),
-        standard_runs=tuple(_longest(order, _standards(models)) for order in orders),
+        places=tuple(
+            tuple(places[place, model] for place in range(len(orders[0])))
+            for model in models
+        ),
+        pairs=tuple(
+            tuple(pairs[model, following] for following in models) for model in models
+        ),
+        model_runs=runs[0],
+        grade_runs=runs[1],
+        standard_runs=runs[2],
     )
-
-
-def _standards(models: Mapping[str, Model]) -> dict[str, str | None]:
-    return {
-        name: model.role if model.role == "standard" else None
-        for name, model in models.items()
-    }
 
 
 def _longest(order: Sequence[str], kinds: Mapping[str, str | None]) -> int:

@@ -3,21 +3,21 @@
 from collections import Counter
 from collections.abc import Sequence
 from functools import lru_cache
-from math import comb, prod
+from math import prod
+from typing import Any
 
 from masrel.errors import ScheduleError
-from masrel.lab.protocol import Model, Protocol, ScheduleScheme
+from masrel.lab.protocol import Protocol, ScheduleScheme
 from masrel.lab.schedule._admissible import (
     FREE,
     MAX_REMAINDERS,
-    Cell,
     LimitedRuns,
     PartedRuns,
+    StandardsApart,
     arrangement,
     n_arrangements,
-    subset,
 )
-from masrel.lab.schedule._stream import Stream
+from masrel.lab.schedule._secret import Stream
 
 WITH_ROWS = ("williams", "latin-square")
 """Schemes whose orders are rows of a design, dealt to raters one after the other."""
@@ -55,7 +55,8 @@ def order_problem(protocol: Protocol) -> str | None:
     scheme = protocol.schedule.scheme
     if scheme not in ("no-immediate-repeat", "restricted"):
         return None
-    if _is_parted(protocol) and (n := _parted(protocol).n_remainders) > MAX_REMAINDERS:
+    _, words = _limited(protocol)
+    if isinstance(words, PartedRuns) and (n := words.n_remainders) > MAX_REMAINDERS:
         return (
             "schedule.max_same_grade: needed orders that can be counted beside "
             f"standards_apart = true (at most {MAX_REMAINDERS} remainders), got {n}: "
@@ -187,100 +188,74 @@ def _in_blocks(protocol: Protocol, stream: Stream) -> list[str]:
 
 def count_orders(protocol: Protocol) -> int:
     """Return how many orders keep the limits of the scheme, repeats not told apart."""
+    groups, words = _limited(protocol)
     repeats = protocol.schedule.repeats
-    if _is_parted(protocol):
-        of_cells = (
-            n_arrangements([repeats] * len(m)) for m in _cells(protocol).values()
-        )
-        return _parted(protocol).count() * prod(of_cells)
-    if protocol.schedule.standards_apart:
-        standards, dummies = _of_roles(protocol)
-        n_gaps = len(dummies) * repeats + 1
-        return (
-            comb(n_gaps, len(standards) * repeats)
-            * n_arrangements([repeats] * len(standards))
-            * n_arrangements([repeats] * len(dummies))
-        )
-    groups, free = _groups(protocol)
-    words = _words(protocol).count()
-    for group in (*groups, free):
-        words *= n_arrangements([repeats] * len(group))
-    return words
+    of_groups = (n_arrangements([repeats] * len(each)) for each in groups.values())
+    return words.count() * prod(of_groups)
 
 
 def order_at(protocol: Protocol, number: int) -> list[str]:
     """Return the order of a number below that of all orders, each number another."""
-    if _is_parted(protocol):
-        cells = {}
-        for cell, models in _cells(protocol).items():
-            number, sequence = _arranged(protocol, models, number)
-            cells[cell] = iter(sequence)
-        return [next(cells[cell]) for cell in _parted(protocol).word(number)]
-    if protocol.schedule.standards_apart:
-        return _standards_parted(protocol, number)
-    groups, free = _groups(protocol)
+    groups, words = _limited(protocol)
     sequences = {}
-    for index, group in ((FREE, free), *enumerate(groups)):
-        number, sequence = _arranged(protocol, group, number)
-        sequences[index] = iter(sequence)
-    return [next(sequences[group]) for group in _words(protocol).word(number)]
+    for group, models in groups.items():
+        sizes = [protocol.schedule.repeats] * len(models)
+        number, index = divmod(number, n_arrangements(sizes))
+        sequences[group] = iter([models[place] for place in arrangement(index, sizes)])
+    return [next(sequences[group]) for group in words.word(number)]
 
 
-def _standards_parted(protocol: Protocol, number: int) -> list[str]:
-    # at most one standard before each dummy, and one after the last
-    standards, dummies = _of_roles(protocol)
-    number, of_standards = _arranged(protocol, standards, number)
-    number, of_dummies = _arranged(protocol, dummies, number)
-    gaps = subset(number, range(len(of_dummies) + 1), len(of_standards))
-    order = list(of_dummies)
-    for gap, standard in reversed(list(zip(gaps, of_standards, strict=True))):
-        order.insert(gap, standard)
-    return order
+_Groups = dict[Any, list[str]]
 
 
-def _arranged(
-    protocol: Protocol, models: Sequence[str], number: int
-) -> tuple[int, list[str]]:
-    # what is left of the number, and all presentations of the models in its order
-    sizes = [protocol.schedule.repeats] * len(models)
-    number, index = divmod(number, n_arrangements(sizes))
-    return number, [models[place] for place in arrangement(index, sizes)]
+def _limited(
+    protocol: Protocol,
+) -> tuple[_Groups, LimitedRuns | PartedRuns | StandardsApart]:
+    """Return models that count as the same, and the words of groups they may form."""
+    rules, models = protocol.schedule, protocol.models
+    # Two standards that are apart are no two of a grade in a row: the one limit does
+    # not hold by the other where a dummy has a grade.
+    are_both = rules.standards_apart and rules.max_same_grade is not None
+    if are_both and any(m.role == "dummy" and m.intended_grade for m in models):
+        return _parted(protocol)
+    if rules.standards_apart:
+        of_roles: _Groups = {
+            role: [model.id for model in models if model.role == role]
+            for role in ("standard", "dummy")
+        }
+        return of_roles, StandardsApart(
+            n_standards=len(of_roles["standard"]) * rules.repeats,
+            n_dummies=len(of_roles["dummy"]) * rules.repeats,
+        )
+    # what may come any number of times is free
+    groups: _Groups = {FREE: []}
+    numbers: dict[str, int] = {}
+    is_by_model = rules.scheme == "no-immediate-repeat"
+    for model in models:
+        name = model.id if is_by_model else model.intended_grade
+        group = FREE if name is None else numbers.setdefault(name, len(numbers))
+        groups.setdefault(group, []).append(model.id)
+    n_free, *sizes = (len(group) * rules.repeats for group in groups.values())
+    longest = rules.max_same_grade or 1
+    return groups, LimitedRuns(sizes=tuple(sizes), n_free=n_free, longest=longest)
 
 
-def _is_parted(protocol: Protocol) -> bool:
-    """Return whether one limit does not hold by the other: a dummy has a grade."""
-    # Two standards that are apart are no two of a grade in a row.
-    rules = protocol.schedule
-    return (
-        rules.standards_apart
-        and rules.max_same_grade is not None
-        and any(m.role == "dummy" and m.intended_grade for m in protocol.models)
-    )
-
-
-def _cells(protocol: Protocol) -> dict[Cell, list[str]]:
+def _parted(protocol: Protocol) -> tuple[_Groups, PartedRuns]:
     # models by grade, in the order in which grades first come, and those without last;
     # of each the dummies, then the standards
-    grades = dict.fromkeys(m.intended_grade for m in protocol.models)
-    names = [*(grade for grade in grades if grade is not None), None]
-    return {
+    rules, models = protocol.schedule, protocol.models
+    grades = dict.fromkeys(m.intended_grade for m in models if m.intended_grade)
+    cells: _Groups = {
         (None if grade is None else index, role == "standard"): [
-            m.id for m in protocol.models if (m.intended_grade, m.role) == (grade, role)
+            m.id for m in models if (m.intended_grade, m.role) == (grade, role)
         ]
-        for index, grade in enumerate(names)
+        for index, grade in enumerate([*grades, None])
         for role in ("dummy", "standard")
     }
-
-
-def _parted(protocol: Protocol) -> PartedRuns:
-    repeats = protocol.schedule.repeats
-    n = {cell: len(models) * repeats for cell, models in _cells(protocol).items()}
-    n_grades = len(n) // 2 - 1
-    return _counted(
-        tuple((n[grade, False], n[grade, True]) for grade in range(n_grades)),
-        (n[None, False], n[None, True]),
-        protocol.schedule.max_same_grade or 1,
-    )
+    n = {cell: len(each) * rules.repeats for cell, each in cells.items()}
+    sizes = tuple((n[grade, False], n[grade, True]) for grade in range(len(grades)))
+    free = n[None, False], n[None, True]
+    return cells, _counted(sizes, free, rules.max_same_grade or 1)
 
 
 @lru_cache(maxsize=8)
@@ -289,37 +264,3 @@ def _counted(
 ) -> PartedRuns:
     # one for all raters: what was counted stays with it
     return PartedRuns(grades, free, longest)
-
-
-def _of_roles(protocol: Protocol) -> tuple[list[str], list[str]]:
-    standards = [model.id for model in protocol.models if model.role == "standard"]
-    dummies = [model.id for model in protocol.models if model.role == "dummy"]
-    return standards, dummies
-
-
-def _groups(protocol: Protocol) -> tuple[list[list[str]], list[str]]:
-    # models that count as the same, and those that may come any number of times
-    groups: dict[str, list[str]] = {}
-    free = []
-    for model in protocol.models:
-        name = _group(protocol, model)
-        if name is None:
-            free.append(model.id)
-        else:
-            groups.setdefault(name, []).append(model.id)
-    return list(groups.values()), free
-
-
-def _group(protocol: Protocol, model: Model) -> str | None:
-    is_by_model = protocol.schedule.scheme == "no-immediate-repeat"
-    return model.id if is_by_model else model.intended_grade
-
-
-def _words(protocol: Protocol) -> LimitedRuns:
-    rules = protocol.schedule
-    groups, free = _groups(protocol)
-    return LimitedRuns(
-        sizes=tuple(len(group) * rules.repeats for group in groups),
-        n_free=len(free) * rules.repeats,
-        longest=rules.max_same_grade or 1,
-    )

@@ -1,18 +1,26 @@
-"""The secret from which a study's orders and codes are drawn, and its file."""
+"""What orders and codes are drawn from: secrets of a study and its sites, and words.
+
+The secret has a file; where sites are strata each has one of its own, derived from the
+study's, and can have a copy of the study. Random words come from a name and a secret.
+"""
 
 import hashlib
 import hmac
 import json
 import re
 import secrets
+from collections.abc import MutableSequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Self, TypeVar
+
+from numpy.random import PCG64
 
 from masrel._files import make_folder, write_files
 from masrel.errors import ScheduleError
 from masrel.lab._bounded_files import MAX_SMALL, read_regular
-from masrel.lab.protocol import StudyPaths
+from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.protocol.study import _check_new_folder
 
 N_BYTES = 16
 """Bytes of a secret: 128 bits, which nobody can try one by one."""
@@ -120,3 +128,158 @@ def _read(file: Path) -> StudySecret:
         f"{file}: needed a line 'format: 1' and a line 'secret: ' with "
         f"{2 * N_BYTES} hexadecimal digits, got another text"
     )
+
+
+def site_of(protocol: Protocol, rater: str) -> str | None:
+    """Return the site of a rater where sites are strata; else None."""
+    if protocol.schedule.strata == "none":
+        return None
+    return {each.id: each.site for each in protocol.raters}[rater]
+
+
+def checked_site(protocol: Protocol, site: str | None) -> str | None:
+    """Return a site that the protocol has, and by which it draws; refuse any other."""
+    if site is None:
+        return None
+    if protocol.schedule.strata != "site":
+        raise ScheduleError(
+            'site: needed schedule.strata = "site" in the protocol, got '
+            f'"{protocol.schedule.strata}"'
+        )
+    sites = dict.fromkeys(rater.site for rater in protocol.raters if rater.site)
+    if site not in sites:
+        raise ScheduleError(f"site: needed one of {', '.join(sites)}, got {site!r}")
+    return site
+
+
+def site_of_copy(study: StudyPaths) -> str | None:
+    """Return the site that a study is the copy of.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+
+    Returns
+    -------
+    str or None
+        The site whose secret alone the study has; None of a whole study.
+
+    Raises
+    ------
+    ScheduleError
+        If the file of the secret is damaged.
+    """
+    key = find_secret(study)
+    return None if key is None else key.site
+
+
+def copy_for_site(
+    protocol: Protocol, study: StudyPaths, site: str, destination: Path
+) -> None:
+    """Copy a study for one of its sites, whose secret alone the copy has.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The study's protocol, whose sites are strata.
+    study : StudyPaths
+        Where the study is; its secret is drawn if there is none yet.
+    site : str
+        Whose copy.
+    destination : Path
+        A new or empty folder: it gets the protocol with its model files, and the
+        secret of the site with the study's commitment. Neither schedules nor logs.
+
+    Raises
+    ------
+    ScheduleError
+        If there is no such site, the study has another site's secret alone, or a
+        model file is not in the study.
+    ParameterError
+        If `destination` is a file or holds anything.
+    OSError
+        If the system refuses a folder or file.
+    """
+    checked_site(protocol, site)
+    copy = StudyPaths(destination)
+    files = [model.file for model in protocol.models if model.file is not None]
+    for file in files:
+        if not (study.root / file).resolve().is_relative_to(study.root.resolve()):
+            raise ScheduleError(
+                f"{study.protocol}: needed model files inside the study to copy it, "
+                f"got {file}"
+            )
+    contents = {
+        destination / file: read_regular(study.root / file, most=MAX_SMALL)
+        for file in (*dict.fromkeys(files), study.protocol.name)
+    }
+    key = find_secret(study) or new_secret(study)
+    secret = {copy.secret_file: site_secret_text(key, site).encode()}
+    _check_new_folder(destination, secret | contents)
+    make_folder(copy.secret_file.parent, mode=0o700)
+    write_files(secret | contents, within=destination, mode=0o600)
+
+
+_T = TypeVar("_T")
+
+_N_WORDS = 2**64
+
+
+class Stream:
+    """Random words for one purpose, whatever else is drawn from the same seed."""
+
+    # NumPy keeps the raw words of a bit generator the same for ever, but not what its
+    # Generator methods make of them: words are taken raw, and numbers made here.
+    #
+    # The SHA-256 of the JSON array ``["masrel", seed, *purpose]`` (UTF-8, no spaces,
+    # non-ASCII escaped) is the whole state of the generator: its first 16 bytes, big
+    # endian, are PCG64's state, the other 16 its increment, made odd. With a secret it
+    # is the HMAC-SHA256 of that array, whose key is the secret: who has the words of
+    # some streams learns neither the secret nor any other stream.
+
+    def __init__(self, seed: int, *purpose: str, secret: bytes | None = None) -> None:
+        name = json.dumps(["masrel", seed, *purpose], separators=(",", ":")).encode()
+        if secret is None:
+            digest = hashlib.sha256(name).digest()
+        else:
+            digest = hmac.digest(secret, name, "sha256")
+        self._generator = PCG64(0)
+        self._generator.state = {
+            "bit_generator": "PCG64",
+            "state": {
+                "state": int.from_bytes(digest[:16], "big"),
+                "inc": int.from_bytes(digest[16:], "big") | 1,
+            },
+            "has_uint32": 0,
+            "uinteger": 0,
+        }
+
+    def word(self) -> int:
+        """Return the next word, uniform on 0 to 2**64 - 1."""
+        return int(self._generator.random_raw())
+
+    def below(self, limit: int) -> int:
+        """Return a number uniform on 0 to `limit` - 1; `limit` from 1."""
+        # As many words as are needed make one number, the first word its highest.
+        # Those at and above the last multiple of `limit` are rejected, so that every
+        # number has exactly the same chance.
+        n_words = max(1, -(-(limit - 1).bit_length() // 64))
+        usable = _N_WORDS**n_words // limit * limit
+        while (number := self._joined(n_words)) >= usable:
+            pass
+        return number % limit
+
+    def _joined(self, n_words: int) -> int:
+        number = 0
+        for _ in range(n_words):
+            number = number * _N_WORDS + self.word()
+        return number
+
+    def shuffle(self, items: MutableSequence[_T]) -> None:
+        """Put `items` into a random order in place, each order equally likely."""
+        # Fisher and Yates, from the last place down: place i takes the item of a place
+        # drawn from 0 to i.
+        for i in range(len(items) - 1, 0, -1):
+            j = self.below(i + 1)
+            items[i], items[j] = items[j], items[i]

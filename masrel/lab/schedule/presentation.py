@@ -1,15 +1,25 @@
-"""The schedule of one rater in one session: what it is, drawing it, checking it."""
+"""The schedule of one rater in one session: drawing it, checking it, and its file."""
 
+import re
 from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import masrel
+from masrel._input import not_utf8
 from masrel.errors import ScheduleError
+from masrel.lab._bounded_files import (
+    MAX_SMALL,
+    csv_format,
+    format_problem,
+    read_regular,
+)
+from masrel.lab._once import once
 from masrel.lab.protocol import Protocol, presented_hash, protocol_hash
 from masrel.lab.schedule._orders import WITH_ROWS, draw_order
-from masrel.lab.schedule._secret import StudySecret, check_secret
-from masrel.lab.schedule._sites import site_of
-from masrel.lab.schedule._stream import Stream
+from masrel.lab.schedule._secret import Stream, StudySecret, check_secret, site_of
 
 # No letter that reads as a digit (I, O, Q, S, Z), that makes a number of the code
 # (E), or that says left or right (L, R).
@@ -213,33 +223,39 @@ def check_schedule(schedule: Schedule, protocol: Protocol) -> None:
             f"{where}: needed study {protocol.study.id}, got {schedule.study}"
         )
     _require_place(protocol, schedule.rater, schedule.session)
-    if schedule.presented_sha256 != presented_hash(protocol):
-        raise ScheduleError(
-            f"{where}: needed one drawn from the protocol as it is, got one from "
-            "before a change in what it presents; masrel check names the keys"
-        )
-    if schedule.site != (site := site_of(protocol, schedule.rater)):
-        raise ScheduleError(
-            f"{where}: needed one drawn for site {site}, got one for {schedule.site}"
-        )
-    if (schedule.row is None) == (schedule.scheme in WITH_ROWS):
-        raise ScheduleError(
-            f"{where}: needed {'a' if schedule.row is None else 'no'} row with scheme "
-            f"{schedule.scheme}, got {'none' if schedule.row is None else schedule.row}"
-        )
     expected = Counter(
         (model.id, repeat)
         for model in protocol.models
         for repeat in range(1, protocol.schedule.repeats + 1)
     )
     scheduled = Counter((shown.model, shown.repeat) for shown in schedule.presentations)
-    if expected != scheduled:
+    site, row = site_of(protocol, schedule.rater), schedule.row
+    rules = (
+        (
+            schedule.presented_sha256 != presented_hash(protocol),
+            "one drawn from the protocol as it is, got one from before a change in "
+            "what it presents; masrel check names the keys",
+        ),
+        (
+            schedule.site != site,
+            f"one drawn for site {site}, got one for {schedule.site}",
+        ),
+        (
+            (row is None) == (schedule.scheme in WITH_ROWS),
+            f"{'a' if row is None else 'no'} row with scheme {schedule.scheme}, got "
+            f"{'none' if row is None else row}",
+        ),
         # Names of models would tell the rater at the console which ones are missing.
-        raise ScheduleError(
-            f"{where}: needed every model of the protocol once per repeat, got rows "
-            f"with {(expected - scheduled).total()} of these missing and "
-            f"{(scheduled - expected).total()} others"
-        )
+        (
+            expected != scheduled,
+            "every model of the protocol once per repeat, got rows with "
+            f"{(expected - scheduled).total()} of these missing and "
+            f"{(scheduled - expected).total()} others",
+        ),
+    )
+    for is_broken, needs in rules:
+        if is_broken:
+            raise ScheduleError(f"{where}: needed {needs}")
 
 
 def _require_place(protocol: Protocol, rater: str, session: str) -> None:
@@ -254,3 +270,173 @@ def _require_place(protocol: Protocol, rater: str, session: str) -> None:
             f"rater: needed one of {', '.join(raters[session])} for session "
             f"{session}, got {rater!r}"
         )
+
+
+_FORMAT = 1
+"""Version of the files of schedules and sheets; a file without one is of version 1."""
+
+_HEAD = {
+    "study": r"\S+",
+    "rater": r"\S+",
+    "session": r"\S+",
+    "seed": r"[0-9]{1,19}",
+    "scheme": r"\S+",
+    "protocol_sha256": r"[0-9a-f]{64}",
+    "presented_sha256": r"[0-9a-f]{64}",
+    "masrel_version": r"\S+",
+    "commitment": r"[0-9a-f]{64}",
+    "site": r"\S+",
+    "row": r"[1-9][0-9]{0,8}",
+}
+"""Keys of the ``# key: value`` lines, in order, and what their values look like."""
+
+_WHOLE = ("seed", "row")
+"""Those whose values are whole numbers."""
+
+_OPTIONAL = ("commitment", "site", "row")
+"""Those that a schedule without a secret, without strata, or without rows has not."""
+
+_COLUMNS = ["position", "code", "model", "repeat"]
+_SHEET_COLUMNS = ["position", "code", "grade"]
+
+# A code names a recording's file, so it is letters and digits only.
+_CODE = re.compile(r"[0-9A-Za-z]{1,16}")
+
+
+@once
+def read_schedule(path: Path) -> Schedule:
+    """Read a schedule file.
+
+    Parameters
+    ----------
+    path : Path
+        A file that :func:`masrel.lab.schedule.write_schedules` wrote.
+
+    Returns
+    -------
+    Schedule
+        The schedule; :func:`masrel.lab.schedule.check_schedule` holds it against a
+        protocol.
+
+    Raises
+    ------
+    ScheduleError
+        If there is no such file, or it is not a schedule: the message has every
+        problem with file and line.
+    """
+    lines = _read_lines(path)
+    n_head = next((i for i, s in enumerate(lines) if not s.startswith("#")), len(lines))
+    problem = _format_problem(lines)
+    if problem is not None:
+        raise ScheduleError(f"{path}: {problem}")
+    problems: list[str] = []
+    head = _read_head(lines[:n_head], path, problems)
+    rows = _read_rows(lines, n_head, path, problems)
+    if problems:
+        raise ScheduleError("\n".join(problems))
+    whole: dict[str, Any] = {key: int(head[key]) for key in _WHOLE if key in head}
+    return Schedule(**(head | whole), presentations=tuple(rows))
+
+
+def _read_lines(path: Path) -> list[str]:
+    try:
+        return read_regular(path, most=MAX_SMALL).decode("utf-8").splitlines()
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise ScheduleError(f"{path}: needed a schedule file, got: {reason}") from error
+    except UnicodeDecodeError as error:
+        raise ScheduleError(f"{path}: {not_utf8(error)}") from error
+
+
+def _format_problem(lines: Sequence[str]) -> str | None:
+    return format_problem(csv_format("\n".join(lines)), newest=_FORMAT)
+
+
+def _read_head(lines: list[str], path: Path, problems: list[str]) -> dict[str, str]:
+    head: dict[str, str] = {}
+    for number, line in enumerate(lines, start=1):
+        key, _, value = line.removeprefix("#").partition(":")
+        key, value = key.strip(), value.strip()
+        if key == "format":
+            continue  # it is known
+        if key not in _HEAD or key in head:
+            problems.append(
+                f"{path}: line {number}: needed '# key: value' with each of "
+                f"{', '.join(_HEAD)} once, got {line!r}"
+            )
+        elif not re.fullmatch(_HEAD[key], value):
+            problems.append(
+                f"{path}: line {number}: needed {key} as {_HEAD[key]}, got {value!r}"
+            )
+            head[key] = ""
+        else:
+            head[key] = value
+    absent = [key for key in _HEAD if key not in head and key not in _OPTIONAL]
+    if absent:
+        problems.append(f"{path}: needed a line '# {absent[0]}: ...', got none")
+    return head
+
+
+def _read_rows(
+    lines: list[str], n_head: int, path: Path, problems: list[str]
+) -> Iterator[Presentation]:
+    # a cell longer than csv takes is in no schedule
+    table = [line.split(",") if line else [] for line in lines[n_head:]]
+    if not table or table[0] != _COLUMNS:
+        header = ",".join(table[0]) if table else "nothing"
+        problems.append(
+            f"{path}: line {n_head + 1}: needed columns {','.join(_COLUMNS)}, "
+            f"got {header}"
+        )
+        return iter(())
+    if len(table) == 1:
+        problems.append(f"{path}: needed at least one presentation, got none")
+    seen: set[str] = set()
+    for place, row in enumerate(table[1:], start=1):
+        problem = _row_problem(row, place, seen)
+        if problem:
+            problems.append(f"{path}: line {n_head + 1 + place}: {problem}")
+        seen.update(row[1:2])
+    return (
+        Presentation(position=int(p), code=code, model=model, repeat=int(repeat))
+        for p, code, model, repeat in table[1:]
+    )
+
+
+def _row_problem(row: Sequence[str], place: int, seen: set[str]) -> str | None:
+    if len(row) != len(_COLUMNS):
+        return f"needed {len(_COLUMNS)} cells, got {len(row)}"
+    position, code, model, repeat = row
+    rules = (
+        (position != str(place), f"needed position {place}, got {position!r}"),
+        (
+            not _CODE.fullmatch(code),
+            f"needed a code of letters and digits, got {code!r}",
+        ),
+        (code in seen, f"needed codes that differ, got {code!r} again"),
+        (not model, "needed the id of a model, got none"),
+        (
+            not re.fullmatch(r"[1-9][0-9]{0,3}", repeat),
+            f"needed repeat as a whole number from 1, got {repeat!r}",
+        ),
+    )
+    return next((needs for is_broken, needs in rules if is_broken), None)
+
+
+def _schedule_text(schedule: Schedule) -> str:
+    """Write a schedule as the text of its file."""
+    values = {key: getattr(schedule, key) for key in _HEAD}
+    head = [f"# format: {_FORMAT}"]
+    head += [f"# {key}: {value}" for key, value in values.items() if value is not None]
+    rows = [
+        f"{shown.position},{shown.code},{shown.model},{shown.repeat}"
+        for shown in schedule.presentations
+    ]
+    return "\n".join([*head, ",".join(_COLUMNS), *rows]) + "\n"
+
+
+def _sheet_text(schedule: Schedule) -> str:
+    """Write the blinded sheet on which a rater's grades are noted."""
+    rows = [f"{shown.position},{shown.code}," for shown in schedule.presentations]
+    head = f"# format: {_FORMAT}"
+    return "\n".join([head, ",".join(_SHEET_COLUMNS), *rows]) + "\n"

@@ -1,66 +1,43 @@
-"""The files of schedules and raters' sheets: read, drawn once, kept, found stale."""
+"""The files of schedules and raters' sheets: drawn once, kept, found stale."""
 
+import hashlib
+import json
 import os
-import re
 import shlex
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from masrel._files import make_folder, write_files
-from masrel._input import listed, not_utf8
+from masrel._input import listed
 from masrel.errors import ScheduleError
-from masrel.lab._bounded_files import (
-    MAX_SMALL,
-    csv_format,
-    format_problem,
-    read_regular,
-)
-from masrel.lab._once import once
+from masrel.lab._bounded_files import MAX_SMALL, read_regular
 from masrel.lab.protocol import (
     Protocol,
     StudyPaths,
     presented_content,
     presented_hash,
 )
-from masrel.lab.schedule._changes import content_file, stale_sentences
 from masrel.lab.schedule._orders import WITH_ROWS, order_problem
-from masrel.lab.schedule._secret import StudySecret, find_secret, new_secret
-from masrel.lab.schedule._sites import checked_site, site_of
+from masrel.lab.schedule._secret import (
+    StudySecret,
+    checked_site,
+    find_secret,
+    new_secret,
+    site_of,
+)
 from masrel.lab.schedule.presentation import (
-    Presentation,
     Schedule,
     _draw_with_key,
+    _format_problem,
     _require_place,
+    _schedule_text,
+    _sheet_text,
     check_schedule,
+    read_schedule,
 )
-
-_FORMAT = 1
-"""Version of the files of schedules and sheets; a file without one is of version 1."""
-
-_HEAD = {
-    "study": r"\S+",
-    "rater": r"\S+",
-    "session": r"\S+",
-    "seed": r"[0-9]{1,19}",
-    "scheme": r"\S+",
-    "protocol_sha256": r"[0-9a-f]{64}",
-    "presented_sha256": r"[0-9a-f]{64}",
-    "masrel_version": r"\S+",
-    "commitment": r"[0-9a-f]{64}",
-    "site": r"\S+",
-    "row": r"[1-9][0-9]{0,8}",
-}
-"""Keys of the ``# key: value`` lines, in order, and what their values look like."""
-
-_OPTIONAL = ("commitment", "site", "row")
-"""Those that a schedule without a secret, without strata, or without rows has not."""
-
-_COLUMNS = ["position", "code", "model", "repeat"]
-_SHEET_COLUMNS = ["position", "code", "grade"]
-
-# A code names a recording's file, so it is letters and digits only.
-_CODE = re.compile(r"[0-9A-Za-z]{1,16}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,53 +52,6 @@ class _ScheduleFiles:
     log: Path
 
 
-@once
-def read_schedule(path: Path) -> Schedule:
-    """Read a schedule file.
-
-    Parameters
-    ----------
-    path : Path
-        A file that :func:`masrel.lab.schedule.write_schedules` wrote.
-
-    Returns
-    -------
-    Schedule
-        The schedule; :func:`masrel.lab.schedule.check_schedule` holds it against a
-        protocol.
-
-    Raises
-    ------
-    ScheduleError
-        If there is no such file, or it is not a schedule: the message has every
-        problem with file and line.
-    """
-    lines = _read_lines(path)
-    n_head = next((i for i, s in enumerate(lines) if not s.startswith("#")), len(lines))
-    problem = _format_problem(lines)
-    if problem is not None:
-        raise ScheduleError(f"{path}: {problem}")
-    problems: list[str] = []
-    head = _read_head(lines[:n_head], path, problems)
-    rows = _read_rows(lines, n_head, path, problems)
-    if problems:
-        raise ScheduleError("\n".join(problems))
-    return Schedule(
-        study=head["study"],
-        rater=head["rater"],
-        session=head["session"],
-        seed=int(head["seed"]),
-        scheme=head["scheme"],
-        protocol_sha256=head["protocol_sha256"],
-        presented_sha256=head["presented_sha256"],
-        masrel_version=head["masrel_version"],
-        commitment=head.get("commitment"),
-        site=head.get("site"),
-        row=int(head["row"]) if "row" in head else None,
-        presentations=tuple(rows),
-    )
-
-
 def _drawn_schedule(
     study: StudyPaths, protocol: Protocol, rater: str, session: str
 ) -> Schedule:
@@ -133,95 +63,18 @@ def _drawn_schedule(
             f"{path}: needed a schedule file, got none: masrel schedule draws it"
         )
     schedule = read_schedule(path)
+    _require_its_own(schedule, path, rater, session)
     check_schedule(schedule, protocol)
-    if (schedule.rater, schedule.session) != (rater, session):
-        raise ScheduleError(
-            f"{path}: needed the schedule of rater {rater} in session {session}, got "
-            f"that of {schedule.rater} in {schedule.session}"
-        )
     return schedule
 
 
-def _read_lines(path: Path) -> list[str]:
-    try:
-        return read_regular(path, most=MAX_SMALL).decode("utf-8").splitlines()
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise ScheduleError(f"{path}: needed a schedule file, got: {reason}") from error
-    except UnicodeDecodeError as error:
-        raise ScheduleError(f"{path}: {not_utf8(error)}") from error
-
-
-def _format_problem(lines: Sequence[str]) -> str | None:
-    return format_problem(csv_format("\n".join(lines)), newest=_FORMAT)
-
-
-def _read_head(lines: list[str], path: Path, problems: list[str]) -> dict[str, str]:
-    head: dict[str, str] = {}
-    for number, line in enumerate(lines, start=1):
-        key, _, value = line.removeprefix("#").partition(":")
-        key, value = key.strip(), value.strip()
-        if key == "format":
-            continue  # it is known
-        if key not in _HEAD or key in head:
-            problems.append(
-                f"{path}: line {number}: needed '# key: value' with each of "
-                f"{', '.join(_HEAD)} once, got {line!r}"
-            )
-        elif not re.fullmatch(_HEAD[key], value):
-            problems.append(
-                f"{path}: line {number}: needed {key} as {_HEAD[key]}, got {value!r}"
-            )
-            head[key] = ""
-        else:
-            head[key] = value
-    absent = [key for key in _HEAD if key not in head and key not in _OPTIONAL]
-    if absent:
-        problems.append(f"{path}: needed a line '# {absent[0]}: ...', got none")
-    return head
-
-
-def _read_rows(
-    lines: list[str], n_head: int, path: Path, problems: list[str]
-) -> Iterator[Presentation]:
-    # a cell longer than csv takes is in no schedule
-    table = [line.split(",") if line else [] for line in lines[n_head:]]
-    if not table or table[0] != _COLUMNS:
-        header = ",".join(table[0]) if table else "nothing"
-        problems.append(
-            f"{path}: line {n_head + 1}: needed columns {','.join(_COLUMNS)}, "
-            f"got {header}"
+def _require_its_own(schedule: Schedule, file: Path, rater: str, session: str) -> None:
+    """Refuse a file that has the schedule of somebody else, or of another session."""
+    if (schedule.rater, schedule.session) != (rater, session):
+        raise ScheduleError(
+            f"{file}: needed the schedule of rater {rater} in session {session}, got "
+            f"that of {schedule.rater} in {schedule.session}"
         )
-        return iter(())
-    if len(table) == 1:
-        problems.append(f"{path}: needed at least one presentation, got none")
-    seen: set[str] = set()
-    for place, row in enumerate(table[1:], start=1):
-        problem = _row_problem(row, place, seen)
-        if problem:
-            problems.append(f"{path}: line {n_head + 1 + place}: {problem}")
-        seen.update(row[1:2])
-    return (
-        Presentation(position=int(p), code=code, model=model, repeat=int(repeat))
-        for p, code, model, repeat in table[1:]
-    )
-
-
-def _row_problem(row: Sequence[str], place: int, seen: set[str]) -> str | None:
-    if len(row) != len(_COLUMNS):
-        return f"needed {len(_COLUMNS)} cells, got {len(row)}"
-    position, code, model, repeat = row
-    if position != str(place):
-        return f"needed position {place}, got {position!r}"
-    if not _CODE.fullmatch(code):
-        return f"needed a code of letters and digits, got {code!r}"
-    if code in seen:
-        return f"needed codes that differ, got {code!r} again"
-    if not model:
-        return "needed the id of a model, got none"
-    if not re.fullmatch(r"[1-9][0-9]{0,3}", repeat):
-        return f"needed repeat as a whole number from 1, got {repeat!r}"
-    return None
 
 
 _Places = Sequence[tuple[str, str]]
@@ -286,15 +139,14 @@ def write_schedules(
                 texts[files.sheet] = _sheet_text(read_schedule(files.schedule))
             continue
         to_draw.append(files)
-        if fault.drawn_from is not None and not redraw:
-            stale.append(fault.drawn_from)
-            continue
-        problem = _refusal(files, fault.message, redraw=redraw)
-        if problem is not None:
+        message, drawn_from = fault
+        if drawn_from is not None and not redraw:
+            stale.append(drawn_from)
+        elif (problem := _refusal(files, message, redraw=redraw)) is not None:
             problems.append(problem)
     problems += (
         f"{sentence}; --redraw draws those anew whose sessions have not begun"
-        for sentence in stale_sentences(protocol, study, stale, len(every))
+        for sentence in _stale_sentences(protocol, study, stale, len(every))
     )
     if problems:
         raise ScheduleError("\n".join(problems))
@@ -323,7 +175,7 @@ def _drawn_texts(
         for files in to_draw:  # refused before a row is allotted
             key.of(site_of(protocol, files.rater))
     texts: dict[Path, str | bytes] = {}
-    drawn_from = content_file(study, presented_hash(protocol))
+    drawn_from = _content_file(study, presented_hash(protocol))
     if not drawn_from.exists():
         texts[drawn_from] = presented_content(protocol)
     rows = {} if allot is None else allot([(f.rater, f.session) for f in to_draw])
@@ -372,11 +224,11 @@ def schedule_problems(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
             problem = _sheet_fault(files, schedule)
             problem = problem or _draw_fault(files, schedule, protocol, secret)
             problems += filter(None, [problem])
-        elif fault.drawn_from is None:
-            problems.append(fault.message)
+        elif fault[1] is None:
+            problems.append(fault[0])
         else:
-            stale.append(fault.drawn_from)
-    problems += stale_sentences(protocol, study, stale, len(every))
+            stale.append(fault[1])
+    problems += _stale_sentences(protocol, study, stale, len(every))
     expected = {path for files in every for path in (files.schedule, files.sheet)}
     for path in sorted(study.schedules.glob("*.csv")):
         if path not in expected:
@@ -419,24 +271,25 @@ def concealment_notes(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
         and (secret is None or not secret.draws(each.site, each.commitment))
         for each in schedules
     )
-    notes = []
-    if study.published_secret_file.is_file():
-        notes.append(
+    notes = (
+        (
+            study.published_secret_file.is_file(),
             f"{study.published_secret_file}: the secret is published, so that codes "
-            "and orders drawn from it conceal nothing from who has read it"
-        )
-    if from_seed:
-        notes.append(
+            "and orders drawn from it conceal nothing from who has read it",
+        ),
+        (
+            from_seed,
             f"{study.schedules}: {from_seed} of {len(schedules)} schedules were "
-            "drawn from the protocol's seed alone: a sheet gives their order away"
-        )
-    if of_others:
-        notes.append(
+            "drawn from the protocol's seed alone: a sheet gives their order away",
+        ),
+        (
+            of_others,
             f"{study.schedules}: {of_others} of {len(schedules)} schedules are of a "
             "secret that is not in the study: they stay good, and cannot be drawn "
-            "again for comparison"
-        )
-    return (*notes, *_open_to_others(study))
+            "again for comparison",
+        ),
+    )
+    return (*(note for is_so, note in notes if is_so), *_open_to_others(study))
 
 
 def _open_to_others(study: StudyPaths) -> Iterator[str]:
@@ -480,61 +333,52 @@ def _every_schedule(
     ]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Fault:
-    """Why the file of a schedule cannot be used as it is."""
+def _fault(files: _ScheduleFiles, protocol: Protocol) -> tuple[str, str | None] | None:
+    """Return why the file of a schedule cannot be used as it is, or None.
 
-    message: str
-    # of a stale one the hash of what was presented when it was drawn
-    drawn_from: str | None = None
-
-
-def _fault(files: _ScheduleFiles, protocol: Protocol) -> _Fault | None:
+    With it of a stale one comes the hash of what was presented when it was drawn.
+    """
     if not files.schedule.exists():
-        return _Fault(message=f"{files.schedule}: needed a schedule file, got none")
+        return f"{files.schedule}: needed a schedule file, got none", None
     try:
         schedule = read_schedule(files.schedule)
+        _require_its_own(schedule, files.schedule, files.rater, files.session)
     except ScheduleError as error:
-        return _Fault(message=str(error))
-    if (schedule.rater, schedule.session) != (files.rater, files.session):
-        return _Fault(
-            message=f"{files.schedule}: needed the schedule of rater {files.rater} in "
-            f"session {files.session}, got that of {schedule.rater} in "
-            f"{schedule.session}"
-        )
+        return str(error), None
     try:
         check_schedule(schedule, protocol)
     except ScheduleError as error:
-        is_stale = schedule.presented_sha256 != presented_hash(protocol)
-        return _Fault(
-            message=f"{files.schedule}: {error}",
-            drawn_from=schedule.presented_sha256 if is_stale else None,
-        )
+        drawn_from = schedule.presented_sha256
+        is_stale = drawn_from != presented_hash(protocol)
+        return f"{files.schedule}: {error}", drawn_from if is_stale else None
     return None
 
 
 def _refusal(files: _ScheduleFiles, fault: str, *, redraw: bool) -> str | None:
     # Why a schedule with this fault may not be drawn, or None.
-    if files.log.exists():
-        return (
-            f"{fault}. It was not drawn, because the session has begun: {files.log} "
-            "was recorded by the schedule there was. Bring back that schedule and its "
-            "protocol, or move the log out of the study"
-        )
-    if files.sheet.exists() and _is_filled_in(files.sheet):
-        return (
-            f"{fault}. It was not drawn, because {files.sheet} has grades on it. Move "
-            "the sheet out of the study first"
-        )
-    if files.typed.exists():
-        return (
-            f"{fault}. It was not drawn, because its sheet was printed, and what is on "
-            f"paper could not be entered any more. Move {files.typed} out of the study "
-            "first"
-        )
-    if files.schedule.exists() and not redraw:
-        return f"{fault}. It was kept; --redraw draws it anew"
-    return None
+    rules = (
+        (
+            files.log.exists(),
+            f"It was not drawn, because the session has begun: {files.log} was "
+            "recorded by the schedule there was. Bring back that schedule and its "
+            "protocol, or move the log out of the study",
+        ),
+        (
+            files.sheet.exists() and _is_filled_in(files.sheet),
+            f"It was not drawn, because {files.sheet} has grades on it. Move the sheet "
+            "out of the study first",
+        ),
+        (
+            files.typed.exists(),
+            "It was not drawn, because its sheet was printed, and what is on paper "
+            f"could not be entered any more. Move {files.typed} out of the study first",
+        ),
+        (
+            files.schedule.exists() and not redraw,
+            "It was kept; --redraw draws it anew",
+        ),
+    )
+    return next((f"{fault}. {why}" for is_so, why in rules if is_so), None)
 
 
 def _is_filled_in(sheet: Path) -> bool:
@@ -587,20 +431,71 @@ def _draw_fault(
     )
 
 
-def _schedule_text(schedule: Schedule) -> str:
-    """Write a schedule as the text of its file."""
-    values = {key: getattr(schedule, key) for key in _HEAD}
-    head = [f"# format: {_FORMAT}"]
-    head += [f"# {key}: {value}" for key, value in values.items() if value is not None]
-    rows = [
-        f"{shown.position},{shown.code},{shown.model},{shown.repeat}"
-        for shown in schedule.presentations
+_SHOWN = 4  # keys that are named
+
+_NOT_SET = object()
+
+
+def _content_file(study: StudyPaths, sha256: str) -> Path:
+    """Return the file that keeps what schedules with this hash were drawn from."""
+    return study.schedules / f"presented_{sha256[:12]}.json"
+
+
+def _stale_sentences(
+    protocol: Protocol, study: StudyPaths, drawn_from: Iterable[str], n_schedules: int
+) -> Iterator[str]:
+    """Yield a sentence for all schedules that were drawn from the same protocol."""
+    # drawn_from: hash of what was presented at the draw, of each stale schedule
+    for sha256, n_stale in Counter(drawn_from).items():
+        changes = _changes(protocol, _content_file(study, sha256), sha256)
+        are = "is" if n_stale == 1 else "are"
+        yield (
+            f"{study.protocol}: {changes} since the draw: {n_stale} of {n_schedules} "
+            f"schedules {are} stale"
+        )
+
+
+def _changes(protocol: Protocol, file: Path, sha256: str) -> str:
+    drawn = file.read_bytes() if file.is_file() else b""
+    if hashlib.sha256(drawn).hexdigest() != sha256:
+        return (
+            "a key of the study id, scale, elbow, models, schedule, stretch, "
+            "presentation, occasions or device has changed"
+        )
+    before, now = (
+        dict(_leaves(json.loads(text))) for text in (drawn, presented_content(protocol))
+    )
+    # of a model that is new or gone its place in the list says all
+    gone = {k for k in before.keys() ^ now.keys() if k.startswith("models.")}
+    both = {k.split(".")[1] for k in before if k.startswith("models.")} & {
+        k.split(".")[1] for k in now if k.startswith("models.")
+    }
+    keys = [
+        key
+        for key in [*now, *(key for key in before if key not in now)]
+        if before.get(key, _NOT_SET) != now.get(key, _NOT_SET)
+        and (key not in gone or key.split(".")[1] in both)
     ]
-    return "\n".join([*head, ",".join(_COLUMNS), *rows]) + "\n"
+    shown = [
+        f"{key} was {_text(before.get(key, _NOT_SET))} and is "
+        f"{_text(now.get(key, _NOT_SET))}"
+        for key in keys[:_SHOWN]
+    ]
+    more = len(keys) - _SHOWN
+    return ", ".join(shown) + (f", and {more} more keys differ" if more > 0 else "")
 
 
-def _sheet_text(schedule: Schedule) -> str:
-    """Write the blinded sheet on which a rater's grades are noted."""
-    rows = [f"{shown.position},{shown.code}," for shown in schedule.presentations]
-    head = f"# format: {_FORMAT}"
-    return "\n".join([head, ",".join(_SHEET_COLUMNS), *rows]) + "\n"
+def _leaves(content: Any, place: str = "") -> Iterator[tuple[str, object]]:
+    # keys of a document with dots between; models by their ids, and the list of these
+    if place == "models":
+        yield place, [model["id"] for model in content]
+        content = {model["id"]: model for model in content}
+    if isinstance(content, dict):
+        for key, value in content.items():
+            yield from _leaves(value, f"{place}.{key}".lstrip("."))
+    else:
+        yield place, content
+
+
+def _text(value: object) -> str:
+    return "not set" if value is _NOT_SET else json.dumps(value, ensure_ascii=False)

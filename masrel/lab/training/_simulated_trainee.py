@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from masrel.lab.protocol import Protocol
 from masrel.lab.run._grade_sources import GradeRequest, Unattended
-from masrel.lab.schedule._stream import Stream
+from masrel.lab.schedule._secret import Stream
 from masrel.lab.training._trainees import confusion
 
 # Noise of perception in grades: at first, in the end, and in how many presentations

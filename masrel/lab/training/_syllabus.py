@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from masrel.lab.schedule._stream import Stream
+from masrel.lab.schedule._secret import Stream
 from masrel.lab.training._lessons import Lesson
 from masrel.lab.training._trainees import BLOCK_SETS
 
