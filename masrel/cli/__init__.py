@@ -1,4 +1,4 @@
-"""The command line: one verb a file, loaded only when it is called.
+"""The command line: one command a file, loaded only when it is called.
 
 Exit codes: 0 fine; 1 the run failed; 2 the input or the call is wrong. Errors
 go to stderr as sentences; a traceback is a bug.
@@ -38,44 +38,66 @@ GROUPS = {
         "audit": "Whether any table gives the agreement that a paper prints.",
     },
     "A study": {
+        "demo": "The whole flow on the simulated device.",
         "init": "Make a new study from a template.",
         "check": "Validate a study and say every error.",
-        "schedule": "Draw the schedules of a study, once.",
-        "between": "Models between models: dummies that hide a study's standards.",
-        "demo": "The whole flow on the simulated device.",
-    },
-    "Its conduct": {
-        "train": "Teach a rater on models of known grade, until a test is passed.",
+        "schedule": "Draw the schedules of a study, once; show; copy for a site.",
         "run": "Present a schedule's models and record every grade.",
         "serve": "Pages for the rater's tablet and the coordinator's screen.",
-        "sheet": "Sheets to print for raters who grade on paper.",
-        "enter": "Bring in a sheet that was filled in on paper.",
-        "status": "How far a study is, and what to do next.",
-        "note": "Record a note, a deviation or an adverse event.",
-        "rater": "What is known of raters, and who is left out of the analysis.",
+        "train": "Teach a rater on models of known grade, until a test is passed.",
+        "paper": "Sheets to print, and to enter once they are filled in.",
+        "record": "Notes, events, corrections, and what becomes of raters.",
+        "status": "How far a study and its raters are, and what to do next.",
         "merge": "Put the sites of one study together in one folder.",
         "ratings": "Turn session logs into the table of ratings.",
         "analyze": "Compute the agreement tables a study asks for.",
-        "grading": "Regress grades on the models' parameters and the speed.",
         "report": "Write the report of a study.",
+        "verify": "Hold every file of a study against the one before it.",
         "export": "Write a study as BIDS or as an RO-Crate.",
         "checklist": "Fill a reporting guideline, GRRAS or COSMIN, from the record.",
-        "verify": "Hold every file of a study against the one before it.",
-        "withdraw": "Record that a rater has left; the grades are kept.",
-        "unblind": "Say which model a code stands for, and record who asked.",
+        "grading": "Regress grades on the models' parameters and the speed.",
     },
-    "The joint and the device": {
-        "trace": "Torque trace of one stretch of one model.",
-        "fit": "Identify a joint, or a device's friction, from recordings.",
+    "Joint and device": {
+        "joint": "Traces of joints, joints of recordings, and models between.",
         "device": "Bring a Puck up on its CAN bus: probe, check, zero, friction.",
     },
 }
-"""Verbs with their summaries, as --help shows them."""
+"""Commands with their summaries, as --help shows them."""
 
-VERBS = {verb: text for verbs in GROUPS.values() for verb, text in verbs.items()}
-"""Verb to summary. The verb ``x`` is the command ``x`` of the module ``x``."""
+SUMMARIES = {name: text for part in GROUPS.values() for name, text in part.items()}
+"""Command to summary. The command ``x`` is ``x`` of the module ``x``."""
 
-# verbs that need no study; the modules of the others are in the laboratory
+RENAMED = {
+    "trace": "joint trace",
+    "trace --tardieu": "joint tardieu",
+    "fit": "joint fit",
+    "fit --friction": "joint friction",
+    "between": "joint between",
+    "sheet": "paper print",
+    "enter": "paper enter",
+    "enter --second": "paper again",
+    "note": "record note",
+    "note --kind": "record deviation, or record adverse-event",
+    "withdraw": "record withdraw",
+    "unblind": "record unblind",
+    "rater": "record rater",
+    "rater set": "record rater",
+    "rater exclude": "record exclude",
+    "rater include": "record include",
+    "rater list": "status raters",
+    "run --correct": "record correct",
+    "run --skip": "record skip",
+    "run --question": "record answer",
+    "schedule --show": "schedule show",
+    "schedule --copy-to": "schedule copy",
+    "train --report": "train show",
+}
+"""Commands of 0.1, and options that were modes, with what they are called now."""
+
+STUDY = "STUDY"
+"""Name of the command of a group that does what the group is named after."""
+
+# whose command needs no study; the modules of the others are in the laboratory
 _STATISTICS = tuple(GROUPS["Ratings you have"])
 
 # parameters whose options are called otherwise
@@ -88,30 +110,53 @@ _CALLED = {
 }
 
 
-class _Verbs(click.Group):
-    """A group that imports a verb only when it is called."""
+def json_name(command: str) -> str:
+    """Return what the JSON of a command says it is of: the name it had first."""
+    for old, new in RENAMED.items():
+        if new == command:
+            return old.partition(" --")[0]
+    return command.removesuffix(f" {STUDY}")
+
+
+class Commands(click.Group):
+    """A group whose refusals name options; its command STUDY need not be named."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Put STUDY before the arguments where no command is named."""
+        known = (*self.list_commands(ctx), *ctx.help_option_names)
+        if STUDY in self.commands and args and args[0] not in known:
+            args = [STUDY, *args]
+        return super().parse_args(ctx, args)
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
-        return list(VERBS)
+        """Return every name, in the order in which commands are used."""
+        return list(self.commands)
 
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in VERBS:
-            if ctx.resilient_parsing:  # as it is where a shell completes names
-                return None
-            from difflib import get_close_matches  # loaded only for an error
-
-            near = get_close_matches(cmd_name, VERBS, n=1)
-            hint = f" Did you mean '{near[0]}'?" if near else ""
-            ctx.fail(f"No such command '{cmd_name}'.{hint}")
-        package = "masrel.cli" if cmd_name in _STATISTICS else "masrel.lab.cli"
-        command: click.Command = getattr(
-            importlib.import_module(f"{package}.{cmd_name}"), cmd_name
-        )
-        return command
+    def format_commands(
+        self,
+        ctx: click.Context,  # noqa: ARG002 - click's signature
+        formatter: click.HelpFormatter,
+    ) -> None:
+        """List the commands with their first sentences."""
+        with formatter.section("Commands"):
+            formatter.write_dl(
+                [
+                    (name, command.get_short_help_str(limit=200))
+                    for name, command in self.commands.items()
+                ]
+            )
 
     def invoke(self, ctx: click.Context) -> Any:
+        """Run a command; name the options that a refusal of parameters is about."""
+        ctx.meta["masrel.json_name"] = json_name
         try:
             return super().invoke(ctx)
+        except click.NoSuchOption as error:
+            path = "" if error.ctx is None else error.ctx.command_path
+            old = f"{' '.join(path.split()[1:2])} {error.option_name}"
+            if old in RENAMED:
+                raise _renamed(old, ctx) from error
+            raise
         except ParameterError as error:
             command = self.get_command(ctx, str(ctx.invoked_subcommand))
             params = [] if command is None else command.params
@@ -128,25 +173,62 @@ class _Verbs(click.Group):
                     places[at] = ", ".join(options[name] for name in names)
             raise ParameterError(": ".join([*places, rest])) from error
 
+
+def _renamed(old: str, ctx: click.Context) -> click.UsageError:
+    return click.UsageError(f"masrel {old} is now masrel {RENAMED[old]}", ctx)
+
+
+class AllCommands(Commands):
+    """All of ``masrel``: a command is imported only when it is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
+        """Return every name."""
+        return list(SUMMARIES)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return a command and what is left to it; say what an old one is called."""
+        for old in (" ".join(args[:2]), args[0]):
+            if old in RENAMED and args[0] not in SUMMARIES:
+                raise _renamed(old, ctx)
+        return super().resolve_command(ctx, args)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import a command."""
+        if cmd_name not in SUMMARIES:
+            if ctx.resilient_parsing:  # as it is where a shell completes names
+                return None
+            from difflib import get_close_matches  # loaded only for an error
+
+            near = get_close_matches(cmd_name, SUMMARIES, n=1)
+            hint = f" Did you mean '{near[0]}'?" if near else ""
+            ctx.fail(f"No such command '{cmd_name}'.{hint}")
+        package = "masrel.cli" if cmd_name in _STATISTICS else "masrel.lab.cli"
+        command: click.Command = getattr(
+            importlib.import_module(f"{package}.{cmd_name}"), cmd_name
+        )
+        return command
+
     def format_commands(
         self,
         ctx: click.Context,  # noqa: ARG002 - click's signature
         formatter: click.HelpFormatter,
     ) -> None:
-        # Summaries are listed here so that --help imports no verb.
-        for title, verbs in GROUPS.items():
+        """List the summaries, so that --help imports no command."""
+        for title, commands in GROUPS.items():
             with formatter.section(title):
-                formatter.write_dl(list(verbs.items()))
+                formatter.write_dl(list(commands.items()))
 
 
-cli = click.version_option(masrel.__version__, prog_name="masrel")(
-    _Verbs(
-        context_settings={"help_option_names": ["-h", "--help"]},
-        help="Agreement of any file of ratings, and studies on a simulator of "
-        "spasticity.\n\n"
-        "To begin, with a file of ratings: masrel agree FILE --target items",
-    )
+cli = AllCommands(
+    context_settings={"help_option_names": ["-h", "--help"]},
+    add_help_option=False,
+    help="\b\nAgreement of any file of ratings, and studies on a simulator of "
+    "spasticity.\nTo begin, with a file of ratings: masrel agree FILE --target items",
 )
+cli = click.version_option(masrel.__version__, prog_name="masrel")(cli)
+cli = click.help_option("-h", "--help", hidden=True)(cli)  # whoever reads it knows
 
 
 def main() -> None:

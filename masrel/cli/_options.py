@@ -100,6 +100,7 @@ class OutputOptions:
         )
 
 
+JSON_NAME = "masrel.json_name"  # where a call has the function to it from a command
 _FORMAT = 1  # of what verbs write as JSON
 _RAW = "With --csv: no apostrophe before a text that a spreadsheet would run."
 
@@ -193,7 +194,8 @@ def write_json(document: dict[str, object], file: Path) -> None:
         context = click.get_current_context()
         # the first word is as the user called it
         words = context.command_path.removeprefix(context.find_root().command_path)
-        document = {"format": f"masrel{words} {_FORMAT}", **document}
+        named = context.meta.get(JSON_NAME, str)(words.strip())
+        document = {"format": f"masrel {named} {_FORMAT}", **document}
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     if file != STDOUT:
         write_file(file, text + "\n")

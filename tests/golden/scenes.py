@@ -51,7 +51,13 @@ def cases() -> list[Case]:
 def _scene(seed: int) -> dict:
     stream = Stream(f"scene {seed}")
     with folder(model__toml=_model_file(stream), arm__csv=_arm(stream)) as here:
-        call = ["trace", *_model(stream, seed), *_motion(stream, seed), *_law(stream)]
+        call = [
+            "joint",
+            "trace",
+            *_model(stream, seed),
+            *_motion(stream, seed),
+            *_law(stream),
+        ]
         call += ["--json", "-", "--quiet", *_outputs(stream)]
         sampled = ["--csv", "samples.csv", "--rate-hz", stream.one_of([50, 200, 333])]
         made = masrel(*call, *(sampled if seed % 4 == 0 else ()))
@@ -146,7 +152,7 @@ def _samples(text: str) -> dict:
 
 
 def _text() -> dict:
-    call = ("trace", "--model", "HM3", "--speed-deg-s", 92)
+    call = ("joint", "trace", "--model", "HM3", "--speed-deg-s", 92)
     return {
         "one": masrel(*call),
         "fast": masrel(*call, "--speed-deg-s", 240, "--model", "HM1"),
@@ -156,7 +162,17 @@ def _text() -> dict:
 
 def _several() -> dict:
     models = [part for k in range(1, 5) for part in ("--model", f"HM{k}")]
-    call = ("trace", *models, "--speeds-deg-s", 15, 300, 12, "--output", "work")
+    call = (
+        "joint",
+        "trace",
+        *models,
+        "--speeds-deg-s",
+        15,
+        300,
+        12,
+        "--output",
+        "work",
+    )
     return masrel(*call, "--json", "-", "--quiet")
 
 
@@ -165,10 +181,12 @@ def _fit(model: str, *options: object) -> dict:
     with folder() as here:
         files = [_recording(here, model, stream, k) for k in range(10)]
         with_file = ("-o", "model.toml", "--json", "fit.json", "--quiet")
-        made = masrel("fit", *files, *options, *with_file)
+        made = masrel("joint", "fit", *files, *options, *with_file)
         if (here / "model.toml").is_file():
             made["model"] = (here / "model.toml").read_text("utf-8")
-        made["printed"] = masrel("fit", *files, *options, "--json", "-", "--quiet")
+        made["printed"] = masrel(
+            "joint", "fit", *files, *options, "--json", "-", "--quiet"
+        )
     return made
 
 
@@ -179,7 +197,7 @@ def _recording(here: Path, model: str, stream: Stream, k: int) -> str:
     start = stream.uniform(25.0, 100.0) if slow else 30.0
     end = start + 18.0 if slow else 146.0
     masrel(
-        "trace", "--model", model, "--motion", "minimum-jerk",
+        "joint", "trace", "--model", model, "--motion", "minimum-jerk",
         "--speed-deg-s", speed, "--from-deg", start, "--to-deg", end,
         "--csv", "trace.csv", "--rate-hz", 500, "--quiet",
     )  # fmt: skip

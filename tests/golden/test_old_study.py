@@ -239,7 +239,7 @@ def test_a_late_rater_is_drawn_the_same_order(
     for file in (old / "expected" / "late" / study).iterdir():
         drawn = copy / "schedules" / file.name
         assert lacking(content(file), content(drawn), file.name) == []
-    listed = said("rater", "list", copy)
+    listed = said("status", "raters", copy)
     late = {line.split()[0] for line in listed.splitlines() if " yes" in line}
     assert late == ({"R7", "R9"} if study == "south" else {"R9"})
 
@@ -251,7 +251,7 @@ def test_a_training_is_told_as_it_was_and_goes_on(
     copy = shutil.copytree(old / study, tmp_path / study)
     of_rater = ("train", copy, "--rater", "R1")
     frozen = content(old / "expected" / f"training_{study}.json")
-    assert lacking(frozen, said(*of_rater, "--report", "--json", "-")) == []
+    assert lacking(frozen, said("train", "show", *of_rater[1:], "--json", "-")) == []
     lines = len(content(copy / "training" / "R1.jsonl"))
     monkeypatch.setattr(sys, "stdin", io.StringIO("\n\n2\nstop\n"))
     said(*of_rater, "--clock", "simulated", code=1)

@@ -1,4 +1,4 @@
-"""What ``masrel trace`` does for other kinds of joints, and the angles of Tardieu."""
+"""Other kinds of joints than the elbow's own, and the angles of Tardieu."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -67,10 +67,6 @@ def write_tardieu(
     output: OutputOptions,
 ) -> None:
     """Write R2, R1 and the catches of joints."""
-    if speeds and len(speeds) != 3:
-        raise ParameterError(
-            f"--speed-deg-s: needs V1, V2 and V3 with --tardieu, got {len(speeds)}"
-        )
     documents = [
         tardieu_document(name, joint, start_deg, speeds)
         for name, joint in joints.items()

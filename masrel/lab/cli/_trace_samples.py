@@ -1,4 +1,4 @@
-"""The file of samples of ``masrel trace``: what the controller commands."""
+"""The file of samples of ``masrel joint trace``: what the controller commands."""
 
 import csv
 import math

@@ -4,76 +4,34 @@ from pathlib import Path
 
 import click
 
+from masrel.cli import STUDY, Commands
 from masrel.cli._options import OutputOptions, output_options, write_output
-from masrel.errors import ParameterError
-from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
+from masrel.lab.protocol import StudyPaths, read_protocol
 
 
-@click.command("schedule")
-@click.argument("study", type=click.Path(path_type=Path))
-@click.option(
-    "--redraw",
-    is_flag=True,
-    help="Draw schedules anew that no longer fit the protocol.",
-)
-@click.option("--site", help="Of the raters of this site alone.")
-@click.option(
-    "--copy-to",
-    "destination",
-    type=click.Path(path_type=Path),
-    help="With --site: draw nothing, but make this folder a copy of the study for the "
-    "site, with the site's secret alone.",
-)
-@click.option(
-    "--show",
-    is_flag=True,
-    help="Draw nothing, but print how even the drawn orders are: places by model, what "
-    "follows what, runs. Not for raters.",
-)
-@output_options(
-    json="With --show: write every count as JSON here; - prints it, and nothing else.",
-    figure="With --show: heatmaps as .png, .svg or .pdf.",
-)
-def schedule(
-    study: Path,
-    redraw: bool,
-    site: str | None,
-    destination: Path | None,
-    show: bool,
-    output: OutputOptions,
-) -> None:
-    """Draw each rater's schedule and blinded sheet for every session of STUDY.
+@click.group("schedule", cls=Commands)
+def schedule() -> None:
+    """Draw the schedules of a study, once; show how even they are; copy for a site.
 
-    Schedules are drawn once: those that are there stay as they are. When the
-    protocol has changed in what it presents, they are refused; --redraw draws them
-    anew, but never those of a session that has begun. In a copy that --copy-to made
-    for a site, they are those of its raters.
+    masrel schedule STUDY draws.
     """
-    paths = StudyPaths(study)
-    protocol = read_protocol(paths.protocol)
-    _check_options(redraw, destination, show=show, output=output)
-    if show:
-        _show(paths, protocol, site, output)
-    elif destination is not None:
-        _copy(paths, protocol, site, destination)
-    else:
-        _draw(paths, protocol, site, redraw=redraw)
 
 
-def _check_options(
-    redraw: bool, destination: Path | None, *, show: bool, output: OutputOptions
-) -> None:
-    for option, file in (("--json", output.json_file), ("--figure", output.figure)):
-        if file is not None and not show:
-            raise ParameterError(f"{option}: needs --show, got it alone")
-    for option, is_chosen in (("--redraw", redraw), ("--copy-to", destination)):
-        if show and is_chosen:
-            raise ParameterError(f"--show: draws nothing, so needs no {option}")
+_study = click.argument("study", type=click.Path(path_type=Path))
 
 
-def _show(
-    study: StudyPaths, protocol: Protocol, site: str | None, output: OutputOptions
-) -> None:
+@schedule.command("show")
+@_study
+@click.option("--site", help="Of the raters of this site alone.")
+@output_options(
+    json="Write every count as JSON here; - prints it, and nothing else.",
+    figure="Heatmaps as .png, .svg or .pdf.",
+)
+def _show(study: Path, site: str | None, output: OutputOptions) -> None:
+    """Print how even the drawn orders of STUDY are. Not for raters.
+
+    Places by model, what follows what, runs.
+    """
     from masrel.lab.report._figure_data import FIGURES
     from masrel.lab.report._order_tables import (
         count_tables,
@@ -83,7 +41,8 @@ def _show(
     from masrel.lab.schedule._balance import order_balance
     from masrel.plots._drawn_values import Drawn
 
-    balances = order_balance(protocol, study, site)
+    paths = StudyPaths(study)
+    balances = order_balance(read_protocol(paths.protocol), paths, site)
     write_output(
         output,
         document=lambda: order_document(balances),
@@ -94,24 +53,48 @@ def _show(
     )
 
 
-def _copy(
-    study: StudyPaths, protocol: Protocol, site: str | None, destination: Path
-) -> None:
+@schedule.command("copy")
+@_study
+@click.option("--site", required=True, help="Id of the site.")
+@click.option(
+    "-o",
+    "--output",
+    "destination",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="Folder of the copy.",
+)
+def _copy(study: Path, site: str, destination: Path) -> None:
+    """Copy STUDY for a site, with the site's secret alone."""
     from masrel.lab.schedule import copy_for_site
 
-    if site is None:
-        raise ParameterError("--copy-to: needs --site, got it alone")
-    copy_for_site(protocol, study, site, destination)
+    paths = StudyPaths(study)
+    copy_for_site(read_protocol(paths.protocol), paths, site, destination)
     click.echo(f"{destination}: a copy of the study with the secret of {site} alone.")
 
 
-def _draw(
-    paths: StudyPaths, protocol: Protocol, site: str | None, *, redraw: bool
-) -> None:
+@schedule.command(STUDY)
+@_study
+@click.option(
+    "--redraw",
+    is_flag=True,
+    help="Draw schedules anew that no longer fit the protocol.",
+)
+@click.option("--site", help="Of the raters of this site alone.")
+def _draw(study: Path, redraw: bool, site: str | None) -> None:
+    """Draw each rater's schedule and blinded sheet for every session of STUDY.
+
+    Schedules are drawn once: those that are there stay as they are. When the
+    protocol has changed in what it presents, they are refused; --redraw draws them
+    anew, but never those of a session that has begun. In a copy that was made for a
+    site, they are those of its raters.
+    """
     from masrel.lab.conduct import allot_schedules
     from masrel.lab.schedule import site_of_copy
     from masrel.lab.schedule._secret import site_of
 
+    paths = StudyPaths(study)
+    protocol = read_protocol(paths.protocol)
     site = site or site_of_copy(paths)
     written = set(allot_schedules(paths, protocol, site=site, redraw=redraw))
     places = [

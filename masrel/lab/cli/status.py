@@ -1,48 +1,53 @@
 """``masrel status``: how far a study is, and what to do next."""
 
 import dataclasses
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli._options import STDOUT, OutputOptions, output_options, write_json
-from masrel.errors import ParameterError, SessionLogError
+from masrel.cli import STUDY, Commands
+from masrel.cli._options import (
+    STDOUT,
+    OutputOptions,
+    output_options,
+    write_json,
+    write_output,
+)
+from masrel.errors import SessionLogError
 from masrel.lab._once import read_once
 from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.protocol._values import field_heading
 
 if TYPE_CHECKING:
     from masrel.lab._event_log import Event
     from masrel.lab.progress import NextStep, RaterProgress, SessionProgress
+    from masrel.lab.protocol import Protocol
     from masrel.tables._tables import Table
 
-_EVERY_S = 2.0
+
+@click.group("status", cls=Commands)
+def status() -> None:
+    """Say how far a study is, or what is known of its raters.
+
+    masrel status STUDY says how far it is.
+    """
 
 
-@click.command("status")
+@status.command(STUDY)
 @click.argument("study", type=click.Path(path_type=Path))
 @output_options(json="Write it as JSON here; - prints it, and nothing else.")
-@click.option("--watch", is_flag=True, help="Show it again when it changes.")
-def status(study: Path, output: OutputOptions, watch: bool) -> None:
+def _study(study: Path, output: OutputOptions) -> None:
     """Say how far STUDY is: every session, what happened beside them, one next step.
 
     By the logs alone, whose chains are verified; no recording is read, nothing is
     changed, and no model is named.
     """
-    if watch and output.json_file is not None:
-        raise ParameterError("--watch: needed without --json, got both")
     overview = _Overview.of(StudyPaths(study))
     if output.json_file is not None:
         write_json(overview.document(), output.json_file)
     if output.json_file != STDOUT:
         click.echo(overview.text())
-    while watch:
-        time.sleep(_EVERY_S)
-        before, overview = overview, _Overview.of(StudyPaths(study))
-        if overview != before:
-            click.clear()
-            click.echo(overview.text())
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,6 +88,7 @@ class _Overview:
 
     def document(self) -> dict[str, object]:
         return {
+            "format": "masrel status 1",
             "study": self.study,
             "sessions": [dataclasses.asdict(session) for session in self.sessions],
             "raters": [
@@ -178,3 +184,74 @@ def _event_line(event: "Event") -> str:
 
 def _minute(time_utc: str) -> str:
     return time_utc[:16].replace("T", " ")
+
+
+@status.command("raters")
+@click.argument("study", type=click.Path(path_type=Path))
+@output_options(
+    json="Write the list here; - prints it, and nothing else.",
+    csv="Print the list as CSV.",
+)
+@read_once()
+def _raters(study: Path, output: OutputOptions) -> None:
+    """List the raters of STUDY: how far each came, and what is known of him or her."""
+    from masrel.lab.progress import rater_progress, session_progress
+
+    paths = StudyPaths(study)
+    protocol = read_protocol(paths.protocol)
+    sessions = session_progress(paths, protocol)
+    raters = rater_progress(paths, protocol, sessions)
+    simulated = any(session.simulated for session in sessions)
+    write_output(
+        output,
+        document=lambda: {"raters": [_rater_document(each) for each in raters]},
+        text=lambda: _raters_table(raters, protocol, simulated=simulated),
+    )
+
+
+def _rater_document(rater: "RaterProgress") -> dict[str, object]:
+    return {
+        "rater": rater.rater,
+        "site": rater.site,
+        "status": rater.status,
+        "is_late": rater.is_late,
+        "fields": dict(rater.values),
+    }
+
+
+def _raters_table(
+    raters: "tuple[RaterProgress, ...]", protocol: "Protocol", *, simulated: bool
+) -> "Table":
+    from masrel.tables._tables import Column, Table
+
+    has_sites = any(rater.site for rater in raters)
+    columns = [Column(key="rater", heading="Rater", align="left")]
+    columns += [Column(key="site", heading="Site", align="left")] * has_sites
+    columns.append(Column(key="status", heading="Status", align="left"))
+    columns.append(Column(key="late", heading="Late", align="left"))
+    for name, field in protocol.rater_fields.items():
+        is_number = field.type in ("whole", "number")
+        columns.append(
+            Column(
+                key=name,
+                heading=field_heading(name, field),
+                align="right" if is_number else "left",
+            )
+        )
+    rows = (
+        (
+            each.rater,
+            *[each.site] * has_sites,
+            each.status,
+            "yes" if each.is_late else None,
+            *each.values.values(),
+        )
+        for each in raters
+    )
+    return Table(
+        name="raters",
+        caption=f"Raters of study {protocol.study.id}",
+        columns=tuple(columns),
+        rows=tuple(rows),
+        data="simulated" if simulated else "recorded",
+    )

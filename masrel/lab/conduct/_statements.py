@@ -149,7 +149,7 @@ def rater_values(
                 raise SessionLogError(
                     f"{study.conduct_file}: {name} of {rater.id}: needed "
                     f"{needed_of(field)}, as the protocol has it now, got {value!r}; "
-                    "masrel rater set records another"
+                    "masrel record rater records another"
                 )
     return values
 
@@ -268,7 +268,7 @@ def record_standing(
         refuse_withdrawn(study, rater)
     elif standing == "excluded" and is_excluded:
         raise ParameterError(
-            f"rater: needed one who is not excluded, {rater} is; masrel rater include "
+            f"rater: needed one who is not excluded, {rater} is; masrel record include "
             "takes it back"
         )
     elif standing == "included" and not is_excluded:

@@ -255,8 +255,8 @@ def _refuse_entered(sheet: TypedSheet, log: SessionLog) -> None:
         f"{sheet.path}: row {row}: needed a presentation that was not entered yet, got "
         f"position {positions}, code {code}, entered on {before.time_utc[:10]} by "
         f"{before.fields['who']} from {before.fields['file']}, row "
-        f"{before.fields['row']}: --second compares a second entry, and masrel run "
-        "--correct corrects a grade"
+        f"{before.fields['row']}: masrel paper again compares a second entry, and "
+        "masrel record correct corrects a grade"
     )
 
 
@@ -272,7 +272,7 @@ def _refuse_answered(
                 raise RatingsError(
                     f"{sheet.path}: row {row.number}: {column.column}: needed "
                     f"{before!r}, which {rater} has answered already, got {answer!r}: "
-                    "masrel run --question corrects an answer"
+                    "masrel record answer corrects an answer"
                 )
 
 

@@ -419,7 +419,7 @@ def _to_run(root: str, session: SessionProgress) -> NextStep:
     place = f"--rater {session.rater} --session {session.session}"
     verb, command = "run", f"masrel run {root} {place}"
     if session.grades_from == "paper":
-        verb, command = "enter", f"masrel enter {root} FILE {place} --who WHO"
+        verb, command = "enter", f"masrel paper enter {root} FILE {place} --who WHO"
     return NextStep(
         command=command,
         why=f"{session.n_graded} of {session.n_presentations} graded",

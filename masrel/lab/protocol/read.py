@@ -117,7 +117,7 @@ def read_model_file(path: Path) -> ElbowParameters:
     Parameters
     ----------
     path : Path
-        A TOML file that ``masrel fit`` or ``masrel between`` wrote.
+        A TOML file that ``masrel joint fit`` or ``masrel joint between`` wrote.
 
     Returns
     -------

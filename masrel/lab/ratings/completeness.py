@@ -227,8 +227,8 @@ def _of_sessions(
             yield (
                 f"{_name(study, log)} is of no rater and session of the protocol: its "
                 "grades are not among the ratings. Put the rater back into the session "
-                "(masrel withdraw keeps the grades of one who left, and says so), or "
-                "move the log out of the study."
+                "(masrel record withdraw keeps the grades of one who left, and says "
+                "so), or move the log out of the study."
             )
         elif log.stat().st_size:
             yield from _of_skips(study, log, include)

@@ -1,4 +1,4 @@
-"""``masrel between``: what it writes, what a study makes of it, what it refuses."""
+"""``masrel joint between``: its files, what a study makes of them, what is refused."""
 
 import json
 from pathlib import Path
@@ -35,7 +35,7 @@ def simulated(path: Path, *, is_it: str = "true") -> Path:
 
 def test_files_hold_the_models_of_the_rule(masrel: Caller, tmp_path: Path) -> None:
     folder = tmp_path / "new" / "dummies"
-    done = masrel("between", *STANDARDS, "-n", "12", "-o", folder)
+    done = masrel("joint", "between", *STANDARDS, "-n", "12", "-o", folder)
     assert done.code == 0
     expected = intermediate_models(STANDARD_MODELS, 12)
     assert sorted(path.stem for path in folder.iterdir()) == list(expected)
@@ -58,7 +58,10 @@ def test_a_study_can_name_them_and_has_the_published_dummies(
 ) -> None:
     study = tmp_path / "study"
     assert masrel("init", study, "--study", "hess2012").code == 0
-    assert masrel("between", *STANDARDS, "-n", 12, "-o", study / "models").code == 0
+    assert (
+        masrel("joint", "between", *STANDARDS, "-n", 12, "-o", study / "models").code
+        == 0
+    )
     protocol = study / "protocol.toml"
     kept, in_dummy = [], False
     for line in protocol.read_text(encoding="utf-8").splitlines():
@@ -90,18 +93,20 @@ def test_what_lies_next_to_simulated_is_simulated(
     masrel: Caller, tmp_path: Path
 ) -> None:
     file = simulated(tmp_path / "käte.toml")
-    done = masrel("between", "HM1", "HM2", file, "-n", "2", "--json", "-")
+    done = masrel("joint", "between", "HM1", "HM2", file, "-n", "2", "--json", "-")
     document = json.loads(done.out)
     assert [model["simulated"] for model in document["models"]] == [False, True]
     assert document["simulated"] is True
     assert "käte" in document["models"][1]["made_from"]
     assert "sha256" in document["models"][1]["made_from"]
-    shown = masrel("between", "HM1", "HM2", file, "-n", "2")
+    shown = masrel("joint", "between", "HM1", "HM2", file, "-n", "2")
     assert shown.out.startswith("SIMULATED DATA")
 
 
 def test_json_is_one_document_and_nothing_else(masrel: Caller, tmp_path: Path) -> None:
-    done = masrel("between", "HM1", "HM2", "-n", "1", "-o", tmp_path, "--json", "-")
+    done = masrel(
+        "joint", "between", "HM1", "HM2", "-n", "1", "-o", tmp_path, "--json", "-"
+    )
     document = json.loads(done.out)
     (model,) = document["models"]
     assert (model["name"], model["from"], model["to"]) == ("D01", "HM1", "HM2")
@@ -109,13 +114,13 @@ def test_json_is_one_document_and_nothing_else(masrel: Caller, tmp_path: Path) -
     assert model["file"] == str(tmp_path / "D01.toml")
     assert model["model"]["catch_torque_nms_rad"] == 1.7  # (1.4 + 2.0)/2
     file = tmp_path / "all.json"
-    assert masrel("between", "HM1", "HM2", "-n", "1", "--json", file).code == 0
+    assert masrel("joint", "between", "HM1", "HM2", "-n", "1", "--json", file).code == 0
     assert json.loads(file.read_text("utf-8"))["models"][0]["file"] is None
 
 
 def test_nothing_is_overwritten_unless_asked(masrel: Caller, tmp_path: Path) -> None:
     (tmp_path / "D02.toml").write_text("mine", encoding="utf-8")
-    arguments = ("between", "HM1", "HM2", "-n", "2", "-o", tmp_path)
+    arguments = ("joint", "between", "HM1", "HM2", "-n", "2", "-o", tmp_path)
     said = refused(masrel(*arguments))
     assert said == (
         f"--output: {tmp_path} holds D02.toml already; --overwrite replaces what is "
@@ -152,7 +157,7 @@ def test_nothing_is_overwritten_unless_asked(masrel: Caller, tmp_path: Path) -> 
 def test_calls_that_are_wrong_are_refused(
     masrel: Caller, arguments: tuple[str, ...], message: str
 ) -> None:
-    assert message in refused(masrel("between", *arguments))
+    assert message in refused(masrel("joint", "between", *arguments))
 
 
 @pytest.mark.parametrize(
@@ -169,7 +174,7 @@ def test_files_that_are_no_models_are_refused(
 ) -> None:
     path = tmp_path / "other.toml"
     path.write_bytes(content)
-    said = refused(masrel("between", "HM1", path, "-n", "1"))
+    said = refused(masrel("joint", "between", "HM1", path, "-n", "1"))
     assert message in said
     assert "other.toml" in said
 
@@ -178,11 +183,11 @@ def test_a_file_that_hides_whether_it_is_simulated_is_refused(
     masrel: Caller, tmp_path: Path
 ) -> None:
     path = simulated(tmp_path / "a.toml", is_it='"no"')
-    said = refused(masrel("between", "HM1", path, "-n", "1"))
+    said = refused(masrel("joint", "between", "HM1", path, "-n", "1"))
     assert "a.toml: simulated must be true or false" in said
     kept = path.read_text(encoding="utf-8").replace('simulated = "no"\n', "")
     path.write_text(kept, encoding="utf-8")
-    assert "got nothing" in refused(masrel("between", "HM1", path, "-n", "1"))
+    assert "got nothing" in refused(masrel("joint", "between", "HM1", path, "-n", "1"))
 
 
 def test_models_that_read_the_law_differently_have_nothing_between(
@@ -191,14 +196,14 @@ def test_models_that_read_the_law_differently_have_nothing_between(
     path = simulated(tmp_path / "a.toml")
     with path.open("a", encoding="utf-8") as file:
         file.write('[constants]\npost_catch = "additive"\n')
-    said = refused(masrel("between", "HM1", path, "-n", "1"))
+    said = refused(masrel("joint", "between", "HM1", path, "-n", "1"))
     assert said.startswith("models: HM1 and a need one post_catch")
 
 
 def test_a_folder_that_is_a_file_is_refused(masrel: Caller, tmp_path: Path) -> None:
     path = tmp_path / "file"
     path.write_text("", encoding="utf-8")
-    said = refused(masrel("between", "HM1", "HM2", "-n", "1", "-o", path))
+    said = refused(masrel("joint", "between", "HM1", "HM2", "-n", "1", "-o", path))
     assert str(path) in said
 
 
@@ -207,6 +212,8 @@ def test_json_may_lie_in_the_folder_that_is_made(
 ) -> None:
     folder = tmp_path / "new"
     file = folder / "all.json"
-    done = masrel("between", "HM1", "HM2", "-n", "1", "-o", folder, "--json", file)
+    done = masrel(
+        "joint", "between", "HM1", "HM2", "-n", "1", "-o", folder, "--json", file
+    )
     assert done.code == 0, done.err
     assert sorted(path.name for path in folder.iterdir()) == ["D01.toml", "all.json"]

@@ -2,12 +2,6 @@
 
 import json
 import os
-import pty
-import select
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -49,19 +43,19 @@ def refusal(*words: object) -> str:
 
 def test_what_is_recorded_is_listed_and_shown(study: StudyPaths) -> None:
     by = ("--who", "MK")
-    call("rater", "set", study.root, "--rater", "R1", "years=12", *by)
-    call("note", study.root, "power cut", *by, "--kind", "deviation", "--rater", "R2")
-    call("rater", "exclude", study.root, "--rater", "R2", *by, "--why", "left-handed")
-    listed = json.loads(call("rater", "list", study.root, "--json", "-"))["raters"]
+    call("record", "rater", study.root, "--rater", "R1", "years=12", *by)
+    call("record", "deviation", study.root, "power cut", *by, "--rater", "R2")
+    call("record", "exclude", study.root, "--rater", "R2", *by, "--why", "left-handed")
+    listed = json.loads(call("status", "raters", study.root, "--json", "-"))["raters"]
     assert [(r["status"], r["fields"]) for r in listed] == [
         ("planned", {"years": 12}),
         ("excluded", {"years": None}),
     ]
-    assert "Experience (years)" in call("rater", "list", study.root)
+    assert "Experience (years)" in call("status", "raters", study.root)
     shown = call("status", study.root)
     assert "deviation: text power cut, who MK, rater R2" in shown
     assert f"next: masrel schedule {study.root}  (1 of 2 schedules" in shown
-    call("rater", "include", study.root, "--rater", "R2", *by, "--why", "it is not so")
+    call("record", "include", study.root, "--rater", "R2", *by, "--why", "it is not so")
     document = json.loads(call("status", study.root, "--json", "-"))
     kinds = [event["event"] for event in document["events"]]
     assert kinds == ["rater-set", "noted", "excluded", "included"]
@@ -90,56 +84,22 @@ def test_the_table_of_raters_is_written_beside_the_ratings(study: StudyPaths) ->
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        (("rater", "set", "--rater", "R1", "years"), "needed a field, '=' and its"),
-        (("rater", "set", "--rater", "R1", "years=1", "years=2"), "each field once"),
+        (("record", "rater", "--rater", "R1", "years"), "needed a field, '=' and its"),
+        (("record", "rater", "--rater", "R1", "years=1", "years=2"), "each field once"),
         (
-            ("rater", "set", "--rater", "R1", "years=x"),
+            ("record", "rater", "--rater", "R1", "years=x"),
             "needed a whole number, got 'x'",
         ),
-        (("rater", "set", "--rater", "R1", "age=3"), "(years), got 'age'"),
-        (("rater", "set", "--rater", "R9", "years=3"), "one of R1, R2, got 'R9'"),
-        (("note", "text", "--severity", "mild"), "'adverse-event' only"),
-        (("note", "text", "--kind", "fault"), "'fault' is not one of"),
-        (("note", " "), "text: needed text, got none"),
+        (("record", "rater", "--rater", "R1", "age=3"), "(years), got 'age'"),
+        (("record", "rater", "--rater", "R9", "years=3"), "one of R1, R2, got 'R9'"),
+        (("record", "note", " "), "text: needed text, got none"),
     ],
 )
 def test_bad_input_is_one_sentence_and_records_nothing(
     study: StudyPaths, words: tuple[str, ...], reason: str
 ) -> None:
-    n_verb = 2 if words[0] == "rater" else 1
-    verb, rest = words[:n_verb], words[n_verb:]
-    assert reason in refusal(*verb, study.root, *rest, "--who", "MK")
+    assert reason in refusal(*words[:2], study.root, *words[2:], "--who", "MK")
     assert not study.conduct_file.exists()
-
-
-def test_watching_and_json_do_not_go_together(study: StudyPaths) -> None:
-    assert "got both" in refusal("status", study.root, "--watch", "--json", "-")
-
-
-@pytest.mark.slow
-def test_watching_shows_what_changes_until_it_is_stopped(study: StudyPaths) -> None:
-    master, slave = pty.openpty()
-    words = [sys.executable, "-m", "masrel", "status", str(study.root), "--watch"]
-    process = subprocess.Popen(words, stdin=slave, stdout=slave, stderr=slave)
-    os.close(slave)
-    try:
-        assert "masrel schedule" in until(master, "not drawn)")
-        call("note", study.root, "power cut", "--who", "MK")
-        assert "note: text power cut" in until(master, "power cut")
-    finally:
-        process.send_signal(signal.SIGINT)
-        assert process.wait(timeout=30) == 1
-        os.close(master)
-
-
-def until(master: int, text: str) -> str:
-    """What a terminal shows, until a text is there."""
-    shown, deadline = "", time.monotonic() + 60
-    while text not in shown:
-        assert time.monotonic() < deadline, shown
-        if select.select([master], [], [], 0.2)[0]:
-            shown += os.read(master, 65536).decode("utf-8", errors="replace")
-    return shown
 
 
 @pytest.mark.slow

@@ -60,9 +60,18 @@ def test_no_input_is_written_over(study: Path, tmp_path: Path, masrel: Caller) -
         ("agree", "--json", table, tmp_path / "link.csv", "--target", "items"),
         ("latent", table, "--json", tmp_path / ".." / tmp_path.name / "table.csv"),
         ("analyze", study, "--ratings", foreign, "--json", foreign),
-        ("fit", tmp_path / "a.npz", "--json", tmp_path / "a.json"),
-        ("trace", "--model", "m.toml", "--speed-deg-s", "90", "--csv", "m.toml"),
-        ("between", "HM1", "D/D01.toml", "-n", "1", "-o", "D", "--overwrite"),
+        ("joint", "fit", tmp_path / "a.npz", "--json", tmp_path / "a.json"),
+        (
+            "joint",
+            "trace",
+            "--model",
+            "m.toml",
+            "--speed-deg-s",
+            "90",
+            "--csv",
+            "m.toml",
+        ),
+        ("joint", "between", "HM1", "D/D01.toml", "-n", "1", "-o", "D", "--overwrite"),
     ]
     before = contents(tmp_path)
     for call in calls:
@@ -74,7 +83,10 @@ def test_no_input_is_written_over(study: Path, tmp_path: Path, masrel: Caller) -
 
 
 def test_a_model_file_of_the_protocol_is_an_input(study: Path, masrel: Caller) -> None:
-    assert masrel("between", "HM1", "HM2", "-n", "1", "-o", study / "models").code == 0
+    assert (
+        masrel("joint", "between", "HM1", "HM2", "-n", "1", "-o", study / "models").code
+        == 0
+    )
     protocol = study / "protocol.toml"
     text = protocol.read_text(encoding="utf-8")
     entry = '[[models]]\nid = "E01"\nrole = "dummy"\nfile = "models/D01.toml"\n\n'

@@ -1,4 +1,4 @@
-"""masrel fit: from files to a table, figures, and a model file for a protocol."""
+"""masrel joint fit: from files to a table, figures, and a model file for a protocol."""
 
 import csv
 import json
@@ -39,7 +39,13 @@ def test_a_fit_goes_into_a_protocol(
     masrel: Caller, files: list[Path], tmp_path: Path
 ) -> None:
     done = masrel(
-        "fit", *files, "-o", tmp_path / "s3.toml", "--json", tmp_path / "fit.json"
+        "joint",
+        "fit",
+        *files,
+        "-o",
+        tmp_path / "s3.toml",
+        "--json",
+        tmp_path / "fit.json",
     )
     assert done.code == 0, done.err
     assert "SIMULATED DATA" in done.out
@@ -62,7 +68,7 @@ def test_a_fit_says_whether_it_fits_everywhere(
     masrel: Caller, files: list[Path], tmp_path: Path
 ) -> None:
     done = masrel(
-        "fit", *files, "-o", tmp_path / "m.toml", "--json", tmp_path / "f.json"
+        "joint", "fit", *files, "-o", tmp_path / "m.toml", "--json", tmp_path / "f.json"
     )
     document = json.loads((tmp_path / "f.json").read_text(encoding="utf-8"))
     lack = document["lack_of_fit"]
@@ -79,7 +85,7 @@ def test_a_fit_says_whether_it_fits_everywhere(
 
 @pytest.mark.slow
 def test_fits_are_compared(masrel: Caller, files: list[Path], tmp_path: Path) -> None:
-    done = masrel("fit", *files, "--compare", "--json", tmp_path / "f.json")
+    done = masrel("joint", "fit", *files, "--compare", "--json", tmp_path / "f.json")
     assert done.code == 0, done.err
     assert "Fits compared by leaving trials out" in done.out
     document = json.loads((tmp_path / "f.json").read_text(encoding="utf-8"))
@@ -98,7 +104,7 @@ def test_fits_are_compared(masrel: Caller, files: list[Path], tmp_path: Path) ->
 def test_json_on_stdout_is_one_document_and_nothing_else(
     masrel: Caller, files: list[Path]
 ) -> None:
-    done = masrel("fit", *files[:3], "--json", "-")
+    done = masrel("joint", "fit", *files[:3], "--json", "-")
     document = json.loads(done.out)
     missing = {e["key"]: e for e in document["estimates"]}["catch_slope_s"]
     assert missing["value"] is None
@@ -110,7 +116,7 @@ def test_json_on_stdout_is_one_document_and_nothing_else(
 def test_only_slow_trials_make_no_model_file(
     masrel: Caller, files: list[Path], tmp_path: Path
 ) -> None:
-    done = masrel("fit", *files[:3], "-o", tmp_path / "s3.toml")
+    done = masrel("joint", "fit", *files[:3], "-o", tmp_path / "s3.toml")
     assert done.code == 2
     assert "Parameters of the joint" in done.out  # what there is, is shown
     assert "catch_angle_constant: there are only slow stretches" in done.err
@@ -120,7 +126,7 @@ def test_only_slow_trials_make_no_model_file(
 def test_figures_are_drawn(masrel: Caller, files: list[Path], tmp_path: Path) -> None:
     folder = tmp_path / "new"  # where JSON may lie, too
     more = ("--json", folder / "a.json", "--quiet")
-    done = masrel("fit", *files, "--figures", folder, *more)
+    done = masrel("joint", "fit", *files, "--figures", folder, *more)
     assert done.code == 0, done.err
     names = ("fit_catches", "fit_residuals", "fit_slow", "fit_trials")
     drawn = [f"{name}.{form}" for name in names for form in ("png", "svg")]
@@ -130,7 +136,7 @@ def test_figures_are_drawn(masrel: Caller, files: list[Path], tmp_path: Path) ->
 def test_friction_is_fitted_and_drawn(masrel: Caller, tmp_path: Path) -> None:
     path = put(backdriven(1), tmp_path)
     done = masrel(
-        "fit", path, "--friction", "--figures", tmp_path / "out", "--json", "-"
+        "joint", "friction", path, "--figures", tmp_path / "out", "--json", "-"
     )
     assert done.code == 0, done.err
     document = json.loads(done.out)
@@ -146,7 +152,6 @@ def test_friction_is_fitted_and_drawn(masrel: Caller, tmp_path: Path) -> None:
         (["--unit", "torque=lb"], "torque needs one of nm, mnm, ncm, got 'lb'"),
         (["--unit", "angle=rad"], "column angle_deg says deg, units says rad"),
         (["--column", "torque=Moment"], "needs the column 'Moment'"),
-        (["--friction", "-o", "x.toml"], "a model file is of a joint"),
         (["--level", "2"], "level: needs more than 0.5"),
         (["--gravity", "much"], "needs off, fitted or a number, got 'much'"),
         (["--rise", "0.2"], "rise: needs 0 to ΔT_peak, 0.1 s, got 0.2 s"),
@@ -156,40 +161,23 @@ def test_friction_is_fitted_and_drawn(masrel: Caller, tmp_path: Path) -> None:
 def test_a_wrong_call_is_one_sentence(
     masrel: Caller, files: list[Path], arguments: list[str], said: str
 ) -> None:
-    done = masrel("fit", *files[:2], *arguments)
+    done = masrel("joint", "fit", *files[:2], *arguments)
     assert done.code == 2
     assert said in done.err
     assert "Traceback" not in done.err
 
 
 def test_a_file_that_is_not_there_is_named(masrel: Caller) -> None:
-    done = masrel("fit", "absent.csv")
+    done = masrel("joint", "fit", "absent.csv")
     assert done.code == 2
     assert "absent.csv: no such file" in done.err
-
-
-def test_options_of_a_joint_are_refused_for_a_device(
-    masrel: Caller, files: list[Path]
-) -> None:
-    for option, value in (
-        ("--slow-below", "10"),
-        ("--inertia", "fitted"),
-        ("--post-catch", "additive"),
-        ("--gravity", "fitted"),
-    ):
-        done = masrel("fit", "--friction", files[0], option, value)
-        assert done.code == 2
-        assert done.err == (
-            f"masrel: {option}: says something of a joint, not of a device "
-            "(--friction)\n"
-        )
 
 
 @pytest.mark.parametrize("speed", ["-3", "0", "nan", "inf"])
 def test_a_limit_that_is_none_is_refused_in_its_unit(
     masrel: Caller, files: list[Path], speed: str
 ) -> None:
-    done = masrel("fit", files[0], "--slow-below", speed)
+    done = masrel("joint", "fit", files[0], "--slow-below", speed)
     assert done.code == 2
     assert done.err == (
         f"masrel: --slow-below: needs more than 0 deg/s and finite, got {speed}\n"
@@ -199,7 +187,7 @@ def test_a_limit_that_is_none_is_refused_in_its_unit(
 def test_only_fast_stretches_are_refused_with_the_option(
     masrel: Caller, files: list[Path]
 ) -> None:
-    done = masrel("fit", *(file for file in files if "fast" in file.name))
+    done = masrel("joint", "fit", *(file for file in files if "fast" in file.name))
     assert done.code == 2
     assert done.err.startswith("masrel: recordings: b and k need a slow stretch")
     assert done.err.endswith(" deg/s. --slow-below raises the limit\n")
@@ -209,13 +197,17 @@ def test_an_inertia_below_0_is_refused(masrel: Caller, tmp_path: Path) -> None:
     arm = Arm(inertia=-0.05)
     made = study(STANDARD_MODELS["HM3"], seed=21, n_slow=3, n_fast=6, arm=arm)
     done = masrel(
-        "fit", *(put(each, tmp_path) for each in made), "--arm-inertia", "fitted"
+        "joint",
+        "fit",
+        *(put(each, tmp_path) for each in made),
+        "--arm-inertia",
+        "fitted",
     )
     assert (done.code, done.out) == (2, "")
     assert "this is not the law: J of all trials is -0.0" in done.err
 
 
 def test_a_folder_is_no_recording(masrel: Caller, tmp_path: Path) -> None:
-    done = masrel("fit", tmp_path)
+    done = masrel("joint", "fit", tmp_path)
     assert (done.code, done.out) == (2, "")
     assert done.err == f"masrel: {tmp_path}: a folder; needs a file\n"

@@ -56,9 +56,9 @@ def test_what_is_no_file_is_not_waited_for(
         schedule.symlink_to(odd)
         refused(masrel("check", study), "not a regular file")
         schedule.unlink()
-        refused(masrel("fit", odd), "not a regular file")
+        refused(masrel("joint", "fit", odd), "not a regular file")
     refused(masrel("agree", "/dev/zero", "--target", "items"), "got a device")
-    refused(masrel("between", "HM1", pipe, "-n", "1"), "not a regular file")
+    refused(masrel("joint", "between", "HM1", pipe, "-n", "1"), "not a regular file")
     log = study / "sessions" / "test_R1.jsonl"
     log.parent.mkdir()
     os.mkfifo(log)
@@ -92,9 +92,11 @@ def bomb(path: Path, n_samples: int) -> None:
 @pytest.mark.slow
 def test_a_small_archive_of_large_columns(tmp_path: Path, masrel: Caller) -> None:
     bomb(tmp_path / "bomb.npz", 6_000_000)
-    refused(masrel("fit", tmp_path / "bomb.npz"), "larger than 128000000 bytes")
+    refused(
+        masrel("joint", "fit", tmp_path / "bomb.npz"), "larger than 128000000 bytes"
+    )
     bomb(tmp_path / "short.npz", 999_999)  # the header promises what is not there
-    refused(masrel("fit", tmp_path / "short.npz"), "not an archive of columns")
+    refused(masrel("joint", "fit", tmp_path / "short.npz"), "not an archive of columns")
 
 
 def test_a_small_packed_table_that_is_large(
@@ -131,7 +133,7 @@ def test_deep_toml(text: str, study: Path, masrel: Caller) -> None:
     refused(masrel("check", study), "nested")
     protocol.write_text(before)
     (study / "deep.toml").write_text(text)
-    refused(masrel("between", "HM1", study / "deep.toml", "-n", "1"), "nested")
+    refused(masrel("joint", "between", "HM1", study / "deep.toml", "-n", "1"), "nested")
 
 
 @pytest.mark.parametrize("number", ["9" * 5000, "0x" + "f" * 5000])
@@ -207,7 +209,7 @@ def test_deep_facts_of_a_recording(tmp_path: Path, masrel: Caller) -> None:
     np.savez(tmp_path / "a.npz", **columns)
     (tmp_path / "a.json").write_text("[" * 100_000)
     motion = ("--motion", "recording", "--recording", tmp_path / "a.npz")
-    refused(masrel("trace", "--model", "HM1", *motion), "nested too deep")
+    refused(masrel("joint", "trace", "--model", "HM1", *motion), "nested too deep")
 
 
 @pytest.mark.parametrize("name", ["CON", "nul", "Com1", "LPT9.x"])

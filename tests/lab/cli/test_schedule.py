@@ -44,7 +44,7 @@ def test_a_site_is_drawn_and_the_other_later(masrel: Caller, study: StudyPaths) 
 
 def test_a_complete_design_shows_its_balance(masrel: Caller, study: StudyPaths) -> None:
     masrel("schedule", study.root)
-    shown = masrel("schedule", study.root, "--show", "--site", "north")
+    shown = masrel("schedule", "show", study.root, "--site", "north")
     assert shown.code == 0
     lines = shown.out.splitlines()
     assert lines[1].startswith("Not for raters")
@@ -61,7 +61,7 @@ def test_a_complete_design_shows_its_balance(masrel: Caller, study: StudyPaths) 
 
 def test_every_count_is_that_of_the_files(masrel: Caller, study: StudyPaths) -> None:
     masrel("schedule", study.root)
-    document = json.loads(masrel("schedule", study.root, "--show", "--json", "-").out)
+    document = json.loads(masrel("schedule", "show", study.root, "--json", "-").out)
     assert [of["site"] for of in document["sessions"]] == ["north", "south"]
     south = document["sessions"][1]
     models = south["models"]
@@ -83,7 +83,7 @@ def test_runs_of_models_grades_and_standards_are_counted(
 ) -> None:
     study = study_of(tmp_path / "study", "blocks", blocks_by="role", repeats=3)
     masrel("schedule", study.root)
-    (of,) = json.loads(masrel("schedule", study.root, "--show", "--json", "-").out)[
+    (of,) = json.loads(masrel("schedule", "show", study.root, "--json", "-").out)[
         "sessions"
     ]
     assert of["standard_runs"] == [6] * 6
@@ -98,14 +98,14 @@ def test_runs_of_models_grades_and_standards_are_counted(
 def test_showing_draws_nothing_and_the_figure_is_the_same_each_time(
     masrel: Caller, study: StudyPaths, tmp_path: Path
 ) -> None:
-    none = masrel("schedule", study.root, "--show")
+    none = masrel("schedule", "show", study.root)
     assert none.code != 0
     assert not study.schedules.exists()
     masrel("schedule", study.root)
     before = {path: path.read_bytes() for path in study.schedules.iterdir()}
     files = [tmp_path / f"{name}.svg" for name in "ab"]
     for file in files:
-        assert masrel("schedule", study.root, "--show", "--figure", file).code == 0
+        assert masrel("schedule", "show", study.root, "--figure", file).code == 0
     assert files[0].read_bytes() == files[1].read_bytes()
     assert {path: path.read_bytes() for path in study.schedules.iterdir()} == before
 
@@ -114,7 +114,7 @@ def test_a_copy_for_a_site_draws_and_verifies_by_itself(
     masrel: Caller, study: StudyPaths, tmp_path: Path
 ) -> None:
     copy = StudyPaths(tmp_path / "south")
-    made = masrel("schedule", study.root, "--site", "south", "--copy-to", copy.root)
+    made = masrel("schedule", "copy", study.root, "--site", "south", "-o", copy.root)
     assert (
         made.out
         == f"{copy.root}: a copy of the study with the secret of south alone.\n"
@@ -135,15 +135,11 @@ def test_a_copy_for_a_site_draws_and_verifies_by_itself(
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        (["--copy-to", "x"], "--copy-to: needs --site, got it alone"),
-        (["--figure", "x.png"], "--figure: needs --show, got it alone"),
-        (["--json", "-"], "--json: needs --show, got it alone"),
-        (["--show", "--redraw"], "--show: draws nothing, so needs no --redraw"),
+        (["--copy-to", "x"], "schedule --copy-to is now masrel schedule copy"),
         (["--site", "east"], "site: needed one of north, south, got 'east'"),
-        (["--show"], "schedules: needed drawn schedules, got none"),
     ],
 )
-def test_options_that_do_not_go_together_are_refused(
+def test_options_that_it_does_not_have_are_refused(
     masrel: Caller, study: StudyPaths, options: list[str], sentence: str
 ) -> None:
     refused = masrel("schedule", study.root, *options)
@@ -168,7 +164,7 @@ def test_sites_that_drew_by_themselves_are_merged(
     masrel: Caller, study: StudyPaths, tmp_path: Path
 ) -> None:
     south, both = tmp_path / "south", tmp_path / "both"
-    masrel("schedule", study.root, "--site", "south", "--copy-to", south)
+    masrel("schedule", "copy", study.root, "--site", "south", "-o", south)
     masrel("schedule", study.root, "--site", "north")
     masrel("schedule", south, "--site", "south")
     merged = masrel("merge", study.root, south, "-o", both)
@@ -199,7 +195,7 @@ def test_the_copy_of_a_site_is_about_that_site_alone(
     masrel: Caller, study: StudyPaths, tmp_path: Path
 ) -> None:
     copy = tmp_path / "south"
-    masrel("schedule", study.root, "--site", "south", "--copy-to", copy)
+    masrel("schedule", "copy", study.root, "--site", "south", "-o", copy)
     before = json.loads(masrel("status", copy, "--json", "-").out)
     assert [session["rater"] for session in before["sessions"]] == ["R5", "R6"]
     assert before["next"]["command"] == f"masrel schedule {copy}"

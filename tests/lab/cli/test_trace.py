@@ -1,4 +1,4 @@
-"""masrel trace: phases, peak and samples of one stretch."""
+"""masrel joint trace: phases, peak and samples of one stretch."""
 
 import csv
 import json
@@ -29,7 +29,7 @@ PHASE_KEYS = ["name", "start_s", "end_s", "start_deg", "end_deg"]
 
 
 def trace(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    call = [sys.executable, "-m", "masrel", "trace", *map(str, arguments)]
+    call = [sys.executable, "-m", "masrel", "joint", "trace", *map(str, arguments)]
     return subprocess.run(
         call,
         capture_output=True,

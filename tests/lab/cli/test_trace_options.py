@@ -1,4 +1,4 @@
-"""masrel trace with any motion, many scenes, other laws, more outputs, and figures."""
+"""masrel joint trace: any motion, many scenes, other laws, more outputs, figures."""
 
 import csv
 import json
@@ -31,7 +31,7 @@ HM3 = STANDARD_MODELS["HM3"]
 
 def run(*arguments: object) -> Result:
     return CliRunner().invoke(
-        cli, ["trace", *map(str, arguments)], catch_exceptions=True
+        cli, ["joint", "trace", *map(str, arguments)], catch_exceptions=True
     )
 
 

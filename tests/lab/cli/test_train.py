@@ -89,7 +89,7 @@ def test_a_simulated_trainee_learns_passes_and_is_reported(
     assert "(simulated)" in done.out
     assert "Nothing of a training enters the ratings" in done.out
     figure, file = tmp_path / "curve.svg", tmp_path / "training.json"
-    report = ["train", trained, "--rater", "R1", "--report"]
+    report = ["train", "show", trained, "--rater", "R1"]
     shown = masrel(*report, "--figure", figure, "--json", file)
     assert shown.out.startswith("SIMULATED DATA. Training of R1: passed after")
     assert "Grades of R1 by intended grade" in shown.out
@@ -255,18 +255,14 @@ def test_one_known_grade_teaches_nothing(study: Path, masrel: Caller) -> None:
 
 
 def test_bad_calls_are_one_sentence_each(study: Path, masrel: Caller) -> None:
-    def said(*arguments: object) -> str:
-        done = masrel("train", study, *arguments)
+    def said(*arguments: object, command: tuple[str, ...] = ("train",)) -> str:
+        done = masrel(*command, study, *arguments)
         assert done.code == 2
         return done.err.strip().splitlines()[-1]
 
     assert "rater: needed one of R1, R2, got 'R9'" in said("--rater", "R9")
-    assert "no such log" in said("--rater", "R1", "--report")
-    assert "--csv: needed with --report only" in said("--rater", "R1", "--csv")
-    assert "--html: needed with --report only" in said("--rater", "R1", "--html", "x")
-    assert "--clock: needed without --report only" in said(
-        "--rater", "R1", "--report", "--clock", "real"
-    )
+    assert "no such log" in said("--rater", "R1", command=("train", "show"))
+    assert "No such option '--csv'" in said("--rater", "R1", "--csv")
 
 
 def test_a_training_goes_on_with_what_it_was_begun_with(
@@ -288,7 +284,7 @@ def test_a_training_goes_on_with_what_it_was_begun_with(
         trained, "catch_angle_constant_deg = 130.0", "catch_angle_constant_deg = 129.0"
     )
     log.write_text(text, encoding="utf-8")
-    changed_models = masrel("train", trained, "--rater", "R1", "--report")
+    changed_models = masrel("train", "show", trained, "--rater", "R1")
     assert "needed the training of the models that the protocol has now" in (
         changed_models.err
     )
@@ -300,5 +296,5 @@ def test_an_adaptive_training_is_taught_and_reported(
     changed(study, "[training]", '[training]\norder = "adaptive"')
     call = ["train", study, "--rater", "R1"]
     assert "passed after" in masrel(*call, "--grades", "simulated").out
-    document = json.loads(masrel(*call, "--report", "--json", "-").out)
+    document = json.loads(masrel("train", "show", *call[1:], "--json", "-").out)
     assert document["criterion"]["order"] == "adaptive"

@@ -9,7 +9,7 @@ from docs.make.pages import output
 
 DOCS = Path(__file__).parents[3] / "docs"
 PAGE = (DOCS / "elbow.md").read_text(encoding="utf-8")
-COMMANDS = re.findall(r"`(masrel trace [^`]*--figure (\S+)\.png)`", PAGE)
+COMMANDS = re.findall(r"`(masrel joint trace [^`]*--figure (\S+)\.png)`", PAGE)
 
 
 def test_there_are_figures_to_check() -> None:

@@ -72,7 +72,8 @@ def to_report(root: Path, study: Path) -> None:
     sheet = root / "schedules" / "test_R2_sheet.csv"
     code = sheet.read_text().splitlines()[-1].split(",")[1]
     where = (str(root), "--rater", "R2", "--session", "test")
-    run("run", *where, "--correct", code, "--grade", "4", "--who", "A", "--why", "b")
+    by = ("--who", "A", "--why", "b")
+    run("record", "correct", *where, "--code", code, "--grade", "4", *by)
     run("ratings", str(root))
 
 
@@ -84,13 +85,13 @@ def to_log(root: Path, study: Path) -> None:
 
 def to_include(root: Path, study: Path) -> None:
     to_log(root, study)
-    run("rater", "exclude", str(root), "--rater", "R2", *BY)
+    run("record", "exclude", str(root), "--rater", "R2", *BY)
 
 
 def to_enter(root: Path, study: Path) -> None:
     shutil.copytree(study, root)
     shutil.rmtree(root / "sessions")
-    run("sheet", str(root))
+    run("paper", "print", str(root))
     typed = root / "sheets" / "test_R1.csv"
     # a grade after the last comma of each row
     typed.write_text(typed.read_text().replace(",\n", ",2\n"))
@@ -111,7 +112,7 @@ def to_merge(root: Path, study: Path) -> None:
         shutil.rmtree(folder / "sessions" / f"test_{other}")
         for path in folder.glob(f"*/test_{other}*"):
             path.unlink()
-        run("note", str(folder), f"the note of {site}", "--who", "Kim")
+        run("record", "note", str(folder), f"the note of {site}", "--who", "Kim")
 
 
 BY = ("--who", "Kim", "--why", "for a test")
@@ -129,15 +130,15 @@ PREPARE: dict[str, Callable[[Path, Path], None]] = {
 CALLS = {
     "schedule": "schedule {0} --redraw",
     "report": "report {0} --quiet",
-    "note": "note {0} power-cut --who Kim",
-    "withdraw": "withdraw {0} --rater R2 --who Kim --why left",
-    "exclude": "rater exclude {0} --rater R2 --who Kim --why ill",
-    "include": "rater include {0} --rater R2 --who Kim --why well",
-    "set": "rater set {0} --rater R2 years=12 --who Kim",
-    "unblind": "unblind {0} --all --who Kim --why end",
-    "enter": "enter {0} {0}/sheets/test_R1.csv --rater R1 --session test --who Kim "
-    "--on 2026-03-02",
-    "sheet": "sheet {0}",
+    "note": "record note {0} power-cut --who Kim",
+    "withdraw": "record withdraw {0} --rater R2 --who Kim --why left",
+    "exclude": "record exclude {0} --rater R2 --who Kim --why ill",
+    "include": "record include {0} --rater R2 --who Kim --why well",
+    "set": "record rater {0} --rater R2 years=12 --who Kim",
+    "unblind": "record unblind {0} --all --who Kim --why end",
+    "enter": "paper enter {0} {0}/sheets/test_R1.csv --rater R1 --session test "
+    "--who Kim --on 2026-03-02",
+    "sheet": "paper print {0}",
     "checklist": "checklist {0} --guideline grras -o {0}/grras.html",
     "export": "export {0} --as bids -o {0}/bids --quiet",
     "merge": "merge {0}/north {0}/south -o {0}/both",

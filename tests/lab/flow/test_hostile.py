@@ -79,7 +79,7 @@ def whole(small_demo: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     (root / ".key").mkdir(exist_ok=True)
     shutil.copy(root / "published_secret.txt", root / ".key" / "secret.txt")
     who = ("--who", "A", "--why", "b")
-    run("withdraw", str(root), "--rater", "R2", *who)
+    run("record", "withdraw", str(root), "--rater", "R2", *who)
     run("report", str(root), "--quiet")
     return root
 
@@ -197,7 +197,10 @@ def test_a_small_recording_of_large_columns(
     packed = tmp_path / "packed.npz"
     bomb(packed, 100_000_000)
     motion = ("--motion", "recording", "--recording", packed)
-    for call in (("fit", packed), ("trace", "--model", "HM1", *motion)):
+    for call in (
+        ("joint", "fit", packed),
+        ("joint", "trace", "--model", "HM1", *motion),
+    ):
         with faults("a packed recording of 2.4 GB"):
             check_refused(measured(*call))
     in_place_of(study, "sessions/test_R1/*.npz", lambda path: packed.rename(path))

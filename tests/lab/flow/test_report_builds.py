@@ -28,7 +28,7 @@ def study(small_demo: Path, tmp_path: Path) -> Path:
     root = Path(shutil.copytree(small_demo / "study", tmp_path / "study"))
     shutil.rmtree(root / "report", ignore_errors=True)
     shutil.rmtree(root / _cache.FOLDER, ignore_errors=True)
-    run("note", str(root), "Begun.", "--who", "A. B.")
+    run("record", "note", str(root), "Begun.", "--who", "A. B.")
     return root
 
 
@@ -100,7 +100,14 @@ class Edits:
 
     def of_conduct(self) -> None:
         """One more event."""
-        run("note", str(self.study), f"{self.random.random()}", "--who", "A. B.")
+        run(
+            "record",
+            "note",
+            str(self.study),
+            f"{self.random.random()}",
+            "--who",
+            "A. B.",
+        )
 
     def of_version(self) -> None:
         """Another version of a library."""

@@ -40,7 +40,7 @@ class Bench:
     masrel: Caller
 
     def __call__(self, verb: str, *options: object, code: int = 0) -> Done:
-        done = self.masrel(verb, self.study, *options)
+        done = self.masrel(*verb.split(), self.study, *options)
         assert done.code == code, done
         assert "Traceback" not in done.err
         return done
@@ -57,7 +57,7 @@ class Bench:
 
     def correct(self, grade: str) -> str:
         where = ("--rater", "R1", "--session", "test", "--who", "Kim", "--why", "typo")
-        self("run", *where, "--correct", self.code(), "--grade", grade)
+        self("record correct", *where, "--code", self.code(), "--grade", grade)
         return self.code()
 
     def take_off(self) -> None:
@@ -237,8 +237,8 @@ def a_file_system_without_locks(bench: Bench) -> None:
     # it is said, and not taken for another process
     if shutil.which("strace") is None:
         pytest.skip("needs strace: it lets a call of the system fail")
-    bench("note", "before", "--who", "Kim")
-    command = masrel_command("note", bench.study, "power cut", "--who", "Kim")
+    bench("record note", "before", "--who", "Kim")
+    command = masrel_command("record", "note", bench.study, "power cut", "--who", "Kim")
     done = Syscall("flock", 1).inject("error=ENOLCK", command)
     assert done.returncode == 2
     assert "another process" not in done.stderr
@@ -246,7 +246,7 @@ def a_file_system_without_locks(bench: Bench) -> None:
 
 
 def a_grade_off_the_scale_on_a_sheet(bench: Bench) -> None:
-    bench("sheet")
+    bench("paper print")
     for sheet, row in (("schedules/test_R2_sheet.csv", 4), ("sheets/test_R1.csv", 3)):
         path = bench.study / sheet
         lines = path.read_text().splitlines(keepends=True)

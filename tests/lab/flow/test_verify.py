@@ -73,8 +73,8 @@ def corrected(study: StudyPaths) -> None:
     session, rater = log.stem.split("_")
     fields = next(e["fields"] for e in events(log) if e["event"] == "grade")
     run(
-        *("run", str(study.root), "--rater", rater, "--session", session),
-        *("--correct", str(fields["code"]), "--who", "me", "--why", "a slip"),
+        *("record", "correct", str(study.root), "--rater", rater, "--session", session),
+        *("--code", str(fields["code"]), "--who", "me", "--why", "a slip"),
         *("--grade", "4" if fields["grade"] != "4" else "0"),
     )
 
@@ -111,7 +111,7 @@ def the_status_of_a_rater(study: StudyPaths) -> Path:
 def a_rater_withdrawn_after_the_table(study: StudyPaths) -> Path:
     of_whom = ("--rater", "R2", "--who", "Kim", "--why", "left")
     run("ratings", str(study.root))
-    run("withdraw", str(study.root), *of_whom)
+    run("record", "withdraw", str(study.root), *of_whom)
     return study.raters_file
 
 

@@ -413,7 +413,16 @@ def test_a_session_on_a_day_to_come_is_refused(small: Small) -> None:
 def test_the_command_enters_and_says_so(small: Small) -> None:
     study, _ = small
     file = typed(small, filled(small, "1", "NA", "3"))
-    call = ["enter", str(study.root), str(file), "--rater", "R1", "--session", "test"]
+    call = [
+        "paper",
+        "enter",
+        str(study.root),
+        str(file),
+        "--rater",
+        "R1",
+        "--session",
+        "test",
+    ]
     result = CliRunner().invoke(cli, [*call, "--who", "MK", "--on", "2026-11-01"])
     assert result.exit_code == 0, result.output
     assert result.output == (

@@ -153,13 +153,13 @@ def test_without_a_first_entry_there_is_no_second(small: Small) -> None:
 
 def test_the_command_lists_differences_and_what_to_do(small: Small) -> None:
     rows, second = entered_twice(small, "3")
-    call = ["enter", str(small[0].root), str(second), "--rater", "R1"]
-    call += ["--session", "test", "--who", "JL", "--second"]
+    call = ["paper", "again", str(small[0].root), str(second), "--rater", "R1"]
+    call += ["--session", "test", "--who", "JL"]
     result = CliRunner().invoke(cli, call)
     assert result.exit_code == 1
     first, then = result.output.splitlines()
     assert first == f"second.csv: row 2: code {rows[1][2]}: grade: first 1+, second 3"
-    assert "masrel run --correct" in then
+    assert "masrel record correct --code" in then
     rows[1][3] = "1+"
     typed(small, [*rows, [""]], name="second.csv")
     result = CliRunner().invoke(cli, call)

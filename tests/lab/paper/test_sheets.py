@@ -172,12 +172,12 @@ def test_sheets_are_of_the_schedules_that_are_drawn(new_study: New) -> None:
 
 def test_the_command_says_what_to_do_next(small: Small) -> None:
     study, _ = small
-    call = ["sheet", str(study.root), "--rater", "R1", "--session", "test"]
+    call = ["paper", "print", str(study.root), "--rater", "R1", "--session", "test"]
     result = CliRunner().invoke(cli, call)
     assert result.exit_code == 0, result.output
     assert result.output == (
         f"{study.sheets / 'sheets.html'}: 1 sheet to print. Type each into its "
-        "SESSION_RATER.csv beside it; then: masrel enter\n"
+        "SESSION_RATER.csv beside it; then: masrel paper enter\n"
     )
 
 

@@ -150,4 +150,4 @@ def test_leftover_schedules_say_what_to_do(study: StudyPaths) -> None:
     take_off(study, "R2")
     code, errors = call("check", study.root)
     assert code == 2
-    assert "put the rater back into the session (masrel withdraw keeps" in errors
+    assert "put the rater back into the session (masrel record withdraw keeps" in errors

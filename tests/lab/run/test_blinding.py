@@ -45,7 +45,8 @@ def test_no_output_before_unblinding_names_a_model_to_a_rater(
     shown += call(monkeypatch, *where, *simulated, typed="\n2\n\n")
     by = ("--who", "A", "--why", "b")
     for code in (codes[0], "00A"):
-        shown += call(monkeypatch, *where, "--correct", code, "--grade", "2", *by)
+        correct = ("record", "correct", *where[1:], "--code", code, "--grade", "2")
+        shown += call(monkeypatch, *correct, *by)
     shown += study.sheet_file("R1", "test").read_text(encoding="utf-8")
     shown += study.log_file("R1", "test").read_text(encoding="utf-8")
     # a schedule that is damaged, one of another, and one that is not there
@@ -63,5 +64,5 @@ def test_no_output_before_unblinding_names_a_model_to_a_rater(
     assert not [name for _, name in NAMES if name in shown]
     # and the models are there to be named
     file.write_bytes(whole)
-    said = call(monkeypatch, "unblind", study.root, codes[0], *by)
+    said = call(monkeypatch, "record", "unblind", study.root, codes[0], *by)
     assert [name for _, name in NAMES if name in said]

@@ -73,11 +73,11 @@ def test_a_person_is_asked_and_may_be_corrected(small: Small) -> None:
     out, _ = typed(*run, "--clock", "simulated", answers="\n1\n\n1+\n\n3\n")
     assert "Presentation 3 of 3" in out
     shown = read_schedule(study.schedule_file("R1", "test")).presentations[1]
-    correction = ("--correct", shown.code, "--grade", "2", "--who", "Kim")
-    said, _ = typed(*run, *correction, "--why", "misheard")
-    assert f"{shown.code} of R1, session test, is now 2" in said
-    again = typed(*run, *correction, "--why", "misheard", "--quiet")
-    assert again == ("", "")
+    correct = ("record", "correct", study.root, *who, "--code", shown.code)
+    correct += ("--grade", "2", "--who", "Kim", "--why", "misheard")
+    for _ in range(2):
+        said, _ = typed(*correct)
+        assert f"{shown.code} of R1, session test, is now 2" in said
     typed("ratings", study.root)
     rows = study.ratings_file.read_text(encoding="utf-8").splitlines()
     (row,) = [row for row in rows if f",{shown.model}," in row]
@@ -87,8 +87,7 @@ def test_a_person_is_asked_and_may_be_corrected(small: Small) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--correct", "X"], "--correct needs --grade, --who and --why too"),
-        (["--who", "Kim"], "--who needs --correct CODE too"),
+        (["--correct", "X"], "run --correct is now masrel record correct"),
         (["--grades", "oracle"], "oracle"),
     ],
 )

@@ -355,8 +355,6 @@ def test_nothing_of_a_rehearsal_is_a_rating(new_study: New) -> None:
     assert not study.sessions.exists()
     run(small, SimulatedGrades(protocol))
     assert len(ratings_from_logs(study, protocol).table) == 3
-    refused = CliRunner().invoke(cli, [*call, "--correct", "X"])
-    assert "--rehearse presents models, and --correct none" in refused.output
 
 
 def test_a_rehearsal_among_the_sessions_is_refused(new_study: New) -> None:

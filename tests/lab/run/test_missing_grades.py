@@ -101,7 +101,7 @@ def test_a_fault_is_skipped_later_and_its_grade_given_later_still(
     first, second, _ = codes(faulty)
     who = ("--rater", "R1", "--session", "test")
     by = ("--who", "Kim", "--why", "too fast")
-    said = call("run", study.root, *who, "--skip", first, *by)
+    said = call("record", "skip", study.root, *who, "--code", first, *by)
     assert f"{first} of R1, session test, is skipped" in said
     with pytest.raises(SessionLogError, match=r"and is not skipped yet \(none\)"):
         record_skip(study, "R1", "test", code=first, **BY)
@@ -109,7 +109,8 @@ def test_a_fault_is_skipped_later_and_its_grade_given_later_still(
         record_correction(*faulty, "R1", "test", code=second, grade="1", **BY)
     _, said = run(faulty, "\nskip a\n\nskip b\n")
     assert "Presentation 1 of 3" not in said
-    call("run", study.root, *who, "--correct", first, "--grade", "1+", *by)
+    correct = ("record", "correct", study.root, *who, "--code", first)
+    call(*correct, "--grade", "1+", *by)
     assert grades(faulty) == ["1+", None, None]
     assert len(study_remarks(study, protocol)) == 2
     assert not verify_study(study).findings
@@ -121,8 +122,8 @@ def test_a_grade_is_corrected_to_missing_and_back(small: Small) -> None:
         *small, "R1", "test", grades=ScriptGrades(["1", "2", "3"]), clock="simulated"
     )
     first = codes(small)[0]
-    words = ("run", study.root, "--rater", "R1", "--session", "test")
-    correct = (*words, "--correct", first, "--who", "Kim", "--why", "wrong arm")
+    words = ("record", "correct", study.root, "--rater", "R1", "--session", "test")
+    correct = (*words, "--code", first, "--who", "Kim", "--why", "wrong arm")
     said = call(*correct, "--grade", "NA")
     assert f"{first} of R1, session test, is now missing" in said
     assert grades(small) == [None, "2", "3"]
@@ -191,25 +192,6 @@ def test_a_graded_presentation_is_not_skipped(small: Small) -> None:
     run_session(*small, "R1", "test", grades=ScriptGrades(["1"] * 3), clock="simulated")
     with pytest.raises(SessionLogError, match="needed a code that a fault stopped"):
         record_skip(small[0], "R1", "test", code=codes(small)[0], **BY)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--skip", "X"], "--skip needs --who and --why too"),
-        (["--skip", "X", "--grade", "1"], "--grade needs --correct CODE, not --skip"),
-        (["--skip", "X", "--correct", "X"], "are said one at a time"),
-        (["--skip", "X", "--rehearse"], "presents models, and --skip none"),
-        (["--question", "a.b"], "--question needs --answer, --who and --why too"),
-        (["--answer", "7"], "--answer needs --question QUESTION too"),
-        (["--code", "X", "--skip", "X"], "--code needs --question QUESTION, not"),
-    ],
-)
-def test_a_skip_that_makes_no_sense_is_refused(
-    small: Small, options: list[str], message: str
-) -> None:
-    who = ("--rater", "R1", "--session", "test")
-    assert message in call("run", small[0].root, *who, *options, code=2)
 
 
 def test_a_grade_is_corrected_at_the_console_while_the_session_runs(

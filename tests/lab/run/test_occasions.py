@@ -405,7 +405,7 @@ def test_an_answer_is_corrected_by_the_command(new_study: New) -> None:
     study, protocol = new_study(("[schedule]", QUESTIONS))
     run(study, protocol)
     first = read_schedule(study.schedule_file("R1", "test")).presentations[0].code
-    command = ("run", study.root, "--rater", "R1", "--session", "test")
+    command = ("record", "answer", study.root, "--rater", "R1", "--session", "test")
     command += ("--who", "AB", "--why", "slip")
     for options, said in (
         (["--question", "realism.score", "--answer", "9"], "realism.score is now 9;"),

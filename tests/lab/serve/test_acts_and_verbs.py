@@ -107,7 +107,7 @@ def by_the_page(study: StudyPaths, act: str, fields: Fields) -> str:
 
 def by_the_verb(study: StudyPaths, verb: str, *words: str) -> str:
     """Do it at the command line -> what it says when it is refused."""
-    result = CliRunner().invoke(cli, [verb, str(study.root), *words])
+    result = CliRunner().invoke(cli, [*verb.split(), str(study.root), *words])
     if result.exit_code == 0:
         return ""
     return f"{result.exception}".replace(str(study.root), "STUDY")
@@ -117,7 +117,8 @@ def by_the_verb(study: StudyPaths, verb: str, *words: str) -> str:
 BY = {"who": "Kim", "why": "asked to"}
 BY_KIM = ("--who", "Kim", "--why", "asked to")
 OF_R1 = {"rater": "R1", "session": "test", **BY}
-RUN_R1 = ("run", "--rater", "R1", "--session", "test", *BY_KIM)
+OF_VERB_R1 = ("--rater", "R1", "--session", "test", *BY_KIM)
+OF_VERB_R2 = ("--rater", "R2", "--session", "test", *BY_KIM)
 
 CASES: dict[str, tuple[str, Fields, tuple[str, ...]]] = {
     "adverse event": (
@@ -128,7 +129,7 @@ CASES: dict[str, tuple[str, Fields, tuple[str, ...]]] = {
             **{"action": "a break", "outcome": ""},
         },
         (
-            *("note", "wrist hurts", "--who", "Kim", "--kind", "adverse-event"),
+            *("record adverse-event", "wrist hurts", "--who", "Kim"),
             *("--severity", "mild", "--rater", "R1", "--session", "test"),
             *("--action", "a break"),
         ),
@@ -136,61 +137,86 @@ CASES: dict[str, tuple[str, Fields, tuple[str, ...]]] = {
     "note": (
         "note",
         {"text": "the window was open", "who": "Kim", "kind": "note", "rater": ""},
-        ("note", "the window was open", "--who", "Kim"),
+        ("record note", "the window was open", "--who", "Kim"),
     ),
     "withdraw": (
         "withdraw",
         {"rater": "R2", **BY},
-        ("withdraw", "--rater", "R2", *BY_KIM),
+        ("record withdraw", "--rater", "R2", *BY_KIM),
     ),
     "unblind": (
         "unblind",
         {"code": "GRADED", "rater": "R1", "session": "", **BY},
-        ("unblind", "GRADED", "--rater", "R1", *BY_KIM),
+        ("record unblind", "GRADED", "--rater", "R1", *BY_KIM),
     ),
     "draw": ("draw", {}, ("schedule",)),
     "skip": (
         "skip",
         {"rater": "R2", "session": "test", "code": "FAULTED", **BY},
-        ("run", "--rater", "R2", "--session", "test", "--skip", "FAULTED", *BY_KIM),
+        ("record skip", *OF_VERB_R2, "--code", "FAULTED"),
     ),
     "correct": (
         "correct",
         {**OF_R1, "code": "GRADED", "grade": "1+"},
-        (*RUN_R1, "--correct", "GRADED", "--grade", "1+"),
+        ("record correct", *OF_VERB_R1, "--code", "GRADED", "--grade", "1+"),
     ),
     "correct to missing": (
         "correct",
         {**OF_R1, "code": "GRADED", "grade": "NA"},
-        (*RUN_R1, "--correct", "GRADED", "--grade", "NA"),
+        ("record correct", *OF_VERB_R1, "--code", "GRADED", "--grade", "NA"),
     ),
     "correct late": (
         "correct",
         {**OF_R1, "rater": "R2", "code": "FAULTED", "grade": "4"},
         (
-            *("run", "--rater", "R2", "--session", "test", *BY_KIM),
-            *("--correct", "FAULTED", "--grade", "4"),
+            *("record correct", *OF_VERB_R2),
+            *("--code", "FAULTED", "--grade", "4"),
         ),
     ),
     "answer about a session": (
         "answer",
         {**OF_R1, "question": "realism.score", "answer": " 70.5 ", "code": ""},
-        (*RUN_R1, "--question", "realism.score", "--answer", "70.5"),
+        (
+            "record answer",
+            *OF_VERB_R1,
+            "--question",
+            "realism.score",
+            "--answer",
+            "70.5",
+        ),
     ),
     "answer about a model": (
         "answer",
         {**OF_R1, "question": "each.sure", "answer": "no", "code": "GRADED"},
-        (*RUN_R1, "--question", "each.sure", "--answer", "no", "--code", "GRADED"),
+        (
+            "record answer",
+            *OF_VERB_R1,
+            "--question",
+            "each.sure",
+            "--answer",
+            "no",
+            "--code",
+            "GRADED",
+        ),
     ),
     "no answer": (
         "answer",
         {**OF_R1, "question": "each.words", "answer": "", "code": "GRADED"},
-        (*RUN_R1, "--question", "each.words", "--answer", "NA", "--code", "GRADED"),
+        (
+            "record answer",
+            *OF_VERB_R1,
+            "--question",
+            "each.words",
+            "--answer",
+            "NA",
+            "--code",
+            "GRADED",
+        ),
     ),
     "answer about the study": (
         "answer",
         {**OF_R1, "question": "all.years", "answer": "12"},
-        (*RUN_R1, "--question", "all.years", "--answer", "12"),
+        ("record answer", *OF_VERB_R1, "--question", "all.years", "--answer", "12"),
     ),
 }
 
@@ -198,42 +224,45 @@ REFUSED: dict[str, tuple[str, Fields, tuple[str, ...]]] = {
     "no rater": (
         "withdraw",
         {"rater": "R9", **BY},
-        ("withdraw", "--rater", "R9", *BY_KIM),
+        ("record withdraw", "--rater", "R9", *BY_KIM),
     ),
     "no code": (
         "unblind",
         {"code": "XX", **BY},
-        ("unblind", "XX", *BY_KIM),
+        ("record unblind", "XX", *BY_KIM),
     ),
     "no fault": (
         "skip",
         {**OF_R1, "code": "GRADED"},
-        (*RUN_R1, "--skip", "GRADED"),
+        ("record skip", *OF_VERB_R1, "--code", "GRADED"),
     ),
     "no grade of the scale": (
         "correct",
         {**OF_R1, "code": "GRADED", "grade": "5"},
-        (*RUN_R1, "--correct", "GRADED", "--grade", "5"),
+        ("record correct", *OF_VERB_R1, "--code", "GRADED", "--grade", "5"),
     ),
     "no presentation": (
         "correct",
         {**OF_R1, "code": "FAULTED", "grade": "4"},
-        (*RUN_R1, "--correct", "FAULTED", "--grade", "4"),
+        ("record correct", *OF_VERB_R1, "--code", "FAULTED", "--grade", "4"),
     ),
     "no number": (
         "answer",
         {**OF_R1, "question": "all.years", "answer": "many"},
-        (*RUN_R1, "--question", "all.years", "--answer", "many"),
+        (
+            *("record answer", *OF_VERB_R1),
+            *("--question", "all.years", "--answer", "many"),
+        ),
     ),
     "out of range": (
         "answer",
         {**OF_R1, "question": "all.years", "answer": "61"},
-        (*RUN_R1, "--question", "all.years", "--answer", "61"),
+        ("record answer", *OF_VERB_R1, "--question", "all.years", "--answer", "61"),
     ),
     "no code of a question": (
         "answer",
         {**OF_R1, "question": "each.sure", "answer": "no"},
-        (*RUN_R1, "--question", "each.sure", "--answer", "no"),
+        ("record answer", *OF_VERB_R1, "--question", "each.sure", "--answer", "no"),
     ),
 }
 

@@ -1,4 +1,4 @@
-"""Figures of `masrel trace`: torque of stretches, catches by speed, and one catch."""
+"""Figures of `masrel joint trace`: torque of stretches, catches, one catch."""
 
 from collections.abc import Sequence
 from typing import Literal

@@ -1,4 +1,4 @@
-"""``masrel between``: model files at even steps between models."""
+"""``masrel joint between``: model files at even steps between models."""
 
 import hashlib
 from collections.abc import Sequence
@@ -174,8 +174,8 @@ def _model_between(
             joint,
             simulated=simulated,
             made_from=(
-                f"masrel between {masrel.__version__}: {fraction} of the way from "
-                f"{first.label} to {second.label}"
+                f"masrel joint between {masrel.__version__}: {fraction} of the way "
+                f"from {first.label} to {second.label}"
             ),
         ),
     )

@@ -1,13 +1,20 @@
-"""``masrel fit``: identify a joint, or a device's friction, from recordings."""
+"""``masrel joint fit``: a joint of recordings; ``friction``: a device's friction."""
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
 from masrel._files import write_file
-from masrel.cli._options import Decorator, OutputOptions, output_options, write_output
+from masrel.cli._options import (
+    Decorator,
+    OutputOptions,
+    grouped,
+    output_options,
+    write_output,
+)
 from masrel.cli._paths import InputFile, OutputFile
 from masrel.errors import ParameterError
 from masrel.lab.cli._study_options import warnings_as_notes
@@ -19,6 +26,43 @@ if TYPE_CHECKING:
         FrictionFit,
         Movement,
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Recordings:
+    """Files of recordings, and what their columns are called."""
+
+    files: tuple[Path, ...]
+    # units, columns: QUANTITY=TEXT each
+    units: tuple[str, ...]
+    columns: tuple[str, ...]
+
+    def read(self, *, of_device: bool, quiet: bool) -> "list[Movement]":
+        """Return what they hold, with a bar."""
+        from tqdm import tqdm
+
+        from masrel.lab.elbow.identification import read_movement
+
+        columns = _pairs("--column", self.columns)
+        units = _pairs("--unit", self.units)
+        with tqdm(
+            self.files, desc="reading", unit="file", disable=quiet or None, delay=1.0
+        ) as bar:
+            return [
+                read_movement(path, columns=columns, units=units, of_device=of_device)
+                for path in bar
+            ]
+
+
+def _pairs(option: str, entries: tuple[str, ...]) -> dict[str, str]:
+    pairs = {}
+    for entry in entries:
+        key, sign, value = entry.partition("=")
+        if not sign or not value:
+            raise ParameterError(f"{option}: needs QUANTITY=TEXT, got {entry!r}")
+        pairs[key] = value
+    return pairs
+
 
 _Term = float | Literal["off", "fitted"]
 
@@ -43,34 +87,73 @@ def _term(option: str, text: str, default: str = "off") -> Decorator:
     )
 
 
+_recordings = grouped(
+    "recordings",
+    _Recordings,
+    click.argument(
+        "files",
+        metavar="RECORDINGS...",
+        nargs=-1,
+        required=True,
+        type=InputFile(path_type=Path),
+    ),
+    click.option(
+        "--unit",
+        "units",
+        help="Unit of a column whose name has none: time=ms, angle=deg, torque=nm.",
+        metavar="QUANTITY=TEXT",
+        multiple=True,
+    ),
+    click.option(
+        "--column",
+        "columns",
+        help="Name of a column that is called otherwise: torque='Moment'.",
+        metavar="QUANTITY=TEXT",
+        multiple=True,
+    ),
+)
+_level = click.option("--level", type=float, default=0.95, show_default=True)
+_figures = click.option(
+    "--figures",
+    "folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Draw the fit as PNG and SVG files in this folder.",
+)
+_output = output_options(
+    json="Write everything as JSON here; - prints it, and nothing else, on stdout.",
+    quiet="Show no progress.",
+    makes_folder=True,
+)
+
+
+@click.command("friction")
+@_recordings
+@_level
+@_figures
+@_output
+def friction(
+    recordings: _Recordings, level: float, folder: Path | None, output: OutputOptions
+) -> None:
+    """Fit (7), the friction of a device, to RECORDINGS of backdriving.
+
+    Recordings are as those of masrel joint fit.
+    """
+    from masrel.lab.elbow.identification import fit_friction
+
+    with warnings_as_notes():
+        movements = recordings.read(of_device=True, quiet=output.quiet)
+        fitted = fit_friction(movements, level=level)
+    _write(fitted, (), folder, output)
+
+
 @click.command("fit")
-@click.argument("recordings", nargs=-1, required=True, type=InputFile(path_type=Path))
+@_recordings
 @click.option(
     "-o",
     "--output",
     "model_file",
     type=OutputFile(path_type=Path),
     help="Write the model file here, for a protocol to name.",
-)
-@click.option(
-    "--friction",
-    "of_device",
-    is_flag=True,
-    help="Fit (7) to recordings of backdriving.",
-)
-@click.option(
-    "--unit",
-    "units",
-    help="Unit of a column whose name has none: time=ms, angle=deg, torque=nm.",
-    metavar="QUANTITY=TEXT",
-    multiple=True,
-)
-@click.option(
-    "--column",
-    "columns",
-    help="Name of a column that is called otherwise: torque='Moment'.",
-    metavar="QUANTITY=TEXT",
-    multiple=True,
 )
 @click.option(
     "--slow-below",
@@ -110,24 +193,12 @@ def _term(option: str, text: str, default: str = "off") -> Decorator:
     is_flag=True,
     help="Also fit with each of these, and compare by leaving trials out.",
 )
-@click.option("--level", type=float, default=0.95, show_default=True)
-@click.option(
-    "--figures",
-    "folder",
-    type=click.Path(path_type=Path, file_okay=False),
-    help="Draw the fit as PNG and SVG files in this folder.",
-)
-@output_options(
-    json="Write everything as JSON here; - prints it, and nothing else, on stdout.",
-    quiet="Show no progress.",
-    makes_folder=True,
-)
+@_level
+@_figures
+@_output
 def fit(
-    recordings: tuple[Path, ...],
+    recordings: _Recordings,
     model_file: Path | None,
-    of_device: bool,
-    units: tuple[str, ...],
-    columns: tuple[str, ...],
     compare: bool,
     level: float,
     folder: Path | None,
@@ -142,77 +213,17 @@ def fit(
     interval, clustered by trial, what these trials do not determine, and
     whether the law fits them.
     """
-    if of_device:
-        _check_device_options(model_file, {**of_joint, "compare": compare})
     slow_below = of_joint["slow_below"]
     if slow_below is not None and not 0.0 < slow_below < math.inf:
         raise ParameterError(
             f"--slow-below: needs more than 0 deg/s and finite, got {slow_below:g}"
         )
-    names = _pairs("--column", columns), _pairs("--unit", units)
-    compared: tuple[ComparedFit, ...] = ()
-    fitted: ElbowFit | FrictionFit
     with warnings_as_notes():
-        movements = _read(
-            recordings,
-            *names,
-            of_device=of_device,
-            quiet=output.quiet,
-        )
-        if of_device:
-            from masrel.lab.elbow.identification import fit_friction
-
-            fitted = fit_friction(movements, level=level)
-        else:
-            fitted, compared = _fit_joint(movements, of_joint, level, compare)
+        movements = recordings.read(of_device=False, quiet=output.quiet)
+        fitted, compared = _fit_joint(movements, of_joint, level, compare)
     _write(fitted, compared, folder, output)
     if model_file is not None:
         _write_model(fitted, model_file)
-
-
-def _check_device_options(
-    model_file: Path | None, of_joint: "dict[str, object]"
-) -> None:
-    if model_file is not None:
-        raise ParameterError("--output: a model file is of a joint, not of a device")
-    source = click.get_current_context().get_parameter_source
-    for name in of_joint:
-        if source(name) is click.core.ParameterSource.COMMANDLINE:
-            raise ParameterError(
-                f"--{name.replace('_', '-')}: says something of a joint, not of a "
-                "device (--friction)"
-            )
-
-
-def _pairs(option: str, entries: tuple[str, ...]) -> dict[str, str]:
-    pairs = {}
-    for entry in entries:
-        key, sign, value = entry.partition("=")
-        if not sign or not value:
-            raise ParameterError(f"{option}: needs QUANTITY=TEXT, got {entry!r}")
-        pairs[key] = value
-    return pairs
-
-
-def _read(
-    paths: tuple[Path, ...],
-    columns: dict[str, str],
-    units: dict[str, str],
-    *,
-    of_device: bool,
-    quiet: bool,
-) -> "list[Movement]":
-    from tqdm import tqdm
-
-    from masrel.lab.elbow.identification import read_movement
-
-    with tqdm(
-        paths, desc="reading", unit="file", disable=quiet or None, delay=1.0
-    ) as bar:
-        return [
-            read_movement(path, columns=columns, units=units, of_device=of_device)
-            for path in bar
-        ]
 
 
 def _fit_joint(
@@ -268,16 +279,14 @@ def _write(
     )
 
 
-def _write_model(fitted: "ElbowFit | FrictionFit", path: Path) -> None:
+def _write_model(fitted: "ElbowFit", path: Path) -> None:
     import masrel
-    from masrel.lab.elbow.identification import ElbowFit, as_toml, model_document
+    from masrel.lab.elbow.identification import as_toml, model_document
 
-    if not isinstance(fitted, ElbowFit):
-        raise ParameterError("--output: a model file is of a joint, not of a device")
     document = model_document(
         fitted.joint(),
         simulated=fitted.simulated,
-        made_from=f"masrel fit {masrel.__version__}, {len(fitted.trials)} trials",
+        made_from=f"masrel joint fit {masrel.__version__}, {len(fitted.trials)} trials",
         fit=fitted,
     )
     write_file(path, as_toml(document))

@@ -1,4 +1,4 @@
-"""``masrel trace``: events, torque and samples of stretches of models."""
+"""``masrel joint trace`` and ``tardieu``: events, torque and samples of stretches."""
 
 import math
 from collections.abc import Sequence
@@ -254,11 +254,6 @@ _joint_options = grouped(
     help="What --figure shows: torque by angle or time, the catches, or one of "
     "them.  [default: angle]",
 )  # fmt: skip
-@click.option(
-    "--tardieu", is_flag=True,
-    help="Say R2, R1 and their difference instead, at --speed-deg-s V1, V2 and V3 or "
-    "10, 100 and 150.",
-)  # fmt: skip
 @click.option("--quiet", is_flag=True, help="Show no progress.")  # of the output
 def trace(
     names: _JointOptions,
@@ -271,7 +266,6 @@ def trace(
     csv_file: Path | None,
     output: OutputOptions,
     view: str | None,
-    tardieu: bool,
 ) -> None:
     """Phases, peak torque and samples of stretches of models.
 
@@ -283,11 +277,6 @@ def trace(
     joints = _joints_of(names, law)
     if speed_range is not None:
         speeds = (*speeds, *_spaced(*speed_range))
-    if tardieu:
-        _check_plain(stretch, quantities, output, csv_file)
-        start = START_DEG if stretch.start is None else stretch.start
-        write_tardieu(joints, start, speeds, output)
-        return
     if view is not None and output.figure is None:
         raise ParameterError("--view: goes with --figure, whose contents it chooses")
     scenes = _scenes(joints, stretch, speeds)
@@ -309,6 +298,26 @@ def trace(
     )
 
 
+@click.command("tardieu")
+@_joint_options
+@_law_options
+@click.option("--from-deg", "start", type=float, default=START_DEG, show_default=True)
+@click.option(
+    "--speed-deg-s", "speeds", type=(float, float, float), metavar="V1 V2 V3",
+    help="Speeds of the stretches.  [default: 10 100 150]",
+)  # fmt: skip
+@output_options(json="Write them as JSON here; - for the screen.")
+def tardieu(
+    names: _JointOptions,
+    law: _LawOptions,
+    start: float,
+    speeds: tuple[float, float, float] | None,
+    output: OutputOptions,
+) -> None:
+    """R2, R1 and their difference, by stretches to the end of range at three speeds."""
+    write_tardieu(_joints_of(names, law), start, speeds or (), output)
+
+
 def _spaced(low: float, high: float, n: int) -> tuple[float, ...]:
     return tuple(low + (high - low) * i / (n - 1) for i in range(n))
 
@@ -325,23 +334,6 @@ def _documents(
                 raise
             raise ParameterError(f"{scene.title}: {error}") from error
     return documents
-
-
-def _check_plain(
-    stretch: _MotionOptions,
-    quantities: Quantities,
-    output: OutputOptions,
-    csv_file: Path | None,
-) -> None:
-    others = (
-        (stretch.kind, stretch.repeats) != ("constant", 1),
-        (stretch.end, stretch.stop, output.figure, csv_file) != (None,) * 4,
-    )
-    if any(others) or quantities != Quantities():
-        raise ParameterError(
-            "--tardieu: stretches at constant speed to the end of range and says "
-            "angles alone; it goes with --from-deg, --speed-deg-s and --json"
-        )
 
 
 def _scenes(

@@ -1,0 +1,150 @@
+"""``masrel paper``: sheets to print, and those that were filled in, into logs."""
+
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from masrel.cli import Commands
+from masrel.cli._paths import InputFile
+from masrel.lab.cli._study_options import warnings_as_notes
+from masrel.lab.protocol import StudyPaths, read_protocol
+
+if TYPE_CHECKING:
+    from masrel.lab.paper import SheetDifference
+
+
+@click.group("paper", cls=Commands)
+def paper() -> None:
+    """Sheets of raters who grade on paper: to print, and to enter once filled in."""
+
+
+@paper.command("print")
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option("--rater", "raters", multiple=True, help="Id of a rater; default: all.")
+@click.option(
+    "--session", "sessions", multiple=True, help="Id of a session; default: all."
+)
+@click.option("--site", "sites", multiple=True, help="Id of a site; default: all.")
+def _print(
+    study: Path,
+    raters: tuple[str, ...],
+    sessions: tuple[str, ...],
+    sites: tuple[str, ...],
+) -> None:
+    """Make sheets of drawn schedules to print, and files to type them into.
+
+    The sheets are a page to open in a browser and print. They have codes and no models.
+    What was written on one is typed into its file, which masrel paper enter takes in; a
+    file in which something has been typed stays as it is.
+    """
+    from masrel.lab.paper import write_sheets
+
+    paths = StudyPaths(study)
+    protocol = read_protocol(paths.protocol)
+    made = write_sheets(paths, protocol, raters=raters, sessions=sessions, sites=sites)
+    n_typed, n_kept = len(made.typed), len(made.unchanged)
+    note = f", {n_kept} of them filled in and kept" if n_kept else ""
+    click.echo(
+        f"{made.html}: {n_typed} {'sheet' if n_typed == 1 else 'sheets'} to print. "
+        f"Type each into its SESSION_RATER.csv beside it{note}; then: masrel paper "
+        "enter"
+    )
+
+
+def _sheet_options(command: Callable[..., None]) -> Callable[..., None]:
+    options = (
+        click.argument("study", type=click.Path(path_type=Path)),
+        click.argument("file", type=InputFile(path_type=Path)),
+        click.option(
+            "--rater", required=True, help="Id of the rater who filled it in."
+        ),
+        click.option("--session", required=True, help="Id of the session."),
+        click.option("--who", required=True, help="Who typed it."),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+@paper.command("enter")
+@_sheet_options
+@click.option(
+    "--on",
+    type=click.DateTime(["%Y-%m-%d"]),
+    help="Day of the session, as on the sheet.",
+)
+@click.option("--device", help="What presented the models; default: none.")
+def _enter(
+    study: Path,
+    file: Path,
+    rater: str,
+    session: str,
+    who: str,
+    on: datetime | None,
+    device: str | None,
+) -> None:
+    """Enter a sheet of STUDY that was filled in on paper and typed into FILE.
+
+    All of it enters the session's log, or nothing where a row is wrong.
+    """
+    from masrel.lab.paper import enter_sheet
+    from masrel.lab.paper._entry import NO_DEVICE
+
+    paths = StudyPaths(study)
+    protocol = read_protocol(paths.protocol)
+    with warnings_as_notes():
+        entered = enter_sheet(
+            paths,
+            protocol,
+            file,
+            rater,
+            session,
+            who=who,
+            on=None if on is None else on.date(),
+            device=device or NO_DEVICE,
+        )
+    n_missing = entered.n_presentations - entered.n_graded
+    without = f", {n_missing} missing," if n_missing else ""
+    click.echo(
+        f"session {session} of {rater} is entered: {entered.n_graded} grades from "
+        f"paper{without} in {entered.log_file}. Then: masrel ratings"
+    )
+
+
+@paper.command("again")
+@_sheet_options
+@click.pass_context
+def _again(
+    context: click.Context, study: Path, file: Path, rater: str, session: str, who: str
+) -> None:
+    """Compare FILE, a sheet that somebody else typed, with what was entered first.
+
+    Nothing is entered: where the two entries differ is listed, and the exit code is 1.
+    """
+    from masrel.lab.paper import compare_sheet
+
+    paths = StudyPaths(study)
+    protocol = read_protocol(paths.protocol)
+    differences = compare_sheet(paths, protocol, file, rater, session, who=who)
+    for each in differences:
+        click.echo(_in_words(each))
+    if differences:
+        click.echo(
+            "Look at the paper. Where the first entry is wrong: masrel record correct "
+            "--code CODE --grade GRADE, or masrel record answer --question QUESTION "
+            "--answer ANSWER, --who WHO --why TEXT; where the second is: mend FILE and "
+            "compare it again"
+        )
+        context.exit(1)
+    click.echo(f"session {session} of {rater}: both entries agree")
+
+
+def _in_words(each: "SheetDifference") -> str:
+    where = "" if each.code is None else f"code {each.code}: "
+    return (
+        f"{each.file}: row {each.row}: {where}{each.column}: first {each.first}, "
+        f"second {each.second}"
+    )
