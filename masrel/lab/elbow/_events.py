@@ -177,20 +177,16 @@ def events(parameters: ElbowParameters, motion: Motion) -> Events:
         for (phase, time, angle), (_, end, end_angle) in pairwise(marks)
         if end > time  # one of no length is left out
     ]
-    first, *others = [
-        {n: _reached(getattr(stretch, n)) for n in _REACHED}
+    names: list[dict[str, Any]] = [
+        {n: None if (x := getattr(stretch, n)) != x else x for n in _REACHED}
         for stretch in (line.first, *line.stretches)
     ]
     return Events(
-        **first,
-        stretches=tuple([StretchEvents(**names) for names in others]),
+        **names[0],
+        stretches=tuple([StretchEvents(**each) for each in names[1:]]),
         end=line.end,
         phases=tuple(phases),
     )
-
-
-def _reached(number: float) -> Any:
-    return None if math.isnan(number) else number
 
 
 def phase_marks(line: "Timeline") -> list[tuple[int, float, float]]:
@@ -233,7 +229,9 @@ class Stretch:
     def mark(self, which: Flag, **numbers: Number) -> None:
         """Have some numbers come, in some rows."""
         for name, number in numbers.items():
-            setattr(self, name, pick(which, number, getattr(self, name)))
+            if which is not True:  # of columns
+                number = pick(which, number, getattr(self, name))
+            setattr(self, name, number)
 
 
 class Timeline:

@@ -28,12 +28,12 @@ _SHARES = [[1.0 / comb(n, j) for j in range(n + 1)] for n in range(12)]
 
 def some(flag: Flag) -> bool:
     """Whether it holds, in any row."""
-    return bool(flag.any()) if isinstance(flag, np.ndarray) else bool(flag)
+    return flag if flag is True or flag is False else bool(np.any(flag))
 
 
 def pick(flag: Flag, one: Any, other: Any) -> Any:
     """Return one thing where a flag holds, the other elsewhere."""
-    if isinstance(flag, np.ndarray):
+    if flag is not True and isinstance(flag, np.ndarray):
         return np.where(flag, one, other)
     return one if flag else other
 
