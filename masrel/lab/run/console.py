@@ -72,24 +72,15 @@ class ConsoleGrades:
         """
         again = "" if request.attempt == 1 else " again"
         presentation = request.presentation
-        labels = [
-            label
-            for label, is_so in (
-                ("REHEARSAL", request.rehearsal),
-                ("PRACTICE", request.practice),
-            )
-            if is_so
-        ]
+        labels = ["REHEARSAL"] * request.rehearsal + ["PRACTICE"] * request.practice
         label = f"{', '.join(labels)}, no rating of the study. " if labels else ""
-        instruction = _instruction(request.rules)
-        answer = self._ask_or_correct(
+        self._ask_or_correct(
             request,
             f"{label}Presentation {presentation.position} of "
-            f"{request.n_presentations}, code {presentation.code}{again}. {instruction}"
-            "Enter to begin (then any other key is an emergency stop), stop to stop: ",
+            f"{request.n_presentations}, code {presentation.code}{again}. "
+            f"{_instruction(request.rules)}Enter to begin (then any other key is an "
+            "emergency stop), stop to stop: ",
         )
-        if answer == "stop":
-            raise _stopped(request, "on request")
 
     def _ask_or_correct(self, request: GradeRequest, question: str) -> str:
         # the answer; before it any grade of the session can be corrected
@@ -144,10 +135,8 @@ class ConsoleGrades:
         """
         grades, n_stretches = ", ".join(self._scale.grades), request.n_stretches
         self._say(_remarks(request))
-        rests, meanings = (
-            "",
-            "" if self._published is None else "; ? for their meanings",
-        )
+        meanings = "" if self._published is None else "; ? for their meanings"
+        rests = ""
         if n_stretches > 1:
             rests = f", and the stretch it rests on, 1 to {n_stretches}, if any"
         while True:
@@ -160,16 +149,13 @@ class ConsoleGrades:
                 return answer
             if answer == "again":
                 return None
-            if answer == "stop":
-                raise _stopped(request, "on request")
             if answer == "?" and self._published is not None:
                 self._say(_meanings_in_words(self._scale, self._published))
                 continue
-            grade, _, stretch = answer.rpartition(" ")
-            if grade.strip() in self._scale.grades and stretch in map(
-                str, range(1, n_stretches + 1)
-            ):
-                return StretchGrade(grade=grade.strip(), stretch=int(stretch))
+            words, _, stretch = answer.rpartition(" ")
+            is_one = stretch in map(str, range(1, n_stretches + 1))
+            if (grade := words.strip()) in self._scale.grades and is_one:
+                return StretchGrade(grade=grade, stretch=int(stretch))
             if answer:  # else it was an Enter too many
                 self._say(
                     f"{answer!r} is not a grade: needed one of {grades}{rests}.\n"
@@ -198,7 +184,7 @@ class ConsoleGrades:
         self._say(f"The presentation was stopped: {fault}.\n")
         choices = "yes, no, or skip and why" if request.may_skip else "yes, no"
         while True:
-            answer = self._ask(request, f"Present it again? ({choices}): ")
+            answer = self._read(request, f"Present it again? ({choices}): ")
             if answer.casefold() in ("yes", "y", "no", "n"):
                 return answer[0] in "yY"
             word, _, why = answer.partition(" ")
@@ -246,9 +232,8 @@ class ConsoleGrades:
         )
 
     def _wait(self, request: GradeRequest, text: str) -> None:
-        while answer := self._ask(request, text):
-            if answer == "stop":
-                raise _stopped(request, "on request")
+        while self._ask(request, text):
+            pass
 
     def begins_anew(self, request: GradeRequest, days: int) -> bool:
         """Ask whether a session goes on or begins anew.
@@ -281,8 +266,6 @@ class ConsoleGrades:
             )
             if answer in ("go on", "anew"):
                 return answer == "anew"
-            if answer == "stop":
-                raise _stopped(request, "on request")
 
     def answer(self, request: QuestionRequest) -> Answer:
         """Ask a question until it is answered.
@@ -309,8 +292,6 @@ class ConsoleGrades:
         text = f"{question.text} ({_possible(question)}; stop): "
         while True:
             answer = self._ask(request, text)
-            if answer == "stop":
-                raise _stopped(request, "on request")
             try:
                 return checked_answer(question, answer, where="answer")
             except ParameterError as error:
@@ -318,6 +299,12 @@ class ConsoleGrades:
                     self._say(f"{error}.\n")
 
     def _ask(self, request: GradeRequest | QuestionRequest, question: str) -> str:
+        # the answer, unless it stops the session
+        if (answer := self._read(request, question)) == "stop":
+            raise _stopped(request, "on request")
+        return answer
+
+    def _read(self, request: GradeRequest | QuestionRequest, question: str) -> str:
         self._say(question)
         try:
             answer = self._answers.readline()
@@ -345,18 +332,26 @@ def _meanings_in_words(scale: Scale, published: PublishedScale) -> str:
 
 def _remarks(request: GradeRequest) -> str:
     # what the rater has to know of the presentation, a line each
-    limit_s = request.rules.time_limit_s
-    ended = {
-        "time-limit": "The time limit ended the presentation: no stretch begins later "
-        f"than {limit_s:g} s after the first movement.\n",
-        "max-duration": "The presentation was ended: it had gone on for too long.\n",
-    }
-    remarks = ended.get(request.ended or "", "")
-    if request.felt not in ("felt", None):
-        remarks += "That was too slow to feel the catch: once more? Then say again.\n"
-    if request.grip_lost:
-        remarks += "The arm came loose, and the model let go: once more? Say again.\n"
-    return remarks
+    remarks = (
+        (
+            request.ended == "time-limit",
+            "The time limit ended the presentation: no stretch begins later than "
+            f"{request.rules.time_limit_s:g} s after the first movement.\n",
+        ),
+        (
+            request.ended == "max-duration",
+            "The presentation was ended: it had gone on for too long.\n",
+        ),
+        (
+            request.felt not in ("felt", None),
+            "That was too slow to feel the catch: once more? Then say again.\n",
+        ),
+        (
+            request.grip_lost,
+            "The arm came loose, and the model let go: once more? Say again.\n",
+        ),
+    )
+    return "".join(remark for is_so, remark in remarks if is_so)
 
 
 def _instruction(rules: PresentationRules, *, on_paper: bool = False) -> str:

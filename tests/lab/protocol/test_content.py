@@ -6,10 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from masrel.errors import ParameterError
 from masrel.lab.elbow.parameters import STANDARD_MODELS
-from masrel.lab.protocol import elbow_parameters, read_protocol, scale_of
-from tests.lab.protocol.documents import VALID, changed, write
+from masrel.lab.protocol import elbow_parameters, read_protocol
+from tests.lab.protocol.documents import changed, write
 
 ELBOW = {
     "inertia_kg_m2": 0.01,
@@ -59,25 +58,6 @@ def test_every_parameter_of_a_joint_has_a_key(tmp_path: Path) -> None:
     assert alike == set()
 
 
-def test_an_unknown_model_is_refused_with_those_there_are(tmp_path: Path) -> None:
-    protocol = read_protocol(write(VALID, tmp_path))
-    with pytest.raises(ParameterError, match="needed one of HM1, D1, got 'HM2'"):
-        elbow_parameters(protocol, "HM2")
-
-
-def test_the_scale_keeps_names_and_order(tmp_path: Path) -> None:
-    scale = scale_of(read_protocol(write(VALID, tmp_path)))
-    assert (scale.name, scale.grades) == ("MAS", ("0", "1", "1+", "2"))
-
-
-@pytest.mark.parametrize("model", sorted(STANDARD_MODELS))
-@pytest.mark.parametrize("study", ["hess2012", "small"])
-def test_the_bundled_studies_have_the_standard_models(study: str, model: str) -> None:
-    path = Path(__file__).parents[3] / "studies" / study / "protocol.toml"
-    found = elbow_parameters(read_protocol(path), model)
-    assert found == STANDARD_MODELS[model]
-
-
 def test_a_models_own_constants_take_the_place_of_the_shared_ones(
     tmp_path: Path,
 ) -> None:
@@ -88,22 +68,3 @@ def test_a_models_own_constants_take_the_place_of_the_shared_ones(
     assert (first.damping, first.catch_slope) == (0.9, 0.3)
     assert first.stiffness == second.stiffness
     assert second.damping == protocol.elbow.damping_nms_rad
-
-
-def test_a_model_may_follow_a_law_of_its_own(tmp_path: Path) -> None:
-    own = {
-        "rest_angle_deg": 36.0,
-        "post_catch": "continuous",
-        "residual_reading": "residual",
-        "catch_rise_s": 0.0,
-    }
-    document = changed("elbow", to=ELBOW)
-    document["models"][0]["constants"] = own
-    protocol = read_protocol(write(document, tmp_path))
-    first = elbow_parameters(protocol, "HM1")
-    assert first.rest_angle == pytest.approx(math.pi / 5, rel=1e-15)
-    assert (first.post_catch, first.residual_reading) == ("continuous", "residual")
-    assert first.catch_rise == 0.0
-    second = elbow_parameters(protocol, "D1")
-    assert (second.post_catch, second.residual_reading) == ("additive", "decrease")
-    assert second.catch_rise == 0.02

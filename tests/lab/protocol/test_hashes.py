@@ -14,6 +14,7 @@ from masrel.lab.protocol import (
     read_protocol,
 )
 from tests.lab.protocol.documents import VALID, changed, write
+from tests.lab.protocol.test_rules import SIZE
 
 QUESTIONNAIRE = {
     "id": "realism",
@@ -40,61 +41,91 @@ def test_comments_layout_order_and_defaults_do_not_enter(tmp_path: Path) -> None
     assert (protocol_hash(protocol), presented_hash(protocol)) == before
 
 
-@pytest.mark.parametrize(
-    ("path", "value"),
-    [
-        (("study", "id"), "other"),
-        (("models", 0, "catch_travel_deg"), 59.0),
-        (("models", 1, "id"), "D2"),
-        (("scale", "grades"), ["0", "1", "1+", "2", "3"]),
-        (("schedule", "seed"), 6),
-        (("elbow", "catch_slope_s"), 0.3),
-        (("elbow", "rest_angle_deg"), 20.0),
-        (("elbow", "residual_reading"), "decrease"),
-        (("elbow", "catch_rise_s"), 0.02),
-        (("models", 1, "constants"), {"rest_angle_deg": 20.0}),
-        (("models", 1, "constants"), {"post_catch": "additive"}),
-        (("models", 1, "constants"), {"residual_reading": "decrease"}),
-        (("models", 1, "constants"), {"catch_rise_s": 0.02}),
-        (("stretch", "start_deg"), 31.0),
-        (("presentation",), {"stretches": "free"}),
-        (("presentation",), {"stretches": 3}),
-        (("presentation",), {"stretches": ["slow", "fast"]}),
-        (("occasions",), {"practice": ["D1"]}),
-        (("occasions",), {"break_after": 1}),
-        (("device", "torque_limit_nm"), 19.0),
-    ],
-)
-def test_what_a_rater_meets_enters_both(
-    tmp_path: Path, path: tuple[str | int, ...], value: object
-) -> None:
-    before, after = hashes(VALID, tmp_path), hashes(changed(*path, to=value), tmp_path)
-    assert before[0] != after[0]
-    assert before[1] != after[1]
+WHAT_A_RATER_MEETS = [
+    (("study", "id"), "other"),
+    (("models", 0, "catch_travel_deg"), 59.0),
+    (("models", 1, "id"), "D2"),
+    (("scale", "grades"), ["0", "1", "1+", "2", "3"]),
+    (("schedule", "seed"), 6),
+    (("elbow", "catch_slope_s"), 0.3),
+    (("elbow", "rest_angle_deg"), 20.0),
+    (("elbow", "residual_reading"), "decrease"),
+    (("elbow", "catch_rise_s"), 0.02),
+    (("models", 1, "constants"), {"rest_angle_deg": 20.0}),
+    (("models", 1, "constants"), {"post_catch": "additive"}),
+    (("models", 1, "constants"), {"residual_reading": "decrease"}),
+    (("models", 1, "constants"), {"catch_rise_s": 0.02}),
+    (("stretch", "start_deg"), 31.0),
+    (("stretch", "largest_speed_deg_s"), 120.0),
+    (("presentation",), {"stretches": "free"}),
+    (("presentation",), {"stretches": 3}),
+    (("presentation",), {"stretches": ["slow", "fast"]}),
+    (("occasions",), {"practice": ["D1"]}),
+    (("occasions",), {"break_after": 1}),
+    (("device", "torque_limit_nm"), 19.0),
+    (("device", "active_torque_limit_nm"), 9.0),
+    (("device", "active_energy_limit_j"), 2.0),
+    (("device", "active_speed_limit_deg_s"), 170.0),
+]
+WHAT_NO_RATER_MEETS = [
+    (("study", "title"), "Another"),
+    (("raters",), [{"id": "R1"}, {"id": "R2"}, {"id": "R3"}]),
+    (("raters", 0, "site"), "north"),
+    (("rater_fields",), {"years": {"type": "whole"}}),
+    (("sessions", 1, "note"), "later"),
+    (("analysis", "level"), 0.9),
+    (("analysis", "sample_sizes"), [SIZE]),
+    (("training",), {"window": 40}),
+    (("occasions",), {"instructions": "Hold the wrist.", "resume": "ask"}),
+    (("sessions", 1, "after"), "test"),
+    (("questionnaires",), [QUESTIONNAIRE]),
+    (("device",), {"torque_sensor": True}),
+    (("report", "title"), "Another"),
+]
+WHAT_PROTOCOLS_ALWAYS_HAD = [
+    (("elbow", "residual_reading"), "residual"),
+    (("elbow", "catch_rise_s"), 0.0),
+    (("models", 0, "constants"), {"residual_reading": "residual"}),
+    (("models", 0, "constants"), {"catch_rise_s": 0.0}),
+    (
+        ("presentation",),
+        {"stretches": 1, "stretch_limit_s": 20.0, "done_with": "enter"},
+    ),
+    (
+        ("schedule",),
+        {
+            "seed": 5,
+            "blocks_by": "repeat",
+            "standards_apart": False,
+            "strata": "none",
+        },
+    ),
+    (("analysis", "sample_sizes"), []),
+    (("models", 0, "kind"), "spastic-elbow"),
+    (("models", 0, "parameters"), {}),
+    (("stretch", "largest_speed_deg_s"), 131.0),
+    (("device", "active_torque_limit_nm"), 10.0),
+    (("device", "active_energy_limit_j"), 1),
+    (("device", "active_speed_limit_deg_s"), 180.0),
+]
 
 
 @pytest.mark.parametrize(
-    ("path", "value"),
+    ("path", "value", "entered"),
     [
-        (("study", "title"), "Another"),
-        (("raters",), [{"id": "R1"}, {"id": "R2"}, {"id": "R3"}]),
-        (("rater_fields",), {"years": {"type": "whole"}}),
-        (("sessions", 1, "note"), "later"),
-        (("analysis", "level"), 0.9),
-        (("training",), {"window": 40}),
-        (("occasions",), {"instructions": "Hold the wrist.", "resume": "ask"}),
-        (("sessions", 1, "after"), "test"),
-        (("questionnaires",), [QUESTIONNAIRE]),
-        (("device",), {"torque_sensor": True}),
-        (("report", "title"), "Another"),
+        *((*each, (True, True)) for each in WHAT_A_RATER_MEETS),
+        *((*each, (True, False)) for each in WHAT_NO_RATER_MEETS),
+        *((*each, (False, False)) for each in WHAT_PROTOCOLS_ALWAYS_HAD),
     ],
 )
-def test_what_no_rater_meets_enters_the_whole_only(
-    tmp_path: Path, path: tuple[str | int, ...], value: object
+def test_what_enters_the_whole_and_what_is_presented(
+    tmp_path: Path,
+    path: tuple[str | int, ...],
+    value: object,
+    entered: tuple[bool, bool],
 ) -> None:
     before, after = hashes(VALID, tmp_path), hashes(changed(*path, to=value), tmp_path)
-    assert before[0] != after[0]
-    assert before[1] == after[1]
+    assert (before[0] != after[0], before[1] != after[1]) == entered
 
 
 def test_a_hash_is_that_of_canonical_json(tmp_path: Path) -> None:
@@ -167,25 +198,6 @@ def test_the_bundled_studies_keep_their_hashes(study: str) -> None:
         report=msgspec.structs.replace(protocol.report, sections=sections),
     )
     assert (protocol_hash(protocol), presented_hash(protocol)) == HASHES[study]
-
-
-@pytest.mark.parametrize(
-    ("key", "default"),
-    [("residual_reading", "residual"), ("catch_rise_s", 0.0)],
-)
-def test_a_variant_at_its_default_is_no_change(
-    tmp_path: Path, key: str, default: object
-) -> None:
-    before = hashes(VALID, tmp_path)
-    assert hashes(changed("elbow", key, to=default), tmp_path) == before
-    own = changed("models", 0, "constants", to={key: default})
-    assert hashes(own, tmp_path) == before
-
-
-def test_one_stretch_is_what_protocols_always_had(tmp_path: Path) -> None:
-    before = hashes(VALID, tmp_path)
-    said = {"stretches": 1, "stretch_limit_s": 20.0, "done_with": "enter"}
-    assert hashes(changed("presentation", to=said), tmp_path) == before
 
 
 def test_occasions_at_their_defaults_are_no_change(tmp_path: Path) -> None:

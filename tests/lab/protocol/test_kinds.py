@@ -9,15 +9,14 @@ import pytest
 
 from masrel.errors import ParameterError
 from masrel.lab.elbow import MODELS, ElbowParameters
-from masrel.lab.elbow.tone import Contracture, LeadPipe
+from masrel.lab.elbow.tone import Contracture
 from masrel.lab.protocol import (
     elbow_parameters,
     joint_model,
-    presented_hash,
-    protocol_hash,
     read_protocol,
 )
 from tests.lab.protocol.documents import VALID, changed, problems_of, write
+from tests.lab.protocol.test_hashes import hashes
 
 KINDS = [kind for kind in MODELS if kind != ElbowParameters.kind]
 PAGE = Path(__file__).parents[3] / "docs" / "protocol.md"
@@ -145,15 +144,6 @@ def test_keys_of_a_spastic_elbow_are_not_those_of_another_kind(
     ]
 
 
-def test_a_spastic_elbow_has_no_parameters(tmp_path: Path) -> None:
-    document = changed("models", 0, "parameters", to={"stiffness_nm_rad": 1.0})
-    assert problems_of(document, tmp_path) == [
-        "models[0].parameters: needed a kind of model that has some, got "
-        '"spastic-elbow", whose numbers stand beside its id and in constants '
-        '(id "HM1")'
-    ]
-
-
 @pytest.mark.parametrize("value", ["1", True, [1.0], {"a": 1.0}, math.inf, math.nan])
 def test_what_is_no_number_is_refused(tmp_path: Path, value: object) -> None:
     (problem,) = problems_of(of_kind("clonus", beat_rate_hz=value), tmp_path)
@@ -172,45 +162,6 @@ def test_the_elbow_of_a_model_of_another_kind_is_refused(tmp_path: Path) -> None
         elbow_parameters(protocol, "K")
 
 
-def hashes(document: dict[str, Any], folder: Path) -> tuple[str, str]:
-    protocol = read_protocol(write(document, folder))
-    return protocol_hash(protocol), presented_hash(protocol)
-
-
-@pytest.mark.parametrize(
-    ("path", "value"),
-    [
-        (("models", 0, "kind"), "spastic-elbow"),
-        (("models", 0, "parameters"), {}),
-        (("stretch", "largest_speed_deg_s"), 131.0),
-        (("device", "active_torque_limit_nm"), 10.0),
-        (("device", "active_energy_limit_j"), 1),
-        (("device", "active_speed_limit_deg_s"), 180.0),
-    ],
-)
-def test_what_no_protocol_could_say_before_does_not_enter_at_its_default(
-    tmp_path: Path, path: tuple[str | int, ...], value: object
-) -> None:
-    assert hashes(changed(*path, to=value), tmp_path) == hashes(VALID, tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("path", "value"),
-    [
-        (("stretch", "largest_speed_deg_s"), 120.0),
-        (("device", "active_torque_limit_nm"), 9.0),
-        (("device", "active_energy_limit_j"), 2.0),
-        (("device", "active_speed_limit_deg_s"), 170.0),
-    ],
-)
-def test_what_else_it_says_enters_both(
-    tmp_path: Path, path: tuple[str | int, ...], value: object
-) -> None:
-    before, after = hashes(VALID, tmp_path), hashes(changed(*path, to=value), tmp_path)
-    assert before[0] != after[0]
-    assert before[1] != after[1]
-
-
 def test_the_numbers_of_a_kind_enter_but_not_at_their_defaults(tmp_path: Path) -> None:
     plain = hashes(of_kind("lead-pipe-rigidity"), tmp_path)
     defaults = of_kind("lead-pipe-rigidity", coulomb_torque_nm=1.6, rest_angle_deg=60)
@@ -218,13 +169,3 @@ def test_the_numbers_of_a_kind_enter_but_not_at_their_defaults(tmp_path: Path) -
     other = of_kind("lead-pipe-rigidity", coulomb_torque_nm=1.7)
     assert hashes(other, tmp_path) != plain
     assert hashes(of_kind("cogwheel-rigidity"), tmp_path) != plain
-
-
-def test_the_models_of_the_tone_study_are_of_every_kind() -> None:
-    folder = Path(__file__).parents[3] / "studies" / "tone"
-    protocol = read_protocol(folder / "protocol.toml")
-    assert {model.kind for model in protocol.models} == set(MODELS)
-    assert joint_model(protocol, "L2") == LeadPipe.of_updrs(2)
-    assert joint_model(protocol, "L3") == LeadPipe.of_updrs(3)
-    assert joint_model(protocol, "N0") == LeadPipe.of_updrs(0)
-    assert joint_model(protocol, "F3") == Contracture.of_severity(3)

@@ -80,16 +80,6 @@ def test_a_file_written_before_laws_were_is_presented_as_it_was(tmp_path: Path) 
     assert presented_hash(before) == presented_hash(after)
 
 
-def test_a_variant_in_both_places_is_refused(tmp_path: Path) -> None:
-    put(tmp_path, constants={"rest_angle_deg": 25.0})
-    document = named(constants={"rest_angle_deg": 26.0, "post_catch": "additive"})
-    with pytest.raises(ProtocolError) as raised:
-        read_protocol(write(document, tmp_path))
-    said = "\n".join(raised.value.problems)
-    assert "models[0].constants.rest_angle_deg: needed in s3.toml or here" in said
-    assert "models[0].constants.post_catch: needed in s3.toml or here" in said
-
-
 def test_a_file_says_whether_it_comes_from_simulated_recordings(tmp_path: Path) -> None:
     put(tmp_path)
     protocol = read_protocol(write(named(), tmp_path))
@@ -111,16 +101,6 @@ def test_of_a_file_that_does_not_say_it_the_protocol_may(tmp_path: Path) -> None
         assert protocol.models[0].simulated is said
 
 
-def test_both_hashes_follow_the_numbers_in_the_file(tmp_path: Path) -> None:
-    path = write(named(), tmp_path)
-    put(tmp_path)
-    before = read_protocol(path)
-    put(tmp_path, model={"residual_ratio": 0.61})
-    after = read_protocol(path)
-    assert protocol_hash(before) != protocol_hash(after)
-    assert presented_hash(before) != presented_hash(after)
-
-
 def test_what_is_presented_does_not_depend_on_the_files_name(tmp_path: Path) -> None:
     put(tmp_path)
     put(tmp_path, "other.toml")
@@ -128,26 +108,6 @@ def test_what_is_presented_does_not_depend_on_the_files_name(tmp_path: Path) -> 
     two = read_protocol(write(named("other.toml"), tmp_path))
     assert presented_hash(one) == presented_hash(two)
     assert protocol_hash(one) != protocol_hash(two)
-
-
-def test_numbers_in_a_file_and_in_the_protocol_are_presented_alike(
-    tmp_path: Path,
-) -> None:
-    put(tmp_path)
-    filed = read_protocol(write(named(), tmp_path))
-    model = filed.models[0]
-    inline = named()
-    entry = inline["models"][0]
-    del entry["file"]
-    entry |= {key: getattr(model, key) for key in KEYS}
-    own = model.constants
-    entry["constants"] = {
-        name: value
-        for name in own.__struct_fields__
-        if (value := getattr(own, name)) is not None
-    }
-    written = read_protocol(write(inline, tmp_path))
-    assert presented_hash(written) == presented_hash(filed)
 
 
 @pytest.mark.parametrize(

@@ -26,18 +26,35 @@ def test_the_valid_protocol_is_read_with_its_defaults(tmp_path: Path) -> None:
     assert protocol.elbow.range_end_deg == 146.0
 
 
-def test_an_integer_is_a_number_and_stays_exact(tmp_path: Path) -> None:
-    protocol = read_protocol(write(VALID, tmp_path))
-    value = protocol.models[0].catch_angle_constant_deg
-    assert (value, type(value)) == (130.0, float)
-
-
 NUMBER = "a number above 0 and at most 180"
 
 
 @pytest.mark.parametrize(
     ("path", "value", "problem"),
     [
+        (
+            ("study", "tilte"),
+            "x",
+            'study.tilte: needed a known key, got "tilte"; did you mean title?',
+        ),
+        (
+            ("stretch", "zzz"),
+            1,
+            "stretch.zzz: needed a known key (start_deg, end_deg, "
+            'largest_speed_deg_s), got "zzz"',
+        ),
+        (
+            ("sessions", 0, "raters"),
+            ["R1", "R2", "R1"],
+            'sessions[0].raters[2]: needed each rater once, got "R1" again (id "test")',
+        ),
+        (
+            ("models", 0, "parameters"),
+            {"stiffness_nm_rad": 1.0},
+            "models[0].parameters: needed a kind of model that has some, got "
+            '"spastic-elbow", whose numbers stand beside its id and in constants '
+            '(id "HM1")',
+        ),
         # types: a boolean is no number, a number no text, a table no array
         (
             ("models", 0, "catch_travel_deg"),
@@ -378,21 +395,6 @@ def test_three_sessions_in_a_line_of_the_plan_are_refused_once(tmp_path: Path) -
     ]
 
 
-def test_an_unknown_key_comes_with_the_closest_known_one(tmp_path: Path) -> None:
-    found = problems_of(changed("study", "tilte", to="x"), tmp_path)
-    assert found == [
-        'study.tilte: needed a known key, got "tilte"; did you mean title?'
-    ]
-
-
-def test_an_unknown_key_near_none_comes_with_all_known_ones(tmp_path: Path) -> None:
-    found = problems_of(changed("stretch", "zzz", to=1), tmp_path)
-    assert found == [
-        "stretch.zzz: needed a known key (start_deg, end_deg, largest_speed_deg_s), "
-        'got "zzz"'
-    ]
-
-
 @pytest.mark.parametrize(
     ("path", "problem"),
     [
@@ -413,13 +415,6 @@ def test_a_missing_key_is_named(
     tmp_path: Path, path: tuple[str | int, ...], problem: str
 ) -> None:
     assert problems_of(without(*path), tmp_path) == [problem]
-
-
-def test_a_rater_twice_in_a_session_is_refused(tmp_path: Path) -> None:
-    document = changed("sessions", 0, "raters", to=["R1", "R2", "R1"])
-    assert problems_of(document, tmp_path) == [
-        'sessions[0].raters[2]: needed each rater once, got "R1" again (id "test")'
-    ]
 
 
 def test_an_estimate_of_models_there_are_none_of_is_refused(tmp_path: Path) -> None:

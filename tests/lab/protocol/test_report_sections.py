@@ -1,7 +1,6 @@
 """Which sections a report has: those that are named, or all there is something for."""
 
 import msgspec
-import pytest
 
 from masrel.lab.protocol import Protocol, protocol_hash, report_sections
 from tests.lab.analysis.studies import hess2012, plan
@@ -39,11 +38,6 @@ def with_sections(sections: tuple[str, ...] | None, **tables: object) -> Protoco
 
 def test_without_a_choice_a_report_tells_the_whole_story() -> None:
     assert report_sections(with_sections(None)) == STORY
-
-
-@pytest.mark.parametrize("names", [FORMER, ("methods", "design"), ()])
-def test_sections_that_are_named_stay_as_named(names: tuple[str, ...]) -> None:
-    assert report_sections(with_sections(names)) == names
 
 
 def test_what_a_study_has_nothing_for_is_left_out() -> None:

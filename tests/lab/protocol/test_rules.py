@@ -3,10 +3,9 @@
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import pytest
 
-from masrel.lab.protocol import presented_hash, protocol_hash, read_protocol
+from masrel.lab.protocol import protocol_hash, read_protocol
 from tests.lab.protocol.documents import VALID, changed, problems_of, write
 
 OCCASIONS = [
@@ -251,43 +250,8 @@ def test_sessions_that_come_after_each_other_are_all_refused(tmp_path: Path) -> 
     assert len(problems_of(document, tmp_path)) == 2
 
 
-@pytest.mark.parametrize("stretches", ["free", 1, 7, ["slow", "fast"], ["fast"]])
-def test_stretches_are_free_counted_or_cued(tmp_path: Path, stretches: object) -> None:
-    document = changed("presentation", to={"stretches": stretches})
-    rules = read_protocol(write(document, tmp_path)).presentation
-    cues = tuple(stretches) if isinstance(stretches, list) else stretches
-    assert rules.stretches == cues
-
-
-def test_a_protocol_without_the_table_has_one_stretch(tmp_path: Path) -> None:
-    rules = read_protocol(write(VALID, tmp_path)).presentation
-    assert (rules.stretches, rules.time_limit_s, rules.stretch_limit_s) == (1, 60, 20)
-
-
-def test_fields_are_read_and_enter_no_hash_of_what_is_presented(tmp_path: Path) -> None:
-    plain = read_protocol(write(VALID, tmp_path))
-    values = {"profession": "PT", "years": 12, "height_m": 2, "since": "2001-02-03"}
-    protocol = read_protocol(write(with_values(values), tmp_path))
-    assert protocol.raters[0].fields == values
-    assert protocol.raters[1].fields == {}
-    assert presented_hash(protocol) == presented_hash(plain)
-    assert protocol_hash(protocol) != protocol_hash(plain)
-
-
 def test_a_date_stands_with_or_without_quotes(tmp_path: Path) -> None:
     path = write(with_values({"since": "2001-02-03"}), tmp_path)
     quoted = read_protocol(path)
     path.write_text(path.read_text().replace('"2001-02-03"', "2001-02-03"))
     assert protocol_hash(read_protocol(path)) == protocol_hash(quoted)
-
-
-def test_a_size_enters_the_hash_of_the_plan_and_of_no_schedule(tmp_path: Path) -> None:
-    old = read_protocol(write(VALID, tmp_path))
-    new = read_protocol(write(changed("analysis", "sample_sizes", to=[SIZE]), tmp_path))
-    assert new.analysis.sample_sizes[0].n_items == 30
-    assert protocol_hash(new) != protocol_hash(old)
-    assert presented_hash(new) == presented_hash(old)
-    analysis = msgspec.structs.replace(new.analysis, sample_sizes=())
-    assert protocol_hash(msgspec.structs.replace(new, analysis=analysis)) == (
-        protocol_hash(old)
-    )

@@ -19,13 +19,6 @@ def contents(folder: Path) -> dict[str, bytes]:
     }
 
 
-def test_the_small_study_is_its_protocol_and_its_readme(tmp_path: Path) -> None:
-    copy_template("small", tmp_path / "a" / "new")
-    found = contents(tmp_path / "a" / "new")
-    assert sorted(found) == ["README.md", "protocol.toml"]
-    assert found["protocol.toml"] == (STUDIES / "small/protocol.toml").read_bytes()
-
-
 def test_the_published_study_brings_its_ratings(tmp_path: Path) -> None:
     copy_template("hess2012", tmp_path)
     found = contents(tmp_path)
@@ -81,19 +74,6 @@ def test_a_copy_that_was_killed_is_completed(tmp_path: Path) -> None:
     assert contents(half) == whole
     with pytest.raises(ParameterError, match=r"got one that holds README\.md and"):
         copy_template("hess2012", half)
-
-
-def test_a_folder_that_another_study_was_begun_in_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "ratings").mkdir()
-    (tmp_path / "ratings" / "published.csv").write_text("mine")
-    with pytest.raises(ParameterError, match=r"got one that holds published\.csv"):
-        copy_template("hess2012", tmp_path)
-
-
-def test_a_file_in_the_place_of_the_folder_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "study").write_text("mine")
-    with pytest.raises(ParameterError, match="empty folder, got a file"):
-        copy_template("small", tmp_path / "study")
 
 
 @pytest.mark.parametrize("name", ["huge", "", "../studies/small", "."])

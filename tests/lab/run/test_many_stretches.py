@@ -4,7 +4,6 @@ import hashlib
 import json
 import math
 import shutil
-import threading
 from collections.abc import Callable
 from functools import partialmethod
 from pathlib import Path
@@ -85,14 +84,6 @@ def test_each_stretch_leaves_its_facts_until_the_rater_is_done(new_study: New) -
     assert max(counts) > 1
 
 
-@pytest.mark.parametrize(("rule", "n"), [("2", 2), ('["slow", "fast"]', 2)])
-def test_as_many_are_made_as_are_asked_for(new_study: New, rule: str, n: int) -> None:
-    small = with_rules(new_study, f"stretches = {rule}")
-    run(small, SimulatedGrades(small[1]))
-    ended = {(e.fields["ended"], e.fields["n_stretches"]) for e in shown(small)}
-    assert ended == {("stretches", n)}
-
-
 def test_a_cued_presentation_has_r1_and_r2(new_study: New) -> None:
     small = with_rules(new_study, 'stretches = ["slow", "fast"]')
     run(small, SimulatedGrades(small[1]))
@@ -137,13 +128,6 @@ def until_fast(study: Small, code: str) -> float:
     return float(np.sum((speed > 0.1 * speed[-1]) & (speed < 0.9 * speed[-1]))) * 1e-3
 
 
-def test_uncued_presentations_have_neither(small: Small) -> None:
-    run(small, ScriptGrades(["1", "2", "3"]))
-    for event in shown(small):
-        assert (event.fields["r1_deg"], event.fields["r2_deg"]) == (None, None)
-        assert event.fields["n_stretches"] == 1
-
-
 SLOW = "[simulated_raters]\nmean_speed_deg_s = 12.0\nspeed_sd_deg_s = 0.0\n"
 
 
@@ -160,17 +144,6 @@ def test_a_rater_is_told_what_was_too_slow_and_may_grade_it(new_study: New) -> N
     assert said.getvalue().count("too slow to feel the catch: once more?") == 4
     assert {event.fields["felt"] for event in shown(small)} == {"below-threshold"}
     assert ratings_from_logs(*small).table["felt"].tolist() == ["below-threshold"] * 3
-
-
-def test_a_rater_is_told_that_the_time_limit_ended_a_presentation(
-    new_study: New,
-) -> None:
-    small = with_rules(new_study, 'stretches = "free"', "time_limit_s = 1.0")
-    source, said = console("\n1\n\n2\n\n3\n")
-    run(small, source)
-    ended = [event.fields["ended"] for event in shown(small)]
-    words = "no stretch begins later than 1 s after the first movement."
-    assert said.getvalue().count(words) == ended.count("time-limit") > 0
 
 
 def test_what_was_too_slow_is_counted(new_study: New) -> None:
@@ -241,36 +214,6 @@ def test_no_grade_rests_on_a_stretch_that_was_not_made(small: Small) -> None:
 
     with pytest.raises(ParameterError, match=r"stretch of .*: needed one of 1, from 1"):
         run(small, Program([]))
-
-
-def test_a_program_says_done(new_study: New) -> None:
-    small = with_rules(new_study, 'stretches = "free"')
-
-    class Program(ScriptGrades):
-        def make_ready(self, request: GradeRequest) -> None:
-            assert request.status is not None
-            request.status.done()
-
-    run(small, Program(["1", "2", "3"]))
-    for event in shown(small):
-        assert (event.fields["ended"], event.fields["n_stretches"]) == ("done", 0)
-        assert event.fields["felt"] == "below-threshold"
-    assert ratings_from_logs(*small).table["n_stretches"].tolist() == [0, 0, 0]
-
-
-@pytest.mark.filterwarnings("ignore::masrel.errors.OverrunWarning")
-def test_it_may_say_so_from_another_thread(new_study: New) -> None:
-    # However late a busy machine is, that shall not end the presentation.
-    lenient = "[device]\nmissed_ticks_limit = 100000\nwatchdog_ms = 100.0\n\n"
-    small = with_rules(new_study, 'stretches = "free"', further=lenient)
-
-    class Program(ScriptGrades):
-        def make_ready(self, request: GradeRequest) -> None:
-            assert request.status is not None
-            threading.Timer(0.3, request.status.done).start()
-
-    run_session(*small, "R1", "test", grades=Program(["1", "2", "3"]), clock="real")
-    assert {event.fields["ended"] for event in shown(small)} == {"done"}
 
 
 def test_a_button_is_asked_of_a_device_that_has_one(new_study: New) -> None:
@@ -395,14 +338,3 @@ def test_a_rehearsal_is_drawn_from_the_secret(small: Small, tmp_path: Path) -> N
     assert rehearsed(same) == codes
     assert rehearsed(other) != codes
     assert other[0].secret_file.is_file()
-
-
-def test_a_rehearsal_of_another_secret_is_left_and_another_begun(small: Small) -> None:
-    with pytest.raises(RuntimeError, match="presentation 2 of 3"):
-        run(small, console("\n1\n\nstop\n")[0], rehearsal=True)
-    before = small[0].root / "rehearsals" / "1" / "rehearsal_test_R1.jsonl"
-    lines = before.read_bytes()
-    small[0].published_secret_file.unlink()
-    summary = run(small, SimulatedGrades(small[1]), rehearsal=True)
-    assert (summary.n_graded_before, summary.log_file.parent.name) == (0, "2")
-    assert before.read_bytes() == lines

@@ -10,8 +10,6 @@ from masrel.cli import cli
 from masrel.errors import DeviceError, SessionLogError
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.ratings import (
-    Correction,
-    corrections_of,
     ratings_from_logs,
     study_remarks,
 )
@@ -132,45 +130,6 @@ def test_a_grade_is_corrected_to_missing_and_back(small: Small) -> None:
     assert not verify_study(study).findings
     call(*correct, "--grade", "4")
     assert grades(small) == ["4", "2", "3"]
-
-
-def test_corrections_are_in_the_report_and_only_if_there_are_any(
-    new_study: Callable[..., Small],
-) -> None:
-    brief = '[report]\nsections = ["design"]\n\n[schedule]'
-    study, protocol = new_study(("[schedule]", brief))
-    run_session(
-        *(study, protocol, "R1", "test"),
-        grades=ScriptGrades(["1", "2", "3"]),
-        clock="simulated",
-    )
-    call("report", study.root)
-    page = study.root / "report" / "report.md"
-    assert "Corrected grades" not in page.read_text(encoding="utf-8")
-    shown = read_schedule(study.schedule_file("R1", "test")).presentations[1]
-    for grade in (None, "4"):
-        where = (study, protocol, "R1", "test")
-        record_correction(*where, code=shown.code, grade=grade, **BY)
-    facts = {
-        **{"session": "test", "rater": "R1", "model": shown.model, "repeat": 1},
-        **{"first_grade": "2", **BY},
-    }
-    assert corrections_of(study, protocol) == (
-        Correction(grade=None, **facts),  # type: ignore[arg-type]
-        Correction(grade="4", **facts),  # type: ignore[arg-type]
-    )
-    call("report", study.root)
-    text = page.read_text(encoding="utf-8")
-    assert "Corrected grades" in text
-    assert "| 2 | 4 |" in text
-    assert "Kim" not in text
-    assert "the motor is hot" not in text
-    call("report", study.root, "--include", "notes")
-    text = page.read_text(encoding="utf-8")
-    assert "| 2 | 4 | the motor is hot |" in text
-    call("report", study.root, "--include", "who")
-    text = page.read_text(encoding="utf-8")
-    assert f"{shown.model} | 1 | 2 | 4 | Kim |" in text
 
 
 def test_what_was_presented_and_graded_late_is_not_presented_again(

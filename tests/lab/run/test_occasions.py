@@ -26,9 +26,7 @@ from masrel.lab.run import (
     GradeRequest,
     ScriptGrades,
     SessionSummary,
-    SimulatedGrades,
     read_log,
-    record_answer,
     run_session,
 )
 from masrel.lab.schedule import read_schedule
@@ -149,13 +147,6 @@ def test_practice_is_no_rating(new_study: New) -> None:
     assert len(table) == 3
     assert sorted(table["grade"]) == ["1", "1+", "2"]
     assert "P1" not in study.schedule_file("R1", "test").read_text()
-
-
-def test_a_code_for_practice_is_no_model_of_the_study(new_study: New) -> None:
-    study, protocol = new_study(('"D1"', '"P1"'), ("[schedule]", OCCASIONS))
-    run(study, protocol)
-    codes = [e.fields["code"] for e in events_of(study) if e.kind == "practised"]
-    assert codes == ["P2", "P3"]
 
 
 def test_the_console_says_what_is_practice_and_what_a_break(new_study: New) -> None:
@@ -358,47 +349,6 @@ def test_the_console_asks_until_there_is_an_answer(new_study: New) -> None:
     assert text.count(f"How real did it feel? {question}") == 3
     assert "needed a whole number, 1 to 10, got '11'." in text
     assert "Anything else? (text; Enter for none; stop): " in text
-
-
-def test_simulated_raters_answer_the_same_each_time(new_study: New) -> None:
-    logs = []
-    for name in ("a", "b"):
-        study, protocol = new_study(("[schedule]", QUESTIONS), name=name)
-        run(study, protocol, grades=SimulatedGrades(protocol))
-        logs.append([e.fields for e in events_of(study) if e.kind == "answered"])
-        assert verify_study(study).findings == ()
-    assert logs[0] == logs[1]
-    assert len({fields["answer"] for fields in logs[0]}) > 2
-
-
-def test_an_answer_is_corrected_and_the_first_one_stays(new_study: New) -> None:
-    study, protocol = new_study(("[schedule]", QUESTIONS))
-    run(study, protocol)
-    reasons = {"who": "AB", "why": "slip of the pen"}
-    record_answer(
-        *(study, protocol, "R1", "test"),
-        question="realism.score",
-        answer="8",
-        **reasons,
-    )
-    *_, last = events_of(study)
-    assert (last.kind, last.fields["answer"]) == ("answer-correction", 8)
-    answers = [e.fields["answer"] for e in events_of(study) if e.kind == "answered"]
-    assert 7 in answers
-    for question, answer, code, problem in (
-        ("realism.score", "11", None, "answer to realism.score: needed a whole number"),
-        ("realism.none", "1", None, "question: needed one of each.sure, realism.score"),
-        ("each.sure", "1", None, "code: needed the code of a presentation"),
-        ("realism.score", "1", "99X", "code: needed no code"),
-    ):
-        with pytest.raises(ParameterError, match=problem):
-            record_answer(
-                *(study, protocol, "R1", "test"),
-                question=question,
-                answer=answer,
-                code=code,
-                **reasons,
-            )
 
 
 def test_an_answer_is_corrected_by_the_command(new_study: New) -> None:

@@ -2,22 +2,14 @@
 
 from collections.abc import Callable
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from masrel.cli import cli
 from masrel.errors import ParameterError
-from masrel.lab.hess import (
-    DeviceLimits,
-    ReplayOptions,
-    SimulatedClock,
-    open_device,
-    run_presentation,
-)
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.recording import read_recording
-from masrel.lab.run import SimulatedGrades, model_controller, read_log, run_session
+from masrel.lab.run import SimulatedGrades, read_log, run_session
 
 NewStudy = Callable[..., tuple[StudyPaths, Protocol]]
 
@@ -68,21 +60,6 @@ def test_a_session_on_an_emulated_puck_is_labelled_simulated(
         assert one["simulated"] is True
 
 
-def test_grades_of_a_person_on_an_emulated_puck_are_simulated_too(
-    new_study: NewStudy,
-) -> None:
-    class Person(SimulatedGrades):
-        name = "console"
-        simulated = False
-
-    study, protocol = on_a_puck(new_study)
-    done = run_session(
-        study, protocol, "R1", "test", grades=Person(protocol), clock="simulated"
-    )
-    assert done.simulated
-    assert read_log(study.log_file("R1", "test"))[0].fields["simulated"] is True
-
-
 def test_its_recordings_are_those_of_the_simulated_device_but_for_the_bus(
     new_study: NewStudy,
 ) -> None:
@@ -95,29 +72,6 @@ def test_its_recordings_are_those_of_the_simulated_device_but_for_the_bus(
         run_session(paths, rules, "R1", "test", grades=grades, clock="simulated")
         speeds.append([one["mean_speed_deg_s"] for one in presented(paths)])
     assert speeds[0] == pytest.approx(speeds[1], rel=0.02)
-
-
-def test_a_recording_of_it_replays_to_the_same_torques(new_study: NewStudy) -> None:
-    study, protocol = on_a_puck(new_study)
-    grades = SimulatedGrades(protocol)
-    run_session(study, protocol, "R1", "test", grades=grades, clock="simulated")
-    for one in presented(study):
-        recording = read_recording(study.sessions / str(one["recording"]))
-        clock = SimulatedClock()
-        options = ReplayOptions(recording=recording)
-        with open_device("replay", clock=clock, options=options) as device:
-            again = run_presentation(
-                device,
-                model_controller(protocol, str(recording.facts["model"])),
-                clock=clock,
-                limits=DeviceLimits(),
-                end_angle=np.radians(protocol.stretch.end_deg),
-            )
-        assert again.fault is None
-        assert again.recording.facts["simulated"] is True
-        for name in ("time_s", "command_torque_nm", "phase"):
-            made = again.recording.columns[name]
-            np.testing.assert_array_equal(made, recording.columns[name])
 
 
 def test_a_puck_outside_this_process_needs_a_real_clock(new_study: NewStudy) -> None:

@@ -55,13 +55,6 @@ def test_grades_of_persons_on_the_simulated_device_never_say_no_person(
         assert "Simulated device." in text
 
 
-def test_grades_of_nobody_say_so(study: Small) -> None:
-    by_a_simulated_rater(study, "R1")
-    for text in reported(study).values():
-        assert "SIMULATED DATA – no person gave these grades" in text
-        assert "every simulated rater" in text
-
-
 def test_some_of_both_say_so_with_the_raters(study: Small) -> None:
     by_a_person(study, "R1")
     by_a_simulated_rater(study, "R2")
@@ -85,11 +78,3 @@ def test_both_facts_are_columns_that_are_read_back(study: Small) -> None:
             ("R1", "console", "simulated"),
             ("R2", "simulated", "simulated"),
         }
-
-
-def test_the_command_says_which(study: Small) -> None:
-    by_a_person(study, "R1")
-    call = ["ratings", str(study[0].root)]
-    assert "3 ratings (simulated device), 0" in CliRunner().invoke(cli, call).output
-    by_a_simulated_rater(study, "R2")
-    assert "6 ratings (simulated), 0 missing" in CliRunner().invoke(cli, call).output

@@ -84,14 +84,6 @@ def test_a_williams_design_is_what_its_rule_gives_by_hand() -> None:
         assert drawn(f"`williams`, row {row}") == by_hand
 
 
-def test_a_latin_square_is_what_its_rule_gives_by_hand() -> None:
-    stream = words("design", "test", "", "1")
-    models, columns = shuffled(list(MODELS), stream), shuffled(list(range(8)), stream)
-    lines = shuffled([[(i + j) % 8 for j in range(8)] for i in range(8)], stream)
-    by_hand = " ".join(models[lines[0][column]] for column in columns)
-    assert drawn("`latin-square`, row 1") == by_hand
-
-
 def test_standards_apart_are_what_the_rule_gives_by_hand() -> None:
     n_orders = comb(5, 4) * factorial(4) * factorial(4)
     assert n_orders == 2880
@@ -112,22 +104,3 @@ def test_standards_apart_are_what_the_rule_gives_by_hand() -> None:
         by_hand += [standards.pop(0)] if gap in gaps else []
         by_hand += [dummies.pop(0)] if dummies else []
     assert drawn("`restricted`, `standards_apart`") == " ".join(by_hand)
-
-
-def test_the_second_repeat_of_a_design_is_what_its_rule_gives_by_hand() -> None:
-    stream = words("design", "test", "", "1")
-    first = [0, 1, 3, 2]
-    rows: list[list[str]] = []
-    for _ in range(2):
-        models = shuffled(list(MODELS[:4]), stream)
-        lines = shuffled([[(i + s) % 4 for s in first] for i in range(4)], stream)
-        named = [[models[symbol] for symbol in line] for line in lines]
-        while rows and any(
-            row[-1] == line[0] for row, line in zip(rows, named, strict=True)
-        ):
-            named = shuffled(named, stream)
-        rows = [row + line for row, line in zip(rows or [[]] * 4, named, strict=True)]
-    protocol = protocol_of(models=MODELS[:4], seed=2012, repeats=2, scheme="williams")
-    for row in (1, 2, 3, 4):
-        schedule = draw_schedule(protocol, "R1", "test", secret=SECRET, row=row)
-        assert [shown.model for shown in schedule.presentations] == rows[row - 1]

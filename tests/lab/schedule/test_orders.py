@@ -11,8 +11,6 @@ from masrel.errors import ScheduleError
 from masrel.lab.protocol import (
     Protocol,
     StudyPaths,
-    presented_hash,
-    protocol_hash,
 )
 from masrel.lab.schedule import (
     check_schedule,
@@ -122,32 +120,6 @@ def test_a_new_replicate_another_session_and_another_site_have_other_permutation
     assert len({frozenset(design) for design in designs}) == 8
 
 
-def test_whose_row_it_is_does_not_change_the_order_but_the_codes() -> None:
-    protocol = protocol_of(models=MODELS, scheme="williams")
-    assert order(protocol, "R1", 3) == order(protocol, "R2", 3)
-    codes = [
-        [
-            s.code
-            for s in draw_schedule(
-                protocol, r, "test", secret=SECRET, row=3
-            ).presentations
-        ]
-        for r in ("R1", "R2")
-    ]
-    assert codes[0] != codes[1]
-
-
-def test_every_row_and_first_model_is_equally_likely_over_secrets() -> None:
-    # The first model of row 1 over 2000 secrets: 4 models, chi-square with 3 degrees
-    # of freedom is above 30.7 with probability 1e-6. Secrets are fixed.
-    protocol = protocol_of(models=MODELS[:4], scheme="williams")
-    first = Counter(
-        order(protocol, "R1", 1, number.to_bytes(16, "big"))[0]
-        for number in range(2000)
-    )
-    assert sum((freq - 500) ** 2 / 500 for freq in first.values()) < 30.7
-
-
 def test_blocks_by_repeat_show_every_model_before_any_comes_again() -> None:
     protocol = protocol_of(models=MODELS, repeats=3, scheme="blocks", raters=raters(20))
     for rater in raters(20):
@@ -241,25 +213,11 @@ def test_repeats_are_numbered_as_they_come(rules: dict[str, object]) -> None:
         assert repeats == [1, 2, 3, 4]
 
 
-def test_the_longest_session_has_an_order() -> None:
-    models = tuple(f"M{number}" for number in range(25))
-    protocol = protocol_of(models=models, repeats=20, scheme="no-immediate-repeat")
-    drawn = order(protocol, "R1")
-    assert len(drawn) == 500
-    assert all(a != b for a, b in itertools.pairwise(drawn))
-
-
 @pytest.mark.parametrize("scheme", ["williams", "latin-square"])
 @pytest.mark.parametrize("row", [None, 0, -1])
 def test_a_design_needs_a_row(scheme: str, row: int | None) -> None:
     with pytest.raises(ScheduleError, match="row: needed a row of the design, from 1"):
         draw_schedule(protocol_of(scheme=scheme), "R1", "test", row=row)
-
-
-def test_limits_that_no_order_keeps_are_refused_at_the_draw() -> None:
-    protocol = protocol_of(scheme="restricted", standards_apart=True)
-    with pytest.raises(ScheduleError, match=r"schedule\.scheme: .* which none does"):
-        draw_schedule(protocol, "R1", "test", secret=SECRET)
 
 
 RESTRICTED = {"seed": 1, "scheme": "restricted"}
@@ -357,23 +315,6 @@ def test_a_scheme_that_no_order_keeps_is_refused_with_the_reason(
     sentence: str,
 ) -> None:
     assert problems_of(of_models(rules, *models), tmp_path)[0] == sentence
-
-
-def test_keys_at_their_defaults_are_what_protocols_always_had() -> None:
-    plain, said = (
-        protocol_of(),
-        protocol_of(
-            blocks_by="repeat",
-            standards_apart=False,
-            max_same_grade=None,
-            strata="none",
-        ),
-    )
-    assert presented_hash(plain) == presented_hash(said)
-    assert protocol_hash(plain) == protocol_hash(said)
-    sited = protocol_of(sites={"R1": "north"})
-    assert presented_hash(sited) == presented_hash(plain)
-    assert protocol_hash(sited) != protocol_hash(plain)
 
 
 def many_graded(repeats: int) -> Protocol:

@@ -169,28 +169,6 @@ def test_no_answer_is_waited_for_longer_than_a_tick(rate_hz, patience_s) -> None
     assert options.patience_s == patience_s
 
 
-def test_a_device_that_a_session_can_use_passes() -> None:
-    assert check_backend(DeviceSettings()) is None
-    virtual = DeviceSettings(backend="puck", puck_interface="virtual")
-    assert check_backend(virtual) is None
-
-
-@pytest.mark.parametrize(
-    ("settings", "words"),
-    [
-        (DeviceSettings(backend="nonesuch"), "device.backend: needed one of puck, sim"),
-        (DeviceSettings(backend="replay"), "device.backend: .* got 'replay'"),
-        (
-            DeviceSettings(backend="puck", puck_properties={"T": 42}),
-            r"\[device\] puck_properties: need MODE",
-        ),
-    ],
-)
-def test_a_device_that_no_session_can_use_is_named(settings, words: str) -> None:
-    with pytest.raises(ParameterError, match=words):
-        check_backend(settings)
-
-
 def largest_command(protocol: Protocol, model: str, speed: float, end: float) -> float:
     # of random movements to and fro, each with minimum jerk, up to a speed
     random, controller = Random(3), model_controller(protocol, model)

@@ -2,13 +2,9 @@
 
 import hashlib
 import itertools
-from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
-import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from masrel.lab.schedule._secret import Stream
 
@@ -50,14 +46,6 @@ def test_the_reference_is_the_generator_that_numpy_calls_pcg64() -> None:
     assert list(itertools.islice(words_of(name), 50)) == expected
 
 
-@pytest.mark.parametrize(
-    "other", [(2, "a", "b"), (1, "b", "a"), (1, "ab"), (1, "a"), (1, "a", "b", "")]
-)
-def test_streams_of_other_seeds_or_purposes_differ(other: tuple[int, ...]) -> None:
-    seed, *purpose = other
-    assert Stream(1, "a", "b").word() != Stream(seed, *map(str, purpose)).word()
-
-
 class Given(Stream):
     """A stream of words that are given."""
 
@@ -74,30 +62,3 @@ def test_words_beyond_the_last_multiple_are_rejected() -> None:
     # a power of two divides 2**64: no word is rejected
     assert Given(2**64 - 1).below(8) == 7
     assert Given(5).below(1) == 0
-
-
-def test_a_shuffle_swaps_from_the_last_place_down() -> None:
-    items = ["a", "b", "c", "d"]
-    # i = 3 takes 1: a d c b; i = 2 takes 2: the same; i = 1 takes 0: d a c b
-    Given(1, 2, 0).shuffle(items)
-    assert items == ["d", "a", "c", "b"]
-
-
-@given(st.integers(0, 2**63 - 1), st.lists(st.integers(), max_size=20))
-def test_a_shuffle_loses_and_invents_nothing(seed: int, items: list[int]) -> None:
-    shuffled = list(items)
-    Stream(seed, "any").shuffle(shuffled)
-    assert Counter(shuffled) == Counter(items)
-
-
-def test_every_order_of_four_is_equally_likely() -> None:
-    # 24 orders, 24 000 streams of consecutive seeds: chi-square with 23 degrees of
-    # freedom exceeds 63.8 with probability 1e-5. Seeds are fixed, so this either
-    # holds for good or fails for good.
-    counts: Counter[tuple[str, ...]] = Counter()
-    for seed in range(24_000):
-        items = list("abcd")
-        Stream(seed, "order").shuffle(items)
-        counts[tuple(items)] += 1
-    assert len(counts) == 24
-    assert sum((count - 1000) ** 2 / 1000 for count in counts.values()) < 63.8
