@@ -1,12 +1,17 @@
 """A small complete study, run once through the command line for all flow tests."""
 
+import shutil
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
 from masrel.cli import cli
+from masrel.lab.conduct import record_standing
+from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.run import SimulatedGrades, run_session
 from tests.cli.process import Caller
+from tests.lab.cli.test_train import new_study, train_simulated
 
 
 def run(*arguments: str, code: int = 0) -> str:
@@ -32,3 +37,30 @@ def small_demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("demo") / "out"
     run("demo", str(out), "--study", "small", "--quiet")
     return out
+
+
+@pytest.fixture(scope="session")
+def whole(small_demo: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A study with every file that a study can have; only read."""
+    folder = tmp_path_factory.mktemp("whole")
+    trained = new_study(folder / "trained")
+    train_simulated(trained)
+    study = StudyPaths(shutil.copytree(small_demo / "study", folder / "study"))
+    shutil.copytree(trained / "training", study.training)
+    study.secret_file.parent.mkdir(mode=0o700, exist_ok=True)
+    shutil.copy(study.published_secret_file, study.secret_file)
+    protocol, who = read_protocol(study.protocol), {"who": "A", "why": "b"}
+    grades = SimulatedGrades(protocol)
+    run_session(
+        study, protocol, "R1", "test", grades=grades, clock="simulated", rehearsal=True
+    )
+    record_standing(study, protocol, "R1", "withdrawn", **who)
+    for verb in ("ratings", "analyze", "report"):
+        run(verb, str(study.root))
+    return study.root
+
+
+@pytest.fixture
+def study(whole: Path, tmp_path: Path) -> StudyPaths:
+    """A copy of it."""
+    return StudyPaths(shutil.copytree(whole, tmp_path / "study"))

@@ -2,83 +2,31 @@
 
 import json
 import re
-import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from masrel.lab.conduct import record_standing
-from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.protocol import StudyPaths
 from masrel.lab.verification import (
     anchors_of,
     read_anchors,
     verify_study,
     write_anchors,
 )
-from tests.lab.cli.test_train import new_study, train_simulated
-from tests.lab.flow.conftest import run
-from tests.lab.flow.test_verify import chained_anew, events, logs, recording
+from tests.lab.flow.test_verify import chained_anew, events
 
-DOCUMENTED = Path(__file__).parents[3] / "docs" / "record.md"
-
-
-@pytest.fixture(scope="module")
-def once(small_demo: Path, tmp_path_factory: pytest.TempPathFactory) -> StudyPaths:
-    """A study that has every file."""
-    trained = new_study(tmp_path_factory.mktemp("trained") / "study")
-    train_simulated(trained)
-    root = tmp_path_factory.mktemp("formats") / "study"
-    study = StudyPaths(shutil.copytree(small_demo / "study", root))
-    shutil.copytree(trained / "training", study.training)
-    record_standing(
-        study, read_protocol(study.protocol), "R1", "withdrawn", who="A", why="b"
-    )
-    run("report", str(root), "--quiet")
-    return study
-
-
-@pytest.fixture
-def study(once: StudyPaths, tmp_path: Path) -> StudyPaths:
-    return StudyPaths(shutil.copytree(once.root, tmp_path / "study"))
-
-
-def schedule(study: StudyPaths) -> Path:
-    return study.schedule_file("R1", "test")
-
-
-def sheet(study: StudyPaths) -> Path:
-    return study.sheet_file("R1", "test")
-
-
-def facts(study: StudyPaths) -> Path:
-    return recording(study).with_suffix(".json")
-
-
-def session_log(study: StudyPaths) -> Path:
-    return logs(study)[0]
-
-
-def training_log(study: StudyPaths) -> Path:
-    return study.training_log_file("R1")
-
-
-def manifest(study: StudyPaths) -> Path:
-    return study.report / "manifest.json"
-
-
-FILES: dict[str, Callable[[StudyPaths], Path]] = {
-    "protocol": lambda study: study.protocol,
-    "schedule": schedule,
-    "sheet": sheet,
-    "session log": session_log,
-    "facts of a recording": facts,
-    "training log": training_log,
-    "conduct log": lambda study: study.conduct_file,
-    "ratings": lambda study: study.ratings_file,
-    "analysis": lambda study: study.analysis_file,
-    "manifest": manifest,
-    "secret": lambda study: study.published_secret_file,
+FILES = {
+    "protocol": "protocol.toml",
+    "schedule": "schedules/test_R1.csv",
+    "sheet": "schedules/test_R1_sheet.csv",
+    "session log": "sessions/test_R1.jsonl",
+    "facts of a recording": "sessions/test_R1/*.json",
+    "training log": "training/R1.jsonl",
+    "conduct log": "conduct.jsonl",
+    "ratings": "ratings/ratings.csv",
+    "analysis": "analysis.json",
+    "manifest": "report/manifest.json",
+    "secret": "published_secret.txt",
 }
 
 
@@ -106,7 +54,7 @@ def of_format(path: Path, version: object) -> None:
 
 @pytest.mark.parametrize("name", FILES)
 def test_a_format_that_is_not_known_is_refused(study: StudyPaths, name: str) -> None:
-    path = FILES[name](study)
+    path = sorted(study.root.glob(FILES[name]))[0]
     of_format(path, 99)
     said = [f.message for f in verify_study(study).findings if f.weight == "broken"]
     needed = rf"{re.escape(str(path))}: (line 1: (\w+: )?)?needed [^\n]*format"
@@ -115,7 +63,7 @@ def test_a_format_that_is_not_known_is_refused(study: StudyPaths, name: str) -> 
 
 @pytest.mark.parametrize("name", ["protocol", "sheet", "analysis"])
 def test_a_file_that_names_none_is_of_version_1(study: StudyPaths, name: str) -> None:
-    path = FILES[name](study)
+    path = sorted(study.root.glob(FILES[name]))[0]
     of_format(path, None)
     assert verify_study(study).is_whole
 

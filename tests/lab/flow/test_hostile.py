@@ -18,7 +18,6 @@ import pytest
 
 from tests.faults import Faults
 from tests.lab.cli.test_limits import DEEP, bomb
-from tests.lab.flow.conftest import run
 from tests.lab.flow.cuts import masrel_command
 
 MOST_S, MOST_MB = 5.0, 1000.0
@@ -71,24 +70,9 @@ def check_refused(ended: Ended) -> None:
     assert 0 < len(ended.err) < 100_000
 
 
-@pytest.fixture(scope="module")
-def whole(small_demo: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A small study with everything a study can have."""
-    root = tmp_path_factory.mktemp("hostile") / "whole"
-    shutil.copytree(small_demo / "study", root)
-    (root / ".key").mkdir(exist_ok=True)
-    shutil.copy(root / "published_secret.txt", root / ".key" / "secret.txt")
-    who = ("--who", "A", "--why", "b")
-    run("record", "withdraw", str(root), "--rater", "R2", *who)
-    run("report", str(root), "--quiet")
-    return root
-
-
 @pytest.fixture
 def study(whole: Path, tmp_path: Path) -> Path:
-    root = tmp_path / "study"
-    shutil.copytree(whole, root)
-    return root
+    return Path(shutil.copytree(whole, tmp_path / "study"))
 
 
 FILES = {

@@ -16,7 +16,6 @@ from tests.faults import Faults
 from tests.lab.flow.cuts import Syscall, contents, masrel_command
 from tests.lab.run.conftest import PROTOCOL
 
-FORMULA = "; touch X #"
 PLAN = """
 [report]
 sections = ["design", "test-retest"]
@@ -51,25 +50,6 @@ class Bench:
         assert old in text, (name, old)
         path.write_text(text.replace(old, new, 1), encoding="utf-8")
 
-    def code(self, position: int = 1) -> str:
-        sheet = self.study / "schedules" / "test_R1_sheet.csv"
-        return sheet.read_text().splitlines()[position + 1].split(",")[1]
-
-    def correct(self, grade: str) -> str:
-        where = ("--rater", "R1", "--session", "test", "--who", "Kim", "--why", "typo")
-        self("record correct", *where, "--code", self.code(), "--grade", grade)
-        return self.code()
-
-    def take_off(self) -> None:
-        """Take R2 off the session, and what needs two raters off the plan."""
-        path = self.study / "protocol.toml"
-        text = path.read_text(encoding="utf-8").partition("[[analysis.est")[0]
-        text = text.replace('\nraters = ["R1", "R2"]', '\nraters = ["R1"]')
-        path.write_text(f'{text}[report]\nsections = ["grades"]\n', encoding="utf-8")
-
-    def page(self) -> str:
-        return (self.study / "report" / "report.md").read_text(encoding="utf-8")
-
 
 def outputs_on_links(bench: Bench) -> None:
     profile = bench.study.parent / "profile"
@@ -103,52 +83,6 @@ def outputs_over_records(bench: Bench) -> None:
     assert contents(bench.study) == before
 
 
-def a_table_that_was_edited(bench: Bench) -> None:
-    table = bench.study / "ratings" / "ratings.csv"
-    line = table.read_text().splitlines()[1]
-    for old, new in ((",1,", ",4,"), ("simulated", "recorded")):
-        kept = table.read_bytes()
-        changed = line.replace(old, new, 1)
-        if changed != line:
-            bench.edit("ratings/ratings.csv", line, changed)
-            for verb in ("check", "verify", "analyze", "report"):
-                assert "is not what the session logs say" in bench(verb, code=2).err
-        table.write_bytes(kept)
-
-
-def facts_that_were_edited(bench: Bench) -> None:
-    facts = next(bench.study.glob("sessions/test_R1/*.json"))
-    name = str(facts.relative_to(bench.study))
-    bench.edit(name, '"simulated": true', '"simulated": false')
-    assert name in bench("verify", code=2).err
-    assert name in bench("check", code=2).err
-
-
-def a_correction_after_the_table(bench: Bench) -> None:
-    # the old table is refused, not used
-    bench.correct("4")
-    assert "is not what the session logs say" in bench("analyze", code=2).err
-    bench("ratings")
-    bench("report", "--include", "notes")
-    assert "typo" in bench.page()
-
-
-def a_rater_taken_off(bench: Bench) -> None:
-    bench.take_off()
-    for verb in ("ratings", "analyze", "report", "check"):
-        said = bench.masrel(verb, bench.study)
-        assert "sessions/test_R2.jsonl" in said.err, verb
-
-
-def a_log_that_is_empty_or_gone(bench: Bench) -> None:
-    log = bench.study / "sessions" / "test_R2.jsonl"
-    log.write_bytes(b"")
-    assert "test_R2.jsonl is empty" in bench.masrel("report", bench.study).err
-    log.unlink()
-    said = bench.masrel("analyze", bench.study).err
-    assert "test_R2 has recordings and there is no log" in said
-
-
 def two_studies_from_one_template(bench: Bench) -> None:
     sheets = []
     for name in ("a", "b"):
@@ -158,18 +92,6 @@ def two_studies_from_one_template(bench: Bench) -> None:
         sheets.append((root / "schedules" / "test_R1_sheet.csv").read_bytes())
         assert (root / "schedules").stat().st_mode & 0o077 == 0
     assert sheets[0] != sheets[1]
-
-
-def cells_that_are_formulas(bench: Bench) -> None:
-    table = bench.study.parent / "table.csv"
-    table.write_text(f'item,A,B\n1,"=1+1",{FORMULA}\n2,"=1+1","=1+1"\n')
-    done = bench.masrel("agree", table, "--target", "items", "--csv", "--nominal")
-    assert not re.search(r"(?m)(^|,)\"?[=+@]", done.out), done.out
-
-
-def names_of_devices(bench: Bench) -> None:
-    bench.edit("protocol.toml", 'id = "R2"', 'id = "CON"')
-    assert '"CON"' in bench("check", code=2).err
 
 
 def a_presentation_that_always_faults(bench: Bench) -> None:
@@ -186,27 +108,10 @@ def one_changed_number(bench: Bench) -> None:
     assert "12" in changed[0]
 
 
-def schedules_left_by_a_dropout(bench: Bench) -> None:
-    for file in bench.study.glob("sessions/test_R2*"):
-        shutil.rmtree(file) if file.is_dir() else file.unlink()
-    bench.take_off()
-    said = bench.masrel("check", bench.study).err
-    assert "test_R2.csv" in said
-    assert re.search(r"delete|remove|move|withdraw", said), said
-
-
 def a_protocol_named_as_the_study(bench: Bench) -> None:
     done = bench.masrel("check", bench.study / "protocol.toml")
     assert done.code == 2
     assert "folder" in done.err
-
-
-def a_text_in_latin_1(bench: Bench) -> None:
-    path = bench.study / "protocol.toml"
-    data = path.read_bytes().replace(b"A small", b"\xc4 small", 1)
-    path.write_bytes(data)
-    line = data[: data.index(b"\xc4")].count(b"\n") + 1
-    assert f"line {line}" in bench("check", code=2).err
 
 
 def a_session_without_a_terminal(bench: Bench) -> None:
@@ -219,18 +124,6 @@ def a_session_without_a_terminal(bench: Bench) -> None:
     assert done.returncode in (1, 2), done.stderr
     assert "Traceback" not in done.stderr
     assert "1 of 4 graded" in bench.masrel("verify", bench.study).out
-
-
-def a_folder_without_locks(bench: Bench) -> None:
-    # two that run one session: the second is refused
-    import fcntl
-
-    log = bench.study / "sessions" / "test_R1.jsonl"
-    with log.open("rb") as held:
-        fcntl.flock(held, fcntl.LOCK_EX)
-        where = ("--rater", "R1", "--session", "test", "--grades", "simulated")
-        said = bench("run", *where, code=2).err
-    assert "another process has this log open" in said
 
 
 def a_file_system_without_locks(bench: Bench) -> None:

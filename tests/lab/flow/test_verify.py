@@ -9,7 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from masrel.lab.protocol import StudyPaths
+from masrel.errors import ParameterError, RatingsError
+from masrel.lab.conduct import record_standing
+from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.run import record_correction
 from masrel.lab.verification import (
     anchor_findings,
     anchors_of,
@@ -19,45 +22,25 @@ from masrel.lab.verification import (
 )
 from tests.lab.flow.conftest import run
 
-Forgery = Callable[[StudyPaths], Path]
+Events = list[dict[str, dict[str, object]]]
+Forgery = Callable[[Path], Path]
+"""Changes a file, and returns what has to be named for it."""
+
+TABLE, RATERS = "ratings/ratings.csv", "ratings/raters.csv"
+SESSION, TRAINING = "sessions/test_R1.jsonl", "training/R1.jsonl"
+REHEARSAL = "rehearsals/1/rehearsal_test_R1.jsonl"
+LOGS = (SESSION, TRAINING, REHEARSAL)
 
 
-@pytest.fixture
-def study(small_demo: Path, tmp_path: Path) -> StudyPaths:
-    """A copy of the small study to forge."""
-    return StudyPaths(shutil.copytree(small_demo / "study", tmp_path / "study"))
-
-
-def test_a_study_that_nobody_touched_is_whole(small_demo: Path) -> None:
-    verification = verify_study(StudyPaths(small_demo / "study"))
-    assert verification.findings == ()
-    assert {record.stage for record in verification.sessions} == {"complete"}
-    assert all(
-        record.n_graded == record.n_presentations == record.n_recordings > 0
-        for record in verification.sessions
-    )
-
-
-def edited(path: Path, old: bytes, new: bytes) -> Path:
-    data = path.read_bytes()
-    assert old in data
-    path.write_bytes(data.replace(old, new, 1))
-    return path
-
-
-def logs(study: StudyPaths) -> list[Path]:
-    return sorted(study.sessions.glob("*.jsonl"))
-
-
-def events(log: Path) -> list[dict[str, dict[str, object]]]:
+def events(log: Path) -> Events:
     return [json.loads(line) for line in log.read_text().splitlines()]
 
 
-def recording(study: StudyPaths) -> Path:
-    return sorted(study.sessions.glob("*/*.npz"))[0]
+def first(documents: Events, kind: str) -> dict[str, object]:
+    return next(each["fields"] for each in documents if each["event"] == kind)
 
 
-def chained_anew(log: Path, documents: list[dict[str, dict[str, object]]]) -> Path:
+def chained_anew(log: Path, documents: Events) -> Path:
     """Write events as a chain that holds, whatever they say."""
     previous, lines = "0" * 64, []
     for document in documents:
@@ -68,239 +51,239 @@ def chained_anew(log: Path, documents: list[dict[str, dict[str, object]]]) -> Pa
     return log
 
 
+def broken(study: StudyPaths) -> list[Path]:
+    return [f.path for f in verify_study(study).findings if f.weight == "broken"]
+
+
+def replaced(old: bytes, new: bytes) -> Forgery:
+    def forge(path: Path) -> Path:
+        data = path.read_bytes()
+        assert old in data
+        path.write_bytes(data.replace(old, new, 1))
+        return path
+
+    return forge
+
+
+def rewritten(kind: str, **fields: object) -> Forgery:
+    """Changes the first event of a kind, and computes the chain anew."""
+
+    def forge(log: Path) -> Path:
+        documents = events(log)
+        first(documents, kind).update(fields)
+        return chained_anew(log, documents)
+
+    return forge
+
+
+def without_line(place: int) -> Forgery:
+    def forge(path: Path) -> Path:
+        lines = path.read_bytes().splitlines(keepends=True)
+        del lines[place]
+        path.write_bytes(b"".join(lines))
+        return path
+
+    return forge
+
+
+def copied_as(name: str) -> Forgery:
+    return lambda path: Path(shutil.copy(path, path.with_name(name)))
+
+
+def moved_to(name: str) -> Forgery:
+    return lambda path: path.rename(path.parent / name)
+
+
+def gone(path: Path) -> Path:
+    path.unlink()
+    return path
+
+
+def gone_with_what_it_names(log: Path) -> Path:
+    return gone(log).parent  # what is left behind is named
+
+
+def emptied(path: Path) -> Path:
+    path.write_bytes(b"")
+    return path
+
+
+def with_a_bit_changed(path: Path) -> Path:
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    return path
+
+
+def with_another_grade(table: Path) -> Path:
+    *lines, last = table.read_text().splitlines()
+    cells = last.split(",")
+    cells[4] = "4" if cells[4] != "4" else "0"
+    table.write_text("\n".join([*lines, ",".join(cells)]) + "\n")
+    return table
+
+
+def in_another_order(log: Path) -> Path:
+    session, presented, grade, *others = events(log)
+    return chained_anew(log, [session, grade, presented, *others])
+
+
+def with_models_that_change_places(schedule: Path) -> Path:
+    *lines, last, end = (x.split(",") for x in schedule.read_text().splitlines())
+    last[2:], end[2:] = end[2:], last[2:]
+    schedule.write_text("".join(f"{','.join(x)}\n" for x in (*lines, last, end)))
+    return schedule.parent.parent
+
+
+def before_a_withdrawal(table: Path) -> Path:
+    study = StudyPaths(table.parent.parent)
+    protocol = read_protocol(study.protocol)
+    record_standing(study, protocol, "R2", "withdrawn", who="Kim", why="left")
+    return table
+
+
 def corrected(study: StudyPaths) -> None:
-    log = logs(study)[0]
-    session, rater = log.stem.split("_")
-    fields = next(e["fields"] for e in events(log) if e["event"] == "grade")
-    run(
-        *("record", "correct", str(study.root), "--rater", rater, "--session", session),
-        *("--code", str(fields["code"]), "--who", "me", "--why", "a slip"),
-        *("--grade", "4" if fields["grade"] != "4" else "0"),
+    given = first(events(study.root / SESSION), "grade")
+    grade = "4" if given["grade"] != "4" else "0"
+    of = {"code": str(given["code"]), "who": "me", "why": "a slip"}
+    record_correction(
+        study, read_protocol(study.protocol), "R1", "test", grade=grade, **of
     )
 
 
-def a_grade_in_the_table(study: StudyPaths) -> Path:
-    lines = study.ratings_file.read_text().splitlines()
-    cells = lines[-1].split(",")
-    index = next(i for i, line in enumerate(lines) if line.startswith("session,"))
-    place = lines[index].split(",").index("grade")
-    cells[place] = "4" if cells[place] != "4" else "0"
-    study.ratings_file.write_text("\n".join([*lines[:-1], ",".join(cells)]) + "\n")
-    return study.ratings_file
-
-
-def a_row_taken_from_the_table(study: StudyPaths) -> Path:
-    lines = study.ratings_file.read_text().splitlines()
-    study.ratings_file.write_text("\n".join(lines[:-1]) + "\n")
-    return study.ratings_file
-
-
-def recorded_for_simulated(study: StudyPaths) -> Path:
-    return edited(study.ratings_file, b"simulated", b"recorded")
-
-
-def a_line_taken_from_the_banner(study: StudyPaths) -> Path:
-    return edited(study.ratings_file, b"# SIMULATED", b"# Recorded")
-
-
-def the_status_of_a_rater(study: StudyPaths) -> Path:
-    run("ratings", str(study.root))
-    return edited(study.raters_file, b"R2,NA,complete", b"R2,NA,planned")
-
-
-def a_rater_withdrawn_after_the_table(study: StudyPaths) -> Path:
-    of_whom = ("--rater", "R2", "--who", "Kim", "--why", "left")
-    run("ratings", str(study.root))
-    run("record", "withdraw", str(study.root), *of_whom)
-    return study.raters_file
-
-
-def an_estimate(study: StudyPaths) -> Path:
-    document = json.loads(study.analysis_file.read_text())
-    document["estimates"][0]["estimate"]["value"] = 0.99
-    study.analysis_file.write_text(json.dumps(document))
-    return study.analysis_file
-
-
-def a_log_taken_away(study: StudyPaths) -> Path:
-    logs(study)[0].unlink()
-    return study.sessions  # what is left behind is named
-
-
-def an_emptied_log(study: StudyPaths) -> Path:
-    logs(study)[0].write_bytes(b"")
-    return logs(study)[0]
-
-
-def a_line_changed(study: StudyPaths) -> Path:
-    log = logs(study)[0]
-    grade = next(e["fields"]["grade"] for e in events(log) if e["event"] == "grade")
-    old = f'"grade": "{grade}"'.encode()
-    return edited(log, old, b'"grade": "4"' if grade != "4" else b'"grade": "0"')
-
-
-def a_line_taken_away(study: StudyPaths) -> Path:
-    log = logs(study)[0]
-    lines = log.read_bytes().splitlines(keepends=True)
-    log.write_bytes(b"".join([*lines[:3], *lines[4:]]))
-    return log
-
-
-def rewritten(study: StudyPaths, kind: str, **fields: object) -> Path:
-    """Change the first event of a kind, and compute the chain anew."""
-    documents = events(logs(study)[0])
-    next(e for e in documents if e["event"] == kind)["fields"].update(fields)
-    return chained_anew(logs(study)[0], documents)
-
-
-def another_position_in_a_chain_computed_anew(study: StudyPaths) -> Path:
-    return rewritten(study, "presented", position=99)
-
-
-def a_grade_off_the_scale_in_a_chain_computed_anew(study: StudyPaths) -> Path:
-    return rewritten(study, "grade", grade="5")
-
-
-def another_schedule_in_a_chain_computed_anew(study: StudyPaths) -> Path:
-    return rewritten(study, "session", schedule_sha256="0" * 64)
-
-
-def lines_in_another_order_in_a_chain_computed_anew(study: StudyPaths) -> Path:
-    session, presented, grade, *others = events(logs(study)[0])
-    return chained_anew(logs(study)[0], [session, grade, presented, *others])
-
-
-def a_recording(study: StudyPaths) -> Path:
-    path = recording(study)
-    data = path.read_bytes()
-    middle = len(data) // 2
-    path.write_bytes(data[:middle] + bytes([data[middle] ^ 1]) + data[middle + 1 :])
-    return path
-
-
-def a_recording_taken_away(study: StudyPaths) -> Path:
-    path = recording(study)
-    path.unlink()
-    return path
-
-
-def a_recording_nobody_logged(study: StudyPaths) -> Path:
-    path = recording(study)
-    return Path(shutil.copy(path, path.with_name("XYZ.npz")))
-
-
-def the_speed_beside_a_recording(study: StudyPaths) -> Path:
-    path = recording(study).with_suffix(".json")
-    facts = json.loads(path.read_text())
-    path.write_text(json.dumps({**facts, "mean_speed_deg_s": 1.0}))
-    return path
-
-
-def the_model_beside_a_recording(study: StudyPaths) -> Path:
-    path = recording(study).with_suffix(".json")
-    facts = json.loads(path.read_text())
-    path.write_text(json.dumps({**facts, "model": facts["model"] + "x"}))
-    return path
-
-
-def any_fact_beside_a_recording(study: StudyPaths) -> Path:
-    path = recording(study).with_suffix(".json")
-    return edited(path, b'"rate_hz": 1000', b'"rate_hz": 1001')
-
-
-def a_page_of_the_report(study: StudyPaths) -> Path:
-    run("report", str(study.root), "--quiet")
-    return edited(study.report / "report.html", b"<p>", b"<p> ")
-
-
-def a_table_of_the_report_taken_away(study: StudyPaths) -> Path:
-    run("report", str(study.root), "--quiet")
-    path = sorted(study.report.glob("tables/*"))[0]
-    path.unlink()
-    return path
-
-
-def a_report_of_before_a_correction(study: StudyPaths) -> Path:
-    run("report", str(study.root), "--quiet")
+def before_a_correction(manifest: Path) -> Path:
+    study = StudyPaths(manifest.parent.parent)
     corrected(study)
-    run("ratings", str(study.root))
-    run("analyze", str(study.root))
-    return study.report
+    for verb in ("ratings", "analyze"):
+        run(verb, str(study.root))
+    return manifest
 
 
-def a_schedule(study: StudyPaths) -> Path:
-    path = next(p for p in study.schedules.glob("*.csv") if "sheet" not in p.name)
-    lines = path.read_text().splitlines()
-    first, second = (lines[-2].split(","), lines[-1].split(","))
-    first[2:], second[2:] = second[2:], first[2:]  # models change places
-    lines[-2:] = [",".join(first), ",".join(second)]
-    path.write_text("\n".join(lines) + "\n")
-    return study.root
-
-
-FORGERIES: list[Forgery] = [
-    a_grade_in_the_table,
-    a_row_taken_from_the_table,
-    recorded_for_simulated,
-    a_line_taken_from_the_banner,
-    the_status_of_a_rater,
-    a_rater_withdrawn_after_the_table,
-    an_estimate,
-    a_log_taken_away,
-    an_emptied_log,
-    a_line_changed,
-    a_line_taken_away,
-    another_position_in_a_chain_computed_anew,
-    a_grade_off_the_scale_in_a_chain_computed_anew,
-    another_schedule_in_a_chain_computed_anew,
-    lines_in_another_order_in_a_chain_computed_anew,
-    a_recording,
-    a_recording_taken_away,
-    a_recording_nobody_logged,
-    the_speed_beside_a_recording,
-    the_model_beside_a_recording,
-    any_fact_beside_a_recording,
-    a_schedule,
-    a_page_of_the_report,
-    a_table_of_the_report_taken_away,
-    a_report_of_before_a_correction,
+RECORDING, FACTS = "test_R1/*.npz", "test_R1/*.json"
+FORGERIES: list[tuple[str, Forgery]] = [
+    (TABLE, with_another_grade),
+    (TABLE, without_line(-1)),
+    (TABLE, replaced(b"simulated", b"recorded")),
+    (TABLE, replaced(b"# SIMULATED", b"# Recorded")),
+    (RATERS, replaced(b"R2,NA,complete", b"R2,NA,planned")),
+    (RATERS, before_a_withdrawal),
+    ("analysis.json", replaced(b'"value": 0.', b'"value": 0.9')),
+    ("schedules/test_R1.csv", with_models_that_change_places),
+    ("report/report.html", replaced(b"<p>", b"<p> ")),
+    ("report/tables/*", gone),
+    ("report/manifest.json", before_a_correction),
+    (SESSION, gone_with_what_it_names),
+    (SESSION, emptied),
+    (SESSION, without_line(3)),
+    (SESSION, replaced(b'"event": "grade"', b'"event": "Grade"')),
+    (SESSION, rewritten("presented", position=99)),
+    (SESSION, rewritten("grade", grade="5")),
+    (SESSION, rewritten("session", schedule_sha256="0" * 64)),
+    (SESSION, in_another_order),
+    (f"sessions/{RECORDING}", with_a_bit_changed),
+    (f"sessions/{RECORDING}", gone),
+    (f"sessions/{RECORDING}", copied_as("XYZ.npz")),
+    (f"sessions/{FACTS}", replaced(b'"mean_speed_deg_s": ', b'"mean_speed_deg_s": 1')),
+    (f"sessions/{FACTS}", replaced(b'"model": "', b'"model": "x')),
+    (f"sessions/{FACTS}", replaced(b'"rate_hz": 1000', b'"rate_hz": 1001')),
+]
+OF_TRAININGS: list[tuple[str, Forgery]] = [
+    (TRAINING, replaced(b'"event": "grade"', b'"event": "Grade"')),
+    (TRAINING, rewritten("grade", grade="7")),
+    (TRAINING, rewritten("grade", intended="4")),
+    (TRAINING, rewritten("presented", model="HM9")),
+    (TRAINING, rewritten("presented", attempt=2)),
+    (TRAINING, rewritten("presented", position=[])),
+    (TRAINING, rewritten("complete", n_presentations=1)),
+    (TRAINING, rewritten("training", format=99)),
+    (TRAINING, moved_to("R2.jsonl")),
+    (TRAINING, copied_as("R9.jsonl")),
+    ("training/R1/*.npz", with_a_bit_changed),
+    ("training/R1/*.npz", gone),
+    ("training/R1/*.npz", copied_as("999.npz")),
+]
+OF_REHEARSALS: list[tuple[str, Forgery]] = [
+    (REHEARSAL, replaced(b'"event": "grade"', b'"event": "Grade"')),
+    (REHEARSAL, rewritten("grade", grade="7")),
+    (REHEARSAL, rewritten("presented", position=3)),
+    (REHEARSAL, rewritten("session", rehearsal=False)),
+    (REHEARSAL, moved_to("rehearsal_test_R2.jsonl")),
+    (f"rehearsals/1/rehearsal_{RECORDING}", with_a_bit_changed),
+    (f"rehearsals/1/rehearsal_{FACTS}", replaced(b"HM", b"HX")),
+    (f"rehearsals/1/rehearsal_{RECORDING}", gone),
+    (f"rehearsals/1/rehearsal_{RECORDING}", copied_as("00A.npz")),
 ]
 
 
-@pytest.mark.parametrize("forge", FORGERIES, ids=lambda forge: forge.__name__)
-def test_a_forgery_that_leaves_the_chain_is_found(
-    study: StudyPaths, forge: Forgery
-) -> None:
-    place = forge(study)
+def test_a_study_that_nobody_touched_is_whole(study: StudyPaths) -> None:
     verification = verify_study(study)
-    assert not verification.is_whole
-    broken = [f.path for f in verification.findings if f.weight == "broken"]
-    assert any(path == place or path.is_relative_to(place) for path in broken)
+    assert verification.findings == ()
+    assert {record.stage for record in verification.sessions} == {"complete"}
+    for record in (*verification.sessions, *verification.rehearsals):
+        assert record.n_graded == record.n_presentations == record.n_recordings == 4
+    (training,) = verification.trainings
+    kinds = [event["event"] for event in events(study.root / TRAINING)]
+    counts = (kinds.count("grade"), kinds.count("presented"))
+    assert (training.n_graded, training.n_recordings) == counts
+    shown = run("verify", str(study.root))
+    assert "rehearsal 1 of test R1: complete" in shown
+    assert f"training R1: {training.stage}, " in shown
+    document = json.loads(run("verify", str(study.root), "--json", "-"))
+    for of in ("rehearsals", "trainings"):
+        assert [record["rater"] for record in document[of]] == ["R1"]
 
 
-def killed_before_the_log(study: StudyPaths) -> Path:
-    """Take a log back to where its first presentation is recorded, and not logged."""
-    log = logs(study)[0]
-    path = log.parent / next(
-        str(e["fields"]["recording"]) for e in events(log) if e["event"] == "presented"
-    )
-    lines = log.read_bytes().splitlines(keepends=True)
-    log.write_bytes(b"".join(lines[:1]))
-    for other in log.with_suffix("").iterdir():
-        if other.stem != path.stem:
-            other.unlink()
-    path.with_suffix(".partial").write_bytes(b"")
-    for file in (study.ratings_file, study.answers_file, study.raters_file):
-        file.unlink(missing_ok=True)
-    study.analysis_file.unlink(missing_ok=True)
-    shutil.rmtree(study.report, ignore_errors=True)
-    return path
+def named(forgeries: list[tuple[str, Forgery]]) -> pytest.MarkDecorator:
+    ids = [
+        f"{file} {forge.__qualname__.partition('.')[0]}" for file, forge in forgeries
+    ]
+    return pytest.mark.parametrize(("file", "forge"), forgeries, ids=ids)
+
+
+@named([*FORGERIES, *OF_TRAININGS, *OF_REHEARSALS])
+def test_a_forgery_that_leaves_the_chain_is_found(
+    study: StudyPaths, file: str, forge: Forgery
+) -> None:
+    place = forge(sorted(study.root.glob(file))[0])
+    assert any(path.is_relative_to(place) for path in broken(study))
+
+
+def test_a_rehearsal_of_another_number_is_found(study: StudyPaths) -> None:
+    (study.rehearsals / "1").rename(study.rehearsals / "two")
+    assert study.rehearsals / "two" / Path(REHEARSAL).name in broken(study)
+
+
+@pytest.mark.parametrize(
+    ("log", "forge"),
+    [
+        (TRAINING, rewritten("training", presented_sha256="0" * 64)),
+        (REHEARSAL, rewritten("session", schedule_sha256="0" * 64)),
+    ],
+)
+def test_what_cannot_be_drawn_again_is_in_doubt(
+    study: StudyPaths, log: str, forge: Forgery
+) -> None:
+    path = forge(study.root / log)
+    (finding,) = verify_study(study).findings
+    assert (finding.weight, finding.path) == ("doubt", path)
+    with_a_bit_changed(sorted(path.with_suffix("").glob("*.npz"))[0])
+    assert not verify_study(study).is_whole  # the log has its hash all the same
 
 
 def test_a_kill_between_a_recording_and_the_log_breaks_no_study(
     study: StudyPaths,
 ) -> None:
-    path = killed_before_the_log(study)
+    # back to where the first presentation is recorded, and not logged
+    log = study.root / SESSION
+    path = log.parent / str(first(events(log), "presented")["recording"])
+    log.write_bytes(log.read_bytes().splitlines(keepends=True)[0])
+    for other in log.with_suffix("").iterdir():
+        if other.stem != path.stem:
+            other.unlink()
+    path.with_suffix(".partial").write_bytes(b"")
+    for made in (study.ratings_file.parent, study.report):
+        shutil.rmtree(made)
+    study.analysis_file.unlink()
     verification = verify_study(study)
     assert verification.is_whole
     doubted = {finding.path for finding in verification.findings}
@@ -310,61 +293,60 @@ def test_a_kill_between_a_recording_and_the_log_breaks_no_study(
 def test_samples_left_beside_it_excuse_no_recording_of_a_complete_session(
     study: StudyPaths,
 ) -> None:
-    path = a_recording_nobody_logged(study)
+    path = copied_as("XYZ.npz")(sorted(study.sessions.glob(RECORDING))[0])
     path.with_suffix(".partial").write_bytes(b"")
-    broken = [f.path for f in verify_study(study).findings if f.weight == "broken"]
-    assert broken == [path]
+    assert broken(study) == [path]
 
 
 def test_of_a_broken_chain_nothing_but_the_chain_is_said(study: StudyPaths) -> None:
-    log = a_line_changed(study)
-    broken = [f.path for f in verify_study(study).findings if f.weight == "broken"]
-    assert log in broken
-    assert not any(path.parent == log.with_suffix("") for path in broken)
-    assert f"sessions/{log.name}" not in {anchor.log for anchor in anchors_of(study)}
+    log = without_line(3)(study.root / SESSION)
+    found = broken(study)
+    assert log in found
+    assert not any(path.parent == log.with_suffix("") for path in found)
+    assert SESSION not in {anchor.log for anchor in anchors_of(study)}
 
 
 @pytest.mark.parametrize(
     ("forge", "verb"),
     [
-        (a_grade_in_the_table, "analyze"),
-        (recorded_for_simulated, "analyze"),
-        (a_row_taken_from_the_table, "report"),
+        (with_another_grade, "analyze"),
+        (replaced(b"simulated", b"recorded"), "analyze"),
+        (without_line(-1), "report"),
     ],
 )
 def test_a_table_that_is_not_that_of_the_logs_is_refused(
     study: StudyPaths, forge: Forgery, verb: str
 ) -> None:
-    from masrel.errors import RatingsError
-
-    forge(study)
+    forge(study.ratings_file)
     with pytest.raises(RatingsError, match="is not what the session logs say"):
         run(verb, str(study.root))
 
 
-def with_other_grade(log: Path) -> Path:
-    documents = events(log)
-    graded = next(d for d in documents if d["event"] == "grade")
-    graded["fields"]["grade"] = "4" if graded["fields"]["grade"] != "4" else "0"
-    return chained_anew(log, documents)
-
-
-def without_last_grade(log: Path) -> Path:
+def without_the_last_grade(log: Path) -> Path:
     return chained_anew(log, events(log)[:-2])
 
 
-@pytest.mark.parametrize("forge", [with_other_grade, without_last_grade])
+@pytest.mark.parametrize(
+    ("file", "forge"),
+    [
+        (SESSION, rewritten("grade", grade="4")),
+        (SESSION, without_the_last_grade),
+        (TRAINING, rewritten("complete", passed=None)),
+        (REHEARSAL, rewritten("grade", stretch=1)),
+    ],
+)
 def test_with_an_anchor_a_chain_computed_anew_is_found(
-    study: StudyPaths, tmp_path: Path, forge: Callable[[Path], Path]
+    study: StudyPaths, tmp_path: Path, file: str, forge: Forgery
 ) -> None:
-    file = tmp_path / "anchors.txt"
-    write_anchors(anchors_of(study), file)
-    assert anchor_findings(study, read_anchors(file)) == ()
-    log = forge(logs(study)[0])
-    run("ratings", str(study.root))
-    run("analyze", str(study.root))
+    anchors = tmp_path / "anchors.txt"
+    write_anchors(anchors_of(study), anchors)
+    assert {anchor.log for anchor in read_anchors(anchors)} > {*LOGS}
+    assert anchor_findings(study, read_anchors(anchors)) == ()
+    log = forge(study.root / file)
+    for verb in ("ratings", "analyze", "report"):
+        run(verb, str(study.root))
     assert verify_study(study).is_whole  # without the anchor it cannot be seen
-    assert [f.path for f in anchor_findings(study, read_anchors(file))] == [log]
+    assert [f.path for f in anchor_findings(study, read_anchors(anchors))] == [log]
 
 
 def test_a_log_that_has_grown_still_fits_its_anchor(study: StudyPaths) -> None:
@@ -399,9 +381,9 @@ def test_the_verb_says_every_session_and_ends_with_2_when_broken(
     file = tmp_path / "kept" / "anchors.txt"
     whole = run("verify", str(study.root), "--anchor", str(file))
     assert f"{study.root}: whole." in whole
-    assert whole.count("complete, ") == len(logs(study))
+    assert whole.count("complete, ") == len(study.logs()) + 1  # and the rehearsal
     assert file.is_file()
-    with_other_grade(logs(study)[0])
+    rewritten("grade", grade="4")(study.root / SESSION)
     out = run("verify", str(study.root), "--anchor", str(file), code=2)
     assert "the anchored SHA-256" in out
     document = json.loads(run("verify", str(study.root), "--json", "-", code=2))
@@ -419,8 +401,6 @@ def test_a_study_without_logs_leaves_no_file_of_anchors(tmp_path: Path) -> None:
 
 
 def test_an_anchor_within_the_study_is_refused(study: StudyPaths) -> None:
-    from masrel.errors import ParameterError
-
     with pytest.raises(ParameterError, match="needed a file outside"):
         run("verify", str(study.root), "--anchor", str(study.root / "anchors.txt"))
 
@@ -429,8 +409,6 @@ def test_an_anchor_within_the_study_is_refused(study: StudyPaths) -> None:
     "text", ["", "abc  1  sessions/a.jsonl\n", f"{'0' * 64} sessions/a.jsonl\n"]
 )
 def test_a_file_that_holds_no_anchors_is_refused(tmp_path: Path, text: str) -> None:
-    from masrel.errors import ParameterError
-
     file = tmp_path / "anchors.txt"
     file.write_text(text)
     with pytest.raises(ParameterError, match="needed"):
