@@ -2,7 +2,6 @@
 
 import copy
 import pickle
-import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
 from math import isnan
@@ -27,7 +26,7 @@ from masrel.lab.elbow import (
     work,
 )
 from masrel.lab.elbow._scenes import EVENTS, LOADS
-from tests.lab.elbow.scenes import KINDS, corner_cases, random_scene
+from tests.lab.elbow.scenes import KINDS, random_scene
 from tests.lab.elbow.stretches import constant
 
 HM3 = STANDARD_MODELS["HM3"]
@@ -94,20 +93,6 @@ def test_torques_and_integrals_are_those_of_one_scene(kind: str) -> None:
         assert (np.nan_to_num(np.abs(found - expected)) <= steep).all()
 
 
-def test_corner_cases_are_those_of_one_scene() -> None:
-    cases = corner_cases()
-    joints, motions = (list(column) for column in zip(*cases.values(), strict=True))
-    table = evaluate(joints, motions, (*EVENTS, "peak_torque"))
-    for i, name in enumerate(cases):
-        found = events(joints[i], motions[i])
-        for event in EVENTS:
-            value = table.column(event)[i]
-            size = max(value, 1.0) if event in ANGLES else motions[i].duration
-            assert same(value, getattr(found, event), size), (name, event)
-        peak = peak_torque(joints[i], motions[i])
-        assert table.column("peak_torque")[i] == pytest.approx(peak, rel=1e-13)
-
-
 def test_slow_stretches_turn_where_one_by_one_they_do() -> None:
     # pre-catch to the end, its torque a quintic that turns twice
     speeds = np.radians(np.random.default_rng(1).uniform(2.0, 9.0, 50))
@@ -150,21 +135,6 @@ def test_copies_of_a_joint_give_what_it_gives(
     of_each = evaluate([joint, again, HM3], constant(92.0), LOADS).values
     np.testing.assert_array_equal(of_each[0], of_each[1])
     assert (of_each[0] != of_each[2]).all()
-
-
-def test_memory_is_that_of_a_chunk() -> None:
-    # 60 000 scenes in chunks of 500: beside the result, 0.5 MB, and the list of rows
-    # there is no more than for 500, some 200 columns of 4 kB.
-    n = 60_000
-    motions = [constant(92.0)] * n
-    evaluate(HM3, motions[:500], chunk=500)
-    tracemalloc.start()
-    try:
-        evaluate(HM3, motions, chunk=500)
-        most = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-    assert most < 6e6  # at once 200 columns would take 96 MB
 
 
 # Columns

@@ -131,16 +131,6 @@ def test_release_returns_to_pre_catch_and_the_stretch_does_not_catch_again(
         assert move(joint, 30.0 + 100.0 * time + i, 100.0, time + 0.01 * i) == PRE_CATCH
 
 
-def test_a_joint_released_before_its_catch_catches_only_after_flexing() -> None:
-    joint = SampledJoint(HM3, start_angle=radians(30.0))
-    joint.release()
-    for i in range(100):
-        assert move(joint, 30.0 + i, 100.0, 0.01 * i) == PRE_CATCH
-    move(joint, 30.0, -60.0, 2.0)
-    phases = [move(joint, 30.0 + i, 100.0, 3.0 + 0.01 * i) for i in range(100)]
-    assert CATCH in phases
-
-
 def test_flexing_ends_the_stretch_and_arms_the_next() -> None:
     joint = SampledJoint(HM3, start_angle=radians(30.0))
 

@@ -136,17 +136,6 @@ def test_catches_that_outlast_their_stretch_count_as_longer() -> None:
     assert made == step["catch_travel"]
 
 
-def test_one_catch_that_ends_says_nothing_of_how_travels_differ() -> None:
-    movements = study(HM2, seed=3, scatter=SCATTER, fast=(70, 130))
-    kept = [m for m in movements if m.name not in ("fast 8", "fast 10")]
-    with pytest.warns(SmallSampleWarning, match="^D, k_post: too few trials"):
-        made = fit(kept)
-    assert math.isnan(made["catch_travel"].low)
-    assert not math.isnan(made["catch_travel"].value)
-    words = "13 of 14 catches do not end within their stretch and say nothing"
-    assert words in " ".join(made.remarks)
-
-
 def test_one_fast_trial_or_one_slow_one_has_values_without_intervals(
     movements: list[Movement],
 ) -> None:

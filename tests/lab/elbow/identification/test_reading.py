@@ -100,16 +100,6 @@ def test_rows_with_an_empty_cell_are_left_out_and_counted(tmp_path: Path) -> Non
     assert read.time.size == TIME.size - 2
 
 
-def test_columns_that_are_not_asked_for_may_be_anything(tmp_path: Path) -> None:
-    lines = table(**good()).splitlines()
-    noted = [f"{lines[0]},phase", *(f"{line},at rest" for line in lines[1:])]
-    read = read_movement(put(tmp_path, "\n".join(noted)))
-    np.testing.assert_allclose(read.torque, TORQUE, rtol=1e-12)
-    path = tmp_path / "trial.npz"
-    np.savez(path, emg=np.zeros((TIME.size, 4)), rater=np.array("R1"), **good())
-    np.testing.assert_allclose(read_movement(path).torque, TORQUE)
-
-
 def test_names_and_units_can_be_said_beside_the_file(tmp_path: Path) -> None:
     path = put(tmp_path, table(time_s=TIME, goniometer=ANGLE, torque=TORQUE))
     units = {"angle": "deg", "torque": "nm"}

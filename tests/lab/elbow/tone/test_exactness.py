@@ -14,7 +14,6 @@ import pytest
 from masrel.lab.elbow import MinimumJerk
 from masrel.lab.elbow.tone import (
     ClaspKnife,
-    Cogwheel,
     Contracture,
     LeadPipe,
     ThresholdReflex,
@@ -23,8 +22,7 @@ from masrel.lab.elbow.tone import (
 
 BAR = Decimal("1e-11")  # s
 
-reflex, knife, end = ThresholdReflex(), ClaspKnife(), Contracture()
-pipe, wheel = LeadPipe(), Cogwheel()
+reflex, knife, end, pipe = ThresholdReflex(), ClaspKnife(), Contracture(), LeadPipe()
 
 Condition = Callable[[Decimal, Decimal, Decimal], Decimal]  # of θ, ω and the start
 CONDITIONS: list[tuple[ToneModel, str, Condition]] = [
