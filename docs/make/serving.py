@@ -11,9 +11,7 @@ from pathlib import Path
 from playwright.sync_api import Page, sync_playwright
 
 from tests.lab.serve.browser.conftest import CHROMIUM, FLAGS
-from tests.lab.serve.browser.serving import Server
-from tests.lab.serve.browser.stages import Stage
-from tests.lab.serve.browser.studies import make_study
+from tests.lab.serve.browser.stages import Stage, make_study
 
 FIGURES = Path(__file__).parents[1] / "figures"
 
@@ -34,7 +32,7 @@ def main() -> None:
             simulated_raters={"mean_speed_deg_s": 85.0},
         )
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        stage = Stage(browser, study, Server(study.root))
+        stage = Stage(browser, study)
         try:
             draw(stage)
         finally:

@@ -2,14 +2,10 @@
 
 import importlib.util
 import os
-import pty
 import re
-import select
 import signal
 import socket
-import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -18,6 +14,7 @@ import pytest
 from masrel.lab.protocol import copy_template
 from tests.cli.process import Caller
 from tests.lab.serve.pages import DATA, KEY, listen
+from tests.lab.serve.terminal import Server
 
 
 @pytest.fixture
@@ -105,104 +102,54 @@ def test_a_port_that_only_root_may_open(masrel: Caller, study: Path) -> None:
     assert "--port: needed one that this user may open" in done.err
 
 
-class Terminal:
-    """``masrel serve`` at a terminal."""
-
-    def __init__(self, study: Path, *options: str, at_a_terminal: bool = True) -> None:
-        self._ours, theirs = pty.openpty() if at_a_terminal else os.pipe()
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "masrel", "serve", str(study), "--port=0", *options],
-            stdin=theirs if at_a_terminal else subprocess.DEVNULL,
-            stdout=theirs,
-            stderr=theirs,
-        )
-        os.close(theirs)
-        self.text = ""
-
-    def until(self, text: str, n_times: int = 1) -> str:
-        """Read until a text has come so many times -> all that has come."""
-        until = time.monotonic() + 60
-        while self.text.count(text) < n_times and time.monotonic() < until:
-            if select.select([self._ours], [], [], 1)[0]:
-                try:
-                    self.text += os.read(self._ours, 65_536).decode(errors="replace")
-                except OSError:  # a terminal whose other side is gone
-                    break
-        assert self.text.count(text) >= n_times, self.text
-        return self.text
-
-    def enter(self) -> None:
-        """Press Enter."""
-        os.write(self._ours, b"\n")
-
-    def port(self) -> int:
-        """The port that is printed."""
-        return int(re.findall(r"http://127.0.0.1:(\d+)/", self.until("Ctrl-C"))[0])
-
-    def stop(self, number: signal.Signals) -> int:
-        """Send a signal -> the exit code."""
-        self.process.send_signal(number)
-        return self.process.wait(20)
-
-    def close(self) -> None:
-        """End it however it stands."""
-        self.process.kill()
-        self.process.wait()
-        os.close(self._ours)
-
-
 @pytest.fixture
-def start() -> Iterator[Callable[..., Terminal]]:
+def start(study: Path) -> Iterator[Callable[..., Server]]:
     """Start it, as often as a test likes."""
-    started: list[Terminal] = []
+    started: list[Server] = []
 
-    def begin(*words: object, **settings: bool) -> Terminal:
-        started.append(Terminal(*words, **settings))  # type: ignore[arg-type]
+    def begin(*options: str, **settings: bool) -> Server:
+        started.append(Server(study, *options, **settings))
         return started[-1]
 
     yield begin
     for each in started:
-        each.close()
+        each.end(signal.SIGKILL)
 
 
 @pytest.mark.slow
 def test_two_addresses_each_with_a_qr_code_and_new_ones_at_enter(
-    start: Callable[..., Terminal], study: Path
+    start: Callable[..., Server],
 ) -> None:
-    terminal = start(study)
-    text = terminal.until("Ctrl-C: stop.")
+    server = start()
     address = r"http://127\.0\.0\.1:\d+/{}\?token=[\w-]{{22}}"
     for role in ("rater", "coordinator"):
-        assert len(re.findall(address.format(role), text)) == 1
-    assert text.count("\N{UPPER HALF BLOCK}") > 100
-    terminal.enter()
-    text = terminal.until("Ctrl-C: stop.", 2)
-    assert len(set(re.findall(r"token=([\w-]{22})", text))) == 4
-    assert terminal.stop(signal.SIGINT) == 0
+        assert len(re.findall(address.format(role), server.text)) == 1
+    assert server.text.count("\N{UPPER HALF BLOCK}") > 100
+    server.enter()
+    assert len(set(re.findall(r"token=([\w-]{22})", server.text))) == 4
+    assert server.end() == 0
 
 
 @pytest.mark.slow
 def test_a_study_is_served_once_and_the_port_says_nothing_else(
-    masrel: Caller, start: Callable[..., Terminal], study: Path
+    masrel: Caller, start: Callable[..., Server], study: Path
 ) -> None:
-    terminal = start(study)
-    done = masrel("serve", study, "--port", terminal.port())
+    server = start()
+    done = masrel("serve", study, "--port", server.port)
     assert done.code == 2
     assert "needed a study that nobody serves, got one that another" in done.err
-    assert terminal.stop(signal.SIGTERM) == 0
+    assert server.end(signal.SIGTERM) == 0
 
 
 @pytest.mark.slow
 def test_an_open_connection_does_not_keep_it_and_what_is_risked_is_said_once(
-    start: Callable[..., Terminal], study: Path
+    start: Callable[..., Server],
 ) -> None:
-    server = start(study, at_a_terminal=False)
-    port = server.port()
+    server = start(at_a_terminal=False)
     assert "\N{UPPER HALF BLOCK}" not in server.text
-    with socket.create_connection(("127.0.0.1", port)) as connection:
+    with socket.create_connection(("127.0.0.1", server.port)) as connection:
         connection.sendall(b"GET /rater HTTP/1.1\r\n")
-        assert server.stop(signal.SIGINT) == 0
-    again = start(study, "--host=0.0.0.0", at_a_terminal=False)
-    text = again.until("Ctrl-C: stop.")
-    assert text.count("--host 0.0.0.0 without --tls: whoever is in") == 1
-    assert again.stop(signal.SIGINT) == 0
+        assert server.end() == 0
+    again = start("--host=0.0.0.0", at_a_terminal=False)
+    assert again.text.count("--host 0.0.0.0 without --tls: whoever is in") == 1
+    assert again.end() == 0

@@ -10,9 +10,7 @@ from collections.abc import Callable, Iterator
 import pytest
 from playwright.sync_api import Browser, Playwright, sync_playwright
 
-from tests.lab.serve.browser.serving import Server
-from tests.lab.serve.browser.stages import Stage
-from tests.lab.serve.browser.studies import OCCASIONS, REALISM, make_study
+from tests.lab.serve.browser.stages import OCCASIONS, REALISM, Stage, make_study
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 CHROMIUM = next(filter(None, map(shutil.which, NAMES)), None)
@@ -50,8 +48,7 @@ def make_stage(
 
     def make(**settings: object) -> Stage:
         root = tmp_path_factory.mktemp("served") / "study"
-        study = make_study(root, **settings)
-        stages.append(Stage(browser, study, Server(root)))
+        stages.append(Stage(browser, make_study(root, **settings)))
         return stages[-1]
 
     yield make

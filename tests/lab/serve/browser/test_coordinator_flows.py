@@ -1,19 +1,23 @@
 """What a coordinator does at the page, in Chromium."""
 
 import re
-from operator import sub
-from statistics import quantiles
+from collections.abc import Iterator
 
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from masrel.lab.protocol import read_protocol
-from masrel.lab.run import read_log
+from masrel.lab.run import ScriptGrades, read_log, run_session
+from tests.lab.serve.browser.conftest import N_RATERS, MakeStage, at_work
 from tests.lab.serve.browser.stages import Stage
-from tests.lab.serve.browser.test_rater_flows import tab_to
+from tests.lab.serve.browser.test_rater_flows import broken, tab_to
 from tests.lab.serve.browser.visitors import LOST, Coordinator, Rater
 
 pytestmark = pytest.mark.slow
+
+NOTE = "Note, deviation or adverse event"
+SKIP = "Leave a model without a grade, after a fault"
+SIGNED = {"who": "MK", "why": "tapped the wrong line"}
 
 
 def form(page: Page, title: str, **fields: str) -> Locator:
@@ -31,9 +35,14 @@ def form(page: Page, title: str, **fields: str) -> Locator:
     return details.locator(".outcome")
 
 
-def now(coordinator: Coordinator) -> Locator:
-    """Return what the page says of the session."""
-    return coordinator.page.locator("#now")
+def press(page: Page, name: str) -> None:
+    """Press a button."""
+    page.get_by_role("button", name=name).click()
+
+
+def sees(coordinator: Coordinator, text: str, at: str = "#now") -> None:
+    """Wait until the page says something: of the session, unless elsewhere."""
+    expect(coordinator.page.locator(at)).to_contain_text(text)
 
 
 def start(stage: Stage) -> Rater:
@@ -41,76 +50,45 @@ def start(stage: Stage) -> Rater:
     page = stage.coordinator.page
     option = page.locator("#which option", has_text=re.compile(f"^{stage.rater}, "))
     page.locator("#which").select_option(option.get_attribute("value"))
-    page.get_by_role("button", name="Start or go on").click()
+    press(page, "Start or go on")
     return stage.tablet()
 
 
-def test_a_session_is_started_followed_and_stopped(stage: Stage) -> None:
-    rater = start(stage)
+def test_a_page_loaded_again_shows_the_session_that_runs(stage: Stage) -> None:
+    coordinator, rater = stage.coordinator, start(stage)
     rater.wait_for("instructions")
-    expect(now(stage.coordinator)).to_contain_text("reads the instructions")
+    sees(coordinator, "reads the instructions")
     rater.go_until("grade")
-    expect(now(stage.coordinator)).to_contain_text(f"{stage.rater} grades practice")
-    stage.coordinator.page.get_by_role("button", name="Stop the session").click()
+    sees(coordinator, f"{stage.rater} grades practice")
+    press(coordinator.page, "Stop the session")
     rater.wait_for("over")
-    expect(now(stage.coordinator)).to_contain_text("No session runs")
-    expect(stage.coordinator.page.locator("#sessions")).to_contain_text("begun")
-
-
-FRAMES = """() => new Promise((resolve) => {
-    const source = new EventSource("/coordinator/events");
-    const moments = [];
-    source.addEventListener("live", () => moments.push(performance.now()));
-    source.addEventListener("desk", (event) => {
-        if (moments.length && JSON.parse(event.data).screen === "grade") {
-            source.close();
-            resolve(moments);
-        }
-    });
-})"""
-
-
-def test_the_arm_is_seen_at_twenty_frames_a_second(slow_stage: Stage) -> None:
-    rater = start(slow_stage)
-    rater.wait_for("ready")
-    page = slow_stage.coordinator.page
-    page.evaluate(f"void (window.frames_ = ({FRAMES})())")
-    empty = page.evaluate("document.getElementById('live').toDataURL()")
-    rater.tap("Begin")
-    expect(page.locator("#live-text")).to_contain_text("catch", timeout=10_000)
-    assert page.evaluate("document.getElementById('live').toDataURL()") != empty
-    moments = page.evaluate("window.frames_")
-    # A busy machine stalls most of them: what a quarter keeps to, the page can
-    shortest, _, _ = quantiles(map(sub, moments[1:], moments))
-    assert shortest <= 1000 / 20
+    sees(coordinator, "No session runs")
+    sees(coordinator, "begun", "#sessions")
+    start(stage)
+    rater.go_until("break")
+    coordinator.page.reload()
+    sees(coordinator, "has a break")
+    sees(coordinator, "practice-grade", "#log")
+    rater.go_until("over")
+    coordinator.page.reload()
+    sees(coordinator, "is complete")
+    assert stage.is_complete()
 
 
 def test_an_emergency_stop_of_the_coordinator(slow_stage: Stage) -> None:
-    rater = start(slow_stage)
-    rater.wait_for("ready")
-    rater.tap("Begin")
-    rater.wait_for("presenting")
-    slow_stage.coordinator.page.get_by_role("button", name="Emergency stop").click()
+    coordinator, rater = slow_stage.coordinator, start(slow_stage)
+    empty = coordinator.page.evaluate("document.getElementById('live').toDataURL()")
+    rater.begin()
+    sees(coordinator, "deg", "#live-text")
+    drawn = coordinator.page.evaluate("document.getElementById('live').toDataURL()")
+    assert drawn != empty
+    press(coordinator.page, "Emergency stop")
     rater.wait_for("fault")
-    expect(now(slow_stage.coordinator)).to_contain_text("coordinator's page")
-    assert slow_stage.log()[-1].kind == "fault"
-
-
-def test_notes_and_adverse_events_are_recorded(stage: Stage) -> None:
-    page = stage.coordinator.page
-    said = form(
-        page,
-        "Note, deviation or adverse event",
-        kind="adverse-event",
-        text=f"Bruised thumb of {stage.rater}",
-        rater=stage.rater,
-        severity="mild",
-        who="MK",
-    )
-    expect(said).to_have_text("Recorded: adverse-event.")
-    expect(page.locator("#events")).to_contain_text(f"Bruised thumb of {stage.rater}")
-    fields = read_log(stage.study.conduct_file)[-1].fields
-    assert (fields["kind"], fields["severity"]) == ("adverse-event", "mild")
+    sees(coordinator, "coordinator's page")
+    assert slow_stage.kinds()[-1] == "fault"
+    form(coordinator.page, "New address for a tablet")
+    coordinator.page.locator("img.qr").wait_for()
+    assert broken(coordinator) == []
 
 
 def test_what_is_sent_without_a_name_is_refused_in_a_sentence(stage: Stage) -> None:
@@ -118,7 +96,7 @@ def test_what_is_sent_without_a_name_is_refused_in_a_sentence(stage: Stage) -> N
     said = form(page, "Correct a grade", rater=stage.rater, code="99X", grade="2")
     assert said.inner_text() == ""  # the browser itself asks for the name
     stage.coordinator.tolerated = re.compile("status of 422")
-    said = form(page, "Correct a grade", who="MK", why="typed wrongly")
+    said = form(page, "Correct a grade", **SIGNED)
     expect(said).to_have_class(re.compile("refused"))
     assert stage.rater in said.inner_text()
 
@@ -129,54 +107,52 @@ def test_what_was_refused_is_tried_again_and_what_is_done_is_told(
     page = stage.coordinator.page
     stage.coordinator.tolerated = re.compile("status of 422")
     which = {"rater": stage.rater, "session": "test", "code": "99X"}
-    title = "Leave a model without a grade, after a fault"
-    said = form(page, title, **which, who="MK", why="no arm")
+    said = form(page, SKIP, **which, **SIGNED)
     expect(said).to_have_class(re.compile("refused"))
-    with page.expect_request("**/coordinator/skip") as second:
-        form(page, title)
-    with page.expect_request("**/coordinator/skip") as third:
-        form(page, title)
-    assert second.value.post_data_json["id"] != third.value.post_data_json["id"]
+    ids = set()
+    for _ in range(2):
+        with page.expect_request("**/coordinator/skip") as request:
+            form(page, SKIP)
+        ids.add(request.value.post_data_json["id"])
+    assert len(ids) == 2
     start(stage).wait_for("instructions")
-    expect(page.locator("#controls .outcome")).to_contain_text("is started")
+    sees(stage.coordinator, "is started", "#controls .outcome")
 
 
 def test_a_grade_is_corrected_and_a_code_unblinded(stage: Stage) -> None:
     rater = start(stage)
-    rater.go_until("grade")
-    rater.answer()
-    rater.go_until("grade")
-    rater.answer()
+    for _ in range(2):
+        rater.go_until("grade")
+        rater.answer()
     rater.wait_for("ready")
     code = stage.log()[-1].fields["code"]
     page = stage.coordinator.page
     which = {"rater": stage.rater, "session": "test", "code": code}
-    signed = {"who": "MK", "why": "tapped the wrong line"}
-    said = form(page, "Correct a grade", **which, grade="3", **signed)
+    said = form(page, "Correct a grade", **which, grade="3", **SIGNED)
     expect(said).to_contain_text(f"{code} is corrected")
     assert stage.log()[-1].fields["grade"] == "3"
     expect(rater.page.locator("#screen")).to_contain_text(f"{code}: 3")
     models = [model.id for model in read_protocol(stage.study.protocol).models]
     assert not any(model in page.content() for model in models)
-    said = form(page, "Unblind a code", **which, **signed)
+    said = form(page, "Unblind a code", **which, **SIGNED)
     expect(said).to_contain_text(f"{code} of {stage.rater}, session test, is HM")
     assert not any(model in rater.page.content() for model in models)
 
 
-def test_a_rater_who_has_left_begins_no_session(stage: Stage) -> None:
-    page = stage.coordinator.page
-    said = form(page, "A rater has left", rater=stage.rater, who="MK", why="moved away")
+def test_an_adverse_event_is_recorded_and_a_rater_who_has_left_begins_no_session(
+    stage: Stage,
+) -> None:
+    page, text = stage.coordinator.page, f"Bruised thumb of {stage.rater}"
+    event = {"kind": "adverse-event", "severity": "mild", "rater": stage.rater}
+    said = form(page, NOTE, text=text, who="MK", **event)
+    expect(said).to_have_text("Recorded: adverse-event.")
+    sees(stage.coordinator, text, "#events")
+    fields = read_log(stage.study.conduct_file)[-1].fields
+    assert (fields["kind"], fields["severity"]) == ("adverse-event", "mild")
+    said = form(page, "A rater has left", rater=stage.rater, **SIGNED)
     expect(said).to_contain_text(f"{stage.rater} is withdrawn")
     start(stage)
-    expect(now(stage.coordinator)).to_contain_text("withdrawn")
-
-
-def test_long_work_shows_how_it_goes(stage: Stage) -> None:
-    page = stage.coordinator.page
-    page.get_by_role("button", name="Verify the record").click()
-    expect(page.locator(".job", has_text="verify")).to_contain_text(
-        re.compile("verify: (done|failed)"), timeout=30_000
-    )
+    sees(stage.coordinator, "withdrawn")
 
 
 def test_an_address_for_a_tablet_lets_it_in(stage: Stage) -> None:
@@ -204,21 +180,18 @@ def test_a_tablet_is_of_whose_session_it_shows_first(stage: Stage) -> None:
 def test_two_coordinators_see_the_same_and_nothing_is_done_twice(stage: Stage) -> None:
     first, second = stage.coordinator, stage.second_coordinator()
     second.tolerated = re.compile("status of 422")
-    expect(now(second)).to_contain_text("No session runs")
-    rater = start(stage)
-    rater.wait_for("instructions")
-    expect(now(second)).to_contain_text("reads the instructions")
+    sees(second, "No session runs")
+    start(stage).wait_for("instructions")
+    sees(second, "reads the instructions")
     status, body = second.post(
         "/coordinator/start", rater="R60", session="test", rehearsal=False
     )
     assert (status, "needed none that runs" in body["why"]) == (422, True)
-    said = form(
-        second.page, "Note, deviation or adverse event", text="Seen by two", who="AB"
-    )
+    said = form(second.page, NOTE, text="Seen by two", who="AB")
     expect(said).to_contain_text("Recorded")
-    expect(first.page.locator("#events")).to_contain_text("Seen by two")
-    second.page.get_by_role("button", name="Stop the session").click()
-    expect(now(first)).to_contain_text("No session runs")
+    sees(first, "Seen by two", "#events")
+    press(second.page, "Stop the session")
+    sees(first, "No session runs")
 
 
 def test_a_coordinator_without_network_is_told_and_nothing_is_lost(
@@ -227,10 +200,9 @@ def test_a_coordinator_without_network_is_told_and_nothing_is_lost(
     coordinator, page = stage.coordinator, stage.coordinator.page
     coordinator.tolerated = LOST
     page.locator("#which").wait_for()
-    title = "Note, deviation or adverse event"
     coordinator.context.set_offline(True)
-    expect(page.locator("#banner")).to_contain_text("No connection")
-    said = form(page, title, text=f"In the dark, {stage.rater}", who="MK")
+    sees(coordinator, "No connection", "#banner")
+    said = form(page, NOTE, text=f"In the dark, {stage.rater}", who="MK")
     page.wait_for_timeout(500)
     assert said.inner_text() == ""
     coordinator.context.set_offline(False)
@@ -240,45 +212,113 @@ def test_a_coordinator_without_network_is_told_and_nothing_is_lost(
     assert texts.count(f"In the dark, {stage.rater}") == 1
 
 
-def test_a_page_loaded_again_shows_the_session_that_runs(stage: Stage) -> None:
-    rater = start(stage)
-    rater.go_until("break")
-    stage.coordinator.page.reload()
-    expect(now(stage.coordinator)).to_contain_text("has a break")
-    expect(stage.coordinator.page.locator("#log")).to_contain_text("practice-grade")
-    rater.go_until("over")
-    stage.coordinator.page.reload()
-    expect(now(stage.coordinator)).to_contain_text("is complete")
-    assert stage.is_complete()
-
-
 def test_a_rehearsal_is_called_one_and_rates_nothing(stage: Stage) -> None:
-    stage.coordinator.page.get_by_label("only a rehearsal").check()
+    coordinator, page = stage.coordinator, stage.coordinator.page
+    page.get_by_label("only a rehearsal").check()
     rater = start(stage)
     rater.go_until("ready")
     assert "Rehearsal: nothing of it counts" in rater.text
-    expect(now(stage.coordinator)).to_contain_text("Rehearsal of session test")
+    sees(coordinator, "Rehearsal of session test")
+    sees(coordinator, "Rehearsal: nothing of it counts", "#now .label")
+    page.locator("summary", has_text="Log of this rehearsal").click()
+    sees(coordinator, "instructed", "#log")
     rater.go_until("grade")
     rater.answer()
     assert not stage.study.log_file(stage.rater, "test").exists()
+    coordinator.leave()
+    expect(page.locator("#log-title")).to_have_text("Log of this session")
 
 
 @pytest.mark.parametrize(("width", "height"), [(390, 844), (1180, 820), (1920, 1080)])
-def test_the_page_fits_on_a_screen(stage: Stage, width: int, height: int) -> None:
-    page = stage.second_coordinator(viewport={"width": width, "height": height}).page
+def test_the_page_fits_on_a_screen_and_needs_no_mouse(
+    stage: Stage, width: int, height: int
+) -> None:
+    coordinator = stage.second_coordinator(viewport={"width": width, "height": height})
+    page = coordinator.page
     page.locator("#which").wait_for()
-    for details in page.locator("details").all():
-        details.evaluate("it => { it.removeAttribute('name'); it.open = true; }")
+    assert broken(coordinator) == []  # all is open now
     wide = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
     assert page.evaluate(wide) <= 0
     expect(page.get_by_role("button", name="Emergency stop")).to_be_in_viewport()
-
-
-def test_a_session_is_started_by_the_keyboard_alone(stage: Stage) -> None:
-    page = stage.coordinator.page
-    page.locator("#which").wait_for()
-    tab_to(stage.coordinator, "#which")
+    tab_to(coordinator, "#which")
     page.keyboard.type(f"{stage.rater},")
-    tab_to(stage.coordinator, "button.main")
+    tab_to(coordinator, "button.main")
     page.keyboard.press("Enter")
-    expect(now(stage.coordinator)).to_contain_text(f"Session test: {stage.rater} ")
+    sees(coordinator, f"Session test: {stage.rater} ")
+
+
+@pytest.fixture
+def slow_asking(make_stage: MakeStage) -> Iterator[Stage]:
+    """A study long enough to press something."""
+    speed = {"mean_speed_deg_s": 45.0}
+    stage = make_stage(n_raters=N_RATERS, n_models=2, simulated_raters=speed)
+    yield from at_work(stage, "R1")
+
+
+def test_a_model_is_left_without_a_grade_after_a_fault_by_either(
+    slow_asking: Stage,
+) -> None:
+    stage, page = slow_asking, slow_asking.coordinator.page
+    rater = stage.session()
+    rater.begin()
+    rater.page.locator("#stop").tap()
+    rater.wait_for("fault")
+    rater.page.locator("summary", has_text="Leave it without a grade").tap()
+    rater.tap("Leave it without a grade")
+    expect(rater.page.locator(".refused")).to_have_text("Write a reason first.")
+    rater.page.locator("#why").fill("the motor is hot")
+    rater.tap("Leave it without a grade")
+    rater.begin()
+    skipped = stage.log()[-1].fields
+    assert (skipped["position"], skipped["why"]) == (1, "the motor is hot")
+    sees(stage.coordinator, "1 skipped", "#sessions")
+    rater.page.locator("#stop").tap()
+    rater.wait_for("fault")
+    press(page, "Stop the session")
+    sees(stage.coordinator, "No session runs")
+    code = str(stage.log()[-2].fields["code"])
+    which = {"rater": stage.rater, "session": "test", "code": code}
+    expect(form(page, SKIP, **which, **SIGNED)).to_contain_text("without a grade")
+    assert (stage.kinds()[-1], stage.log()[-1].fields["who"]) == ("skipped", "MK")
+    # the page itself says what comes next, and does it
+    page.locator("#next button", has_text="Go on with it").click()
+    sees(stage.coordinator, f"Session test: {stage.rater} ")
+    expect(page.locator("#next")).to_be_empty()
+
+
+QUICKLY_PLANNED = {
+    **{"id": "kappa", "kind": "inter-rater", "coefficient": "fleiss_kappa"},
+    **{"models": "standard", "sessions": ["test"], "target": "items"},
+    "interval": "analytic",
+}
+
+
+def test_long_work_is_done_by_the_page_and_the_report_opened(
+    make_stage: MakeStage,
+) -> None:
+    stage = make_stage(
+        n_models=2,
+        report={"sections": ["design"]},
+        analysis={"estimates": [QUICKLY_PLANNED]},
+    )
+    protocol, page = read_protocol(stage.study.protocol), stage.coordinator.page
+    for rater in ("R1", "R2"):
+        grades = ScriptGrades(["1", "2"])
+        run_session(
+            stage.study, protocol, rater, "test", grades=grades, clock="simulated"
+        )
+    for _ in at_work(stage, "R1"):
+        sees(stage.coordinator, "ratings.csv is not there yet", "#next")
+        assert "masrel" not in page.locator("#next").inner_text()
+        for name in ("Write the ratings", "Build the report"):
+            page.locator("#next button", has_text=name).click()
+        press(page, "Plan the size")
+        for name in ("report", "plan"):
+            job = page.locator(".job", has_text=f"{name}:")
+            expect(job).to_contain_text(f"{name}: done", timeout=60_000)
+        expect(job).to_contain_text("simulated studies")
+        with page.expect_popup() as opened:
+            page.get_by_role("link", name="Open the report").click()
+        expect(opened.value.locator("h1")).to_contain_text("small")
+        opened.value.close()
+        page.locator("#next button", has_text="Verify the record").wait_for()

@@ -1,27 +1,29 @@
 """Sessions at a rater's tablet, in Chromium."""
 
 import re
-from collections.abc import Iterator
+import signal
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import expect
 
+from tests.lab.serve.browser.axe import violations
 from tests.lab.serve.browser.conftest import MakeStage, at_work
-from tests.lab.serve.browser.stages import Stage
-from tests.lab.serve.browser.studies import OCCASIONS
+from tests.lab.serve.browser.stages import OCCASIONS, Stage
 from tests.lab.serve.browser.visitors import LOST, REFUSED, Rater, Visitor
 
 pytestmark = pytest.mark.slow
 
 GRADES = ("0", "1", "1+", "2", "3", "4")
 ALL = (*("instructions", "ready", "presenting", "grade", "break", "question", "over"),)
+NO_CONNECTION = "No connection to the laptop"
 
 
 def grade_all(rater: Rater, n: int, *, until: str) -> list[str]:
     """Give n grades, of the scale in turn -> them."""
     grades = [GRADES[number % len(GRADES)] for number in range(n)]
-    for grade in grades:
-        rater.grade = grade
+    for rater.grade in grades:
         rater.go_until("grade")
         rater.answer()
     rater.go_until(until)
@@ -37,9 +39,7 @@ def test_a_whole_session_of_sixteen_models(make_stage: MakeStage) -> None:
         rater = stage.session()
         rater.go_until("grade")
         assert "Practice 1 of 2" in rater.page.locator("header").inner_text()
-        rater.answer()
-        rater.go_until("grade")
-        rater.answer()
+        grade_all(rater, 2, until="ready")
         grades = grade_all(rater, 8, until="break")
         rater.go_until("ready")
         rater.page.get_by_text("Correct the last grade").tap()
@@ -52,38 +52,104 @@ def test_a_whole_session_of_sixteen_models(make_stage: MakeStage) -> None:
         assert "Everything is saved" in rater.text
         assert stage.grades() == grades
         assert stage.is_complete()
-        kinds = [event.kind for event in stage.log()]
-        n_kinds = {kind: kinds.count(kind) for kind in kinds}
-        assert n_kinds == {
+        kinds = stage.kinds()
+        assert {kind: kinds.count(kind) for kind in kinds} == {
             **{"session": 1, "instructed": 1, "practised": 2, "practice-grade": 2},
             **{"presented": 16, "grade": 16, "break": 1, "correction": 1},
             **{"answered": 1, "complete": 1},
         }
-        (correction,) = (each for each in stage.log() if each.kind == "correction")
-        assert (correction.fields["grade"], correction.fields["who"]) == ("4", "R1")
+        correction = stage.log()[kinds.index("correction")].fields
+        assert (correction["grade"], correction["who"]) == ("4", "R1")
 
 
-def test_a_page_that_is_loaded_again_shows_the_same_and_loses_nothing(
-    stage: Stage,
+def broken(visitor: Visitor) -> list[str]:
+    """Return which rules of axe-core are broken in either scheme of colours."""
+    rules = []
+    for details in visitor.page.locator("details").all():
+        details.evaluate("it => { it.removeAttribute('name'); it.open = true; }")
+    for scheme in ("light", "dark"):
+        visitor.page.emulate_media(color_scheme=scheme)
+        rules += [f"{scheme}: {rule}" for rule in violations(visitor.page)]
+    return rules
+
+
+# Wider than the screen, too small for a finger, or hidden below the emergency stop
+UNFIT = """() => {
+    const problems = [];
+    const root = document.documentElement;
+    if (root.scrollWidth > root.clientWidth) problems.push("wider than the screen");
+    const stop = document.getElementById("stop").getBoundingClientRect();
+    if (stop.bottom > innerHeight || stop.top < 0) problems.push("no stop in sight");
+    if (stop.height > innerHeight / 3) problems.push("the stop fills the screen");
+    const targets = "button, label.choice, [type=range], [type=number], textarea";
+    for (const each of document.querySelectorAll(`${targets}, summary`)) {
+        if (!each.checkVisibility()) continue;
+        each.scrollIntoView({block: "center"});
+        const {x, y, width, height} = each.getBoundingClientRect();
+        const name = `${each.tagName} ${each.textContent.slice(0, 20)}`;
+        if (height < 44 || width < 44) problems.push(`small: ${name}`);
+        const top = document.elementFromPoint(x + width / 2, y + height / 2);
+        const isSeen = each.contains(top) || top?.contains(each);
+        if (!isSeen) problems.push(`covered: ${name}`);
+    }
+    scrollTo(0, 0);
+    return problems;
+}"""
+
+
+def unfit(rater: Rater) -> list[str]:
+    """Return what does not fit on a phone or tablet, or a finger."""
+    problems: list[str] = []
+    for size in ((360, 640), (390, 844), (844, 390), (820, 1180), (1180, 820)):
+        rater.page.set_viewport_size({"width": size[0], "height": size[1]})
+        problems += rater.page.evaluate(UNFIT)
+    return problems
+
+
+def changed_by_loading(rater: Rater) -> list[str]:
+    """Load the page again -> what it shows otherwise."""
+    shown, title = rater.screen, rater.text.split("\n")[0]
+    rater.page.reload()
+    if shown == "presenting":  # which may be over meanwhile
+        rater.wait_for(shown, "grade")
+        return []
+    rater.wait_for(shown)
+    return [title] if rater.text.split("\n")[0] != title else []
+
+
+@pytest.mark.parametrize("problems", [broken, unfit, changed_by_loading])
+def test_every_screen_of_a_session(
+    stage: Stage, problems: Callable[[Rater], list[str]]
 ) -> None:
-    rater = stage.session()
+    rater = stage.tablet(is_mobile=problems is unfit)
+    rater.wait_for("waiting")
+    assert problems is changed_by_loading or problems(rater) == []
+    stage.coordinator.start(stage.rater)
     seen = set()
     while (shown := rater.wait_for(*ALL)) != "over":
+        fields = rater.page.locator("#screen input, #screen textarea, #screen details")
+        kind = shown, *fields.evaluate_all("all => all.map(it => it.type)")
+        if kind not in seen and (shown, problems) != ("presenting", broken):
+            assert problems(rater) == [], kind
+        seen.add(kind)
         if shown == "presenting":
-            rater.page.reload()
-            rater.wait_for("presenting", "grade")
             rater.wait_for("grade")
         else:
-            text = rater.text
-            rater.page.reload()
-            rater.wait_for(shown)
-            assert rater.text.split("\n")[0] == text.split("\n")[0]
             rater.answer()
-        seen.add(shown)
-    rater.page.reload()
-    rater.wait_for("over")
-    assert seen == set(ALL) - {"over"}
+    assert problems(rater) == []
+    assert {shown for shown, *_ in seen} == set(ALL) - {"over"}
     assert stage.is_complete()
+
+
+def test_screens_of_a_stop(slow_stage: Stage) -> None:
+    rater = slow_stage.session()
+    rater.begin()
+    assert violations(rater.page) == []
+    rater.page.locator("#stop").tap()
+    rater.wait_for("fault")
+    assert broken(rater) == []
+    rater.page.evaluate("document.documentElement.removeAttribute('lang')")
+    assert [rule.split(":")[1] for rule in broken(rater)] == [" html-has-lang"] * 2
 
 
 def test_of_two_tablets_one_answers_and_the_other_sees_it(stage: Stage) -> None:
@@ -126,40 +192,25 @@ def test_a_tablet_of_another_rater_sees_nothing_of_a_session(stage: Stage) -> No
     assert not rater.page.locator("#stop").is_visible()
 
 
-def test_a_model_is_felt_again(stage: Stage) -> None:
-    rater = stage.session()
-    rater.go_until("grade")
-    rater.answer()
-    rater.go_until("grade")
-    rater.tap("Feel it again")
-    rater.wait_for("ready")
-    assert "once more" in rater.text
-    rater.go_until("grade")
-    rater.answer()
-    rater.wait_for("ready")
-    kinds = [each.kind for each in stage.log()]
-    assert kinds[-4:] == ["practice-grade", "presented", "presented", "grade"]
-
-
 @pytest.mark.parametrize("how", ["touch", "Escape"])
 def test_an_emergency_stop_ends_a_presentation_at_once(
     slow_stage: Stage, how: str
 ) -> None:
     rater = slow_stage.session()
-    rater.wait_for("ready")
-    rater.tap("Begin")
-    rater.wait_for("presenting")
+    rater.begin()
     if how == "touch":
         rater.page.locator("#stop").tap()
     else:
-        rater.page.keyboard.press("Escape")
+        rater.page.keyboard.press(how)
     rater.wait_for("fault")
     assert "stopped by the emergency stop" in rater.text
     with rater.shown_anew():
         rater.tap("Present it again")
     rater.go_until("grade")
-    kinds = [each.kind for each in slow_stage.log()]
-    assert kinds == ["session", "presented", "fault", "presented"]
+    rater.tap("Feel it again")
+    rater.wait_for("ready")
+    assert "once more" in rater.text
+    assert slow_stage.kinds() == ["session", "presented", "fault", "presented"]
     assert "rater's page" in str(slow_stage.log()[2].fields)
 
 
@@ -179,16 +230,14 @@ def test_each_stretch_that_is_due_is_shown(slow_stage: Stage) -> None:
     rater.wait_for("ready")
     cues = rater.page.locator(".cues li").all_inner_texts()
     assert [cue.split(",")[0] for cue in cues] == ["slow", "fast"]
-    rater.tap("Begin")
-    rater.wait_for("presenting")
+    rater.begin()
     due = rater.page.locator('.cues li[aria-current="step"]')
     due.filter(has_text="slow").wait_for()
     due.filter(has_text="fast").wait_for()
     rater.wait_for("grade")
     rater.choose("3")
-    rater.page.get_by_role("group", name="The stretch it rests on").locator(
-        "label"
-    ).nth(2).tap()
+    group = rater.page.get_by_role("group", name="The stretch it rests on")
+    group.locator("label").nth(2).tap()
     rater.tap("Save")
     rater.wait_for("ready")
     grade = slow_stage.log()[-1].fields
@@ -197,101 +246,68 @@ def test_each_stretch_that_is_due_is_shown(slow_stage: Stage) -> None:
 
 def test_a_session_goes_on_after_its_server_was_stopped(stage: Stage) -> None:
     rater = stage.session()
-    for visitor in (rater, stage.coordinator):
-        visitor.tolerated = LOST
-    rater.go_until("grade")
-    rater.answer()
-    rater.go_until("grade")
-    stage.server.stop()
+    rater.tolerated = stage.coordinator.tolerated = LOST
+    grade_all(rater, 1, until="grade")
+    stage.server.end()
     rater.wait_for("over")
     assert "it can go on where it was" in rater.text
-    start_again(stage)
+    stage.start_again()
     rater.wait_for("ready")
     rater.go_until("grade")
     assert stage.grades() == []
     rater.answer()
-    assert stage.grades() == ["2"]
+    assert stage.grades() == ["0"]
 
 
 def test_a_session_goes_on_after_its_server_was_killed(stage: Stage) -> None:
     rater = stage.session()
-    for visitor in (rater, stage.coordinator):
-        visitor.tolerated = re.compile(f"{LOST.pattern}|{REFUSED.pattern}")
-    rater.go_until("grade")
-    rater.answer()
-    rater.go_until("grade")
-    stage.server.kill()
-    rater.page.get_by_text("No connection to the laptop").wait_for()
+    rater.tolerated = re.compile(f"{LOST.pattern}|{REFUSED.pattern}")
+    stage.coordinator.tolerated = rater.tolerated
+    grade_all(rater, 1, until="grade")
+    stage.server.end(signal.SIGKILL)
+    rater.page.get_by_text(NO_CONNECTION).wait_for()
     rater.choose("3")
     with rater.shown_anew():
         rater.tap("Save")  # which nobody takes
-        start_again(stage)
+        stage.start_again()
     rater.go_until("over")
     assert stage.is_complete()
 
 
-def start_again(stage: Stage) -> None:
-    """Start the server as before, and go on with the session."""
-    stage.server.start()
-    stage.coordinator.page.reload()
-    stage.coordinator.start(stage.rater)
-
-
-SIZES = {
-    "phone": [(360, 640), (390, 844), (844, 390)],
-    "tablet": [(820, 1180), (1180, 820)],
-}
-
-
-@pytest.mark.parametrize("device", SIZES)
-def test_every_screen_fits(stage: Stage, device: str) -> None:
-    rater = stage.session(is_mobile=True)
-    seen = set()
+@pytest.mark.parametrize(
+    "long_at",  # for 10 s; for a moment elsewhere
+    [("grade",), pytest.param(ALL, marks=pytest.mark.long)],
+    ids=["at one screen", "at every screen"],
+)
+def test_a_tablet_without_network_says_so_and_goes_on_by_itself(
+    stage: Stage, long_at: tuple[str, ...]
+) -> None:
+    rater = stage.session()
+    rater.tolerated = LOST
+    seen = []
     while (shown := rater.wait_for(*ALL)) != "over":
-        for width, height in SIZES[device] if shown not in seen else ():
-            rater.page.set_viewport_size({"width": width, "height": height})
-            assert unfit(rater) == [], (shown, width, height)
-        seen.add(shown)
-        if shown == "presenting":
-            rater.wait_for("grade")
-        else:
-            rater.answer()
+        if shown in seen and shown != "question":
+            rater.go_until(*set(ALL) - {*seen, "presenting"})
+            continue
+        seen.append(shown)
+        rater.context.set_offline(True)
+        rater.page.get_by_text(NO_CONNECTION).wait_for()
+        with rater.shown_anew():
+            heading = rater.page.query_selector("#screen h1")
+            if shown != "presenting":
+                rater.act()  # what is tapped now is sent when the network is back
+            rater.page.wait_for_timeout(10_000 if shown in long_at else 300)
+            # a presentation ends by itself, of which Chromium still lets the page hear
+            is_shown = heading.evaluate("it => it.isConnected")
+            assert is_shown or shown == "presenting", "nobody can have answered"
+            rater.context.set_offline(False)
+        rater.page.get_by_text(NO_CONNECTION).wait_for(state="detached")
+    assert set(seen) == set(ALL) - {"over"}
     assert stage.is_complete()
-
-
-# Wider than the screen, too small for a finger, or hidden below the emergency stop
-UNFIT = """() => {
-    const problems = [];
-    const root = document.documentElement;
-    if (root.scrollWidth > root.clientWidth) problems.push("wider than the screen");
-    const stop = document.getElementById("stop").getBoundingClientRect();
-    if (stop.bottom > innerHeight || stop.top < 0) problems.push("no stop in sight");
-    if (stop.height > innerHeight / 3) problems.push("the stop fills the screen");
-    const targets = "button, label.choice, [type=range], [type=number], textarea";
-    for (const each of document.querySelectorAll(`${targets}, summary`)) {
-        if (!each.checkVisibility()) continue;
-        each.scrollIntoView({block: "center"});
-        const {x, y, width, height} = each.getBoundingClientRect();
-        const name = `${each.tagName} ${each.textContent.slice(0, 20)}`;
-        if (height < 44 || width < 44) problems.push(`small: ${name}`);
-        const top = document.elementFromPoint(x + width / 2, y + height / 2);
-        const isSeen = each.contains(top) || top?.contains(each);
-        if (!isSeen) problems.push(`covered: ${name}`);
-    }
-    scrollTo(0, 0);
-    return problems;
-}"""
-
-
-def unfit(rater: Rater) -> list[str]:
-    """Return what does not fit on the screen, or a finger."""
-    problems: list[str] = rater.page.evaluate(UNFIT)
-    return problems
 
 
 def test_a_session_by_the_keyboard_alone(stage: Stage) -> None:
     rater = stage.session(has_touch=False)
-    press = rater.page.keyboard.press
     while (shown := rater.wait_for(*ALL)) != "over":
         if shown == "presenting":
             rater.wait_for("grade")
@@ -299,7 +315,6 @@ def test_a_session_by_the_keyboard_alone(stage: Stage) -> None:
         with rater.shown_anew():
             by_keyboard(rater, shown)
         assert rater.page.evaluate("document.activeElement.tagName") == "H1"
-    press("Tab")
     assert stage.is_complete()
     assert stage.grades() == ["1+", "1+", "1+"]
 
@@ -309,8 +324,8 @@ def by_keyboard(rater: Rater, shown: str) -> None:
     press = rater.page.keyboard.press
     if shown == "grade":
         tab_to(rater, "input[type=radio]")
-        for _ in range(2):
-            press("ArrowDown")
+        press("ArrowDown")
+        press("ArrowDown")
     elif shown == "question":
         tab_to(rater, "#screen input, #screen textarea")
         match rater.page.evaluate("document.activeElement.type"):
@@ -357,12 +372,14 @@ def replace(path: Path, text: str) -> None:
 
 def test_a_page_speaks_the_language_of_its_study(stage: Stage, protocol: Path) -> None:
     english = protocol.read_text(encoding="utf-8")
-    rater = stage.session()
+    rater = stage.session(color_scheme="dark")
+    assert "token" not in rater.page.url  # its address stays in no history
     rater.wait_for("instructions")  # the session has read its protocol
+    ground = rater.page.evaluate("getComputedStyle(document.body).backgroundColor")
+    assert max(int(part) for part in re.findall(r"\d+", ground)[:3]) < 60
     for language, (title, go_on) in LANGUAGES.items():
-        replace(
-            protocol, english.replace("[study]", f'[study]\nlanguage = "{language}"')
-        )
+        changed = f'[study]\nlanguage = "{language}"'
+        replace(protocol, english.replace("[study]", changed))
         rater.page.reload()
         rater.wait_for("instructions")
         assert rater.page.locator("html").get_attribute("lang") == language
@@ -370,15 +387,49 @@ def test_a_page_speaks_the_language_of_its_study(stage: Stage, protocol: Path) -
         assert rater.page.get_by_role("button", name=go_on, exact=True).is_visible()
 
 
-def test_an_address_lets_in_one_browser_once(stage: Stage) -> None:
-    first = stage.tablet()
-    address = first.page.url
-    assert "token" not in address, "it stays in no history"
-    first.page.wait_for_selector("#screen h1")
+YEARS = {
+    "id": "work",
+    "title": "Your work",
+    "when": "presentation",
+    "questions": [
+        {
+            **{"id": "years", "text": "How many years?", "type": "whole"},
+            **{"low": 20, "high": 60, "high_label": "or more"},
+        }
+    ],
+}
 
 
-def test_the_scheme_is_dark_where_the_tablet_is(stage: Stage) -> None:
-    rater = stage.session(color_scheme="dark")
-    rater.wait_for("instructions")
-    ground = rater.page.evaluate("getComputedStyle(document.body).backgroundColor")
-    assert max(int(part) for part in re.findall(r"\d+", ground)[:3]) < 60
+def test_a_number_is_set_by_taps_by_keys_and_by_typing(make_stage: MakeStage) -> None:
+    for stage in at_work(make_stage(n_models=2, questionnaires=[YEARS]), "R1"):
+        rater = stage.session()
+        rater.go_until("question")
+        page = rater.page
+        number = page.get_by_role("spinbutton", name="How many years?")
+        less, more = (page.get_by_label(words) for words in ("One less", "One more"))
+        refused = page.locator(".refused")
+        assert number.input_value() == ""  # nothing is suggested
+        rater.tap("Save")
+        expect(refused).to_have_text("A whole number from 20 to 60")
+        for button, value in ((more, "20"), (more, "21"), (less, "20"), (less, "20")):
+            button.tap()
+            expect(number).to_have_value(value)
+            expect(page.locator(".unseen")).to_have_text(value)  # for screen readers
+        more.hover()
+        page.mouse.down()  # and held
+        page.wait_for_function("it => it.value > 22", arg=number.element_handle())
+        page.mouse.up()
+        held = number.input_value()
+        page.wait_for_timeout(200)
+        assert number.input_value() == held
+        number.press("ArrowUp")
+        expect(number).to_have_value(str(int(held) + 1))
+        number.fill("99")
+        rater.tap("Save")
+        expect(refused).to_have_text("A whole number from 20 to 60")
+        less.tap()
+        expect(number).to_have_value("60")
+        number.press("Enter")
+        rater.wait_for("ready")
+        (answer,) = (each for each in stage.log() if each.kind == "answered")
+        assert answer.fields["answer"] == 60

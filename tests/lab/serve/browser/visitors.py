@@ -132,6 +132,12 @@ class Rater(Visitor):
             has=self.page.locator("b", has_text=exactly(text))
         ).first.tap()
 
+    def begin(self) -> None:
+        """Begin a presentation, and return when it is shown."""
+        self.wait_for("ready")
+        self.tap("Begin")
+        self.wait_for("presenting")
+
     def answer(self) -> None:
         """Answer what is asked now, and return when something else is shown."""
         with self.shown_anew():
