@@ -79,13 +79,13 @@ def test_an_emergency_stop_of_the_coordinator(slow_stage: Stage) -> None:
     coordinator, rater = slow_stage.coordinator, start(slow_stage)
     empty = coordinator.page.evaluate("document.getElementById('live').toDataURL()")
     rater.begin()
-    sees(coordinator, "deg", "#live-text")
-    drawn = coordinator.page.evaluate("document.getElementById('live').toDataURL()")
-    assert drawn != empty
     press(coordinator.page, "Emergency stop")
     rater.wait_for("fault")
     sees(coordinator, "coordinator's page")
     assert slow_stage.kinds()[-1] == "fault"
+    # the arm was seen as it moved
+    drawn = coordinator.page.evaluate("document.getElementById('live').toDataURL()")
+    assert drawn != empty
     form(coordinator.page, "New address for a tablet")
     coordinator.page.locator("img.qr").wait_for()
     assert broken(coordinator) == []
