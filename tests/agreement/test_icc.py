@@ -47,33 +47,6 @@ def test_a_variance_below_0_is_0_and_named() -> None:
     assert result.negative == ("items", "raters")
 
 
-def test_published_interval_of_absolute_agreement() -> None:
-    # as R's psych and irr print it for Table 2: ICC(A,1) 0.29 (0.019, 0.761)
-    found = icc(TABLE_2, interval="F").interval
-    assert found is not None
-    assert (found.low, found.high) == pytest.approx((0.0188, 0.7611), abs=5e-4)
-    assert (found.target, found.method) == ("both", "F distribution")
-    assert icc(TABLE_2).interval != found
-    for form in ("ICC(1)", "ICC(C,k)"):  # exact by F, whatever is asked for
-        assert icc(TABLE_2, form=form, interval="F") == icc(TABLE_2, form=form)  # type: ignore[arg-type]
-
-
-def test_a_missing_cell_changes_the_interval_of_agreement_by_little() -> None:
-    rng = np.random.default_rng(2)
-    ratings = rng.normal(size=(60, 1)) + [0.9, 0.0, -0.4] + rng.normal(size=(60, 3)) / 2
-    for form in ("ICC(A,1)", "ICC(A,k)"):
-        whole = icc(ratings, form=form).interval  # type: ignore[arg-type]
-        gap = ratings.copy()
-        gap[0, 0] = np.nan
-        other = icc(gap, form=form).interval  # type: ignore[arg-type]
-        assert whole is not None
-        assert other is not None
-        assert (whole.low, whole.high) == pytest.approx(
-            (other.low, other.high), abs=3e-3
-        )
-        assert whole.method == "profile likelihood"
-
-
 def test_a_value_below_0_draws_the_interval_out_to_it() -> None:
     found = icc([[1, 4, 2], [4, 1, 3], [2, 3, 3], [3, 2, 2]])
     assert found.interval is not None
@@ -128,16 +101,6 @@ def test_undefined_with_a_reason(
             found = function(table, form=form)  # type: ignore[operator]
         assert why in found.reason
     assert math.isnan(found.p_value)
-
-
-def test_mean_of_raters_on_items_that_do_not_differ_is_a_division_by_zero() -> None:
-    # items' means are equal, ratings within are not: (0 - W)/0
-    with pytest.warns(UndefinedStatisticWarning, match="division by 0"):
-        assert math.isnan(icc([[1, 2], [2, 1]], form="ICC(1,k)").value)
-    # F is 0 and says: no difference, whatever the total variance is
-    for form in FORMS:
-        found = icc_f_test([[1, 2], [2, 1]], form=form)
-        assert (found.statistic, found.p_value, found.reason) == (0.0, 1.0, None)
 
 
 def test_wrong_options_are_one_sentence() -> None:

@@ -12,14 +12,9 @@ from numpy.typing import NDArray
 
 from masrel.agreement import (
     COEFFICIENTS,
-    cohen_kappa,
     count_items,
     krippendorff_alpha,
 )
-from masrel.errors import (
-    ParameterError,
-)
-from masrel.intervals import bootstrap
 
 Distance = Callable[[Fraction, Fraction], Fraction]
 
@@ -90,41 +85,6 @@ def test_many_grades_have_the_value_of_a_matrix(name: str, weights: str) -> None
     assert (result.observed, result.chance) == pytest.approx(
         (custom.observed, custom.chance), abs=1e-12
     )
-
-
-def test_cohens_kappa_of_continuous_ratings_by_moments() -> None:
-    # Quadratic: κ = 1 - Σ (x - y)² / Σ_ij (x_i - y_j)² n, so 2 s_xy over
-    # s_x² + s_y² + (x̄ - ȳ)², Lin's concordance over n.
-    ratings = continuous()
-    x, y = ratings[~np.isnan(ratings[:, :2]).any(axis=1), :2].T
-    covariance = ((x - x.mean()) * (y - y.mean())).mean()
-    kappa = 2 * covariance / (x.var() + y.var() + (x.mean() - y.mean()) ** 2)
-    result = cohen_kappa(ratings[:, :2], weights="quadratic")
-    assert result.value == pytest.approx(kappa, rel=1e-13)
-    light = COEFFICIENTS["light_kappa"](ratings[:, :2], weights="quadratic")
-    assert light.value == pytest.approx(kappa, rel=1e-13)
-    assert light.standard_error > 0.0
-
-
-def test_continuous_ratings_have_a_bootstrap_by_moments() -> None:
-    ratings = continuous(700)
-    result = bootstrap(
-        "krippendorff_alpha", ratings, target="items", metric="interval", rng=1
-    )
-    value = krippendorff_alpha(ratings, metric="interval").value
-    assert result.low < value < result.high
-    with pytest.raises(ParameterError, match="raters of 2096 different grades are"):
-        bootstrap("fleiss_kappa", ratings, target="raters", weights="quadratic", rng=1)
-
-
-def test_continuous_ratings_take_a_few_times_their_room() -> None:
-    # a matrix of the grades would have 3.6e9 places; nothing is coded, only sorted
-    ratings = np.random.default_rng(0).normal(size=(20_000, 3))
-    tracemalloc.start()
-    krippendorff_alpha(ratings, metric="interval")
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert peak < 20 * ratings.nbytes
 
 
 @pytest.mark.parametrize("weights", ["identity", "linear"])

@@ -1,4 +1,4 @@
-"""SEM and MDC95: mean squares by hand, R's values, simulated coverage."""
+"""Measurements: SEM, MDC95, limits of agreement, concordance; by hand and by R."""
 
 import json
 import math
@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy import stats
 
-from masrel.agreement import ErrorKind, mdc, sem
-from masrel.errors import UndefinedStatisticWarning
+from masrel.agreement import ErrorKind, limits_of_agreement, lin_ccc, mdc, sem
+from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate
 
 KINDS: tuple[ErrorKind, ...] = ("agreement", "consistency")
@@ -84,17 +85,124 @@ def test_undefined_with_a_reason() -> None:
         assert result.interval is None
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("gaps", [False, True])
-def test_coverage_of_the_error_of_agreement(gaps: bool) -> None:
-    # 400 studies of 20 items and 4 raters: at 95 % fewer than 364 cover with
-    # probability .0005; the method is known to cover more than it says
-    rng, covered = np.random.default_rng(4), 0
-    for _ in range(400):
-        ratings = rng.normal(size=(20, 1)) * 2 + rng.normal(size=(20, 4))
-        ratings += rng.normal(size=4) * 0.7
-        if gaps:
-            ratings[rng.random(ratings.shape) < 0.3] = np.nan
-        low, high = ends(sem(ratings))
-        covered += low <= math.sqrt(1.49) <= high
-    assert covered >= 364
+FILE = Path(__file__).parents[1] / "oracles" / "measurement.json"
+EVERY: list[dict[str, Any]] = json.loads(FILE.read_text("utf-8"))["settings"]
+LIMITS = {s["id"]: s for s in EVERY if s["kind"] == "bland_altman"}
+(LIN,) = (s["data"] for s in EVERY if s["kind"] == "lin_ccc")
+
+
+def ratings_of(name: str) -> NDArray[np.float64]:
+    """Pairs whose differences have the mean and spread of a setting."""
+    data = LIMITS[name]["data"]
+    if isinstance(data, str):  # those of the concordance
+        return np.column_stack([LIN["x"], LIN["y"]])
+    z = np.arange(float(data["n"]))
+    z = (z - z.mean()) / z.std(ddof=1) * data["sd"] + data["mean"]
+    return np.column_stack([50.0 + z, np.full(len(z), 50.0)])
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_limits_and_exact_intervals(name: str) -> None:
+    expected = LIMITS[name]["reference"]
+    limits = limits_of_agreement(ratings_of(name))
+    assert limits.n_items == expected["n"]
+    assert limits.mean == pytest.approx(expected["mean_difference"], rel=1e-8)
+    assert limits.sd == pytest.approx(expected["sd"], rel=1e-8)
+    assert (limits.lower, limits.upper) == pytest.approx(expected["limits"], rel=1e-8)
+    alone, pair = expected["exact_ci_individual"], expected["exact_pair"]
+    for interval, ends in (
+        (limits.mean_interval, expected["ci_mean"]),
+        (limits.lower_interval, alone["lower_limit"]),
+        (limits.upper_interval, alone["upper_limit"]),
+    ):
+        assert (interval.low, interval.high) == pytest.approx(ends, rel=1e-8)
+    assert limits.inner == pytest.approx(pair["inner"], rel=1e-8)
+    assert limits.outer == pytest.approx(pair["outer"], rel=1e-8)
+
+
+def test_published_factors_of_ten_items() -> None:
+    # Tables of tolerance factors for n = 10, 95 % of a population with confidence
+    # 95 %: one-sided 2.911, two-sided 3.393 (Carkeet 2015 and the textbooks)
+    z = np.arange(10.0)
+    z = (z - z.mean()) / z.std(ddof=1)
+    pairs = np.column_stack([z, np.zeros(10)])
+    both = limits_of_agreement(pairs, level=0.9)
+    assert both.outer[1] == pytest.approx(3.393, abs=1e-3)
+    one = limits_of_agreement(pairs, share=0.9, level=0.9)
+    assert one.upper_interval.high == pytest.approx(2.911, abs=5e-4)
+
+
+def test_limits_by_hand() -> None:
+    # differences 1, -2, 0, 1: mean 0, variance 6/3 = 2
+    limits = limits_of_agreement([[9, 8], [5, 7], [4, 4], [8, 7]])
+    assert limits.mean == 0.0
+    assert limits.upper == pytest.approx(
+        stats.norm.ppf(0.975) * math.sqrt(2), rel=1e-14
+    )
+    half = stats.t.ppf(0.975, 3) * math.sqrt(2) / 2
+    assert limits.mean_interval.high == pytest.approx(half, rel=1e-12)
+    assert limits.averages.tolist() == [8.5, 6.0, 4.0, 7.5]
+    assert limits.differences.tolist() == [1.0, -2.0, 0.0, 1.0]
+
+
+def test_limits_that_are_none() -> None:
+    with pytest.warns(UndefinedStatisticWarning, match="fewer than two items"):
+        limits = limits_of_agreement([[1, 2], [None, 3]])
+    assert math.isnan(limits.lower)
+    assert limits.lower_interval.reason == limits.reason
+    with pytest.raises(RatingsError, match=r"need the ratings of two raters, got 3"):
+        limits_of_agreement([[1, 2, 3], [3, 4, 4]])
+    for name in ("share", "level"):
+        with pytest.raises(ParameterError, match=rf"{name}: needs \(0, 1\), got 95"):
+            limits_of_agreement([[1, 2], [2, 2]], **{name: 95})
+
+
+(SETTING,) = (
+    setting
+    for setting in json.loads(
+        (Path(__file__).parents[1] / "oracles" / "measurement.json").read_text("utf-8")
+    )["settings"]
+    if setting["kind"] == "lin_ccc"
+)
+PAIRS = np.column_stack([SETTING["data"]["x"], SETTING["data"]["y"]])
+
+
+def test_value_error_and_interval_are_those_of_epir() -> None:
+    expected = SETTING["reference"]
+    result = lin_ccc(PAIRS)
+    assert result.value == pytest.approx(expected["ccc_divisor_n"], rel=1e-8)
+    assert result.standard_error == pytest.approx(expected["se"], rel=1e-8)
+    assert result.interval is not None
+    ends = (result.interval.low, result.interval.high)
+    assert ends == pytest.approx(expected["ci_z"], rel=1e-8)
+    assert result.interval.target == "items"
+
+
+def test_interval_of_three_raters_leaves_out_each_item() -> None:
+    ratings = np.array([[1.0, 2, 1], [3, 3, 4], [5, 7, 6], [2, 1, 4], [6, 6, 7]])
+    z = [math.atanh(lin_ccc(np.delete(ratings, i, axis=0)).value) for i in range(5)]
+    width = stats.t.ppf(0.975, 4) * math.sqrt(4 / 5 * np.sum((z - np.mean(z)) ** 2))
+    result = lin_ccc(ratings)
+    assert result.interval is not None
+    ends = np.tanh(math.atanh(result.value) + width * np.array([-1.0, 1.0]))
+    assert (result.interval.low, result.interval.high) == pytest.approx(ends, rel=1e-10)
+    assert result.interval.method == "item jackknife, t(4) on Fisher's z"
+
+
+def test_a_concordance_that_is_none() -> None:
+    for ratings, why in (
+        ([[1, 2], [3, None]], "fewer than two items are rated by every rater"),
+        ([[1], [2]], "fewer than two raters"),
+        ([[2, 2], [2, 2]], "0/0: all ratings are the same"),
+    ):
+        with pytest.warns(UndefinedStatisticWarning, match=why):
+            result = lin_ccc(ratings)
+        assert math.isnan(result.value)
+        assert result.interval is None
+    # fewer than three items; a rater without variance; no item moves the value
+    no_error = [[1, 2], [3, 4]], [[1, 2], [1, 4], [1, 1]], [[1, 1, 1], [1, 1, 2]] * 2
+    for rows in no_error:
+        result = lin_ccc(rows)
+        assert result.interval is not None
+        assert math.isnan(result.interval.low)
+        assert result.interval.reason is not None

@@ -1,4 +1,4 @@
-"""P-values of estimates: by hand, against 450 digits, and against a test of a mean."""
+"""P-values and bands of estimates: by hand, and against 450 digits."""
 
 import math
 from typing import get_args
@@ -12,11 +12,17 @@ from scipy import stats
 from masrel.agreement import (
     COEFFICIENTS,
     Alternative,
+    BandScale,
+    bands,
+    benchmark,
+    brennan_prediger,
+    count_items,
     equivalence_p_value,
     fleiss_kappa,
     holm,
     p_value,
     percent_agreement,
+    strength,
 )
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate
@@ -122,19 +128,6 @@ def test_equivalence_is_two_one_sided_tests_and_an_interval(
             assert (p < a) == (low < value - half and value + half < high)
 
 
-@pytest.mark.parametrize("wrong", [math.nan, math.inf, "0.4", True])
-def test_a_hypothesis_is_a_number(wrong: float) -> None:
-    kappa = estimate(0.5, 0.1)
-    with pytest.raises(ParameterError, match="null: needs a finite number, got"):
-        p_value(kappa, null=wrong)
-    with pytest.raises(ParameterError, match="low: needs a finite number, got"):
-        equivalence_p_value(kappa, low=wrong, high=0.5)
-    with pytest.raises(ParameterError, match=r"needs low < high, got 0\.5 and 0\.5"):
-        equivalence_p_value(kappa, low=0.5, high=0.5)
-    with pytest.raises(ParameterError, match="alternative: needs one of two-sided, gr"):
-        p_value(kappa, alternative=wrong)  # type: ignore[arg-type]
-
-
 def test_is_undefined_where_the_estimate_or_its_error_is() -> None:
     assert_undefined(lambda: p_value(estimate(math.nan, math.nan)))
     assert_undefined(lambda: p_value(estimate(0.5, math.nan)))
@@ -146,13 +139,6 @@ def test_is_undefined_where_the_estimate_or_its_error_is() -> None:
     assert one_item.reason is None
     with pytest.warns(UndefinedStatisticWarning, match="one item with a pair"):
         assert math.isnan(p_value(one_item))
-
-
-def test_holm_does_not_count_what_is_undefined() -> None:
-    # two tests are left: .01 and .04 times 2 and 1
-    first, none, last = holm([0.04, math.nan, 0.01])
-    assert math.isnan(none)
-    assert (first, last) == (0.04, 0.02)
 
 
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=8))
@@ -168,3 +154,130 @@ def test_holm_rejects_what_the_procedure_rejects(p_values: list[float]) -> None:
             rejected.add(place)
         found = {k for k, p in enumerate(holm(p_values)) if p <= level}
         assert found == rejected
+
+
+SCALES: tuple[BandScale, ...] = get_args(BandScale)
+
+
+def phi(z: float) -> mpmath.mpf:
+    # Φ, with digits enough for differences of far tails
+    return mpmath.erfc(-mpmath.mpf(z) / mpmath.sqrt(2)) / 2
+
+
+def within(low: float, high: float, value: float, error: float) -> float:
+    with mpmath.workdps(330):
+        value_, error_ = mpmath.mpf(value), mpmath.mpf(error)
+        ends = [(mpmath.mpf(end) - value_) / error_ for end in (low, high, -1.0, 1.0)]
+        low_, high_, first, last = map(phi, ends)
+        return float((high_ - low_) / (last - first))
+
+
+@pytest.mark.parametrize(
+    ("scale", "published"),
+    [
+        # Landis and Koch (1977), p. 165
+        (
+            "landis_koch",
+            {
+                "almost perfect": 0.8,
+                "substantial": 0.6,
+                "moderate": 0.4,
+                "fair": 0.2,
+                "slight": 0.0,
+                "poor": -1.0,
+            },
+        ),
+        # Altman (1991), p. 404
+        (
+            "altman",
+            {"very good": 0.8, "good": 0.6, "moderate": 0.4, "fair": 0.2, "poor": -1.0},
+        ),
+        # Fleiss (1981), p. 218
+        ("fleiss", {"excellent": 0.75, "intermediate to good": 0.4, "poor": -1.0}),
+        # Cicchetti and Sparrow, 1981
+        ("cicchetti", {"excellent": 0.75, "good": 0.6, "fair": 0.4, "poor": -1.0}),
+    ],
+)
+def test_words_and_ends_are_the_published_ones(
+    scale: BandScale, published: dict[str, float]
+) -> None:
+    found = bands(estimate(0.5, 0.1), scale=scale)
+    assert {band.word: band.low for band in found} == published
+    assert [band.high for band in found] == [1.0, *list(published.values())[:-1]]
+
+
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize("error", [0.02, 0.07, 1.5])
+@pytest.mark.parametrize("value", [-1.0, -0.31, 0.0, 0.5, 0.93, 1.0])
+def test_every_band_has_its_digits_however_far(
+    value: float, error: float, scale: BandScale
+) -> None:
+    # 0.93 with an error of 0.02 is "poor" once in 10^154
+    for band in bands(estimate(value, error), scale=scale):
+        exact = within(band.low, band.high, value, error)
+        assert band.probability == pytest.approx(exact, rel=1e-9, abs=1e-307)
+
+
+def test_the_word_is_the_best_that_is_certain_enough() -> None:
+    # .85 ± .1 above .8, cut at 1: (Φ(1.5) - Φ(-.5))/Φ(1.5) = (.9332 - .3085)/.9332 =
+    # .669; above .6: (.9332 - .0062)/.9332 = .993.
+    found = estimate(0.85, 0.1)
+    assert benchmark(found, level=0.66) == "almost perfect"
+    assert benchmark(found, level=0.68) == "substantial"
+    assert benchmark(found) == "substantial"
+    assert benchmark(found, level=0.995) == "moderate"
+    # above .75: (.9332 - .1587)/.9332 = .830
+    assert benchmark(found, scale="fleiss", level=0.82) == "excellent"
+    assert benchmark(found, scale="fleiss") == "intermediate to good"
+    assert benchmark(found, scale="cicchetti") == "good"
+    assert benchmark(found, scale="altman") == "good"
+
+
+def test_what_is_undefined_or_has_no_error_earns_no_word() -> None:
+    with pytest.warns(UndefinedStatisticWarning):
+        nothing = fleiss_kappa([["a", "a"], ["a", "a"]])
+    # two items, on both of which two raters agree; and a value without an error
+    perfect, one_item = (
+        fleiss_kappa([["a", "a"], ["b", "b"]]),
+        fleiss_kappa([["a", "b"]]),
+    )
+    for undefined in (nothing, one_item, perfect, estimate(0.3, 0.0)):
+        with pytest.warns(UndefinedStatisticWarning):
+            assert benchmark(undefined) == "undefined"
+        with pytest.warns(UndefinedStatisticWarning):
+            assert all(math.isnan(band.cumulative) for band in bands(undefined))
+
+
+@pytest.mark.parametrize(
+    ("counts", "scale", "word"),
+    [
+        # four raters of two categories, κ_BP = 2 P - 1
+        ([3, 1], "landis_koch", "slight"),  # 0 is slight, below it is poor
+        ([3, 1], "altman", "poor"),
+        ([4, 0], "landis_koch", "almost perfect"),
+        # 15 and 1 of 16: P = 105/120, κ_BP = 0.75
+        ([15, 1], "fleiss", "intermediate to good"),  # excellent is above 0.75
+        ([15, 1], "cicchetti", "excellent"),  # 0.75 and more
+        ([15, 1], "landis_koch", "substantial"),
+    ],
+)
+def test_a_value_at_an_end_has_the_published_word(
+    counts: list[int], scale: BandScale, word: str
+) -> None:
+    found = brennan_prediger(count_items([counts] * 5))
+    assert strength(found.value, scale=scale) == word
+
+
+@pytest.mark.parametrize("n_other", [1, 300])
+def test_an_estimate_below_minus_one_has_probabilities_too(n_other: int) -> None:
+    # Linear weights of three categories have T_w = 5, p_e = 5/9: all ratings at the
+    # ends give (0 - 5/9)/(4/9) = -5/4.
+    ratings = [["1", "3"]] * 999 + [["1", "2"]] * n_other
+    found = brennan_prediger(ratings, categories=["1", "2", "3"], weights="linear")
+    assert (found.value < -1) == (n_other < 300)
+    for scale in get_args(BandScale):
+        of_bands = bands(found, scale=scale)
+        assert sum(band.probability for band in of_bands) == pytest.approx(1, rel=1e-14)
+        assert of_bands[-1].cumulative == pytest.approx(1, rel=1e-14)
+        assert of_bands[-1].low == (-math.inf if found.value < -1 else -1.0)
+        assert benchmark(found, scale=scale) == "poor"

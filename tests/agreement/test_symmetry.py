@@ -1,6 +1,7 @@
-"""Tests of symmetry: by hand on sparse tables, against statsmodels on random ones."""
+"""Tests and indices of two raters, kappa of one category: by hand, against others."""
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -13,9 +14,19 @@ from statsmodels.stats import contingency_tables as peer
 from masrel.agreement import (
     McnemarKind,
     bhapkar,
+    bias_index,
     bowker,
+    brennan_prediger,
+    category_kappa,
+    cohen_kappa,
     contingency_table,
+    count_table,
+    fleiss_kappa,
+    fleiss_null,
+    kappa_max,
     mcnemar,
+    prevalence_index,
+    specific_agreement,
     stuart_maxwell,
 )
 from masrel.errors import (
@@ -24,6 +35,8 @@ from masrel.errors import (
     RatingsError,
     UndefinedStatisticWarning,
 )
+from tests.agreement.undefined import assert_undefined
+from tests.strategies import LABELS, Table, tables
 
 TESTS = [bowker, stuart_maxwell, bhapkar]
 
@@ -138,15 +151,6 @@ def test_groups_that_no_change_connects_are_tested_each() -> None:
     assert bowker(table).statistic == pytest.approx(16 / 6 + 36 / 8, rel=1e-14)
 
 
-def test_all_items_changing_one_way_are_infinitely_unlike_under_wald() -> None:
-    # X = 6²/6 = n
-    statistic = stuart_maxwell([[0, 6], [0, 0]]).statistic
-    assert statistic == pytest.approx(6.0, rel=1e-14)
-    found = bhapkar([[0, 6], [0, 0]])
-    assert found.statistic == math.inf
-    assert found.p_value == 0.0
-
-
 @pytest.mark.parametrize("test", TESTS)
 @pytest.mark.parametrize("table", [[[3, 0], [0, 4]], [[5]], [[0, 0], [0, 0]]])
 def test_without_a_change_there_is_nothing_to_test(test, table) -> None:  # type: ignore[no-untyped-def]
@@ -157,27 +161,11 @@ def test_without_a_change_there_is_nothing_to_test(test, table) -> None:  # type
     assert str(found) == f"{test.__name__}: undefined (0/0: no item changed)"
 
 
-def test_mcnemar_without_a_change() -> None:
-    # exact: both tails of an empty sample are certain
-    assert mcnemar([[3, 0], [0, 4]]).p_value == 1.0
-    for kind in ("uncorrected", "corrected"):
-        with pytest.warns(UndefinedStatisticWarning, match="0/0: no item changed"):
-            found = mcnemar([[3, 0], [0, 4]], kind=kind)  # type: ignore[arg-type]
-        assert math.isnan(found.p_value)
-
-
 def test_exact_mcnemar_of_many_changes_goes_on_where_integers_end() -> None:
     for b, c in ((480, 520), (480, 521), (700, 900), (1, 1200)):
         found = mcnemar([[0, b], [c, 0]]).p_value
         other = min(1.0, 2 * stats.binom.cdf(min(b, c), b + c, 0.5))
         assert found == pytest.approx(other, rel=1e-9)
-
-
-def test_corrected_mcnemar_of_equal_changes_is_zero() -> None:
-    found = mcnemar([[0, 4], [4, 0]], kind="corrected")
-    assert (found.statistic, found.p_value) == (0.0, 1.0)
-    # |5 - 4| - 1 = 0 as well
-    assert mcnemar([[0, 5], [4, 0]], kind="corrected").statistic == 0.0
 
 
 def test_mcnemar_takes_two_categories_and_three_kinds() -> None:
@@ -200,3 +188,158 @@ def test_a_contingency_table_keeps_the_declared_order_and_drops_missing_pairs() 
     assert table.tolist() == [[1, 0, 0, 0], [0, 0, 2, 0], [0, 0, 0, 0], [0, 0, 0, 0]]
     with pytest.raises(RatingsError, match="two raters, got 3"):
         contingency_table([["a", "a", "b"]])
+
+
+Cells = list[list[int]]
+
+pairs_of_two = st.tuples(*[st.integers(0, 30)] * 4).filter(any)
+
+
+def squares(sides: tuple[int, int] = (2, 5)) -> st.SearchStrategy[Cells]:
+    return st.integers(*sides).flatmap(
+        lambda q: st.lists(
+            st.lists(st.integers(0, 12), min_size=q, max_size=q), min_size=q, max_size=q
+        )
+    )
+
+
+def margins(cells: Cells) -> tuple[list[int], list[int]]:
+    return [sum(r) for r in cells], [sum(c) for c in zip(*cells, strict=True)]
+
+
+def has_kappa(cells: Cells) -> bool:
+    # 0/0 if there is nothing, or both raters used one category and the same
+    n = sum(map(sum, cells))
+    return all(cells[k][k] < n for k in range(len(cells)))
+
+
+def test_cohens_own_example_of_the_largest_kappa() -> None:
+    # Cohen (1960), Table 2: p_o = 140/200, margins .60 .30 .10 and .50 .30 .20, so that
+    # p_c = .41 and kappa .492. At most .50 + .30 + .10 = .90 can agree: kappa_M = .831.
+    cells = [[88, 14, 18], [10, 40, 10], [2, 6, 12]]
+    assert cohen_kappa(count_table(cells)).value == pytest.approx(0.492, abs=5e-4)
+    assert kappa_max(cells) == pytest.approx(0.831, abs=5e-4)
+    assert kappa_max(cells) == pytest.approx(0.49 / 0.59, rel=1e-15)
+
+
+@given(pairs_of_two)
+def test_kappa_is_made_of_agreement_prevalence_and_bias(
+    cells: tuple[int, ...],
+) -> None:
+    # Byrt, Bishop and Carlin (1993): (PABAK - PI² + BI²)/(1 - PI² + BI²), with PABAK
+    # = 2 p_o - 1
+    a, b, c, d = cells
+    table, n = [[a, b], [c, d]], sum(cells)
+    if not has_kappa(table):
+        assert_undefined(lambda: cohen_kappa(count_table(table)))
+        return
+    pabak = Fraction(2 * (a + d), n) - 1
+    found = brennan_prediger(count_table(table)).value
+    assert found == pytest.approx(float(pabak), abs=1e-14)
+    prevalence, bias = prevalence_index(table), bias_index(table)
+    less = bias**2 - prevalence**2
+    kappa = cohen_kappa(count_table(table)).value
+    assert kappa == pytest.approx((float(pabak) + less) / (1 + less), abs=1e-12)
+
+
+@given(squares())
+def test_no_kappa_is_above_the_largest(cells: Cells) -> None:
+    if not has_kappa(cells):
+        assert_undefined(lambda: kappa_max(cells))
+        return
+    most = kappa_max(cells)
+    assert cohen_kappa(count_table(cells)).value <= most + 1e-14 <= 1.0 + 1e-14
+    rows, columns = margins(cells)
+    assert (most == 1.0) == (rows == columns)
+
+
+@pytest.mark.parametrize("function", [prevalence_index, bias_index, kappa_max])
+def test_without_an_item_there_is_nothing(function) -> None:  # type: ignore[no-untyped-def]
+    with pytest.warns(UndefinedStatisticWarning, match="no item has ratings of two"):
+        assert math.isnan(function([[0, 0], [0, 0]]))
+
+
+@pytest.mark.parametrize("function", [prevalence_index, bias_index, kappa_max])
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ([[1, 2, 3], [4, 5, 6]], "as many rows as columns"),
+        ([[1, -1], [0, 2]], "row 0, column 1"),
+        ([[0.5, 1], [0, 2]], "0.5"),
+    ],
+)
+def test_what_is_no_table_of_counts_is_refused(function, table, said) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(CountsError, match=said):
+        function(table)
+
+
+def test_specific_agreement_of_a_published_table() -> None:
+    # Cicchetti and Feinstein (1990), [[40, 9], [6, 45]]: 80/95 and 90/105
+    assert specific_agreement([[40, 9], [6, 45]]) == (80 / 95, 90 / 105)
+
+
+DIAGNOSES = ["depression", "personality", "schizophrenia", "neurosis", "other"]
+
+# Fleiss (1971), Table 1: psychiatrists, of six, who chose each for thirty patients.
+PATIENTS = """
+00060 03003 01401 00006 03030 20400 00402 20310 20040 00006
+10050 11040 03300 10050 02031 00501 30012 51000 02040 10203
+00006 01050 02013 20040 10041 05010 40002 02040 10500 00006
+""".split()
+
+RATINGS = [
+    [name for name, n in zip(DIAGNOSES, patient, strict=True) for _ in range(int(n))]
+    for patient in PATIENTS
+]
+
+
+def test_published_kappa_of_each_diagnosis() -> None:
+    # Table 2 there, with the shares .144, .144, .167, .306, .239; and .430 of all
+    published = [0.245, 0.245, 0.520, 0.471, 0.566]
+    for diagnosis, kappa in zip(DIAGNOSES, published, strict=True):
+        found = category_kappa(RATINGS, diagnosis, categories=DIAGNOSES)
+        assert found.value == pytest.approx(kappa, abs=5e-4)
+        assert (found.coefficient, found.weights) == ("category_kappa", diagnosis)
+        assert (found.n_items, found.n_raters, found.n_categories) == (30, 6, 2)
+    assert fleiss_kappa(RATINGS).value == pytest.approx(0.430, abs=5e-4)
+
+
+@pytest.mark.filterwarnings("ignore::masrel.errors.UndefinedStatisticWarning")
+@given(tables(missing=False))
+def test_fleiss_kappa_is_their_mean_weighed_by_p_times_q(table: Table) -> None:
+    grades = [grade for row in table for grade in row]
+    if len(set(grades)) < 2:
+        assert_undefined(lambda: fleiss_kappa(table, categories=LABELS))
+        return
+    shares = {g: grades.count(g) / len(grades) for g in set(grades)}
+    weights = {g: p * (1 - p) for g, p in shares.items()}
+    mean = sum(
+        w * category_kappa(table, g, categories=LABELS).value
+        for g, w in weights.items()
+        if g is not None
+    ) / sum(weights.values())
+    found = fleiss_kappa(table, categories=LABELS).value
+    assert found == pytest.approx(mean, rel=1e-12, abs=1e-14)
+
+
+def test_items_with_a_missing_rating_are_not_tested() -> None:
+    whole: Table = [["a", "a", "b"], ["b", "b", "b"], ["c", "c", "c"]]
+    holed: Table = [*whole, ["a", "a", None], [None, None, None]]
+    assert fleiss_null(holed) == fleiss_null(whole)
+    assert fleiss_null(holed, category="a") == fleiss_null(whole, category="a")
+
+
+@pytest.mark.parametrize(
+    ("ratings", "why"),
+    [
+        ([["a", "a"], ["a", "a"]], "0/0: all ratings are in one category"),
+        ([["a"], ["b"]], "fewer than two raters"),
+        ([["a", None], [None, "b"]], "no item is rated by every rater"),
+    ],
+)
+def test_nothing_to_test_is_said(ratings: Table, why: str) -> None:
+    with pytest.warns(UndefinedStatisticWarning, match=why):
+        found = fleiss_null(ratings, categories=["a", "b"])
+    assert math.isnan(found.statistic)
+    assert math.isnan(found.p_value)
+    assert why in (found.reason or "")

@@ -12,17 +12,14 @@ from hypothesis import strategies as st
 from masrel.agreement import (
     COEFFICIENTS,
     WeightName,
-    cohen_kappa,
     declared_weights,
     fleiss_kappa,
-    percent_agreement,
 )
 from masrel.errors import MasrelError, UndefinedStatisticWarning
 from masrel.intervals import jackknife
 
 NAMES = get_args(WeightName)
 UNEVEN = [1, 2, 4]  # range 3; differences 1, 2, 3
-TEXT = ["1", "1+", "2", "3"]
 
 
 def agreement(name: object, scale: list[float] | list[str]) -> list[list[float]]:
@@ -65,23 +62,6 @@ def test_weights_of_an_uneven_scale_by_hand(
     a, b, c = by_hand
     by_hand = np.array([[0, a, b], [a, 0, c], [b, c, 0]], dtype=float)
     assert disagreement(name, UNEVEN) == pytest.approx(by_hand, rel=1e-15)
-
-
-def test_identity_weights_count_every_miss_in_full() -> None:
-    assert agreement("identity", UNEVEN) == np.eye(3).tolist()
-
-
-def test_four_grades_of_text_weigh_by_rank_and_not_by_their_letters() -> None:
-    assert agreement("linear", TEXT)[0] == pytest.approx([1, 2 / 3, 1 / 3, 0])
-    assert agreement("quadratic", TEXT)[0] == pytest.approx([1, 8 / 9, 5 / 9, 0])
-    # C(2, 2), C(3, 2), C(4, 2) = 1, 3, 6 of 6
-    assert agreement("ordinal", TEXT)[0] == pytest.approx([1, 5 / 6, 1 / 2, 0])
-    # sin² of π/4, π/2, 3π/4
-    assert agreement("circular", TEXT)[0] == pytest.approx([1, 0.5, 0, 0.5])
-    # ranks 1, 4: (1/3)², (2/4)², (3/5)²
-    assert agreement("ratio", TEXT)[0] == pytest.approx(
-        [1, 1 - (1 / 9) / 0.36, 1 - 0.25 / 0.36, 0]
-    )
 
 
 def test_scale_of_the_declared_order_and_not_of_the_values() -> None:
@@ -142,15 +122,6 @@ def test_ratio_weights_of_values_that_sum_to_zero_are_undefined(
     assert math.isnan(found.value)
     assert found.reason is not None
     assert "ratio weights divide by sums of two values" in found.reason
-
-
-@pytest.mark.parametrize("name", [name for name in NAMES if name != "identity"])
-@pytest.mark.parametrize("function", [fleiss_kappa, cohen_kappa, percent_agreement])
-def test_one_category_has_no_weights(function: object, name: str) -> None:
-    with pytest.warns(UndefinedStatisticWarning, match="one category"):
-        found = function([["a", "a"], ["a", "a"]], weights=name)  # type: ignore[operator]
-    assert math.isnan(found.value)
-    assert found.reason
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from scipy import stats
 
 from masrel import intervals
 from masrel.agreement import holm
-from tests.agreement.test_category import DIAGNOSES, PATIENTS, RATINGS
+from tests.agreement.test_symmetry import DIAGNOSES, PATIENTS, RATINGS
 from tests.cli.process import Caller
 
 Record = dict[str, Any]

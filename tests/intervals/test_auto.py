@@ -138,15 +138,6 @@ def test_perfect_agreement_is_bounded_from_below_by_the_model(
     assert "rests on the prior" in found.notes[1]
 
 
-def test_a_posterior_is_widened_to_an_estimate_that_it_leaves_out() -> None:
-    # every item splits: κ < 0, where no ρ can be
-    found = chosen([["a", "b"], ["b", "a"], ["a", "b"]], "items")
-    assert found.low == -1.0
-    assert found.high > 0
-    assert found.notes[1].startswith("the lower end is extended from 0.0")
-    assert "to the estimate, -1.000, which lies outside" in found.notes[1]
-
-
 RARE = np.zeros((50, 3), dtype=int)
 RARE[[0, 1, 2], [0, 1, 2]] = 1  # three items on which one of three sees something
 

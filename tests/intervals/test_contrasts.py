@@ -16,9 +16,6 @@ from masrel.agreement import (
     cohen_kappa,
     count_table,
 )
-from masrel.errors import (
-    UndefinedStatisticWarning,
-)
 from masrel.estimates import Estimate
 from masrel.intervals import (
     analytic,
@@ -48,18 +45,6 @@ def shares(table: list[list[int]]) -> list[float]:
     """Agreement of each item: how many pairs of its raters agree."""
     k = len(table[0])
     return [sum(row.count(g) - 1 for g in row) / (k * (k - 1)) for row in table]
-
-
-def test_of_percent_agreement_of_the_same_items_it_is_the_paired_t_test() -> None:
-    first, second = two(25)
-    other = stats.ttest_rel(shares(first), shares(second))
-    found = difference("percent_agreement", first, second, design="dependent")
-    assert found.value / found.standard_error == pytest.approx(other.statistic)
-    interval = other.confidence_interval(0.95)
-    assert found.interval is not None
-    assert (found.interval.low, found.interval.high) == pytest.approx(
-        (interval.low, interval.high), rel=1e-9
-    )
 
 
 def test_of_percent_agreement_of_other_items_it_is_welchs_t_test() -> None:
@@ -124,17 +109,6 @@ def test_every_coefficient_is_left_out_of_item_by_item(
     assert found.standard_error == pytest.approx(math.sqrt(variance), rel=1e-9)
     assert found.coefficient == f"difference of {name}"
     assert found.weights == weights
-
-
-def test_what_only_rounding_sets_apart_does_not_differ() -> None:
-    # Conger's κ of the same ratings in another order of the raters
-    first, _ = two(20)
-    second = [row[::-1] for row in first]
-    with pytest.warns(UndefinedStatisticWarning, match="leaves the difference as it"):
-        found = difference(
-            "conger_kappa", first, second, design="dependent", categories=CATEGORIES
-        )
-    assert found.standard_error == 0.0
 
 
 FILE = Path(__file__).parents[1] / "oracles" / "several_kappas.json"

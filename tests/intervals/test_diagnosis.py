@@ -117,16 +117,3 @@ def test_with_a_reference_shares_have_clopper_and_pearsons_interval() -> None:
     assert alone.interval is not None
     assert found.reference_values[2] == pytest.approx(alone.value, rel=1e-12)
     assert found.reference_low[2] == pytest.approx(alone.interval.low, rel=1e-9)
-
-
-def test_a_reference_is_left_out_of_all_else() -> None:
-    ratings = drawn()
-    names = ["Kim", "Gold", "Lee", "Ann"]
-    with_it = diagnose(ratings, reference="Gold", raters=names, categories=[0, 1, 2])
-    without = diagnose(ratings[:, [0, 2, 3]], categories=[0, 1, 2])
-    assert with_it.estimate == without.estimate
-    assert with_it.raters == ("Kim", "Lee", "Ann")
-    for name in ("pair_values", "without_values", "category_values", "mean_values"):
-        assert getattr(with_it, name) == pytest.approx(
-            getattr(without, name), nan_ok=True, rel=1e-14
-        )

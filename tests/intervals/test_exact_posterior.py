@@ -43,17 +43,6 @@ def test_one_agreeing_pair_by_hand(n_categories: int, a: float) -> None:
     assert ends(result) == pytest.approx(by_hand, abs=1e-12)
 
 
-# m items of one rating, all in category 1 of 2, multiply the chance of the agreeing
-# pair by π_1^m: ρ E π_1^(m+1) + (1 - ρ) E π_1^(m+2), with E π_1^t = 1 / (t + 1).
-@pytest.mark.parametrize("m", [0, 1, 7])
-def test_single_ratings_inform_the_shares_only(m: int) -> None:
-    ratings: Ratings = [["a", "a"], *[["a", None] for _ in range(m)]]
-    result = posterior("fleiss_kappa", ratings, target="items", categories=["a", "b"])
-    square = (m + 2.0) / (m + 3.0)
-    by_hand = [quadratic(square, 1.0 - square, share) for share in (0.025, 0.975)]
-    assert ends(result) == pytest.approx(by_hand, abs=1e-12)
-
-
 def labelled(counts: NDArray[np.int64] | list[list[int]]) -> Ratings:
     """Ratings that have these counts, padded with missing ones."""
     rows = [[str(k) for k, n in enumerate(row) for _ in range(n)] for row in counts]
@@ -113,14 +102,3 @@ def test_ends_are_those_of_panels(name: str, a: Fraction, prior: str) -> None:
     )
     expected = [panels.quantile(share) for share in (0.025, 0.975)]
     assert ends(result) == pytest.approx(expected, abs=1e-9)
-
-
-@pytest.mark.parametrize("level", [0.01, 0.5, 0.9999, 1.0 - 1e-9])
-def test_ends_are_right_at_every_level(level: float) -> None:
-    counts = [[row.count(grade) for grade in SCALE] for row in TABLE_V]
-    panels = ByPanels(counts)
-    result = posterior(
-        "fleiss_kappa", TABLE_V, target="items", categories=SCALE, level=level
-    )
-    expected = [panels.quantile(0.5 - 0.5 * level), panels.quantile(0.5 + 0.5 * level)]
-    assert ends(result) == pytest.approx(expected, abs=1e-8)

@@ -63,36 +63,6 @@ def test_everything_has_a_name_and_an_interval(result: LatentTrait) -> None:
     assert np.array(result.grades).sum(axis=1) == pytest.approx(np.ones(4))
 
 
-def test_numbers_are_those_of_the_chains(result: LatentTrait) -> None:
-    chains, kappa = result.chains, result.kappa
-    assert chains is not None
-    assert kappa.interval is not None
-    assert kappa.value == np.median(chains.kappa)
-    ends = np.quantile(chains.kappa, (0.025, 0.975)).tolist()
-    assert [kappa.interval.low, kappa.interval.high] == pytest.approx(ends, rel=1e-12)
-    assert result.raters[1].value == np.median(chains.bias[..., 1])
-    assert result.thresholds[2].value == np.median(chains.thresholds[..., 2])
-    assert kappa.interval.n_resamples == chains.kappa.size
-
-
-def test_the_other_prior_is_shown_beside(result: LatentTrait) -> None:
-    assert result.other is not None
-    assert result.other.prior == LatentPrior.other()
-    there, here = result.other.kappa.interval, result.kappa.interval
-    assert there is not None
-    assert here is not None
-    assert here.notes == (
-        f"under another prior {there.low:.3f} to {there.high:.3f}: "
-        f"{LatentPrior.other().words}",
-    )
-    assert result.other.other is None
-    alone = fitted()
-    assert alone.other is None
-    assert alone.kappa.interval is not None
-    assert alone.kappa.interval.notes == ()
-    assert alone.kappa.value == result.kappa.value  # one prior does not move the other
-
-
 def test_a_seed_repeats_every_byte(result: LatentTrait) -> None:
     again = fitted(keep_chains=True, compare=True)
     assert again == result

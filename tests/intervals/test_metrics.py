@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 
 from masrel.agreement import Metric, krippendorff_alpha
-from masrel.intervals import analytic, bootstrap, jackknife
+from masrel.intervals import bootstrap, jackknife
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore::masrel.errors.SmallSampleWarning",
@@ -55,13 +55,3 @@ def test_every_resample_has_the_metric_of_its_ratings(metric: Metric) -> None:
     assert met @ weights == pytest.approx(np.mean(values), rel=1e-9)
     assert met**2 @ weights == pytest.approx(np.mean(np.square(values)), rel=1e-9)
     assert met[[0, -1]] == pytest.approx([values[0], values[-1]], rel=1e-9)
-
-
-def test_many_grades_hold_the_ordinal_metric_and_say_so() -> None:
-    ratings = np.random.default_rng(3).integers(0, 50, (40, 1)) + np.array([0, 1, 1])
-    held = jackknife("krippendorff_alpha", ratings, target="items", metric="ordinal")
-    assert any("metric" in note for note in held.notes)
-    few = jackknife("krippendorff_alpha", RATINGS, target="items", metric="ordinal")
-    assert not any("metric" in note for note in few.notes)
-    of_delta = analytic("krippendorff_alpha", RATINGS, target="items", metric="ordinal")
-    assert any("metric" in note for note in of_delta.notes)

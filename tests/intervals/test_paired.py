@@ -1,6 +1,5 @@
 """What carries nothing changes nothing, and counts are the ratings they count."""
 
-import math
 import warnings
 from collections.abc import Callable
 
@@ -8,7 +7,7 @@ import numpy as np
 import pytest
 
 from masrel.agreement import COEFFICIENTS, count_table
-from masrel.errors import MasrelWarning, SmallSampleWarning
+from masrel.errors import MasrelWarning
 from masrel.estimates import Estimate, Interval, Target
 from masrel.intervals import (
     analytic,
@@ -70,32 +69,6 @@ def test_single_ratings_change_no_bit_where_only_pairs_count(
     alone = quiet(METHODS[method], name, FULL, **options)
     # at the end, so that the clusters of the others stay
     assert quiet(METHODS[method], name, FULL + SINGLES, **options) == alone
-
-
-@pytest.mark.parametrize("name", ["fleiss_kappa", "gwet_ac", "brennan_prediger"])
-def test_where_they_tell_of_chance_they_are_left_out_in_turn(name: str) -> None:
-    # Q: of 25 items with a single rating and 5 with two, (n - 1)/n and t count the 5
-    table = FULL + SINGLES
-    function = COEFFICIENTS[name]
-    centre = function(table, categories=["a", "b"])
-    assert (centre.n_items, centre.n_items_paired) == (30, 5)
-    left = np.array(
-        [
-            function(table[:i] + table[i + 1 :], categories=["a", "b"]).value
-            for i in range(30)
-        ]
-    )
-    variance = 4 / 5 * ((left - left.mean()) ** 2).sum()
-    t4 = 2.7764451051977987
-    options = {"target": "items", "categories": ["a", "b"]}
-    with pytest.warns(SmallSampleWarning, match="5 items with a pair of ratings: bel"):
-        found = jackknife(name, table, **options)  # type: ignore[arg-type]
-    low = max(-1.0, centre.value - t4 * math.sqrt(variance))
-    assert found.low == pytest.approx(low, rel=1e-9)
-    plain = analytic(name, table, **options)  # type: ignore[arg-type]
-    low = max(-1.0, centre.value - t4 * centre.standard_error)
-    assert plain.low == pytest.approx(low, rel=1e-12)
-    assert plain.notes[0].startswith("5 items with a pair of ratings: below 10")
 
 
 def holed(table: Table) -> list[Table]:

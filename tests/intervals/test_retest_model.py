@@ -42,24 +42,6 @@ def test_on_many_pairs_of_alike_raters_it_is_stratified_kappa() -> None:
     assert result.standard_deviation.value < 0.1
 
 
-def test_three_raters_and_four_models_say_how_little_is_known() -> None:
-    perfect = [[["1", "1"], ["1+", "1+"], ["2", "2"], ["3", "3"]]] * 2
-    study = [*perfect, [["1", "1"], ["1+", "1"], ["2", "2"], ["3", "2"]]]
-    result = retest_model(study, categories=["0", "1", "1+", "2", "3", "4"])
-    assert result.kappa.interval.low < 0.5
-    assert result.kappa.interval.high > 0.9
-    assert result.raters[2].value < result.kappa.value < result.raters[0].value
-    assert result.n_pairs == (4, 4, 4)
-    assert result.prior.startswith("mean kappa ~ U(0, 1), π ~ Dirichlet(1")
-    assert result.other_prior != result.prior
-    assert result.other_kappa.interval != result.kappa.interval
-    assert (result.kappa.interval.target, result.kappa.interval.kind) == (
-        "raters",
-        "credible",
-    )
-    assert result.raters[0].interval.target == "items"
-
-
 def test_gaps_and_raters_without_pairs_are_left_out() -> None:
     full = [["a", "a"], ["b", "b"], ["a", "b"]]
     gaps = [["a", None], ["b", "b"], [None, None]]

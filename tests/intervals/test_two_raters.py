@@ -182,13 +182,6 @@ def test_the_monte_carlo_error_is_the_spread_over_seeds() -> None:
         assert 0.6 < spread / float(np.mean(said)) < 1.45
 
 
-def test_seeds_repeat_and_are_recorded() -> None:
-    one, two = (table_posterior("cohen_kappa", TABLE, rng=seed) for seed in (1, 2))
-    assert (one.seed, one.n_resamples) == (1, 10_000)
-    assert one == table_posterior("cohen_kappa", TABLE)
-    assert one.low != two.low
-
-
 def test_items_of_a_single_rating_are_left_out() -> None:
     ratings: list[list[str | None]] = [list(row) for row in pairs([[20, 5], [10, 15]])]
     whole = posterior("cohen_kappa", ratings, target="items", model="table")
