@@ -34,24 +34,6 @@ def wide(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.fixture
-def sites(tmp_path: Path) -> Path:
-    """Two raters on one to four teeth of a patient, left or right."""
-    rng = np.random.default_rng(5)
-    lines = ["patient,tooth,side,Kim,Lee"]
-    for patient in range(18):
-        for tooth in range(1 + patient % 4):
-            true = rng.integers(0, 2)
-            pair = [
-                true if rng.random() < 0.75 else rng.integers(0, 2) for _ in range(2)
-            ]
-            side = "left" if tooth % 2 else "right"
-            lines.append(f"p{patient},{tooth},{side},{pair[0]},{pair[1]}")
-    path = tmp_path / "sites.csv"
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return path
-
-
 def record(masrel: Caller, *call: object) -> Record:
     done = masrel(*call, "--json", "-")
     assert done.code in (0, None), done.err
@@ -99,34 +81,3 @@ def test_the_reference_is_in_no_estimate_between_raters(
     for row in with_it["diagnosis_raters"]:
         assert row["without"] - row["change"] == pytest.approx(estimate["value"])
     assert with_it["notes"] == []  # not that Gold counts as a rater
-
-
-def test_groups_with_clusters_in_common_are_compared_cluster_by_cluster(
-    masrel: Caller, sites: Path
-) -> None:
-    names = ("--item", "patient,tooth", "--by", "side", "--clusters", "patient")
-    coefficients = ("--coefficients", "fleiss_kappa")
-    document = record(masrel, "compare", sites, *names, *coefficients)
-    (row,) = document["differences"]
-    file = read_ratings(
-        sites, Reading(item="patient,tooth", by="side", clusters="patient")
-    )
-    first, second = file.parts
-    rows = len(first.items) + len(second.items)
-    stacked = []
-    for part, start in ((first, 0), (second, len(first.items))):
-        table = np.full((rows, 2), np.nan)
-        codes = np.asarray(part.counted.coded.codes)  # type: ignore[union-attr]
-        table[start : start + len(codes)] = codes
-        stacked.append(table)
-    expected = intervals.difference(
-        "fleiss_kappa",
-        *stacked,
-        design="dependent",
-        categories=[0, 1],
-        clusters=[*first.clusters, *second.clusters],
-    )
-    assert expected.interval is not None
-    assert row["value"] == pytest.approx(expected.value, rel=1e-12)
-    assert row["interval"]["low"] == pytest.approx(expected.interval.low, rel=1e-12)
-    assert row["design"] == "dependent"

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from scipy import stats
 
@@ -230,38 +229,3 @@ def test_differences_of_clinics_are_those_of_the_library(
     assert least["p_holm"] == pytest.approx(3 * least["p_value"], rel=1e-15)
     assert document["options"]["target"] == "items"
     assert {e["interval"]["target"] for e in document["estimates"]} == {"items"}
-
-
-def three_groups(folder: Path, *, same_items: bool) -> Path:
-    rng = np.random.default_rng(29)
-    lines = ["item,when,Kim,Lee"]
-    for when, share in (("before", 0.4), ("after", 0.8), ("later", 0.7)):
-        for k in range(40):
-            true = rng.integers(0, 2)
-            pair = [
-                true if rng.random() < share else rng.integers(0, 2) for _ in range(2)
-            ]
-            name = f"m{k}" if same_items else f"{when} {k}"
-            lines.append(f"{name},{when},{pair[0]},{pair[1]}")
-    path = folder / "three.csv"
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return path
-
-
-def test_three_groups_of_the_same_items_are_tested_by_hotellings_t2(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    path = three_groups(tmp_path, same_items=True)
-    rows = [line.split(",") for line in path.read_text().splitlines()[1:]]
-    sets = [
-        [row[2:] for row in rows if row[1] == when]
-        for when in ("before", "after", "later")
-    ]
-    expected = intervals.differences(
-        "cohen_kappa", sets, categories=["0", "1"]
-    ).equality
-    names = ("--by", "when", "--coefficients", "cohen_kappa")
-    (test,) = record(masrel, path, *names, command="compare")["equality"]
-    assert test["statistic"] == pytest.approx(expected.statistic, rel=1e-12)
-    assert test["df"] == [2.0, 38.0]
-    assert test["p_value"] == pytest.approx(expected.p_value, rel=1e-12)

@@ -3,7 +3,6 @@
 import csv
 import io
 import json
-import re
 from pathlib import Path
 from typing import Any, get_args
 
@@ -25,28 +24,11 @@ WIDE = "patient,Kim,Lee,Ann\nA,1,1+,1\nB,2,NA,2\nC,1,1,2\nD,3,3,3\n"
 SCALE = ("1", "1+", "2", "3")
 ROWS = [["1", "1+", "1"], ["2", None, "2"], ["1", "1", "2"], ["3", "3", "3"]]
 
-# Sessions of names that CSV and LaTeX must not take for their own.
-NAMES = ["a_b&c%", 'x,"y"', "50~^$#{}\\"]
-
 
 @pytest.fixture
 def wide(tmp_path: Path) -> Path:
     path = tmp_path / "wide.csv"
     path.write_text(WIDE, encoding="utf-8")
-    return path
-
-
-@pytest.fixture
-def sessions(tmp_path: Path) -> Path:
-    path = tmp_path / "sessions.csv"
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(["session", "item", "rater", "grade"])
-        for number, name in enumerate(NAMES):
-            for item in range(4):
-                for rater in range(2):
-                    grade = 1 + (item + rater * (item <= number)) % 3
-                    writer.writerow([name, item, f"R{rater}", grade])
     return path
 
 
@@ -113,40 +95,6 @@ def test_csv_has_every_digit_of_the_json(
         assert row["coefficient"].isprintable()
 
 
-def lacking_escape(latex: str) -> str:
-    """Return what TeX would take for its own and is no command, cell or group."""
-    rest = re.sub(r"\\[&%$#_{}]", "", latex)  # escaped
-    rest = re.sub(r"\$(-|\\[a-z]+)\$", "", rest)  # formulas there are
-    rest = rest.removeprefix("% needs ")
-    rest = re.sub(r"\\(begin|end)\{(table|tabular)\}", "", rest)
-    rest = re.sub(r"\\text\w+\{\}", "", rest)
-    return "".join(re.findall(r"[%$#_~^&]", rest))
-
-
-def test_latex_is_one_balanced_table_of_escaped_text(
-    masrel: Caller, sessions: Path
-) -> None:
-    out = masrel("agree", sessions, "--by", "session", "--latex").out
-    out = re.sub("(?m)^%.*\n", "", out)  # comments say what was read
-    opened = re.findall(r"\\begin\{(\w+)\}", out)
-    closed = re.findall(r"\\end\{(\w+)\}", out)
-    assert opened == closed[::-1] == ["table", "tabular"]
-    plain = re.sub(r"\\[{}]", "", out)
-    assert plain.count("{") == plain.count("}")
-    (letters,) = re.findall(r"\\begin\{tabular\}\{([lcr]+)\}", out)
-    body = out.split(r"\toprule")[1].split(r"\bottomrule")[0]
-    lines = [line for line in body.splitlines() if line and line != r"\midrule"]
-    assert len(lines) == 1 + 2 * len(NAMES)
-    for line in lines:
-        assert line.endswith(r" \\")
-        assert lacking_escape(line) == "&" * (len(letters) - 1)
-    for line in set(out.splitlines()) - set(lines):
-        assert lacking_escape(line) == ""
-    assert r"a\_b\&c\% & Percent agreement & " in out
-    assert r"50$\sim$\textasciicircum{}\$\#\{\}\textbackslash{} & Fleiss'" in out
-    assert r"Fleiss' $\kappa$ & $-$" in out
-
-
 def test_json_in_a_file_leaves_the_table_on_stdout(
     masrel: Caller, wide: Path, tmp_path: Path
 ) -> None:
@@ -155,25 +103,6 @@ def test_json_in_a_file_leaves_the_table_on_stdout(
     assert done.out.startswith("coefficient,")
     both = masrel("agree", wide, "--json", "-")
     assert json.loads(path.read_text(encoding="utf-8")) == json.loads(both.out)
-
-
-def test_a_level_is_that_of_every_interval(masrel: Caller, wide: Path) -> None:
-    call = ("--target", "items", "--level", "0.8", "--json", "-")
-    names = "icc_c1,fleiss_kappa"
-    found = estimates(masrel("agree", wide, "--coefficients", names, *call))
-    assert [e["interval"]["level"] for e in found] == [0.8, 0.8]
-    said = refused(
-        masrel("agree", wide, "--coefficients", names, "--interval", "bootstrap", *call)
-    )
-    assert "an ICC with items left out" in said
-    # under "all" it keeps the interval that it comes with
-    every = ("--coefficients", "all", "--interval", "jackknife")
-    (icc, *_) = (
-        e
-        for e in estimates(masrel("agree", wide, *every, *call))
-        if e["coefficient"].startswith("icc")
-    )
-    assert icc["interval"]["method"] == "REML, profile likelihood"
 
 
 @pytest.mark.parametrize(
@@ -253,25 +182,3 @@ def test_weights_of_a_file_are_those_of_a_matrix(
     assert of_kappa["standard_error"] == pytest.approx(kappa.standard_error, abs=1e-14)
     assert of_kappa["weights"] == "w.csv"
     assert json.loads(done.out)["options"]["weight_matrix"] == matrix
-
-
-@pytest.mark.parametrize(
-    ("one", "two", "other"),
-    [
-        # (x y, x), (y, y), (x y, x y), (y, x), as pandas and a form's export write it
-        ("x", "x|y", "y"),
-        ("['x']", "\"['x', 'y']\"", "['y']"),
-    ],
-)
-def test_several_labels_of_a_cell_are_told_apart(
-    masrel: Caller, tmp_path: Path, one: str, two: str, other: str
-) -> None:
-    path = tmp_path / "sets.csv"
-    rows = [(two, one), (other, other), (two, two), (other, one)]
-    text = "".join(f"{k},{a},{b}\n" for k, (a, b) in enumerate(rows))
-    path.write_text(f"item,Kim,Lee\n{text}", encoding="utf-8")
-    (of_alpha,) = estimates(masrel("agree", path, "--metric", "jaccard", "--json", "-"))
-    # of 8: x 2, y 3, xy 3; D_o = (1/2 + 1)/4, D_e = (6 + 6/2 + 9/2)/28
-    assert of_alpha["value"] == pytest.approx(1 - (3 / 8) / (27 / 56), rel=1e-12)
-    path.write_text("item,Kim,Lee\na,x,x\nb,y,x\n", encoding="utf-8")
-    assert "x|y" in refused(masrel("agree", path, "--metric", "jaccard"))

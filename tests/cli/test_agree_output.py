@@ -5,18 +5,12 @@ import io
 import json
 import re
 import shlex
-import sys
-import warnings
 from pathlib import Path
 
 import pytest
 
-from masrel.agreement import strength
-from masrel.intervals import estimate
-from masrel.ratings import read_ratings
 from tests.cli.process import Caller, Done
 
-TABLE_V = Path(__file__).parents[2] / "studies/hess2012/ratings/published.csv"
 WIDE = "patient,Kim,Lee,Ann\nA,1,1+,1\nB,2,NA,2\nC,1,1,2\nD,3,3,3\n"
 SESSIONS = "session,item,rater,grade,source\n" + "".join(
     f"{session},{item},{rater},{(item * rater) % 3},simulated\n"
@@ -45,22 +39,6 @@ def document(done: Done) -> dict:
 def table(done: Done) -> list[dict[str, str]]:
     assert done.code == 0, done.err
     return list(csv.DictReader(io.StringIO(done.out)))
-
-
-def test_what_is_null_has_its_reason(masrel: Caller, tmp_path: Path) -> None:
-    path = written(tmp_path, "item,A,B\n1,1,4\n2,4,1\n3,2,3\n4,3,2\n")
-    call = ("--coefficients", "all", "--target", "items", "--interval", "analytic")
-    for one in document(masrel("agree", path, *call, "--json", "-"))["estimates"]:
-        said = " ".join(one["notes"])
-        for key in ("value", "standard_error", "observed", "chance"):
-            assert one[key] is not None or one["reason"] is not None or key in said
-        interval = one["interval"]
-        if interval is None:
-            assert one["reason"] is not None or "no interval: " in said
-            continue
-        for end in ("low", "high"):
-            known = interval[end] is not None or interval["reason"] is not None
-            assert known or f"interval.{end}: null" in said
 
 
 # A table as CSV and LaTeX.
@@ -99,67 +77,7 @@ def test_warnings_are_lines_on_stderr_alone(masrel: Caller, tmp_path: Path) -> N
 # Notes below a table.
 
 
-def notes(done: Done) -> list[str]:
-    """Return the lines below a table."""
-    lines = done.out.splitlines()
-    rule = next(k for k, line in enumerate(lines) if line.startswith("---"))
-    rows = [k for k, line in enumerate(lines) if k > rule and re.search(r" \d+$", line)]
-    return lines[rows[-1] + 1 :]
-
-
-@pytest.mark.parametrize(("columns", "most"), [(None, 88), ("60", 60), ("300", 100)])
-def test_notes_are_as_wide_as_the_screen(
-    masrel: Caller,
-    wide: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    columns: str | None,
-    most: int,
-) -> None:
-    if columns is not None:
-        monkeypatch.setenv("COLUMNS", columns)
-        monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
-    call = ("agree", wide, "--target", "items", "--explain")
-    widths = [len(line) for line in notes(masrel(*call))]
-    assert most - 20 < max(widths) <= most
-    assert max(map(len, masrel(*call, "--csv").err.splitlines())) > 100
-
-
 # Words.
-
-
-def word_of(done: Done) -> str:
-    (row,) = table(done)
-    return row["words"]
-
-
-@pytest.mark.parametrize(
-    ("target", "interval"),
-    [
-        *(("items", kind) for kind in ("auto", "analytic", "jackknife", "bootstrap")),
-        *(("raters", kind) for kind in ("auto", "jackknife", "bootstrap")),
-        *(("both", kind) for kind in ("auto", "jackknife")),
-    ],
-)
-@pytest.mark.parametrize("level", [0.8, 0.95])
-def test_a_word_follows_the_interval_that_is_shown(
-    masrel: Caller, target: str, interval: str, level: float
-) -> None:
-    # the lower end of an interval at 90 % leaves 5 % below
-    call = ("agree", TABLE_V, "--coefficients", "gwet_ac", "--words", "landis_koch")
-    more = ("--target", target, "--interval", interval, "--level", level)
-    ratings = read_ratings(TABLE_V)
-    with warnings.catch_warnings(action="ignore"):
-        at_90 = estimate(
-            "gwet_ac",
-            ratings.parts[0].counted,
-            target=target,  # type: ignore[arg-type]
-            method=interval,  # type: ignore[arg-type]
-            level=0.9,
-            rng=0,
-        ).interval
-    assert at_90 is not None
-    assert word_of(masrel(*call, *more, "--csv")) == strength(at_90.low)
-    assert "by its interval (one-sided)" in masrel(*call, *more, "--csv").err
 
 
 # The offer of an interval.

@@ -1,21 +1,10 @@
-"""masrel audit: claims as options, as a file, or of a study."""
+"""masrel audit: what a report says of the claims of a study."""
 
 import hashlib
 from pathlib import Path
 
-import pytest
-
 from masrel.lab.protocol import copy_template
 from tests.cli.process import Caller
-
-STUDY = Path(__file__).parents[2] / "studies" / "hess2012"
-
-
-@pytest.mark.slow
-def test_the_published_study_audits_its_paper(masrel: Caller) -> None:
-    lines = masrel("audit", STUDY, "--sentence").out.splitlines()
-    assert lines[0].startswith("kappa-standard: 8 640 tables of 4 items")
-    assert lines[2].endswith("in them the raters agree on 10 of 12.")
 
 
 def test_a_report_that_names_them_has_the_claims(

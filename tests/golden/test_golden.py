@@ -12,13 +12,16 @@ EXACT = dict.fromkeys(GROUPS, True)
 
 MOST_SAID = 15
 
+SLOW = {"random": pytest.mark.long}
+"""A case that .ci/run leaves out: it has other chains of a latent trait."""
+
 
 def _parameters() -> list[object]:
     return [
         pytest.param(
             case,
             id=f"{case.group}/{case.name}",
-            marks=() if is_quick(case) else pytest.mark.slow,
+            marks=() if is_quick(case) else SLOW.get(case.name, pytest.mark.slow),
         )
         for cases in GROUPS.values()
         for case in cases

@@ -849,35 +849,3 @@ def test_every_suggestion_is_in_the_table() -> None:
             options = {(row.code, option) for option, _ in words_of(words)}
             tried[expected is not None] |= options
     assert tried[False] <= tried[True]
-
-
-@pytest.mark.parametrize(
-    ("text", "options"),
-    [
-        (CHANGES, ()),
-        (CHANGES, ("--coefficients", "percent_agreement,robinson_a")),
-        (CHANGES, ("--coefficients", "all")),
-        (DAYS, ("--by", "day")),
-        (CHANGES, ("--raters=Kim,Lee", "--symmetry", "--")),
-    ],
-)
-def test_the_command_of_an_interval_gives_it(
-    text: str, options: tuple[str, ...], tmp_path: Path, masrel: Caller
-) -> None:
-    path = tmp_path / "a file.csv"
-    path.write_text(text)
-    first = masrel("agree", "--json", "-", *options, path)
-    (line,) = (
-        line for line in first.err.splitlines() if line.startswith("no interval")
-    )
-    program, *words = shlex.split(line.rpartition(": ")[2])
-    assert program == "masrel"
-    done = masrel(*words)
-    assert (done.code, "no interval" in done.err) == (0, False), done.err
-    met, found = (
-        {(of["coefficient"], of.get("day")): of for of in json.loads(out)["estimates"]}
-        for out in (first.out, done.out)
-    )
-    assert all(found[key]["value"] == met[key]["value"] for key in found)
-    assert any(of["interval"] for of in found.values())
-    assert met.keys() - found.keys() <= {("robinson_a", None)}

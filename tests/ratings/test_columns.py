@@ -1,18 +1,13 @@
 """Columns that are more than raters and items: frequencies, criteria, and others."""
 
-import csv
-import itertools
-import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from masrel.agreement import count_ratings
 from masrel.errors import ParameterError, RatingsError
 from masrel.ratings import RatingsFile, Reading, read_ratings
-from tests.cli.process import Caller
 
 
 def read(folder: Path, text: str, **options: Any) -> RatingsFile:
@@ -111,59 +106,6 @@ def test_frequencies_that_are_refused(
 ) -> None:
     with pytest.raises((RatingsError, ParameterError), match=words):
         read(tmp_path, text, **{"frequency": "Freq", **options})
-
-
-def numbers_of(document: Any) -> list[Any]:
-    """All numbers of a document, in order."""
-    if isinstance(document, dict | list):
-        values = document.values() if isinstance(document, dict) else document
-        return [number for value in values for number in numbers_of(value)]
-    return [document] if isinstance(document, int | float) else []
-
-
-@pytest.mark.parametrize(
-    ("command", "options"),
-    [
-        ("agree", ("--coefficients", "all", "--target", "items")),
-        *(
-            ("agree", ("--interval", interval, "--target", "items"))
-            for interval in ("analytic", "jackknife", "bootstrap", "posterior")
-        ),
-        ("agree", ("--target", "both")),
-        ("diagnose", ("--target", "items")),
-        ("compare", ("--by", "sex", "--coefficients", "fleiss_kappa")),
-    ],
-)
-def test_frequencies_are_rows_that_are_repeated(
-    tmp_path: Path, masrel: Caller, command: str, options: tuple[str, ...]
-) -> None:
-    rng = np.random.default_rng(4)
-    patterns = itertools.product("fm", "123", "123", ["1", "2", "3", ""])
-    often = [(row, int(rng.integers(4) + 5 * (row[1] == row[2]))) for row in patterns]
-    rows = {
-        "counted.csv": [["sex", "A", "B", "C", "Freq"]]
-        + [[*row, str(n)] for row, n in often],
-        "repeated.csv": [["sex", "A", "B", "C"]]
-        + [list(row) for row, n in often for _ in range(n)],
-    }
-    for name, table in rows.items():
-        with (tmp_path / name).open("w", newline="") as file:
-            csv.writer(file).writerows(table)
-    if "--by" not in options:
-        options = (*options, "--ignore", "sex")
-    counted, repeated = (
-        masrel(command, tmp_path / name, *more, *options, "--json", "-")
-        for name, more in (
-            ("counted.csv", ("--frequency", "Freq")),
-            ("repeated.csv", ("--no-item",)),
-        )
-    )
-    assert counted.code == repeated.code == 0, (counted.err, repeated.err)
-    ours, theirs = (
-        [v for k, v in json.loads(done.out).items() if k not in ("read", "options")]
-        for done in (counted, repeated)
-    )
-    assert numbers_of(ours) == pytest.approx(numbers_of(theirs), rel=1e-12, abs=1e-14)
 
 
 # ---- columns that are no raters ----

@@ -3,9 +3,7 @@
 import cProfile
 import csv
 import gzip
-import subprocess
 import sys
-from collections.abc import Iterator
 from dataclasses import astuple, replace
 from pathlib import Path
 from typing import Any
@@ -171,18 +169,6 @@ def test_names_of_items_are_looked_through(
     assert [finding.code for finding in streamed.warnings] == ["stream"]
 
 
-@pytest.mark.parametrize("name", ["shuffled, texts", "items that two columns name"])
-def test_many_items_are_told_apart_without_their_names(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
-    columns, options = FILES[name]
-    path = written(tmp_path / "long.csv", columns)
-    monkeypatch.setattr(_large, "_MAX_NAMED", 2)
-    streamed, whole = both(path, **options)
-    assert streamed.warnings[-1].code == "stream"
-    assert_same(replace(streamed, warnings=whole.warnings), whole)
-
-
 @pytest.mark.parametrize(
     ("columns", "words"),
     [
@@ -228,16 +214,6 @@ def test_what_is_refused_is_refused_where_it_stands(
         read_ratings(path, Reading(stream=True))
     with pytest.raises(RatingsError, match=words.split(":")[0]):
         read_ratings(path, Reading(stream=False))
-
-
-def test_a_second_line_of_names_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(_large, "_HEAD_BYTES", 20)
-    path = tmp_path / "wide.csv"
-    path.write_text("id,A,B\np2,2,2\n\np3,2,1\nid,A,B\np4,1,1\n")
-    with pytest.raises(RatingsError, match="line 5: holds the names of the columns"):
-        read_ratings(path, Reading(stream=True))
 
 
 HEAD = "id,A,B\n" + "".join(f"p{k},{k % 3},{k // 2 % 3}\n" for k in range(500))
@@ -313,25 +289,6 @@ class TestSize:
         assert not is_streamed(read_ratings(path))
 
 
-def test_ctrl_c_leaves_no_file_behind(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    folder = tmp_path / "temporary"
-    folder.mkdir()
-    monkeypatch.setattr("tempfile.tempdir", str(folder))
-    columns = long_columns(ORDER, [f"p{k}" for k in range(400)])
-    path = written(tmp_path / "long.parquet", columns)
-    calls: Iterator[int] = iter(range(100))
-
-    def interrupt(*_: int) -> None:
-        if next(calls) == 1:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        read_ratings(path, Reading(stream=True), progress=interrupt)
-    assert list(folder.iterdir()) == []
-
-
 @pytest.mark.skipif(not IO.exists(), reason="Linux counts what a process reads")
 def test_a_file_is_read_twice_and_python_sees_none_of_its_rows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -351,22 +308,3 @@ def test_a_file_is_read_twice_and_python_sees_none_of_its_rows(
 
 def n_read() -> int:
     return int(IO.read_text().split()[1])
-
-
-@pytest.mark.parametrize(
-    ("options", "n_lines"),
-    [(["--target", "items"], 0), (["--coefficients", "cohen_kappa"], 1)],
-)
-def test_nothing_is_left_on_stderr(
-    tmp_path: Path, options: list[str], n_lines: int
-) -> None:
-    path = written(tmp_path / "long.csv", long_columns(None, list(range(400))))
-    command = [sys.executable, "-m", "masrel", "agree", str(path), "--stream", *options]
-    run = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert len(run.stderr.splitlines()) == n_lines, run.stderr
-    # what is frozen at the end is what DuckDB 2.0.0 reports
-    program = "import atexit, gc; atexit.register(lambda: print(gc.get_freeze_count()))"
-    program += f"; import masrel.cli, sys; sys.argv[1:] = {command[3:]}"
-    command = [sys.executable, "-c", f"{program}; masrel.cli.main()"]
-    run = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert run.stdout.splitlines()[-1] == "0"

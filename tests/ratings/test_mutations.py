@@ -5,7 +5,6 @@ a silent guess; what keeps the meaning keeps the numbers; and a plain table with
 cells gives what a few lines of exact arithmetic give.
 """
 
-import gzip
 import json
 import random
 from collections.abc import Callable, Sequence
@@ -182,25 +181,6 @@ MUTATIONS: list[Mutate] = [
 # ---- what keeps its meaning ----
 
 
-def quoted(data: bytes) -> bytes:
-    """Every cell in quotes, of a text whose cells have none."""
-    mark = b";" if b";" in data.partition(b"\n")[0] else b","
-    if b'"' in data or mark not in data:
-        return data
-    cells = (line.split(mark) for line in data.splitlines())
-    return b"".join(b'"' + (b'"' + mark + b'"').join(row) + b'"\n' for row in cells)
-
-
-KEPT: dict[str, Callable[[bytes], bytes]] = {
-    "mark": lambda data: b"\xef\xbb\xbf" + data.removeprefix(b"\xef\xbb\xbf"),
-    "crlf": lambda data: data.replace(b"\r\n", b"\n").replace(b"\n", b"\r\n"),
-    "no last end": lambda data: data.rstrip(b"\r\n"),
-    "blank lines": lambda data: data.rstrip(b"\r\n") + b"\n\n\n",
-    "quotes": quoted,
-    "gz": gzip.compress,
-}
-
-
 def call(masrel: Caller, folder: Path, base: Base, *more: str) -> Done:
     path = folder / base.name
     path.write_bytes(base.data)
@@ -250,18 +230,6 @@ def test_a_mutation_is_answered_or_refused(
     check_ended(done)
     if done.code == 0 and "--stream" in more:
         assert numbers(call(masrel, tmp_path, mutated)) == numbers(done)
-
-
-@pytest.mark.parametrize("kind", KEPT)
-@pytest.mark.parametrize("base", BASES, ids=repr)
-def test_what_keeps_the_meaning_keeps_the_numbers(
-    base: Base, kind: str, tmp_path: Path, masrel: Caller
-) -> None:
-    if kind != "gz" and b"\0" in base.data:
-        pytest.skip("two bytes a letter")
-    first = call(masrel, tmp_path, base)
-    kept = Base(base.name, KEPT[kind](base.data), base.options)
-    assert numbers(call(masrel, tmp_path, kept)) == numbers(first)
 
 
 # ---- plain tables ----

@@ -1,8 +1,6 @@
 """Lines above a table, names in several lines, and notes below."""
 
-import gzip
 import re
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -183,31 +181,6 @@ def test_where_no_names_are(
 def test_options_that_contradict(options: dict[str, Any], words: str) -> None:
     with pytest.raises(ParameterError, match=words):
         Reading(**options)
-
-
-def packed(path: Path, text: str) -> None:
-    if path.suffix == ".zip":
-        with zipfile.ZipFile(path, "w") as archive:
-            archive.writestr("r.csv", text)
-    else:
-        path.write_bytes(gzip.compress(text.encode()))
-
-
-@pytest.mark.parametrize("ending", [".csv", ".csv.gz", ".zip"])
-@pytest.mark.parametrize("stream", [None, True])
-def test_every_way_in(tmp_path: Path, ending: str, stream: bool | None) -> None:
-    text = f"{TITLE}{TWO_LINES.replace('patient', '# SIMULATED')}\nSource: ward 4\n"
-    path = tmp_path / f"r{ending}"
-    path.write_text(text) if ending == ".csv" else packed(path, text)
-    reading = Reading(header=(3, 4), stream=stream)
-    if stream and ending != ".csv":
-        with pytest.raises(RatingsError, match="not packed"):
-            read_ratings(path, reading)
-        return
-    file = read_ratings(path, reading)
-    assert file.read["raters"] == ["Rater Ines", "Rater Omar", "Rater Yun"]
-    assert file.read["n_items"] == 3
-    assert file.simulated
 
 
 @pytest.mark.parametrize("ending", [".json", ".sav"])

@@ -745,34 +745,6 @@ def test_files_that_are_refused(name: str, tmp_path: Path) -> None:
 # ---- sizes ----
 
 
-def wide(n_items: int, n_raters: int) -> str:
-    rows = [",".join(["item", *(f"r{j}" for j in range(n_raters))])]
-    rows += [
-        ",".join([f"i{i}", *(str((i + j * j) % 3) for j in range(n_raters))])
-        for i in range(n_items)
-    ]
-    return "\n".join([*rows, ""])
-
-
-@pytest.mark.parametrize(
-    ("n_items", "n_raters"), [(1, 2), (2, 2), (2, 1), (3, 2000), (2000, 3), (1, 1100)]
-)
-def test_sizes(n_items: int, n_raters: int, tmp_path: Path) -> None:
-    table = [[(i + j * j) % 3 for j in range(n_raters)] for i in range(n_items)]
-    kind, _, values = outcome(tmp_path, wide(n_items, n_raters))
-    assert kind != "refused"
-    assert values == values_of(table)
-
-
-def test_row_names_beside_many_columns(tmp_path: Path) -> None:
-    header, rows = wide(4, 1500).split("\n", 1)
-    data = header.removeprefix("item,") + "\n" + rows
-    table = [[(i + j * j) % 3 for j in range(1500)] for i in range(4)]
-    kind, message, values = outcome(tmp_path, data)
-    assert (kind, values) == ("warned", values_of(table))
-    assert "1500 columns count as raters of 4 items" in message
-
-
 def test_a_folder_and_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(MasrelError, match="needed a file, got a folder"):
         read_ratings(tmp_path)

@@ -1,7 +1,6 @@
 """What is read of a file of ratings: shapes, names, grades, options."""
 
 import gzip
-import hashlib
 import io
 import os
 import re
@@ -378,14 +377,6 @@ def test_scales(
     assert file.scale.grades == (grades or tuple(options["categories"]))
     assert file.is_ordered is is_ordered
     assert file.read["scale"]["declared"] is bool(options)
-
-
-@pytest.mark.parametrize("stream", [False, True])
-def test_the_hash_is_that_of_the_file(tmp_path: Path, stream: bool) -> None:
-    if stream:
-        pytest.importorskip("duckdb")
-    file = read(tmp_path, WIDE, stream=stream)
-    assert file.sha256() == hashlib.sha256(WIDE.encode()).hexdigest()
 
 
 def test_a_simulated_file_says_so(tmp_path: Path) -> None:
