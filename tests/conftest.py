@@ -27,3 +27,11 @@ def faults(
     if request.node.get_closest_marker("faults"):
         for row in counts.rows():
             record_property("faults", row)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
+    """Give each worker neighbours, so that what a module shares is made once."""
+    from xdist.scheduler import WorkStealingScheduling
+
+    return WorkStealingScheduling(config, log)
