@@ -197,8 +197,6 @@ class ToneEvent:
 class ToneStepper:
     """A law that sees one sample at a time; one with a memory adds it."""
 
-    __slots__ = ("is_given_up", "model", "phase", "rest")
-
     def __init__(self, model: Any, start_angle: float) -> None:
         self.model, self.rest = model, model.rest_from(start_angle)
         self.is_given_up = False

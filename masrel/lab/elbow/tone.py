@@ -68,8 +68,6 @@ _BEYOND = math.radians(10.0)
 class _Rigid(ToneStepper):
     """Rigidity; nothing is ever triggered."""
 
-    __slots__ = ("_angle", "_bristle")
-
     def begin(self) -> None:
         self._angle, self._bristle = math.nan, 0.0
 
@@ -206,8 +204,6 @@ class LeadPipe(ToneModel):
 
 class _Cogwheel(_Rigid):
     """Cogwheel rigidity; nothing is ever triggered."""
-
-    __slots__ = ("_ended", "_last", "_onset", "_way")
 
     def begin(self) -> None:
         super().begin()
@@ -349,8 +345,6 @@ def _edge(since: float, length: float) -> float:
 
 class _ClaspKnife(ToneStepper):
     """A clasp-knife; a release gives it up until the arm is back beyond θ_arm."""
-
-    __slots__ = ("_fired",)
 
     def begin(self) -> None:
         self._fired = math.nan  # when the latch closed, s
@@ -623,8 +617,6 @@ class Contracture(ToneModel):
 class _Dystonia(ToneStepper):
     """Dystonia; once released it stays at its resting activation."""
 
-    __slots__ = ("_begun",)
-
     def begin(self) -> None:
         self._begun = math.nan  # the first sample, s
 
@@ -732,8 +724,6 @@ class Dystonia(ToneModel):
 
 class _Clonus(ToneStepper):
     """Clonus; a release stops the beats until the arm has been moved back."""
-
-    __slots__ = ("_begun", "_farthest")
 
     def begin(self) -> None:
         self._begun = math.nan  # when the beats were set off, s
@@ -890,8 +880,6 @@ class _ThresholdReflex(ToneStepper):
     a whole number of samples, and after a missed tick it is still right. Before the
     first is old enough the arm is taken to have rested where it was then.
     """
-
-    __slots__ = ("_late", "_samples")
 
     def begin(self) -> None:
         self._samples: deque[tuple[float, float, float]] = deque()

@@ -96,12 +96,8 @@ class Known:
     limit: DetectionLimit | None = None
 
 
-class Row(NamedTuple):
-    """A residual over its spread that is not of a sample, and its derivatives."""
-
-    name: str
-    left: float
-    slopes: Mapping[str, float]
+# A residual over its spread that is not of a sample: name, size, and derivatives.
+Row = tuple[str, float, Mapping[str, float]]
 
 
 class _Design(NamedTuple):
@@ -262,10 +258,10 @@ class Equations:
         table = np.zeros((n + len(rows), len(names) + 1))
         for place, name in enumerate(names):
             table[:n, place] = by_name.get(name, 0.0)
-            table[n:, place] = [row.slopes.get(name, 0.0) for row in rows]
+            table[n:, place] = [slopes.get(name, 0.0) for _, _, slopes in rows]
         table[:n, -1] = law - self.part.torque
         table[:n] /= sd
-        table[n:, -1] = [row.left for row in rows]
+        table[n:, -1] = [left for _, left, _ in rows]
         return table
 
     def law(self, values: Mapping[str, float]) -> _Floats:
@@ -297,7 +293,8 @@ class Equations:
 
     def catch_rows(self, values: Mapping[str, float]) -> list[Row]:
         """Return how far the trial's own values are from what they scatter about."""
-        rows, used, size = [], self.catch, self.known.spreads
+        rows: list[Row] = []
+        used, size = self.catch, self.known.spreads
         line, slope, height, ratio, mean, peak, residual = (
             values.get(name, math.nan) for name in _SCATTERED
         )
@@ -305,25 +302,25 @@ class Equations:
             slowest = self.known.constants.slowest_mean_speed
             left, by_line, by_slope = line_row(self.trial.catch, line, slope, slowest)
             slopes = {"catch_angle_constant": by_line, "catch_slope": by_slope}
-            rows.append(Row("catch angle", left, slopes))  # (2)
+            rows.append(("catch angle", left, slopes))  # (2)
         if used is not None:
             slopes = {"catch_torque_constant": used.speed, "peak": -1.0}
-            rows.append(Row("peak", height * used.speed - peak, slopes))  # (3)
+            rows.append(("peak", height * used.speed - peak, slopes))  # (3)
             slopes = {"residual_ratio": peak, "peak": ratio, "residual": -1.0}
-            rows.append(Row("residual", ratio * peak - residual, slopes))  # (3)
+            rows.append(("residual", ratio * peak - residual, slopes))  # (3)
             if used.end is not None:
                 left = mean - values.get("travel", used.travel)  # (4)
-                rows.append(Row("travel", left, {"catch_travel": 1.0, "travel": -1.0}))
+                rows.append(("travel", left, {"catch_travel": 1.0, "travel": -1.0}))
         # what is not fitted is nan, and says nothing
         rows = [
-            Row(name, left / size[name], {n: x / size[name] for n, x in slopes.items()})
+            (name, left / size[name], {n: x / size[name] for n, x in slopes.items()})
             for name, left, slopes in rows
             if not math.isnan(left)
         ]
         limit = self.known.limit
         if used is not None and limit is not None and not math.isnan(mean):
             left, by_mean, _ = beyond(mean, limit, size["travel"])
-            rows.append(Row("limit", left, {"catch_travel": by_mean}))
+            rows.append(("limit", left, {"catch_travel": by_mean}))
         return rows
 
     def rows(self, shared: _Floats, table: _Floats) -> Rows:
@@ -401,15 +398,22 @@ def mills(z: _Floats) -> _Floats:
 class Solution:
     """Where the sum of squares is smallest: shared parameters, and each trial's own."""
 
+    equations: Sequence[Equations]
     shared: _Floats
     local: list[_Floats]
-    typical: float  # median over catches of the mean square that is left, (N·m)²
     n_evaluations: int
+    values: list[dict[str, float]]  # each trial's parameters by name
+    laws: tuple[_Floats, ...]  # and torque, N·m
 
-    def values(self, equations: Sequence[Equations]) -> list[dict[str, float]]:
-        """Return every trial's parameters by name."""
-        pairs = zip(equations, self.local, strict=True)
-        return [e.values(self.shared, local) for e, local in pairs]
+    @property
+    def typical(self) -> float:
+        """Return the median over catches of the mean square that is left, (N·m)²."""
+        left = [
+            float(((e.part.measured - law) ** 2).mean())
+            for e, law in zip(self.equations, self.laws, strict=True)
+            if e.catch is not None
+        ]
+        return float(np.median(left)) if left else math.nan
 
 
 def fit_together(
@@ -464,13 +468,9 @@ def fit_together(
         max_nfev=_EVALUATIONS,
     )
     shared, local = solution.x[:n], np.split(solution.x[n:], cuts[:-1] - n)[1:]
-    left = [
-        float(((e.part.measured - e.law(e.values(shared, own))) ** 2).mean())
-        for e, own in zip(equations, local, strict=True)
-        if e.catch is not None
-    ]
-    typical = float(np.median(left)) if left else math.nan
-    return Solution(shared, local, typical, solution.nfev)
+    values = [e.values(shared, own) for e, own in zip(equations, local, strict=True)]
+    laws = tuple(e.law(at) for e, at in zip(equations, values, strict=True))
+    return Solution(equations, shared, local, solution.nfev, values, laws)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -479,21 +479,18 @@ class JointFit:
 
     fit: ClusteredFit
     tables: list[_Floats] = field(repr=False)  # of all samples, at the solution
-    laws: tuple[_Floats, ...] = field(repr=False)
     torque_sd: float
     cross_validation: _Floats = field(repr=False)
 
 
-def joint_fit(equations: Sequence[Equations], solution: Solution) -> JointFit:
+def joint_fit(solution: Solution) -> JointFit:
     """Return values of all parameters with their covariance, clustered by trial."""
-    shared = solution.shared
-    pairs = list(zip(equations, solution.local, strict=True))
+    shared, equations = solution.shared, solution.equations
+    pairs = zip(equations, solution.local, strict=True)
     tables = [e.table(shared, local) for e, local in pairs]
     rows = [e.rows(shared, t) for e, t in zip(equations, tables, strict=True)]
-    laws = tuple(e.law(e.values(shared, local)) for e, local in pairs)
-    left = np.concatenate(
-        [e.part.measured - law for e, law in zip(equations, laws, strict=True)]
-    )
+    pairs_of_torque = zip(equations, solution.laws, strict=True)
+    left = np.concatenate([e.part.measured - law for e, law in pairs_of_torque])
     spare = left.size - sum(local.size for local in solution.local) - shared.size
     step = solve(rows)
     # what no trial determines is nan in the step and stays so
@@ -501,26 +498,22 @@ def joint_fit(equations: Sequence[Equations], solution: Solution) -> JointFit:
     return JointFit(
         fit=replace(step, values=values),
         tables=tables,
-        laws=laws,
         torque_sd=math.sqrt(float(left @ left) / max(spare, 1)),
-        cross_validation=_left_out(equations, solution, rows, tables, laws),
+        cross_validation=_left_out(solution, rows, tables),
     )
 
 
 def _left_out(
-    equations: Sequence[Equations],
-    solution: Solution,
-    rows: Sequence[Rows],
-    tables: Sequence[_Floats],
-    laws: Sequence[_Floats],
+    solution: Solution, rows: Sequence[Rows], tables: Sequence[_Floats]
 ) -> _Floats:
     # Per trial the mean square of its torque less what the others' parameters give, as
     # linear as they are at the fit. Constant, peak, residual and travel are its own;
     # its drift is the others' mean, or a drift would better every fit.
-    drifts = np.array([values["drift"] for values in solution.values(equations)])
+    drifts = np.array([values["drift"] for values in solution.values])
     made = []
-    for i, (e, step) in enumerate(zip(equations, left_out_steps(rows), strict=True)):
-        table, law, n = tables[i], laws[i], len(e.local)
+    pairs = zip(solution.equations, left_out_steps(rows), strict=True)
+    for i, (e, step) in enumerate(pairs):
+        table, law, n = tables[i], solution.laws[i], len(e.local)
         r = triangle(table)
         local = np.zeros(n)
         if "drift" in e.local and drifts.size > 1:

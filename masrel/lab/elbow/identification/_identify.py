@@ -322,12 +322,12 @@ class Round:
     law: Law
     limits: list[DetectionLimit | None]
     steps: list[Step]
-    equations: list[Equations]
     solution: Solution
 
+    @property
     def shared(self) -> dict[str, float]:
         """Return the shared parameters by name."""
-        names = self.equations[0].known.names
+        names = self.solution.equations[0].known.names
         return dict(zip(names, self.solution.shared.tolist(), strict=True))
 
     def untimed(self) -> dict[str, str]:
@@ -336,7 +336,7 @@ class Round:
         return {
             name: f"shorter than {1000.0 * floors[name]:.2g} ms, which these samples "
             "do not tell from nothing: taken as 0"
-            for name, value in self.shared().items()
+            for name, value in self.shared.items()
             if name in floors and value <= floors[name]
         }
 
@@ -382,30 +382,25 @@ def fit_in_rounds(
     made = min(tries, key=lambda each: each.solution.typical)
     n_rounds = _ROUNDS if set(options.fitted) - {"offset"} else 1
     for _ in range((_TIMED_ROUNDS if made.law.takes_time else n_rounds) - 1):
-        values = made.solution.values(made.equations)
+        pairs = list(zip(made.trials, made.solution.values, strict=True))
         shifts = {
             trial.name: (trial.catch.time, at["shift"])
-            for trial, at in zip(made.trials, values, strict=True)
+            for trial, at in pairs
             if trial.catch is not None and "shift" in at
         }
         instants = {name: sum(pair) for name, pair in shifts.items()}
+        # what the fit says of the law before a catch, and of the arm
+        known = {*ALWAYS, *ARM_QUANTITIES}
+        found: dict[str, Any] = {n: x for n, x in made.shared.items() if n in known}
+        if "drift" in options.fitted:
+            found["drifts"] = {trial.name: at["drift"] for trial, at in pairs}
         # no catch moves by more than a sample
         furthest = max((abs(by) for _, by in shifts.values()), default=math.inf)
-        period = _period(made.trials)
-        made = _round(stretches, slow, _next(made, options), options, instants)
-        if furthest < period:
+        is_last = furthest < _period(made.trials)
+        made = _round(stretches, slow, replace(made.law, **found), options, instants)
+        if is_last:
             break
     return made
-
-
-def _next(made: Round, options: FitOptions) -> Law:
-    # what the fit says of the law before a catch, and of the arm
-    values = made.solution.values(made.equations)
-    drifts = {t.name: at["drift"] for t, at in zip(made.trials, values, strict=True)}
-    known = {*ALWAYS, *ARM_QUANTITIES}
-    found: dict[str, Any] = {n: x for n, x in made.shared().items() if n in known}
-    found["drifts"] = drifts if "drift" in options.fitted else {}
-    return replace(made.law, **found)
 
 
 def _round(
@@ -466,7 +461,6 @@ def _round(
         law=law,
         limits=limits,
         steps=steps,
-        equations=equations,
         solution=fit_together(equations, start, lowest),
     )
 
@@ -772,11 +766,10 @@ def _result(
     rest_sd: float,
     untimed: Mapping[str, str],
 ) -> ElbowFit:
-    joint = joint_fit(made.equations, made.solution)
+    joint, values = joint_fit(made.solution), made.solution.values
     reasons = {**_reasons(made, options), **untimed}
     estimates = _all_estimates(joint, made, reasons, options)
     _check_law(estimates)
-    values = made.solution.values(made.equations)
     terms = {**options.terms, **dict.fromkeys(untimed, 0.0)}
     return ElbowFit(
         estimates=estimates,
@@ -784,12 +777,10 @@ def _result(
         steps=tuple(made.steps),
         relative_error=slow.relative_error,
         torque_sd=joint.torque_sd,
-        lack_of_fit=lack_of_fit(
-            made.equations, made.solution, joint.tables, joint.laws, rest_sd
-        ),
+        lack_of_fit=lack_of_fit(made.solution, joint.tables, rest_sd),
         cross_validation=joint.cross_validation,
         trials=tuple(made.trials),
-        fitted_torque=joint.laws,
+        fitted_torque=made.solution.laws,
         constants=options.constants,
         arm={**terms, "gravity_angle": options.gravity_angle},
         offsets=tuple(each["offset"] for each in values),
@@ -839,7 +830,7 @@ def _all_estimates(
     # Where travels are censored, D is that of its step. Least squares hold the spread
     # of travels and know less than they say; and they draw each end towards D, by
     # which that spread would come out too small.
-    level, names = options.level, list(made.shared())
+    level, names = options.level, list(made.shared)
     by_name = {e.name: e for e in fitted(names, joint.fit, level, reasons)}
     if any(each is not None for each in made.limits):
         whole = {e.name: e for step in made.steps for e in step.estimates}
@@ -855,7 +846,7 @@ def _all_estimates(
 def _correlation(
     joint: JointFit, made: Round, estimates: Sequence[FittedParameter]
 ) -> _Floats:
-    names = list(made.shared())
+    names = list(made.shared)
     places = [names.index(e.name) if e.name in names else -1 for e in estimates]
     sd = np.sqrt(np.diag(joint.fit.covariance))
     whole = np.full((len(sd) + 1, len(sd) + 1), np.nan)

@@ -173,10 +173,13 @@ class LackOfFit:
             return f"Fits: {nothing}; {share}."
         if self.verdict == "no evidence either way":
             most = max(_not_noise(self.phases, self.rest_sd), key=lambda left: left.sd)
+            at_rest = "unknown"
+            if not math.isnan(self.rest_sd):
+                at_rest = f"{self.rest_sd:.2g} N·m"
             return (
                 f"No evidence either way: {nothing}, but what is left is not noise "
                 f"({most.phase}: {most.sd:.2g} N·m, autocorrelation "
-                f"{most.autocorrelation:.2f}; at rest {_rest_text(self.rest_sd)}); "
+                f"{most.autocorrelation:.2f}; at rest {at_rest}); "
                 f"{share}."
             )
         words, option = STRUCTURES[first.name]
@@ -188,20 +191,14 @@ class LackOfFit:
 
 
 def lack_of_fit(
-    equations: Sequence[Equations],
-    solution: Solution,
-    tables: Sequence[_Floats],
-    laws: Sequence[_Floats],
-    rest_sd: float,
+    solution: Solution, tables: Sequence[_Floats], rest_sd: float
 ) -> LackOfFit:
     """Return what a fit leaves over, and whether that goes with anything.
 
-    `tables` are the equations' at the solution, `laws` their torques.
+    `tables` are the equations' at the solution.
     """
-    values = solution.values(equations)
-    added = [
-        _added(e, at, law) for e, at, law in zip(equations, values, laws, strict=True)
-    ]
+    equations, laws = solution.equations, solution.laws
+    added = list(map(_added, equations, solution.values, laws))
     # of catches that outlast their stretch, those that end are the short ones
     unended = any(e.catch is not None and e.catch.end is None for e in equations)
     names = [
@@ -271,10 +268,6 @@ def _not_noise(phases: Sequence[PhaseResidual], rest_sd: float) -> list[PhaseRes
     ]
 
 
-def _rest_text(rest_sd: float) -> str:
-    return "unknown" if math.isnan(rest_sd) else f"{rest_sd:.2g} N·m"
-
-
 def _pooled(phases: Sequence[PhaseResidual]) -> float:
     squares = sum(p.n_samples * p.sd**2 for p in phases)
     return math.sqrt(squares / sum(p.n_samples for p in phases))
@@ -331,7 +324,7 @@ def _added(
             timed = {**values, name: getattr(e.known.law, name) + more}
             columns[name] = e.law(timed) - law
     columns |= {"bent stiffness": angle**2, "bent damping": speed**2}
-    rows = [row.name for row in e.catch_rows(values)]
+    rows = [name for name, _, _ in e.catch_rows(values)]
     sd, fitted = e.known.spreads["torque"], {*e.known.names, *e.local}
     columns = {
         name: np.append(column / sd, np.zeros(len(rows)))
