@@ -258,9 +258,10 @@ class ToneModel(JointModel, ABC):
     )
 
     def __post_init__(self) -> None:
+        defaults = {entry.name: entry.default for entry in fields(self)}
         for name, known in self.quantities().items():
             value = getattr(self, name)
-            if value is None and name in self._may_be_none():
+            if value is None and defaults[name] is None:
                 continue
             is_number = isinstance(value, int | float) and not isinstance(value, bool)
             if not is_number or not math.isfinite(value):
@@ -280,10 +281,6 @@ class ToneModel(JointModel, ABC):
     def quantities(cls) -> dict[str, Quantity]:
         """Return unit, range and origin of every parameter, by name."""
         return {entry.name: entry.metadata["quantity"] for entry in fields(cls)}
-
-    @classmethod
-    def _may_be_none(cls) -> frozenset[str]:
-        return frozenset(entry.name for entry in fields(cls) if entry.default is None)
 
     def stepper(self, start_angle: float) -> ToneStepper:
         """Return the joint as a state machine that has not seen a sample yet."""

@@ -401,7 +401,6 @@ class Solution:
     equations: Sequence[Equations]
     shared: _Floats
     local: list[_Floats]
-    n_evaluations: int
     values: list[dict[str, float]]  # each trial's parameters by name
     laws: tuple[_Floats, ...]  # and torque, N·m
 
@@ -470,7 +469,7 @@ def fit_together(
     shared, local = solution.x[:n], np.split(solution.x[n:], cuts[:-1] - n)[1:]
     values = [e.values(shared, own) for e, own in zip(equations, local, strict=True)]
     laws = tuple(e.law(at) for e, at in zip(equations, values, strict=True))
-    return Solution(equations, shared, local, solution.nfev, values, laws)
+    return Solution(equations, shared, local, values, laws)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

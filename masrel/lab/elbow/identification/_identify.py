@@ -143,8 +143,6 @@ class ElbowFit:
         value, SI units.
     offsets, drifts : tuple of float
         Per trial its constant torque (N·m) and what that gains a second (N·m/s).
-    n_evaluations : int
-        How often the last fit evaluated the law.
     level : float
         Level of the intervals.
     simulated : bool
@@ -168,7 +166,6 @@ class ElbowFit:
     arm: Mapping[str, float | str]
     offsets: tuple[float, ...] = field(repr=False)
     drifts: tuple[float, ...] = field(repr=False)
-    n_evaluations: int
     level: float
     simulated: bool
     sources: Mapping[str, str | None]
@@ -785,7 +782,6 @@ def _result(
         arm={**terms, "gravity_angle": options.gravity_angle},
         offsets=tuple(each["offset"] for each in values),
         drifts=tuple(each["drift"] for each in values),
-        n_evaluations=made.solution.n_evaluations,
         level=options.level,
         simulated=any(movement.simulated for movement in movements),
         sources={m.name: m.sha256 for m in movements},
@@ -975,7 +971,16 @@ def compare_fits(
                 fits.append(((term,), made, None))
             except MasrelError as error:
                 fits.append(((term,), None, str(error)))
-    squares = [{} if made is None else _finite_errors(made) for _, made, _ in fits]
+    squares = [
+        {
+            trial.name: value
+            for trial, value in zip(made.trials, made.cross_validation, strict=True)
+            if math.isfinite(value)
+        }
+        if made is not None
+        else {}
+        for _, made, _ in fits
+    ]
     order = sorted(set.intersection(*(set(each) for each in squares if each)))
     table = np.array([[each.get(n, math.nan) for n in order] for each in squares])
     means = table.mean(axis=1) if order else np.full(len(fits), math.nan)
@@ -997,8 +1002,3 @@ def compare_fits(
         )
         for i, (terms, made, reason) in enumerate(fits)
     )
-
-
-def _finite_errors(made: ElbowFit) -> dict[str, float]:
-    pairs = zip(made.trials, made.cross_validation.tolist(), strict=True)
-    return {trial.name: value for trial, value in pairs if math.isfinite(value)}
