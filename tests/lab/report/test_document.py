@@ -53,6 +53,7 @@ def csv_rows(path: Path) -> list[list[str]]:
         return list(csv.reader(file))
 
 
+@pytest.mark.slow
 def test_the_same_inputs_give_the_same_bytes(
     tmp_path: Path, published: ReportFiles, simulated: ReportFiles
 ) -> None:
