@@ -408,7 +408,27 @@ class Hold(Motion):
         return [Piece(0.0, self.duration, (0.0,), 0.0, 0.0)]
 
 
-class Recorded(Motion):
+class _Laid(Motion):
+    """A movement whose pieces are laid out once."""
+
+    __slots__ = ("_pieces", "_rows", "duration", "end", "start")
+
+    start: float
+    end: float
+    duration: float
+    _pieces: list[Piece]
+    _rows: Rows
+
+    def pieces(self) -> list[Piece]:
+        """Return the pieces in order of time."""
+        return self._pieces
+
+    def rows(self) -> Rows:
+        """Return the pieces as arrays."""
+        return self._rows
+
+
+class Recorded(_Laid):
     """A movement given by samples, evenly spaced or not, a `Motion`.
 
     Parameters
@@ -446,7 +466,7 @@ class Recorded(Motion):
     (3.0, 1.0)
     """
 
-    __slots__ = ("_angles", "_knots", "_pieces", "_rows", "interpolation")
+    __slots__ = ("_angles", "_knots", "interpolation")
 
     def __init__(
         self,
@@ -462,8 +482,15 @@ class Recorded(Motion):
         times, angles = _checked(time, angle)
         self.interpolation = interpolation
         self._knots, self._angles = times - times[0], angles
+        self.start, self.end = float(angles[0]), float(angles[-1])
+        self.duration = float(self._knots[-1])
         self._rows = Rows(self._knots[:-1], self._coefficients())
-        self._pieces = self._laid()
+        width = np.diff(self._knots)
+        speeds = bernstein(derivative(list(self._rows.angle)), width)
+        slowest, fastest = np.min(speeds, axis=0), np.max(speeds, axis=0)
+        columns = (self._rows.start, width, self._rows.angle.T, slowest, fastest)
+        rows = zip(*(column.tolist() for column in columns), strict=True)
+        self._pieces = list(map(Piece._make, rows))
 
     def _coefficients(self) -> Floats:
         # θ_i + u (first + u (c₂ + u c₃)), u the time since sample i
@@ -475,36 +502,6 @@ class Recorded(Motion):
         begin, finish = slopes[:-1] - chord, slopes[1:] - chord
         square, cube = -(2.0 * begin + finish) / width, (begin + finish) / width / width
         return np.stack([low, slopes[:-1], square, cube])
-
-    def _laid(self) -> list[Piece]:
-        width = np.diff(self._knots)
-        speeds = bernstein(derivative(list(self._rows.angle)), width)
-        slowest, fastest = np.min(speeds, axis=0), np.max(speeds, axis=0)
-        columns = (self._rows.start, width, self._rows.angle.T, slowest, fastest)
-        return list(map(Piece._make, zip(*(c.tolist() for c in columns), strict=True)))
-
-    @property
-    def start(self) -> float:
-        """Angle of the first sample, rad."""
-        return float(self._angles[0])
-
-    @property
-    def end(self) -> float:
-        """Angle of the last sample, rad."""
-        return float(self._angles[-1])
-
-    @property
-    def duration(self) -> float:
-        """From the first sample to the last, s."""
-        return float(self._knots[-1])
-
-    def pieces(self) -> list[Piece]:
-        """Return the cubics, or lines, from sample to sample."""
-        return self._pieces
-
-    def rows(self) -> Rows:
-        """Return the pieces as arrays."""
-        return self._rows
 
 
 def _monotone_slopes(width: Floats, chord: Floats) -> Floats:
@@ -675,7 +672,7 @@ class Reversed(Motion):
         return back
 
 
-class Joined(Motion):
+class Joined(_Laid):
     """Movements one after another, a `Motion`.
 
     Parameters
@@ -704,7 +701,7 @@ class Joined(Motion):
     (4.0, 1.5, -1.0)
     """
 
-    __slots__ = ("_duration", "_pieces", "_rows", "motions")
+    __slots__ = ("motions",)
 
     def __init__(self, motions: Sequence[Motion]) -> None:
         self.motions = tuple(motions)
@@ -717,47 +714,24 @@ class Joined(Motion):
                     "degrees, where the one before ends, got "
                     f"{math.degrees(other.start):g} degrees"
                 )
-        self._duration = 0.0
-        self._pieces: list[Piece] = []
+        self.start, self.end = self.motions[0].start, self.motions[-1].end
+        self.duration, self._pieces = 0.0, []
         for motion in self.motions:
             offset = motion.origin - self.origin
             self._pieces += [
                 piece._replace(
-                    start=self._duration + piece.start,
+                    start=self.duration + piece.start,
                     angle=(piece.angle[0] + offset, *piece.angle[1:]),
                 )
                 for piece in motion.pieces()
             ]
-            self._duration += motion.duration
+            self.duration += motion.duration
         self._rows = rows_of(self._pieces)
 
     @property
     def origin(self) -> float:
         """Angle the pieces count from, rad."""
         return float(self.motions[0].origin)
-
-    @property
-    def start(self) -> float:
-        """Angle where the first starts, rad."""
-        return self.motions[0].start
-
-    @property
-    def end(self) -> float:
-        """Angle where the last ends, rad."""
-        return self.motions[-1].end
-
-    @property
-    def duration(self) -> float:
-        """How long they take together, s."""
-        return self._duration
-
-    def pieces(self) -> list[Piece]:
-        """Return the pieces of every movement in turn."""
-        return self._pieces
-
-    def rows(self) -> Rows:
-        """Return the pieces as arrays."""
-        return self._rows
 
 
 def interrupted(motion: Motion, *, at: float, pause: float) -> Joined:
