@@ -1,6 +1,6 @@
 """What differs between the two entries of a sheet, by the session's log."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from masrel.lab.protocol._values import Answer
@@ -8,9 +8,6 @@ from masrel.lab.run._state import SessionState
 
 StudyAnswers = Mapping[tuple[str, str], Answer]
 """What a rater answered about the study, by questionnaire and question."""
-
-GRADE = "grade"
-"""The column of grades."""
 
 NO_GRADE = "NA"
 """What is typed where a presentation has no grade."""
@@ -49,31 +46,27 @@ def sheet_differences(
     state: SessionState, of_study: StudyAnswers
 ) -> tuple[SheetDifference, ...]:
     """Return in what the last second entry of a sheet differs from the logs."""
-    return tuple(sorted(_differences(state, of_study), key=lambda each: each.row))
-
-
-def _differences(
-    state: SessionState, of_study: StudyAnswers
-) -> Iterator[SheetDifference]:
     first: dict[tuple[str | None, str], object] = {
-        (code, GRADE): grade for code, grade in state.grades.items()
+        (code, "grade"): grade for code, grade in state.grades.items()
     }
     for (questionnaire, question), answer in of_study.items():
         first[None, f"{questionnaire}.{question}"] = answer
     for (questionnaire, question, code), answer in state.answers.items():
         first[code, f"{questionnaire}.{question}"] = answer
-    for (code, column), event in state.reentered.items():
-        fields, before = event.fields, first.get((code, column))
-        if before != fields["value"]:
-            yield SheetDifference(
-                code=code,
-                column=column,
-                first=_shown(before),
-                second=_shown(fields["value"]),
-                file=str(fields["file"]),
-                row=int(str(fields["row"])),
-                who=str(fields["who"]),
-            )
+    differences = [
+        SheetDifference(
+            code=code,
+            column=column,
+            first=_shown(first.get((code, column))),
+            second=_shown(event.fields["value"]),
+            file=str(event.fields["file"]),
+            row=int(str(event.fields["row"])),
+            who=str(event.fields["who"]),
+        )
+        for (code, column), event in state.reentered.items()
+        if event.fields["value"] != first.get((code, column))
+    ]
+    return tuple(sorted(differences, key=lambda each: each.row))
 
 
 def _shown(value: object) -> str:

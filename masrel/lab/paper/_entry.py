@@ -15,7 +15,7 @@ from masrel._files import check_inside
 from masrel.errors import ParameterError, RatingsError, SessionLogError
 from masrel.lab._event_log import Event, SessionLog, utc_now
 from masrel.lab.conduct._study_log import append_event, stated, study_answers
-from masrel.lab.paper._differences import GRADE, SheetDifference, sheet_differences
+from masrel.lab.paper._differences import SheetDifference, sheet_differences
 from masrel.lab.paper._form import (
     FilledRow,
     Form,
@@ -126,8 +126,7 @@ def enter_sheet(
         If the session was out of the order, or the interval, of the protocol.
     """
     reasons = stated(who=who)
-    _check_day(on, now)
-    _check_device(device)
+    _check(on, device, now)
     sheet, rows, form = filled_sheet(study, protocol, file, rater, session)
     _refuse_answered(study, sheet, rows, rater)
     log_file = study.log_file(rater, session)
@@ -211,13 +210,10 @@ def _begin(
             )
 
 
-def _check_day(on: date | None, now: Callable[[], datetime]) -> None:
+def _check(on: date | None, device: str, now: Callable[[], datetime]) -> None:
     today = now().astimezone().date()
     if on is not None and on > today:
         raise ParameterError(f"on: needed a day up to {today}, got {on}")
-
-
-def _check_device(device: str) -> None:
     # what is simulated is run by masrel, and says so in the log
     if not _DEVICE.fullmatch(device) or "simulated" in device.casefold():
         raise ParameterError(
@@ -412,7 +408,7 @@ def _reenter(
     state: SessionState,
     log: SessionLog,
 ) -> None:
-    values: dict[str, _Fact] = {GRADE: row.grade} if row.code is not None else {}
+    values: dict[str, _Fact] = {"grade": row.grade} if row.code is not None else {}
     values |= {column.column: answer for column, answer in row.answers}
     for column, value in values.items():
         cell = {

@@ -64,14 +64,8 @@ def form_of(protocol: Protocol, schedule: Schedule) -> Form:
     """Return the sheet of a schedule; it names no model."""
     codes = tuple(shown.code for shown in schedule.presentations)
     # a rater is asked about the study on the sheet of the last session
-    is_last = (
-        schedule.session
-        == [
-            session.id
-            for session in protocol.sessions
-            if schedule.rater in session.raters
-        ][-1]
-    )
+    sessions = [each.id for each in protocol.sessions if schedule.rater in each.raters]
+    is_last = schedule.session == sessions[-1]
     return Form(
         id=_id_of(schedule.study, schedule.rater, schedule.session, codes),
         rater=schedule.rater,
@@ -138,7 +132,11 @@ class TypedSheet:
 
 def read_typed(path: Path) -> TypedSheet:
     """Return what was typed into a sheet; RatingsError if it is no such file."""
-    data = _bytes(path)
+    try:
+        data = read_regular(path, most=MAX_SMALL)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise RatingsError(f"{path}: needed a sheet, got: {reason}") from error
     records = list(_records(path, _text(path, data)))
     # Below the version, and "sep=;", which some spreadsheets write and want first
     head = list(takewhile(_is_head, (record[0] for record in records)))
@@ -162,14 +160,6 @@ def read_typed(path: Path) -> TypedSheet:
 
 def _is_head(cell: str) -> bool:
     return cell.startswith("#") or cell.casefold().startswith("sep=")
-
-
-def _bytes(path: Path) -> bytes:
-    try:
-        return read_regular(path, most=MAX_SMALL)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise RatingsError(f"{path}: needed a sheet, got: {reason}") from error
 
 
 def _text(path: Path, data: bytes) -> str:
@@ -308,18 +298,14 @@ def fill_form(
 
 
 def _check_columns(sheet: TypedSheet, form: Form) -> None:
-    for column in sheet.columns:
-        if column not in form.columns:
-            raise RatingsError(
-                f"{sheet.path}: needed the columns {', '.join(form.columns)}, got "
-                f"{shortened(column)} too"
-            )
-    for column in form.columns[len(FIRST_COLUMNS) :]:
-        if column not in sheet.columns:
-            raise RatingsError(
-                f"{sheet.path}: needed the columns {', '.join(form.columns)}, got no "
-                f"{column}"
-            )
+    stray = [name for name in sheet.columns if name not in form.columns]
+    absent = [
+        each for each in form.columns[len(FIRST_COLUMNS) :] if each not in sheet.columns
+    ]
+    if stray or absent:
+        got = f"{shortened(stray[0])} too" if stray else f"no {absent[0]}"
+        needed = f"needed the columns {', '.join(form.columns)}"
+        raise RatingsError(f"{sheet.path}: {needed}, got {got}")
 
 
 def _refuse_other_sheet(sheet: TypedSheet, form: Form, others: Iterable[Form]) -> None:

@@ -9,12 +9,7 @@ from pathlib import Path
 import masrel
 from masrel._files import write_files
 from masrel.errors import ParameterError, RatingsError
-from masrel.lab.paper._form import (
-    Form,
-    QuestionColumn,
-    form_of,
-    read_typed,
-)
+from masrel.lab.paper._form import Form, form_of, read_typed
 from masrel.lab.protocol import Protocol, Question, StudyPaths, scale_of
 from masrel.lab.run._rehearsal import practice_presentations
 from masrel.lab.run.console import _instruction
@@ -156,29 +151,14 @@ def _typed_text(form: Form) -> str:
     return f"# format: 1\n{text.getvalue()}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _ShownQuestion:
-    """A question as it is printed: with boxes, or a blank where there are none."""
-
-    question: Question
-    boxes: tuple[str, ...]
-
-
-def _shown(questions: Sequence[QuestionColumn]) -> list[_ShownQuestion]:
-    return [
-        _ShownQuestion(question=each.question, boxes=_boxes(each.question))
-        for each in questions
-    ]
-
-
 def _boxes(question: Question) -> tuple[str, ...]:
     if question.type == "choice":
         return question.choices
     if question.type != "whole" or question.range is None:
         return ()
     low, high = question.range
-    n_answers = high - low + 1
-    return tuple(map(str, range(low, high + 1))) if n_answers <= _MOST_BOXES else ()
+    answers = range(low, high + 1)
+    return tuple(map(str, answers)) if len(answers) <= _MOST_BOXES else ()
 
 
 def _page(protocol: Protocol, forms: Sequence[Form]) -> str:
@@ -210,13 +190,14 @@ def _page(protocol: Protocol, forms: Sequence[Form]) -> str:
         grades=grades,
         how=_instruction(protocol.presentation, on_paper=True),
         practice=[shown.code for shown in practice_presentations(protocol)],
-        of_presentation=_shown(forms[0].questions["presentation"]),
+        boxes_of=_boxes,
+        of_presentation=forms[0].questions["presentation"],
         sheets=[
             {
                 "form": form,
                 "rows": _rows(protocol, form),
                 "afterwards": [
-                    (f"After the {when}", _shown(form.questions[when]))
+                    (f"After the {when}", form.questions[when])
                     for when in form.afterwards
                 ],
             }
@@ -227,17 +208,10 @@ def _page(protocol: Protocol, forms: Sequence[Form]) -> str:
 
 def _rows(protocol: Protocol, form: Form) -> list[dict[str, object]]:
     # position, code, and what comes after the presentation
-    after, minutes = protocol.occasions.break_after, protocol.occasions.break_minutes
-    n_presentations = len(form.codes)
+    after, n_presentations = protocol.occasions.break_after, len(form.codes)
+    breaks = range(after, n_presentations, after) if after is not None else ()
+    pause = f"Break of {protocol.occasions.break_minutes:g} min"
     return [
-        {
-            "position": position,
-            "code": code,
-            "pause": f"Break of {minutes:g} min"
-            if after is not None
-            and position % after == 0
-            and position < n_presentations
-            else None,
-        }
-        for position, code in enumerate(form.codes, start=1)
+        {"position": at, "code": code, "pause": pause if at in breaks else None}
+        for at, code in enumerate(form.codes, start=1)
     ]

@@ -8,8 +8,12 @@ from collections import Counter
 
 from masrel.estimates import Interval
 from masrel.lab.report._figure_data import FIGURES, LearningView
-from masrel.lab.training._learning_curve import CURVE_SETS, CurvePoint, learning_curve
-from masrel.lab.training._lessons import TrainingRecord
+from masrel.lab.training._lessons import (
+    CURVE_SETS,
+    CurvePoint,
+    TrainingRecord,
+    learning_curve,
+)
 from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import (
     SIMULATED,

@@ -15,11 +15,15 @@ if TYPE_CHECKING:
         calibrate,
         training_criterion,
     )
-    from masrel.lab.training._learning_curve import CurvePoint, learning_curve
-    from masrel.lab.training._lessons import Lesson, TrainingRecord, read_training
-    from masrel.lab.training._simulated_trainee import SimulatedTrainee
+    from masrel.lab.training._lessons import (
+        CurvePoint,
+        Lesson,
+        TrainingRecord,
+        learning_curve,
+        read_training,
+    )
     from masrel.lab.training._trainees import confusion
-    from masrel.lab.training._trainer import train_rater
+    from masrel.lab.training._trainer import SimulatedTrainee, train_rater
 
 __all__ = [
     "Calibration",
@@ -38,7 +42,6 @@ __all__ = [
 ]
 
 _HOMES = {
-    "_simulated_trainee": ("SimulatedTrainee",),
     "_criterion": (
         "Calibration",
         "Criterion",
@@ -46,10 +49,15 @@ _HOMES = {
         "calibrate",
         "training_criterion",
     ),
-    "_learning_curve": ("CurvePoint", "learning_curve"),
-    "_lessons": ("Lesson", "TrainingRecord", "read_training"),
+    "_lessons": (
+        "CurvePoint",
+        "Lesson",
+        "TrainingRecord",
+        "learning_curve",
+        "read_training",
+    ),
     "_trainees": ("confusion",),
-    "_trainer": ("train_rater",),
+    "_trainer": ("SimulatedTrainee", "train_rater"),
 }
 
 

@@ -3,21 +3,24 @@
 Started again, a training goes on where its log ends, as a session does.
 """
 
+import math
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from datetime import datetime
+from typing import ClassVar
 
 import masrel
 from masrel.errors import ParameterError, ProtocolError, SessionLogError
 from masrel.lab._event_log import SessionLog, utc_now
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
 from masrel.lab.recording import _Fact
-from masrel.lab.run._grade_sources import GradeRequest, GradeSource, Skip
+from masrel.lab.run._grade_sources import GradeRequest, GradeSource, Skip, Unattended
 from masrel.lab.run._presenter import ClockName, Presenter
 from masrel.lab.run._settings import moves_hardware
 from masrel.lab.run.session import _check_device
 from masrel.lab.schedule import Presentation
+from masrel.lab.schedule._secret import Stream
 from masrel.lab.training._criterion import calibrate, training_criterion
 from masrel.lab.training._lessons import (
     FORMAT,
@@ -27,9 +30,15 @@ from masrel.lab.training._lessons import (
     check_events,
     record_of,
 )
-from masrel.lab.training._syllabus import next_model
+from masrel.lab.training._trainees import BLOCK_SETS, confusion
 
 _SESSION = "training"  # what recordings of a training have in place of a session
+
+# Noise of perception in grades: at first, in the end, and in how many presentations
+# it comes nearer to the latter by a factor of e.
+_FIRST_NOISE, _LAST_NOISE, _PRESENTATIONS = 1.2, 0.2, 12.0
+
+_N_WORDS = 2.0**64
 
 
 def train_rater(
@@ -267,3 +276,84 @@ def _has_passed(record: TrainingRecord) -> bool:
     # looked at once a set is whole; a training that went on before could not have ended
     evidence = record.evidence()
     return bool(evidence.size and (evidence >= record.boundary).any())
+
+
+def next_model(
+    intended: Mapping[str, str],
+    lessons: Sequence[Lesson],
+    *,
+    order: str,
+    seed: int,
+    rater: str,
+) -> str:
+    """Return the id of the next model."""
+    # intended: grade by model. Each draw is of its number alone, or of that and the
+    # grades before, so that a training goes on as if nothing had stopped it.
+    models = list(intended)
+    if order == "blocked":
+        block, place = divmod(len(lessons), BLOCK_SETS * len(models))
+        return _block(models, Stream(seed, "training", rater, str(block)))[place]
+    last = {one.model: one.grade for one in lessons}
+    wrong = [
+        model for model in models if last.get(model, intended[model]) != intended[model]
+    ]
+    tickets = [*models, *wrong]  # what was misgraded the last time, twice
+    stream = Stream(seed, "training", rater, str(len(lessons)))
+    return tickets[stream.below(len(tickets))]
+
+
+def _block(models: Sequence[str], stream: Stream) -> list[str]:
+    # Only that each comes at all is certain: who counts knows next to nothing.
+    while True:
+        block = [
+            models[stream.below(len(models))] for _ in range(BLOCK_SETS * len(models))
+        ]
+        if set(block) == set(models):
+            return block
+
+
+class SimulatedTrainee(Unattended):
+    """A trainee who confuses neighbouring grades less and less.
+
+    The grade depends on the seed of ``[simulated_raters]``, the rater, the model and
+    the number of the presentation alone. Nothing here models a person.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The protocol.
+    """
+
+    name: ClassVar[str] = "simulated"
+
+    def __init__(self, protocol: Protocol) -> None:
+        self._seed = protocol.simulated_raters.seed
+        self._grades = protocol.scale.grades
+        self._intended = {
+            model.id: self._grades.index(model.intended_grade)
+            for model in protocol.models
+            if model.intended_grade is not None
+        }
+
+    def grade(self, request: GradeRequest) -> str | None:
+        """Return the grade that the trainee gives.
+
+        Parameters
+        ----------
+        request : GradeRequest
+            What was presented; its model has an intended grade.
+
+        Returns
+        -------
+        str
+            A grade of the scale.
+        """
+        shown = request.presentation
+        learnt = math.exp(-(shown.position - 1) / _PRESENTATIONS)
+        noise = _LAST_NOISE + (_FIRST_NOISE - _LAST_NOISE) * learnt
+        n_grades = len(self._grades)
+        table = confusion("noise", noise, n_grades, tuple(self._intended.values()))
+        purpose = "trainee", request.rater, str(shown.position)
+        share = Stream(self._seed, *purpose).word() / _N_WORDS
+        row = table[self._intended[shown.model]].cumsum()
+        return self._grades[min(int((share >= row).sum()), n_grades - 1)]

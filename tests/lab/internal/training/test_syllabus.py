@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from masrel.lab.training import Lesson
-from masrel.lab.training._syllabus import next_model
 from masrel.lab.training._trainees import (
     adaptive_weights,
     draw_blocks,
     draw_training,
 )
+from masrel.lab.training._trainer import next_model
 
 INTENDED = {"A": "1", "B": "2", "C": "3"}
 
