@@ -194,7 +194,29 @@ _PRESENTED = (
 )
 """The tables that decide what a rater meets, besides the study's id."""
 
-_LATER: dict[str, dict[str, object]] = {
+_LATER: dict[str, Any] = {
+    "models": [
+        {
+            "file": None,
+            "simulated": False,
+            "kind": DEFAULT_KIND,
+            "catch_angle_constant_deg": None,
+            "catch_torque_nms_rad": None,
+            "residual_ratio": None,
+            "catch_travel_deg": None,
+        }
+    ],
+    "raters": [{"fields": {}, "site": None}],
+    "rater_fields": {},
+    "sessions": [
+        {
+            "after": None,
+            "at_least_days": None,
+            "at_most_days": None,
+            "order_policy": "refuse",
+        }
+    ],
+    "questionnaires": (),
     "study": {"language": "en"},
     "elbow": {
         "catch_rise_s": 0.0,
@@ -253,8 +275,9 @@ _LATER: dict[str, dict[str, object]] = {
         "seed": 0,
     },
 }
-"""Keys that protocols once had not, by table, with the defaults they then had: these
-do not enter, so that no schedule drawn before turns stale."""
+"""What protocols once had not, with the defaults it then had: it does not enter where
+it says nothing, so that no schedule drawn before turns stale. A list has what is so of
+every entry."""
 
 
 _FORMER_SECTIONS = (
@@ -267,32 +290,6 @@ _FORMER_SECTIONS = (
     "traces",
 )
 """The default of ``report.sections`` when it entered: it still does, for no choice."""
-
-_LATER_ARRAYS = ("questionnaires", "rater_fields")
-"""Arrays and tables of tables that protocols once had not: empty, they do not enter."""
-
-_LATER_OF_SESSIONS: dict[str, object] = {
-    "after": None,
-    "at_least_days": None,
-    "at_most_days": None,
-    "order_policy": "refuse",
-}
-"""Keys of sessions that do not enter where they are these."""
-
-_ABSENT: dict[str, object] = {
-    "file": None,
-    "simulated": False,
-    "kind": DEFAULT_KIND,
-    "catch_angle_constant_deg": None,
-    "catch_torque_nms_rad": None,
-    "residual_ratio": None,
-    "catch_travel_deg": None,
-}
-"""Keys of models that do not enter where they are these."""
-
-
-_LATER_OF_RATERS: dict[str, object] = {"fields": {}, "site": None}
-"""The same of every rater."""
 
 
 @once
@@ -368,33 +365,23 @@ def _canonical(content: object, ignored: tuple[str, ...] = ()) -> bytes:
         _drop_defaults(model, plain["elbow"])
         for key in ignored:
             model.pop(key, None)
-    _drop_later(plain)
+    if "report" in plain and plain["report"]["sections"] is None:
+        plain["report"]["sections"] = _FORMER_SECTIONS
+    _drop(plain, _LATER)
     return msgspec.json.encode(plain, order="sorted")
 
 
-def _drop_later(plain: dict[str, Any]) -> None:
+def _drop(plain: dict[str, Any], defaults: dict[str, Any]) -> None:
     # takes out what protocols once had not, where it says nothing
-    for session in plain.get("sessions", ()):
-        _drop(session, _LATER_OF_SESSIONS)
-    for rater in plain.get("raters", ()):
-        _drop(rater, _LATER_OF_RATERS)
-    for array in _LATER_ARRAYS:
-        if not plain.get(array, True):
-            del plain[array]
-    if "report" in plain and plain["report"]["sections"] is None:
-        plain["report"]["sections"] = _FORMER_SECTIONS
-    for table, defaults in _LATER.items():
-        if not isinstance(plain.get(table), dict):  # of a study perhaps its id alone
-            continue
-        _drop(plain[table], defaults)
-        if not plain[table]:
-            del plain[table]
-
-
-def _drop(table: dict[str, Any], absent: dict[str, object]) -> None:
-    for key, value in absent.items():
-        if table[key] == value:
-            del table[key]
+    for key, default in defaults.items():
+        value = plain.get(key)
+        if isinstance(default, list):
+            for entry in value or ():
+                _drop(entry, default[0])
+        elif isinstance(default, dict) and isinstance(value, dict):
+            _drop(value, default)  # a study is perhaps its id alone
+        if key in plain and value in (default, {}):
+            del plain[key]
 
 
 def _drop_defaults(model: dict[str, Any], elbow: dict[str, Any]) -> None:
@@ -408,7 +395,6 @@ def _drop_defaults(model: dict[str, Any], elbow: dict[str, Any]) -> None:
     for key, values in (("constants", constants), ("parameters", parameters)):
         if values:
             model[key] = values
-    _drop(model, _ABSENT)
 
 
 _GATE_NUMBERS = ("value", "low", "high", "width", "n", "n_missing", "p")

@@ -5,7 +5,7 @@ import dataclasses
 import functools
 import hashlib
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -49,19 +49,13 @@ from masrel.lab.run._settings import (
     has_simulated_hand,
     model_controller,
 )
-from masrel.lab.run._simulated_raters import hand_seed, intended_speeds, sensor_seed
+from masrel.lab.run._simulated_raters import (
+    hand_seed,
+    intended_speeds,
+    key_of,
+    sensor_seed,
+)
 from masrel.lab.run._state import Felt
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StretchFacts:
-    """What the log keeps of the stretches of one presentation."""
-
-    stretches: list[dict[str, _Fact]]  # of each, with its cue
-    felt: Felt
-    # of cued stretches: where a fast one catches, how far a slow one goes, deg
-    r1_deg: float | None
-    r2_deg: float | None
 
 
 class StatusOfHand(PresentationStatus):
@@ -102,39 +96,13 @@ class StatusOfHand(PresentationStatus):
 
 def stretch_rules(rules: PresentationRules, slowest_s: float) -> StretchRules:
     """Return the rules of the loop; a hand that needs longer for a stretch gets it."""
-    n: int | None = None
-    if isinstance(rules.stretches, int):
-        n = rules.stretches
-    elif isinstance(rules.stretches, tuple):
-        n = len(rules.stretches)
+    n = rules.stretches
+    if isinstance(n, tuple):
+        n = len(n)
     return StretchRules(
-        n=n,
+        n=n if isinstance(n, int) else None,
         time_limit=rules.time_limit_s,
         stretch_limit=max(rules.stretch_limit_s, slowest_s),
-    )
-
-
-def stretch_facts(protocol: Protocol, model: str, recording: Recording) -> StretchFacts:
-    """Say what came of the stretches that were made."""
-    made = stretches(recording)
-    cues: tuple[str, ...] = ()
-    if isinstance(protocol.presentation.stretches, tuple):
-        cues = protocol.presentation.stretches
-    cued = dict(enumerate(cues, start=1))
-    r1_deg, r2_deg = _tardieu_angles(made, cued, recording)
-    start = math.radians(protocol.stretch.start_deg)
-    return StretchFacts(
-        stretches=[
-            {
-                **dataclasses.asdict(stretch),
-                "phases": ", ".join(stretch.phases),
-                "cue": cued.get(stretch.number),
-            }
-            for stretch in made
-        ],
-        felt=_felt(made, joint_model(protocol, model), start),
-        r1_deg=r1_deg,
-        r2_deg=r2_deg,
     )
 
 
@@ -150,7 +118,7 @@ def _felt(made: Sequence[Stretch], joint: JointModel, start: float) -> Felt:
 
 
 def _tardieu_angles(
-    made: Sequence[Stretch], cues: dict[int, str], recording: Recording
+    made: Sequence[Stretch], cues: Mapping[int, str], recording: Recording
 ) -> tuple[float | None, float | None]:
     # -> R1 and R2, deg, as `elbow.Tardieu` has them: R1 is R2 without a catch
     angle, number = recording.columns["angle_deg"], recording.columns["stretch"]
@@ -190,17 +158,9 @@ _FORMATS = {
 class Outcome:
     """What a presentation left."""
 
-    sha256: str  # checksum of the recording
-    # mean speed before the catch, deg/s; None when the arm never moved
-    mean_speed_deg_s: float | None
-    n_missed_ticks: int  # ticks the loop skipped
+    logged: dict[str, _Facts]  # what a log says of it, whatever it is for
     fault: Fault | None  # what stopped it, or None
-    # the recording from 200 ms before the fault until the torque was zero, as CSV
-    last_200_ms: str | None
-    simulated: bool  # whether no hardware moved
-    ended: str  # how it ended, as in the recording
-    made: StretchFacts  # what came of its stretches
-    grip_lost: bool | None  # whether the model let go of a loose arm; None: unknown
+    fault_fields: dict[str, _Facts]  # what a log says of the fault, if there is one
 
 
 def present(
@@ -237,7 +197,8 @@ def recover(protocol: Protocol, request: GradeRequest, *, file: Path) -> Outcome
         return None
     if file.exists():  # it died between the recording and the log
         checksum = hashlib.sha256(file.read_bytes()).hexdigest()
-        return _outcome(read_recording(file), protocol, request, checksum)
+        model = request.presentation.model
+        return _outcome(read_recording(file), protocol, model, file, checksum)
     presented = cut_off(spool)
     if presented is None:
         spool.unlink()
@@ -278,7 +239,7 @@ def _on_device(
                 hand=hand,
                 range_end=range_end,
                 options=backend_options(
-                    settings, hand, _sensor_seed(protocol, request)
+                    settings, hand, sensor_seed(protocol, key_of(request))
                 ),
             )
         )
@@ -315,14 +276,7 @@ def _hand_speeds(protocol: Protocol, request: GradeRequest) -> list[float]:
     # rad/s of the simulated hand, by stretch; none when a person moves the arm
     if not has_simulated_hand(protocol.device):
         return []
-    presentation = request.presentation
-    speeds = intended_speeds(
-        protocol,
-        request.rater,
-        request.session,
-        presentation.model,
-        presentation.repeat,
-    )
+    speeds = intended_speeds(protocol, key_of(request))
     return [math.radians(speed) for speed in speeds]
 
 
@@ -342,13 +296,6 @@ def _hand(
         rest=_REST_S + settings.hold_s,
         # Of a number of stretches the last is over when the arm is brought back
         returns=settings.hold_s > 0.0 or protocol.presentation.stretches != "free",
-    )
-
-
-def _sensor_seed(protocol: Protocol, request: GradeRequest) -> int:
-    presented = request.presentation
-    return sensor_seed(
-        protocol, request.rater, request.session, presented.model, presented.repeat
     )
 
 
@@ -382,36 +329,67 @@ def _keep(
     if request.practice:
         facts["practice"] = True
     checksum = write_recording(dataclasses.replace(recording, facts=facts), file)
-    return _outcome(recording, protocol, request, checksum)
+    return _outcome(recording, protocol, presentation.model, file, checksum)
 
 
 def _outcome(
-    recording: Recording, protocol: Protocol, request: GradeRequest, checksum: str
+    recording: Recording, protocol: Protocol, model: str, file: Path, sha256: str
 ) -> Outcome:
-    facts, fault = recording.facts, None
-    if facts["fault"] is not None:
+    facts, made = recording.facts, stretches(recording)
+    speed, lost = facts["mean_speed_deg_s"], facts.get("grip_lost")
+    asked_for = protocol.presentation.stretches
+    cues = dict(enumerate(asked_for if isinstance(asked_for, tuple) else (), start=1))
+    r1_deg, r2_deg = _tardieu_angles(made, cues, recording)
+    fault, felt, fault_fields = None, None, dict[str, _Facts]()
+    if facts["fault"] is None:
+        start = math.radians(protocol.stretch.start_deg)
+        felt = _felt(made, joint_model(protocol, model), start)
+    else:
         fault = Fault(
             kind=str(facts["fault_kind"]),
             message=str(facts["fault"]),
             time_s=float(facts["fault_time_s"] or 0.0),
             torque_nm=float(facts["fault_torque_nm"] or 0.0),
         )
-    speed, lost = facts["mean_speed_deg_s"], facts.get("grip_lost")
-    return Outcome(
-        sha256=checksum,
-        mean_speed_deg_s=None if speed is None else float(speed),
-        n_missed_ticks=int(facts["n_missed_ticks"] or 0),
-        fault=fault,
-        last_200_ms=None if fault is None else _before(fault, recording),
-        simulated=bool(facts["simulated"]),
-        ended=str(facts["ended"]),
-        made=stretch_facts(protocol, request.presentation.model, recording),
-        grip_lost=None if lost is None else bool(lost),
-    )
+        fault_fields = {
+            "kind": fault.kind,
+            "words": fault.message,
+            "time_s": fault.time_s,
+            "torque_nm": fault.torque_nm,
+            "last_200_ms": _before(fault, recording),
+        }
+    of_each: list[dict[str, _Fact]] = [
+        {
+            **dataclasses.asdict(stretch),
+            "phases": ", ".join(stretch.phases),
+            "cue": cues.get(stretch.number),
+        }
+        for stretch in made
+    ]
+    beside = file.with_suffix(".json").read_bytes()
+    logged: dict[str, _Facts] = {
+        "recording": f"{file.parent.name}/{file.name}",
+        "sha256": sha256,
+        "facts_sha256": hashlib.sha256(beside).hexdigest(),
+        # before the catch; None when the arm never moved
+        "mean_speed_deg_s": None if speed is None else float(speed),
+        "n_missed_ticks": int(facts["n_missed_ticks"] or 0),
+        "fault": None if fault is None else fault.message,
+        "simulated": bool(facts["simulated"]),
+        "stretches": of_each,
+        "ended": str(facts["ended"]),
+        "n_stretches": len(made),
+        "felt": felt,
+        # of cued stretches: where a fast one catches, how far a slow one goes
+        "r1_deg": r1_deg,
+        "r2_deg": r2_deg,
+        "grip_lost": None if lost is None else bool(lost),
+    }
+    return Outcome(logged=logged, fault=fault, fault_fields=fault_fields)
 
 
 def _before(fault: Fault, recording: Recording) -> str:
-    # The rows from shortly before a fault to the end, as CSV
+    # the rows from 200 ms before a fault until the torque was zero, as CSV
     columns = recording.columns
     first = int(np.searchsorted(columns["time_s"], fault.time_s - _BEFORE_FAULT_S))
     lines = [",".join(RECORDING_COLUMNS)]
@@ -422,36 +400,3 @@ def _before(fault: Fault, recording: Recording) -> str:
         )
         lines.append(",".join(cells))
     return "\n".join(lines) + "\n"
-
-
-def presented_fields(outcome: Outcome, file: Path, folder: Path) -> dict[str, _Facts]:
-    """Return what a log says of every presentation, whatever it is for."""
-    fault, made = outcome.fault, outcome.made
-    facts = file.with_suffix(".json").read_bytes()
-    return {
-        "recording": file.relative_to(folder).as_posix(),
-        "sha256": outcome.sha256,
-        "facts_sha256": hashlib.sha256(facts).hexdigest(),
-        "mean_speed_deg_s": outcome.mean_speed_deg_s,
-        "n_missed_ticks": outcome.n_missed_ticks,
-        "fault": None if fault is None else fault.message,
-        "simulated": outcome.simulated,
-        "stretches": made.stretches,
-        "ended": outcome.ended,
-        "n_stretches": len(made.stretches),
-        "felt": made.felt if fault is None else None,
-        "r1_deg": made.r1_deg,
-        "r2_deg": made.r2_deg,
-        "grip_lost": outcome.grip_lost,
-    }
-
-
-def fault_fields(fault: Fault, outcome: Outcome) -> dict[str, _Facts]:
-    """Return what a log says of the fault that stopped a presentation."""
-    return {
-        "kind": fault.kind,
-        "words": fault.message,
-        "time_s": fault.time_s,
-        "torque_nm": fault.torque_nm,
-        "last_200_ms": outcome.last_200_ms,
-    }

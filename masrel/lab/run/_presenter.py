@@ -6,7 +6,7 @@ Sessions and trainings present so; their logs name what is presented by other fi
 import dataclasses
 from collections.abc import Callable
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from masrel.errors import DeviceError, ParameterError, SessionStoppedError
 from masrel.lab._event_log import SessionLog
@@ -16,10 +16,8 @@ from masrel.lab.recording import _Facts
 from masrel.lab.run._grade_sources import GradeRequest, GradeSource, Skip, StretchGrade
 from masrel.lab.run._present import (
     Outcome,
-    fault_fields,
     present,
     presentation_status,
-    presented_fields,
     recover,
     spool_of,
 )
@@ -86,22 +84,19 @@ class Presenter:
             request = dataclasses.replace(request, status=status)
             self._grades.make_ready(request)
             outcome = self._present(request)
-            fault, made = outcome.fault, outcome.made
-            n_faults = 0 if fault is None else n_faults + 1
+            n_faults = 0 if outcome.fault is None else n_faults + 1
+            known = ["n_stretches", "ended"]
+            if outcome.fault is None:
+                known += ["felt", "grip_lost"]
+            made: dict[str, Any] = {name: outcome.logged[name] for name in known}
             request = dataclasses.replace(
-                request,
-                status=None,
-                n_faults=n_faults,
-                n_stretches=len(made.stretches),
-                felt=made.felt if fault is None else None,
-                grip_lost=outcome.grip_lost if fault is None else None,
-                ended=outcome.ended,
+                request, status=None, n_faults=n_faults, **made
             )
             answer: StretchGrade | Skip | None
-            if fault is None:
+            if outcome.fault is None:
                 answer = self._checked(request, self._grades.grade(request))
             else:
-                answer = self._after_fault(request, fault.message)
+                answer = self._after_fault(request, outcome.fault.message)
             if answer is not None:
                 return answer
 
@@ -155,15 +150,12 @@ class Presenter:
     def _log_presented(
         self, request: GradeRequest, outcome: Outcome, file: Path
     ) -> None:
-        fault = outcome.fault
-        self.n_faults += fault is not None
-        fields = self._fields(request, self._named_by)
-        fields["attempt"] = request.attempt
+        fields = self._fields(request, self._named_by) | {"attempt": request.attempt}
         known = self._fields(request, self._known_by)
-        presented = presented_fields(outcome, file, self._log.path.parent)
-        self._log.append(self._kind, {**fields, **known, **presented})
-        if fault is not None:
-            self._log.append("fault", {**fields, **fault_fields(fault, outcome)})
+        self._log.append(self._kind, {**fields, **known, **outcome.logged})
+        if outcome.fault is not None:
+            self.n_faults += 1
+            self._log.append("fault", {**fields, **outcome.fault_fields})
         spool_of(file).unlink(missing_ok=True)  # only now is it of no use
 
     def _fields(

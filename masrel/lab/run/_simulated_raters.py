@@ -18,6 +18,16 @@ from masrel.lab.run._grade_sources import GradeRequest, QuestionRequest, Unatten
 _MOST_STRETCHES = 3  # of a simulated rater who may stretch as often as wanted
 
 
+_Key = tuple[str, str, str, int]
+"""Rater, session, model and repeat."""
+
+
+def key_of(request: GradeRequest) -> _Key:
+    """Return what a simulated rater's numbers depend on, beside what they are for."""
+    shown = request.presentation
+    return request.rater, request.session, shown.model, shown.repeat
+
+
 class SimulatedGrades(Unattended):
     """Simulated raters as ``[simulated_raters]`` of a protocol describes them.
 
@@ -77,15 +87,12 @@ class SimulatedGrades(Unattended):
                 f"model: needed one of {', '.join(self._severity)}, "
                 f"got {presentation.model!r}"
             )
-        session = request.session
-        first = self._first_session.get(request.rater, session)
-        key = (request.rater, session, presentation.model, presentation.repeat)
-        repeats = _uniform(self._settings.seed, "retest", *key)
+        rater, session, model, repeat = key = key_of(request)
+        first = self._first_session.get(rater, session)
+        repeats = _uniform(self._settings.seed, "retest", key)
         if session != first and repeats < self._settings.retest_agreement:
-            session = first
-        return self._fresh(
-            request.rater, session, presentation.model, presentation.repeat
-        )
+            key = (rater, first, model, repeat)
+        return self._fresh(key)
 
     def answer(self, request: QuestionRequest) -> Answer:
         """Return an answer that is drawn, each that is possible equally likely.
@@ -104,7 +111,7 @@ class SimulatedGrades(Unattended):
         model, repeat = ("", 0) if shown is None else (shown.model, shown.repeat)
         name = f"answer {request.questionnaire.id}.{question.id}"
         key = (request.rater, request.session, model, repeat)
-        share = _uniform(self._settings.seed, name, *key)
+        share = _uniform(self._settings.seed, name, key)
         if question.choices:
             return question.choices[int(share * len(question.choices))]
         if question.range is None:
@@ -112,16 +119,15 @@ class SimulatedGrades(Unattended):
         low, high = question.range
         return low + int(share * (high - low + 1))
 
-    def _fresh(self, rater: str, session: str, model: str, repeat: int) -> str:
-        seed, key = self._settings.seed, (rater, session, model, repeat)
-        position = self._severity[model]
+    def _fresh(self, key: _Key) -> str:
+        seed, position = self._settings.seed, self._severity[key[2]]
         lower = math.floor(position)
-        upper = _uniform(seed, "severity", *key) < position - lower
+        upper = _uniform(seed, "severity", key) < position - lower
         code = lower + 1 if upper else lower
-        if _uniform(seed, "accuracy", *key) >= self._settings.accuracy:
+        if _uniform(seed, "accuracy", key) >= self._settings.accuracy:
             last = len(self._grades) - 1
             neighbours = [c for c in (code - 1, code + 1) if 0 <= c <= last]
-            share = _uniform(seed, "neighbour", *key)
+            share = _uniform(seed, "neighbour", key)
             code = neighbours[int(share * len(neighbours))]
         return self._grades[code]
 
@@ -150,46 +156,38 @@ def severity(protocol: Protocol, model: Model) -> float:
     return _interpolated(height, anchors)
 
 
-def intended_speeds(
-    protocol: Protocol, rater: str, session: str, model: str, repeat: int
-) -> list[float]:
+def intended_speeds(protocol: Protocol, key: _Key) -> list[float]:
     """Return the mean speed of each stretch that a simulated hand means to make."""
-    rules, key = protocol.presentation, (rater, session, model, repeat)
+    rules = protocol.presentation
     if isinstance(rules.stretches, tuple):
         speeds = {"slow": rules.slow_speed_deg_s, "fast": rules.fast_speed_deg_s}
         return [speeds[cue] for cue in rules.stretches]
     if isinstance(rules.stretches, int):
         n_stretches = rules.stretches
     else:
-        share = _uniform(protocol.simulated_raters.seed, "stretches", *key)
+        share = _uniform(protocol.simulated_raters.seed, "stretches", key)
         n_stretches = 1 + int(share * _MOST_STRETCHES)
-    return [_speed(protocol, *key, number) for number in range(1, n_stretches + 1)]
+    return [_speed(protocol, key, number) for number in range(1, n_stretches + 1)]
 
 
-def _speed(
-    protocol: Protocol, rater: str, session: str, model: str, repeat: int, number: int
-) -> float:
+def _speed(protocol: Protocol, key: _Key, number: int) -> float:
     settings = protocol.simulated_raters
     mean, sd = settings.mean_speed_deg_s, settings.speed_sd_deg_s
-    key = (rater, session, model, repeat)
     # the first is as it was when there was no other
-    share = _uniform(settings.seed, "speed", *key, *((number,) if number > 1 else ()))
+    share = _uniform(settings.seed, "speed", key, *((number,) if number > 1 else ()))
     speed = mean + sd * statistics.NormalDist().inv_cdf(share)
     return min(max(speed, mean - 3 * sd, 0.2 * mean), mean + 3 * sd)
 
 
-def sensor_seed(
-    protocol: Protocol, rater: str, session: str, model: str, repeat: int
-) -> int:
+def sensor_seed(protocol: Protocol, key: _Key) -> int:
     """Return the seed of a simulated torque sensor's noise, another one each time."""
-    seed = protocol.simulated_raters.seed
-    return int(2**52 * _uniform(seed, "sensor", rater, session, model, repeat))
+    return int(2**52 * _uniform(protocol.simulated_raters.seed, "sensor", key))
 
 
 def hand_seed(protocol: Protocol, rater: str) -> int:
     """Return the seed of what a rater's hand is like, in every presentation."""
     seed = protocol.simulated_raters.seed
-    return int(2**52 * _uniform(seed, "hand", rater, "", "", 0))
+    return int(2**52 * _uniform(seed, "hand", (rater, "", "", 0)))
 
 
 def _interpolated(height: float, anchors: list[tuple[float, float]]) -> float:
@@ -202,16 +200,8 @@ def _interpolated(height: float, anchors: list[tuple[float, float]]) -> float:
     return anchors[-1][1]
 
 
-def _uniform(
-    seed: int,
-    purpose: str,
-    rater: str,
-    session: str,
-    model: str,
-    repeat: int,
-    *further: int,
-) -> float:
+def _uniform(seed: int, purpose: str, key: _Key, *further: int) -> float:
     # In (0, 1), from SHA-256 so that it is the same on every machine and version.
-    key = json.dumps([seed, purpose, rater, session, model, repeat, *further])
-    word = int.from_bytes(hashlib.sha256(key.encode()).digest()[:8], "big")
+    text = json.dumps([seed, purpose, *key, *further])
+    word = int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big")
     return ((word >> 12) + 0.5) / 2**52

@@ -84,6 +84,14 @@ def test_each_stretch_leaves_its_facts_until_the_rater_is_done(new_study: New) -
     assert max(counts) > 1
 
 
+@pytest.mark.parametrize(("rule", "n"), [("2", 2), ('["slow", "fast"]', 2)])
+def test_as_many_are_made_as_are_asked_for(new_study: New, rule: str, n: int) -> None:
+    small = with_rules(new_study, f"stretches = {rule}")
+    run(small, SimulatedGrades(small[1]))
+    ended = {(e.fields["ended"], e.fields["n_stretches"]) for e in shown(small)}
+    assert ended == {("stretches", n)}
+
+
 def test_a_cued_presentation_has_r1_and_r2(new_study: New) -> None:
     small = with_rules(new_study, 'stretches = ["slow", "fast"]')
     run(small, SimulatedGrades(small[1]))
@@ -144,6 +152,17 @@ def test_a_rater_is_told_what_was_too_slow_and_may_grade_it(new_study: New) -> N
     assert said.getvalue().count("too slow to feel the catch: once more?") == 4
     assert {event.fields["felt"] for event in shown(small)} == {"below-threshold"}
     assert ratings_from_logs(*small).table["felt"].tolist() == ["below-threshold"] * 3
+
+
+def test_a_rater_is_told_that_the_time_limit_ended_a_presentation(
+    new_study: New,
+) -> None:
+    small = with_rules(new_study, 'stretches = "free"', "time_limit_s = 1.0")
+    source, said = console("\n1\n\n2\n\n3\n")
+    run(small, source)
+    ended = [event.fields["ended"] for event in shown(small)]
+    words = "no stretch begins later than 1 s after the first movement."
+    assert said.getvalue().count(words) == ended.count("time-limit") > 0
 
 
 def test_what_was_too_slow_is_counted(new_study: New) -> None:
@@ -338,3 +357,14 @@ def test_a_rehearsal_is_drawn_from_the_secret(small: Small, tmp_path: Path) -> N
     assert rehearsed(same) == codes
     assert rehearsed(other) != codes
     assert other[0].secret_file.is_file()
+
+
+def test_a_rehearsal_of_another_secret_is_left_and_another_begun(small: Small) -> None:
+    with pytest.raises(RuntimeError, match="presentation 2 of 3"):
+        run(small, console("\n1\n\nstop\n")[0], rehearsal=True)
+    before = small[0].root / "rehearsals" / "1" / "rehearsal_test_R1.jsonl"
+    lines = before.read_bytes()
+    small[0].published_secret_file.unlink()
+    summary = run(small, SimulatedGrades(small[1]), rehearsal=True)
+    assert (summary.n_graded_before, summary.log_file.parent.name) == (0, "2")
+    assert before.read_bytes() == lines

@@ -149,6 +149,13 @@ def test_practice_is_no_rating(new_study: New) -> None:
     assert "P1" not in study.schedule_file("R1", "test").read_text()
 
 
+def test_a_code_for_practice_is_no_model_of_the_study(new_study: New) -> None:
+    study, protocol = new_study(('"D1"', '"P1"'), ("[schedule]", OCCASIONS))
+    run(study, protocol)
+    codes = [e.fields["code"] for e in events_of(study) if e.kind == "practised"]
+    assert codes == ["P2", "P3"]
+
+
 def test_the_console_says_what_is_practice_and_what_a_break(new_study: New) -> None:
     study, protocol = new_study(("[schedule]", OCCASIONS))
     answers = io.StringIO("\n" + "\n2\n" * 4 + "what\n\n" + "\n2\n")

@@ -32,7 +32,7 @@ def test_severity_is_interpolated_in_the_height_of_the_catch(small: Small) -> No
 def test_speeds_have_the_mean_and_deviation_they_say(small: Small) -> None:
     protocol = with_settings(small[1], mean_speed_deg_s=85.0, speed_sd_deg_s=15.0)
     n = 4000
-    speeds = [intended_speeds(protocol, "R1", "test", "HM1", i)[0] for i in range(n)]
+    speeds = [intended_speeds(protocol, ("R1", "test", "HM1", i))[0] for i in range(n)]
     mean = math.fsum(speeds) / n
     sd = math.sqrt(math.fsum((s - mean) ** 2 for s in speeds) / (n - 1))
     assert abs(mean - 85.0) < 4.5 * 15.0 / math.sqrt(n)
@@ -46,11 +46,11 @@ def test_who_is_free_stretches_one_to_three_times(small: Small) -> None:
         small[1], presentation=PresentationRules(stretches="free")
     )
     n = 3000
-    made = [intended_speeds(free, "R1", "test", "HM1", i) for i in range(n)]
+    made = [intended_speeds(free, ("R1", "test", "HM1", i)) for i in range(n)]
     for count in (1, 2, 3):
         # within 4.5 standard errors: false alarm 2 in a hundred thousand
         share = sum(len(speeds) == count for speeds in made) / n
         assert abs(share - 1 / 3) < 4.5 * math.sqrt(2 / 9 / n)
-    once = [intended_speeds(small[1], "R1", "test", "HM1", i) for i in range(n)]
+    once = [intended_speeds(small[1], ("R1", "test", "HM1", i)) for i in range(n)]
     assert [speeds[:1] for speeds in made] == once  # the first is as it was
     assert all(len(set(speeds)) == len(speeds) for speeds in made)
