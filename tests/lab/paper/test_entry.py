@@ -2,16 +2,13 @@
 
 import csv
 import io
-import json
 import random
 from collections.abc import Callable, Sequence
 from datetime import UTC, date, datetime
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
-from masrel.cli import cli
 from masrel.errors import (
     MasrelError,
     MasrelWarning,
@@ -89,7 +86,9 @@ def refusal(small: Small, rows: Sequence[Sequence[str]], **options: object) -> s
 
 def test_a_sheet_becomes_a_complete_session_of_a_person(small: Small) -> None:
     study, protocol = small
-    summary = enter(small, typed(small, filled(small, "1+", "NA", "3")))
+    rows = filled(small, "1+", "NA", "3")
+    file = typed(small, [row[1:] for row in rows])  # as masrel schedule writes it
+    summary = enter(small, file)
     assert (summary.n_presentations, summary.n_graded) == (3, 2)  # type: ignore[attr-defined]
     log = read_log(study.log_file("R1", "test"))
     assert [event.kind for event in log] == ["session", *["entered"] * 3, "complete"]
@@ -111,6 +110,12 @@ def test_a_sheet_becomes_a_complete_session_of_a_person(small: Small) -> None:
     }
     assert set(ratings.table["source"]) == {"recorded"}
     assert (ratings.n_from_persons, ratings.simulated) == (3, False)
+    reasons = {"who": "JL", "why": "typed wrongly"}
+    for row, grade in zip(rows[1:3], ("1", "2"), strict=True):
+        of_code = {"code": row[2], "grade": grade, **reasons}
+        record_correction(study, protocol, "R1", "test", **of_code)
+    corrections = [(c.first_grade, c.grade) for c in corrections_of(study, protocol)]
+    assert corrections == [("1+", "1"), (None, "2")]
     verification = verify_study(study)
     assert verification.is_whole
     assert [s.stage for s in verification.sessions][:1] == ["complete"]
@@ -134,12 +139,6 @@ def test_the_habits_of_spreadsheets_are_read(
     assert [fields["grade"] for fields in entered] == ["0", "1+", "2"]
     below = 1 if begins.startswith(b"sep") else 0  # rows as a spreadsheet has them
     assert [fields["row"] for fields in entered] == [4 + below, 3 + below, 2 + below]
-
-
-def test_a_sheet_of_masrel_schedule_is_read_too(small: Small) -> None:
-    rows = [row[1:] for row in filled(small, "0", "1", "2")]
-    assert rows[0] == ["position", "code", "grade"]
-    enter(small, typed(small, rows))
 
 
 def test_unicode_text_and_utf_16_are_told_from_others(small: Small) -> None:
@@ -221,12 +220,6 @@ def test_a_rater_is_asked_about_the_study_on_the_sheet_of_the_last_session(
 @pytest.mark.parametrize(
     ("row", "column", "cell", "message"),
     [
-        (1, 3, "5", "row 2: grade: needed one of 0, 1, 1+, 2, 3, 4, or NA where there "
-         "is none, got '5'"),
-        (1, 3, "1,0", "row 2: grade: needed one of 0, 1, 1+, 2, 3, 4, or NA where "
-         "there is none, got '1,0'"),
-        (2, 3, "", "row 3: grade: needed one of 0, 1, 1+, 2, 3, 4, or NA where there "
-         "is none, got an empty cell"),
         (3, 4, "11", "row 4: arm.realism: needed a whole number, 1 to 10, got '11' "
          "(NA: was left out)"),
         (3, 4, "", "row 4: arm.realism: needed a whole number, 1 to 10, got none "
@@ -235,13 +228,6 @@ def test_a_rater_is_asked_about_the_study_on_the_sheet_of_the_last_session(
         (4, 3, "2", "row 5: grade: needed of presentations, got '2'"),
         (4, 5, "101", "row 5: end.tired: needed a number, 0 to 100, got '101' (NA: was "
          "left out)"),
-        (0, 4, "realism", "needed the columns sheet, position, code, grade, "
-         "arm.realism, end.tired, end.words, got realism too"),
-        (0, 6, "", "needed the columns sheet, position, code, grade, arm.realism, "
-         "end.tired, end.words, got no end.words"),
-        (0, 6, "grade", "row 1: needed each column once, got grade twice"),
-        (0, 3, "note", "row 1: needed the columns position, code, grade, got sheet, "
-         "position, code, note, arm.realism, end.tired, end.words"),
     ],
 )  # fmt: skip
 def test_a_wrong_cell_is_named_with_its_row(
@@ -254,29 +240,6 @@ def test_a_wrong_cell_is_named_with_its_row(
     rows[4][5] = "50"
     rows[row][column] = cell
     assert refusal(small, rows) == message
-
-
-def test_a_wrong_code_and_a_code_in_another_place_are_named(small: Small) -> None:
-    rows = filled(small, "1", "2", "3")
-    codes = [row[2] for row in rows[1:]]
-    rows[1][2] = "99X"
-    first, second = refusal(small, rows).splitlines()
-    assert first == f"row 2: code: needed {codes[0]} at position 1, got '99X'"
-    assert second.startswith("needed a row for each of 3 presentations, got none of")
-    rows[1][2], rows[2][1] = codes[0], "3"
-    first, second = refusal(small, rows).splitlines()
-    assert first == f"row 3: position: needed 2, that of code {codes[1]}, got '3'"
-
-
-def test_a_presentation_twice_or_not_at_all_is_named(small: Small) -> None:
-    rows = filled(small, "1", "2", "3")
-    assert refusal(small, [*rows, rows[2]]) == (
-        "row 5: needed each presentation once, got that of row 3 again"
-    )
-    assert refusal(small, [*rows[:2], rows[3]]) == (
-        "needed a row for each of 3 presentations, got none of position 2, code "
-        f"{rows[2][2]}: its grade is NA where there is none"
-    )
 
 
 def test_another_raters_sheet_is_refused_with_whose_it_is(small: Small) -> None:
@@ -342,27 +305,6 @@ def test_a_process_that_dies_in_the_middle_goes_on(
     assert [(e.kind, dict(e.fields)) for e in read_log(log)] == kinds
 
 
-def test_a_grade_from_paper_is_corrected_as_others_are(small: Small) -> None:
-    study, protocol = small
-    rows = filled(small, "1", "NA", "3")
-    enter(small, typed(small, rows))
-    for row, grade in zip(rows[1:3], ("1+", "2"), strict=True):
-        record_correction(
-            study,
-            protocol,
-            "R1",
-            "test",
-            code=row[2],
-            grade=grade,
-            who="JL",
-            why="typed wrongly",
-        )
-    first, late = corrections_of(study, protocol)
-    assert (first.first_grade, first.grade) == ("1", "1+")
-    assert (late.first_grade, late.grade) == (None, "2")
-    assert verify_study(study).is_whole
-
-
 AFTER = 'id = "retest"\nraters = ["R1"]\nafter = "test"\nat_least_days = 14'
 
 
@@ -401,36 +343,6 @@ def test_what_presented_the_models_is_named_and_never_simulated(small: Small) ->
             enter(small, file, device=name)
     enter(small, file, device="wam-arm")
     assert set(ratings_from_logs(*small).table["device"]) == {"wam-arm"}
-
-
-def test_a_session_on_a_day_to_come_is_refused(small: Small) -> None:
-    file = typed(small, filled(small, "1", "2", "3"))
-    with pytest.raises(ParameterError, match=r"^on: needed a day up to "):
-        enter(small, file, on=date(9999, 1, 1))
-    assert not small[0].log_file("R1", "test").exists()
-
-
-def test_the_command_enters_and_says_so(small: Small) -> None:
-    study, _ = small
-    file = typed(small, filled(small, "1", "NA", "3"))
-    call = [
-        "paper",
-        "enter",
-        str(study.root),
-        str(file),
-        "--rater",
-        "R1",
-        "--session",
-        "test",
-    ]
-    result = CliRunner().invoke(cli, [*call, "--who", "MK", "--on", "2026-11-01"])
-    assert result.exit_code == 0, result.output
-    assert result.output == (
-        "session test of R1 is entered: 2 grades from paper, 1 missing, in "
-        f"{study.log_file('R1', 'test')}. Then: masrel ratings\n"
-    )
-    header = json.loads(study.log_file("R1", "test").read_text("utf-8").splitlines()[0])
-    assert header["fields"]["grades"] == "paper"
 
 
 CELLS = ("", "NA", "1", "1,0", "11", "-1", "7", "x", "=1+1", "\u00e9", "1" * 200)

@@ -8,14 +8,10 @@ import pytest
 from docs.make.training import (
     SEED,
     calibrated,
-    counting,
     criterion,
     fixed_errors,
-    kappa_of_all,
-    lengths,
     sequential,
 )
-from masrel.agreement import cohen_kappa
 
 N = 1_000
 
@@ -39,30 +35,3 @@ def test_it_needs_30_percent_fewer_presentations_at_equal_errors(
     fails, _ = fixed_errors(replace(rule, order="blocked"), as_many, false_pass, n)
     # a fixed number that is 30 % larger fails more
     assert fails > false_fail + 4.0 * (2.0 * false_fail / n) ** 0.5
-
-
-def test_kappa_of_all_is_cohens_kappa() -> None:
-    rng = np.random.default_rng(3)
-    intended, codes = rng.integers(1, 5, (4, 20)), rng.integers(0, 6, (4, 20))
-    expected = [
-        cohen_kappa(np.column_stack(pair), categories=range(6), weights="linear").value
-        for pair in zip(intended, codes, strict=True)
-    ]
-    assert kappa_of_all(criterion(), intended, codes) == pytest.approx(
-        expected, abs=1e-12
-    )
-
-
-@pytest.mark.slow
-def test_who_counts_what_came_gains_next_to_nothing() -> None:
-    rule, rng = criterion(), np.random.default_rng(SEED)
-    boundary = calibrated(rule).boundary
-    shares = []
-    for is_even in (None, False, True):
-        drawn = counting(rule, is_even, N, rng)
-        passed, _ = lengths(rule, rule.evidence(*drawn), boundary)
-        shares.append(float(passed.mean()))
-    plain, counts, in_even_blocks = shares
-    # four standard errors of a difference, and 2 %
-    assert counts - plain < 0.02 + 4.0 * (2.0 * 0.08 * 0.92 / N) ** 0.5
-    assert in_even_blocks > 0.5  # blocks of each model twice would give it away
