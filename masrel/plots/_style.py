@@ -216,20 +216,26 @@ def finished(
         complete_fonts(figure)
     files: dict[Form, bytes] = {}
     lay_out(figure, stamp)
-    for form in forms:
-        file = io.BytesIO()
-        how: dict[str, Any] = {"dpi": _DPI, "metadata": _NO_TIME[form]}
-        if form == "inline":  # on the page's own ground, in letters of the reader
-            for axes in figure.findobj(Axes):
-                axes.patch.set_visible(False)
-            with mpl.rc_context({"svg.fonttype": "none"}):
-                figure.canvas.print_figure(file, format="svg", facecolor="none", **how)
-        else:
-            figure.canvas.print_figure(file, format=form, **how)
-        files[form] = file.getvalue()
-    if "inline" in files:
-        files["inline"] = _inlined(files["inline"].decode()).encode()
+    # The same layout for every form: with this setting each form begins anew with one.
+    with mpl.rc_context({"figure.constrained_layout.use": False}):
+        figure.set_layout_engine(None)  # "none" leaves one, for which all is drawn
+        for form in forms:
+            files[form] = _printed(figure, form)
     return files
+
+
+def _printed(figure: Figure, form: Form) -> bytes:
+    file = io.BytesIO()
+    how: dict[str, Any] = {"dpi": _DPI, "metadata": _NO_TIME[form]}
+    if form != "inline":
+        figure.canvas.print_figure(file, format=form, **how)
+        return file.getvalue()
+    # on the page's own ground, in letters of the reader
+    for axes in figure.findobj(Axes):
+        axes.patch.set_visible(False)
+    with mpl.rc_context({"svg.fonttype": "none"}):
+        figure.canvas.print_figure(file, format="svg", facecolor="none", **how)
+    return _inlined(file.getvalue().decode()).encode()
 
 
 def _inlined(svg: str) -> str:
@@ -262,10 +268,8 @@ def lay_out(figure: Figure, stamp: str) -> None:
             color=ALARM if is_loud else GREY,
             weight="bold" if is_loud else "normal",
         )
-    figure.draw_without_rendering()
-    # the same for every form; "none" would leave one, for which all is drawn once more
-    with mpl.rc_context({"figure.constrained_layout.use": False}):
-        figure.set_layout_engine(None)
+    if (engine := figure.get_layout_engine()) is not None:
+        engine.execute(figure)
 
 
 def _enlarge(figure: Figure) -> None:

@@ -6,13 +6,12 @@ means for each rater, and its interval is that of a mean difference of pairs.
 
 import math
 import statistics
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from masrel.agreement import limits_of_agreement
-from masrel.errors import MasrelWarning
+import numpy as np
+
 from masrel.lab.protocol import Protocol
 from masrel.lab.ratings import Ratings
 
@@ -223,16 +222,18 @@ def _effect(
     means = [
         [statistics.fmean(values) for values in of_rater] for of_rater in pairs.values()
     ]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", MasrelWarning)  # the reason says it
-        result = limits_of_agreement(means, level=level)
-    low, high = result.mean_interval.low, result.mean_interval.high
-    mean, reason = result.mean, result.reason
-    if len(means) == 1:
-        mean, reason = means[0][0] - means[0][1], "one rater has no spread"
-    elif result.sd <= 1e-12:
-        low = high = math.nan
+    differences = np.array([first - second for first, second in means])
+    n, mean, reason = len(means), float(differences.mean()), None
+    low = high = math.nan
+    if n == 1:
+        reason = "one rater has no spread"
+    elif (sd := float(differences.std(ddof=1))) <= 1e-12:
         reason = "it is the same for every rater"
+    else:
+        from scipy.special import stdtrit  # loaded only when an interval needs it
+
+        half = float(stdtrit(n - 1, 0.5 + 0.5 * level)) / math.sqrt(n) * sd
+        low, high = mean - half, mean + half
     n_pairs = n_equal = None
     if kind in ("again", "session"):
         both = [zip(*of_rater, strict=True) for of_rater in pairs.values()]
