@@ -27,6 +27,9 @@ from masrel.plots._style import (
 Quantity = Literal["torque", "angle"]
 """What is drawn against time."""
 
+Against = Quantity | Literal["torque over angle"]
+"""What is drawn against time, or against the angle."""
+
 _LABELS: dict[Quantity, str] = {"torque": "torque (N·m)", "angle": "angle (deg)"}
 _CATCH = 1  # position in _PHASES
 _LETTERS, _LETTER, _LINE = 6.5, 4.2, 8.5  # points: of a name, its letters, its height
@@ -129,7 +132,7 @@ def traces_picture(
 
 
 def draw_traces(
-    axes: Axes, stretches: Sequence[Stretch], quantity: Quantity, factor: float = 1.0
+    axes: Axes, stretches: Sequence[Stretch], quantity: Against, factor: float = 1.0
 ) -> None:
     """Draw stretches by lines so many times as wide as usual."""
     for code, (_, look) in enumerate(_PHASES):
@@ -150,10 +153,11 @@ def draw_traces(
             axes.plot(*dots, "o", color=look["color"], markersize=2.4)
 
 
-def _points(stretch: Stretch, quantity: Quantity) -> _Floats:
-    # (2, n_samples): s, and N·m or deg
-    values = stretch.torque if quantity == "torque" else np.degrees(stretch.angle)
-    return np.stack([stretch.time, values])
+def _points(stretch: Stretch, quantity: Against) -> _Floats:
+    # (2, n_samples): s or deg, and N·m or deg
+    angle, is_over_angle = np.degrees(stretch.angle), quantity == "torque over angle"
+    values = angle if quantity == "angle" else stretch.torque
+    return np.stack([angle if is_over_angle else stretch.time, values])
 
 
 def _runs(phase: NDArray[np.int8]) -> list[tuple[int, slice]]:
@@ -177,7 +181,7 @@ def phase_handles(stretches: Sequence[Stretch]) -> list[Line2D]:
 
 
 def name_traces(
-    axes: Axes, stretches: Sequence[Stretch], quantity: Quantity, names: Sequence[str]
+    axes: Axes, stretches: Sequence[Stretch], quantity: Against, names: Sequence[str]
 ) -> None:
     """Write names at catches, or ends, above each other where they would overlap."""
     axes.autoscale_view()  # otherwise done only when it is drawn

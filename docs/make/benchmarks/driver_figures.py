@@ -22,8 +22,8 @@ from masrel.lab.hess import (
     run_presentation,
 )
 from masrel.lab.recording import MEASURED_TORQUE, Recording
-from masrel.lab.report._figure_data import FIGURES
-from masrel.lab.report._measured_torque import measured_panel
+from masrel.lab.report._material import FIGURES
+from masrel.lab.report._trace_section import measured_panel
 from masrel.plots import draw
 from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import SIMULATED
@@ -150,7 +150,7 @@ def draw_measured(path: Path) -> None:
         measured_panel(measured(joint, stretch(60.0)), model)
         for model, joint in STANDARD_MODELS.items()
     )
-    shown = Drawn(FIGURES + "_trace_figures:measured_figure", (panels,))
+    shown = Drawn(FIGURES + "_stretch_figures:measured_figure", (panels,))
     files = draw(shown, stamp=SIMULATED, forms=("png",))
     path.write_bytes(files["png"])
 

@@ -30,14 +30,10 @@ def task_report():
 
 
 def files_read(study: Path) -> list[Path]:
-    """The files of a study that its report was made from."""
-    for path in (study / ".masrel_cache").iterdir():
-        _, _, body = path.read_bytes().partition(b"\n")
-        index, _, rest = body.partition(b"\n")
-        if index.startswith(b'[["note"'):
-            read = map(Path, json.loads(rest)["read"])
-            return [path for path in read if path.is_relative_to(study)]
-    raise FileNotFoundError(study)
+    """The files of a study, each of which its report may be made from."""
+    outputs = (study / ".masrel_cache", study / "report")
+    files = [path for path in sorted(study.rglob("*")) if path.is_file()]
+    return [p for p in files if not any(p.is_relative_to(of) for of in outputs)]
 
 
 def tasks(folder: Path, read: list[Path], written: list[Path]) -> None:
@@ -101,9 +97,9 @@ def main() -> None:
         "STUDY` again where nothing has changed, beside `doit` with one task that is "
         "up to date and has as many files to read and as many written, each a process "
         f"of its own, in turn; medians of {turns} turns of processor time, ± is half "
-        "the distance of the quartiles of the ratios. masrel hashes every file that "
-        "was read or written, and its own code; doit looks at sizes and times of those "
-        "read.",
+        "the distance of the quartiles of the ratios. masrel hashes every file of "
+        "the study and of the report, and its own code; doit looks at sizes and times "
+        "of those read.",
         "",
         f"{platform.machine()}, Python {platform.python_version()}; "
         f"masrel {masrel.__version__}, doit {importlib.metadata.version('doit')}.",

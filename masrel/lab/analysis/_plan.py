@@ -4,7 +4,6 @@ import hashlib
 import random
 import warnings
 from collections.abc import Sequence
-from functools import partial
 
 import masrel
 from masrel.agreement import coefficient, cohen_kappa
@@ -23,7 +22,6 @@ from masrel.lab.analysis._descriptions import (
     stretching_speeds,
 )
 from masrel.lab.analysis._exclusions import analysed_in_person, analysed_ratings
-from masrel.lab.analysis._known_estimates import known_estimate
 from masrel.lab.analysis._question_summaries import question_summaries
 from masrel.lab.analysis._results import Analysis, PlannedEstimate, RaterEstimate
 from masrel.lab.protocol import (
@@ -325,15 +323,6 @@ def _compute(
     line: EstimatePlan, protocol: Protocol, ratings: object, purpose: str
 ) -> Estimate:
     # the coefficient of a line, with the interval it asks for
-    categories, plan = scale_of(protocol).values, protocol.analysis
-    read = (line, ratings, purpose, categories, plan.level, plan.seed, plan.n_resamples)
-    compute = partial(_compute_anew, line, protocol, ratings, purpose)
-    return known_estimate(compute, *read)
-
-
-def _compute_anew(
-    line: EstimatePlan, protocol: Protocol, ratings: object, purpose: str
-) -> Estimate:
     categories, level = scale_of(protocol).values, protocol.analysis.level
     if line.interval == "none":
         return coefficient(line.coefficient)(

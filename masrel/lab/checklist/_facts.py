@@ -13,9 +13,12 @@ from masrel.lab.analysis import Analysis, analyze
 from masrel.lab.progress import RaterProgress, rater_progress, session_progress
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.ratings import Ratings, corrections_of, read_study_data, study_remarks
-from masrel.lab.report._design import beside_presentations, stretches_asked_for
-from masrel.lab.report._sample_size import size_sentence
-from masrel.lab.report._sentences import TARGETS, coefficient_name
+from masrel.lab.report._design import (
+    beside_presentations,
+    size_sentence,
+    stretches_asked_for,
+)
+from masrel.lab.report._material import TARGETS, coefficient_name
 from masrel.lab.run._state import read_session
 from masrel.lab.schedule import read_schedule
 from masrel.lab.schedule._orders import orders_in_words

@@ -19,7 +19,7 @@ from masrel.errors import ParameterError
 from masrel.lab._bounded_files import MAX_TABLE, read_regular
 from masrel.lab.checklist._facts import StudyFacts, gather_facts, words_of
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.report._pandoc import converted
+from masrel.lab.report._pages import converted
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -38,7 +38,7 @@ class CompareOptions:
     ) -> dict[str, object]:
         """Return what has changed as a document, and show it unless JSON is printed."""
         from masrel.lab.analysis._number_changes import changed_inputs, changes_between
-        from masrel.lab.report._changes_table import changes_table
+        from masrel.lab.report._jobs import changes_table
         from masrel.tables._tables import as_text
 
         changes, inputs = changes_between(old, new), changed_inputs(old, new)

@@ -85,7 +85,7 @@ class Verdict:
 def verdict_of(analysis: "Analysis", gates: "tuple[Gate, ...]") -> Verdict:
     """Hold an analysis against gates."""
     from masrel.lab.analysis import check_gates
-    from masrel.lab.report._junit import job_summary, junit_text
+    from masrel.lab.report._jobs import job_summary, junit_text
 
     results = check_gates(analysis, gates)
     return Verdict(

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from masrel.cli._options import OutputOptions, write_output
 from masrel.errors import ParameterError
-from masrel.lab.report._tone_scenes import tardieu_document, tardieu_text
+from masrel.lab.report._traced_scenes import tardieu_document, tardieu_text
 
 if TYPE_CHECKING:
     from masrel.lab.elbow import JointModel

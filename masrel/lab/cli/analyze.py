@@ -60,7 +60,7 @@ def analyze(
 
 
 def _show(data: "StudyData", analysis: "Analysis", *, csv: bool, raw: bool) -> None:
-    from masrel.lab.report._document import SECTIONS
+    from masrel.lab.report._document import made_section
     from masrel.lab.report._grade_sections import felt_sentences
     from masrel.lab.report._material import gather
     from masrel.pages._sections import Paragraph
@@ -71,7 +71,7 @@ def _show(data: "StudyData", analysis: "Analysis", *, csv: bool, raw: bool) -> N
     if felt:
         click.echo(textwrap.fill(felt, 88) + "\n", err=csv)
     for name in _computed(analysis):
-        for block in SECTIONS[name](material).blocks:
+        for block in made_section(name, material).blocks:
             if isinstance(block, Table):
                 click.echo(as_csv(block, raw=raw) if csv else as_text(block) + "\n")
             elif isinstance(block, Paragraph) and block.absent:

@@ -20,15 +20,15 @@ from masrel.cli._options import (
 )
 from masrel.errors import ParameterError
 from masrel.lab._bounded_files import MAX_TABLE, parse_json, read_regular
-from masrel.lab._cache import FOLDER, Cache
 from masrel.lab._once import read_once
 from masrel.lab.cli._comparing import CompareOptions, compare_options
 from masrel.lab.cli._gating import GateOptions, Verdict, gate_options, verdict_of
 from masrel.lab.cli._study_options import ratings_option, read_study, warnings_as_notes
-from masrel.lab.report._builds import Build
 from masrel.lab.report._report_folder import (
     MANIFEST,
+    NOTES,
     NUMBERS,
+    Build,
     changed_files,
     replace_report,
     stale_assets,
@@ -90,8 +90,7 @@ _OTHER_OPTIONS = (
     "--cache",
     "cache_folder",
     type=click.Path(path_type=Path, file_okay=False),
-    help="Folder in which figures are kept until what they show changes; default: "
-    f"STUDY/{FOLDER}.",
+    help=f"Folder that has what the last report was made from; default: STUDY/{NOTES}.",
 )
 @compare_options()
 @output_options(
@@ -126,8 +125,9 @@ def report(
     build = Build(
         study=study,
         folder=destination,
+        notes=_notes(study, cache_folder),
         options=_options_of_call(),
-        cache=_cache(study, cache_folder, check=check),
+        ratings_file=ratings_file,
     )
     old = comparing.read(study)  # which may be what is replaced
     making = _Making(build, ratings_file, only, formats, gating, include, output)
@@ -157,12 +157,12 @@ def _options_of_call() -> dict[str, str]:
     return {k: str(v) for k, v in params.items() if k not in _OTHER_OPTIONS}
 
 
-def _cache(study: Path, folder: Path | None, *, check: bool) -> Cache:
+def _notes(study: Path, folder: Path | None) -> Path:
     if folder is None:
-        folder = study / FOLDER
+        folder = study / NOTES
         check_inside(folder, study)
     refuse_record(folder / "any")
-    return Cache(folder, is_read_only=check)
+    return folder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -189,17 +189,16 @@ class _Making:
     def outcome(self, *, check: bool) -> _Outcome:
         """Make the report, or see that it is current."""
         build = self.build
-        shown = build.last()
+        made_from = build.made_from()  # a file that comes later is a change
+        shown = build.last(made_from)
         if shown is not None:
             echo_notes(shown["notes"])
             numbers = read_regular(build.folder / NUMBERS, most=MAX_TABLE)
             return _Outcome(shown=shown, changes=[], numbers=numbers)
-        with build.noted() as made:
-            files, shown = self._run()
-            # of what is written, not of what is there: others may write there, too
-            made["manifest"] = hashlib.sha256(files[MANIFEST]).hexdigest()
-            made["shown"] = shown
-            changes = _write_or_compare(files, build.folder, check=check)
+        files, shown = self._run()
+        changes = _write_or_compare(files, build.folder, check=check)
+        if not check:
+            build.keep(made_from, shown)
         return _Outcome(shown=shown, changes=changes, numbers=files[NUMBERS])
 
     def _run(self) -> tuple[dict[str, bytes], dict[str, Any]]:
@@ -210,12 +209,14 @@ class _Making:
             _check_sections(self.only, data.protocol)
             if {"latex", "docx"} & {*data.protocol.report.formats, *self.formats}:
                 # Imported here: who has a report that is current needs none of it.
-                from masrel.lab.report._pandoc import pandoc_version
+                from masrel.lab.report._pages import pandoc_version
 
                 pandoc_version()
             gates = self.gating.gates(data.protocol)
             analysis, files = self._files(data)
         return files, {
+            # of what is written, not of what is there: others may write there, too
+            "manifest": hashlib.sha256(files[MANIFEST]).hexdigest(),
             "notes": notes_of_call(),
             "read": f"read: {data.read}",
             "pages": [
@@ -231,16 +232,15 @@ class _Making:
         from tqdm import tqdm
 
         from masrel.lab.analysis import analyze
-        from masrel.lab.analysis._known_estimates import estimates_known
         from masrel.lab.report import study_conduct
         from masrel.lab.report._document import make_report
-        from masrel.lab.report._published_numbers import published_claims
+        from masrel.lab.report._material import gather
         from masrel.lab.verification import anchors_of
 
         conduct = study_conduct(
             data.paths, data.protocol, file=self.ratings_file, include=self.include
         )
-        with warnings_as_notes(), estimates_known(self.build.cache):
+        with warnings_as_notes():
             analysis = analyze(
                 data.protocol,
                 data.ratings,
@@ -255,22 +255,23 @@ class _Making:
             bar.set_postfix_str(part, refresh=False)
             bar.update()
 
+        material = gather(
+            data.protocol,
+            data.ratings,
+            analysis,
+            data.in_person,
+            data.paths.sessions,
+            conduct,
+        )
         with warnings_as_notes(), bar:
             return analysis, make_report(
-                data.protocol,
-                data.ratings,
-                analysis,
-                in_person=data.in_person,
-                recordings=data.paths.sessions,
+                material,
                 # of what is simulated none, so that it repeats byte for byte
                 anchors=() if data.ratings.simulated else anchors_of(data.paths),
-                conduct=conduct,
-                claims=published_claims(data.paths, data.protocol),
                 progress=progress,
                 raw_csv=self.output.raw_csv,
                 only=self.only,
                 formats=self.formats,
-                cache=self.build.cache,
             )
 
 

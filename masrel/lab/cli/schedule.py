@@ -32,7 +32,7 @@ def _show(study: Path, site: str | None, output: OutputOptions) -> None:
 
     Places by model, what follows what, runs.
     """
-    from masrel.lab.report._figure_data import FIGURES
+    from masrel.lab.report._material import FIGURES
     from masrel.lab.report._order_tables import (
         count_tables,
         order_document,
@@ -47,7 +47,7 @@ def _show(study: Path, site: str | None, output: OutputOptions) -> None:
         output,
         document=lambda: order_document(balances),
         text=lambda: summary_table(balances),
-        figure=lambda: Drawn(FIGURES + "_order_figure:order_pictures", (balances,)),
+        figure=lambda: Drawn(FIGURES + "_study_figures:order_pictures", (balances,)),
         stamp="not for raters",
         more=[table for balance in balances for table in count_tables(balance)],
     )

@@ -61,7 +61,7 @@ def _train(
     the test that [training] of the protocol sets. Nothing of a training enters the
     ratings of the study.
     """
-    from masrel.lab.report._training_tables import NOT_RATINGS, outcome
+    from masrel.lab.report._training import NOT_RATINGS, outcome
     from masrel.lab.training import train_rater
 
     paths = StudyPaths(study)
@@ -121,8 +121,8 @@ def _show(
     study: Path, rater: str, level: float, page: Path | None, output: OutputOptions
 ) -> None:
     """Show the training of one rater of STUDY so far; nothing is presented."""
-    from masrel.lab.report._training_tables import (
-        learning_view,
+    from masrel.lab.report._training import (
+        learning_content,
         training_document,
         training_stamp,
         training_tables,
@@ -137,13 +137,13 @@ def _show(
         output,
         document=lambda: training_document(record, level=level),
         text=lambda: curve,
-        figure=lambda: learning_view(record, level=level),
+        figure=lambda: learning_content(record, level=level),
         stamp=training_stamp(record, protocol.study.id),
         more=() if output.csv else (confusion,),
         width=_WIDTH,
     )
     if page is not None:
         # Imported here: the tables alone load nothing that draws.
-        from masrel.lab.report._training_page import training_page
+        from masrel.lab.report._training import training_page
 
         write_file(page, training_page(record, protocol, level=level))

@@ -9,13 +9,10 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from masrel.lab.report._conduct import StudyConduct, study_conduct
     from masrel.lab.report._document import ReportFiles, write_report
-    from masrel.lab.report._published_numbers import PublishedClaims, published_claims
 
 __all__ = [
-    "PublishedClaims",
     "ReportFiles",
     "StudyConduct",
-    "published_claims",
     "study_conduct",
     "write_report",
 ]
@@ -23,8 +20,7 @@ __all__ = [
 
 def __getattr__(name: str) -> object:
     if name in __all__:
-        from masrel.lab.report import _conduct, _document, _published_numbers
+        from masrel.lab.report import _conduct, _document
 
-        modules = (_conduct, _published_numbers, _document)
-        return next(getattr(m, name) for m in modules if hasattr(m, name))
+        return getattr(_conduct if "onduct" in name else _document, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,6 +1,6 @@
-"""Sections `agreement` and `test-retest`: coefficients with their intervals.
+"""Sections `agreement`, `test-retest` and `categories`: what raters agree on.
 
-Their table is narrow on a page, and has every field in the CSV.
+The table of coefficients is narrow on a page, and has every field in the CSV.
 """
 
 import dataclasses
@@ -13,20 +13,32 @@ from operator import attrgetter
 from masrel.agreement import strength
 from masrel.estimates import Estimate, Interval
 from masrel.lab.analysis import PlannedEstimate
-from masrel.lab.report._figure_data import MANY_RATERS
-from masrel.lab.report._material import Material
-from masrel.lab.report._sentences import (
+from masrel.lab.analysis._category_agreement import category_agreement
+from masrel.lab.analysis._exclusions import analysed_ratings
+from masrel.lab.report._material import (
+    MANY_RATERS,
     NOT_THERE,
     TARGETS,
+    Lacking,
+    Material,
+    at_ranks,
     coefficient_name,
     interval_name,
+    main_estimate,
     meaning,
 )
-from masrel.lab.report._stretches import at_ranks
-from masrel.pages._sections import Drawing, Paragraph, Section
+from masrel.pages._sections import Content, Drawing, Paragraph
 from masrel.plots._drawn_values import FOREST, Drawn, ForestRow
 from masrel.tables._estimate_words import forest_row
-from masrel.tables._tables import Column, Table, Value, counted, interval_text, number
+from masrel.tables._tables import (
+    Column,
+    Table,
+    Value,
+    counted,
+    interval_text,
+    number,
+    percent,
+)
 
 _AGREEMENTS = (
     "p_o: observed agreement; p_e: agreement expected by chance, 0 where the "
@@ -62,51 +74,40 @@ _COLUMNS = (
 _LETTERS = "ᵃᵇᶜᵈᵉᶠᵍʰⁱʲᵏˡᵐⁿᵒᵖʳˢᵗᵘᵛʷˣʸᶻ"  # they stand high without any markup
 
 
-# Kind of the plan's lines: name of the section, its title, and caption of its table.
-_SECTIONS = {
-    "inter-rater": (
-        "agreement",
-        "Agreement between raters",
-        "Agreement between raters",
-    ),
-    "test-retest": (
-        "test-retest",
-        "Test-retest agreement",
-        "Agreement of raters with themselves",
-    ),
-}
+_Planned = Sequence[PlannedEstimate]
 
 
-def estimates_section(material: Material, kind: str) -> Section:
-    """Show the plan's estimates of a kind: between raters, or test-retest."""
-    name, title, caption = _SECTIONS[kind]
-    planned = [p for p in material.analysis.estimates if p.line.kind == kind]
-    blocks: list[Paragraph | Table | Drawing] = []
+def planned_of_kind(material: Material, kind: str) -> _Planned:
+    """Return the plan's estimates of a kind: between raters, or test-retest."""
+    return [p for p in material.analysis.estimates if p.line.kind == kind]
+
+
+def estimates_section(
+    material: Material, planned: _Planned, *, name: str, caption: str
+) -> Iterator[Content]:
+    """Show estimates with their intervals, or say why there are none."""
     if not planned:
-        text = "The plan asks for no such estimate."
-        blocks.append(Paragraph(text=text, absent=True))
-    elif all(entry.estimate is None and not entry.by_rater for entry in planned):
-        texts = [f"{p.line.id} is not in these data: {p.reason}." for p in planned]
-        blocks += [Paragraph(text=text, absent=True) for text in texts]
-    else:
-        every = estimate_rows(planned)
-        rows = _few_of_many(every)
-        file = name.replace("-", "_")
-        intervals = [row.interval for row in rows if row.interval is not None]
-        meanings = dict.fromkeys(meaning(interval) for interval in intervals)
-        table = estimate_table(rows, name=file, caption=caption, data=material.data)
-        if len(rows) < len(every):
-            full = estimate_table(every, name=file, caption=caption, data=material.data)
-            note = "Of many raters, five by their value; the file has all."
-            table = dataclasses.replace(
-                table, rows=full.rows, page_rows=table.rows, notes=(*table.notes, note)
-            )
-        blocks = [
-            table,
-            *(Paragraph(text=text) for text in meanings),
-            _forest(material, rows, file, caption),
-        ]
-    return Section(name=name, title=title, blocks=tuple(blocks))
+        yield Paragraph(text="The plan asks for no such estimate.", absent=True)
+        return
+    if all(entry.estimate is None and not entry.by_rater for entry in planned):
+        for entry in planned:
+            text = f"{entry.line.id} is not in these data: {entry.reason}."
+            yield Paragraph(text=text, absent=True)
+        return
+    every = estimate_rows(planned)
+    rows = _few_of_many(every)
+    table = estimate_table(rows, name=name, caption=caption, data=material.data)
+    if len(rows) < len(every):
+        full = estimate_table(every, name=name, caption=caption, data=material.data)
+        note = "Of many raters, five by their value; the file has all."
+        table = dataclasses.replace(
+            table, rows=full.rows, page_rows=table.rows, notes=(*table.notes, note)
+        )
+    yield table
+    intervals = [row.interval for row in rows if row.interval is not None]
+    for text in dict.fromkeys(meaning(interval) for interval in intervals):
+        yield Paragraph(text=text)
+    yield _forest(material, rows, name, caption)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,19 +157,17 @@ def _few_of_many(rows: Sequence[EstimateRow]) -> list[EstimateRow]:
     shown: list[EstimateRow] = []
     for single, group in groupby(rows, key=attrgetter("single")):
         of_raters = list(group)
-        if not single or len(of_raters) <= MANY_RATERS:
-            shown += of_raters
-            continue
-        known = [
-            (row.estimate.value, row)
-            for row in of_raters
-            if row.estimate is not None and math.isfinite(row.estimate.value)
-        ]
-        ranks = at_ranks([value for value, _ in known]) if known else {}
-        shown += [
-            dataclasses.replace(known[at][1], name=f"{known[at][1].name} ({rank})")
-            for rank, at in ranks.items()
-        ]
+        if single and len(of_raters) > MANY_RATERS:
+            values = [
+                row.estimate.value if row.estimate else math.nan for row in of_raters
+            ]
+            of_raters = [
+                dataclasses.replace(
+                    of_raters[at], name=f"{of_raters[at].name} ({rank})"
+                )
+                for rank, at in at_ranks(values).items()
+            ]
+        shown += of_raters
     return shown
 
 
@@ -227,14 +226,10 @@ def _cells(row: EstimateRow, mark: str) -> tuple[Value, ...]:
         return (*head, *data, None, NOT_THERE, *[None] * 7, row.reason)
     ends: tuple[Value, ...] = (None,) * 5
     if interval is not None:
-        ends = (
-            f"{interval_text(interval.low, interval.high)} {mark}",
-            interval.low,
-            interval.high,
-            interval_name(interval),
-            TARGETS[interval.target],
-        )
-    is_kappa = estimate.coefficient.endswith("kappa")
+        text = f"{interval_text(interval.low, interval.high)} {mark}"
+        words = interval_name(interval), TARGETS[interval.target]
+        ends = (text, interval.low, interval.high, *words)
+    has_word = estimate.coefficient.endswith("kappa") and math.isfinite(estimate.value)
     return (
         *head,
         f"{estimate.n_items} {row.models}",
@@ -244,9 +239,7 @@ def _cells(row: EstimateRow, mark: str) -> tuple[Value, ...]:
         1 if row.single else estimate.n_raters,
         estimate.value,
         *ends,
-        strength(estimate.value)
-        if is_kappa and math.isfinite(estimate.value)
-        else None,
+        strength(estimate.value) if has_word else None,
         estimate.observed,
         estimate.chance,
         estimate.reason,
@@ -265,17 +258,14 @@ def _forest(
             raters = "twice" if row.single else counted(estimate.n_raters, "rater")
             detail = f"{counted(estimate.n_items, 'model')}, {raters}"
         if interval is not None:
-            kind = (
-                f"{interval.kind}, one-sided"
-                if interval.is_one_sided
-                else interval.kind
-            )
+            kind = interval.kind + ", one-sided" * interval.is_one_sided
             detail += f"; {kind}, {TARGETS[interval.target]}"
         label = f"{row.coefficient}, {row.name}"
-        line = ForestRow(label=label, detail=detail, text=NOT_THERE, has_zero=False)
-        if estimate is not None:
-            line = forest_row(label, estimate, detail=detail)
-        lines.append(line)
+        lines.append(
+            ForestRow(label=label, detail=detail, text=NOT_THERE, has_zero=False)
+            if estimate is None
+            else forest_row(label, estimate, detail=detail)
+        )
     texts = "; ".join(f"{line.label}: {line.text}" for line in lines)
     return Drawing(
         name=name,
@@ -301,3 +291,51 @@ def _looks(lines: Sequence[ForestRow], caption: str) -> Iterator[str]:
         yield "Blue, above: resamples, each row to its own height."
     if any(line.has_zero for line in lines):
         yield "Dashed: what chance gives."
+
+
+_CATEGORIES = "Agreement on each grade"
+_FEW = 10  # models, below which the intervals of a grade say next to nothing
+
+
+def categories_needs(material: Material) -> PlannedEstimate | Lacking:
+    """Return the main estimate, whose ratings agreement on each grade is of."""
+    entry = main_estimate(material.analysis)
+    if entry is None:
+        return Lacking("the plan asks for no estimate of agreement between raters")
+    return Lacking(entry.reason) if entry.estimate is None else entry
+
+
+def categories_section(material: Material, entry: PlannedEstimate) -> Iterator[Content]:
+    """Show how well raters agree on each grade, by the ratings of the main estimate."""
+    level, n_models = material.analysis.level, len(entry.models)
+    ratings = analysed_ratings(material.ratings, material.analysis.excluded)
+    notes = [
+        "Agreement: how often, where one rater gave the grade, another rater of the "
+        f"model gave it too. Low, High: its {percent(level)} % confidence interval for "
+        "these raters on other models like these. κ: Fleiss', of the grade against all "
+        "others."
+    ]
+    if n_models < _FEW:
+        text = f"The intervals are wide, as they rest on {counted(n_models, 'model')}."
+        notes.append(text)
+    of = f"{entry.line.models} models, session {entry.line.sessions[0]}"
+    yield Table(
+        name="categories",
+        caption=f"{_CATEGORIES} of the scale, {of}",
+        columns=(
+            Column(key="grade", heading="Grade", align="left"),
+            Column(key="n_ratings", heading="Ratings"),
+            Column(key="agreement", heading="Agreement", digits=3),
+            Column(key="low", heading="Low", digits=3),
+            Column(key="high", heading="High", digits=3),
+            Column(key="kappa", heading="κ", digits=3),
+        ),
+        rows=tuple(
+            (of.grade, 0, *[None] * 4)
+            if of.n_ratings == 0
+            else (of.grade, of.n_ratings, of.agreement, of.low, of.high, of.kappa)
+            for of in category_agreement(entry, ratings, level)
+        ),
+        notes=tuple(notes),
+        data=material.data,
+    )

@@ -20,9 +20,8 @@ from masrel.lab.progress import (
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.protocol._values import field_heading
 from masrel.lab.ratings import Correction, corrections_of, study_remarks
-from masrel.lab.report._figure_data import FIGURES, FlowStep
-from masrel.lab.report._material import Material
-from masrel.pages._sections import Content, Drawing, Paragraph, Section
+from masrel.lab.report._material import FIGURES, Material
+from masrel.pages._sections import Content, Drawing, Paragraph
 from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import Column, Table, Value
 
@@ -130,37 +129,36 @@ CONDUCT_SECTIONS = ("flow", "conduct")
 """Sections that no protocol names: they are there where there is anything to say."""
 
 
-def conduct_sections(material: Material, conduct: StudyConduct) -> list[Section]:
-    """Say what became of the raters and what happened, as far as it is known."""
-    sections = []
-    if any(session.last_event is not None for session in conduct.sessions):
-        blocks: tuple[Content, ...] = (
-            _flow_table(material, conduct),
-            _flow_figure(material, conduct),
-            *_characteristics(material, conduct),
-        )
-        sections.append(Section(name="flow", title="Flow of the raters", blocks=blocks))
-    if happened := _happened(material, conduct):
-        sections.append(Section(name="conduct", title="Conduct", blocks=happened))
-    return sections
+def run_of(material: Material) -> StudyConduct | None:
+    """Return how the study was run, if that is to be said."""
+    return material.conduct
 
 
-def _happened(material: Material, conduct: StudyConduct) -> tuple[Content, ...]:
-    blocks: list[Content] = []
+def flow_section(material: Material, conduct: StudyConduct | None) -> Iterator[Content]:
+    """Say what became of the raters, once one has begun."""
+    if conduct and any(session.last_event is not None for session in conduct.sessions):
+        yield _flow_table(material, conduct)
+        yield _flow_figure(material, conduct)
+        yield from _characteristics(material, conduct)
+
+
+def conduct_section(
+    material: Material, conduct: StudyConduct | None
+) -> Iterator[Content]:
+    """Say what happened, as far as it is known."""
+    if conduct is None:
+        return
     if conduct.events:
-        blocks += _event_tables(material, conduct)
+        yield _events_table(material, conduct)
     if conduct.corrections:
-        blocks.append(_corrections_table(material, conduct))
-    blocks += [Paragraph(text=text) for text in conduct.remarks]
-    left_out = "; ".join(_left_out(material, conduct))
-    if left_out:
-        blocks.append(
-            Paragraph(
-                text=f"Left out, as nobody asked for it: {left_out}. masrel report "
-                "--include NAME shows what is in parentheses."
-            )
+        yield _corrections_table(material, conduct)
+    for text in conduct.remarks:
+        yield Paragraph(text=text)
+    if left_out := "; ".join(_left_out(material, conduct)):
+        yield Paragraph(
+            text=f"Left out, as nobody asked for it: {left_out}. masrel report "
+            "--include NAME shows what is in parentheses."
         )
-    return tuple(blocks)
 
 
 def _analysed(material: Material, session: str | None = None) -> set[str]:
@@ -220,41 +218,33 @@ def _flow_figure(material: Material, conduct: StudyConduct) -> Drawing:
     complete = [r for r, s in stages.items() if s == {"complete"}]
     left = [r for r in status if r not in complete and status[r] == "withdrawn"]
     late = [rater.rater for rater in conduct.raters if rater.is_late]
-    analysed = _analysed(material)
-    going_on = [r for r in begun if r not in complete and r not in left]
-    excluded = material.analysis.excluded
-    steps = (
-        FlowStep(label="Planned", n=len(status), others=_named(("Late", late))),
-        FlowStep(
-            label="Begun",
-            n=len(begun),
-            others=_named(("Not begun", [r for r in status if r not in begun])),
+    # how many came so far, and what became of the others
+    groups: dict[str, tuple[int, dict[str, Collection[str]]]] = {
+        "Planned": (len(status), {"Late": late}),
+        "Begun": (len(begun), {"Not begun": [r for r in status if r not in begun]}),
+        "Complete": (
+            len(complete),
+            {
+                "Withdrawn": left,
+                "Not complete": [r for r in begun if r not in (*complete, *left)],
+            },
         ),
-        FlowStep(
-            label="Complete",
-            n=len(complete),
-            others=_named(("Withdrawn", left), ("Not complete", going_on)),
+        "Analysed": (
+            len(_analysed(material)),
+            {"Excluded": material.analysis.excluded},
         ),
-        FlowStep(
-            label="Analysed", n=len(analysed), others=_named(("Excluded", excluded))
-        ),
+    }
+    steps = tuple(
+        (f"{label}: {n}", [f"{k}: {len(r)} ({listed(r)})" for k, r in of.items() if r])
+        for label, (n, of) in groups.items()
     )
-    shown = "; ".join(
-        f"{step.label}: {step.n}" + "".join(f", {text}" for text in step.others)
-        for step in steps
-    )
+    shown = "; ".join(", ".join((label, *others)) for label, others in steps)
     return Drawing(
         name="rater_flow",
         caption="Flow of the raters. Who began and did not complete is analysed, too.",
         alt=f"Flow of the raters. {shown}.",
-        content=Drawn(FIGURES + "_rater_flow:flow_figure", (steps,)),
+        content=Drawn(FIGURES + "_study_figures:flow_figure", (steps,)),
         stamp=material.stamp,
-    )
-
-
-def _named(*groups: tuple[str, Collection[str]]) -> tuple[str, ...]:
-    return tuple(
-        f"{name}: {len(raters)} ({listed(raters)})" for name, raters in groups if raters
     )
 
 
@@ -312,7 +302,7 @@ def _summary(known: Sequence[object]) -> tuple[Value, ...]:
     return (statistics.fmean(numbers), sd, middle, min(numbers), max(numbers))
 
 
-def _event_tables(material: Material, conduct: StudyConduct) -> Iterator[Table]:
+def _events_table(material: Material, conduct: StudyConduct) -> Table:
     by = [Column(key="who", heading="By", align="left")] * (_WHO in conduct.include)
     rows: list[tuple[Value, ...]] = []
     for event in conduct.events:
@@ -322,7 +312,7 @@ def _event_tables(material: Material, conduct: StudyConduct) -> Iterator[Table]:
         place = (_text(fields.get("rater")), _text(fields.get("session")))
         details = "; ".join(_details(event, has_texts=_NOTES in conduct.include))
         rows.append((event.time_utc[:10], kind, *place, details or None, *who))
-    yield Table(
+    return Table(
         name="events",
         caption="What happened beside the sessions, in order of time",
         columns=(

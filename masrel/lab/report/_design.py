@@ -1,24 +1,18 @@
-"""Section `design`: what was presented to whom, with the constants of the joints."""
+"""Sections `design` and `sample-size`: what was presented to whom, and to how many."""
 
-from collections.abc import Sequence
-from typing import Any
+import math
+from collections.abc import Iterator, Sequence
 
 import msgspec
 
-from masrel.lab.protocol import Occasions, PresentationRules
+from masrel.lab.analysis import PlannedEstimate
+from masrel.lab.protocol import Occasions, PresentationRules, Protocol, SampleSize
 from masrel.lab.protocol._kinds import DEFAULT_KIND, all_values
 from masrel.lab.ratings import Rating
-from masrel.lab.report._figure_data import MANY_RATERS
-from masrel.lab.report._material import Material
+from masrel.lab.report._material import MANY_RATERS, Lacking, Material, sentence
 from masrel.lab.schedule._orders import orders_in_words
-from masrel.pages._sections import Paragraph, Section
-from masrel.tables._tables import (
-    Column,
-    Table,
-    Value,
-    as_entered,
-    counted,
-)
+from masrel.pages._sections import Content, Paragraph
+from masrel.tables._tables import Column, Table, Value, as_entered, counted, number
 
 _PARAMETERS = (
     ("catch_angle_constant_deg", "L (deg)"),
@@ -68,50 +62,46 @@ _CONSTANT_COLUMNS = (
     Column(key="value", heading="Value"),
 )
 
+_MODEL = Column(key="model", heading="Model", align="left")
 
-def design_section(material: Material) -> Section:
+
+def design_section(material: Material, _: None) -> Iterator[Content]:
     """Describe the study: models with parameters, raters and sessions."""
     protocol = material.protocol
     study, settings = protocol.study, protocol.simulated_raters
     n_models = len(protocol.models)
     n_standard = sum(model.role == "standard" for model in protocol.models)
-    texts = [
+    stretches = stretches_asked_for(protocol.presentation)
+    text = (
         f"{study.title}. {counted(n_models, 'haptic model')} ({n_standard} "
         f"standard, {n_models - n_standard} dummy), "
         f"{counted(len(protocol.raters), 'rater')}, "
         f"{counted(len(protocol.sessions), 'session')}; scale {protocol.scale.name}: "
         f"{', '.join(protocol.scale.grades)}."
-    ]
-    stretches = stretches_asked_for(protocol.presentation)
-    if stretches:
-        texts[0] += f" {stretches}"
-    texts[0] += beside_presentations(protocol.occasions)
+        f"{' ' * bool(stretches)}{stretches}{beside_presentations(protocol.occasions)}"
+    )
     if protocol.schedule.scheme != "random-order":
-        texts[0] += (
-            " In each session a rater meets the models in "
-            f"{orders_in_words(protocol.schedule)}."
-        )
+        orders = orders_in_words(protocol.schedule)
+        text += f" In each session a rater meets the models in {orders}."
+    yield Paragraph(text=text)
     if study.notes:
-        texts.append(study.notes)
+        yield Paragraph(text=study.notes)
     if study.source and material.data != "published":  # else it is in the head
-        texts.append(f"The study follows {study.source}.")
+        yield Paragraph(text=f"The study follows {study.source}.")
     n_simulated = len(material.ratings.rows) - material.ratings.n_from_persons
     if material.ratings.simulated and n_simulated:
-        texts.append(
-            "The grades are simulated: every simulated rater gives the intended grade "
-            f"with probability {as_entered(settings.accuracy)} and repeats a grade at "
-            f"a retest with probability {as_entered(settings.retest_agreement)} (seed "
-            f"{settings.seed}). They show that the study runs; they say nothing about "
-            "people or about the models."
+        yield Paragraph(
+            text="The grades are simulated: every simulated rater gives the intended "
+            f"grade with probability {as_entered(settings.accuracy)} and repeats a "
+            f"grade at a retest with probability "
+            f"{as_entered(settings.retest_agreement)} (seed {settings.seed}). They "
+            "show that the study runs; they say nothing about people or about the "
+            "models."
         )
-    tables = (
-        _models(material),
-        *_constants(material),
-        *_other_kinds(material),
-        _sessions(material),
-    )
-    paragraphs = (Paragraph(text=text) for text in texts)
-    return Section(name="design", title="Design", blocks=(*paragraphs, *tables))
+    yield _models(material)
+    yield from _constants(material)
+    yield from _other_kinds(material)
+    yield _sessions(material)
 
 
 def stretches_asked_for(rules: PresentationRules) -> str:
@@ -171,7 +161,7 @@ def _models(material: Material) -> Table:
         name="models",
         caption="Haptic models and their parameters",
         columns=(
-            Column(key="model", heading="Model", align="left"),
+            _MODEL,
             Column(key="role", heading="Role", align="left"),
             Column(key="intended_grade", heading="Intended grade", align="center"),
             *(
@@ -188,110 +178,70 @@ def _models(material: Material) -> Table:
     )
 
 
-def _constants(material: Material) -> list[Table]:
+def _constants(material: Material) -> Iterator[Table]:
     # those all models share, and, where there are any, those of single models
     protocol = material.protocol
-    values: dict[str, Any] = {"start_deg": protocol.stretch.start_deg}
-    values |= msgspec.structs.asdict(protocol.elbow)
-    shared: list[tuple[Value, ...]] = []
-    for key, names in _CONSTANTS.items():
-        value = values[key]
-        if value != _DEFAULTS.get(key, ""):
-            shared.append((*names, _VARIANT_NAMES.get(value) or float(value)))
-    single: list[tuple[Value, ...]] = []
-    for model in protocol.models:
-        for key, value in msgspec.structs.asdict(model.constants).items():
-            if value is not None and value != values[key]:
-                shown = _VARIANT_NAMES.get(value) or float(value)
-                single.append((model.id, *_CONSTANTS[key], shown))
+    values = msgspec.structs.asdict(protocol.elbow)
+    values["start_deg"] = protocol.stretch.start_deg
+    shared = [
+        (*names, _VARIANT_NAMES.get(values[key]) or float(values[key]))
+        for key, names in _CONSTANTS.items()
+        if values[key] != _DEFAULTS.get(key, "")
+    ]
+    single = [
+        (model.id, *_CONSTANTS[key], _VARIANT_NAMES.get(value) or float(value))
+        for model in protocol.models
+        for key, value in msgspec.structs.asdict(model.constants).items()
+        if value not in (None, values[key])
+    ]
     caption = "Constants all models share"
     if any(model.kind != DEFAULT_KIND for model in protocol.models):
         caption = "Constants all spastic elbows share"
+    yield Table(
+        name="constants",
+        caption=caption + ", but for those in the table below" * bool(single),
+        columns=_CONSTANT_COLUMNS,
+        rows=tuple(shared),
+        data=material.data,
+    )
     if single:
-        caption += ", but for those in the table below"
-    tables = [
-        Table(
-            name="constants",
-            caption=caption,
-            columns=_CONSTANT_COLUMNS,
-            rows=tuple(shared),
+        yield Table(
+            name="own_constants",
+            caption="Constants that single models have of their own",
+            columns=(_MODEL, *_CONSTANT_COLUMNS),
+            rows=tuple(single),
             data=material.data,
         )
-    ]
-    if single:
-        by_model = Column(key="model", heading="Model", align="left")
-        tables.append(
-            Table(
-                name="own_constants",
-                caption="Constants that single models have of their own",
-                columns=(by_model, *_CONSTANT_COLUMNS),
-                rows=tuple(single),
-                data=material.data,
-            )
-        )
-    return tables
 
 
-def _other_kinds(material: Material) -> list[Table]:
+def _other_kinds(material: Material) -> Iterator[Table]:
     # every number of the models that are no spastic elbows, if there are any
     rows: list[tuple[Value, ...]] = []
     for model in material.protocol.models:
-        if model.kind == DEFAULT_KIND:
-            continue
-        numbers = "; ".join(
-            f"{key} {'none' if value is None else as_entered(value)}"
-            for key, value in all_values(model.kind, model.parameters).items()
-        )
-        rows.append((model.id, model.kind, numbers))
-    if not rows:
-        return []
-    return [
-        Table(
+        if model.kind != DEFAULT_KIND:
+            numbers = "; ".join(
+                f"{key} {'none' if value is None else as_entered(value)}"
+                for key, value in all_values(model.kind, model.parameters).items()
+            )
+            rows.append((model.id, model.kind, numbers))
+    if rows:
+        heading = "Numbers, by the keys of the protocol"
+        yield Table(
             name="other_kinds",
             caption="Models of other kinds than the spastic elbow",
             columns=(
-                Column(key="model", heading="Model", align="left"),
+                _MODEL,
                 Column(key="kind", heading="Kind", align="left"),
-                Column(
-                    key="numbers",
-                    heading="Numbers, by the keys of the protocol",
-                    align="left",
-                ),
+                Column(key="numbers", heading=heading, align="left"),
             ),
             rows=tuple(rows),
             notes=("Keys end in their units; what each is stands in docs/tone.md.",),
             data=material.data,
         )
-    ]
-
-
-def _by_rater(ratings: Sequence[Rating], key: str) -> str | None:
-    # the value of a column, with the raters who have it where it is not everybody's
-    raters: dict[str, dict[str, None]] = {}
-    for row in ratings:
-        if (value := getattr(row, key)) is not None:
-            raters.setdefault(value, {})[row.rater] = None
-    if len(raters) < 2:
-        return next(iter(raters), None)
-    return "; ".join(f"{value}: {', '.join(who)}" for value, who in raters.items())
-
-
-def _without_ratings(material: Material, graded: Sequence[Rating]) -> list[str]:
-    notes = []
-    sessions = {row.session for row in graded}
-    rated = {row.model for row in graded}
-    absent = [each.id for each in material.protocol.sessions if each.id not in sessions]
-    if absent:
-        notes.append(f"No ratings in these data: session {', '.join(absent)}.")
-    unrated = [each.id for each in material.protocol.models if each.id not in rated]
-    if unrated and rated:
-        notes.append(f"Models without ratings in these data: {', '.join(unrated)}.")
-    return notes
 
 
 def _sessions(material: Material) -> Table:
     protocol, ratings = material.protocol, material.ratings.rows
-    graded = [row for row in ratings if row.grade is not None]
     # known of ratings from session logs
     origins = {
         key: heading
@@ -300,19 +250,18 @@ def _sessions(material: Material) -> Table:
     }
     rows, shown = [], []
     for session in protocol.sessions:
-        n_raters = len(session.raters)
-        n_planned = n_raters * len(protocol.models) * protocol.schedule.repeats
-        n_given = sum(row.session == session.id for row in graded)
-        names = ", ".join(session.raters)
         here = [row for row in ratings if row.session == session.id]
-        facts = [_by_rater(here, key) for key in origins]
-        note = session.note or None
-        rows.append((session.id, n_raters, names, n_planned, n_given, *facts, note))
-        if n_raters > MANY_RATERS:
-            names = ", ".join([*session.raters[:2], "…", session.raters[-1]])
-        shown.append((session.id, n_raters, names, n_planned, n_given, *facts, note))
-    notes = [] if shown == rows else ["The file names all raters."]
-    notes += _without_ratings(material, graded)
+        n_raters = len(session.raters)
+        few = [*session.raters[:2], "…", session.raters[-1]]
+        cells = (
+            n_raters * len(protocol.models) * protocol.schedule.repeats,
+            sum(row.grade is not None for row in here),
+            *(_by_rater(here, key) for key in origins),
+            session.note or None,
+        )
+        rows.append((session.id, n_raters, ", ".join(session.raters), *cells))
+        raters = few if n_raters > MANY_RATERS else session.raters
+        shown.append((session.id, n_raters, ", ".join(raters), *cells))
     return Table(
         name="sessions",
         caption="Sessions, their raters, and the ratings there are",
@@ -327,6 +276,164 @@ def _sessions(material: Material) -> Table:
         ),
         rows=tuple(rows),
         page_rows=tuple(shown),
-        notes=tuple(notes),
+        notes=(
+            *["The file names all raters."] * (shown != rows),
+            *_without_ratings(protocol, [r for r in ratings if r.grade is not None]),
+        ),
         data=material.data,
     )
+
+
+def _by_rater(ratings: Sequence[Rating], key: str) -> str | None:
+    # the value of a column, with the raters who have it where it is not everybody's
+    raters: dict[str, dict[str, None]] = {}
+    for row in ratings:
+        if (value := getattr(row, key)) is not None:
+            raters.setdefault(value, {})[row.rater] = None
+    if len(raters) < 2:
+        return next(iter(raters), None)
+    return "; ".join(f"{value}: {', '.join(who)}" for value, who in raters.items())
+
+
+def _without_ratings(protocol: Protocol, graded: Sequence[Rating]) -> Iterator[str]:
+    sessions = {row.session for row in graded}
+    rated = {row.model for row in graded}
+    absent = [each.id for each in protocol.sessions if each.id not in sessions]
+    if absent:
+        yield f"No ratings in these data: session {', '.join(absent)}."
+    unrated = [each.id for each in protocol.models if each.id not in rated]
+    if unrated and rated:
+        yield f"Models without ratings in these data: {', '.join(unrated)}."
+
+
+_SIZES = (
+    Column(key="estimate", heading="Estimate", align="left"),
+    Column(key="what", heading="Planned or came", align="left"),
+    Column(key="n_items", heading="Items"),
+    Column(key="n_raters", heading="Raters"),
+    Column(key="value", heading="Value", digits=3),
+    Column(key="half_width", heading="Half-width", digits=3),
+    Column(key="low", heading="Low", digits=3),
+    Column(key="high", heading="High", digits=3),
+    Column(key="assurance", heading="Assurance", digits=3),
+    Column(key="power", heading="Power", digits=3),
+)
+
+
+_Sizes = Sequence[tuple[PlannedEstimate, SampleSize]]
+
+
+def planned_sizes(material: Material) -> _Sizes | Lacking:
+    """Return each size of the plan with the estimate that it is of."""
+    sizes = material.protocol.analysis.sample_sizes
+    if not sizes:
+        return Lacking(sentence("sample-size", "nothing"))
+    of_line = {planned.line.id: planned for planned in material.analysis.estimates}
+    return [(of_line[size.estimate], size) for size in sizes]
+
+
+def sample_size_section(material: Material, sizes: _Sizes) -> Iterator[Content]:
+    """Show how the size was chosen, as the protocol says it, and what came of it."""
+    rows: list[tuple[Value, ...]] = []
+    for result, size in sizes:
+        planned = size_sentence(material.protocol, size)
+        yield Paragraph(text=f"{result.line.id}: {planned} {_outcome(result, size)}")
+        rows += _size_rows(result, size)
+    yield Table(
+        name="sample_size",
+        caption="What was planned, and what came",
+        columns=_SIZES,
+        rows=tuple(rows),
+        notes=(sentence("sample-size", "planned"),),
+        data=material.data,
+    )
+
+
+def size_sentence(protocol: Protocol, size: SampleSize) -> str:
+    """Say what a protocol states that a size can show."""
+    # imported here: a report without such a section loads nothing of planning
+    from masrel.planning import Plan
+    from masrel.tables._planning_tables import planning_sentence
+
+    # the plan as it is written: nothing is computed
+    line = next(e for e in protocol.analysis.estimates if e.id == size.estimate)
+    plan = Plan(
+        coefficient=line.coefficient,
+        weights=line.weights,
+        value=size.value,
+        n_items=size.n_items,
+        n_raters=size.n_raters,
+        model=size.model,
+        target=line.target,
+        interval=line.interval,
+        level=protocol.analysis.level,
+        sides=size.sides,
+        method=size.method or "",
+        prevalences=size.prevalences,
+        p_missing=size.p_missing,
+        half_width=size.half_width,
+        lower=size.lower,
+        upper=size.upper,
+        null=size.null,
+        expected_half_width=_or_nan(size.expected_half_width),
+        expected_low=_or_nan(size.expected_low),
+        expected_high=_or_nan(size.expected_high),
+        assurance=_or_nan(size.assurance),
+        power=_or_nan(size.power),
+        coverage=_or_nan(size.coverage),
+        n_studies=size.n_studies,
+    )
+    return planning_sentence(plan)
+
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def _outcome(result: PlannedEstimate, size: SampleSize) -> str:
+    if result.reason is not None:
+        return sentence("sample-size", "absent", reason=result.reason)
+    words = {
+        "items": counted(len(result.items), "item"),
+        "raters": counted(len(result.raters), "rater"),
+        "missing": f" ({result.n_missing} ratings missing)" * bool(result.n_missing),
+    }
+    half, low, high = _ends(result)
+    if half is None:
+        return sentence("sample-size", "no_interval", **words)
+    limit = size.half_width or size.expected_half_width
+    name = "interval" if limit is None else "narrow" if half <= limit else "wide"
+    return sentence(
+        "sample-size",
+        name,
+        **words,
+        half_width=number(half, 3),
+        low=number(low, 3),
+        high=number(high, 3),
+        what="wanted" if size.half_width else "expected",
+        limit=number(limit, 3),
+    )
+
+
+_Ends = tuple[float, float, float] | tuple[None, None, None]
+
+
+def _ends(result: PlannedEstimate) -> _Ends:
+    # half the width and the ends of the interval that came, if it has both
+    interval = None if result.estimate is None else result.estimate.interval
+    if interval is None or math.isnan(interval.high - interval.low):
+        return None, None, None
+    return 0.5 * (interval.high - interval.low), interval.low, interval.high
+
+
+def _size_rows(result: PlannedEstimate, size: SampleSize) -> list[tuple[Value, ...]]:
+    names = (
+        *("n_items", "n_raters", "value", "expected_half_width"),
+        *("expected_low", "expected_high", "assurance", "power"),
+    )
+    value = None if result.estimate is None else result.estimate.value
+    came = (len(result.items) or None, len(result.raters) or None, value)
+    return [
+        (result.line.id, "planned", *(getattr(size, name) for name in names)),
+        (result.line.id, "came", *came, *_ends(result), None, None),
+    ]

@@ -7,33 +7,50 @@ any of them.
 """
 
 import warnings
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from masrel.errors import MissingLettersWarning
-from masrel.lab._cache import Cache
 from masrel.lab.analysis import Analysis
 from masrel.lab.analysis._analysis_json import analysis_text
 from masrel.lab.protocol import Protocol, report_sections
 from masrel.lab.ratings import InPerson, Ratings
-from masrel.lab.report._agreement import estimates_section
-from masrel.lab.report._conduct import CONDUCT_SECTIONS, StudyConduct, conduct_sections
-from masrel.lab.report._design import design_section
-from masrel.lab.report._grade_sections import (
-    grades_section,
-    in_person_section,
-    intended_section,
+from masrel.lab.report._agreement import (
+    categories_needs,
+    categories_section,
+    estimates_section,
+    planned_of_kind,
 )
-from masrel.lab.report._grade_tables import categories_section, confusion_section
-from masrel.lab.report._material import Material, gather
-from masrel.lab.report._methods import methods_section
-from masrel.lab.report._order_section import order_section
-from masrel.lab.report._pages import WRITERS, Writer
-from masrel.lab.report._pandoc import pandoc_version
-from masrel.lab.report._published_numbers import PublishedClaims, claims_section
-from masrel.lab.report._question_tables import questionnaires_section
+from masrel.lab.report._conduct import (
+    CONDUCT_SECTIONS,
+    StudyConduct,
+    conduct_section,
+    flow_section,
+    run_of,
+)
+from masrel.lab.report._design import (
+    design_section,
+    planned_sizes,
+    sample_size_section,
+)
+from masrel.lab.report._grade_sections import (
+    confusion_needs,
+    confusion_section,
+    grades_section,
+    in_person_needs,
+    in_person_section,
+    intended_needs,
+    intended_section,
+    questionnaires_needs,
+    questionnaires_section,
+)
+from masrel.lab.report._material import Lacking, Material, gather
+from masrel.lab.report._order_tables import order_needs, order_section
+from masrel.lab.report._pages import WRITERS, pandoc_version
+from masrel.lab.report._paragraphs import methods_section, result_text
 from masrel.lab.report._report_folder import (
     MANIFEST,
     NUMBERS,
@@ -41,44 +58,106 @@ from masrel.lab.report._report_folder import (
     replace_report,
     report_files,
 )
-from masrel.lab.report._result import result_text
-from masrel.lab.report._sample_size import sample_size_section
-from masrel.lab.report._stretches import speeds_section
-from masrel.lab.report._trace_section import traces_section
+from masrel.lab.report._trace_section import (
+    speeds_needs,
+    speeds_section,
+    traces_needs,
+    traces_section,
+)
 from masrel.lab.verification import Anchor
-from masrel.pages._sections import Block, Content, Document, Drawing, Section, chapters
+from masrel.pages._sections import (
+    Block,
+    Content,
+    Document,
+    Drawing,
+    Paragraph,
+    Section,
+    chapters,
+)
 from masrel.plots import draw
 from masrel.tables._tables import Table, as_csv, tag_of
 
 Progress = Callable[[str], object]
 """Called with the name of each figure, and of the pages, once it is made."""
 
-SECTIONS: dict[str, Callable[[Material], Section]] = {
-    "design": design_section,
-    "sample-size": sample_size_section,
-    "grades": grades_section,
-    "agreement": partial(estimates_section, kind="inter-rater"),
-    "test-retest": partial(estimates_section, kind="test-retest"),
-    "categories": categories_section,
-    "intended": intended_section,
-    "confusion": confusion_section,
-    "in-person": in_person_section,
-    "order": order_section,
-    "speeds": speeds_section,
-    "traces": traces_section,
-    "questionnaires": questionnaires_section,
-    "claims": claims_section,
-    "methods": methods_section,
+
+def _nothing(_: Material) -> None:
+    """Return what a section needs that is made of the material alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class SectionRow:
+    """A section: its heading, what it says, and of what."""
+
+    title: str
+    contents: Callable[[Material, Any], Iterable[Content]]
+    # computed when the section is asked for; `Lacking` says why it is not there
+    needs: Callable[[Material], object] = _nothing
+
+
+_AGREEMENT = "Agreement between raters"
+_AGAIN = "Agreement of raters with themselves"
+SECTIONS = {
+    "design": SectionRow("Design", design_section),
+    "flow": SectionRow("Flow of the raters", flow_section, run_of),
+    "conduct": SectionRow("Conduct", conduct_section, run_of),
+    "sample-size": SectionRow("Sample size", sample_size_section, planned_sizes),
+    "grades": SectionRow("Grades", grades_section),
+    "agreement": SectionRow(
+        _AGREEMENT,
+        partial(estimates_section, name="agreement", caption=_AGREEMENT),
+        partial(planned_of_kind, kind="inter-rater"),
+    ),
+    "test-retest": SectionRow(
+        "Test-retest agreement",
+        partial(estimates_section, name="test_retest", caption=_AGAIN),
+        partial(planned_of_kind, kind="test-retest"),
+    ),
+    "categories": SectionRow(
+        "Agreement on each grade", categories_section, categories_needs
+    ),
+    "intended": SectionRow(
+        "Agreement with the intended grade", intended_section, intended_needs
+    ),
+    "confusion": SectionRow(
+        "Grades given for each intended grade", confusion_section, confusion_needs
+    ),
+    "in-person": SectionRow(
+        "In-person and haptic grades", in_person_section, in_person_needs
+    ),
+    "order": SectionRow("Effects of order", order_section, order_needs),
+    "speeds": SectionRow("Stretching speeds", speeds_section, speeds_needs),
+    "traces": SectionRow("Torque traces", traces_section, traces_needs),
+    "questionnaires": SectionRow(
+        "Questionnaires", questionnaires_section, questionnaires_needs
+    ),
+    "claims": SectionRow(
+        "Published numbers",
+        lambda *_: (),
+        lambda _: Lacking("masrel audit holds ratings/claims.csv against every table"),
+    ),
+    "methods": SectionRow("Methods", methods_section),
 }
-"""Name in ``report.sections`` to what makes it."""
+"""By their names in ``report.sections``; those of the conduct are nowhere named."""
 
 _INPUTS = {
     "protocol_sha256": "protocol",
     "ratings_sha256": "ratings",
     "in_person_sha256": "grades given in person",
     "answers_sha256": "answers to questionnaires",
-    "claims_sha256": "claims of the paper",
 }
+
+
+def made_section(name: str, material: Material) -> Section:
+    """Return a section by its name, or what says why its data are not there."""
+    row = SECTIONS[name]
+    needed = row.needs(material)
+    if isinstance(needed, Lacking):
+        text = f"Not in these data: {needed.reason or 'this was not computed'}."
+        contents: Iterable[Content] = [Paragraph(text=text, absent=True)]
+    else:
+        contents = row.contents(material, needed)
+    return Section(name=name, title=row.title, blocks=tuple(contents))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,9 +196,7 @@ def write_report(
     conduct: StudyConduct | None = None,
     anchors: Sequence[Anchor] = (),
     progress: Progress | None = None,
-    claims: PublishedClaims | None = None,
     raw_csv: bool = False,
-    cache: Path | None = None,
 ) -> ReportFiles:
     """Write the report a protocol asks for.
 
@@ -149,14 +226,9 @@ def write_report(
         the end: a report kept elsewhere shows whether the logs were written anew.
     progress : callable, optional
         Called with the name of each figure, and of the pages, once it is made.
-    claims : PublishedClaims, optional
-        What a paper printed of the study (`published_claims`), for section ``claims``.
     raw_csv : bool, optional
         Whether texts of the tables' files are as they are. Else those that a
         spreadsheet would run as formulas stand after an apostrophe.
-    cache : Path, optional
-        A folder in which figures and pages are kept, by all that they are made from;
-        those that are there already are not made again.
 
     Returns
     -------
@@ -171,19 +243,8 @@ def write_report(
     OSError
         If a file cannot be written; the pages that were there are then there still.
     """
-    files = make_report(
-        protocol,
-        ratings,
-        analysis,
-        in_person=in_person,
-        recordings=recordings,
-        conduct=conduct,
-        anchors=anchors,
-        progress=progress,
-        claims=claims,
-        raw_csv=raw_csv,
-        cache=Cache(cache),
-    )
+    material = gather(protocol, ratings, analysis, in_person, recordings, conduct)
+    files = make_report(material, anchors=anchors, progress=progress, raw_csv=raw_csv)
     replace_report(destination, files)
     pages = {
         name: destination / writer.file if writer.file in files else None
@@ -198,139 +259,98 @@ def write_report(
 
 
 def make_report(
-    protocol: Protocol,
-    ratings: Ratings,
-    analysis: Analysis,
+    material: Material,
     *,
-    in_person: InPerson | None = None,
-    recordings: Path | None = None,
-    conduct: StudyConduct | None = None,
     anchors: Sequence[Anchor] = (),
     progress: Progress | None = None,
     raw_csv: bool = False,
     only: Collection[str] = (),
     formats: Collection[str] = (),
-    claims: PublishedClaims | None = None,
-    cache: Cache,
 ) -> dict[str, bytes]:
     """Return the files of a report, of these sections only if some are named."""
     # formats: those that are made beside the protocol's
     # By name from the report's folder, in the order in which they are to be written
-    printed = () if claims is None else claims.claims
-    material = gather(protocol, ratings, analysis, in_person, recordings, printed)
-    inputs = {**analysis.inputs, **({} if claims is None else claims.inputs)}
-    names = [name for name in report_sections(protocol) if not only or name in only]
-    sections = [SECTIONS[name](material) for name in names]
-    if conduct is not None:
-        place = 1 + next((i for i, s in enumerate(sections) if s.name == "design"), -1)
-        of_conduct = conduct_sections(material, conduct)
-        sections[place:place] = [s for s in of_conduct if not only or s.name in only]
-    assets, lacking = Assets(), set[str]()
+    protocol, analysis = material.protocol, material.analysis
+    names = [n for n in section_names(protocol) if not only or n in only]
+    sections = [made_section(name, material) for name in names]
+    assets, inputs = Assets(), dict(analysis.inputs)
     document = Document(
         title=protocol.report.title or protocol.study.title,
         tag=tag_of(material.data),
         banner=material.banner,
         provenance=material.provenance,
         result=result_text(analysis),
-        sections=chapters(
-            sections, _blocks(assets, progress, cache, lacking, raw_csv=raw_csv)
+        sections=_chapters(
+            [section for section in sections if section.blocks],
+            partial(_block, assets, progress, raw_csv),
         ),
-        inputs=_inputs(inputs, anchors),
+        # what the pages end with: the hash of everything they were made from
+        inputs=(
+            *((f"SHA-256 of the {_INPUTS[name]}", of) for name, of in inputs.items()),
+            *((f"SHA-256 of line {a.line} of {a.log}", a.sha256) for a in anchors),
+        ),
         version=analysis.masrel_version,
     )
-    if lacking:  # of all figures at once
-        warnings.warn(MissingLettersWarning(lacking), stacklevel=2)
     writers = [
         writer
         for name, writer in WRITERS.items()
         if name in protocol.report.formats or name in formats
     ]
-    pages = {writer.file: _page(writer, document, cache) for writer in writers}
+    pages = {writer.file: writer.write(document) for writer in writers}
     pages[NUMBERS] = analysis_text(analysis).encode()
     if progress is not None:
         progress("pages")
-    made_from = {**inputs, **({} if conduct is None else conduct.inputs)}
-    converted = any(writer.is_converted for writer in writers)
-    with_pandoc = pandoc_version() if converted else None
-    return report_files(assets, pages, made_from, pandoc=with_pandoc)
+    if material.conduct is not None:
+        inputs |= material.conduct.inputs
+    is_converted = any(writer.is_converted for writer in writers)
+    pandoc = pandoc_version() if is_converted else None
+    return report_files(assets, pages, inputs, pandoc=pandoc)
 
 
-def section_names(protocol: Protocol) -> tuple[str, ...]:
-    """Return the names of the sections that the report of a study can have."""
-    return (*report_sections(protocol), *CONDUCT_SECTIONS)
+def section_names(protocol: Protocol) -> list[str]:
+    """Return the names of the sections that a report can have, in their order."""
+    names = list(report_sections(protocol))
+    place = names.index("design") + 1 if "design" in names else 0
+    names[place:place] = CONDUCT_SECTIONS
+    return names
 
 
-def _blocks(
+def _chapters(
+    sections: Sequence[Section], block: Callable[[int, Content], Block]
+) -> tuple[Any, ...]:
+    # letters that no font has are said of all figures at once
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        made = chapters(sections, block)
+    lacking: set[str] = set()
+    for warning in caught:
+        if isinstance(warning.message, MissingLettersWarning):
+            lacking |= warning.message.letters
+        else:
+            warnings.warn(warning.message, stacklevel=3)
+    if lacking:
+        warnings.warn(MissingLettersWarning(lacking), stacklevel=3)
+    return made
+
+
+def _block(
     assets: Assets,
     progress: Progress | None,
-    cache: Cache,
-    lacking: set[str],
-    *,
     raw_csv: bool,
-) -> Callable[[int, Content], Block]:
-    # what makes blocks as they are shown; files of tables and figures go to the assets
-    def block(number: int, content: Content) -> Block:
-        pictures: Mapping[str, bytes] = {}
-        if isinstance(content, Table):
-            file = as_csv(content, raw=raw_csv).encode()
-            assets.add("tables", content.name, "csv", file)
-        elif isinstance(content, Drawing):
-            pictures = _pictures(content, cache, lacking)
-            if progress is not None:
-                progress(content.name)
-        files = {
-            form: assets.add("figures", content.name, form, picture)
-            for form, picture in pictures.items()
-            if isinstance(content, Drawing)
-        }
-        return Block(number=number, content=content, pictures=pictures, files=files)
-
-    return block
-
-
-def _pictures(drawing: Drawing, cache: Cache, lacking: set[str]) -> Mapping[str, bytes]:
-    # its files by form: those that were kept, or else drawn; lacking: letters that
-    # figures so far have no font for
-    key = cache.key("figure", drawing.content, drawing.stamp, libraries=_DRAWING)
-    stored = cache.read(key)
-    if stored is None:
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            files = draw(drawing.content, stamp=drawing.stamp)
-        stored = {str(form): data for form, data in files.items()}
-        if not caught:  # a font with the letters that are missing may come
-            cache.write(key, stored)
-        for warning in caught:
-            if isinstance(warning.message, MissingLettersWarning):
-                lacking |= warning.message.letters
-            else:
-                warnings.warn(warning.message, stacklevel=2)
-    return stored
-
-
-_DRAWING = ("matplotlib", "numpy", "pillow", "scipy")
-_PAGE = "page"
-
-
-def _page(writer: Writer, document: Document, cache: Cache) -> bytes:
-    pandoc = pandoc_version() if writer.is_converted else None
-    key = cache.key("page", writer.file, document, pandoc, libraries=("jinja2",))
-    stored = cache.read(key)
-    if stored is not None:
-        return stored[_PAGE]
-    page = writer.write(document)
-    cache.write(key, {_PAGE: page})
-    return page
-
-
-def _inputs(
-    inputs: Mapping[str, str], anchors: Sequence[Anchor]
-) -> tuple[tuple[str, str], ...]:
-    # what the pages end with: the hash of everything they were made from
-    return (
-        *(
-            (f"SHA-256 of the {_INPUTS[name]}", digest)
-            for name, digest in inputs.items()
-        ),
-        *((f"SHA-256 of line {a.line} of {a.log}", a.sha256) for a in anchors),
-    )
+    number: int,
+    content: Content,
+) -> Block:
+    # as it is shown; files of tables and figures go to the assets
+    if isinstance(content, Table):
+        assets.add("tables", content.name, "csv", as_csv(content, raw=raw_csv).encode())
+    if not isinstance(content, Drawing):
+        return Block(number=number, content=content)
+    drawn = draw(content.content, stamp=content.stamp)
+    pictures = {str(form): picture for form, picture in drawn.items()}
+    if progress is not None:
+        progress(content.name)
+    files = {
+        form: assets.add("figures", content.name, form, picture)
+        for form, picture in pictures.items()
+    }
+    return Block(number=number, content=content, pictures=pictures, files=files)

@@ -12,7 +12,6 @@ from masrel.lab.elbow.identification import (
 )
 from masrel.lab.elbow.identification._catches import Trial
 from masrel.lab.elbow.identification._model_file import ALL_QUANTITIES, Quantity
-from masrel.lab.report._figure_data import FIGURES
 from masrel.plots._drawn_values import Drawn, Form
 from masrel.tables._tables import (
     ABSENT,
@@ -34,26 +33,49 @@ FRICTION = {
 
 def fit_table(fit: ElbowFit | FrictionFit) -> Table:
     """Return the table of an identified joint, or of a device's friction."""
-    return _joint_table(fit) if isinstance(fit, ElbowFit) else _friction_table(fit)
+    is_joint = isinstance(fit, ElbowFit)
+    alone, quantities = {}, FRICTION
+    error = f"{number(100.0 * fit.relative_error, 1)} %"
+    if isinstance(fit, ElbowFit):
+        alone = {e.name: e for step in fit.steps for e in step.estimates}
+        quantities = ALL_QUANTITIES
+        slow = sum(trial.pace == "slow" for trial in fit.trials)
+        notes = (
+            fit.lack_of_fit.sentence,
+            f"{slow} slow and {len(fit.trials) - slow} fast trials; intervals are "
+            "clustered by trial.",
+            f"Slow trials differ from (1) by {error} of their mean torque; all trials "
+            f"from the law by {number(fit.torque_sd, 3)} N·m (standard deviation).",
+            "The column of a step takes what earlier steps found as known.",
+            *fit.remarks,
+        )
+    else:
+        notes = (
+            f"{len(fit.strokes)} strokes; intervals are clustered by stroke.",
+            f"Torque differs from (7) by {error} of its mean.",
+        )
+    return Table(
+        name="joint" if is_joint else "friction",
+        caption="Parameters of the joint" if is_joint else "Friction of the device",
+        columns=(
+            Column(key="parameter", heading="Parameter", align="left"),
+            Column(key="unit", heading="Unit", align="left"),
+            Column(key="value", heading="Value"),
+            Column(key="standard_error", heading="SE"),
+            Column(key="interval", heading=f"{percent(fit.level)} % interval"),
+            Column(key="step", heading="Step alone"),
+            Column(key="n_trials", heading="Trials"),
+        ),
+        rows=tuple(
+            _row(e, alone.get(e.name), quantities[e.name]) for e in fit.estimates
+        ),
+        notes=notes,
+        data=_data_of(fit),
+    )
 
 
-def _joint_table(fit: ElbowFit) -> Table:
-    alone = {e.name: e for step in fit.steps for e in step.estimates}
-    rows = tuple(
-        _row(e, alone.get(e.name), ALL_QUANTITIES[e.name]) for e in fit.estimates
-    )
-    slow = sum(trial.pace == "slow" for trial in fit.trials)
-    fast = len(fit.trials) - slow
-    notes = (
-        fit.lack_of_fit.sentence,
-        f"{slow} slow and {fast} fast trials; intervals are clustered by trial.",
-        f"Slow trials differ from (1) by {number(100.0 * fit.relative_error, 1)} % of "
-        f"their mean torque; all trials from the law by {number(fit.torque_sd, 3)} N·m "
-        "(standard deviation).",
-        "The column of a step takes what earlier steps found as known.",
-        *fit.remarks,
-    )
-    return _table("joint", "Parameters of the joint", rows, notes, fit)
+def _data_of(fit: ElbowFit | FrictionFit) -> str:
+    return "simulated" if fit.simulated else "recorded"
 
 
 def residual_tables(fit: ElbowFit | FrictionFit) -> tuple[Table, ...]:
@@ -91,7 +113,7 @@ def residual_tables(fit: ElbowFit | FrictionFit) -> tuple[Table, ...]:
             for phase in lack.phases
         ),
         notes=tuple(notes),
-        data="simulated" if fit.simulated else "recorded",
+        data=_data_of(fit),
     )
     return (table,)
 
@@ -134,7 +156,7 @@ def comparison_tables(compared: Sequence[ComparedFit]) -> tuple[Table, ...]:
             columns=columns,
             rows=rows,
             notes=notes,
-            data="simulated" if first.simulated else "recorded",
+            data=_data_of(first),
         ),
     )
 
@@ -168,69 +190,24 @@ def comparison_document(compared: Sequence[ComparedFit]) -> dict[str, object]:
     }
 
 
-def _friction_table(fit: FrictionFit) -> Table:
-    rows = tuple(_row(e, None, FRICTION[e.name]) for e in fit.estimates)
-    notes = (
-        f"{len(fit.strokes)} strokes; intervals are clustered by stroke.",
-        f"Torque differs from (7) by {number(100.0 * fit.relative_error, 1)} % of its "
-        "mean.",
-    )
-    return _table("friction", "Friction of the device", rows, notes, fit)
-
-
 def _row(
     estimate: FittedParameter, alone: FittedParameter | None, quantity: Quantity
 ) -> tuple[str, str, str, str, str, str, int]:
     factor = quantity.factor
     value, error = estimate.value * factor, estimate.standard_error * factor
-    digits = _digits(value, error)
-    interval, step = ABSENT, ABSENT
-    if not math.isnan(error):
-        low, high = estimate.low * factor, estimate.high * factor
-        interval = interval_text(low, high, digits)
-    if alone is not None and not math.isnan(alone.value):
-        step = number(alone.value * factor, digits)
+    # two digits of the error, or four of the value
+    size, n = (error, 1) if error > 0.0 else (abs(value), 3)
+    digits = max(0, n - math.floor(math.log10(size))) if size > 0.0 else 3
+    ends = interval_text(estimate.low * factor, estimate.high * factor, digits)
+    has_step = alone is not None and not math.isnan(alone.value)
     return (
         quantity.symbol,
         quantity.unit,
         number(value, digits),
-        number(error, digits) if not math.isnan(error) else ABSENT,
-        interval,
-        step,
+        ABSENT if math.isnan(error) else number(error, digits),
+        ABSENT if math.isnan(error) else ends,
+        number(alone.value * factor, digits) if alone and has_step else ABSENT,
         estimate.n_trials,
-    )
-
-
-def _digits(value: float, error: float) -> int:
-    # two digits of the error, or four of the value
-    if math.isnan(value):
-        return 0
-    size, digits = (error, 1) if error > 0.0 else (abs(value), 3)
-    return max(0, digits - math.floor(math.log10(size))) if size > 0.0 else 3
-
-
-def _table(
-    name: str,
-    caption: str,
-    rows: Sequence[tuple[str | int, ...]],
-    notes: tuple[str, ...],
-    fit: ElbowFit | FrictionFit,
-) -> Table:
-    return Table(
-        name=name,
-        caption=caption,
-        columns=(
-            Column(key="parameter", heading="Parameter", align="left"),
-            Column(key="unit", heading="Unit", align="left"),
-            Column(key="value", heading="Value"),
-            Column(key="standard_error", heading="SE"),
-            Column(key="interval", heading=f"{percent(fit.level)} % interval"),
-            Column(key="step", heading="Step alone"),
-            Column(key="n_trials", heading="Trials"),
-        ),
-        rows=tuple(rows),
-        notes=notes,
-        data="simulated" if fit.simulated else "recorded",
     )
 
 
@@ -361,17 +338,15 @@ def fit_figures(fit: ElbowFit | FrictionFit) -> dict[str, dict[Form, bytes]]:
     # Imported here: a table loads nothing that draws.
     from masrel.plots import draw
 
-    views = {}
+    views = {"fit_slow": "slow", "fit_residuals": "residuals"}
     if isinstance(fit, FrictionFit):
-        views["fit_friction"] = "friction"
-    else:
-        views["fit_slow"] = "slow"
-        views["fit_residuals"] = "residuals"
-        if any(trial.after is not None for trial in fit.trials):
-            views["fit_trials"] = "fast"
-            views["fit_catches"] = "catches"
-    stamp = SIMULATED if fit.simulated else ""
+        views = {"fit_friction": "friction"}
+    elif any(trial.after is not None for trial in fit.trials):
+        views |= {"fit_trials": "fast", "fit_catches": "catches"}
     return {
-        name: draw(Drawn(f"{FIGURES}_fit_figures:{view}_figure", (fit,)), stamp=stamp)
+        name: draw(
+            Drawn(f"masrel.lab.report.figures._fit_figures:{view}_figure", (fit,)),
+            stamp=SIMULATED * fit.simulated,
+        )
         for name, view in views.items()
     }

@@ -1,32 +1,39 @@
-"""Sections `grades`, `intended` and `in-person`: every grade, and what it should be."""
+"""Grades beside what they should be, and answers, without saying who gave them."""
 
-from collections import Counter
-from collections.abc import Iterator
+import math
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from decimal import ROUND_HALF_UP, Decimal
 from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.lab.report._figure_data import MANY_RATERS
-from masrel.lab.report._material import Material, has_order
-from masrel.pages._sections import Drawing, Paragraph, Section, absent_section
+from masrel.lab.analysis import InPersonAgreement, IntendedAgreement, QuestionSummary
+from masrel.lab.analysis._exclusions import analysed_ratings
+from masrel.lab.analysis._given_grades import GivenGrades, given_grades
+from masrel.lab.analysis._question_summaries import FEWEST_RATERS
+from masrel.lab.protocol import report_sections
+from masrel.lab.report._material import FIGURES, MANY_RATERS, Lacking, Material
+from masrel.pages._sections import Content, Drawing, Paragraph
 from masrel.plots._drawn_values import Drawn
-from masrel.scales import Scale
-from masrel.tables._tables import Column, Table, Value, counted, number
+from masrel.tables._tables import Column, Table, Value, counted, number, percent
+
+_MODEL = Column(key="model", heading="Model", align="left")
 
 
-def grades_section(material: Material) -> Section:
+def grades_section(material: Material, _: None) -> Iterator[Content]:
     """Show every grade of every session, as a grid of models by raters."""
-    blocks: list[Paragraph | Table | Drawing] = []
-    for session in material.sessions:
-        blocks += _grid_blocks(material, session, _grid(material, session))
     felt = felt_sentences(material)
-    if felt and blocks:
-        blocks.insert(0, Paragraph(text=felt))
-    if not blocks:
-        blocks.append(Paragraph(text="These data hold no ratings.", absent=True))
-    return Section(name="grades", title="Grades", blocks=tuple(blocks))
+    if not material.sessions:
+        yield Paragraph(text="These data hold no ratings.", absent=True)
+    elif felt:
+        yield Paragraph(text=felt)
+    for session in material.sessions:
+        grid = _grid(material, session)
+        is_many = len(grid.raters) > MANY_RATERS
+        yield from (_counted_blocks if is_many else _grid_blocks)(material, grid)
 
 
 def felt_sentences(material: Material) -> str:
@@ -57,178 +64,159 @@ def felt_sentences(material: Material) -> str:
     return " ".join(sentences)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Grid:
     """Grades of one session, one row a model and one column a rater."""
 
-    raters: tuple[str, ...]
-    models: tuple[str, ...]
-    intended: tuple[str | None, ...]  # by model
-    # by model and rater, the grades of every presentation in order; no None
-    grades: tuple[tuple[tuple[str, ...], ...], ...]
+    session: str
+    raters: list[str]
+    models: list[str]
+    rows: list[tuple[Value, ...]]  # as a table has them
+    # (n_models, n_raters, most presentations): of the scale, -1 where there is none
+    codes: NDArray[np.intp]
+    aims: list[int]  # codes of the intended grades, -1 for none
+    notes: list[str]
+    words: str  # what a reader who cannot see it needs to know
 
     @property
     def has_aims(self) -> bool:
         """Whether a model has an intended grade."""
-        return any(intended is not None for intended in self.intended)
+        return max(self.aims) >= 0
 
 
 def _grid(material: Material, session: str) -> _Grid:
-    rows = [row for row in material.ratings.rows if row.session == session]
-    grades: dict[tuple[str, str], tuple[str, ...]] = {}
-    for row in sorted(rows, key=attrgetter("repeat")):
-        if row.grade is not None:
-            key = row.model, row.rater
-            grades[key] = (*grades.get(key, ()), row.grade)
-    with_rows, with_columns = {row.model for row in rows}, {row.rater for row in rows}
-    models = [model for model in material.protocol.models if model.id in with_rows]
-    raters = [r.id for r in material.protocol.raters if r.id in with_columns]
+    grades = material.ratings.scale.grades
+    ratings = [row for row in material.ratings.rows if row.session == session]
+    cells: dict[tuple[str, str], list[str]] = defaultdict(list)
+    for row in sorted(ratings, key=attrgetter("repeat")):
+        cells[row.model, row.rater] += [] if row.grade is None else [row.grade]
+    models = [m for m in material.protocol.models if m.id in {r.model for r in ratings}]
+    raters = [
+        r.id for r in material.protocol.raters if r.id in {r.rater for r in ratings}
+    ]
+    shape = len(models), len(raters), max(1, *map(len, cells.values()))
+    codes, words = np.full(shape, -1), []
+    rows: list[tuple[Value, ...]] = []
+    for i, model in enumerate(models):
+        of_raters = [cells[model.id, rater] for rater in raters]
+        for k, of_rater in enumerate(of_raters):
+            codes[i, k, : len(of_rater)] = [grades.index(grade) for grade in of_rater]
+        texts = [", ".join(of_rater) or None for of_rater in of_raters]
+        rows.append((model.id, model.intended_grade, *texts))
+        counts = Counter(grade for of_rater in of_raters for grade in of_rater)
+        aim = f" (intended {model.intended_grade})" * bool(model.intended_grade)
+        text = ", ".join(f"{n} of grade {grade}" for grade, n in counts.items())
+        words.append(f"{model.id}{aim}: {text or 'no grades'}")
+    n_missing = int((codes.max(axis=2) < 0).sum())
+    notes = [f"{counted(n_missing, 'rating')} missing, shown as –."] * bool(n_missing)
+    if excluded := [r for r in raters if r in material.analysis.excluded]:
+        text = f"Excluded from every number of this report: {', '.join(excluded)}."
+        notes.append(text)
+    aims = [model.intended_grade for model in models]
     return _Grid(
-        raters=tuple(raters),
-        models=tuple(model.id for model in models),
-        intended=tuple(model.intended_grade for model in models),
-        grades=tuple(
-            tuple(grades.get((model.id, rater), ()) for rater in raters)
-            for model in models
-        ),
+        session=session,
+        raters=raters,
+        models=[model.id for model in models],
+        rows=rows,
+        codes=codes,
+        aims=[-1 if aim is None else grades.index(aim) for aim in aims],
+        notes=notes,
+        words="; ".join(words),
     )
 
 
-def _grid_blocks(
-    material: Material, session: str, grid: _Grid
-) -> tuple[Table, Drawing]:
-    table_rows: list[tuple[Value, ...]] = [
-        (model, intended, *(", ".join(grades) or None for grades in cells))
-        for model, intended, cells in zip(
-            grid.models, grid.intended, grid.grades, strict=True
-        )
-    ]
-    n_missing = sum(not grades for cells in grid.grades for grades in cells)
-    notes = [f"{counted(n_missing, 'rating')} missing, shown as –."] * bool(n_missing)
-    excluded = [r for r in grid.raters if r in material.analysis.excluded]
-    if excluded:
-        notes.append(
-            f"Excluded from every number of this report: {', '.join(excluded)}."
-        )
-    if len(grid.raters) > MANY_RATERS:
-        return _counted_blocks(material, session, grid, table_rows, notes)
-    table = Table(
-        name=f"grades_{session}",
-        caption=f"Grades of session {session}: models by raters",
-        columns=(
-            Column(key="model", heading="Model", align="left"),
-            Column(key="intended_grade", heading="Intended", align="center"),
-            *(Column(key=name, heading=name, align="center") for name in grid.raters),
-        ),
-        rows=tuple(table_rows),
-        notes=tuple(notes),
+_INTENDED = Column(key="intended_grade", heading="Intended", align="center")
+
+
+def _grid_blocks(material: Material, grid: _Grid) -> Iterator[Content]:
+    protocol, scale = material.protocol, material.ratings.scale
+    raters = [Column(key=name, heading=name, align="center") for name in grid.raters]
+    yield Table(
+        name=f"grades_{grid.session}",
+        caption=f"Grades of session {grid.session}: models by raters",
+        columns=(_MODEL, _INTENDED, *raters),
+        rows=tuple(grid.rows),
+        notes=tuple(grid.notes),
         data=material.data,
     )
-    is_ordered = has_order(material)
+    # as far as a protocol tells
+    is_ordered = (
+        "order" in report_sections(protocol)
+        or any(line.weights != "identity" for line in protocol.analysis.estimates)
+        or any(grade[0].isdecimal() for grade in scale.grades)
+    )
     caption = [
-        f"Grades of session {session}.",
+        f"Grades of session {grid.session}.",
         *["Darker: a higher grade."] * is_ordered,
         *["Framed: a grade other than the intended one."] * grid.has_aims,
-        *["Blank: no rating."] * bool(n_missing),
+        *["Blank: no rating."] * bool((grid.codes.max(axis=2) < 0).any()),
     ]
-    scale = material.ratings.scale
     pictured = (
-        *(_codes(grid, scale), grid.models, grid.raters, scale.grades, is_ordered),
-        *(np.array(scale.values), _aims(grid, scale) if grid.has_aims else None),
+        *(grid.codes, grid.models, grid.raters, scale.grades, is_ordered),
+        *(np.array(scale.values), grid.aims if grid.has_aims else None),
     )
-    drawing = Drawing(
-        name=f"grades_{session}",
+    yield Drawing(
+        name=f"grades_{grid.session}",
         caption=" ".join(caption),
-        alt=f"Grid of grades. {'; '.join(_grades_by_model(grid))}.",
+        alt=f"Grid of grades. {grid.words}.",
         content=Drawn("masrel.plots._grades:items_picture", pictured),
         stamp=material.stamp,
     )
-    return table, drawing
 
 
-def _codes(grid: _Grid, scale: Scale) -> NDArray[np.intp]:
-    # (n_models, n_raters, most presentations), -1 where there is no grade
-    most = max(len(grades) for cells in grid.grades for grades in cells)
-    codes = np.full((len(grid.models), len(grid.raters), max(most, 1)), -1)
-    for row, cells in enumerate(grid.grades):
-        for column, grades in enumerate(cells):
-            codes[row, column, : len(grades)] = list(map(scale.grades.index, grades))
-    return codes
-
-
-def _aims(grid: _Grid, scale: Scale) -> list[int]:
-    return [-1 if aim is None else scale.grades.index(aim) for aim in grid.intended]
-
-
-def _grades_by_model(grid: _Grid) -> Iterator[str]:
-    by_model = zip(grid.models, grid.intended, grid.grades, strict=True)
-    for model, intended, cells in by_model:
-        counts = Counter(grade for grades in cells for grade in grades)
-        text = ", ".join(f"{n} of grade {grade}" for grade, n in counts.items())
-        aim = "" if intended is None else f" (intended {intended})"
-        yield f"{model}{aim}: {text or 'no grades'}"
-
-
-def _counted_blocks(
-    material: Material,
-    session: str,
-    grid: _Grid,
-    rows: list[tuple[Value, ...]],
-    notes: list[str],
-) -> tuple[Table, Drawing]:
+def _counted_blocks(material: Material, grid: _Grid) -> Iterator[Content]:
     # of many raters: how often each grade was given; the CSV has who gave it
-    scale = material.ratings.scale
-    codes = _codes(grid, scale).reshape(len(grid.models), -1)
-    every = np.arange(len(scale.grades))
+    grades = material.ratings.scale.grades
+    every = np.arange(len(grades))
+    codes = grid.codes.reshape(len(grid.models), -1)
     counts = (codes[:, :, None] == every).sum(axis=1)
     n_raters = counted(len(grid.raters), "rater")
-    by_rater = [Column(key=name, heading=name, where="csv") for name in grid.raters]
-    by_grade = [Column(key=f"n_{g}", heading=g, where="page") for g in scale.grades]
-    table = Table(
-        name=f"grades_{session}",
-        caption=f"How often {n_raters} gave each grade in session {session}",
+    text = f"How often {n_raters} gave each grade in session {grid.session}"
+    yield Table(
+        name=f"grades_{grid.session}",
+        caption=text,
         columns=(
-            Column(key="model", heading="Model", align="left"),
-            Column(key="intended_grade", heading="Intended", align="center"),
-            *by_rater,
-            *by_grade,
+            *(_MODEL, _INTENDED),
+            *(Column(key=name, heading=name, where="csv") for name in grid.raters),
+            *(Column(key=f"n_{g}", heading=g, where="page") for g in grades),
         ),
         rows=tuple(
-            (*row, *of_row) for row, of_row in zip(rows, counts.tolist(), strict=True)
+            (*row, *of_row)
+            for row, of_row in zip(grid.rows, counts.tolist(), strict=True)
         ),
-        notes=(*notes, "The file has the grades of every rater."),
+        notes=(*grid.notes, "The file has the grades of every rater."),
         data=material.data,
     )
-    caption = f"How often {n_raters} gave each grade in session {session}. Darker is"
-    caption += " more often, of the grades of the model"
-    if grid.has_aims:
-        caption += "; the intended grade is framed"
-    framed = np.array(_aims(grid, scale))[:, None] == every
-    names = "model", "grade given"
-    drawing = Drawing(
-        name=f"grades_{session}",
-        caption=f"{caption}.",
-        alt=f"Counts of grades. {'; '.join(_grades_by_model(grid))}.",
-        content=Drawn(
-            "masrel.plots._grades:counts_picture",
-            (counts, grid.models, scale.grades, framed, names),
-        ),
+    text += ". Darker is more often, of the grades of the model"
+    text += "; the intended grade is framed" * grid.has_aims
+    framed = np.array(grid.aims)[:, None] == every
+    pictured = (counts, grid.models, grades, framed, ("model", "grade given"))
+    yield Drawing(
+        name=f"grades_{grid.session}",
+        caption=f"{text}.",
+        alt=f"Counts of grades. {grid.words}.",
+        content=Drawn("masrel.plots._grades:counts_picture", pictured),
         stamp=material.stamp,
     )
-    return table, drawing
 
 
-def intended_section(material: Material) -> Section:
-    """Show how many raters gave each standard model its intended grade."""
+def intended_needs(material: Material) -> IntendedAgreement | Lacking:
+    """Return how often the intended grade was given."""
     result = material.analysis.intended
-    title = "Agreement with the intended grade"
-    if result is None or not result.models:
-        return absent_section("intended", title, result.reason if result else None)
-    table = Table(
+    if result is not None and result.models:
+        return result
+    return Lacking(None if result is None else result.reason)
+
+
+def intended_section(
+    material: Material, result: IntendedAgreement
+) -> Iterator[Content]:
+    """Show how many raters gave each standard model its intended grade."""
+    yield Table(
         name="intended",
         caption=f"Raters who gave the intended grade, session {result.session}",
         columns=(
-            Column(key="model", heading="Model", align="left"),
+            _MODEL,
             Column(key="intended_grade", heading="Intended grade", align="center"),
             Column(key="n_ratings", heading="Ratings"),
             Column(key="n_agree", heading="As intended"),
@@ -241,24 +229,30 @@ def intended_section(material: Material) -> Section:
         notes=() if result.reason is None else (f"Mean or SD: {result.reason}.",),
         data=material.data,
     )
-    text = (
-        f"Mean over the {counted(len(result.models), 'standard model')}: "
+    yield Paragraph(
+        text=f"Mean over the {counted(len(result.models), 'standard model')}: "
         f"{number(result.mean, 1)} % (standard deviation between models "
         f"{number(result.sd, 1)}, n − 1)."
     )
-    return Section(name="intended", title=title, blocks=(table, Paragraph(text=text)))
 
 
-def in_person_section(material: Material) -> Section:
-    """Show grades given to patients beside those given to their models."""
+def in_person_needs(material: Material) -> InPersonAgreement | Lacking:
+    """Return the pairs of grades of patients and of their models."""
     result = material.analysis.in_person
-    title = "In-person and haptic grades"
-    if result is None or result.n_pairs == 0:
-        return absent_section("in-person", title, result.reason if result else None)
-    percent = number(100 * result.n_equal / result.n_pairs, 1)
-    text = f"{result.n_equal} of {result.n_pairs} pairs are equal ({percent} %)."
+    if result is not None and result.n_pairs:
+        return result
+    return Lacking(None if result is None else result.reason)
+
+
+def in_person_section(
+    material: Material, result: InPersonAgreement
+) -> Iterator[Content]:
+    """Show grades given to patients beside those given to their models."""
+    percents = number(100 * result.n_equal / result.n_pairs, 1)
+    text = f"{result.n_equal} of {result.n_pairs} pairs are equal ({percents} %)."
     if result.n_unpaired:
         text += f" Entries that lack one of the two grades: {result.n_unpaired}."
+    yield Paragraph(text=text)
     entries = () if material.in_person is None else material.in_person.rows
     notes = (
         f"{row.rater}, {row.model} (subject {row.subject}, source table "
@@ -266,25 +260,209 @@ def in_person_section(material: Material) -> Section:
         for row in entries
         if row.note
     )
-    table = Table(
+    yield Table(
         name="in_person",
         caption=(
             "Grade of the patient in person and of the model built from that patient, "
             f"by the same rater (session {result.session})"
         ),
         columns=(
-            Column(key="model", heading="Model", align="left"),
+            _MODEL,
             Column(key="rater", heading="Rater", align="left"),
             Column(key="in_person", heading="In person", align="center"),
             Column(key="haptic", heading="Haptic", align="center"),
             Column(key="equal", heading="Equal", align="center"),
         ),
         rows=tuple(
-            (p.model, p.rater, p.in_person, p.haptic, "yes" if equal else "no")
+            (p.model, p.rater, p.in_person, p.haptic, ("no", "yes")[is_equal])
             for p in result.pairs
-            for equal in [p.in_person == p.haptic]
+            for is_equal in [p.in_person == p.haptic]
         ),
         notes=tuple(dict.fromkeys(notes)),
         data=material.data,
     )
-    return Section(name="in-person", title=title, blocks=(Paragraph(text=text), table))
+
+
+_Given = tuple[str | None, tuple[GivenGrades, ...]]
+
+
+def confusion_needs(material: Material) -> _Given | Lacking:
+    """Return a session, and what models of each intended grade were given in it."""
+    analysis = material.analysis
+    ratings = analysed_ratings(material.ratings, analysis.excluded)
+    aims = given_grades(material.protocol, ratings, analysis.level)
+    lacks = Lacking("no model with an intended grade has ratings")
+    return aims if aims[1] else lacks
+
+
+_CONFUSION = "Grades given for each intended grade"
+
+
+def confusion_section(material: Material, aims: _Given) -> Iterator[Content]:
+    """Show which grades models of each intended grade were given."""
+    session, rows = aims
+    grades, level = material.ratings.scale.grades, material.analysis.level
+    n_met = sum(row.counts[grades.index(row.intended)] for row in rows)
+    yield Paragraph(
+        text=f"Of {counted(sum(row.n for row in rows), 'grade')} of models with an "
+        f"intended grade, {n_met} are the intended one."
+    )
+    texts = [
+        f"intended {row.intended}: "
+        + ", ".join(f"{n} of {g}" for g, n in zip(grades, row.counts, strict=True) if n)
+        for row in rows
+    ]
+    yield Drawing(
+        name="confusion",
+        caption=(
+            f"{_CONFUSION}, session {session}. Above: how often; darker is a larger "
+            "part of the row, and the intended grade is framed. Below: the part as "
+            f"intended, with its {percent(level)} % confidence interval for other "
+            "raters like these."
+        ),
+        alt=f"Counts of grades given. {'; '.join(texts)}.",
+        content=Drawn(FIGURES + "_study_figures:aim_pictures", (rows, grades, level)),
+        stamp=material.stamp,
+    )
+    yield Table(
+        name="confusion",
+        caption=f"{_CONFUSION}, session {session}",
+        columns=(
+            Column(key="intended_grade", heading="Intended", align="left"),
+            *(Column(key=f"grade_{grade}", heading=grade) for grade in grades),
+            Column(key="n_ratings", heading="Ratings"),
+            Column(key="percent", heading="As intended (%)", digits=1),
+            Column(key="low", heading="Low", digits=1),
+            Column(key="high", heading="High", digits=1),
+        ),
+        rows=tuple(
+            (
+                row.intended,
+                *row.counts,
+                row.n,
+                *(100.0 * share for share in (row.share, row.low, row.high)),
+            )
+            for row in rows
+        ),
+        notes=(
+            "Rows: the grade a model was built for; columns: the grades given. Where "
+            "the scale has an order, those left of the intended one are too low and "
+            "those right of it too high. Low, High: "
+            f"{percent(level)} % confidence interval of "
+            "the percentage, for other raters like these on these models.",
+        ),
+        data=material.data,
+    )
+
+
+_RECONSTRUCTED = (
+    "Reconstructed answers are one set that fits the published mean and standard "
+    "deviation, not the answers that were given."
+)
+
+_WITHHELD = (
+    f"Where fewer than {FEWEST_RATERS} raters answered a question that is not public, "
+    "only n is shown: more could show what one of them answered."
+)
+
+_QUESTIONS = (
+    Column(key="question", heading="Question", align="left"),
+    Column(key="session", heading="Session", align="left"),
+    _MODEL,
+    Column(key="n", heading="n"),
+    Column(key="n_missing", heading="Missing"),
+    Column(key="mean_sd", heading="Mean ± SD (n − 1)", where="page"),
+    Column(key="mean", heading="Mean", where="csv"),
+    Column(key="sd", heading="SD (n − 1)", where="csv"),
+    Column(key="median", heading="Median"),
+    Column(key="least", heading="Least"),
+    Column(key="most", heading="Most"),
+    Column(key="counts", heading="Answers", align="left"),
+)
+
+
+_Summaries = Sequence[QuestionSummary]
+
+
+def questionnaires_needs(material: Material) -> _Summaries | Lacking:
+    """Return how questions were answered, if any was."""
+    summaries = material.analysis.questionnaires
+    return summaries if any(s.n for s in summaries) else Lacking("there are no answers")
+
+
+def questionnaires_section(
+    material: Material, summaries: _Summaries
+) -> Iterator[Content]:
+    """Show how each question was answered, over all raters."""
+    made_up = [_RECONSTRUCTED] * any(each.is_reconstructed for each in summaries)
+    questions = [
+        (q, each) for q in material.protocol.questionnaires for each in q.questions
+    ]
+    for questionnaire, question in questions:
+        text = f"{questionnaire.title}: {question.text} ({question.needed})."
+        yield Paragraph(text=text)
+    # of texts nothing but n is ever shown
+    texts = {(q.id, each.id) for q, each in questions if each.type == "text"}
+    is_withheld = any(
+        each.n and not each.counts and (each.questionnaire, each.question) not in texts
+        for each in summaries
+    )
+    yield Table(
+        name="questionnaires",
+        caption="Answers to each question, over all raters",
+        columns=_QUESTIONS,
+        rows=tuple(map(_question_row, summaries)),
+        notes=(*made_up, *[_WITHHELD] * is_withheld),
+        data="reconstructed" if made_up else material.data,
+    )
+    # in each session, over all models
+    counts: dict[str, Counter[str]] = defaultdict(Counter)
+    for each in summaries:
+        of = "" if each.session is None else f", {each.session}"
+        title = f"{each.questionnaire}.{each.question}{of}"
+        counts[title].update({count.label: count.n for count in each.counts})
+    panels = tuple(
+        (t, tuple(c), tuple(c.values())) for t, c in counts.items() if c.total()
+    )
+    words = (
+        f"{title}: {', '.join(f'{n} × {label}' for label, n in of.items() if n)}"
+        for title, of in counts.items()
+        if of.total()
+    )
+    if panels:
+        yield Drawing(
+            name="questionnaires",
+            caption=" ".join(("The share of each answer, over all raters.", *made_up)),
+            alt=f"Bars of answers. {'; '.join(words)}.",
+            content=Drawn("masrel.plots._grades:answer_pictures", (panels,)),
+            stamp=_RECONSTRUCTED if made_up else material.stamp,
+        )
+
+
+def _question_row(summary: QuestionSummary) -> tuple[Value, ...]:
+    numbers: tuple[Value, ...] = (None,) * 6
+    choices = ", ".join(f"{count.label}: {count.n}" for count in summary.counts)
+    if not math.isnan(summary.least):
+        choices = ""
+        both = f"{_half_up(summary.mean, 2)} ± {_half_up(summary.sd, 2)}"
+        ends = (summary.median, summary.least, summary.most)
+        numbers = (both, summary.mean, summary.sd, *ends)
+    return (
+        f"{summary.questionnaire}.{summary.question}",
+        summary.session,
+        summary.model,
+        summary.n,
+        summary.n_missing,
+        *numbers,
+        choices or None,
+    )
+
+
+def _half_up(value: float, decimals: int) -> str:
+    # rounded as on paper: what lies in the middle goes up
+    # Means of a few whole numbers often lie there; a float's own format goes to even.
+    if math.isnan(value):
+        return "undefined"
+    unit = Decimal(1).scaleb(-decimals)
+    text = str(Decimal(repr(value)).quantize(unit, ROUND_HALF_UP))
+    return text.replace("-", "−")

@@ -1,13 +1,31 @@
-"""What a section of the report is made from, and what it is made of."""
+"""What sections of the report are made from, and the words they share."""
 
+import math
+import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from masrel.audit import Claim
-from masrel.lab.analysis import Analysis
-from masrel.lab.protocol import Protocol, report_sections
+from masrel.agreement import COEFFICIENTS
+from masrel.estimates import Interval
+from masrel.lab.analysis import Analysis, PlannedEstimate
+from masrel.lab.protocol import Protocol
 from masrel.lab.ratings import InPerson, Ratings
-from masrel.tables._tables import SIMULATED, SIMULATED_DEVICE
+from masrel.tables._estimate_words import Noun, origin, promise
+from masrel.tables._tables import SIMULATED, SIMULATED_DEVICE, percent
+
+if TYPE_CHECKING:
+    from masrel.lab.report._conduct import StudyConduct
+
+FIGURES = "masrel.lab.report.figures."
+"""Where the functions are that draw what no file of ratings has."""
+
+# From more than so many on, a figure shows distributions instead of every one.
+MANY_RATERS = 30
+MANY_STRETCHES = 12
+MANY_MODELS = 12  # and panels are smaller
 
 SIMULATED_GRADES = (
     "SIMULATED DATA – no person gave these grades",
@@ -40,8 +58,15 @@ class Material:
     # sessions, raters: those that have ratings, in the protocol's order
     sessions: tuple[str, ...]
     raters: tuple[str, ...]
-    recordings: Path | None = None  # the folder of the sessions' recordings, if known
-    claims: tuple[Claim, ...] = ()  # what a paper printed
+    recordings: Path | None  # the folder of the sessions' recordings, if known
+    conduct: "StudyConduct | None"  # how the study was run, if that is to be said
+
+
+@dataclass(frozen=True, slots=True)
+class Lacking:
+    """Why that is not there which a section needs."""
+
+    reason: str | None  # None where nobody has computed it
 
 
 def gather(
@@ -50,7 +75,7 @@ def gather(
     analysis: Analysis,
     in_person: InPerson | None = None,
     recordings: Path | None = None,
-    claims: tuple[Claim, ...] = (),
+    conduct: "StudyConduct | None" = None,
 ) -> Material:
     """Return ratings and their analysis with what every section says of them."""
     sources = sorted({row.source for row in ratings.rows})
@@ -90,17 +115,7 @@ def gather(
         sessions=tuple(s.id for s in protocol.sessions if s.id in sessions),
         raters=tuple(r.id for r in protocol.raters if r.id in raters),
         recordings=recordings,
-        claims=claims,
-    )
-
-
-def has_order(material: Material) -> bool:
-    """Say whether the grades have an order, as far as a protocol tells."""
-    protocol = material.protocol
-    return (
-        "order" in report_sections(protocol)
-        or any(line.weights != "identity" for line in protocol.analysis.estimates)
-        or any(grade[0].isdecimal() for grade in material.ratings.scale.grades)
+        conduct=conduct,
     )
 
 
@@ -112,3 +127,64 @@ def _on_simulated_device(how_many: str) -> tuple[str, str]:
         "the simulated device nobody felt a model, and the speeds are those of a "
         "simulated hand. Such grades say nothing about the models.",
     )
+
+
+def main_estimate(analysis: Analysis) -> PlannedEstimate | None:
+    """Return the first line between raters that the data hold, or else the first."""
+    planned = [p for p in analysis.estimates if p.line.kind == "inter-rater"]
+    return next((p for p in planned if p.estimate), planned[0] if planned else None)
+
+
+_FILE = Path(__file__).with_name("templates") / "sentences.toml"
+
+
+@cache
+def sentences() -> dict[str, dict[str, str]]:
+    """Return every sentence by its group and name, with its words in braces."""
+    return tomllib.loads(_FILE.read_text(encoding="utf-8"))
+
+
+def sentence(group: str, name: str, **words: object) -> str:
+    """Return a sentence with its words in braces replaced."""
+    return sentences()[group][name].format_map(words)
+
+
+TARGETS = {
+    "raters": "other raters",
+    "items": "other models",
+    "both": "other raters and models",
+}
+"""Target of an interval to what it generalises to."""
+
+NOT_THERE = "not in these data"
+"""What is shown where a plan's estimate is not."""
+
+
+def coefficient_name(coefficient: str, weights: str = "identity") -> str:
+    """Return a coefficient's name for a reader."""
+    title = COEFFICIENTS[coefficient].title
+    if weights != "identity":
+        title = f"{title}, {weights} weights"
+    # A share as all others are: 1 is all, not 100.
+    return f"{title} (0–1)" if coefficient == "percent_agreement" else title
+
+
+def interval_name(interval: Interval) -> str:
+    """Return level, kind and method of an interval."""
+    return f"{percent(interval.level)} % {interval.kind}, {interval.method}"
+
+
+def meaning(interval: Interval, noun: Noun = "model") -> str:
+    """Return in one sentence what an interval promises and what it was made from."""
+    kind = "bound" if interval.is_one_sided else "interval"
+    name = f"{interval.kind.capitalize()} {kind}"
+    return f"{name}{origin(interval, noun)}: {promise(interval, noun)}."
+
+
+def at_ranks(values: Sequence[float]) -> dict[str, int]:
+    """Return which of many values are the least, the quartiles and the most."""
+    finite = [at for at, value in enumerate(values) if math.isfinite(value)]
+    order = sorted(finite, key=values.__getitem__)
+    names = ("lowest", "lower quartile", "median", "upper quartile", "highest")
+    last = len(order) - 1
+    return {name: order[k * last // 4] for k, name in enumerate(names) if order}

@@ -1,17 +1,22 @@
-"""The document a report is, and the pages it is written as.
+"""The pages that a report is written as.
 
-In: sections whose figures are drawn. Out: the bytes of a page, in every format that
-`WRITERS` names.
+In: a document whose figures are drawn. Out: the bytes of a page, in every format that
+`WRITERS` names; LaTeX and documents of a word processor by pandoc from the Markdown.
 """
 
-from collections.abc import Callable, Sequence
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import chain
+from functools import cache, partial
+from pathlib import Path
 from typing import Literal
 
-from masrel.lab.report._pandoc import converted
-from masrel.pages._sections import Block, Document, html_page, narrow
+from masrel._files import write_file
+from masrel.errors import ParameterError
+from masrel.pages._sections import Document, html_page, narrow
 from masrel.tables._latex import in_math
 from masrel.tables._tables import Column, Table, page_cells
 
@@ -23,14 +28,6 @@ class Writer:
     file: str  # name of the page, in the report's folder
     write: Callable[[Document], bytes]
     is_converted: bool = False  # whether pandoc makes it
-
-
-def _as_html(document: Document) -> bytes:
-    return html_page(document).encode()
-
-
-def _as_markdown(document: Document) -> bytes:
-    return _markdown(document, None).encode()
 
 
 def _markdown(document: Document, form: Literal["latex", "docx"] | None) -> str:
@@ -58,7 +55,18 @@ def _markdown(document: Document, form: Literal["latex", "docx"] | None) -> str:
 def _as_document(form: Literal["latex", "docx"], document: Document) -> bytes:
     # tables are no wider than paper
     sections = tuple(
-        replace(section, blocks=tuple(chain(*map(_parts, section.blocks))))
+        replace(
+            section,
+            blocks=tuple(
+                replace(block, content=part)
+                for block in section.blocks
+                for part in (
+                    narrow(block.content)
+                    if isinstance(block.content, Table)
+                    else [block.content]
+                )
+            ),
+        )
         for section in document.sections
     )
     document = replace(document, sections=sections)
@@ -69,15 +77,9 @@ def _as_document(form: Literal["latex", "docx"], document: Document) -> bytes:
     return converted(_markdown(document, form), form, pictures=pictures)
 
 
-def _parts(block: Block) -> list[Block]:
-    if not isinstance(block.content, Table):
-        return [block]
-    return [replace(block, content=part) for part in narrow(block.content)]
-
-
 WRITERS: dict[str, Writer] = {
-    "html": Writer(file="report.html", write=_as_html),
-    "markdown": Writer(file="report.md", write=_as_markdown),
+    "html": Writer(file="report.html", write=lambda of: html_page(of).encode()),
+    "markdown": Writer(file="report.md", write=lambda of: _markdown(of, None).encode()),
     "latex": Writer(
         file="report.tex", write=partial(_as_document, "latex"), is_converted=True
     ),
@@ -108,3 +110,73 @@ _MARKDOWN_ESCAPES = str.maketrans({letter: f"\\{letter}" for letter in "\\`*_|<>
 def as_markdown(text: str) -> str:
     """Return a text as one line of Markdown that shows it as it is."""
     return " ".join(text.translate(_MARKDOWN_ESCAPES).split())
+
+
+_FIRST_DAY = "315532800"  # of 1980, the earliest that a zip can say
+_SMALL = (  # letters of tables; figures stand where they are told of
+    r"header-includes=\usepackage{float}\floatplacement{figure}{H}"
+    r"\AtBeginEnvironment{longtable}{\footnotesize"
+    r"\setlength{\tabcolsep}{3pt}}"
+)
+_OPTIONS = {
+    "latex": (
+        *("--from=markdown-smart-citations", "--toc"),
+        *("-V", "papersize=a4", "-V", "geometry=margin=20mm", "-V", _SMALL),
+    ),
+    "docx": ("--from=markdown-smart-citations-tex_math_dollars",),
+}
+
+
+@cache
+def _pandoc() -> str:
+    """Return the path of pandoc, or refuse to go on without it."""
+    try:
+        import pypandoc
+
+        return str(pypandoc.get_pandoc_path())
+    except (ImportError, OSError):
+        if path := shutil.which("pandoc"):
+            return path
+    raise ParameterError(
+        "latex and docx: need pandoc; install it with: pip install 'masrel[docx]'"
+    )
+
+
+def pandoc_version() -> str:
+    """Return the version of pandoc, or refuse to go on without it."""
+    shown = subprocess.run([_pandoc(), "--version"], capture_output=True, check=True)
+    return shown.stdout.decode().split()[1]
+
+
+def converted(
+    markdown: str,
+    form: Literal["latex", "docx"],
+    *,
+    pictures: Mapping[str, bytes],
+) -> bytes:
+    """Return Markdown in another form; pictures by their paths from its folder."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        out = folder / f"report.{form}"
+        for path, data in pictures.items():
+            (folder / path).parent.mkdir(exist_ok=True)
+            write_file(folder / path, data)
+        done = subprocess.run(
+            [
+                *(_pandoc(), "--to", form, "--standalone", "--output", str(out)),
+                "--data-dir=.",  # templates of the user's change nothing
+                *("--shift-heading-level-by=-1", *_OPTIONS[form]),
+            ],
+            input=markdown.encode(),
+            cwd=folder,
+            env={**os.environ, "SOURCE_DATE_EPOCH": _FIRST_DAY},
+            check=False,
+            capture_output=True,
+        )
+        if done.returncode:
+            why = " ".join(done.stderr.decode(errors="replace").split())
+            raise ParameterError(
+                f"{form}: needs a pandoc that makes it, 3.0 or newer; {_pandoc()} "
+                f"ended with: {why}"
+            )
+        return out.read_bytes()

@@ -1,9 +1,12 @@
-"""The folder of a report: at any moment, every page is whole and its links hold.
+"""The folder of a report, whose pages are whole at any moment, and when it is current.
 
 Tables and figures have the start of their hash in their names, so that those of a new
 report never take the place of those that a page still shows. They are on disk before
 the first page is replaced; the manifest names them all; then those go that it does not
 name, also of a report that was never finished. What else is in the folder stays.
+
+A report is current if it was made by the same call, of the same files, by the same
+code: a note in a folder of the study has their hash. Nothing heavy is loaded for it.
 """
 
 import contextlib
@@ -16,10 +19,17 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-from masrel._files import make_folder, refuse_record, sync_folder, write_files
-from masrel.lab._bounded_files import MAX_TABLE, read_regular
-from masrel.lab._cache import file_hash
+from masrel._files import (
+    make_folder,
+    refuse_record,
+    sync_folder,
+    write_file,
+    write_files,
+)
+from masrel.errors import ParameterError
+from masrel.lab._bounded_files import MAX_TABLE, read_regular, regular
 
 if sys.platform != "win32":
     import fcntl
@@ -162,3 +172,136 @@ def stale_assets(folder: Path, named: Collection[str]) -> Iterator[Path]:
             digest = file_hash(str(path))
             if digest is not None and digest.startswith(asset[1]):
                 yield path
+
+
+def file_hash(path: str) -> str | None:
+    """Return the SHA-256 of a file; None where there is none that can be read."""
+    digest = hashlib.sha256()
+    try:
+        # a pipe without a writer keeps nobody waiting
+        descriptor = regular(os.open(path, _FLAGS), Path(path))
+        try:
+            while data := os.read(descriptor, 1 << 20):
+                digest.update(data)
+        finally:
+            os.close(descriptor)
+    except OSError:
+        return None
+    return digest.hexdigest()
+
+
+_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+
+NOTES = ".masrel_cache"
+"""The folder of notes in a study."""
+
+_PACKAGE = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+_SOURCES = (".py", ".html", ".css", ".md", ".toml", ".bib")
+_DEPTH = 3  # of the folders in a study whose files are read
+# Nobody wants it in a repository, or in a backup (https://bford.info/cachedir/)
+_MARKS = {
+    ".gitignore": "*\n",
+    "CACHEDIR.TAG": "Signature: 8a477f597d28d172789f06886806bc55\n",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Build:
+    """A call of ``masrel report``."""
+
+    study: Path
+    folder: Path  # of the report
+    notes: Path  # the folder that has what builds were made from
+    options: Mapping[str, str]  # all of the call that changes what is made or said
+    ratings_file: Path | None  # a table of ratings that the study may not have
+
+    def made_from(self) -> str:
+        """Return a hash of the call, of every file that it may read, and the code."""
+        call = [os.path.abspath(self.study), os.environ.get("MASREL_FONT")]
+        digest = hashlib.sha256(json.dumps([call, self.options, sys.version]).encode())
+        outputs = tuple(map(os.path.abspath, (self.folder, self.notes)))
+        files = [*_files_below(self.study, outputs), *_sources(_PACKAGE)]
+        for path in (*files, *filter(None, [self.ratings_file])):
+            digest.update(f"{path}\0{file_hash(str(path))}\n".encode())
+        digest.update(json.dumps(_libraries()).encode())
+        return digest.hexdigest()
+
+    def last(self, made_from: str) -> dict[str, Any] | None:
+        """Return what the last build has shown if a new one would change nothing."""
+        note = self._note()
+        with contextlib.suppress(OSError, ValueError):
+            seal, _, text = read_regular(note, most=MAX_TABLE).partition(b"\n")
+            if seal == self._seal(made_from, text):
+                shown: dict[str, Any] = json.loads(text)
+                return shown if _is_whole(self.folder, shown["manifest"]) else None
+        return None
+
+    def keep(self, made_from: str, shown: Mapping[str, Any]) -> None:
+        """Note what this build has shown, or do without."""
+        # shown: the hash of its manifest, too
+        if made_from != self.made_from():
+            return  # somebody wrote in the study meanwhile
+        text = json.dumps(shown).encode()
+        # full, read-only, no folder, a link
+        with contextlib.suppress(OSError, ParameterError):
+            if not self.notes.exists():
+                for name, mark in _MARKS.items():
+                    write_file(self.notes / name, mark)
+            write_file(self._note(), self._seal(made_from, text) + b"\n" + text)
+
+    def _note(self) -> Path:
+        return self.notes / f"{_hash(os.path.abspath(self.folder).encode())}.json"
+
+    def _seal(self, made_from: str, text: bytes) -> bytes:
+        # of both: a note under another's name is of no use
+        return _hash(made_from.encode() + text).encode()
+
+
+def _files_below(folder: Path, but: Collection[str], depth: int = _DEPTH) -> list[str]:
+    # hidden ones are none of a study's, but for its key
+    try:
+        entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
+    except OSError:
+        return []
+    paths = []
+    for entry in entries:
+        is_hidden = entry.name.startswith(".") and entry.name != ".key"
+        if is_hidden or os.path.abspath(entry.path) in but:
+            continue
+        if not entry.is_dir():
+            paths.append(entry.path)
+        elif depth:
+            paths += [entry.path, *_files_below(Path(entry.path), but, depth - 1)]
+    return paths
+
+
+def _sources(folder: str) -> Iterator[str]:
+    # every file of masrel: who edits its code has no other version
+    for entry in sorted(os.scandir(folder), key=lambda entry: entry.name):
+        if entry.name.endswith(_SOURCES):
+            yield entry.path
+        elif entry.name != "__pycache__" and entry.is_dir():
+            yield from _sources(entry.path)
+
+
+def _libraries() -> list[str]:
+    # names and versions of all that Python finds, by the names of folders:
+    # importlib.metadata takes longer than all else here
+    names: list[str] = []
+    for folder in sys.path:
+        with contextlib.suppress(OSError):  # such as a zip
+            every = os.listdir(folder or ".")
+            names += (n for n in every if n.endswith((".dist-info", ".egg-info")))
+    return sorted(names)
+
+
+def _is_whole(folder: Path, manifest: str) -> bool:
+    # Whether a report is there as it was written, and nothing that a build would remove
+    path = folder / MANIFEST
+    if file_hash(str(path)) != manifest:
+        return False
+    files = json.loads(read_regular(path, most=MAX_TABLE))["files"]
+    return not any(
+        os.path.islink(folder / name) or file_hash(str(folder / name)) != digest
+        for name, digest in files.items()
+    ) and not any(stale_assets(folder, files))

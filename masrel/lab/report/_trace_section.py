@@ -1,14 +1,19 @@
-"""Section `traces`: the torque that models make at the speeds of the raters."""
+"""Sections `speeds` and `traces`: how fast raters stretched, and what torque that made.
+
+Measured torque stands beside the torque that was sent where recordings have it.
+"""
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.lab.analysis import Speed
+from masrel.lab.analysis import Speed, Speeds, SpeedSummary
 from masrel.lab.elbow import (
     ConstantSpeed,
     ElbowParameters,
@@ -18,131 +23,236 @@ from masrel.lab.elbow import (
     outline,
     trace,
 )
-from masrel.lab.protocol import Protocol, joint_model
+from masrel.lab.protocol import Model, Protocol, joint_model
 from masrel.lab.protocol._kinds import DEFAULT_KIND
-from masrel.lab.report._figure_data import (
+from masrel.lab.recording import MEASURED_TORQUE, Recording, read_recording, stretches
+from masrel.lab.report._material import (
     FIGURES,
     MANY_MODELS,
     MANY_RATERS,
     MANY_STRETCHES,
-    TraceBand,
-    TracePanel,
+    Lacking,
+    Material,
+    at_ranks,
 )
-from masrel.lab.report._material import Material
-from masrel.lab.report._measured_torque import measured_blocks
-from masrel.lab.report._stretches import at_ranks, has_many, whole_or_tenths
-from masrel.pages._sections import Drawing, Paragraph, Section, absent_section
+from masrel.pages._sections import Content, Drawing, Paragraph
 from masrel.plots._drawn_values import Drawn
-from masrel.tables._tables import Column, Table, Value, as_entered, number
+from masrel.tables._tables import SIMULATED, Column, Table, Value, as_entered, number
 
 _PANELS_PER_FIGURE, _SMALL_PANELS_PER_FIGURE = 4, 24
 _N_POINTS = 200  # of a line: a panel is not much wider
 _N_IN_BAND = 100  # lines that a band rests on
 _BAND_SHARES = (0.05, 0.25, 0.75, 0.95)
+_AROUND_S = 0.25  # shown before and after a measured stretch
 
 # Slower is no stretch, and its trace would last for minutes.
 _SLOWEST_DRAWN_DEG_S = 1.0
-
 _TOO_SLOW = f"below {as_entered(_SLOWEST_DRAWN_DEG_S)} deg/s"
 
+_MODEL = Column(key="model", heading="Model", align="left")
 
+_Floats = NDArray[np.float64]
 _Line = Outline | Trace  # of the exact law, or samples of another kind
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Stretch:
-    speed: Speed  # whose it is, and how fast
-    peak: float  # its largest torque, N·m
+def speeds_needs(material: Material) -> Speeds | Lacking:
+    """Return the speeds, if any is known."""
+    speeds = material.analysis.speeds
+    if speeds is not None and speeds.values:
+        return speeds
+    return Lacking(None if speeds is None else speeds.reason)
+
+
+def speeds_section(material: Material, speeds: Speeds) -> Iterator[Content]:
+    """Show the mean speeds per model and per rater."""
+    text = (
+        "Mean speed of the phase before the catch, which sets the catch angle by "
+        "equation (2); below ν_L the catch angle no longer changes."
+    )
+    if speeds.n_missing:
+        text += f" Ratings whose speed is not known: {speeds.n_missing}."
+    if _has_many(speeds.values):
+        text += (
+            " Where a rater stretched the arm more than once, n counts stretches that "
+            "reached ν_th."
+        )
+    yield Paragraph(text=text)
+    digits = whole_or_tenths([speed.mean_speed_deg_s for speed in speeds.values])
+    yield _speeds_table(material, speeds.by_model, "model", digits)
+    texts = "; ".join(
+        f"{s.name} in {s.session}: mean {number(s.mean, 0)}, "
+        f"{number(s.least, 0)} to {number(s.most, 0)} deg/s"
+        for s in speeds.by_model
+    )
+    slowest = material.protocol.elbow.slowest_mean_speed_deg_s
+    yield Drawing(
+        name="speeds",
+        caption=_speeds_caption(len(material.raters), speeds.values),
+        alt=f"Dot plot of speeds. {texts}.",
+        content=Drawn(
+            FIGURES + "_study_figures:speed_figure", (speeds, material.raters, slowest)
+        ),
+        stamp=material.stamp,
+    )
+    yield _speeds_table(material, speeds.by_rater, "rater", digits)
+
+
+def _speeds_table(
+    material: Material, summaries: Sequence[SpeedSummary], by: str, digits: int
+) -> Table:
+    rows: list[tuple[Value, ...]] = [
+        (s.name, s.session, s.n, s.mean, s.sd, s.least, s.most) for s in summaries
+    ]
+    shown, counts = [], []  # five raters of sessions of many
+    for session in dict.fromkeys(s.session for s in summaries):
+        here = [i for i, s in enumerate(summaries) if s.session == session]
+        if by == "model" or len(here) <= MANY_RATERS:
+            shown += [rows[i] for i in here]
+            continue
+        counts.append(f"{len(here)} of session {session}")
+        for rank, at in at_ranks([summaries[i].mean for i in here]).items():
+            name, *cells = rows[here[at]]
+            shown.append((f"{name} ({rank})", *cells))
+    note = "Five raters by their mean speed, of {}; the file has all."
+    return Table(
+        name=f"speeds_by_{by}",
+        caption=f"Mean stretching speeds per {by} (deg/s)",
+        columns=(
+            Column(key=by, heading=by.capitalize(), align="left"),
+            Column(key="session", heading="Session", align="left"),
+            Column(key="n", heading="n"),
+            Column(key="mean_deg_s", heading="Mean", digits=1),
+            Column(key="sd_deg_s", heading="SD (n − 1)", digits=1),
+            Column(key="least_deg_s", heading="Least", digits=digits),
+            Column(key="most_deg_s", heading="Most", digits=digits),
+        ),
+        rows=tuple(rows),
+        page_rows=tuple(shown),
+        notes=(note.format(" and ".join(counts)),) if counts else (),
+        data=material.data,
+    )
+
+
+def _speeds_caption(n_raters: int, speeds: Sequence[Speed]) -> str:
+    dashed = "Dashed: ν_L, below which the catch angle stays the same."
+    if n_raters > MANY_RATERS:
+        return (
+            f"Mean stretching speeds of {n_raters} raters for every model: the middle "
+            f"50 % (broad), the middle 90 % (thin) and the mean (bar). {dashed}"
+        )
+    of = "rater for every model, and the mean over raters"
+    if _has_many(speeds):
+        of = "stretch of every rater for every model, and the mean over stretches"
+    caption = f"Mean stretching speed of every {of} (bar). {dashed}"
+    if any(speed.is_graded for speed in speeds):
+        caption += " Ringed: the stretch that the rater said the grade rests on."
+    return caption
+
+
+def _has_many(speeds: Sequence[Speed]) -> bool:
+    # whether there was more than one stretch to a presentation
+    return any(speed.stretch is not None and speed.stretch > 1 for speed in speeds)
+
+
+def whole_or_tenths(values: Sequence[float]) -> int:
+    """Return the decimals a column of measurements needs: 0 if all are whole."""
+    known = [value for value in values if math.isfinite(value)]
+    return 0 if all(float(value).is_integer() for value in known) else 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Model:
+class TracedModel:
+    """A model at the speeds of the raters."""
+
     id: str
-    stretches: tuple[_Stretch, ...]
-    # what is drawn: every stretch, or a few of many
-    shown: tuple[_Stretch, ...]
-    lines: tuple[_Line, ...]  # of those that are shown
-    band: TraceBand | None  # of all, where they are many
+    title: str  # the model, its intended grade, and the range of speeds
+    speeds: Sequence[Speed]
+    peaks: Sequence[float]  # largest torque at each speed, N·m
+    # what is drawn: the line of every speed, or of a few of many
+    shown: Sequence[Speed]
+    lines: Sequence[_Line]
+    # of many: where most are at each "time", s, while half of them go on: (n_points,)
+    # and "angle", deg, and "torque", N·m, from the lowest to the highest, (4, n_points)
+    band: Mapping[str, _Floats] | None
 
 
-def traces_section(material: Material) -> Section:
+def traces_needs(material: Material) -> Speeds | Lacking:
+    """Return the speeds, if any is fast enough to be drawn."""
+    speeds = speeds_needs(material)
+    if isinstance(speeds, Lacking) or any(map(_is_drawn, speeds.values)):
+        return speeds
+    return Lacking(f"every speed is {_TOO_SLOW}")
+
+
+def _is_drawn(speed: Speed) -> bool:
+    return speed.mean_speed_deg_s >= _SLOWEST_DRAWN_DEG_S
+
+
+def traces_section(material: Material, speeds: Speeds) -> Iterator[Content]:
     """Show the torque each model makes at each rater's mean speed."""
-    speeds, protocol = material.analysis.speeds, material.protocol
-    title = "Torque traces"
-    if speeds is None or not speeds.values:
-        return absent_section("traces", title, speeds.reason if speeds else None)
-    moved = [v for v in speeds.values if v.mean_speed_deg_s >= _SLOWEST_DRAWN_DEG_S]
-    if not moved:
-        return absent_section("traces", title, f"every speed is {_TOO_SLOW}")
+    protocol = material.protocol
+    moved = [speed for speed in speeds.values if _is_drawn(speed)]
     session = next(s for s in material.sessions if s in {v.session for v in moved})
-    end_deg = min(protocol.stretch.end_deg, protocol.elbow.range_end_deg)
     values = [value for value in moved if value.session == session]
-    models = _models(protocol, values, end_deg)
+    end_deg = min(protocol.stretch.end_deg, protocol.elbow.range_end_deg)
     text = _traces_text(material, values, end_deg)
     n_still = sum(v.session == session for v in speeds.values) - len(values)
     if n_still:
         text += f" Speeds {_TOO_SLOW}, which are not drawn: {n_still}."
+    yield Paragraph(text=text)
+    models = [
+        _traced(protocol, model, of_model, end_deg)
+        for model in protocol.models
+        if (of_model := [value for value in values if value.model == model.id])
+    ]
     has_angle = len(models) <= MANY_MODELS
     size = _PANELS_PER_FIGURE if has_angle else _SMALL_PANELS_PER_FIGURE
-    drawings = [
-        _trace_drawing(material, models[first : first + size], nth, has_angle=has_angle)
-        for nth, first in enumerate(range(0, len(models), size), start=1)
-    ]
-    table = _peak_table(material, models, session)
-    return Section(
-        name="traces",
-        title=title,
-        blocks=(Paragraph(text=text), *drawings, table, *measured_blocks(material)),
-    )
+    for nth, first in enumerate(range(0, len(models), size), start=1):
+        shown = models[first : first + size]
+        yield _traces_drawing(material, shown, nth, has_angle=has_angle)
+    yield _peak_table(material, models, session)
+    yield from measured_blocks(material)
 
 
 def _traces_text(material: Material, values: Sequence[Speed], end_deg: float) -> str:
     # the values are of one session
-    session, start_deg = values[0].session, material.protocol.stretch.start_deg
     kind = {
         "published": "published mean speeds",
         "simulated": "mean speeds of the simulated hands",
         "simulated device": "mean speeds of the simulated hands",
     }.get(material.data, "recorded mean speeds")
-    each = "stretch" if has_many(values) else "rater"
+    each = "stretch" if _has_many(values) else "rater"
     most = max(Counter(value.model for value in values).values())
     of_many = f", or a few of more than {MANY_STRETCHES}" * (most > MANY_STRETCHES)
     text = (
         "These traces are reconstructions, not measurements: each model is stretched "
-        f"at constant speed from {as_entered(start_deg)}° to "
+        f"at constant speed from {as_entered(material.protocol.stretch.start_deg)}° to "
         f"{as_entered(end_deg)}°, at the {kind} of session "
-        f"{session}, one line a {each}{of_many}. Torque resists extension; the arm's "
-        "own inertia is not in it."
+        f"{values[0].session}, one line a {each}{of_many}. Torque resists extension; "
+        "the arm's own inertia is not in it."
     )
     if any(value.is_graded for value in values):
         text += " A thicker line is the stretch that the rater said the grade rests on."
     return text
 
 
-def _models(
-    protocol: Protocol, speeds: Sequence[Speed], end_deg: float
-) -> list[_Model]:
-    # in the protocol's order: each at constant speed over the whole range
-    models = []
-    for model in protocol.models:
-        of_model = [speed for speed in speeds if speed.model == model.id]
-        if of_model:
-            models.append(_model(protocol, model.id, of_model, end_deg))
-    return models
-
-
-def _model(
-    protocol: Protocol, model: str, speeds: Sequence[Speed], end_deg: float
-) -> _Model:
-    joint = joint_model(protocol, model)
+def _traced(
+    protocol: Protocol, model: Model, speeds: Sequence[Speed], end_deg: float
+) -> TracedModel:
+    # at constant speed over the whole range
+    joint = joint_model(protocol, model.id)
     start, rate_hz = math.radians(protocol.stretch.start_deg), protocol.device.rate_hz
     end = min(math.radians(end_deg), joint.range_end)
 
-    def lines_at(speeds_deg_s: Sequence[float]) -> list[_Line]:
-        motions = [_motion(start, end, speed) for speed in speeds_deg_s]
+    def motions(speeds_deg_s: Sequence[float]) -> list[ConstantSpeed]:
+        speeds = map(math.radians, speeds_deg_s)
+        return [ConstantSpeed(start=start, end=end, speed=speed) for speed in speeds]
+
+    def lines(speeds_deg_s: Sequence[float]) -> list[_Line]:
+        made = motions(speeds_deg_s)
         if isinstance(joint, ElbowParameters):
-            return [outline(joint, motion, n_points=_N_POINTS) for motion in motions]
-        return [trace(joint, motion, rate_hz=rate_hz) for motion in motions]
+            return [outline(joint, motion, n_points=_N_POINTS) for motion in made]
+        return [trace(joint, motion, rate_hz=rate_hz) for motion in made]
 
     known = [speed.mean_speed_deg_s for speed in speeds]
     shown, band = list(range(len(known))), None
@@ -150,119 +260,103 @@ def _model(
         ranks = at_ranks(known)
         shown = [ranks[name] for name in ("lowest", "median", "highest")]
         steps = (np.arange(_N_IN_BAND) + 0.5) / _N_IN_BAND
-        band = _band(lines_at(np.quantile(known, steps).tolist()))
+        band = _band(lines(np.quantile(known, steps).tolist()))
     if isinstance(joint, ElbowParameters):
-        motions = [_motion(start, end, speed) for speed in known]
-        peaks = evaluate(joint, motions, ["peak_torque"]).column("peak_torque").tolist()
+        outputs = evaluate(joint, motions(known), ["peak_torque"])
+        peaks = outputs.column("peak_torque").tolist()
     else:
-        peaks = [float(line.torque.max()) for line in lines_at(known)]
-    stretches = [
-        _Stretch(speed=speed, peak=peak)
-        for speed, peak in zip(speeds, peaks, strict=True)
-    ]
-    return _Model(
-        id=model,
-        stretches=tuple(stretches),
-        shown=tuple(stretches[i] for i in shown),
-        lines=tuple(lines_at([known[i] for i in shown])),
+        peaks = [float(line.torque.max()) for line in lines(known)]
+    digits = whole_or_tenths(known)
+    grade = ""
+    if model.intended_grade is not None:
+        grade = f" ({protocol.scale.name} {model.intended_grade})"
+    ends = f"{number(min(known), digits)} to {number(max(known), digits)} deg/s"
+    return TracedModel(
+        id=model.id,
+        title=f"{model.id}{grade}\n{ends}",
+        speeds=speeds,
+        peaks=peaks,
+        shown=[speeds[i] for i in shown],
+        lines=lines([known[i] for i in shown]),
         band=band,
     )
 
 
-def _motion(start: float, end: float, speed_deg_s: float) -> ConstantSpeed:
-    return ConstantSpeed(start=start, end=end, speed=math.radians(speed_deg_s))
-
-
-def _band(lines: Sequence[_Line]) -> TraceBand:
+def _band(lines: Sequence[_Line]) -> dict[str, _Floats]:
     # lines at evenly spaced quantiles of the speeds: as many are below each time's
     # quantile as of all stretches; the slower half goes on to the end of the band
     ends = np.array([line.time[-1] for line in lines])
     time = np.linspace(0.0, float(np.median(ends)), _N_POINTS)
     under_way = time <= ends[:, np.newaxis]  # (n_lines, n_points)
     n_under_way = under_way.sum(axis=0)
-
-    def ends_of(values: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-        known = [
-            np.interp(time, line.time, of_line)
-            for line, of_line in zip(lines, values, strict=True)
-        ]
+    band = {"time": time}
+    for name in ("angle", "torque"):
+        known = [np.interp(time, line.time, _column(line, name)) for line in lines]
         ordered = np.sort(np.where(under_way, np.stack(known), np.inf), axis=0)
-        shown = np.empty((len(_BAND_SHARES), time.size))
+        band[name] = np.empty((len(_BAND_SHARES), time.size))
         for n in np.unique(n_under_way):
             of_n = n_under_way == n
-            shown[:, of_n] = np.quantile(ordered[:n, of_n], _BAND_SHARES, axis=0)
-        return shown
-
-    return TraceBand(
-        time=time,
-        angle=ends_of([np.degrees(line.angle) for line in lines]),
-        torque=ends_of([line.torque for line in lines]),
-    )
+            band[name][:, of_n] = np.quantile(ordered[:n, of_n], _BAND_SHARES, axis=0)
+    return band
 
 
-def _trace_drawing(
-    material: Material, models: Sequence[_Model], nth: int, *, has_angle: bool
+def _column(line: _Line, name: str) -> _Floats:
+    return np.degrees(line.angle) if name == "angle" else line.torque
+
+
+def _traces_drawing(
+    material: Material, models: Sequence[TracedModel], nth: int, *, has_angle: bool
 ) -> Drawing:
-    # of the models of the nth figure
-    intended = {m.id: m.intended_grade for m in material.protocol.models}
-    panels = []
-    for model in models:
-        speeds = [stretch.speed.mean_speed_deg_s for stretch in model.stretches]
-        digits = whole_or_tenths(speeds)
-        slowest, fastest = number(min(speeds), digits), number(max(speeds), digits)
-        grade = ""
-        if intended[model.id] is not None:
-            grade = f" ({material.protocol.scale.name} {intended[model.id]})"
-        names = [stretch.speed.rater for stretch in model.shown]
-        panels.append(
-            TracePanel(
-                title=f"{model.id}{grade}\n{slowest} to {fastest} deg/s",
-                traces=model.lines,
-                graded=tuple(stretch.speed.is_graded for stretch in model.shown),
-                names=() if model.band is None else tuple(names),
-                band=model.band,
-            )
-        )
     listed = ", ".join(model.id for model in models)
     shape = (
         "Torque rises slowly, jumps at the catch, falls to a residual, and rises again "
         "after the catch; the"
     )
-    if _of_other_kinds(material) & {model.id for model in models}:
+    if _of_other_kinds(material, models):
         shape = "The"
     what = "Torque and angle" if has_angle else "Torque"
+    panels = tuple(
+        (
+            *(model.title, model.lines, [speed.is_graded for speed in model.shown]),
+            [] if model.band is None else [speed.rater for speed in model.shown],
+            model.band,
+        )
+        for model in models
+    )
+    content = (panels, "time" if has_angle else "small")
     return Drawing(
         name=f"traces_{nth}",
-        caption=_trace_caption(models, listed, has_angle=has_angle),
+        caption=_traces_caption(models, listed, has_angle=has_angle),
         alt=(
             f"{what} against time for {listed}. {shape} "
             "peaks are in the table of peak torques."
         ),
-        content=Drawn(
-            FIGURES + "_trace_figures:trace_figure", (tuple(panels), has_angle)
-        ),
+        content=Drawn(FIGURES + "_stretch_figures:trace_figure", content),
         stamp=material.trace_stamp,
     )
 
 
-def _trace_caption(models: Sequence[_Model], listed: str, *, has_angle: bool) -> str:
-    made_of = [stretch.speed for model in models for stretch in model.stretches]
-    whose = "every stretch's" if has_many(made_of) else "every rater's"
+def _traces_caption(
+    models: Sequence[TracedModel], listed: str, *, has_angle: bool
+) -> str:
+    every = (
+        "stretch's" if _has_many([s for m in models for s in m.speeds]) else "rater's"
+    )
     what = "torque (top) and angle (bottom)" if has_angle else "torque"
     met = np.unique(np.concatenate([line.phase for m in models for line in m.lines]))
     words = "; ".join(_PHASE_LOOKS[code] for code in met)
     # one phase has nothing to be told from
     looks = f"{words}; a dot marks where a phase begins." if len(met) > 1 else ""
-    n_most = max((len(m.stretches) for m in models if m.band is not None), default=0)
-    if not n_most:
-        text = f"Reconstructed {what} of {listed} at {whose} mean speed. {looks}"
-        return text.rstrip()
-    return (
-        f"Reconstructed {what} of {listed} at the mean speeds of up to {n_most} "
-        "stretches. Shaded: the middle 50 % and 90 % at each time, while half of the "
-        "stretches go on. Lines: the slowest, the median and the fastest, each with "
-        f"its rater. {looks}".rstrip()
-    )
+    n_most = max((len(m.speeds) for m in models if m.band is not None), default=0)
+    speeds, shaded = f"every {every} mean speed.", ""
+    if n_most:
+        speeds = f"the mean speeds of up to {n_most} stretches."
+        shaded = (
+            "Shaded: the middle 50 % and 90 % at each time, while half of the "
+            "stretches go on. Lines: the slowest, the median and the fastest, each "
+            "with its rater. "
+        )
+    return f"Reconstructed {what} of {listed} at {speeds} {shaded}{looks}".rstrip()
 
 
 _PHASE_LOOKS = (
@@ -272,65 +366,134 @@ _PHASE_LOOKS = (
 )
 
 
-def _of_other_kinds(material: Material) -> set[str]:
-    return {m.id for m in material.protocol.models if m.kind != DEFAULT_KIND}
+def _of_other_kinds(material: Material, models: Sequence[TracedModel]) -> list[str]:
+    others = {m.id for m in material.protocol.models if m.kind != DEFAULT_KIND}
+    return [model.id for model in models if model.id in others]
 
 
-def _peak_notes(
-    material: Material, models: Sequence[_Model], raters: Sequence[str]
-) -> list[str]:
+def _peak_table(
+    material: Material, models: Sequence[TracedModel], session: str
+) -> Table:
+    peaks = [{speed.rater: -math.inf for speed in model.speeds} for model in models]
+    for of_model, model in zip(peaks, models, strict=True):
+        for speed, peak in zip(model.speeds, model.peaks, strict=True):
+            of_model[speed.rater] = max(peak, of_model[speed.rater])
+    raters = [rater for rater in material.raters if any(rater in p for p in peaks)]
+    is_many = len(raters) > MANY_RATERS
+    where: Literal["csv", "everywhere"] = "csv" if is_many else "everywhere"
+    made = [speed for model in models for speed in model.speeds]
     notes = [
         "The largest torque of all phases, be it in the catch or at the end of the "
         "stretch, computed from the exact events of the motion, not from the samples."
     ]
-    others = [m.id for m in models if m.id in _of_other_kinds(material)]
-    if others:
+    if others := _of_other_kinds(material, models):
         notes.append(f"Of {', '.join(others)} it is the largest sample.")
-    made = [stretch.speed for model in models for stretch in model.stretches]
-    if has_many(made):
+    if _has_many(made):
         notes.append("Of several stretches the largest peak is given.")
     elif len({(speed.model, speed.rater) for speed in made}) < len(made):
         notes.append("Of repeated presentations the largest peak is given.")
-    if len(raters) > MANY_RATERS:
+    if is_many:
         notes.append(f"The file has the peaks of all {len(raters)} raters.")
-    return notes
-
-
-def _peak_row(model: _Model, raters: Sequence[str]) -> tuple[Value, ...]:
-    peaks: dict[str, float] = {}
-    for stretch in model.stretches:
-        rater = stretch.speed.rater
-        peaks[rater] = max(stretch.peak, peaks.get(rater, stretch.peak))
-    median = float(np.median(list(peaks.values())))
-    ends = min(peaks.values()), median, max(peaks.values())
-    return (model.id, *(peaks.get(rater) for rater in raters), *ends)
-
-
-def _peak_table(material: Material, models: Sequence[_Model], session: str) -> Table:
-    present = {stretch.speed.rater for model in models for stretch in model.stretches}
-    raters = [rater for rater in material.raters if rater in present]
-    by_rater = [
-        Column(
-            key=f"{rater}_nm",
-            heading=rater,
-            digits=2,
-            where="csv" if len(raters) > MANY_RATERS else "everywhere",
-        )
-        for rater in raters
-    ]
     return Table(
         name="peak_torque",
         caption=(
             f"Peak model torque at each rater's mean speed, session {session} (N·m)"
         ),
         columns=(
-            Column(key="model", heading="Model", align="left"),
-            *by_rater,
+            _MODEL,
+            *(Column(key=f"{r}_nm", heading=r, digits=2, where=where) for r in raters),
             Column(key="least_nm", heading="Least", digits=2),
             Column(key="median_nm", heading="Median", digits=2),
             Column(key="most_nm", heading="Most", digits=2),
         ),
-        rows=tuple(_peak_row(model, raters) for model in models),
-        notes=tuple(_peak_notes(material, models, raters)),
+        rows=tuple(
+            (
+                model.id,
+                *map(of_model.get, raters),
+                min(of_model.values()),
+                float(np.median(list(of_model.values()))),
+                max(of_model.values()),
+            )
+            for of_model, model in zip(peaks, models, strict=True)
+        ),
+        notes=tuple(notes),
         data=material.data,
+    )
+
+
+def measured_blocks(material: Material) -> Iterator[Paragraph | Drawing]:
+    """Yield figures of the first presentation of each model; none without a sensor."""
+    folder = material.recordings
+    if folder is None or not material.protocol.device.torque_sensor:
+        return
+    recordings = _first_of_each_model(material, folder)
+    if not recordings:
+        text = "Measured torque is not in these data: no recording has it."
+        yield Paragraph(text=text, absent=True)
+    starts = range(0, len(recordings), _PANELS_PER_FIGURE)
+    for nth, first in enumerate(starts, start=1):
+        shown = recordings[first : first + _PANELS_PER_FIGURE]
+        yield _measured_drawing(material, shown, nth)
+
+
+def _first_of_each_model(material: Material, folder: Path) -> list[Recording]:
+    # by model, in the protocol's order; of the first session and rater that have one
+    models = [model.id for model in material.protocol.models]
+    first: dict[str, Recording] = {}
+    for session in material.sessions:
+        for rater in material.raters:
+            for path in sorted((folder / f"{session}_{rater}").glob("*.npz")):
+                recording = read_recording(path)
+                has_torque = MEASURED_TORQUE in recording.channels
+                if has_torque and recording.facts["fault"] is None:
+                    first.setdefault(str(recording.facts["model"]), recording)
+            if first.keys() >= set(models):
+                break
+    return [first[model] for model in models if model in first]
+
+
+MeasuredPanel = tuple[str, _Floats, _Floats, _Floats, _Floats]
+"""A title; time, s, angle, deg, and torque that was sent and measured, N·m."""
+
+
+def measured_panel(recording: Recording, title: str) -> MeasuredPanel:
+    """Return what is drawn of one presentation: the first stretch that could catch."""
+    first, last, made = 0.0, math.inf, stretches(recording)
+    if made:
+        stretch = next((each for each in made if each.reached_threshold), made[0])
+        first, last = stretch.onset_s - _AROUND_S, stretch.end_s + _AROUND_S
+    time = recording.columns["time_s"]
+    shown = (time >= first) & (time <= last)
+    names = ("angle_deg", "command_torque_nm", MEASURED_TORQUE.column)
+    angle, sent, measured = (recording.columns[name][shown] for name in names)
+    return title, time[shown] - max(first, 0.0), angle, sent, measured
+
+
+def _measured_drawing(
+    material: Material, recordings: Sequence[Recording], nth: int
+) -> Drawing:
+    panels = tuple(
+        measured_panel(
+            recording, "{model}\n{rater}, {session}".format_map(recording.facts)
+        )
+        for recording in recordings
+    )
+    listed = ", ".join(str(recording.facts["model"]) for recording in recordings)
+    largest = max(float(np.nanmax(measured)) for *_, measured in panels)
+    simulated = any(recording.facts["simulated"] for recording in recordings)
+    return Drawing(
+        name=f"measured_{nth}",
+        caption=(
+            f"Torque that the device's sensor measured of {listed} (line), and torque "
+            "that was sent (dashed), above the angle: of the first presentation of "
+            "each the first stretch that was fast enough for a catch. The measured "
+            "torque also has the device's friction and the inertia of its motor, and "
+            "what was sent has the compensation of friction taken off."
+        ),
+        alt=(
+            f"Measured and sent torque against time for {listed}; the largest "
+            f"measured torque is {number(largest, 1)} N·m."
+        ),
+        content=Drawn(FIGURES + "_stretch_figures:measured_figure", (panels,)),
+        stamp=SIMULATED if simulated else material.stamp,
     )

@@ -1,24 +1,27 @@
-"""The JSON, the text and the figures of scenes: a model stretched by a motion each."""
+"""Scenes, a model stretched by a motion each: their JSON, their text, their figures.
+
+Of any joint, also the angles of the Tardieu scale.
+"""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import TYPE_CHECKING, Any, Literal
 
 from masrel.errors import ParameterError
-from masrel.lab.report._figure_data import (
-    FIGURES,
-    CatchCurve,
-    CatchSchematic,
-    StretchLine,
-    StretchPanel,
-)
-from masrel.lab.report._tone_scenes import tone_document, tone_line, torque_rows
+from masrel.lab.recording import PHASES
 from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import aligned, fixed_or_significant, significant
 
 if TYPE_CHECKING:
-    from masrel.lab.elbow import ElbowParameters, JointModel, Motion
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from masrel.lab.elbow import ElbowParameters, JointModel, Motion, Outline, Trace
+    from masrel.lab.elbow.tone import ToneModel
+
+_FIGURES = "masrel.lab.report.figures._stretch_figures:"
 
 SCENE_OUTPUTS = {
     "residual-torque": "residual_torque_nm",
@@ -39,7 +42,7 @@ _LINES = {
 # Where torque may be computed: a list of the document, its key of the place, and a unit
 _PLACES = (("torque_at_s", "time_s", "s"), ("torque_at_deg", "angle_deg", "deg"))
 
-_N_PIXELS = 800  # points a line has: a panel is less wide than that
+_RATE_HZ = 1000  # of the samples that phases and lines of other kinds are made of
 
 SCENE_STAMP = "computed from the joint model, not measured"
 """What figures say of their data."""
@@ -71,21 +74,41 @@ class Quantities:
 
 def scene_document(scene: Scene, quantities: Quantities) -> dict[str, object]:
     """Return the events of a scene, its peak torque, and what else was requested."""
-    from masrel.lab import elbow
+    from masrel.lab.elbow import ElbowParameters
 
-    joint, motion = scene.joint, scene.motion
-    if not isinstance(joint, elbow.ElbowParameters):
-        return tone_document(scene, quantities)
-    events = elbow.events(joint, motion)
-    angle, speed = events.catch_angle, events.mean_speed
+    is_elbow = isinstance(scene.joint, ElbowParameters)
     document: dict[str, object] = {
         "model": scene.model,
+        **({} if is_elbow else {"kind": scene.joint.kind}),
         "motion": scene.kind,
         "speed_deg_s": scene.speed_deg_s,
         "from_deg": scene.start_deg,
         "to_deg": scene.end_deg,
-        "catch_angle_deg": None if angle is None else math.degrees(angle),
-        "mean_speed_deg_s": None if speed is None else math.degrees(speed),
+        **(_of_elbow if is_elbow else _of_tone)(scene, quantities),
+    }
+    for key, number in document.items():
+        if isinstance(number, float) and not math.isfinite(number):
+            raise ParameterError(
+                f"{key}: needs a number that a float can hold, got "
+                f"{significant(number)}; some parameter or speed is too large"
+            )
+    return document
+
+
+def _of_elbow(scene: Scene, quantities: Quantities) -> dict[str, object]:
+    from masrel.lab import elbow
+
+    (joint,), motion = _elbows([scene]), scene.motion
+    events = elbow.events(joint, motion)
+    functions = {
+        "residual-torque": elbow.residual_torque,
+        "work": elbow.work,
+        "impulse": elbow.impulse,
+    }
+    values = {name: functions[name](joint, motion) for name in quantities.outputs}
+    return {
+        "catch_angle_deg": _degrees(events.catch_angle),
+        "mean_speed_deg_s": _degrees(events.mean_speed),
         "peak_torque_nm": elbow.peak_torque(joint, motion),
         "phases": [
             {
@@ -97,39 +120,107 @@ def scene_document(scene: Scene, quantities: Quantities) -> dict[str, object]:
             }
             for span in events.phases
         ],
+        **{SCENE_OUTPUTS[k]: None if math.isnan(v) else v for k, v in values.items()},
+        **_torques(
+            quantities,
+            lambda times: elbow.torque(joint, motion, times),
+            lambda angles: elbow.torque_at(joint, motion, angles),
+        ),
     }
-    if quantities != Quantities():
-        document |= _requested(joint, motion, quantities)
-    for key, number in document.items():
-        if isinstance(number, float) and not math.isfinite(number):
+
+
+def _of_tone(scene: Scene, quantities: Quantities) -> dict[str, object]:
+    if quantities.outputs:
+        raise ParameterError(f"--output: needs spastic elbows, got {scene.joint.kind}")
+    import numpy as np
+
+    from masrel.lab.elbow import times_at, trace
+
+    joint, motion = _tone_of(scene), scene.motion
+    events = joint.events(motion)
+    caught = [event for event in events if event.name == joint.catch_event]
+    sampled = trace(joint, motion, rate_hz=_RATE_HZ)
+    every = np.append(sampled.time, motion.duration)
+    at_events = joint.torque(motion, [event.time for event in events])
+    phases, first = [], 0
+    for code, group in groupby(sampled.phase.tolist()):
+        end = first + len(list(group))
+        phases.append((PHASES[code], float(every[first]), float(every[end])))
+        first = end
+
+    def at_times(times: Sequence[float]) -> "NDArray[np.float64]":
+        late = [time for time in times if not 0.0 <= time <= motion.duration]
+        if late:
             raise ParameterError(
-                f"{key}: needs a number that a float can hold, got "
-                f"{significant(number)}; some parameter or speed is too large"
+                "--at-s: needs times within the motion, 0 to "
+                f"{significant(motion.duration)} s, got {significant(late[0])}"
             )
-    return document
+        return joint.torque(motion, times)
 
-
-def _requested(
-    joint: "ElbowParameters", motion: "Motion", quantities: Quantities
-) -> dict[str, object]:
-    from masrel.lab import elbow
-
-    requested: dict[str, object] = {}
-    functions = {
-        "residual-torque": elbow.residual_torque,
-        "work": elbow.work,
-        "impulse": elbow.impulse,
+    return {
+        "catch_angle_deg": _degrees(caught[0].angle if caught else None),
+        "mean_speed_deg_s": None,
+        # of every millisecond and every event
+        "peak_torque_nm": float(max(*joint.torque(motion, every), *at_events)),
+        "phases": [
+            {
+                "name": name,
+                "start_s": start,
+                "end_s": end,
+                "start_deg": math.degrees(motion.angle(start)),
+                "end_deg": math.degrees(motion.angle(end)),
+            }
+            for name, start, end in phases
+        ],
+        "events": [
+            {
+                "name": event.name,
+                "time_s": event.time,
+                "angle_deg": math.degrees(event.angle),
+            }
+            for event in events
+        ],
+        **_torques(
+            quantities,
+            at_times,
+            lambda angles: joint.torque(motion, times_at(motion, angles)),
+        ),
     }
-    for name in quantities.outputs:
-        value = functions[name](joint, motion)
-        requested[SCENE_OUTPUTS[name]] = None if math.isnan(value) else value
+
+
+def _degrees(angle: float | None) -> float | None:
+    return None if angle is None else math.degrees(angle)
+
+
+_TorqueOf = Callable[[Sequence[float]], "NDArray[np.float64]"]
+
+
+def _torques(
+    quantities: Quantities, at_times: _TorqueOf, at_angles: _TorqueOf
+) -> dict[str, object]:
+    # the torque at each time, s, and where each angle, rad, is first reached
+    requested: dict[str, object] = {}
     if times := quantities.times:
-        torques = elbow.torque(joint, motion, times)
-        requested["torque_at_s"] = torque_rows("time_s", times, torques)
+        torques = at_times(times).tolist()
+        rows = zip(times, torques, strict=True)
+        requested["torque_at_s"] = [{"time_s": t, "torque_nm": nm} for t, nm in rows]
     if angles := quantities.angles:
-        torques = elbow.torque_at(joint, motion, [math.radians(a) for a in angles])
-        requested["torque_at_deg"] = torque_rows("angle_deg", angles, torques)
+        torques = at_angles([math.radians(angle) for angle in angles]).tolist()
+        rows = zip(angles, torques, strict=True)
+        requested["torque_at_deg"] = [
+            {"angle_deg": angle, "torque_nm": nm} for angle, nm in rows
+        ]
     return requested
+
+
+def _tone_of(scene: Scene) -> "ToneModel":
+    from masrel.lab.elbow.tone import ToneModel
+
+    if not isinstance(scene.joint, ToneModel):
+        raise ParameterError(
+            f"--model: needs a law with exact events, got {scene.model}"
+        )
+    return scene.joint
 
 
 def scene_text(document: dict[str, Any], title: str) -> str:
@@ -254,14 +345,15 @@ def scenes_content(scenes: Sequence[Scene], view: str) -> Drawn:
     """Return what a figure of scenes shows."""
     models = _by_model(scenes).items()
     if view == "catch":
-        curves = tuple(_curve(*of_model) for of_model in models)
-        return Drawn(FIGURES + "_scene_figures:catch_figure", (curves,))
+        curves = tuple(_catches(*of_model) for of_model in models)
+        return Drawn(_FIGURES + "catch_figure", (curves,))
     if view == "schematic":
-        shown = _schematic(scenes[0])
-        return Drawn(FIGURES + "_scene_figures:schematic_figure", (shown,))
-    against: Literal["angle", "time"] = "angle" if view == "angle" else "time"
-    panels = tuple(_panel(*of_model) for of_model in models)
-    return Drawn(FIGURES + "_scene_figures:stretch_figure", (panels, against))
+        return Drawn(_FIGURES + "schematic_figure", _schematic(scenes[0]))
+    panels = tuple(
+        (name, [*map(_line, of)], [False] * len(of), [*map(_label, of)], None)
+        for name, of in models
+    )
+    return Drawn(_FIGURES + "trace_figure", (panels, view))
 
 
 def _by_model(scenes: Sequence[Scene]) -> dict[str, list[Scene]]:
@@ -271,72 +363,47 @@ def _by_model(scenes: Sequence[Scene]) -> dict[str, list[Scene]]:
     return models
 
 
-def _panel(name: str, scenes: Sequence[Scene]) -> StretchPanel:
-    return StretchPanel(title=name, lines=tuple(map(_line, scenes)))
-
-
-def _line(scene: Scene) -> StretchLine:
-    import numpy as np
-
-    from masrel.lab.elbow import ElbowParameters, outline
-
-    if not isinstance(scene.joint, ElbowParameters):
-        return tone_line(scene)
-    line = outline(scene.joint, scene.motion, n_points=_N_PIXELS)
+def _label(scene: Scene) -> str:
     speed = scene.speed_deg_s
-    return StretchLine(
-        label=scene.kind if speed is None else f"{significant(speed)} deg/s",
-        time=line.time,
-        angle=np.degrees(line.angle),
-        torque=line.torque,
-        phases=tuple((s.name, s.start, s.end) for s in line.events.phases),
-    )
+    return scene.kind if speed is None else f"{significant(speed)} deg/s"
 
 
-def _schematic(scene: Scene) -> CatchSchematic:
+def _line(scene: Scene) -> "Outline | Trace":
+    from masrel.lab.elbow import ElbowParameters, outline, trace
+
+    if isinstance(scene.joint, ElbowParameters):
+        return outline(scene.joint, scene.motion)
+    return trace(_tone_of(scene), scene.motion, rate_hz=_RATE_HZ)
+
+
+def _schematic(
+    scene: Scene,
+) -> "tuple[str, Outline, tuple[float, float, float], str]":
     from masrel.lab.elbow import outline, residual_torque
 
     (joint,) = _elbows([scene])
-    line = outline(joint, scene.motion, n_points=_N_PIXELS)
-    events = line.events
-    if events.catch is None or events.catch_speed is None or events.peak_end is None:
+    line = outline(joint, scene.motion)
+    if line.events.catch_speed is None or line.events.peak_end is None:
         raise ParameterError("--view schematic: needs a stretch that catches")
-    rise = joint.catch_torque_constant * events.catch_speed
+    rise = joint.catch_torque_constant * line.events.catch_speed
     residual = residual_torque(joint, scene.motion)
     pre_end = residual - joint.residual_share * rise
-    return CatchSchematic(
-        title=scene.title,
-        time=line.time,
-        torque=line.torque,
-        phases=tuple((s.name, s.start, s.end) for s in events.phases),
-        catch=events.catch,
-        peak_end=events.peak_end,
-        catch_end=events.end if events.catch_end is None else events.catch_end,
-        pre_end=pre_end,
-        peak=pre_end + rise,
-        residual=residual,
-        residual_name=(
-            r"$Q\,H\,v_c$"
-            if joint.residual_reading == "residual"
-            else r"$(1-Q)\,H\,v_c$"
-        ),
-    )
+    share = {"residual": "Q", "decrease": "(1-Q)"}[joint.residual_reading]
+    name = rf"${share}\,H\,v_c$"
+    return scene.title, line, (pre_end, pre_end + rise, residual), name
 
 
-def _curve(name: str, scenes: Sequence[Scene]) -> CatchCurve:
+def _catches(name: str, scenes: Sequence[Scene]) -> tuple[object, ...]:
     import numpy as np
 
     from masrel.lab.elbow import evaluate
 
-    joints = _elbows(scenes)
-    motions = [scene.motion for scene in scenes]
-    outputs = evaluate(
-        joints, motions, ("mean_speed", "catch_angle", "catch", "catch_end")
-    )
+    joints, motions = _elbows(scenes), [scene.motion for scene in scenes]
+    names = ("mean_speed", "catch_angle", "catch", "catch_end")
+    outputs = evaluate(joints, motions, names)
     caught = np.flatnonzero(np.isfinite(outputs.column("catch")))
     caught = caught[np.argsort(outputs.column("mean_speed")[caught])]
     mean, angle, catch, end = outputs.values[caught].T
-    duration = end - catch
     # from the catch angle on to where the catch ends; nan where the motion ends first
     travel = [
         float(motions[i].angle(until, origin)) if np.isfinite(until) else np.nan
@@ -344,14 +411,67 @@ def _curve(name: str, scenes: Sequence[Scene]) -> CatchCurve:
             caught.tolist(), end.tolist(), angle.tolist(), strict=True
         )
     ]
-    return CatchCurve(
-        label=name,
-        mean_speed=np.degrees(mean),
-        catch_angle=np.degrees(angle),
-        catch_speed=np.degrees(np.array(travel) / duration),
-        duration=duration,
-        clamps=(
-            math.degrees(joints[0].slowest_mean_speed),
-            math.degrees(joints[0].fastest_mean_speed),
-        ),
+    clamps = joints[0].slowest_mean_speed, joints[0].fastest_mean_speed
+    return (
+        name,
+        np.degrees(mean),
+        np.degrees(angle),
+        np.degrees(np.array(travel) / (end - catch)),
+        end - catch,
+        tuple(map(math.degrees, clamps)),
+    )
+
+
+def tardieu_document(
+    model: str, joint: "JointModel", start_deg: float, speeds: Sequence[float]
+) -> dict[str, object]:
+    """Return R2, R1, their difference and the catch at V1, V2 and V3 of a joint."""
+    # speeds: V1, V2 and V3, deg/s; none for the usual ones
+    from masrel.lab.elbow import tardieu
+
+    start = math.radians(start_deg)
+    if speeds:
+        first, second, third = map(math.radians, speeds)
+        made = tardieu(joint, start_angle=start, speeds=(first, second, third))
+    else:
+        made = tardieu(joint, start_angle=start)
+    return {
+        "model": model,
+        "kind": joint.kind,
+        "from_deg": start_deg,
+        "r2_deg": math.degrees(made.range_angle),
+        "r1_deg": math.degrees(made.catch_angle),
+        "difference_deg": math.degrees(made.difference),
+        "catches": [
+            {
+                "name": f"V{nth}",
+                "speed_deg_s": math.degrees(speed),
+                "catch_angle_deg": _degrees(angle),
+            }
+            for nth, (speed, angle) in enumerate(
+                zip(made.speeds, made.catch_angles, strict=True), start=1
+            )
+        ],
+    }
+
+
+def tardieu_text(documents: Sequence[dict[str, Any]]) -> str:
+    """Return Tardieu's angles for a person, a joint a line."""
+    heads = [
+        f"{catch['name']} {significant(catch['speed_deg_s'])} deg/s"
+        for catch in documents[0]["catches"]
+    ]
+    rows = [["model", "R2 deg", "R1 deg", "R2 - R1", *heads]]
+    for document in documents:
+        angles = [document[key] for key in ("r2_deg", "r1_deg", "difference_deg")]
+        angles += [catch["catch_angle_deg"] for catch in document["catches"]]
+        cells = ["–" if a is None else fixed_or_significant(a, 2) for a in angles]
+        rows.append([document["model"], *cells])
+    numeric: list[Literal["right"]] = ["right"] * (len(rows[0]) - 1)
+    return "\n".join(
+        (
+            *aligned(rows, ["left", *numeric]),
+            "R2: where the range ends at V1. R1: the catch at V3, or R2 without one. "
+            "Then the catch at each speed.",
+        )
     )

@@ -20,7 +20,7 @@ from typing import Any
 
 import pytest
 
-from masrel.lab._cache import FOLDER
+from masrel.lab.report._report_folder import NOTES
 from masrel.lab.run import read_log
 
 CHANGING = ("open", "write", "fsync", "replace", "unlink", "mkdir", "chmod")
@@ -65,7 +65,7 @@ def _whole_files(root: Path) -> Iterator[Path]:
         places = path.relative_to(root).parts
         # a cache notes when its files were written; what it holds is sealed, and held
         # by tests/lab/flow/test_report_builds.py
-        left_out = any(part.startswith((".masrel-", FOLDER)) for part in places)
+        left_out = any(part.startswith((".masrel-", NOTES)) for part in places)
         if path.is_file() and not left_out:
             yield path
 

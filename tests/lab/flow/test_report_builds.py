@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from masrel.lab import _cache
+from masrel.lab.report._report_folder import NOTES
 from tests.cli.process import Caller, Done
 from tests.faults import Faults
 from tests.lab.flow.conftest import run
@@ -27,7 +27,7 @@ def study(small_demo: Path, tmp_path: Path) -> Path:
     """A small study that was run, with a note and without its report."""
     root = Path(shutil.copytree(small_demo / "study", tmp_path / "study"))
     shutil.rmtree(root / "report", ignore_errors=True)
-    shutil.rmtree(root / _cache.FOLDER, ignore_errors=True)
+    shutil.rmtree(root / NOTES, ignore_errors=True)
     run("record", "note", str(root), "Begun.", "--who", "A. B.")
     return root
 
@@ -116,7 +116,6 @@ class Edits:
         (self.site / f"{name}-{self.random.randint(1, 3)}.0.dist-info").mkdir(
             parents=True
         )
-        _cache.installed.cache_clear()
 
     def nothing(self) -> None:
         """Leave all as it is."""
@@ -159,7 +158,6 @@ def test_no_edit_leaves_a_stale_report(
         if cold.exists():
             n_built += 1
             assert contents(warm) == contents(cold), number
-    _cache.installed.cache_clear()
     assert n_built > 0.5 * n_edits
 
 

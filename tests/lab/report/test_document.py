@@ -7,10 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from masrel.lab.analysis import analyze
-from masrel.lab.protocol import StudyPaths
-from masrel.lab.report import ReportFiles, published_claims, write_report
-from tests.lab.analysis.studies import plan, protocol_with, table_v
+from masrel.lab.report import ReportFiles
 from tests.lab.report.pages import (
     ALL,
     HOSTILE,
@@ -194,7 +191,7 @@ def test_a_page_shows_the_numbers_of_the_csv_rounded(
     for path, (_, *shown) in zip(files.tables, page_of(files).tables, strict=True):
         head, *rows = csv_rows(path)
         if name_of(path) in ("agreement", "test_retest"):
-            continue  # other columns; tests/lab/internal/report/test_estimate_table.py
+            continue  # other columns; test_estimates.py
         for exact, page in zip(rows, shown, strict=True):
             for value, cell in zip(exact[:-1], page, strict=True):
                 n_compared += 1
@@ -240,23 +237,3 @@ def test_symbols_have_their_index_set_low(published: ReportFiles) -> None:
     text = published.html.read_text(encoding="utf-8")
     assert "ν<sub>L</sub>" in text
     assert "ν_L" not in text
-
-
-def test_what_a_paper_printed_is_held_against_every_table(tmp_path: Path) -> None:
-    paths = StudyPaths(Path(__file__).parents[3] / "studies" / "hess2012")
-    protocol = protocol_with(plan(id="kappa"), sections=("claims",))
-    claims = published_claims(paths, protocol)
-    assert claims is not None
-    assert published_claims(paths, protocol_with(sections=("design",))) is None
-    analysis = analyze(protocol, table_v())
-    files = write_report(
-        protocol, table_v(), analysis, tmp_path / "report", claims=claims
-    )
-    assert files.html is not None
-    assert claims.sha256 in files.html.read_text(encoding="utf-8")
-    names = [path.name.rpartition("-")[0] for path in files.tables]
-    rows = csv_rows(files.tables[0])
-    assert len(names) == 2
-    assert {row[0] for row in rows[1:]} >= {claim.name for claim in claims.claims}
-    bare = write_report(protocol, table_v(), analysis, tmp_path / "bare")
-    assert bare.tables == ()

@@ -1,6 +1,5 @@
 """Figures of a report: all of their data are in them, and nothing is cut off."""
 
-import dataclasses
 import io
 import os
 import re
@@ -13,19 +12,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from masrel.lab.analysis import analyze
+from masrel.lab.analysis import Speed, Speeds, SpeedSummary, analyze
 from masrel.lab.elbow import STANDARD_MODELS, ConstantSpeed, outline
 from masrel.lab.protocol import read_protocol, scale_of
 from masrel.lab.ratings import read_study_ratings
 from masrel.lab.report import write_report
-from masrel.lab.report._figure_data import (
-    FIGURES,
-    SpeedColumn,
-    TraceBand,
-    TracePanel,
-)
+from masrel.lab.report.figures._stretch_figures import TracePanel, View, trace_figure
 from masrel.lab.report.figures._study_figures import speed_figure
-from masrel.lab.report.figures._trace_figures import trace_figure
 from masrel.plots import draw
 from masrel.plots._drawn_values import Drawn
 from tests.benchmarks.many_ratings import many_ratings
@@ -34,50 +27,59 @@ ROOT = Path(__file__).parents[3]
 WIDEST_IN = 9.5  # inches of a page of a report
 
 
-def figure(name: str, *arguments: object) -> Drawn:
-    return Drawn(FIGURES + name, arguments)
-
-
 def speeds(n_raters: int) -> Drawn:
     numbers = np.random.default_rng(1).normal(85.0, 10.0, (4, n_raters, 5))
-    columns = tuple(
-        SpeedColumn(
-            model=f"HM{model}",
-            session="test",
-            speeds=tuple(map(tuple, of_model.tolist())),
-            mean=85.0,
-        )
+    raters = [f"R{number}" for number in range(n_raters)]
+    values = tuple(
+        speed(f"HM{model}", rater, value)
         for model, of_model in enumerate(numbers)
+        for rater, of_rater in zip(raters, of_model, strict=True)
+        for value in of_rater.tolist()
     )
-    raters = tuple(f"R{number}" for number in range(n_raters))
-    return figure("_study_figures:speed_figure", columns, raters, 60.0)
+    by_model = tuple(summary(f"HM{model}") for model in range(4))
+    shown = Speeds(values=values, by_model=by_model, by_rater=(), n_missing=0)
+    drawer = "masrel.lab.report.figures._study_figures:speed_figure"
+    return Drawn(drawer, (shown, raters, 60.0))
 
 
-def panel(n_stretches: int, *, has_band: bool) -> TracePanel:
+def speed(model: str, rater: str, value: float, *, is_graded: bool = False) -> Speed:
+    return Speed(
+        session="test",
+        rater=rater,
+        model=model,
+        mean_speed_deg_s=value,
+        is_graded=is_graded,
+    )
+
+
+def summary(model: str) -> SpeedSummary:
+    ends = {"sd": 10.0, "least": 60.0, "most": 110.0}
+    return SpeedSummary(session="test", name=model, n=2, mean=85.0, **ends)
+
+
+def panel(n_stretches: int, *, has_band: bool, is_graded: bool = False) -> TracePanel:
     motion = ConstantSpeed(start=0.5, end=2.5, speed=2.0)
     stretch = outline(STANDARD_MODELS["HM1"], motion, n_points=50)
     ends = np.outer(np.arange(1.0, 5.0), stretch.time)
-    band = TraceBand(time=stretch.time, angle=ends, torque=ends)
-    return TracePanel(
-        title="HM1\n50 to 90 deg/s",
-        traces=(stretch,) * n_stretches,
-        graded=(False,) * n_stretches,
-        names=("R1",) * n_stretches if has_band else (),
-        band=band if has_band else None,
-    )
+    band = {"time": stretch.time, "angle": ends, "torque": ends}
+    names = ["R1"] * n_stretches if has_band else []
+    lines, graded = [stretch] * n_stretches, [is_graded] * n_stretches
+    title = "HM1\n50 to 90 deg/s"
+    return title, lines, graded, names, band if has_band else None
 
 
-def traces(*panels: TracePanel, has_angle: bool = True) -> Drawn:
-    return figure("_trace_figures:trace_figure", panels, has_angle)
+def traces(*panels: TracePanel, view: View = "time") -> Drawn:
+    drawer = "masrel.lab.report.figures._stretch_figures:trace_figure"
+    return Drawn(drawer, (panels, view))
 
 
-NAN = float("nan")
 CONTENTS: dict[str, Drawn] = {
     "speeds": speeds(2),
     "speeds of many": speeds(200),
     "traces": traces(panel(2, has_band=False)),
     "bands": traces(*(panel(3, has_band=True),) * 2),
-    "small panels": traces(*(panel(3, has_band=True),) * 5, has_angle=False),
+    "over the angle": traces(panel(2, has_band=False), view="angle"),
+    "small panels": traces(*(panel(3, has_band=True),) * 5, view="small"),
 }
 
 
@@ -126,22 +128,16 @@ def test_a_small_grid_of_panels_names_what_it_shades() -> None:
 
 
 def test_a_stretch_that_a_grade_rests_on_is_ringed_and_drawn_thicker() -> None:
-    column = SpeedColumn(
-        model="HM1",
-        session="first",
-        speeds=((80.0, 95.0),),
-        mean=85.0,
-        graded=((95.0,),),
-    )
-    (axes,) = speed_figure((column,), ("R1",), 60.0).axes
+    values = speed("HM1", "R1", 80.0), speed("HM1", "R1", 95.0, is_graded=True)
+    shown = Speeds(values=values, by_model=(summary("HM1"),), by_rater=(), n_missing=0)
+    (axes,) = speed_figure(shown, ("R1",), 60.0).axes
     ringed = [line for line in axes.lines if line.get_fillstyle() == "none"]
     assert [list(line.get_ydata()) for line in ringed] == [[95.0]]
-    widths = []
-    for graded in (False, True):
-        one = dataclasses.replace(panel(1, has_band=False), graded=(graded,))
-        top = trace_figure((one,), True).axes[0]
-        widths.append(top.lines[0].get_linewidth())
-    assert widths[1] > 2.0 * widths[0]
+    plain, wide = (
+        trace_figure([panel(1, has_band=False, is_graded=graded)], "time").axes[0]
+        for graded in (False, True)
+    )
+    assert wide.lines[0].get_linewidth() > 2.0 * plain.lines[0].get_linewidth()
 
 
 @pytest.mark.slow

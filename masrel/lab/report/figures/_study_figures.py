@@ -1,5 +1,7 @@
-"""Figures of a study's report: grades and speeds."""
+"""Figures of a study: its raters, schedules, grades and speeds, and its trainings."""
 
+import math
+import textwrap
 from collections.abc import Sequence
 from typing import Any
 
@@ -7,9 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
+from masrel.lab.analysis import Speed, Speeds
 from masrel.lab.analysis._given_grades import GivenGrades
-from masrel.lab.report._figure_data import MANY_RATERS, SpeedColumn
+from masrel.lab.report._material import MANY_RATERS
+from masrel.lab.schedule._balance import OrderBalance
+from masrel.plots._cells import cells, name_columns, name_rows, room_of
 from masrel.plots._grades import categories_picture, counts_picture
 from masrel.plots._style import (
     BLACK,
@@ -17,14 +23,14 @@ from masrel.plots._style import (
     DASHES,
     GREY,
     ORANGE,
+    SEQUENTIAL,
     VERMILLION,
     Picture,
     short_name,
 )
-from masrel.tables._tables import percent
+from masrel.tables._tables import counted, percent
 
 _UPRIGHT_LETTERS = 7  # of a model's name that fits below a column
-
 _MODELS_IN_A_ROW = 8  # more go into further rows: a page is no wider
 _SPREADS = ((0.9, 1.4), (0.5, 6.0))  # share of the speeds, width of its line
 _SESSION_LOOKS = (("o", BLUE), ("s", ORANGE), ("^", VERMILLION), ("v", GREY))
@@ -47,13 +53,11 @@ def aim_pictures(
     ]
 
 
-def speed_figure(
-    columns: Sequence[SpeedColumn], raters: Sequence[str], slowest: float
-) -> Figure:
+def speed_figure(speeds: Speeds, raters: Sequence[str], slowest: float) -> Figure:
     """Return every rater's mean speed, one column a model."""
-    # columns by session and model; slowest: below it the catch angle stays the same
-    models = list(dict.fromkeys(column.model for column in columns))
-    sessions = list(dict.fromkeys(column.session for column in columns))
+    # slowest: below it the catch angle stays the same
+    models = list(dict.fromkeys(column.name for column in speeds.by_model))
+    sessions = list(dict.fromkeys(column.session for column in speeds.by_model))
     is_many = len(raters) > MANY_RATERS
     in_a_row = -(-len(models) // -(-len(models) // _MODELS_IN_A_ROW))  # even rows
     starts = range(0, len(models), in_a_row)
@@ -62,7 +66,7 @@ def speed_figure(
     rows = figure.subplots(len(starts), 1, sharey=True, squeeze=False)[:, 0]
     for axes, start in zip(rows, starts, strict=True):
         shown = models[start : start + in_a_row]
-        _speed_row(axes, columns, shown, sessions, is_many=is_many)
+        _speed_row(axes, speeds, raters, shown, sessions)
         _mark_slowest(axes, slowest)
     rows[0].set_ylim(bottom=0)
     label = "haptic model"
@@ -71,64 +75,85 @@ def speed_figure(
     rows[-1].set_xlabel(label)
     for axes in rows:
         axes.set_ylabel("mean speed before\nthe catch (deg/s)")
-    marks = _speed_marks(sessions, has_many=is_many)
+    marks = _speed_marks(sessions, is_many=is_many)
     figure.legend(handles=marks, ncols=5, loc="outside lower center")
     return figure
 
 
-def _speed_marks(sessions: Sequence[str], *, has_many: bool) -> list[Line2D]:
-    looks = zip(sessions, _SESSION_LOOKS * len(sessions), strict=False)
-    marks = [
-        Line2D([], [], color=colour, linewidth=6.0, label=session)
-        if has_many
-        else Line2D([], [], marker=marker, color=colour, ls="none", label=session)
-        for session, (marker, colour) in looks
+def _speed_marks(sessions: Sequence[str], *, is_many: bool) -> list[Line2D]:
+    looks: list[dict[str, Any]] = [
+        {"color": colour, "linewidth": 6.0, "label": session}
+        if is_many
+        else {"marker": marker, "color": colour, "ls": "none", "label": session}
+        for session, (marker, colour) in zip(
+            sessions, _SESSION_LOOKS * len(sessions), strict=False
+        )
     ]
-    if has_many:
-        marks += [
-            Line2D(
-                [], [], color=GREY, linewidth=wide, label=f"middle {percent(share)} %"
-            )
-            for share, wide in _SPREADS
-        ]
-    return [*marks, Line2D([], [], color=BLACK, linewidth=1.6, label="mean")]
+    looks += [
+        {"color": GREY, "linewidth": wide, "label": f"middle {percent(share)} %"}
+        for share, wide in _SPREADS * is_many
+    ]
+    looks.append({"color": BLACK, "linewidth": 1.6, "label": "mean"})
+    return [Line2D([], [], **look) for look in looks]
 
 
 def _speed_row(
     axes: Axes,
-    columns: Sequence[SpeedColumn],
+    speeds: Speeds,
+    raters: Sequence[str],
     models: Sequence[str],
     sessions: Sequence[str],
-    *,
-    is_many: bool,
 ) -> None:
     width = 0.76 / len(sessions)
-    for column in columns:
-        if column.model not in models:
+    for column in speeds.by_model:
+        if column.name not in models:
             continue
-        session = sessions.index(column.session)
-        middle = models.index(column.model) - 0.38 + width * (session + 0.5)
-        marker, colour = _SESSION_LOOKS[session % len(_SESSION_LOOKS)]
+        place = sessions.index(column.session)
+        middle = models.index(column.name) - 0.38 + width * (place + 0.5)
         ends = [middle - 0.45 * width, middle + 0.45 * width]
         axes.plot(ends, [column.mean] * 2, color=BLACK, linewidth=1.6, zorder=2.5)
-        if is_many:
-            _draw_spread(axes, column, middle, colour)
-            continue
-        axes.plot(
-            *_strip(column.speeds, middle, width), marker, color=colour, markersize=5,
-            alpha=0.9,
-        )  # fmt: skip
-        if any(column.graded):
-            axes.plot(
-                *_strip(column.graded, middle, width), "o", color=BLACK, markersize=8,
-                fillstyle="none",
-            )  # fmt: skip
+        values = [
+            speed
+            for rater in raters
+            for speed in speeds.values
+            if (speed.session, speed.model, speed.rater)
+            == (column.session, column.name, rater)
+        ]
+        look = _SESSION_LOOKS[place % len(_SESSION_LOOKS)]
+        _draw_speeds(axes, values, raters, (middle, 0.9 * width), look)
     names = [short_name(model) for model in models]
     is_long = max(map(len, names)) > _UPRIGHT_LETTERS
     slanted: dict[str, Any] = {"rotation": 30, "ha": "right", "rotation_mode": "anchor"}
     axes.set_xticks(range(len(models)), names, **slanted if is_long else {})
     axes.set_xlim(-0.55, len(models) - 0.45)
     axes.grid(axis="y")
+
+
+def _draw_speeds(
+    axes: Axes,
+    speeds: Sequence[Speed],
+    raters: Sequence[str],
+    place: tuple[float, float],
+    look: tuple[str, str],
+) -> None:
+    # every rater's above each other, raters from left to right; where most are of many
+    (middle, width), (marker, colour) = place, look
+    values = [speed.mean_speed_deg_s for speed in speeds]
+    if len(raters) > MANY_RATERS:
+        for share, wide in _SPREADS:
+            ends = np.quantile(values, [0.5 - 0.5 * share, 0.5 + 0.5 * share])
+            axes.plot(
+                [middle, middle], ends, color=colour, linewidth=wide,
+                solid_capstyle="butt", zorder=1.5,
+            )  # fmt: skip
+        return
+    shares = [(raters.index(speed.rater) + 0.5) / len(raters) for speed in speeds]
+    places = [middle + width * (share - 0.5) for share in shares]
+    axes.plot(places, values, marker, color=colour, markersize=5, alpha=0.9)
+    graded = [i for i, speed in enumerate(speeds) if speed.is_graded]
+    if graded:
+        ringed = [places[i] for i in graded], [values[i] for i in graded]
+        axes.plot(*ringed, "o", color=BLACK, markersize=8, fillstyle="none")
 
 
 def _mark_slowest(axes: Axes, slowest: float) -> None:
@@ -148,25 +173,132 @@ def _mark_slowest(axes: Axes, slowest: float) -> None:
         )
 
 
-def _draw_spread(axes: Axes, column: SpeedColumn, middle: float, colour: str) -> None:
-    # where most of many speeds are
-    every = [speed for of_rater in column.speeds for speed in of_rater]
-    for share, wide in _SPREADS:
-        ends = np.quantile(every, [0.5 - 0.5 * share, 0.5 + 0.5 * share])
-        axes.plot(
-            [middle, middle], ends, color=colour, linewidth=wide,
-            solid_capstyle="butt", zorder=1.5,
-        )  # fmt: skip
+_WIDTH_IN, _STEP_IN, _LINE_IN = 6.2, 0.62, 0.16
+_N_LETTERS = 52  # in a line of the others
+# the middle of the boxes on the way, and the left edge of the others
+_BOXES: tuple[dict[str, Any], ...] = (
+    {"x": 0.2, "ha": "center", "fontsize": 9},
+    {"x": 0.45, "ha": "left", "fontsize": 8},
+)
 
 
-def _strip(
-    speeds: Sequence[Sequence[float]], middle: float, width: float
-) -> tuple[list[float], list[float]]:
-    # every rater's speeds above each other, raters from left to right
-    n_raters = len(speeds)
-    places = [
-        middle + 0.9 * width * ((rater + 0.5) / n_raters - 0.5)
-        for rater, of_rater in enumerate(speeds)
-        for _ in of_rater
+def flow_figure(steps: Sequence[tuple[str, Sequence[str]]]) -> Figure:
+    """Return a box for every step, and beside it what became of the others."""
+    texts = [
+        [line for text in others for line in textwrap.wrap(text, _N_LETTERS)]
+        for _, others in steps
     ]
-    return places, [speed for of_rater in speeds for speed in of_rater]
+    heights = [max(_STEP_IN, 0.3 + _LINE_IN * len(lines)) for lines in texts]
+    figure = Figure(figsize=(_WIDTH_IN, sum(heights) + 0.2))
+    axes = figure.add_subplot()
+    axes.set_axis_off()
+    axes.set(xlim=(0.0, 1.0), ylim=(sum(heights), 0.0))
+    top, before = 0.0, None
+    for (label, _), lines, height in zip(steps, texts, heights, strict=True):
+        middle = top + height / 2
+        shown = ((label, BLACK), ("\n".join(lines), GREY))
+        for place, (text, colour) in zip(_BOXES, shown, strict=True):
+            box: dict[str, Any] = {"boxstyle": "square,pad=0.4", "facecolor": "white"}
+            box |= {"edgecolor": colour, "linewidth": 0.8}
+            if text:
+                axes.text(y=middle, s=text, va="center", bbox=box, **place)
+        if before is not None:
+            axes.annotate(
+                "",
+                xy=(0.2, middle - 0.17),
+                xytext=(0.2, before + 0.17),
+                arrowprops={"arrowstyle": "->", "color": BLACK, "linewidth": 0.8},
+            )
+        top, before = top + height, middle
+    return figure
+
+
+_MAX_NUMBERS = 16  # columns up to which numbers are written in the cells
+_CELL, _WIDEST, _HIGHEST = 0.3, 7.0, 5.0  # inches of a cell and of all of them
+
+
+def order_pictures(panels: Sequence[OrderBalance]) -> list[tuple[str, Picture]]:
+    """Return two heatmaps a session: models by places, and what follows what."""
+    pictures = []
+    for panel in panels:
+        of = ", ".join(filter(None, (panel.session, panel.site)))
+        places = [str(place + 1) for place in range(panel.n_places)]
+        title = f"{of}: {counted(panel.n_schedules, 'schedule')}, by place"
+        pictures.append((title, _freqs(panel.models, places, panel.places)))
+        after = _freqs(panel.models, panel.models, panel.pairs)
+        pictures.append(("by the model right after", after))
+    return pictures
+
+
+def _freqs(
+    rows: Sequence[str], columns: Sequence[str], freqs: Sequence[Sequence[int]]
+) -> Picture:
+    of = np.array(freqs, dtype=np.int64)
+    across = min(_CELL, _WIDEST / len(columns))
+    down = min(_CELL, _HIGHEST / len(rows))
+
+    def draw(axes: Axes) -> None:
+        letters = of.astype(str)[: len(of) * (len(columns) <= _MAX_NUMBERS)]
+        most = max(1, int(of.max()))
+        cells(axes, of, letters, cmap=SEQUENTIAL, vmin=0.0, vmax=most)
+        name_rows(axes, rows, down)
+        name_columns(axes, columns, across, range(len(columns)))
+        axes.set_ylabel("model")
+
+    height = room_of(columns) + down * len(rows) + 0.3
+    return Picture(room_of(rows) + across * len(columns) + 0.4, height, draw)
+
+
+def learning_figure(
+    title: str,
+    kappas: Sequence[tuple[float, float, float, float]],
+    level: float,
+    bounds: tuple[float, float],
+    differences: Sequence[int],
+) -> Figure:
+    """Return kappa time and again, and below it how far each grade was off."""
+    # kappas: number of the last presentation, kappa, and the ends of its interval at
+    # the level; bounds: insufficient and sufficient kappa; differences: by how many
+    # grades each grade is too high
+    figure = Figure(figsize=(6.0, 4.2))
+    upper, lower = figure.subplots(2, sharex=True, height_ratios=(2.2, 1.0))
+    upper.set_title(title, loc="left")
+    for bound, word in zip(bounds, ("insufficient", "sufficient"), strict=True):
+        upper.axhline(bound, color=GREY, linewidth=0.8, linestyle=DASHES, zorder=1.0)
+        upper.annotate(
+            word, (1.0, bound), xycoords=("axes fraction", "data"), xytext=(4, 0),
+            textcoords="offset points", va="center", fontsize=7.5, color=GREY,
+        )  # fmt: skip
+    position, value, low, high = np.array(kappas, dtype=np.float64).reshape(-1, 4).T
+    has_ends = np.isfinite(low)
+    ends = position[has_ends], low[has_ends], high[has_ends]
+    label = f"{percent(level)} % interval"
+    upper.vlines(*ends, color=BLUE, linewidth=1.8, label=label)
+    upper.plot(position, value, "o-", color=BLACK, markersize=5, label="weighted κ")
+    lowest = min([0.0, *low[has_ends], *value[np.isfinite(value)]])
+    upper.set_ylim(max(-1.0, math.floor(10.0 * lowest) / 10.0) - 0.02, 1.03)
+    upper.set_ylabel("κ with the intended grades")
+    upper.grid(axis="y")
+    _draw_differences(lower, np.array(differences, dtype=np.int64))
+    figure.legend(loc="outside lower center", ncols=5, fontsize=8)
+    return figure
+
+
+def _draw_differences(axes: Axes, differences: Any) -> None:
+    places = np.arange(1, len(differences) + 1)
+    for at, colour, marker, label in (
+        (differences == 0, BLUE, "o", "right"),
+        (differences != 0, VERMILLION, "X", "wrong"),
+    ):
+        if at.any():
+            axes.plot(
+                places[at], differences[at], linestyle="none", marker=marker,
+                markersize=4.5, color=colour, label=label,
+            )  # fmt: skip
+    axes.axhline(0.0, color=GREY, linewidth=0.7, zorder=1.0)
+    axes.set_xlabel("presentation")
+    axes.set_ylabel("grades too high")
+    axes.set_xlim(0.0, len(differences) + 1.0)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=5))
+    axes.margins(y=0.2)

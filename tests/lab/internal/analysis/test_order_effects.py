@@ -11,7 +11,7 @@ from masrel.lab.analysis._order_effects import (
     place_summaries,
 )
 from masrel.lab.ratings import Ratings, ratings_from_rows
-from masrel.lab.report._sentences import sentence
+from masrel.lab.report._material import sentence
 from masrel.scales import MODIFIED_ASHWORTH
 from tests.lab.analysis.studies import protocol_with
 

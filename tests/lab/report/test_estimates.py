@@ -1,0 +1,272 @@
+"""Estimates as a report tells them: the first paragraph, a table, their meaning."""
+
+import csv
+import dataclasses
+import math
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+import masrel.lab.report
+from masrel.estimates import Estimate, Interval
+from masrel.lab.analysis import PlannedEstimate, analyze, as_analysis_document
+from masrel.lab.ratings import Ratings, ratings_from_rows
+from masrel.lab.report import ReportFiles, write_report
+from masrel.scales import MODIFIED_ASHWORTH
+from tests.lab.analysis.studies import of_session, plan, protocol_with, ratings, table_v
+from tests.lab.report.pages import AGAIN, simulated_ratings
+
+pytestmark = pytest.mark.filterwarnings("ignore::masrel.errors.MasrelWarning")
+
+FILE = Path(masrel.lab.report.__file__).parent / "templates" / "sentences.toml"
+SENTENCES = tomllib.loads(FILE.read_text(encoding="utf-8"))
+
+
+def paragraph(files: ReportFiles) -> str:
+    """The first paragraph of both pages, which is the same."""
+    page = files.html.read_text(encoding="utf-8")
+    found = re.search(r'<p class="result">(.*?)</p>', page)
+    assert found is not None
+    text = re.sub("<.*?>", "", found[1]).replace("&#x27;", "'").replace("&nbsp;", " ")
+    plain = files.markdown.read_text(encoding="utf-8").replace("*", "")
+    assert text in plain.replace("\\", "")
+    return text
+
+
+def result_of(rows: Ratings, folder: Path, *lines: Any, **of: Any) -> str:
+    protocol = protocol_with(*lines, sections=("intended",))
+    analysis = analyze(protocol, rows, **of)
+    return paragraph(write_report(protocol, rows, analysis, folder))
+
+
+def of_the_file(text: str) -> bool:
+    """Whether a paragraph is sentences of the file and nothing else."""
+    known = [*SENTENCES["result"].values(), *SENTENCES["interval"].values()]
+    patterns = [
+        re.sub(r"\\{\w+\\}", "(.*?)", re.escape(sentence))
+        for sentence in known
+        if sentence.endswith(".")
+    ]
+    return re.fullmatch(f"(?:(?:{'|'.join(patterns)}) ?)+", text) is not None
+
+
+def numbers(content: object) -> set[str]:
+    """Every number of an analysis, as a paragraph may show it."""
+    if isinstance(content, dict):
+        return set().union(*map(numbers, content.values()))
+    if isinstance(content, list):
+        return {str(len(content))}.union(*map(numbers, content))
+    if isinstance(content, float):
+        return {f"{content:.3f}", f"{content:.1f}", f"{100 * content:g}"}
+    return {str(content)} if isinstance(content, int) else set()
+
+
+def test_the_published_result_is_told_in_sentences_of_the_file(tmp_path: Path) -> None:
+    lines = (
+        plan(id="kappa", interval="jackknife"),
+        plan(id="items", interval="posterior", target="items"),
+        AGAIN,
+    )
+    text = result_of(table_v(), tmp_path, *lines)
+    assert text == (
+        "In session test, 8 raters graded 4 standard models (32 grades, none missing): "
+        "Fleiss' κ was 0.626 (95 % confidence interval 0.320 to 0.933, for other "
+        "raters like these on the same models). For these raters on other models like "
+        "these, its 95 % credible interval is 0.370 to 0.874. On average over the 4 "
+        "standard models, 84.4 % of the grades were as intended. Agreement of raters "
+        "with themselves could not be estimated: there are no ratings of session "
+        "retest."
+    )
+    assert of_the_file(text)
+    assert not of_the_file(text.replace("graded", "scored"))
+    protocol = protocol_with(*lines, sections=("intended",))
+    document = as_analysis_document(analyze(protocol, table_v()))
+    known = numbers(msgspec.json.decode(msgspec.json.encode(document)))
+    assert set(re.findall(r"\d+(?:\.\d+)?", text.replace("32 grades", ""))) <= known
+
+
+ONE = ratings(*of_session("test", R1=("1",), R2=("1",)))
+ALIKE = ratings(*of_session("test", R1=("1", "1"), R2=("1", "1")))
+TWICE = ratings_from_rows(
+    [
+        {"session": row.session, "rater": row.rater, "model": row.model}
+        | {"grade": row.grade, "repeat": repeat}
+        for row in simulated_ratings().rows
+        if row.session == "test"
+        for repeat in (1, 2)
+    ],
+    MODIFIED_ASHWORTH,
+)
+FULL = dataclasses.replace(
+    simulated_ratings(),
+    rows=tuple(
+        row._replace(grade=row.grade or "2") for row in simulated_ratings().rows
+    ),
+)
+SHARE = plan(coefficient="percent_agreement")
+ALPHA = plan(coefficient="krippendorff_alpha", weights="quadratic")
+OF_RATERS = msgspec.structs.replace(AGAIN, coefficient="cohen_kappa")
+TOLD: dict[str, tuple[Ratings, tuple[Any, ...], list[str]]] = {
+    "one model": (
+        ONE, (SHARE,), ["Of the grades of 1 standard model, 100.0 % were as intended."],
+    ),
+    "again, and missing": (
+        simulated_ratings(), (plan(), AGAIN),
+        ["In session test, 2 raters graded 2 standard models (3 grades, 1 missing)",
+         "In test and again in retest, 2 raters graded 2 standard models:"],
+    ),
+    "undefined": (ALIKE, (plan(),), ["Fleiss' κ is undefined, as "]),
+    "not there": (
+        ALIKE, (plan(models="dummy"),),
+        ["Fleiss' κ of the dummy models in session test could not be estimated: no "
+         "dummy model has ratings in session test."],
+    ),
+    "not planned": (
+        ALIKE, (), ["The plan asks for no estimate of agreement between raters."],
+    ),
+    "raters alone": (FULL, (plan(), OF_RATERS), ["lay between 0.000 and 0.333."]),
+    "a model that came again": (
+        TWICE, (plan(),),
+        ["2 raters graded 2 standard models, 4 presentations of them, (6 grades"],
+    ),
+    "weights": (
+        table_v(), (ALPHA,),
+        ["none missing): Krippendorff's α with quadratic weights was 0.886."],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", TOLD)
+def test_a_result_is_told_with_what_it_rests_on(what: str, tmp_path: Path) -> None:
+    rows, lines, texts = TOLD[what]
+    text = result_of(rows, tmp_path, *lines).removeprefix("Simulated data. ")
+    for said in texts:
+        assert said in text
+    assert of_the_file(text)
+
+
+def test_excluded_raters_are_named(tmp_path: Path) -> None:
+    text = result_of(table_v(), tmp_path, plan(), excluded=["R3"])
+    assert "7 raters" in text
+    assert text.endswith("None of this counts the grades of R3, who is excluded.")
+
+
+def interval(**changes: Any) -> Interval:
+    made: dict[str, Any] = {"low": 0.31957, "high": 0.93252, "level": 0.95}
+    made |= {"kind": "confidence", "method": "jackknife, t(7)", "target": "raters"}
+    return Interval(**{**made, **changes})
+
+
+def one(**changes: Any) -> PlannedEstimate:
+    made: dict[str, Any] = {"coefficient": "fleiss_kappa", "weights": "identity"}
+    made |= {"value": 0.626083678854127, "standard_error": 0.1, "observed": 81 / 112}
+    made |= {"chance": 266 / 1024, "n_items": 4, "n_items_paired": 4, "n_raters": 8}
+    estimate = Estimate(**{**made, "n_categories": 6, **changes})
+    line = plan(id="kappa", coefficient=estimate.coefficient)
+    return PlannedEstimate(line=line, estimate=estimate)
+
+
+def shown(
+    folder: Path, *planned: PlannedEstimate
+) -> tuple[list[list[str]], list[dict[str, str]], str]:
+    """The table of estimates on a page and as CSV, and the page."""
+    protocol, rows = protocol_with(sections=("agreement",)), table_v()
+    analysis = dataclasses.replace(analyze(protocol, rows), estimates=planned)
+    files = write_report(protocol, rows, analysis, folder)
+    text = files.markdown.read_text(encoding="utf-8").replace("\\", "")
+    lines = [line for line in text.splitlines() if line.startswith("| ")]
+    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines]
+    with files.tables[0].open(encoding="utf-8", newline="") as file:
+        return cells, list(csv.DictReader(file)), text
+
+
+def test_the_csv_has_every_number_and_the_page_one_interval(tmp_path: Path) -> None:
+    ((head, row), (cells,), text) = shown(tmp_path, one(interval=interval()))
+    assert head == [
+        "Estimate", "Coefficient", "Models", "Session", "Raters", "Value", "Interval",
+        "Strength", "p_o", "p_e",
+    ]  # fmt: skip
+    assert row[5:8] == ["0.626", "[0.320, 0.933] ᵃ", "substantial"]
+    assert "ᵃ 95 % confidence, jackknife, t(7); generalises to other raters." in text
+    expected = {"value": "0.626083678854127", "low": "0.31957", "high": "0.93252"}
+    expected |= {"interval": "95 % confidence, jackknife, t(7)", "n_items": "4"}
+    expected |= {"target": "other raters", "n_raters": "8", "models": "standard"}
+    assert {key: cells[key] for key in expected} == expected
+    assert "interval_shown" not in cells
+
+
+def test_intervals_made_alike_share_a_mark_and_a_meaning(tmp_path: Path) -> None:
+    other = interval(kind="credible", method="posterior", target="both", level=0.999)
+    alike = (one(interval=interval()), one(interval=interval(low=0.1)))
+    (_, *rows), _, text = shown(tmp_path / "a", *alike, one(interval=other), one())
+    marks = ["[0.320, 0.933] ᵃ", "[0.100, 0.933] ᵃ", "[0.320, 0.933] ᵇ", "–"]
+    assert [row[6] for row in rows] == marks
+    assert text.count("about 95 % of the intervals") == 1
+    assert text.count("with probability 99.9 %") == 1
+    lines = [one(interval=interval(method=f"way {i}")) for i in range(60)]
+    (_, *rows), _, _ = shown(tmp_path / "b", *lines)
+    assert len({row[6].split()[-1] for row in rows}) == 60
+
+
+def test_what_a_reader_must_know_is_below_the_table(tmp_path: Path) -> None:
+    nan = one(value=math.nan, reason="all ratings are in one category")
+    lost = PlannedEstimate(line=plan(id="lost"), reason="there are no ratings")
+    warned = one(interval=interval(notes=("4 items: below 10.",), n_undefined=3))
+    share = one(coefficient="percent_agreement")
+    (_, *rows), cells, text = shown(tmp_path, nan, lost, warned, share)
+    assert [row[5] for row in rows] == ["undefined", "–", "0.626", "0.626"]
+    words = [row["strength"] for row in cells]
+    assert words == ["", "", "substantial", ""]  # of a kappa that has a value
+    assert rows[1][6] == "not in these data"
+    assert (cells[1]["reason"], cells[1]["value"]) == ("there are no ratings", "")
+    assert rows[3][1] == "Percent agreement (0–1)"
+    for note in (
+        "kappa: all ratings are in one category.",
+        "lost: there are no ratings.",
+        "kappa: 4 items: below 10.",
+        "kappa: undefined on 3 resamples.",
+    ):
+        assert note in text
+
+
+OTHER_ITEMS = "these raters graded other models like these"
+OTHER_RATERS = "the same models were put to other raters like these"
+BOTH = "other raters graded other models, both like these"
+GIVEN = "given these ratings, the prior and"
+MEANT: list[tuple[dict[str, Any], str]] = [
+    ({"kind": "credible", "target": "items"},
+     "Credible interval: given these ratings and the prior, the value that would be "
+     f"found if {OTHER_ITEMS}, without end, lies inside with probability 95 %."),
+    ({"kind": "credible", "target": "both"},
+     f"{GIVEN} raters who differ by chance alone, the value that would be found if "
+     f"{BOTH}, without end, lies inside"),
+    ({"kind": "credible", "target": "raters", "raters_differ": True},
+     f"{GIVEN} the model of how raters differ, the value that would be found if "
+     f"{OTHER_RATERS}, without end, lies inside"),
+    ({"kind": "credible", "target": "items", "is_one_sided": True},
+     "Credible bound: given these ratings and the prior, the value that would be found "
+     f"if {OTHER_ITEMS}, without end, lies above the lower end"),
+    ({"target": "both"},
+     f"Confidence interval: if {BOTH}, again and again, about 95 % of the intervals "
+     "made this way would hold the value that all such studies together would give."),
+    ({"unit": "items", "units_are": "left out", "target": "items"},
+     f"(from leaving out one model at a time): if {OTHER_ITEMS},"),
+    ({"unit": "both", "units_are": "left out", "target": "both"},
+     f"(from leaving out models and raters, one at a time): if {BOTH},"),
+    ({"unit": "raters", "units_are": "drawn"},
+     f"(from raters drawn with replacement): if {OTHER_RATERS},"),
+    ({"unit": "clusters", "target": "items"},
+     "if these raters graded other clusters of models like these,"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("made", "meaning"), MEANT)
+def test_an_interval_is_told_in_plain_words(
+    made: dict[str, Any], meaning: str, tmp_path: Path
+) -> None:
+    _, _, text = shown(tmp_path, one(interval=interval(**made)))
+    assert meaning in text
