@@ -60,26 +60,6 @@ def test_every_kind_of_missing_value_is_missing() -> None:
     assert code_ratings([[1, pd.NaT], [1, 2]]).codes.tolist() == [[0, -1], [0, 1]]
 
 
-def test_list_array_and_frame_are_the_same_ratings() -> None:
-    rows = [["1", "1+", "1"], ["2", "2", "1+"], ["3", "3", "2"]]
-    expected = fleiss_kappa(rows)
-    assert fleiss_kappa(np.array(rows)) == expected
-    assert fleiss_kappa(pd.DataFrame(rows, columns=["R1", "R2", "R3"])) == expected
-    assert fleiss_kappa(pd.DataFrame(rows, dtype="category")) == expected
-    assert fleiss_kappa(tuple(map(tuple, rows))) == expected
-
-
-def test_items_and_raters_without_any_rating_do_not_count() -> None:
-    coded = code_ratings([["a", None, "b"], [None, None, None], ["a", None, "a"]])
-    assert (coded.n_items, coded.n_raters) == (2, 2)
-
-
-def test_codes_cannot_be_written_to() -> None:
-    coded = code_ratings([["a", "b"]])
-    with pytest.raises(ValueError, match="read-only"):
-        coded.codes[0, 0] = 1
-
-
 SCALE = ["1", "1+", "2", "3"]
 
 
@@ -132,16 +112,6 @@ def test_a_named_policy_keeps_one_of_them(policy: Repeated, kept: int) -> None:
     assert coded.codes.tolist() == [[kept, 2], [2, -1]]
 
 
-def test_sets_of_labels_are_categories_as_of_a_wide_table() -> None:
-    frame = long(("x", "A", {"b", "a"}), ("x", "B", {"a"}), ("y", "A", set()))
-    wide = code_ratings([[{"a", "b"}, {"a"}], [set(), None]])
-    coded = code_long(frame)
-    assert coded == wide
-    assert coded.codes.tolist() == wide.codes.tolist()
-    with pytest.raises(RatingsError, match="row 1, column 'grade'"):
-        code_long(long(("x", "A", {"a"}), ("x", "B", ["a"])))
-
-
 KIM, LEE = ["x", "y", "y", None, "x"], ["x", "y", "x", "x", "x"]
 MEASURES = [[9, 2, 5, 8], [6, 1, 3, 2], [8, 4, 6, 8], [7, 1, 2, 6], [10, 5, 6, 9]]
 
@@ -170,16 +140,6 @@ def test_two_sequences_of_measurements() -> None:
     rows = np.column_stack([first, second])
     assert lin_ccc(first, second) == lin_ccc(rows)
     assert limits_of_agreement(first, second).upper == limits_of_agreement(rows).upper
-
-
-def test_ordered_categories_of_two_series_are_the_scale() -> None:
-    kind = pd.CategoricalDtype(["mild", "none", "severe"], ordered=True)
-    first, second = (
-        pd.Series(labels, dtype=kind)
-        for labels in (["mild", "severe", "mild"], ["none", "severe", "mild"])
-    )
-    value = cohen_kappa(first, second, weights="linear").value
-    assert value == cohen_kappa([0, 2, 0], [1, 2, 0], weights="linear").value
 
 
 @pytest.mark.parametrize(
@@ -356,11 +316,6 @@ def test_frames_of_raters_rate_as_before(data: dict[Any, Any]) -> None:
     frame = pd.DataFrame(data)
     assert coefficient(frame) == coefficient(frame.to_numpy().tolist())
     assert coefficient(pl.DataFrame({str(k): v for k, v in data.items()})).n_items
-
-
-def test_names_may_be_overruled() -> None:
-    frame = pd.DataFrame(LONG["numbers"][0])
-    assert fleiss_kappa(frame.to_numpy()).n_raters == 3
 
 
 PLAIN = [["a", "b"], ["b", "b"], [None, "a"], ["a", "a"]]

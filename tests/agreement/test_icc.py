@@ -47,14 +47,6 @@ def test_a_variance_below_0_is_0_and_named() -> None:
     assert result.negative == ("items", "raters")
 
 
-def test_a_value_below_0_draws_the_interval_out_to_it() -> None:
-    found = icc([[1, 4, 2], [4, 1, 3], [2, 3, 3], [3, 2, 2]])
-    assert found.interval is not None
-    assert found.interval.low == found.value < 0.0 < found.interval.high
-    assert "takes a variance as less than 0" in found.interval.notes[0]
-    assert icc(TABLE_2).interval.notes == ()  # type: ignore[union-attr]
-
-
 tables = st.integers(2, 4).flatmap(
     lambda k: st.lists(
         st.lists(st.integers(0, 9), min_size=k, max_size=k), min_size=3, max_size=7

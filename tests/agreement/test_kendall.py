@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from masrel.agreement import kendall_w, kendall_w_test
-from masrel.errors import UndefinedStatisticWarning
 from tests.agreement.undefined import assert_undefined
 
 Rows = list[list[int]]
@@ -91,17 +90,6 @@ def test_is_the_quotient_of_plain_sums(table: Rows, ties: bool) -> None:
         return
     assert kendall_w(table, ties=ties).value == float(expected)
     assert 0 <= expected <= 1
-
-
-def test_raters_who_tell_nothing_apart_have_no_order() -> None:
-    table = [[3, 1], [3, 1], [3, 1]]
-    for function in (kendall_w, kendall_w_test):
-        with pytest.warns(UndefinedStatisticWarning, match="0/0: every rater"):
-            assert function(table).reason  # type: ignore[operator]
-    # Without the correction 0 is the value: S = 0 of 96.
-    assert kendall_w(table, ties=False).value == 0.0
-    # One of them who tells two apart is enough: her sums are all there is.
-    assert kendall_w([[3, 1], [3, 2], [3, 2]]).value == 0.5
 
 
 def weighted_w(ratings: list[list[int]], shares: Array, *, ties: bool) -> Any:

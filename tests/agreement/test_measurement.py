@@ -132,19 +132,6 @@ def test_published_factors_of_ten_items() -> None:
     assert one.upper_interval.high == pytest.approx(2.911, abs=5e-4)
 
 
-def test_limits_by_hand() -> None:
-    # differences 1, -2, 0, 1: mean 0, variance 6/3 = 2
-    limits = limits_of_agreement([[9, 8], [5, 7], [4, 4], [8, 7]])
-    assert limits.mean == 0.0
-    assert limits.upper == pytest.approx(
-        stats.norm.ppf(0.975) * math.sqrt(2), rel=1e-14
-    )
-    half = stats.t.ppf(0.975, 3) * math.sqrt(2) / 2
-    assert limits.mean_interval.high == pytest.approx(half, rel=1e-12)
-    assert limits.averages.tolist() == [8.5, 6.0, 4.0, 7.5]
-    assert limits.differences.tolist() == [1.0, -2.0, 0.0, 1.0]
-
-
 def test_limits_that_are_none() -> None:
     with pytest.warns(UndefinedStatisticWarning, match="fewer than two items"):
         limits = limits_of_agreement([[1, 2], [None, 3]])

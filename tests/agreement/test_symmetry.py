@@ -26,7 +26,6 @@ from masrel.agreement import (
     kappa_max,
     mcnemar,
     prevalence_index,
-    specific_agreement,
     stuart_maxwell,
 )
 from masrel.errors import (
@@ -124,18 +123,6 @@ def test_equal_margins_of_a_sparse_table_by_hand() -> None:
     # X/(1 - X/n) with n = 40: (10/3)/(1 - 1/12) = 40/11
     found = bhapkar([[10, 5, 0], [1, 10, 2], [0, 4, 8]])
     assert found.statistic == pytest.approx(40 / 11, rel=1e-14)
-
-
-def test_a_category_of_equal_margins_stays_in() -> None:
-    # d = (2, 0, -2): the margins of category 2 are equal, but it carries changes.
-    # Pairs 1-2: 3, 1-3: 1, 2-3: 3. Without category 3: d = (2, 0),
-    # V = [[4, -3], [-3, 6]], its inverse's corner 6/15: X = 4 · 6/15 with 2 degrees.
-    # Dropping category 2 as well would give 4/4 with 1.
-    table = [[5, 2, 1], [1, 5, 2], [0, 1, 5]]
-    found = stuart_maxwell(table)
-    assert np.sum(table, axis=0)[1] == np.sum(table, axis=1)[1]
-    assert found.statistic == pytest.approx(8 / 5, rel=1e-13)
-    assert found.df == (2.0,)
 
 
 def test_groups_that_no_change_connects_are_tested_each() -> None:
@@ -271,11 +258,6 @@ def test_without_an_item_there_is_nothing(function) -> None:  # type: ignore[no-
 def test_what_is_no_table_of_counts_is_refused(function, table, said) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(CountsError, match=said):
         function(table)
-
-
-def test_specific_agreement_of_a_published_table() -> None:
-    # Cicchetti and Feinstein (1990), [[40, 9], [6, 45]]: 80/95 and 90/105
-    assert specific_agreement([[40, 9], [6, 45]]) == (80 / 95, 90 / 105)
 
 
 DIAGNOSES = ["depression", "personality", "schizophrenia", "neurosis", "other"]

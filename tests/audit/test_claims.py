@@ -1,7 +1,6 @@
 """What a paper prints is read in every way that it may be meant."""
 
 import itertools
-from pathlib import Path
 from statistics import NormalDist
 
 import numpy as np
@@ -9,7 +8,7 @@ import pytest
 from statsmodels.stats.inter_rater import cohens_kappa
 
 from masrel.agreement import cohen_kappa, count_table
-from masrel.audit import Claim, audit_claim, read_claims
+from masrel.audit import Claim, audit_claim
 from masrel.errors import ParameterError
 
 TABLE = [[5, 2], [4, 16]]
@@ -70,20 +69,6 @@ def test_rules_that_differ_are_two_readings() -> None:
     claim = Claim(n_items=16, n_categories=2, agreement="56.3", kappa="0.263")
     numbers = {r.rounding: r.n_tables for r in audit_claim(claim).readings}
     assert numbers == {"half_even": 0, "half_up": 4}
-
-
-def test_a_file_has_a_claim_a_row(tmp_path: Path) -> None:
-    file = tmp_path / "claims.csv"
-    file.write_text(
-        "# two claims\n"
-        "name;n_items;n_categories;agreement;kappa;margins_1;level\n"
-        "A;20;2;85.0;0.58;;\n"
-        ";27;2;;.47;7 20;0.9\n",
-        encoding="utf-8",
-    )
-    first, second = read_claims(file)
-    assert (first.name, first.agreement, first.margins_1) == ("A", "85.0", None)
-    assert (second.name, second.margins_1, second.level) == ("row 4", (7, 20), 0.9)
 
 
 def test_an_interval_beside_its_kappa_is_of_no_table_however_many_there_are() -> None:

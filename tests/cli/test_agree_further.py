@@ -12,7 +12,6 @@ from scipy import stats
 
 from masrel import intervals
 from masrel.agreement import holm
-from tests.agreement.test_symmetry import DIAGNOSES, PATIENTS, RATINGS
 from tests.cli.process import Caller
 
 Record = dict[str, Any]
@@ -26,9 +25,6 @@ PAIRS = {
 
 # docs/agreement/symmetry.md
 THREE = [[10, 5, 1], [1, 10, 2], [3, 4, 8]]
-
-# docs/agreement/indices.md
-YES_NO = [[20, 5], [10, 15]]
 
 
 def write(path: Path, header: str, rows: Sequence[Sequence[object]]) -> Path:
@@ -115,26 +111,6 @@ def test_retest_by_hand_whatever_the_order_of_the_rows(
 # --- each category
 
 
-def test_the_kappa_of_each_diagnosis_is_the_published_one(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    # Fleiss (1971), Table 2, from ratings and from their counts
-    rows = [(n, *ratings) for n, ratings in enumerate(RATINGS)]
-    wide = write(tmp_path / "wide.csv", "patient,R1,R2,R3,R4,R5,R6", rows)
-    counted = [(f"P{n}", *patient) for n, patient in enumerate(PATIENTS)]
-    counts = write(tmp_path / "n.csv", f"patient,{','.join(DIAGNOSES)}", counted)
-    scale = ("--categories", ",".join(DIAGNOSES))
-    of_ratings = record(masrel, wide, *scale, "--each-category")["categories"]
-    of_counts = record(masrel, counts, "--counts", "--each-category")["categories"]
-    for found in (of_ratings, of_counts):
-        assert [row["category"] for row in found] == DIAGNOSES
-        assert [round(row["value"], 3) for row in found] == [
-            *(0.245, 0.245, 0.520, 0.471, 0.566)
-        ]
-    for one, other in zip(of_ratings, of_counts, strict=True):
-        assert other["standard_error"] == pytest.approx(one["standard_error"])
-
-
 # --- two raters
 
 
@@ -160,33 +136,6 @@ def test_tests_of_symmetry_by_hand(
     for row, x in zip(found, statistics, strict=True):
         assert row["p_value"] == pytest.approx(stats.chi2.sf(x, row["df"][0]))
         assert (row["n_items"], row["reason"]) == (44, None)
-
-
-def test_indices_by_hand(masrel: Caller, tmp_path: Path) -> None:
-    # docs/agreement/indices.md; 40/55 and 30/45 are the agreement on yes and on no
-    path = write(
-        tmp_path / "w.csv",
-        "item,Kim,Lee",
-        [
-            (item, *({"y": "yes", "n": "no"}[grade] for grade in pair))
-            for item, *pair in pairs_of(YES_NO, "yn")
-        ],
-    )
-    found = record(masrel, path, "--indices", "--categories", "yes,no")["indices"]
-    assert [(row["index"], row["category"]) for row in found] == [
-        ("pabak", None),
-        ("prevalence_index", None),
-        ("bias_index", None),
-        ("kappa_max", None),
-        ("specific_agreement", "yes"),
-        ("specific_agreement", "no"),
-    ]
-    assert [row["value"] for row in found] == pytest.approx(
-        [0.4, 0.1, 0.1, 0.8, 40 / 55, 30 / 45], rel=1e-15
-    )
-    # 2 p_o - 1 has twice the error of p_o: 2 √(0.7 · 0.3/49)
-    assert found[0]["standard_error"] == pytest.approx(2 * (0.21 / 49) ** 0.5)
-    assert {row["n_items"] for row in found} == {50}
 
 
 # --- differences

@@ -47,21 +47,6 @@ def table(done: Done) -> list[dict[str, str]]:
 # The first screen.
 
 
-def test_how_numbers_were_made_is_behind_explain(masrel: Caller, wide: Path) -> None:
-    call = ("agree", wide, "--target", "items")
-    brief, explained = (masrel(*call, *more) for more in ((), ("--explain",)))
-    assert explained.out.replace("\n  ", " ").count("SE: delta method") == 1
-    for words in ("SE: ", "auto-20", "posterior", "comma", "--categories"):
-        assert words not in brief.out
-        assert words in explained.out
-    both = [
-        document(masrel(*call, *more, "--json", "-")) for more in ((), ("--explain",))
-    ]
-    assert both[0] == both[1]
-    assert "chosen by" in both[0]["estimates"][0]["interval"]["method"]
-    assert masrel(*call, "--csv").out == masrel(*call, "--csv", "--explain").out
-
-
 def test_warnings_are_lines_on_stderr_alone(masrel: Caller, tmp_path: Path) -> None:
     rows = [f"{k},{20 + 1.37 * k:.2f},{20.5 + 1.31 * k:.2f}\n" for k in range(30)]
     path = written(tmp_path, "item,Kim,Lee\n" + "".join(rows), "r.csv")

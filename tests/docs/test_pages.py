@@ -6,7 +6,6 @@ A page is a test case. ``python -m docs.make.pages PAGE`` writes what it prints 
 import ast
 import difflib
 import tomllib
-from pathlib import Path
 
 import msgspec
 import pytest
@@ -156,13 +155,6 @@ def test_a_comment_of_what_is_printed_is_renewed(
     assert renewed(page(python(*right))) == page(python(*right))
 
 
-def test_an_error_of_an_example_names_its_line_of_the_page() -> None:
-    with pytest.raises(ZeroDivisionError) as caught:
-        renewed(page(python("x = 1", "x / 0")), "a.md")
-    last = caught.traceback[-1]
-    assert (Path(last.path).name, last.lineno + 1) == ("a.md", 5)
-
-
 def test_a_command_reads_the_file_that_the_page_shows() -> None:
     text = page("In `r.csv`:", console("item,Kim,Lee", "A,1,2"))
     text += "\n" + console("$ masrel agree r.csv --item place", "ratings")
@@ -188,12 +180,6 @@ def test_three_dots_stand_for_lines_of_output(
 ) -> None:
     command = "$ python -c \"print('a', 'b', 'c', sep='\\n')\""
     assert renewed(page(console(command, *shown))) == page(console(command, *right))
-
-
-def test_a_command_may_take_two_lines_and_its_errors_are_output() -> None:
-    program = "import sys; print(1, flush=True); print(2, file=sys.stderr)"
-    lines = ["$ python -c \\", f"'{program}'"]
-    assert renewed(page(console(*lines))) == page(console(*lines, "1", "2"))
 
 
 def test_what_is_typed_is_seen_at_the_prompt() -> None:

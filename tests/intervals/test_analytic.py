@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from scipy.stats import t
 
 from masrel.agreement import fleiss_kappa
 from masrel.errors import (
@@ -97,3 +98,42 @@ def test_spss_prints_the_error_of_the_hypothesis_that_fleiss_kappa_is_0() -> Non
         "cohen_kappa", PAIRS, target="items", **options | {"convention": "over_n"}
     )
     assert (of_two.low, of_two.high) == (same.low, same.high)
+
+
+IRRCAC = {"target": "items", "convention": "irrcac", "distribution": "normal"}
+
+
+UNITS = [
+    (1, 1, None, 1), (2, 2, 3, 2), (3, 3, 3, 3), (3, 3, 3, 3), (2, 2, 2, 2),
+    (1, 2, 3, 4), (4, 4, 4, 4), (1, 1, 2, 1), (2, 2, 2, 2), (None, 5, 5, 5),
+    (None, None, 1, 1), (None, None, 3, None),
+]  # fmt: skip
+
+
+SINGLE = [["a", "a", "a"], ["a", "a", "b"], ["a", None, None]]
+
+
+LONE = [["a", "a"], ["a", "b"], ["b", "b"], ["b", None]]
+
+
+@pytest.mark.parametrize(
+    ("name", "ratings", "error"),
+    [
+        # by hand, u_i + (2/3)(s_i n/n' - 1): 1/2 + 1/3, -1/2 + 1/3, 0 - 2/3
+        ("percent_agreement", SINGLE, math.sqrt(7 / 36)),
+        # ours are 10, -14, 6, -2 ninths; 1/9 more with a pair, 1/3 less without
+        ("conger_kappa", LONE, math.sqrt((121 + 169 + 49 + 25) / 81 / 12)),
+        # as R prints them of Krippendorff's units
+        ("percent_agreement", UNITS, 0.12561),
+        ("gwet_ac", UNITS, 0.14295),
+        ("fleiss_kappa", UNITS, 0.15302),
+    ],
+)
+def test_irrcac_counts_a_single_rating_as_disagreement(
+    name: str, ratings: list, error: float
+) -> None:
+    found = half(quiet(name, ratings, **IRRCAC, level=0.2)) / 0.253347
+    assert found == pytest.approx(error, rel=1e-4)
+    by_t = half(quiet(name, ratings, **{**IRRCAC, "distribution": "t"}, level=0.2))
+    # which counts such an item, too
+    assert by_t / t.ppf(0.6, len(ratings) - 1) == pytest.approx(error, rel=1e-4)

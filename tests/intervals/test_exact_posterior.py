@@ -141,17 +141,6 @@ def test_any_order_of_items_ratings_and_categories_gives_the_same(
     )
 
 
-# Both items split, or each agreed: the shares of the categories stay as they were.
-@settings(max_examples=25)
-@given(tables(n_raters=(2, 2), missing=False), st.permutations(LABELS))
-def test_more_agreement_moves_it_up(table: Table, grades: list[str]) -> None:
-    x, y = grades[:2]
-    apart = exact([*table, [x, y], [y, x]])
-    agreed = exact([*table, [x, x], [y, y]])
-    assert agreed.low > apart.low
-    assert agreed.high > apart.high
-
-
 @settings(max_examples=25)
 @given(WITH_PAIRS)
 def test_the_density_integrates_to_one(table: Table) -> None:

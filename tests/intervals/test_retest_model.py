@@ -42,15 +42,6 @@ def test_on_many_pairs_of_alike_raters_it_is_stratified_kappa() -> None:
     assert result.standard_deviation.value < 0.1
 
 
-def test_gaps_and_raters_without_pairs_are_left_out() -> None:
-    full = [["a", "a"], ["b", "b"], ["a", "b"]]
-    gaps = [["a", None], ["b", "b"], [None, None]]
-    none = [[None, "a"]] * 3
-    result = retest_model([full, none, gaps])
-    assert [q.name for q in result.raters] == ["rater 1", "rater 3"]
-    assert result.n_pairs == (3, 1)
-
-
 def test_where_there_is_nothing_to_learn_it_is_undefined() -> None:
     with pytest.warns(UndefinedStatisticWarning, match="no rater has a pair"):
         result = retest_model([[["a", None], [None, "b"]]])

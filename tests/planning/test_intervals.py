@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from masrel.errors import ParameterError
 from masrel.intervals import estimate
-from masrel.planning import Study, precision
+from masrel.planning import Study
 from masrel.planning._studies import draw, outcomes_of
 from masrel.planning._truth import design_of
 
@@ -70,20 +69,3 @@ def test_it_is_that_of_masrel_intervals(
         assert made is not None
         ends = (made.low, made.high)
         np.testing.assert_allclose(outcome[1:], ends, rtol=0, atol=1e-13)
-
-
-def test_weights_go_by_the_scale_where_it_is_named() -> None:
-    common: dict[str, Any] = {
-        **MIXTURE,
-        **{"weights": "quadratic", "target": "items", "interval": "t", "rng": 1},
-        **{"n_items": 40, "n_raters": 2},
-    }
-    by_place, even, uneven = (
-        precision(Study("cohen_kappa", **{**common, "categories": scale}))
-        for scale in (3, [0, 2, 4], [0, 1, 10])
-    )
-    half = by_place.expected_half_width
-    assert even.expected_half_width == pytest.approx(half, rel=1e-12)
-    assert abs(uneven.expected_half_width - half) > 1e-3
-    with pytest.raises(ParameterError, match="categories: needs 3 that differ"):
-        precision(Study("cohen_kappa", **{**common, "categories": [0, 1, 1]}))

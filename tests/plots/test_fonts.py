@@ -3,26 +3,12 @@
 import warnings
 
 import pytest
-from matplotlib import font_manager
-from matplotlib.font_manager import get_font
 
 from masrel.errors import MissingLettersWarning
 from masrel.plots import draw, forest
 from masrel.plots._drawn_values import Drawn
 from masrel.tables._estimate_words import forest_row
 from tests.plots.made import blank, estimate
-
-
-def letter_of_another_font() -> str:
-    """A letter that DejaVu Sans has not, and that a font which is here has."""
-    own = get_font(font_manager.findfont("DejaVu Sans")).get_charmap()
-    fonts = [of.fname for of in font_manager.fontManager.ttflist if "STIX" in of.name]
-    charmaps = [get_font(file).get_charmap() for file in fonts]
-    return next(
-        chr(code)
-        for code in sorted({code for charmap in charmaps for code in charmap} - {*own})
-        if chr(code).isalpha()
-    )
 
 
 def test_letters_without_a_font_are_said_in_one_sentence_with_the_way_out() -> None:
@@ -44,10 +30,3 @@ def test_a_page_has_the_letters_of_its_reader(form: str, is_said: bool) -> None:
         warnings.simplefilter("always")
         draw(shown, stamp="", forms=(form,))
     assert [of.category for of in caught] == [MissingLettersWarning] * is_said
-
-
-def test_the_file_of_a_font_gives_its_letters(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("MASREL_FONT", font_manager.findfont("STIXGeneral"))
-    axes = forest(estimate(), [letter_of_another_font()], ax=blank())
-    (name,) = (of for of in axes.texts if of.get_text() == letter_of_another_font())
-    assert name.get_fontfamily() == ["DejaVu Sans", "STIXGeneral"]

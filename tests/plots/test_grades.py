@@ -84,17 +84,6 @@ def test_all_others_are_held_against_a_reference_together() -> None:
     assert (axes.get_ylabel(), axes.get_xlabel()) == ("Kim", "2 other raters")
 
 
-@pytest.mark.parametrize(
-    ("options", "is_ordered"),
-    [({}, False), ({"categories": ["a", "b", "c"]}, True), ({"ordered": True}, True)],
-)
-def test_neighbours_are_counted_where_grades_have_an_order(
-    options: dict[str, Any], is_ordered: bool
-) -> None:
-    (text,) = (of for of in texts_of(confusion(TWO, **options)) if "same grade" in of)
-    assert ("same or next grade: 5 of 5 (100 %)" in text) == is_ordered
-
-
 def test_the_use_of_grades_is_a_bar_of_shares() -> None:
     axes = grades(THREE, ax=blank())
     bars = {

@@ -1,6 +1,5 @@
 """A file that DuckDB groups gives what it gives when it is read as a whole."""
 
-import cProfile
 import csv
 import gzip
 import sys
@@ -19,7 +18,6 @@ pyarrow = pytest.importorskip("pyarrow")
 parquet = pytest.importorskip("pyarrow.parquet")
 pytest.importorskip("duckdb")
 
-IO = Path("/proc/self/io")
 NAMES = ("fleiss_kappa", "gwet_ac", "krippendorff_alpha", "conger_kappa")
 SAME = (
     *("layout", "item", "rater", "grade", "grades", "missing", "merged", "scale"),
@@ -287,24 +285,3 @@ class TestSize:
             read_ratings(path, Reading(stream=True))
         monkeypatch.setattr(_large, "_LARGE_TABLE", 1000)
         assert not is_streamed(read_ratings(path))
-
-
-@pytest.mark.skipif(not IO.exists(), reason="Linux counts what a process reads")
-def test_a_file_is_read_twice_and_python_sees_none_of_its_rows(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(_large, "_HEAD_BYTES", 1000)
-    n_calls = []
-    for n_rows in (10_000, 100_000):
-        path, profile = tmp_path / f"{n_rows}.csv", cProfile.Profile()
-        rows = (f"item{k // 5},r{k % 5},{k * k % 7 % 4}\n" for k in range(n_rows))
-        path.write_text("item,rater,grade\n" + "".join(rows))
-        before = n_read()
-        profile.runcall(read_ratings, path, Reading(stream=True))
-        assert n_read() - before < 2.2 * path.stat().st_size + 200_000
-        n_calls.append(sum(entry.callcount for entry in profile.getstats()))
-    assert n_calls[1] < n_calls[0] + 2000  # looks at a clock
-
-
-def n_read() -> int:
-    return int(IO.read_text().split()[1])
