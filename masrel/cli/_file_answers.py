@@ -14,6 +14,7 @@ import click
 from masrel._input import refuse, split_names
 from masrel.analysis._file_estimates import USUAL, Answer, Questions
 from masrel.cli._options import (
+    GroupedHelp,
     OutputOptions,
     call_text,
     echo_notes,
@@ -191,7 +192,7 @@ def file_command(
     )
     for decorator in reversed(decorators):
         command = decorator(command)
-    return click.command(name, help=about)(command)
+    return click.command(name, help=about, cls=GroupedHelp)(command)
 
 
 def _show_answers(

@@ -30,6 +30,38 @@ STDOUT = Path("-")
 _FORMS: dict[str, "Form"] = {".png": "png", ".svg": "svg", ".pdf": "pdf"}
 
 
+_HEADINGS = {
+    "reading": "Reading FILE",
+    "questions": "Estimating",
+    "joints": "Joints",
+    "stretch": "Motion",
+    "quantities": "Quantities",
+    "recordings": "Reading RECORDINGS",
+    "gating": "Gates",
+    "comparing": "Comparison",
+    "output": "Output",
+}
+"""Groups of options by the name of their argument, as --help heads them."""
+
+
+class GroupedHelp(click.Command):
+    """A command whose help shows options under the headings of their groups."""
+
+    def format_options(
+        self, ctx: click.Context, formatter: click.HelpFormatter
+    ) -> None:
+        """Write what belongs to no group first, and --help with it."""
+        parts: dict[str, list[tuple[str, str]]] = {"Options": []}
+        for param in self.get_params(ctx):
+            shown = param.get_help_record(ctx)
+            if shown is not None:
+                heading = vars(param).get("heading", "Options")
+                parts.setdefault(heading, []).append(shown)
+        for heading, records in parts.items():
+            with formatter.section(heading):
+                formatter.write_dl(records)
+
+
 def grouped(name: str, group: type, *options: Callable[..., Any]) -> Decorator:
     """Return a decorator that gives a command several options as one argument."""
     # the command may have some of the group's options, in any place among its others
@@ -37,13 +69,15 @@ def grouped(name: str, group: type, *options: Callable[..., Any]) -> Decorator:
 
     def decorate(command: Command) -> Command:
         @wraps(command)
-        def with_group(**args: object) -> None:
+        def with_group(*study: object, **args: object) -> None:
             values = {key: args.pop(key) for key in keys if key in args}
-            command(**args, **{name: group(**values)})
+            command(*study, **args, **{name: group(**values)})
 
         decorated: Command = with_group
         for option in reversed(options):
             decorated = option(decorated)
+        for param in vars(decorated)["__click_params__"][-len(options) :]:
+            vars(param)["heading"] = _HEADINGS[name]
         return decorated
 
     return decorate

@@ -8,6 +8,7 @@ import click
 
 from masrel._input import refuse
 from masrel.cli._options import (
+    GroupedHelp,
     OutputOptions,
     output_options,
     write_output,
@@ -23,7 +24,7 @@ _WIDTH = 88  # of notes below a table
 _WEIGHTS = click.Choice(["identity", "linear", "quadratic", "any"])
 
 
-@click.command("audit")
+@click.command("audit", cls=GroupedHelp)
 @click.argument("source", required=False, type=click.Path(path_type=Path))
 @click.option("--items", "n_items", metavar="INTEGER", help="Items that were rated.")
 @click.option("--categories", "n_categories", metavar="INTEGER", help="Of the scale.")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from masrel.cli._options import (
+    GroupedHelp,
     OutputOptions,
     call_text,
     echo_notes,
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 _DRAWER = "masrel.plots._latent_scale:latent_picture"
 
 
-@click.command("latent")
+@click.command("latent", cls=GroupedHelp)
 @click.argument("file", type=InputFile(path_type=Path))
 @click.option(
     "--items",

@@ -9,6 +9,7 @@ import click
 
 from masrel._input import refuse
 from masrel.cli._options import (
+    GroupedHelp,
     OutputOptions,
     Report,
     output_options,
@@ -59,7 +60,7 @@ _METHODS = ("auto", "exact", "simulation", "wald", "goodness-of-fit")
 _MODELS = ("mixture", "dirichlet-multinomial", "latent", "table")
 
 
-@click.command("plan")
+@click.command("plan", cls=GroupedHelp)
 @click.argument("study", required=False, type=InputFile(path_type=Path))
 @click.option("--coefficient", help="Its name.  [default: fleiss_kappa]")
 @click.option(

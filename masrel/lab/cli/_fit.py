@@ -10,6 +10,7 @@ import click
 from masrel._files import write_file
 from masrel.cli._options import (
     Decorator,
+    GroupedHelp,
     OutputOptions,
     grouped,
     output_options,
@@ -126,7 +127,7 @@ _output = output_options(
 )
 
 
-@click.command("friction")
+@click.command("friction", cls=GroupedHelp)
 @_recordings
 @_level
 @_figures
@@ -146,7 +147,7 @@ def friction(
     _write(fitted, (), folder, output)
 
 
-@click.command("fit")
+@click.command("fit", cls=GroupedHelp)
 @_recordings
 @click.option(
     "-o",

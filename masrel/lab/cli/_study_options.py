@@ -1,20 +1,62 @@
-"""The ratings of a study, as commands read them, and warnings, as they say them."""
+"""A study and its ratings, as commands read them, and warnings, as they say them."""
 
+import functools
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli._options import echo_notes
+from masrel.cli._options import Command, Decorator, echo_notes
 from masrel.cli._paths import InputFile, note_inputs
 from masrel.errors import MasrelWarning
 
 if TYPE_CHECKING:
     from masrel.lab.ratings import StudyData
 
+study_argument = click.argument("study", type=click.Path(path_type=Path))
+
+
+def of_study(command: Callable[..., None]) -> Command:
+    """Give a command the argument STUDY: where the study is, and its protocol."""
+
+    @functools.wraps(command)
+    def with_study(study: Path, **arguments: object) -> None:
+        from masrel.lab.protocol import StudyPaths, read_protocol
+
+        paths = StudyPaths(study)
+        command(paths, read_protocol(paths.protocol), **arguments)
+
+    return study_argument(with_study)
+
+
+def several(*options: Decorator) -> Decorator:
+    """Return options as one decorator."""
+
+    def decorate(command: Command) -> Command:
+        return functools.reduce(
+            lambda done, option: option(done), options[::-1], command
+        )
+
+    return decorate
+
+
+id_option = click.option("--rater", required=True, help="Id of the rater.")
+session_option = click.option("--session", required=True, help="Id of the session.")
+clock_option = click.option(
+    "--clock",
+    type=click.Choice(["real", "simulated"]),
+    help="Clock of the control loop; default: real, for simulated grades simulated.",
+)
+grades_option = click.option(
+    "--grades",
+    type=click.Choice(["console", "simulated"]),
+    default="console",
+    show_default=True,
+    help="Who gives the grades.",
+)
 ratings_option = click.option(
     "--ratings",
     "ratings_file",

@@ -1,31 +1,36 @@
-"""``masrel joint trace`` and ``tardieu``: events, torque and samples of stretches."""
+"""``masrel joint trace``: events, torque and samples of stretches of joints."""
 
+import csv
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 from tqdm import tqdm
 
+from masrel._files import safe_cell
+from masrel._input import refuse
 from masrel.cli._options import (
+    GroupedHelp,
     OutputOptions,
     grouped,
     output_options,
     write_output,
 )
-from masrel.cli._paths import FileInFolder, InputFile, note_inputs
+from masrel.cli._paths import FileInFolder, InputFile
 from masrel.errors import ParameterError
-from masrel.lab.cli._tone_traces import (
+from masrel.lab._durable_files import new_file
+from masrel.lab.cli._joints import (
     END_DEG,
     START_DEG,
+    JointOptions,
     end_within,
-    joint_of_kind,
-    write_tardieu,
+    joint_options,
+    joints_of,
 )
-from masrel.lab.cli._trace_samples import check_samples, write_samples
-from masrel.lab.report._traced_scenes import (
+from masrel.lab.report._scenes import (
     SCENE_OUTPUTS,
     SCENE_STAMP,
     SCENE_VIEWS,
@@ -43,8 +48,10 @@ if TYPE_CHECKING:
     from masrel.lab.elbow.motions import Interpolation
 
 _KINDS = ("constant", "minimum-jerk", "trapezoid", "recording")
-_PATH = click.Path(path_type=Path)
 
+_COLUMNS = ("time_s", "angle_deg", "velocity_deg_s", "torque_nm", "phase")
+_MAX_SAMPLES = 5_000_000  # rows of a CSV file: at 1 kHz 83 minutes, and some 400 MB
+_N_AT_ONCE = 10_000  # rows between two signs of progress
 _MAX_SPEEDS = 100_000
 _MAX_REPEATS = 1000  # which take a second to solve
 
@@ -66,30 +73,38 @@ class _MotionOptions:
     repeats: int  # how often it is made, with the way back in between
 
     def __post_init__(self) -> None:
-        if (self.kind == "recording") != (self.recording is not None):
-            raise ParameterError(
-                "--recording: goes with --motion recording, and that needs a file"
-            )
-        if (self.kind == "trapezoid") != (self.acceleration is not None):
-            raise ParameterError(
-                "--acceleration-deg-s2: goes with --motion trapezoid, and that needs it"
-            )
-        if self.recording is None and self.interpolation is not None:
-            raise ParameterError("--interpolation: goes with --motion recording")
-        if self.recording is not None and (self.start, self.end) != (None, None):
-            raise ParameterError(
-                "--from-deg, --to-deg: a recording starts and ends where it does"
-            )
-        if (self.stop is None) != (self.pause is None):
-            raise ParameterError("--stop-at-s, --pause-s: each needs the other")
-        if self.pause is not None and not 0.0 < self.pause < math.inf:
-            raise ParameterError(
-                f"--pause-s: needs more than 0 and finite, got {self.pause:g} s"
-            )
-        if not 1 <= self.repeats <= _MAX_REPEATS:
-            raise ParameterError(
-                f"--repeat: needs 1 to {_MAX_REPEATS}, got {self.repeats}"
-            )
+        of_recording = self.recording is not None
+        refuse(
+            (
+                (self.kind == "recording") != of_recording,
+                "--recording: goes with --motion recording, and that needs a file",
+            ),
+            (
+                (self.kind == "trapezoid") != (self.acceleration is not None),
+                "--acceleration-deg-s2: goes with --motion trapezoid, and that needs "
+                "it",
+            ),
+            (
+                not of_recording and self.interpolation is not None,
+                "--interpolation: goes with --motion recording",
+            ),
+            (
+                of_recording and (self.start, self.end) != (None, None),
+                "--from-deg, --to-deg: a recording starts and ends where it does",
+            ),
+            (
+                (self.stop is None) != (self.pause is None),
+                "--stop-at-s, --pause-s: each needs the other",
+            ),
+            (
+                self.pause is not None and not 0.0 < self.pause < math.inf,
+                f"--pause-s: needs more than 0 and finite, got {self.pause or 0:g} s",
+            ),
+            (
+                not 1 <= self.repeats <= _MAX_REPEATS,
+                f"--repeat: needs 1 to {_MAX_REPEATS}, got {self.repeats}",
+            ),
+        )
 
 
 _motion_options = grouped(
@@ -141,88 +156,8 @@ _quantity_options = grouped(
 )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _LawOptions:
-    """What the command line changes of every joint; None changes nothing."""
-
-    rest: float | None = None  # θ_rest, deg
-    post_catch: str | None = None  # reading of (5)
-    reading: str | None = None  # reading of Q
-    rise: float | None = None  # how long torque takes to its peak, s
-    inertia: float | None = None  # m of (1) and (5), kg·m²
-
-    def change(self, joint: "JointModel") -> "JointModel":
-        """Return a joint with these changes, which only a spastic elbow can have."""
-        from masrel.lab.elbow import ElbowParameters
-
-        if not isinstance(joint, ElbowParameters):
-            raise ParameterError(
-                "--rest-deg, --post-catch, --q-reading, --catch-rise-s, "
-                f"--inertia-kg-m2: need a spastic elbow, got {joint.kind}"
-            )
-        changes: dict[str, object] = {
-            "rest_angle": None if self.rest is None else math.radians(self.rest),
-            "post_catch": self.post_catch,
-            "residual_reading": self.reading,
-            "catch_rise": self.rise,
-            "inertia": self.inertia,
-        }
-        changes = {name: value for name, value in changes.items() if value is not None}
-        return replace(joint, **changes)  # type: ignore[arg-type]
-
-
-_law_options = grouped(
-    "law",
-    _LawOptions,
-    click.option("--rest-deg", "rest", type=float, help="θ_rest; default: the start."),
-    click.option(
-        "--post-catch", type=click.Choice(["continuous", "additive"]),
-        help="How (5) is read.",
-    ),
-    click.option(
-        "--q-reading", "reading", type=click.Choice(["residual", "decrease"]),
-        help="What Q is a share of the peak for.",
-    ),
-    click.option(
-        "--catch-rise-s", "rise", type=float, help="Smooth the catch's onset."
-    ),
-    click.option("--inertia-kg-m2", "inertia", type=float, help="m of (1) and (5)."),
-)  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _JointOptions:
-    """The joints, however they are named."""
-
-    models: tuple[str, ...]
-    study: Path | None
-    kinds: tuple[str, ...]
-    parameters: tuple[str, ...]  # KEY=VALUE each
-
-
-_joint_options = grouped(
-    "names",
-    _JointOptions,
-    click.option(
-        "--model", "models", multiple=True,
-        help="HM1 to HM4, a model of --study, or a model file (.toml); may be given "
-        "again.",
-    ),
-    click.option("--study", type=_PATH, help="Take models from this study's protocol."),
-    click.option(
-        "--kind", "kinds", multiple=True,
-        help="Another kind of joint with its defaults, as in a protocol; may be given "
-        "again.",
-    ),
-    click.option(
-        "--parameter", "parameters", multiple=True, metavar="KEY=VALUE",
-        help="One of its numbers, as in [models.parameters]; may be given again.",
-    ),
-)  # fmt: skip
-
-
-@click.command("trace")
-@_joint_options
+@click.command("trace", cls=GroupedHelp)
+@joint_options
 @click.option(
     "--speed-deg-s", "speeds", type=float, multiple=True,
     help="Mean speed, deg/s; of a trapezoid that of its level. May be given again.",
@@ -233,7 +168,6 @@ _joint_options = grouped(
     metavar="LOW HIGH N", help="N speeds from LOW to HIGH.",
 )  # fmt: skip
 @_motion_options
-@_law_options
 @_quantity_options
 @click.option(
     "--rate-hz", type=click.FloatRange(min=0.0, min_open=True),
@@ -256,11 +190,10 @@ _joint_options = grouped(
 )  # fmt: skip
 @click.option("--quiet", is_flag=True, help="Show no progress.")  # of the output
 def trace(
-    names: _JointOptions,
+    joints: JointOptions,
     speeds: tuple[float, ...],
     speed_range: tuple[float, float, int] | None,
     stretch: _MotionOptions,
-    law: _LawOptions,
     quantities: Quantities,
     rate_hz: float | None,
     csv_file: Path | None,
@@ -273,19 +206,18 @@ def trace(
     at --rate-hz for that motion. Several models or speeds make one scene of each pair.
     """
     if csv_file is not None or rate_hz is not None:
-        check_samples(csv_file, rate_hz)
-    joints = _joints_of(names, law)
+        _check_samples(csv_file, rate_hz)
     if speed_range is not None:
         speeds = (*speeds, *_spaced(*speed_range))
     if view is not None and output.figure is None:
         raise ParameterError("--view: goes with --figure, whose contents it chooses")
-    scenes = _scenes(joints, stretch, speeds)
+    scenes = _scenes(joints_of(joints), stretch, speeds)
     if output.figure is not None:
         check_view(scenes, view or SCENE_VIEWS[0])
     documents = _documents(scenes, quantities, quiet=output.quiet)
     if csv_file is not None:
         rate = 1000.0 if rate_hz is None else rate_hz
-        write_samples(csv_file, rate, scenes, documents, quiet=output.quiet)
+        _write_samples(csv_file, rate, scenes, documents, quiet=output.quiet)
     one = len(scenes) == 1
     write_output(
         output,
@@ -296,26 +228,6 @@ def trace(
         figure=lambda: scenes_content(scenes, view or SCENE_VIEWS[0]),
         stamp=SCENE_STAMP,
     )
-
-
-@click.command("tardieu")
-@_joint_options
-@_law_options
-@click.option("--from-deg", "start", type=float, default=START_DEG, show_default=True)
-@click.option(
-    "--speed-deg-s", "speeds", type=(float, float, float), metavar="V1 V2 V3",
-    help="Speeds of the stretches.  [default: 10 100 150]",
-)  # fmt: skip
-@output_options(json="Write them as JSON here; - for the screen.")
-def tardieu(
-    names: _JointOptions,
-    law: _LawOptions,
-    start: float,
-    speeds: tuple[float, float, float] | None,
-    output: OutputOptions,
-) -> None:
-    """R2, R1 and their difference, by stretches to the end of range at three speeds."""
-    write_tardieu(_joints_of(names, law), start, speeds or (), output)
 
 
 def _spaced(low: float, high: float, n: int) -> tuple[float, ...]:
@@ -373,57 +285,6 @@ def _scenes(
                 )
             )
     return scenes
-
-
-def _joints_of(names: _JointOptions, law: _LawOptions) -> dict[str, "JointModel"]:
-    from masrel.lab.elbow import STANDARD_MODELS
-
-    if not names.models and not names.kinds:
-        raise click.UsageError("Missing option '--model' or '--kind'.")
-    if names.parameters and len(names.kinds) != 1:
-        raise ParameterError("--parameter: goes with one --kind, whose it is")
-    joints: dict[str, JointModel] = {}
-    for model in dict.fromkeys(names.models):
-        name = Path(model).stem if model.endswith(".toml") else model
-        if name in joints:
-            raise ParameterError(
-                f"--model: needs models whose names differ, got two called {name}"
-            )
-        if names.study is None and model in STANDARD_MODELS:
-            joints[name] = STANDARD_MODELS[model]
-        else:
-            joints[name] = _joint_of_file(model, names.study)
-    for kind in dict.fromkeys(names.kinds):
-        joints[kind] = joint_of_kind(kind, names.parameters)
-    if law != _LawOptions():
-        joints = {name: law.change(joint) for name, joint in joints.items()}
-    return joints
-
-
-def _joint_of_file(model: str, study: Path | None) -> "JointModel":
-    # a model file, or a model of a study's protocol
-    from masrel.lab.elbow import STANDARD_MODELS
-    from masrel.lab.protocol import (
-        StudyPaths,
-        joint_model,
-        read_model_file,
-        read_protocol,
-    )
-
-    if study is not None and model.endswith(".toml"):
-        raise ParameterError(
-            f"--model: needs a model of --study, got the file {model}; without "
-            "--study it is read with the usual constants"
-        )
-    if study is not None:
-        return joint_model(read_protocol(StudyPaths(study).protocol), model)
-    if not model.endswith(".toml"):
-        raise ParameterError(
-            f"--model: needs one of {', '.join(STANDARD_MODELS)}, or a model file "
-            f"(.toml), or --study to name a study's own, got {model!r}"
-        )
-    note_inputs(Path(model))
-    return read_model_file(Path(model))
 
 
 def _motion_of(
@@ -487,3 +348,73 @@ def _stopped_and_repeated(stretch: _MotionOptions, once: "Motion") -> "Motion":
     for _ in range(stretch.repeats - 1):
         parts += [Reversed(motion=once), motion]
     return Joined(parts)
+
+
+def _check_samples(csv_file: Path | None, rate_hz: float | None) -> None:
+    if rate_hz is not None and csv_file is None:
+        raise ParameterError("--rate-hz: goes with --csv, whose samples it spaces")
+    if rate_hz is not None and not math.isfinite(rate_hz):
+        raise ParameterError(f"--rate-hz: needs a finite rate, got {rate_hz}")
+    if csv_file == Path("-"):
+        raise ParameterError("--csv: needs the name of a file, got -")
+
+
+def _write_samples(
+    csv_file: Path,
+    rate_hz: float,
+    scenes: Sequence[Scene],
+    documents: Sequence[dict[str, Any]],
+    *,
+    quiet: bool,
+) -> None:
+    # columns name the scene where there are several
+    n_rows = _n_samples(documents, rate_hz)
+    several = len(scenes) > 1
+    with (
+        new_file(csv_file) as out,
+        tqdm(total=n_rows, desc="samples", delay=1.0, disable=quiet or None) as bar,
+    ):
+        out.write("# simulated: true\n")
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow((*(("model", "speed_deg_s") if several else ()), *_COLUMNS))
+        for scene in scenes:
+            names = (safe_cell(scene.model), scene.speed_deg_s) if several else ()
+            _write_rows(writer, names, scene, rate_hz, bar)
+
+
+def _n_samples(documents: Sequence[dict[str, Any]], rate_hz: float) -> int:
+    durations = [document["phases"][-1]["end_s"] for document in documents]
+    n_samples = sum(durations) * rate_hz + len(durations)
+    if not n_samples <= _MAX_SAMPLES:
+        raise ParameterError(
+            f"--csv: needs at most {_MAX_SAMPLES} samples, got {n_samples:.4g}: "
+            f"{sum(durations):.4g} s at {rate_hz:g} Hz; --rate-hz makes them fewer"
+        )
+    return int(n_samples)
+
+
+def _write_rows(
+    writer: Any,  # csv.writer, whose type has no name
+    names: tuple[object, ...],
+    scene: Scene,
+    rate_hz: float,
+    bar: "tqdm[Any]",
+) -> None:
+    import numpy as np
+
+    from masrel.lab import elbow
+    from masrel.lab.recording import PHASES
+
+    samples = elbow.trace(scene.joint, scene.motion, rate_hz=rate_hz)
+    columns = (
+        samples.time,
+        np.degrees(samples.angle),
+        np.degrees(samples.velocity),
+        samples.torque,
+    )
+    for start in range(0, samples.time.size, _N_AT_ONCE):
+        block = slice(start, start + _N_AT_ONCE)
+        phases = [PHASES[code] for code in samples.phase[block].tolist()]
+        rows = zip(*(c[block].tolist() for c in columns), phases, strict=True)
+        writer.writerows((*names, *row) for row in rows)
+        bar.update(len(phases))

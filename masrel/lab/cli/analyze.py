@@ -6,7 +6,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli._options import STDOUT, OutputOptions, output_options, write_json
+from masrel.cli._options import (
+    STDOUT,
+    GroupedHelp,
+    OutputOptions,
+    output_options,
+    write_json,
+)
 from masrel.lab.cli._gating import GateOptions, gate_options, verdict_of
 from masrel.lab.cli._study_options import ratings_option, read_study, warnings_as_notes
 
@@ -15,7 +21,7 @@ if TYPE_CHECKING:
     from masrel.lab.ratings import StudyData
 
 
-@click.command("analyze")
+@click.command("analyze", cls=GroupedHelp)
 @click.argument("study", type=click.Path(path_type=Path))
 @ratings_option
 @gate_options()

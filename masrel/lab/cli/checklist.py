@@ -6,12 +6,13 @@ import click
 
 from masrel.cli._paths import OutputFile
 from masrel.lab._once import read_once
-from masrel.lab.cli._study_options import warnings_as_notes
-from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.cli._study_options import of_study, warnings_as_notes
+from masrel.lab.protocol import Protocol, StudyPaths
 
 
 @click.command("checklist")
-@click.argument("study", type=click.Path(path_type=Path))
+@read_once()
+@of_study
 @click.option(
     "--guideline",
     required=True,
@@ -24,8 +25,9 @@ from masrel.lab.protocol import StudyPaths, read_protocol
     type=OutputFile(path_type=Path),
     help="File to write: .html, .md or .docx; Markdown on the screen unless given.",
 )
-@read_once()
-def checklist(study: Path, guideline: str, output: Path | None) -> None:
+def checklist(
+    study: StudyPaths, protocol: Protocol, guideline: str, output: Path | None
+) -> None:
     """Fill the checklist of a reporting guideline for STUDY.
 
     Each item has what the protocol, the schedules, the logs and the analysis say of it,
@@ -33,9 +35,8 @@ def checklist(study: Path, guideline: str, output: Path | None) -> None:
     """
     from masrel.lab.checklist import checklist_markdown, fill_checklist, write_checklist
 
-    paths = StudyPaths(study)
     with warnings_as_notes():
-        filled = fill_checklist(paths, read_protocol(paths.protocol), guideline)
+        filled = fill_checklist(study, protocol, guideline)
     if output is None:
         click.echo(checklist_markdown(filled), nl=False)
     else:

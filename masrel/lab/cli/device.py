@@ -1,22 +1,144 @@
 """``masrel device``: bring a Puck up on its CAN bus and see what it says."""
 
 import dataclasses
+import functools
 import math
 import sys
-from contextlib import nullcontext
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
+from tqdm import tqdm
 
-from masrel.lab.cli._puck_session import PuckSession, puck_command
+from masrel.cli import Commands
+from masrel.cli._options import STDOUT, OutputOptions, output_options, write_output
+from masrel.cli._paths import InputFile
+from masrel.lab.cli._study_options import several
+from masrel.lab.hess import Clock, RealClock, SimulatedClock, SimulatedHand
+from masrel.lab.hess.puck import PuckOptions, read_property_table
 
 if TYPE_CHECKING:
-    from masrel.lab.hess.puck import FrictionEstimate, NodeReport
+    from masrel.lab.hess.puck import FrictionEstimate, Link, NodeReport
 
 _N_NODES = 31
+_RANGE_END = math.radians(146.0)  # where an emulated arm meets its end stop
+_EMULATED_START = math.radians(60.0)
+
+_puck_options = several(
+    click.option(
+        "--interface",
+        help="The adapter, as python-can names it; default: socketcan, with --emulate "
+        "virtual.",
+    ),
+    click.option("--channel", default="can0", show_default=True, help="Its channel."),
+    click.option("--puck", type=int, default=1, show_default=True, help="Its node."),
+    click.option(
+        "--direction",
+        type=click.Choice(["1", "-1"]),
+        default="1",
+        show_default=True,
+        help="-1 where its counts shrink with extension.",
+    ),
+    click.option("--gear-ratio", type=float, default=18.8, show_default=True),
+    click.option(
+        "--properties",
+        type=InputFile(path_type=Path),
+        help="TOML file with the property numbers of a firmware unknown to masrel.",
+    ),
+    click.option(
+        "--emulate", is_flag=True, help="Emulate the puck; there is no hardware then."
+    ),
+    output_options(
+        json="Write what was found as JSON; - for the screen.", quiet="No progress bar."
+    ),
+)
 
 
-@click.group("device")
+@dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
+class _Session:
+    """A puck, and the screen or file that its results go to."""
+
+    options: PuckOptions  # bus, node and how to treat it
+    clock: Clock  # simulated for an emulated puck
+    # what holds the arm of an emulated puck: a hand that has let go
+    hand: SimulatedHand | None
+    output: OutputOptions  # where its results go
+
+    def link(self, *, all_nodes: bool = False) -> "AbstractContextManager[Link]":
+        """Join the bus for a while."""
+        from masrel.lab.hess.puck import connected
+
+        return connected(
+            self.options,
+            clock=self.clock,
+            hand=self.hand,
+            range_end=_RANGE_END,
+            all_nodes=all_nodes,
+        )
+
+    @contextmanager
+    def progress(self, total: int) -> Iterator[Callable[[], None]]:
+        """Show a bar of steps on a terminal."""
+        hidden = self.output.json_file == STDOUT or self.output.quiet or None
+        with tqdm(total=total, unit="", leave=False, disable=hidden) as bar:
+
+            def step() -> None:
+                bar.update()
+
+            yield step
+
+    def write_output(self, lines: list[str], document: dict[str, object]) -> None:
+        """Print lines, or write the document as JSON; both say whether it is real."""
+        simulated = not self.options.moves_hardware
+        note = ["(simulated: there is no hardware on this bus)"] if simulated else []
+        write_output(
+            self.output,
+            document=lambda: {**document, "simulated": simulated},
+            text=lambda: "\n".join([*lines, *note]),
+        )
+
+
+def _puck_command(function: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options that say which puck it is for, as a session."""
+
+    @functools.wraps(function)
+    def command(
+        *,
+        interface: str | None,
+        channel: str,
+        puck: int,
+        direction: str,
+        gear_ratio: float,
+        properties: Path | None,
+        emulate: bool,
+        output: OutputOptions,
+        **kwargs: Any,
+    ) -> None:
+        hand = SimulatedHand(
+            start=_EMULATED_START, end=_RANGE_END, mean_speed=1.0, slip_time=0.0
+        )
+        options = PuckOptions(
+            interface=interface or ("virtual" if emulate else "socketcan"),
+            channel=channel,
+            puck=puck,
+            gear_ratio=gear_ratio,
+            direction=1 if direction == "1" else -1,
+            properties=None if properties is None else read_property_table(properties),
+        )
+        session = _Session(
+            options=options.emulated(_EMULATED_START) if emulate else options,
+            clock=SimulatedClock() if emulate else RealClock(),
+            hand=hand if emulate else None,
+            output=output,
+        )
+        function(session, **kwargs)
+
+    return _puck_options(command)
+
+
+@click.group("device", cls=Commands)
 def device() -> None:
     """Bring a Barrett Puck up on its CAN bus.
 
@@ -27,8 +149,8 @@ def device() -> None:
 
 
 @device.command("probe")
-@puck_command
-def _probe(session: PuckSession) -> None:
+@_puck_command
+def _probe(session: _Session) -> None:
     """Ask every node who it is; nothing is set and nobody is woken."""
     from masrel.lab.hess.puck import probe
 
@@ -48,8 +170,8 @@ def _probe(session: PuckSession) -> None:
 
 
 @device.command("check")
-@puck_command
-def _check(session: PuckSession) -> None:
+@_puck_command
+def _check(session: _Session) -> None:
     """Wake a puck and see whether it can be driven. The arm must be at rest.
 
     It is told its groups and torque limit, goes into torque mode for some
@@ -84,8 +206,8 @@ def _check(session: PuckSession) -> None:
     required=True,
     help="Where the arm is held now, 0 at full flexion.",
 )
-@puck_command
-def _zero(session: PuckSession, angle_deg: float) -> None:
+@_puck_command
+def _zero(session: _Session, angle_deg: float) -> None:
     """Tell a puck where the arm is; it forgets when its supply is switched off."""
     from masrel.lab.hess.puck import zero
 
@@ -105,13 +227,15 @@ def _zero(session: PuckSession, angle_deg: float) -> None:
     is_flag=True,
     help="Say that nobody holds the arm and nothing is in its way: IT MOVES.",
 )
-@puck_command
-def _friction(session: PuckSession, arm_is_free: bool) -> None:
+@_puck_command
+def _friction(session: _Session, arm_is_free: bool) -> None:
     """Turn the free arm at steady speeds and fit B and β of equation (7).
 
     The arm moves by itself, between 40 and 115 deg, at up to 80 deg/s, with at most
     2 N·m, for about 20 s.
     """
+    from masrel.lab.hess import EmergencyStop, open_device
+    from masrel.lab.hess._stop import stop_on_key, stop_on_signals
     from masrel.lab.hess._watchdog import watched
     from masrel.lab.hess.puck import fit_friction, steady_runs
     from masrel.lab.hess.puck._commissioning import LIMITS, SPEEDS
@@ -120,14 +244,27 @@ def _friction(session: PuckSession, arm_is_free: bool) -> None:
         raise click.UsageError(
             "the arm will move by itself; when it is free, say --arm-is-free"
         )
+    stop = EmergencyStop()
+    keys = None if session.hand is not None else sys.stdin  # an emulator is quick
     with (
-        session.emergency_stop() as stop,
-        session.device() as device,
+        stop_on_signals(stop),
+        stop_on_key(stop, keys),
+        open_device(
+            "puck",
+            clock=session.clock,
+            hand=session.hand,
+            range_end=_RANGE_END,
+            options=session.options,
+        ) as device,
         watched(device, LIMITS.watchdog_time) or nullcontext() as watchdog,
         session.progress(2 * len(SPEEDS)) as progress,
     ):
         runs = steady_runs(
-            device, session.clock, watchdog=watchdog, stop=stop, progress=progress
+            device,
+            session.clock,
+            watchdog=watchdog,
+            stop=stop,
+            progress=progress,
         )
         estimate = fit_friction(runs)
     session.write_output(_friction_lines(estimate), dataclasses.asdict(estimate))

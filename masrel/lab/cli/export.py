@@ -7,11 +7,12 @@ from tqdm import tqdm
 
 from masrel._files import refuse_record
 from masrel.cli._options import OutputOptions, output_options
-from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.cli._study_options import of_study
+from masrel.lab.protocol import Protocol, StudyPaths
 
 
 @click.command("export")
-@click.argument("study", type=click.Path(path_type=Path))
+@of_study
 @click.option(
     "--as",
     "form",
@@ -36,7 +37,8 @@ from masrel.lab.protocol import StudyPaths, read_protocol
 )
 @output_options(quiet="No progress bar.")
 def export(
-    study: Path,
+    study: StudyPaths,
+    protocol: Protocol,
     form: str,
     folder: Path,
     include: tuple[str, ...],
@@ -50,11 +52,9 @@ def export(
     from masrel.lab.export import export_study
 
     refuse_record(folder)
-    paths = StudyPaths(study)
-    protocol = read_protocol(paths.protocol)
     with tqdm(desc="export", unit=" files", disable=output.quiet or None) as bar:
         left_out = export_study(
-            paths,
+            study,
             protocol,
             form,
             folder,

@@ -1,6 +1,5 @@
 """``masrel paper``: sheets to print, and those that were filled in, into logs."""
 
-from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,8 +8,14 @@ import click
 
 from masrel.cli import Commands
 from masrel.cli._paths import InputFile
-from masrel.lab.cli._study_options import warnings_as_notes
-from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.cli._study_options import (
+    id_option,
+    of_study,
+    session_option,
+    several,
+    warnings_as_notes,
+)
+from masrel.lab.protocol import Protocol, StudyPaths
 
 if TYPE_CHECKING:
     from masrel.lab.paper import SheetDifference
@@ -22,14 +27,15 @@ def paper() -> None:
 
 
 @paper.command("print")
-@click.argument("study", type=click.Path(path_type=Path))
+@of_study
 @click.option("--rater", "raters", multiple=True, help="Id of a rater; default: all.")
 @click.option(
     "--session", "sessions", multiple=True, help="Id of a session; default: all."
 )
 @click.option("--site", "sites", multiple=True, help="Id of a site; default: all.")
 def _print(
-    study: Path,
+    paths: StudyPaths,
+    protocol: Protocol,
     raters: tuple[str, ...],
     sessions: tuple[str, ...],
     sites: tuple[str, ...],
@@ -42,8 +48,6 @@ def _print(
     """
     from masrel.lab.paper import write_sheets
 
-    paths = StudyPaths(study)
-    protocol = read_protocol(paths.protocol)
     made = write_sheets(paths, protocol, raters=raters, sessions=sessions, sites=sites)
     n_typed, n_kept = len(made.typed), len(made.unchanged)
     note = f", {n_kept} of them filled in and kept" if n_kept else ""
@@ -54,19 +58,13 @@ def _print(
     )
 
 
-def _sheet_options(command: Callable[..., None]) -> Callable[..., None]:
-    options = (
-        click.argument("study", type=click.Path(path_type=Path)),
-        click.argument("file", type=InputFile(path_type=Path)),
-        click.option(
-            "--rater", required=True, help="Id of the rater who filled it in."
-        ),
-        click.option("--session", required=True, help="Id of the session."),
-        click.option("--who", required=True, help="Who typed it."),
-    )
-    for option in reversed(options):
-        command = option(command)
-    return command
+_sheet_options = several(
+    of_study,
+    click.argument("file", type=InputFile(path_type=Path)),
+    id_option,
+    session_option,
+    click.option("--who", required=True, help="Who typed it."),
+)
 
 
 @paper.command("enter")
@@ -78,7 +76,8 @@ def _sheet_options(command: Callable[..., None]) -> Callable[..., None]:
 )
 @click.option("--device", help="What presented the models; default: none.")
 def _enter(
-    study: Path,
+    paths: StudyPaths,
+    protocol: Protocol,
     file: Path,
     rater: str,
     session: str,
@@ -93,8 +92,6 @@ def _enter(
     from masrel.lab.paper import enter_sheet
     from masrel.lab.paper._entry import NO_DEVICE
 
-    paths = StudyPaths(study)
-    protocol = read_protocol(paths.protocol)
     with warnings_as_notes():
         entered = enter_sheet(
             paths,
@@ -116,9 +113,13 @@ def _enter(
 
 @paper.command("again")
 @_sheet_options
-@click.pass_context
 def _again(
-    context: click.Context, study: Path, file: Path, rater: str, session: str, who: str
+    paths: StudyPaths,
+    protocol: Protocol,
+    file: Path,
+    rater: str,
+    session: str,
+    who: str,
 ) -> None:
     """Compare FILE, a sheet that somebody else typed, with what was entered first.
 
@@ -126,8 +127,6 @@ def _again(
     """
     from masrel.lab.paper import compare_sheet
 
-    paths = StudyPaths(study)
-    protocol = read_protocol(paths.protocol)
     differences = compare_sheet(paths, protocol, file, rater, session, who=who)
     for each in differences:
         click.echo(_in_words(each))
@@ -138,7 +137,7 @@ def _again(
             "--answer ANSWER, --who WHO --why TEXT; where the second is: mend FILE and "
             "compare it again"
         )
-        context.exit(1)
+        click.get_current_context().exit(1)
     click.echo(f"session {session} of {rater}: both entries agree")
 
 

@@ -7,20 +7,20 @@ import click
 from masrel._files import write_file
 from masrel.cli._paths import OutputFile, note_inputs
 from masrel.lab._once import read_once
-from masrel.lab.cli._study_options import echo_remarks
-from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.cli._study_options import echo_remarks, of_study
+from masrel.lab.protocol import Protocol, StudyPaths
 
 
 @click.command("ratings")
-@click.argument("study", type=click.Path(path_type=Path))
+@read_once()
+@of_study
 @click.option(
     "-o",
     "--output",
     type=OutputFile(path_type=Path),
     help="File to write; default: STUDY/ratings/ratings.csv.",
 )
-@read_once()
-def ratings(study: Path, output: Path | None) -> None:
+def ratings(paths: StudyPaths, protocol: Protocol, output: Path | None) -> None:
     """Collect the ratings of STUDY from its session logs.
 
     Every chain of hashes is verified, and every recording that is there is held
@@ -36,16 +36,14 @@ def ratings(study: Path, output: Path | None) -> None:
         write_ratings,
     )
 
-    paths = StudyPaths(study)
-    protocol = read_protocol(paths.protocol)
-    note_inputs(*(study / model.file for model in protocol.models if model.file))
+    note_inputs(*(paths.root / model.file for model in protocol.models if model.file))
     echo_remarks(study_remarks(paths, protocol))
     ratings = ratings_from_logs(paths, protocol)
     destination = output or paths.ratings_file
-    write_ratings(ratings, destination, within=None if output else study)
+    write_ratings(ratings, destination, within=None if output else paths.root)
     if output is None:
         raters = raters_text(paths, protocol)  # also with fields that are not public
-        write_file(paths.raters_file, raters, within=study, mode=0o600)
+        write_file(paths.raters_file, raters, within=paths.root, mode=0o600)
     n_rows, n_missing = len(ratings.rows), ratings.n_missing
     label = " (simulated)" if ratings.simulated else ""
     if ratings.n_from_persons == n_rows and label:
@@ -58,7 +56,7 @@ def ratings(study: Path, output: Path | None) -> None:
         beside = paths.answers_file
         if output is not None:
             beside = output.with_name(f"{output.stem}_answers.csv")
-        write_answers(answers, beside, within=None if output else study)
+        write_answers(answers, beside, within=None if output else paths.root)
         n_open = sum(each.answer is None for each in answers)
         click.echo(f"{len(answers) - n_open} answers, {n_open} missing: {beside}")
     n_slow = sum(row.felt in ("below-threshold", "no-catch") for row in ratings.rows)

@@ -12,6 +12,7 @@ from masrel._collector import collector_off
 from masrel._files import check_inside, refuse_record
 from masrel.cli._options import (
     STDOUT,
+    GroupedHelp,
     OutputOptions,
     echo_notes,
     notes_of_call,
@@ -47,7 +48,7 @@ _OTHER_OPTIONS = (
 )
 
 
-@click.command("report")
+@click.command("report", cls=GroupedHelp)
 @click.argument("study", type=click.Path(path_type=Path))
 @click.option(
     "-o",

@@ -1,35 +1,31 @@
 """``masrel run``: present a schedule's models and record every grade."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
 from tqdm import tqdm
 
 from masrel.cli._options import OutputOptions, output_options
-from masrel.lab.cli._study_options import warnings_as_notes
-from masrel.lab.protocol import Protocol, StudyPaths, read_protocol, scale_of
+from masrel.lab.cli._study_options import (
+    clock_option,
+    grades_option,
+    id_option,
+    of_study,
+    session_option,
+    warnings_as_notes,
+)
+from masrel.lab.protocol import Protocol, StudyPaths, scale_of
 
 if TYPE_CHECKING:
     from masrel.lab.run import GradeSource, SessionSummary
 
 
 @click.command("run")
-@click.argument("study", type=click.Path(path_type=Path))
-@click.option("--rater", required=True, help="Id of the rater.")
-@click.option("--session", required=True, help="Id of the session.")
-@click.option(
-    "--grades",
-    type=click.Choice(["console", "simulated"]),
-    default="console",
-    show_default=True,
-    help="Who gives the grades.",
-)
-@click.option(
-    "--clock",
-    type=click.Choice(["real", "simulated"]),
-    help="Clock of the control loop; default: real, for simulated grades simulated.",
-)
+@of_study
+@id_option
+@session_option
+@grades_option
+@clock_option
 @output_options(quiet="No progress bar and no closing line.")
 @click.option(
     "--rehearse",
@@ -37,7 +33,8 @@ if TYPE_CHECKING:
     help="Only rehearse: nothing of it enters the ratings of STUDY.",
 )
 def run(
-    study: Path,
+    paths: StudyPaths,
+    protocol: Protocol,
     rater: str,
     session: str,
     grades: Literal["console", "simulated"],
@@ -52,8 +49,6 @@ def run(
     """
     from masrel.lab.run import run_session
 
-    paths = StudyPaths(study)
-    protocol = read_protocol(paths.protocol)
     n_presentations = len(protocol.models) * protocol.schedule.repeats
     # A person's prompts count the presentations themselves.
     hidden = output.quiet or grades == "console"

@@ -6,7 +6,8 @@ import click
 
 from masrel.cli import STUDY, Commands
 from masrel.cli._options import OutputOptions, output_options, write_output
-from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.cli._study_options import of_study
+from masrel.lab.protocol import Protocol, StudyPaths
 
 
 @click.group("schedule", cls=Commands)
@@ -17,17 +18,16 @@ def schedule() -> None:
     """
 
 
-_study = click.argument("study", type=click.Path(path_type=Path))
-
-
 @schedule.command("show")
-@_study
+@of_study
 @click.option("--site", help="Of the raters of this site alone.")
 @output_options(
     json="Write every count as JSON here; - prints it, and nothing else.",
     figure="Heatmaps as .png, .svg or .pdf.",
 )
-def _show(study: Path, site: str | None, output: OutputOptions) -> None:
+def _show(
+    paths: StudyPaths, protocol: Protocol, site: str | None, output: OutputOptions
+) -> None:
     """Print how even the drawn orders of STUDY are. Not for raters.
 
     Places by model, what follows what, runs.
@@ -41,8 +41,7 @@ def _show(study: Path, site: str | None, output: OutputOptions) -> None:
     from masrel.lab.schedule._balance import order_balance
     from masrel.plots._drawn_values import Drawn
 
-    paths = StudyPaths(study)
-    balances = order_balance(read_protocol(paths.protocol), paths, site)
+    balances = order_balance(protocol, paths, site)
     write_output(
         output,
         document=lambda: order_document(balances),
@@ -54,7 +53,7 @@ def _show(study: Path, site: str | None, output: OutputOptions) -> None:
 
 
 @schedule.command("copy")
-@_study
+@of_study
 @click.option("--site", required=True, help="Id of the site.")
 @click.option(
     "-o",
@@ -64,24 +63,25 @@ def _show(study: Path, site: str | None, output: OutputOptions) -> None:
     required=True,
     help="Folder of the copy.",
 )
-def _copy(study: Path, site: str, destination: Path) -> None:
+def _copy(paths: StudyPaths, protocol: Protocol, site: str, destination: Path) -> None:
     """Copy STUDY for a site, with the site's secret alone."""
     from masrel.lab.schedule import copy_for_site
 
-    paths = StudyPaths(study)
-    copy_for_site(read_protocol(paths.protocol), paths, site, destination)
+    copy_for_site(protocol, paths, site, destination)
     click.echo(f"{destination}: a copy of the study with the secret of {site} alone.")
 
 
 @schedule.command(STUDY)
-@_study
+@of_study
 @click.option(
     "--redraw",
     is_flag=True,
     help="Draw schedules anew that no longer fit the protocol.",
 )
 @click.option("--site", help="Of the raters of this site alone.")
-def _draw(study: Path, redraw: bool, site: str | None) -> None:
+def _draw(
+    paths: StudyPaths, protocol: Protocol, redraw: bool, site: str | None
+) -> None:
     """Draw each rater's schedule and blinded sheet for every session of STUDY.
 
     Schedules are drawn once: those that are there stay as they are. When the
@@ -93,8 +93,6 @@ def _draw(study: Path, redraw: bool, site: str | None) -> None:
     from masrel.lab.schedule import site_of_copy
     from masrel.lab.schedule._secret import site_of
 
-    paths = StudyPaths(study)
-    protocol = read_protocol(paths.protocol)
     site = site or site_of_copy(paths)
     written = set(allot_schedules(paths, protocol, site=site, redraw=redraw))
     places = [

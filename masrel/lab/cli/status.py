@@ -1,28 +1,22 @@
 """``masrel status``: how far a study is, and what to do next."""
 
-import dataclasses
-from pathlib import Path
+from collections.abc import Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 import click
 
 from masrel.cli import STUDY, Commands
-from masrel.cli._options import (
-    STDOUT,
-    OutputOptions,
-    output_options,
-    write_json,
-    write_output,
-)
+from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.errors import SessionLogError
 from masrel.lab._once import read_once
-from masrel.lab.protocol import StudyPaths, read_protocol
+from masrel.lab.cli._study_options import of_study
+from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.protocol._values import field_heading
 
 if TYPE_CHECKING:
     from masrel.lab._event_log import Event
-    from masrel.lab.progress import NextStep, RaterProgress, SessionProgress
-    from masrel.lab.protocol import Protocol
+    from masrel.lab.progress import RaterProgress, SessionProgress
     from masrel.tables._tables import Table
 
 
@@ -35,84 +29,54 @@ def status() -> None:
 
 
 @status.command(STUDY)
-@click.argument("study", type=click.Path(path_type=Path))
+@read_once()
+@of_study
 @output_options(json="Write it as JSON here; - prints it, and nothing else.")
-def _study(study: Path, output: OutputOptions) -> None:
+def _study(paths: StudyPaths, protocol: Protocol, output: OutputOptions) -> None:
     """Say how far STUDY is: every session, what happened beside them, one next step.
 
     By the logs alone, whose chains are verified; no recording is read, nothing is
     changed, and no model is named.
     """
-    overview = _Overview.of(StudyPaths(study))
-    if output.json_file is not None:
-        write_json(overview.document(), output.json_file)
-    if output.json_file != STDOUT:
-        click.echo(overview.text())
+    from masrel.lab.conduct import read_conduct
+    from masrel.lab.progress import next_step, rater_progress, session_progress
+    from masrel.tables._tables import as_text
 
-
-@dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
-class _Overview:
-    """What is shown of a study."""
-
-    study: str
-    sessions: "tuple[SessionProgress, ...]"
-    raters: "tuple[RaterProgress, ...]"
-    events: "tuple[Event, ...]"
-    problem: str | None  # why what happened beside the sessions cannot be read
-    next: "NextStep"
-
-    @classmethod
-    @read_once()
-    def of(cls, paths: StudyPaths) -> "_Overview":
-        from masrel.lab.conduct import read_conduct
-        from masrel.lab.progress import next_step, rater_progress, session_progress
-
-        protocol = read_protocol(paths.protocol)
-        sessions = session_progress(paths, protocol)
-        raters: tuple[RaterProgress, ...] = ()
-        events: tuple[Event, ...] = ()
-        problem = None
-        try:
-            raters = rater_progress(paths, protocol, sessions)
-            events = read_conduct(paths)
-        except SessionLogError as error:  # hides no session
-            problem = str(error)
-        return cls(
-            study=protocol.study.id,
-            sessions=sessions,
-            raters=raters,
-            events=events,
-            problem=problem,
-            next=next_step(paths, sessions, raters),
-        )
-
-    def document(self) -> dict[str, object]:
-        return {
-            "format": "masrel status 1",
-            "study": self.study,
-            "sessions": [dataclasses.asdict(session) for session in self.sessions],
+    sessions = session_progress(paths, protocol)
+    raters: tuple[RaterProgress, ...] = ()
+    events: tuple[Event, ...] = ()
+    problem = None  # why what happened beside the sessions cannot be read
+    try:
+        raters = rater_progress(paths, protocol, sessions)
+        events = read_conduct(paths)
+    except SessionLogError as error:  # hides no session
+        problem = str(error)
+    step = next_step(paths, sessions, raters)
+    problems = (problem, *(session.problem for session in sessions))
+    write_output(
+        output,
+        document=lambda: {
+            "study": protocol.study.id,
+            "sessions": [asdict(session) for session in sessions],
             "raters": [
                 {"rater": r.rater, "status": r.status, "is_late": r.is_late}
-                for r in self.raters
+                for r in raters
             ],
             "events": [
-                {"event": e.kind, "time_utc": e.time_utc, **e.fields}
-                for e in self.events
+                {"event": e.kind, "time_utc": e.time_utc, **e.fields} for e in events
             ],
-            "problem": self.problem,
-            "next": dataclasses.asdict(self.next),
-        }
-
-    def text(self) -> str:
-        from masrel.tables._tables import as_text
-
-        parts = [as_text(_sessions_table(self))]
-        problems = (self.problem, *(session.problem for session in self.sessions))
-        parts += [problem for problem in problems if problem is not None]
-        if self.events:
-            parts.append("\n".join(map(_event_line, self.events)))
-        parts.append(f"next: {self.next.command}  ({self.next.why})")
-        return "\n\n".join(parts)
+            "problem": problem,
+            "next": asdict(step),
+        },
+        text=lambda: "\n\n".join(
+            [
+                as_text(_sessions_table(protocol.study.id, sessions, raters)),
+                *(each for each in problems if each is not None),
+                *(["\n".join(map(_event_line, events))] if events else []),
+                f"next: {step.command}  ({step.why})",
+            ]
+        ),
+    )
 
 
 _COUNTS = {
@@ -126,11 +90,14 @@ _COUNTS = {
 """Columns that are there when any session has something in them."""
 
 
-def _sessions_table(overview: _Overview) -> "Table":
+def _sessions_table(
+    study: str,
+    sessions: "Sequence[SessionProgress]",
+    raters: "Sequence[RaterProgress]",
+) -> "Table":
     from masrel.tables._tables import Column, Table
 
-    sessions = overview.sessions
-    status = {rater.rater: rater.status for rater in overview.raters}
+    status = {rater.rater: rater.status for rater in raters}
     n_complete = sum(session.stage == "complete" for session in sessions)
     counts = {
         heading: key
@@ -139,8 +106,7 @@ def _sessions_table(overview: _Overview) -> "Table":
     }
     return Table(
         name="status",
-        caption=f"Study {overview.study}: {n_complete} of {len(sessions)} sessions "
-        "complete",
+        caption=f"Study {study}: {n_complete} of {len(sessions)} sessions complete",
         columns=(
             Column(key="session", heading="Session", align="left"),
             Column(key="rater", heading="Rater", align="left"),
@@ -187,36 +153,35 @@ def _minute(time_utc: str) -> str:
 
 
 @status.command("raters")
-@click.argument("study", type=click.Path(path_type=Path))
+@read_once()
+@of_study
 @output_options(
     json="Write the list here; - prints it, and nothing else.",
     csv="Print the list as CSV.",
 )
-@read_once()
-def _raters(study: Path, output: OutputOptions) -> None:
+def _raters(paths: StudyPaths, protocol: Protocol, output: OutputOptions) -> None:
     """List the raters of STUDY: how far each came, and what is known of him or her."""
     from masrel.lab.progress import rater_progress, session_progress
 
-    paths = StudyPaths(study)
-    protocol = read_protocol(paths.protocol)
     sessions = session_progress(paths, protocol)
     raters = rater_progress(paths, protocol, sessions)
     simulated = any(session.simulated for session in sessions)
     write_output(
         output,
-        document=lambda: {"raters": [_rater_document(each) for each in raters]},
+        document=lambda: {
+            "raters": [
+                {
+                    "rater": rater.rater,
+                    "site": rater.site,
+                    "status": rater.status,
+                    "is_late": rater.is_late,
+                    "fields": dict(rater.values),
+                }
+                for rater in raters
+            ]
+        },
         text=lambda: _raters_table(raters, protocol, simulated=simulated),
     )
-
-
-def _rater_document(rater: "RaterProgress") -> dict[str, object]:
-    return {
-        "rater": rater.rater,
-        "site": rater.site,
-        "status": rater.status,
-        "is_late": rater.is_late,
-        "fields": dict(rater.values),
-    }
 
 
 def _raters_table(

@@ -9,8 +9,14 @@ from masrel._files import write_file
 from masrel.cli import STUDY, Commands
 from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.cli._paths import OutputFile
-from masrel.lab.cli._study_options import warnings_as_notes
-from masrel.lab.protocol import Protocol, StudyPaths, read_protocol, scale_of
+from masrel.lab.cli._study_options import (
+    clock_option,
+    grades_option,
+    id_option,
+    of_study,
+    warnings_as_notes,
+)
+from masrel.lab.protocol import Protocol, StudyPaths, scale_of
 
 if TYPE_CHECKING:
     from masrel.lab.run import GradeSource
@@ -27,28 +33,15 @@ def train() -> None:
     """
 
 
-_study = click.argument("study", type=click.Path(path_type=Path))
-_rater = click.option("--rater", required=True, help="Id of the rater.")
-
-
 @train.command(STUDY)
-@_study
-@_rater
-@click.option(
-    "--grades",
-    type=click.Choice(["console", "simulated"]),
-    default="console",
-    show_default=True,
-    help="Who gives the grades.",
-)
-@click.option(
-    "--clock",
-    type=click.Choice(["real", "simulated"]),
-    help="Clock of the control loop; default: real, for simulated grades simulated.",
-)
+@of_study
+@id_option
+@grades_option
+@clock_option
 @output_options(quiet="No closing line.")
 def _train(
-    study: Path,
+    paths: StudyPaths,
+    protocol: Protocol,
     rater: str,
     grades: Literal["console", "simulated"],
     clock: Literal["real", "simulated"] | None,
@@ -64,8 +57,6 @@ def _train(
     from masrel.lab.report._training import NOT_RATINGS, outcome
     from masrel.lab.training import train_rater
 
-    paths = StudyPaths(study)
-    protocol = read_protocol(paths.protocol)
     with warnings_as_notes():
         record = train_rater(
             paths,
@@ -103,8 +94,8 @@ def _source(
 
 
 @train.command("show")
-@_study
-@_rater
+@of_study
+@id_option
 @click.option("--level", type=float, default=0.95, show_default=True)
 @click.option(
     "--html",
@@ -118,7 +109,12 @@ def _source(
     csv="The learning curve as CSV, every digit kept.",
 )
 def _show(
-    study: Path, rater: str, level: float, page: Path | None, output: OutputOptions
+    paths: StudyPaths,
+    protocol: Protocol,
+    rater: str,
+    level: float,
+    page: Path | None,
+    output: OutputOptions,
 ) -> None:
     """Show the training of one rater of STUDY so far; nothing is presented."""
     from masrel.lab.report._training import (
@@ -129,8 +125,6 @@ def _show(
     )
     from masrel.lab.training import read_training
 
-    paths = StudyPaths(study)
-    protocol = read_protocol(paths.protocol)
     record = read_training(paths, protocol, rater)
     curve, confusion = training_tables(record, level=level)
     write_output(

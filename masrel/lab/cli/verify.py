@@ -2,6 +2,7 @@
 
 import dataclasses
 import sys
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,15 +45,16 @@ def verify(study: Path, anchor_file: Path | None, output: OutputOptions) -> None
     paths = StudyPaths(study)
     with warnings_as_notes():
         verification = verify_study(paths)
-    findings, anchors = list(verification.findings), anchors_of(paths)
-    findings += _anchored(paths, anchor_file, anchors)
-    is_whole = not any(finding.weight == "broken" for finding in findings)
+    anchors = anchors_of(paths)
+    findings = (*verification.findings, *_anchored(paths, anchor_file, anchors))
+    verification = dataclasses.replace(verification, findings=findings)
+    n_broken = sum(finding.weight == "broken" for finding in findings)
     if output.json_file is not None:
-        document = _document(verification, findings, anchors, is_whole=is_whole)
+        document = _document(verification, anchors, is_whole=not n_broken)
         write_json(document, output.json_file)
     if output.json_file != STDOUT:
-        _show(study, verification, findings, anchors, is_whole=is_whole)
-    if not is_whole:
+        _show(study, verification, anchors, n_broken)
+    if n_broken:
         sys.exit(2)
 
 
@@ -70,7 +72,15 @@ def _anchored(
         )
     if file.exists():
         old = read_anchors(file)
-        _say_what_is_newer(file, old, anchors)
+        lines = {each.log: each.line for each in sorted(old, key=attrgetter("line"))}
+        newer = sum(lines.get(each.log, 0) < each.line for each in anchors)
+        if newer:
+            click.echo(
+                f"note: {newer} of {len(anchors)} logs have lines that no anchor in "
+                f"{file} covers yet; --anchor with another file keeps anchors of them "
+                "too",
+                err=True,
+            )
         return anchor_findings(study, old)
     if anchors:
         write_anchors(anchors, file)
@@ -80,41 +90,13 @@ def _anchored(
     return ()
 
 
-def _say_what_is_newer(
-    file: Path, old: "tuple[Anchor, ...]", anchors: "tuple[Anchor, ...]"
-) -> None:
-    lines: dict[str, int] = {}
-    for anchor in old:
-        lines[anchor.log] = max(anchor.line, lines.get(anchor.log, 0))
-    newer = sum(lines.get(anchor.log, 0) < anchor.line for anchor in anchors)
-    if newer:
-        click.echo(
-            f"note: {newer} of {len(anchors)} logs have lines that no anchor in {file} "
-            "covers yet; --anchor with another file keeps anchors of them too",
-            err=True,
-        )
-
-
 def _document(
-    verification: "Verification",
-    findings: "list[Finding]",
-    anchors: "tuple[Anchor, ...]",
-    *,
-    is_whole: bool,
+    verification: "Verification", anchors: "tuple[Anchor, ...]", *, is_whole: bool
 ) -> dict[str, object]:
-    return {
-        "is_whole": is_whole,
-        "sessions": [dataclasses.asdict(record) for record in verification.sessions],
-        "trainings": [dataclasses.asdict(record) for record in verification.trainings],
-        "rehearsals": [
-            dataclasses.asdict(record) for record in verification.rehearsals
-        ],
-        "findings": [
-            {**dataclasses.asdict(finding), "path": str(finding.path)}
-            for finding in findings
-        ],
-        "anchors": [dataclasses.asdict(anchor) for anchor in anchors],
-    }
+    document = {"is_whole": is_whole, **dataclasses.asdict(verification)}
+    for finding in document["findings"]:
+        finding["path"] = str(finding["path"])
+    return {**document, "anchors": [dataclasses.asdict(anchor) for anchor in anchors]}
 
 
 def _stage_of(record: "SessionRecord") -> str:
@@ -130,10 +112,8 @@ def _stage_of(record: "SessionRecord") -> str:
 def _show(
     study: Path,
     verification: "Verification",
-    findings: "list[Finding]",
     anchors: "tuple[Anchor, ...]",
-    *,
-    is_whole: bool,
+    n_broken: int,
 ) -> None:
     for record in (*verification.sessions, *verification.rehearsals):
         number = record.rehearsal
@@ -146,12 +126,11 @@ def _show(
         )
     for anchor in anchors:
         click.echo(f"anchor: {anchor}")
-    for finding in findings:
+    for finding in verification.findings:
         click.echo(f"{finding.weight}: {finding.message}", err=True)
-    n_broken = sum(finding.weight == "broken" for finding in findings)
-    n_doubts = len(findings) - n_broken
+    n_doubts = len(verification.findings) - n_broken
     doubts = f", {n_doubts} in doubt" if n_doubts else ""
-    if is_whole:
-        click.echo(f"{study}: whole{doubts}.")
-    else:
+    if n_broken:
         click.echo(f"masrel: {study}: {n_broken} broken{doubts}", err=True)
+    else:
+        click.echo(f"{study}: whole{doubts}.")
