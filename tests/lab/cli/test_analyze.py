@@ -80,14 +80,6 @@ def test_json_on_stdout_is_one_document_and_nothing_is_written(
     assert not (study / "analysis.json").exists()
 
 
-def test_json_in_a_file_holds_the_same(masrel: Caller, study: Path) -> None:
-    there = study / "deep" / "mine.json"
-    assert masrel("analyze", study, "--json", there).code == 0
-    printed = masrel("analyze", study, "--json", "-").out
-    assert there.read_text(encoding="utf-8") == printed
-    assert not (study / "analysis.json").exists()
-
-
 def test_csv_on_stdout_is_tables_alone(masrel: Caller, study: Path) -> None:
     done = masrel("analyze", study, "--csv")
     assert done.code == 0
@@ -96,12 +88,6 @@ def test_csv_on_stdout_is_tables_alone(masrel: Caller, study: Path) -> None:
     assert [head[0] for head in heads] == ["id", "model", "model", "question"]
     assert {head[-1] for head in heads} == {"data"}
     assert "again" in done.err
-
-
-def test_two_wants_for_stdout_are_refused(masrel: Caller, study: Path) -> None:
-    done = masrel("analyze", study, "--json", "-", "--csv")
-    assert (done.code, done.out) == (2, "")
-    assert "choose one" in done.err
 
 
 def test_what_is_to_know_of_an_interval_is_a_note_on_stderr(
@@ -147,44 +133,6 @@ def test_wrong_ratings_are_one_sentence_with_their_file(
     assert str(study / "ratings") in done.err
     assert all(part in done.err for part in said), done.err
     assert not (study / "analysis.json").exists()
-
-
-def test_a_folder_without_a_study_is_one_sentence(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    done = masrel("analyze", tmp_path)
-    assert (done.code, done.out) == (2, "")
-    assert str(tmp_path / "protocol.toml") in done.err
-    assert done.err.count("\n") == 1
-
-
-def test_a_study_without_ratings_says_how_to_get_them(
-    masrel: Caller, study: Path
-) -> None:
-    (study / "ratings/published.csv").unlink()
-    done = masrel("analyze", study)
-    assert (done.code, done.out) == (2, "")
-    assert "masrel run makes" in done.err
-    assert str(study) in done.err
-
-
-def test_a_plan_that_does_not_fit_names_its_line(masrel: Caller, study: Path) -> None:
-    protocol = study / "protocol.toml"
-    text = protocol.read_text(encoding="utf-8")
-    write(protocol, text.replace('"fleiss_kappa"', '"cohen_kappa"'))
-    done = masrel("analyze", study)
-    assert (done.code, done.out) == (2, "")
-    assert "kappa" in done.err
-    assert "Traceback" not in done.err
-
-
-def test_a_place_that_cannot_be_written_is_one_sentence(
-    masrel: Caller, study: Path
-) -> None:
-    done = masrel("analyze", study, "--json", study)
-    assert done.code == 2
-    assert str(study) in done.err
-    assert done.err.count("\n") == 1
 
 
 def test_an_analysis_loads_no_library_that_draws(study: Path) -> None:

@@ -132,53 +132,6 @@ def test_nothing_is_overwritten_unless_asked(masrel: Caller, tmp_path: Path) -> 
     assert read_model_file(tmp_path / "D02.toml").residual_ratio == 0.25
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("HM1", "HM9", "-n", "1"), "MODEL: needs HM1, HM2, HM3, HM4 or a model file"),
-        (("HM1", "-n", "1"), "models: need two or more, got 1"),
-        (("HM1", "HM2", "HM1", "-n", "2"), "got two called HM1"),
-        (
-            ("HM1", "HM2", "-n", "0"),
-            "number of models: needs a multiple of 1, one or more",
-        ),
-        (
-            ("HM1", "HM2", "-n", "-3"),
-            "number of models: needs a multiple of 1, one or more",
-        ),
-        (("HM1", "HM2", "HM3", "-n", "3"), "number of models: needs a multiple of 2"),
-        (
-            ("HM1", "none.toml", "-n", "1"),
-            "needed a model file, got none.toml: No such",
-        ),
-        (("HM1", "HM2", "-n", "1", "--overwrite"), "--overwrite: needs --output"),
-    ],
-)
-def test_calls_that_are_wrong_are_refused(
-    masrel: Caller, arguments: tuple[str, ...], message: str
-) -> None:
-    assert message in refused(masrel("joint", "between", *arguments))
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (b"\xff\xfe\x00", "needed a model file, got"),
-        (b"not toml", "needed a model file, got"),
-        (b'format = "another"\n', 'whose format is "masrel joint model 1"'),
-        (b"", 'whose format is "masrel joint model 1"'),
-    ],
-)
-def test_files_that_are_no_models_are_refused(
-    masrel: Caller, tmp_path: Path, content: bytes, message: str
-) -> None:
-    path = tmp_path / "other.toml"
-    path.write_bytes(content)
-    said = refused(masrel("joint", "between", "HM1", path, "-n", "1"))
-    assert message in said
-    assert "other.toml" in said
-
-
 def test_a_file_that_hides_whether_it_is_simulated_is_refused(
     masrel: Caller, tmp_path: Path
 ) -> None:
@@ -198,22 +151,3 @@ def test_models_that_read_the_law_differently_have_nothing_between(
         file.write('[constants]\npost_catch = "additive"\n')
     said = refused(masrel("joint", "between", "HM1", path, "-n", "1"))
     assert said.startswith("models: HM1 and a need one post_catch")
-
-
-def test_a_folder_that_is_a_file_is_refused(masrel: Caller, tmp_path: Path) -> None:
-    path = tmp_path / "file"
-    path.write_text("", encoding="utf-8")
-    said = refused(masrel("joint", "between", "HM1", "HM2", "-n", "1", "-o", path))
-    assert str(path) in said
-
-
-def test_json_may_lie_in_the_folder_that_is_made(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    folder = tmp_path / "new"
-    file = folder / "all.json"
-    done = masrel(
-        "joint", "between", "HM1", "HM2", "-n", "1", "-o", folder, "--json", file
-    )
-    assert done.code == 0, done.err
-    assert sorted(path.name for path in folder.iterdir()) == ["D01.toml", "all.json"]

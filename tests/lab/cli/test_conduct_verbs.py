@@ -100,26 +100,3 @@ def test_bad_input_is_one_sentence_and_records_nothing(
 ) -> None:
     assert reason in refusal(*words[:2], study.root, *words[2:], "--who", "MK")
     assert not study.conduct_file.exists()
-
-
-@pytest.mark.slow
-def test_a_merge_is_said_and_goes_on(study: StudyPaths, tmp_path: Path) -> None:
-    south = StudyPaths(tmp_path / "south")
-    call("schedule", study.root)
-    south.root.mkdir()
-    for file in (study.protocol, *study.schedules.iterdir()):
-        target = south.root / file.relative_to(study.root)
-        target.parent.mkdir(exist_ok=True)
-        target.write_bytes(file.read_bytes())
-    for root, rater in ((study.root, "R1"), (south.root, "R2")):
-        where = ("--rater", rater, "--session", "test", "--grades", "simulated")
-        call("run", root, *where)
-    out = tmp_path / "both"
-    said = call("merge", study.root, south.root, "-o", out)
-    assert said == (
-        f"{out}: 2 studies with 2 raters and 2 session logs, verified. "
-        f"Next: masrel ratings {out}\n"
-    )
-    assert "2 of 2 sessions complete" in call("status", out)
-    assert "8 ratings" in call("ratings", out)
-    assert "needed two or more, got 1" in refusal("merge", out, "-o", tmp_path / "c")

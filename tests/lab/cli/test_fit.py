@@ -64,43 +64,6 @@ def test_a_fit_goes_into_a_protocol(
     assert joint.catch_slope == pytest.approx(0.35, rel=0.1)
 
 
-def test_a_fit_says_whether_it_fits_everywhere(
-    masrel: Caller, files: list[Path], tmp_path: Path
-) -> None:
-    done = masrel(
-        "joint", "fit", *files, "-o", tmp_path / "m.toml", "--json", tmp_path / "f.json"
-    )
-    document = json.loads((tmp_path / "f.json").read_text(encoding="utf-8"))
-    lack = document["lack_of_fit"]
-    assert lack["verdict"] == "fits"
-    assert lack["sentence"] in done.out
-    assert "From the catch on" in done.out
-    assert "Noise at rest" in done.out
-    assert {"runs", "autocorrelation", "sd_nm"} <= set(lack["phases"][0])
-    model = tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))
-    assert model["remarks"][0] == lack["sentence"]
-    assert model["lack_of_fit"]["verdict"] == "fits"
-    assert model["lack_of_fit"]["explained"] == lack["explained"]
-
-
-@pytest.mark.slow
-def test_fits_are_compared(masrel: Caller, files: list[Path], tmp_path: Path) -> None:
-    done = masrel("joint", "fit", *files, "--compare", "--json", tmp_path / "f.json")
-    assert done.code == 0, done.err
-    assert "Fits compared by leaving trials out" in done.out
-    document = json.loads((tmp_path / "f.json").read_text(encoding="utf-8"))
-    compared = document["comparison"]
-    assert [each["fitted"] for each in compared] == [
-        [],
-        ["gravity"],
-        ["arm_inertia"],
-        ["drift"],
-        ["lag"],
-        ["rise"],
-    ]
-    assert sum(each["chosen"] for each in compared) == 1
-
-
 def test_json_on_stdout_is_one_document_and_nothing_else(
     masrel: Caller, files: list[Path]
 ) -> None:
@@ -167,23 +130,6 @@ def test_a_wrong_call_is_one_sentence(
     assert "Traceback" not in done.err
 
 
-def test_a_file_that_is_not_there_is_named(masrel: Caller) -> None:
-    done = masrel("joint", "fit", "absent.csv")
-    assert done.code == 2
-    assert "absent.csv: no such file" in done.err
-
-
-@pytest.mark.parametrize("speed", ["-3", "0", "nan", "inf"])
-def test_a_limit_that_is_none_is_refused_in_its_unit(
-    masrel: Caller, files: list[Path], speed: str
-) -> None:
-    done = masrel("joint", "fit", files[0], "--slow-below", speed)
-    assert done.code == 2
-    assert done.err == (
-        f"masrel: --slow-below: needs more than 0 deg/s and finite, got {speed}\n"
-    )
-
-
 def test_only_fast_stretches_are_refused_with_the_option(
     masrel: Caller, files: list[Path]
 ) -> None:
@@ -205,9 +151,3 @@ def test_an_inertia_below_0_is_refused(masrel: Caller, tmp_path: Path) -> None:
     )
     assert (done.code, done.out) == (2, "")
     assert "this is not the law: J of all trials is -0.0" in done.err
-
-
-def test_a_folder_is_no_recording(masrel: Caller, tmp_path: Path) -> None:
-    done = masrel("joint", "fit", tmp_path)
-    assert (done.code, done.out) == (2, "")
-    assert done.err == f"masrel: {tmp_path}: a folder; needs a file\n"

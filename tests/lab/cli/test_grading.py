@@ -51,11 +51,3 @@ def test_only_the_ratings_asked_for_are_regressed(masrel: Caller) -> None:
     done = masrel("grading", STUDY, "--session", "third")
     assert done.code == 2
     assert done.err.startswith("masrel: --session: needs one of ")
-
-
-def test_a_folder_that_is_not_there_is_named_before_anything_is_read(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    done = masrel("grading", tmp_path / "none", "--json", tmp_path / "no" / "it.json")
-    assert (done.code, done.out) == (2, "")
-    assert done.err.startswith("masrel: --json: needs a folder that exists, got ")

@@ -1,6 +1,5 @@
 """Files that would fill the memory, hold a verb up or break a parser: one sentence."""
 
-import gzip
 import hashlib
 import io
 import json
@@ -99,24 +98,6 @@ def test_a_small_archive_of_large_columns(tmp_path: Path, masrel: Caller) -> Non
     refused(masrel("joint", "fit", tmp_path / "short.npz"), "not an archive of columns")
 
 
-def test_a_small_packed_table_that_is_large(
-    tmp_path: Path, masrel: Caller, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("masrel.ratings._sheet.MAX_UNPACKED", 1000)
-    packed = tmp_path / "table.csv.gz"
-    packed.write_bytes(gzip.compress(b"item,A,B\n" + b"1,1,1\n" * 1000))
-    done = masrel("agree", packed, "--target", "items")
-    refused(done, "more than 1000 bytes when unpacked")
-
-
-def test_a_simulated_hand_does_not_take_an_hour(study: Path, masrel: Caller) -> None:
-    slow = "[simulated_raters]\nmean_speed_deg_s = 0.1"
-    changed(study, r"(?m)^\[simulated_raters\]$", slow)
-    text = (study / "protocol.toml").read_text()
-    (study / "protocol.toml").write_text(text.replace("mean_speed_deg_s = 85.0", ""))
-    refused(masrel("check", study), "needed a number at least 1, got 0.1")
-
-
 DEEP = {
     "arrays": "x = " + "[" * 100_000,
     "tables": "x = " + "{a=" * 50_000,
@@ -210,13 +191,6 @@ def test_deep_facts_of_a_recording(tmp_path: Path, masrel: Caller) -> None:
     (tmp_path / "a.json").write_text("[" * 100_000)
     motion = ("--motion", "recording", "--recording", tmp_path / "a.npz")
     refused(masrel("joint", "trace", "--model", "HM1", *motion), "nested too deep")
-
-
-@pytest.mark.parametrize("name", ["CON", "nul", "Com1", "LPT9.x"])
-def test_names_of_devices_are_no_ids(name: str, study: Path, masrel: Caller) -> None:
-    with (study / "protocol.toml").open("a") as file:
-        file.write(f'\n[[raters]]\nid = "{name}"\n')
-    refused(masrel("check", study), f"got {json.dumps(name)}")
 
 
 @pytest.mark.parametrize(

@@ -103,20 +103,6 @@ def test_a_spoilt_file_is_named_and_nothing_is_written(
     assert not (study / "report").exists()
 
 
-def test_a_missing_study_is_one_sentence(masrel: Caller, tmp_path: Path) -> None:
-    done = masrel("report", tmp_path / "nowhere")
-    assert (done.code, done.out) == (2, "")
-    assert str(tmp_path / "nowhere") in done.err
-    assert done.err.count("\n") == 1
-
-
-def test_a_missing_file_of_ratings_is_one_sentence(masrel: Caller, study: Path) -> None:
-    done = masrel("report", study, "--ratings", study / "none.csv")
-    assert (done.code, done.out) == (2, "")
-    assert str(study / "none.csv") in done.err
-    assert done.err.count("\n") == 1
-
-
 def test_an_output_that_is_a_file_is_refused(masrel: Caller, study: Path) -> None:
     done = masrel("report", study, "--quiet", "-o", study / "protocol.toml")
     assert (done.code, done.out) == (2, "")

@@ -137,8 +137,3 @@ def test_what_is_no_older_report_is_refused_before_anything_is_made(
     assert done.err.startswith("masrel: --against: ")
     assert words in done.err
     assert not (study / "report").exists()
-
-
-def test_no_change_needs_something_to_compare_with(masrel: Caller, study: Path) -> None:
-    done = masrel("report", study, "--no-change")
-    assert "masrel: --no-change: needs --against" in done.err

@@ -42,23 +42,6 @@ def test_a_site_is_drawn_and_the_other_later(masrel: Caller, study: StudyPaths) 
     assert "0 drawn, 2 kept" in masrel("schedule", study.root, "--site", "south").out
 
 
-def test_a_complete_design_shows_its_balance(masrel: Caller, study: StudyPaths) -> None:
-    masrel("schedule", study.root)
-    shown = masrel("schedule", "show", study.root, "--site", "north")
-    assert shown.code == 0
-    lines = shown.out.splitlines()
-    assert lines[1].startswith("Not for raters")
-    # 4 rows of a Williams design of 4: each model once in each place, each pair once
-    row = next(line.split() for line in lines if line.startswith("test"))
-    assert row[:8] == ["test", "north", "4", "4", "1", "1", "0", "1"]
-    places = lines.index(
-        "How often each model stands in each place, session test, site north"
-    )
-    assert [line.split() for line in lines[places + 3 : places + 7]] == [
-        [model, "1", "1", "1", "1"] for model in ("HM1", "D1", "D2", "HM2")
-    ]
-
-
 def test_every_count_is_that_of_the_files(masrel: Caller, study: StudyPaths) -> None:
     masrel("schedule", study.root)
     document = json.loads(masrel("schedule", "show", study.root, "--json", "-").out)
@@ -132,22 +115,6 @@ def test_a_copy_for_a_site_draws_and_verifies_by_itself(
         assert checked.code == 0, checked.err
 
 
-@pytest.mark.parametrize(
-    ("options", "sentence"),
-    [
-        (["--copy-to", "x"], "schedule --copy-to is now masrel schedule copy"),
-        (["--site", "east"], "site: needed one of north, south, got 'east'"),
-    ],
-)
-def test_options_that_it_does_not_have_are_refused(
-    masrel: Caller, study: StudyPaths, options: list[str], sentence: str
-) -> None:
-    refused = masrel("schedule", study.root, *options)
-    assert refused.code != 0
-    assert sentence in refused.err
-    assert not study.schedules.exists()
-
-
 def test_a_row_that_was_forged_is_broken(masrel: Caller, study: StudyPaths) -> None:
     masrel("schedule", study.root)
     file = study.schedule_file("R1", "test")
@@ -175,20 +142,6 @@ def test_sites_that_drew_by_themselves_are_merged(
     masrel("schedule", study.root)
     for file in sorted(study.schedules.glob("test_*.csv")):
         assert (both / "schedules" / file.name).read_bytes() == file.read_bytes()
-
-
-def test_a_copy_without_the_secret_is_not_merged(
-    masrel: Caller, study: StudyPaths, tmp_path: Path
-) -> None:
-    other = tmp_path / "south"
-    other.mkdir()
-    (other / "protocol.toml").write_bytes(study.protocol.read_bytes())
-    masrel("schedule", study.root, "--site", "north")
-    masrel("schedule", other, "--site", "south")
-    refused = masrel("merge", study.root, other, "-o", tmp_path / "both")
-    assert refused.code == 2
-    assert "commitment" in refused.err
-    assert not (tmp_path / "both").exists()
 
 
 def test_the_copy_of_a_site_is_about_that_site_alone(

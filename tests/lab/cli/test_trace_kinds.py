@@ -2,7 +2,6 @@
 
 import csv
 import json
-import re
 from math import degrees, radians
 from pathlib import Path
 
@@ -11,7 +10,6 @@ import pytest
 from click.testing import CliRunner, Result
 
 from masrel.cli import cli
-from masrel.errors import MasrelError
 from masrel.lab.elbow import MODELS, ConstantSpeed
 from masrel.lab.elbow.tone import ClaspKnife, Contracture, ToneModel
 
@@ -112,54 +110,6 @@ def test_a_model_of_a_study_may_be_of_another_kind() -> None:
     assert scene["peak_torque_nm"] == stretched["peak_torque_nm"]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (
-            ("--kind", "clonis"),
-            "--kind: needed one of spastic-elbow, .*; did you mean clonus",
-        ),
-        (("--kind", "spastic-elbow"), "--kind: needs another kind than spastic-elbow"),
-        (
-            ("--kind", "clonus", "--parameter", "x=1"),
-            '--parameter x: needed a key of kind "clonus"',
-        ),
-        (
-            ("--kind", "clonus", "--parameter", "delay_s=-1"),
-            "--parameter delay_s: needed 0 or more, got -1.0",
-        ),
-        (
-            ("--kind", "clonus", "--parameter", "delay_s"),
-            "--parameter: needs KEY=VALUE with a number, got 'delay_s'",
-        ),
-        (
-            ("--kind", "clonus", "--kind", "dystonia", "--parameter", "delay_s=1"),
-            "--parameter: goes with one --kind, whose it is",
-        ),
-        (
-            ("--kind", "contracture", "--to-deg", 140),
-            "--to-deg: needs at most the end of range of every model, 125 deg, got 140",
-        ),
-        (
-            ("--kind", "clonus", "--output", "work"),
-            "--output: needs spastic elbows, got clonus",
-        ),
-        (("--kind", "clonus", "--rest-deg", 20), "need a spastic elbow, got clonus"),
-        (("--kind", "clonus", "--at-s", 9), "--at-s: needs times within the motion"),
-        (
-            ("--kind", "clonus", "--figure", "x.png", "--view", "schematic"),
-            "--view schematic: shows the catch of a spastic elbow, got other kinds too",
-        ),
-    ],
-)
-def test_what_cannot_be_traced_is_one_sentence(
-    arguments: tuple[object, ...], words: str
-) -> None:
-    done = run(*arguments, "--speed-deg-s", 90)
-    assert isinstance(done.exception, MasrelError)
-    assert re.search(words, str(done.exception))
-
-
 # Tardieu
 
 
@@ -197,39 +147,3 @@ def test_a_contracture_has_no_difference_and_speeds_can_be_chosen() -> None:
     # 3.32 (θ - 56.27° + 0.25 s · 120°/s) = 3 N·m
     fires = degrees(3.0 / ClaspKnife().reflex_stiffness) + 56.27 - 0.25 * 120
     assert made[1]["r1_deg"] == pytest.approx(fires)
-
-
-def test_it_is_a_table_on_the_screen() -> None:
-    done = run("--model", "HM1", "--model", "HM4", command="tardieu")
-    assert done.exit_code == 0
-    lines = done.output.splitlines()
-    assert lines[0].split() == (
-        "model R2 deg R1 deg R2 - R1 V1 10 deg/s V2 100 deg/s V3 150 deg/s".split()
-    )
-    assert lines[1].split() == "HM1 146.00 77.50 68.50 – 95.00 77.50".split()
-    assert lines[2].split() == "HM4 146.00 60.00 86.00 – 75.00 60.00".split()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (
-            ("--speed-deg-s", 9, 8, 7),
-            "speed-deg-s: need three above 0 deg/s, .*, got 9, 8, 7",
-        ),
-        (
-            ("--from-deg", 150),
-            "start_angle: needs 0 to less than 146 degrees, .*, got 150 degrees",
-        ),
-        (
-            ("--kind", "clonus", *("--parameter", "beat_rate_hz=5") * 2),
-            "--parameter beat_rate_hz: needs one value, got two",
-        ),
-    ],
-)
-def test_what_tardieu_cannot_say_is_refused(
-    arguments: tuple[object, ...], words: str
-) -> None:
-    done = run("--model", "HM1", *arguments, command="tardieu")
-    assert isinstance(done.exception, MasrelError)
-    assert re.search(words, str(done.exception))

@@ -124,13 +124,6 @@ def test_a_simulated_trainee_learns_passes_and_is_reported(
     assert {row["data"] for row in rows} == {"simulated"}
 
 
-def test_what_has_ended_is_left_as_it_is(trained: Path, masrel: Caller) -> None:
-    before = (trained / "training" / "R1.jsonl").read_bytes()
-    again = masrel("train", trained, "--rater", "R1", "--grades", "simulated")
-    assert "training of R1: passed after" in again.out
-    assert (trained / "training" / "R1.jsonl").read_bytes() == before
-
-
 def test_no_rating_of_the_study_comes_from_a_training(trained: Path) -> None:
     paths = StudyPaths(trained)
     protocol = read_protocol(paths.protocol)
@@ -215,54 +208,6 @@ def test_killed_at_line_after_line_it_comes_to_the_same_end(
     named = {e.fields["recording"] for e in events if e.kind == "presented"}
     there = {f"R1/{file.name}" for file in (study / "training" / "R1").glob("*.npz")}
     assert named == there
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        (
-            "max_presentations = 32",
-            "max_presentations = 32\nfalse_fail = 0.001",
-            "training.max_presentations: needed enough to fail at most 0.1 % of "
-            "trainees with kappa 0.95, got 32, which fail",
-        ),
-        (
-            "window = 24",
-            "window = 3",
-            "training.window: needed at least one presentation of each of the 4 models "
-            "with an intended grade, got 3",
-        ),
-    ],
-)
-def test_a_test_that_cannot_be_is_refused(
-    study: Path, masrel: Caller, old: str, new: str, message: str
-) -> None:
-    changed(study, old, new)
-    if "false_fail" in new:
-        changed(study, "kappa_insufficient = 0.3", "kappa_insufficient = 0.9")
-    refused = masrel("train", study, "--rater", "R1", "--grades", "simulated")
-    assert refused.code == 2
-    assert message in refused.err
-    assert not (study / "training" / "R1").exists()
-
-
-def test_one_known_grade_teaches_nothing(study: Path, masrel: Caller) -> None:
-    for grade in ("1+", "2", "3"):
-        changed(study, f'intended_grade = "{grade}"', 'intended_grade = "1"')
-    refused = masrel("train", study, "--rater", "R1", "--grades", "simulated")
-    assert refused.code == 2
-    assert "needs two or more different intended grades, got 1" in refused.err
-
-
-def test_bad_calls_are_one_sentence_each(study: Path, masrel: Caller) -> None:
-    def said(*arguments: object, command: tuple[str, ...] = ("train",)) -> str:
-        done = masrel(*command, study, *arguments)
-        assert done.code == 2
-        return done.err.strip().splitlines()[-1]
-
-    assert "rater: needed one of R1, R2, got 'R9'" in said("--rater", "R9")
-    assert "no such log" in said("--rater", "R1", command=("train", "show"))
-    assert "No such option '--csv'" in said("--rater", "R1", "--csv")
 
 
 def test_a_training_goes_on_with_what_it_was_begun_with(

@@ -3,12 +3,11 @@
 import hmac
 import json
 import os
-from collections import Counter
 from pathlib import Path
 
 import pytest
 
-from masrel.errors import ParameterError, ScheduleError, SessionLogError
+from masrel.errors import ScheduleError, SessionLogError
 from masrel.lab.conduct import allot_schedules, record_standing
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.schedule import (
@@ -17,7 +16,6 @@ from masrel.lab.schedule import (
     draw_schedule,
     read_schedule,
     schedule_problems,
-    write_schedules,
 )
 from masrel.lab.verification import verify_sessions
 from tests.lab.schedule.studies import SECRET, protocol_of, with_secret
@@ -79,20 +77,6 @@ def test_a_late_rater_gets_the_next_row_wherever_the_protocol_has_the_name(
     assert broken(study, later) == []
 
 
-def test_a_full_design_goes_on_with_a_new_replicate(study: StudyPaths) -> None:
-    raters = tuple(f"R{number}" for number in range(8))
-    protocol = williams(raters=raters)
-    allot_schedules(study, protocol)
-    orders = [
-        [s.model for s in read_schedule(study.schedule_file(r, "test")).presentations]
-        for r in raters
-    ]
-    for replicate in (orders[:4], orders[4:]):
-        places = [Counter(column) for column in zip(*replicate, strict=True)]
-        assert all(set(freq.values()) == {1} for freq in places)
-    assert orders[:4] != orders[4:]
-
-
 def test_asking_again_changes_nothing_and_a_redraw_keeps_the_rows(
     study: StudyPaths,
 ) -> None:
@@ -119,17 +103,6 @@ def test_nothing_is_allotted_where_the_draw_is_refused(study: StudyPaths) -> Non
     assert not study.schedules.exists()
 
 
-def test_schemes_without_rows_leave_no_event(study: StudyPaths) -> None:
-    allot_schedules(study, protocol_of())
-    assert not study.conduct_file.exists()
-    assert read_schedule(study.schedule_file("R1", "test")).row is None
-
-
-def test_a_design_is_not_drawn_without_the_log(study: StudyPaths) -> None:
-    with pytest.raises(ScheduleError, match="allot: needed with scheme williams"):
-        write_schedules(williams(), study)
-
-
 def test_each_site_has_rows_and_a_secret_of_its_own(study: StudyPaths) -> None:
     protocol = at_sites()
     allot_schedules(study, protocol)
@@ -151,28 +124,6 @@ def test_each_site_has_rows_and_a_secret_of_its_own(study: StudyPaths) -> None:
     of_site = draw_schedule(plain, "R2", "test", secret=south)
     assert drawn.presentations == of_site.presentations
     assert drawn.commitment != of_site.commitment
-
-
-def test_a_site_is_drawn_alone(study: StudyPaths) -> None:
-    protocol = at_sites()
-    allot_schedules(study, protocol, site="south")
-    drawn = sorted(path.name for path in study.schedules.glob("test_R?.csv"))
-    assert drawn == ["test_R2.csv", "test_R4.csv"]
-    assert [fields[0] for fields in allotted(study)] == ["R2", "R4"]
-
-
-@pytest.mark.parametrize(
-    ("protocol", "message"),
-    [
-        (at_sites(), "site: needed one of north, south, got 'east'"),
-        (williams(), 'site: needed schedule.strata = "site" in the protocol, got'),
-    ],
-)
-def test_a_site_that_is_none_is_refused(
-    study: StudyPaths, protocol: Protocol, message: str
-) -> None:
-    with pytest.raises(ScheduleError, match=message):
-        allot_schedules(study, protocol, site="east")
 
 
 def test_a_rater_who_changes_site_has_no_schedule_until_it_is_drawn_anew(
@@ -296,31 +247,6 @@ def test_a_site_draws_from_its_secret_what_the_study_draws_for_it(
     with_secret(copy, bytes(16))
     (problem, *_) = broken(copy, protocol)
     assert "published_secret.txt: needed the secret of" in problem
-
-
-def test_events_name_no_model(study: StudyPaths) -> None:
-    protocol = williams()
-    allot_schedules(study, protocol)
-    lines = study.conduct_file.read_text(encoding="utf-8").splitlines()
-    assert [json.loads(line)["event"] for line in lines] == [
-        "conduct",
-        "allotted",
-        "allotted",
-    ]
-    assert not [model.id for model in protocol.models if f'"{model.id}"' in str(lines)]
-
-
-def test_a_copy_is_made_into_a_new_folder_for_a_site_that_there_is(
-    study: StudyPaths, tmp_path: Path
-) -> None:
-    study.protocol.write_text("# ...", encoding="utf-8")
-    with pytest.raises(ParameterError, match="needed a new or empty folder, got one"):
-        copy_for_site(at_sites(), study, "south", study.root)
-    with pytest.raises(ScheduleError, match="site: needed one of north, south"):
-        copy_for_site(at_sites(), study, "east", tmp_path / "east")
-    with pytest.raises(ScheduleError, match=r"needed schedule.strata"):
-        copy_for_site(williams(), study, "south", tmp_path / "east")
-    assert not (tmp_path / "east").exists()
 
 
 def test_an_event_that_two_logs_have_allots_once(study: StudyPaths) -> None:

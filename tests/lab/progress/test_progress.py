@@ -93,17 +93,6 @@ def test_a_line_that_a_kill_cut_off_hides_nothing(small: Small) -> None:
     assert "note: text power cut" in call("status", study.root)
 
 
-def test_raters_go_from_planned_to_excluded(small: Small) -> None:
-    study, protocol = small
-    assert status(small) == {"R1": "planned", "R2": "planned"}
-    run(small, "R1")
-    run(small, "R2")
-    assert status(small) == {"R1": "begun", "R2": "complete"}
-    record_standing(study, protocol, "R1", "withdrawn", **BY)
-    record_standing(study, protocol, "R2", "excluded", **BY)
-    assert status(small) == {"R1": "withdrawn", "R2": "excluded"}
-
-
 @pytest.mark.parametrize(
     ("steps", "late"),
     [
