@@ -51,16 +51,10 @@ def cases() -> list[Case]:
 def _scene(seed: int) -> dict:
     stream = Stream(f"scene {seed}")
     with folder(model__toml=_model_file(stream), arm__csv=_arm(stream)) as here:
-        call = [
-            "joint",
-            "trace",
-            *_model(stream, seed),
-            *_motion(stream, seed),
-            *_law(stream),
-        ]
+        call = ["trace", *_model(stream, seed), *_motion(stream, seed), *_law(stream)]
         call += ["--json", "-", "--quiet", *_outputs(stream)]
         sampled = ["--csv", "samples.csv", "--rate-hz", stream.one_of([50, 200, 333])]
-        made = masrel(*call, *(sampled if seed % 4 == 0 else ()))
+        made = masrel("joint", *call, *(sampled if seed % 4 == 0 else ()))
         made["call"] = " ".join(map(str, call)).replace(str(STUDIES), "STUDIES")
         if (here / "samples.csv").is_file():
             made |= _samples((here / "samples.csv").read_text("utf-8"))
@@ -162,18 +156,8 @@ def _text() -> dict:
 
 def _several() -> dict:
     models = [part for k in range(1, 5) for part in ("--model", f"HM{k}")]
-    call = (
-        "joint",
-        "trace",
-        *models,
-        "--speeds-deg-s",
-        15,
-        300,
-        12,
-        "--output",
-        "work",
-    )
-    return masrel(*call, "--json", "-", "--quiet")
+    call = ("trace", *models, "--speeds-deg-s", 15, 300, 12, "--output", "work")
+    return masrel("joint", *call, "--json", "-", "--quiet")
 
 
 def _fit(model: str, *options: object) -> dict:
@@ -184,9 +168,8 @@ def _fit(model: str, *options: object) -> dict:
         made = masrel("joint", "fit", *files, *options, *with_file)
         if (here / "model.toml").is_file():
             made["model"] = (here / "model.toml").read_text("utf-8")
-        made["printed"] = masrel(
-            "joint", "fit", *files, *options, "--json", "-", "--quiet"
-        )
+        printed = ("--json", "-", "--quiet")
+        made["printed"] = masrel("joint", "fit", *files, *options, *printed)
     return made
 
 

@@ -9,43 +9,49 @@ import click
 
 from masrel.errors import MasrelError, ParameterError, ProtocolError, RatingsError
 from masrel.lab._once import read_once
-from masrel.lab.cli._study_options import echo_remarks
+from masrel.lab.cli._study_options import echo_remarks, study_argument
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol, scale_of
 from masrel.lab.ratings import study_remarks
 from masrel.lab.schedule import concealment_notes, schedule_problems
 
 
 @click.command("check")
-@click.argument("study", type=click.Path(path_type=Path))
+@study_argument
 @read_once()
 def check(study: Path) -> None:
     """Check protocol, schedules, record and ratings of STUDY; say every problem."""
-    problems, notes = _check_study(StudyPaths(study))
+    paths = StudyPaths(study)
+    notes: list[str] = []
+    try:
+        protocol = read_protocol(paths.protocol)
+    except ProtocolError as error:
+        problems = list(error.problems)
+    else:
+        problems = [each for checker in _CHECKERS for each in checker(protocol, paths)]
+        # What only may happen is for a study of which all else is right.
+        notes += [] if problems else _device_notes(protocol, paths)
+        with contextlib.suppress(MasrelError):  # a checker has said it
+            notes += concealment_notes(protocol, paths)
+        with contextlib.suppress(MasrelError):
+            notes += study_remarks(paths, protocol)
     for problem in problems:
         click.echo(problem, err=True)
     echo_remarks(notes)
     if problems:
-        click.echo(f"masrel: {study}: {_count(len(problems), 'problem')}", err=True)
+        click.echo(f"masrel: {study}: {_count(problems, 'problem')}", err=True)
         sys.exit(2)
-    click.echo(_summary(StudyPaths(study)))
+    places = [(rater, s.id) for s in protocol.sessions for rater in s.raters]
+    n_drawn = sum(paths.schedule_file(*place).is_file() for place in places)
+    click.echo(
+        f"{study}: no problems. {_count(protocol.models, 'model')}, "
+        f"{_count(protocol.raters, 'rater')}, "
+        f"{_count(protocol.sessions, 'session')}; "
+        f"{n_drawn} of {_count(places, 'schedule')} drawn."
+    )
 
 
-def _check_study(study: StudyPaths) -> tuple[Sequence[str], Sequence[str]]:
-    """Gather the problems of a study from every checker, and what to know beside."""
-    try:
-        protocol = read_protocol(study.protocol)
-    except ProtocolError as error:
-        return error.problems, ()
-    problems = [
-        problem for checker in _CHECKERS for problem in checker(protocol, study)
-    ]
-    # What only may happen is for a study of which all else is right.
-    notes = [] if problems else list(_device_notes(protocol, study))
-    with contextlib.suppress(MasrelError):  # a checker has said it
-        notes += concealment_notes(protocol, study)
-    with contextlib.suppress(MasrelError):
-        notes += study_remarks(study, protocol)
-    return problems, notes
+def _count(things: Sequence[object], noun: str) -> str:
+    return f"{len(things)} {noun}" + ("" if len(things) == 1 else "s")
 
 
 def _plan_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
@@ -89,7 +95,7 @@ def _device_notes(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
 
 
 def _record_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
-    if not _has_record(study):
+    if not study.sessions.is_dir() and not study.conduct_logs():
         return
     from masrel.lab.verification import verify_sessions
 
@@ -129,18 +135,12 @@ def _table_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
     from masrel.lab.ratings.logs import _of_logs
     from masrel.lab.ratings.study_data import _refuse_other_table
 
-    try:
+    with contextlib.suppress(MasrelError):  # another checker has said what of the logs
         ratings = _of_logs(study, protocol, check_recordings=False)
-    except MasrelError:
-        return  # another checker has said what is wrong with the logs
-    try:
-        _refuse_other_table(study.ratings_file, ratings)
-    except RatingsError as error:
-        yield str(error)
-
-
-def _has_record(study: StudyPaths) -> bool:
-    return study.sessions.is_dir() or bool(study.conduct_logs())
+        try:
+            _refuse_other_table(study.ratings_file, ratings)
+        except RatingsError as error:
+            yield str(error)
 
 
 _CHECKERS: tuple[Callable[[Protocol, StudyPaths], Iterable[str]], ...] = (
@@ -151,19 +151,3 @@ _CHECKERS: tuple[Callable[[Protocol, StudyPaths], Iterable[str]], ...] = (
     _record_problems,
     _ratings_problems,
 )
-
-
-def _summary(study: StudyPaths) -> str:
-    protocol = read_protocol(study.protocol)
-    pairs = [(rater, s.id) for s in protocol.sessions for rater in s.raters]
-    n_drawn = sum(study.schedule_file(*pair).is_file() for pair in pairs)
-    return (
-        f"{study.root}: no problems. {_count(len(protocol.models), 'model')}, "
-        f"{_count(len(protocol.raters), 'rater')}, "
-        f"{_count(len(protocol.sessions), 'session')}; "
-        f"{n_drawn} of {_count(len(pairs), 'schedule')} drawn."
-    )
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" + ("" if number == 1 else "s")

@@ -327,10 +327,9 @@ def raters_csv(
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["rater", "site", "status", "late", *protocol.rater_fields])
     for each in raters:
-        cells = [each.values[name] for name in protocol.rater_fields]
         late = "yes" if each.is_late else "no"
-        known = [each.rater, _cell(each.site), each.status, late]
-        writer.writerow([*known, *map(_cell, cells)])
+        known = (each.rater, each.site, each.status, late, *each.values.values())
+        writer.writerow(map(_cell, known))
     return f"{head}# format: 1\n{text.getvalue()}"
 
 
