@@ -67,7 +67,7 @@ _add_note(
 )
 
 
-def _given(text: str) -> str | None:
+def _or_missing(text: str) -> str | None:
     return None if text == "NA" else text  # no scale has such a grade
 
 
@@ -91,10 +91,10 @@ def _correct(
     from masrel.lab.run import record_correction
 
     record_correction(
-        study, protocol, rater, session, code=code, grade=_given(grade), **reasons
+        study, protocol, rater, session, code=code, grade=_or_missing(grade), **reasons
     )
     what = f"{code} of {rater}, session {session},"
-    _say_corrected(what, _given(grade), study.log_file(rater, session))
+    _say_corrected(what, _or_missing(grade), study.log_file(rater, session))
 
 
 @record.command("skip")
@@ -140,11 +140,11 @@ def _answer(
     from masrel.lab.run import record_answer
 
     log = record_answer(
-        study, protocol, rater, session, answer=_given(answer), **fields
+        study, protocol, rater, session, answer=_or_missing(answer), **fields
     )
     code = fields["code"]
     of = fields["question"] + ("" if code is None else f" of {code}")
-    _say_corrected(f"the answer of {rater} to {of}", _given(answer), log)
+    _say_corrected(f"the answer of {rater} to {of}", _or_missing(answer), log)
 
 
 def _say_corrected(what: str, now: str | None, log: Path) -> None:
