@@ -17,7 +17,7 @@ from masrel.cli._options import (
 )
 from masrel.cli._paths import note_inputs
 from masrel.errors import ParameterError
-from masrel.lab.report._scenes import tardieu_document, tardieu_text
+from masrel.lab.report._traced_scenes import tardieu_document, tardieu_text
 
 if TYPE_CHECKING:
     from masrel.lab.elbow import JointModel

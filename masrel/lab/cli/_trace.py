@@ -30,7 +30,7 @@ from masrel.lab.cli._joints import (
     joint_options,
     joints_of,
 )
-from masrel.lab.report._scenes import (
+from masrel.lab.report._traced_scenes import (
     SCENE_OUTPUTS,
     SCENE_STAMP,
     SCENE_VIEWS,
