@@ -132,8 +132,7 @@ def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
 
 
 def _table_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
-    from masrel.lab.ratings.logs import _of_logs
-    from masrel.lab.ratings.study_data import _refuse_other_table
+    from masrel.lab.ratings.study_data import _of_logs, _refuse_other_table
 
     with contextlib.suppress(MasrelError):  # another checker has said what of the logs
         ratings = _of_logs(study, protocol, check_recordings=False)

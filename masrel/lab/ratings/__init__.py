@@ -4,46 +4,42 @@ In: session logs, or a study's table. Out: a checked table, the item by rater ma
 of one session, and the pairs of two.
 """
 
-import importlib
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from masrel.lab.ratings.answers import (
-        RECONSTRUCTED,
-        GivenAnswer,
-        answers_csv,
-        answers_from_logs,
-        answers_of,
-        read_answers,
-        write_answers,
-    )
-    from masrel.lab.ratings.completeness import (
-        Correction,
-        corrections_of,
-        study_remarks,
-    )
-    from masrel.lab.ratings.in_person import InPerson, InPersonRow, read_in_person
-    from masrel.lab.ratings.logs import ratings_from_logs
-    from masrel.lab.ratings.study_data import (
-        StudyData,
-        in_person_of,
-        read_study_data,
-    )
-    from masrel.lab.ratings.study_file import read_study_ratings
-    from masrel.lab.ratings.table import (
-        DEFAULT_SESSION,
-        RATING_COLUMNS,
-        SOURCES,
-        Rating,
-        RatingMatrix,
-        Ratings,
-        RetestPairs,
-        rating_matrix,
-        ratings_csv,
-        ratings_from_rows,
-        retest_pairs,
-        write_ratings,
-    )
+from masrel.lab.ratings.answers import (
+    RECONSTRUCTED,
+    GivenAnswer,
+    answers_csv,
+    answers_from_logs,
+    answers_of,
+    read_answers,
+    write_answers,
+)
+from masrel.lab.ratings.completeness import Correction, corrections_of, study_remarks
+from masrel.lab.ratings.study_data import (
+    StudyData,
+    in_person_of,
+    ratings_from_logs,
+    read_study_data,
+)
+from masrel.lab.ratings.study_file import (
+    InPerson,
+    InPersonRow,
+    read_in_person,
+    read_study_ratings,
+)
+from masrel.lab.ratings.table import (
+    DEFAULT_SESSION,
+    RATING_COLUMNS,
+    SOURCES,
+    Rating,
+    RatingMatrix,
+    Ratings,
+    RetestPairs,
+    rating_matrix,
+    ratings_csv,
+    ratings_from_rows,
+    retest_pairs,
+    write_ratings,
+)
 
 __all__ = [
     "DEFAULT_SESSION",
@@ -77,38 +73,3 @@ __all__ = [
     "write_answers",
     "write_ratings",
 ]
-
-_HOMES = {
-    "answers": (
-        "RECONSTRUCTED",
-        "GivenAnswer",
-        "answers_csv",
-        "answers_from_logs",
-        "answers_of",
-        "read_answers",
-        "write_answers",
-    ),
-    "completeness": (
-        "Correction",
-        "corrections_of",
-        "study_remarks",
-    ),
-    "in_person": ("InPerson", "InPersonRow", "read_in_person"),
-    "logs": ("ratings_from_logs",),
-    "study_data": (
-        "StudyData",
-        "in_person_of",
-        "read_study_data",
-    ),
-    "study_file": ("read_study_ratings",),
-}
-"""Module to the names in it; all other names are of `table`."""
-
-
-def __getattr__(name: str) -> object:
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    home = next((home for home, names in _HOMES.items() if name in names), "table")
-    value = getattr(importlib.import_module(f"masrel.lab.ratings.{home}"), name)
-    globals()[name] = value  # the next use finds it without coming here
-    return value

@@ -274,12 +274,11 @@ def read_answers(path: Path, protocol: Protocol) -> tuple[GivenAnswer, ...]:
     }
     problems: list[_Problem] = []
     answers = []
-    for row in rows.rows:
-        cells = dict(zip(rows.header, row.cells, strict=True))
+    for line, cells in rows.rows:
         try:
             answers.append(_of_row(cells, questions))
         except ParameterError as error:
-            problems.append((row.line, None, str(error)))
+            problems.append((line, None, str(error)))
     if problems:
         raise _refusal(path, problems)
     return tuple(answers)

@@ -1,11 +1,10 @@
-"""Reading a study's table of ratings: one row a rating, every cell checked."""
+"""Reading tables of a study, every cell checked: ratings, grades given in person."""
 
 import csv
 import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -19,18 +18,16 @@ from masrel.lab._bounded_files import (
     read_regular,
 )
 from masrel.lab.ratings.table import (
+    _DEFAULTS,
+    _FLOATS,
     _FORMAT,
-    _NEEDED_TIME,
+    _WHOLE,
     _YES_NO,
-    DEFAULT_SESSION,
     RATING_COLUMNS,
-    SOURCES,
-    Rating,
     Ratings,
     _assemble,
-    _is_utc,
+    _problems,
 )
-from masrel.lab.run._state import FELT
 from masrel.scales import Scale
 
 _MISSING = ("", "NA")
@@ -52,51 +49,15 @@ _Problem = tuple[int, str | None, str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _CsvRow:
-    """One record of a CSV file."""
-
-    line: int  # line of the file where it begins, from 1
-    # its cells without the blanks around them, as many as the header has
-    cells: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class _CsvRows:
     """A CSV file as text."""
 
     path: Path  # the file
     header: tuple[str, ...]  # names of the columns, all different
     header_line: int  # line of the header
-    rows: tuple[_CsvRow, ...]  # the records below it; blank lines are left out
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Cell:
-    """One rating as it is in the file: the columns of a table, and where it stands."""
-
-    line: int
-    column: str
-    session: str
-    rater: str
-    model: str
-    repeat: int
-    grade: str | None
-    mean_speed_deg_s: float
-    source: str
-    n_stretches: int | None
-    min_speed_deg_s: float
-    max_speed_deg_s: float
-    speeds_deg_s: tuple[float | None, ...] | None
-    graded_stretch: int | None
-    felt: str | None
-    grades_from: str | None
-    device: str | None
-    position: int | None
-    code: str | None
-    n_attempts: int | None
-    first_grade: str | None
-    graded_at: str | None
-    grip_lost: bool | None
+    # the line where each record begins, and its cells by column without the blanks
+    # around them; blank lines are left out
+    rows: list[tuple[int, dict[str, str]]]
 
 
 def read_study_ratings(path: Path | str, scale: Scale) -> Ratings:
@@ -133,168 +94,171 @@ def read_study_ratings(path: Path | str, scale: Scale) -> Ratings:
     ['1+', None]
     """
     rows = _read_rows(Path(path))
-    places = {role: _find(rows, role) for role in _NAMES}
-    for role in ("rater", "model", "grade"):
-        if places[role] is None:
+    names = {name: name for name in RATING_COLUMNS if name in rows.header}
+    for role in _NAMES:
+        columns = [name for name in rows.header if name.casefold() in _NAMES[role]]
+        if len(columns) > 1:
+            message = f"needed one column for the {role}, got {' and '.join(columns)}"
+            raise _error(rows, message)
+        if columns:
+            names[role] = columns[0]
+        elif role != "session":
             raise _error(
                 rows,
                 f"needed a column for the {role} named {' or '.join(_NAMES[role])}, "
                 f"got {listed(rows.header)}; masrel agree reads other tables",
             )
-    problems: list[_Problem] = []
-    cells = _long_cells(rows, places, problems)
-    _check_cells(cells, scale, problems)
+    values = [
+        (line, _DEFAULTS | _values({name: cells[names[name]] for name in names}))
+        for line, cells in rows.rows
+    ]
+    problems = [
+        (line, names.get(column, column), message)
+        for line, column, message in _problems(values, scale, "line")
+    ]
     if problems:
         raise _refusal(rows.path, problems)
-    taken = attrgetter(*RATING_COLUMNS)
-    return _assemble((Rating(*taken(cell)) for cell in cells), scale, rows.path)
+    return _assemble((row for _, row in values), scale, rows.path)
 
 
-def _long_cells(
-    rows: _CsvRows, places: Mapping[str, int | None], problems: list[_Problem]
-) -> list[_Cell]:
-    columns = {role: place for role, place in places.items() if place is not None}
-    for name in ("repeat", *RATING_COLUMNS[5:]):
-        if name in rows.header:
-            columns[name] = rows.header.index(name)
-    cells = []
-    for row in rows.rows:
-        texts = {role: row.cells[place] for role, place in columns.items()}
-        row_problems: list[tuple[str, str]] = []
-        extra = _extra_values(texts, row_problems)
-        problems += [(row.line, name, text) for name, text in row_problems]
-        cells.append(
-            _Cell(
-                line=row.line,
-                column=rows.header[columns["grade"]],
-                session=texts.get("session", DEFAULT_SESSION),
-                rater=texts["rater"],
-                model=texts["model"],
-                grade=None if texts["grade"] in _MISSING else texts["grade"],
-                **extra,
-            )
+def _values(texts: Mapping[str, str]) -> dict[str, Any]:
+    # what the cells of one row mean; a cell that cannot be read stays text
+    values: dict[str, Any] = {}
+    for name, text in texts.items():
+        never_missing = name in ("session", "repeat")
+        if name in _FLOATS:
+            values[name] = math.nan if text in _MISSING else _speed(text)
+        elif not text or (text in _MISSING and not never_missing):
+            values[name] = None
+        elif name in _WHOLE:
+            # more digits than any count has
+            is_whole = text.isascii() and text.isdigit() and len(text) < 19
+            values[name] = int(text) if is_whole else text
+        elif name == "grip_lost" and text in _YES_NO:
+            values[name] = text == _YES_NO[True]
+        else:
+            values[name] = text
+    speeds, n_stretches = texts.get("speeds_deg_s", "NA"), values.get("n_stretches")
+    if speeds in _MISSING and n_stretches != 1:
+        values["speeds_deg_s"] = () if n_stretches == 0 else None
+    else:
+        cells = (cell.strip() for cell in speeds.split(";"))  # one a stretch
+        values["speeds_deg_s"] = tuple(
+            None if cell in _MISSING else _speed(cell) for cell in cells
         )
-        for role in ("model", "rater"):
-            if texts[role] in _MISSING:
-                problems.append(
-                    (row.line, rows.header[columns[role]], f"needed the {role}")
-                )
-    return cells
-
-
-_Problems = list[tuple[str, str]]
-"""Column and message of what is wrong with a row."""
-
-
-def _extra_values(texts: Mapping[str, str], problems: _Problems) -> dict[str, Any]:
-    # the values of one row from the columns that a file may lack
-    n_stretches = _whole(texts, "n_stretches", 0, problems)
-    speeds = _speeds(texts, n_stretches, problems)
-    graded = _whole(texts, "graded_stretch", 1, problems)
-    if graded is not None and graded > (n_stretches or 0):
-        problems.append(("graded_stretch", f"needed at most n_stretches, got {graded}"))
-    values: dict[str, Any] = {
-        "repeat": _whole({"repeat": "1", **texts}, "repeat", 1, problems),
-        "source": texts.get("source", "foreign"),
-        **{
-            name: None if (text := texts.get(name, "NA")) in _MISSING else text
-            for name in _TEXTS
-        },
-        "position": _whole(texts, "position", 1, problems),
-        "n_attempts": _whole(texts, "n_attempts", 0, problems),
-        "n_stretches": n_stretches,
-        "speeds_deg_s": speeds,
-        "graded_stretch": graded,
-    }
-    for name in ("mean_speed_deg_s", "min_speed_deg_s", "max_speed_deg_s"):
-        values[name] = _speed(name, texts.get(name, ""), problems)
-    _texts = {"source": SOURCES, "felt": (*FELT, None), "grip_lost": (*_YES_NO, None)}
-    for name, known in _texts.items():
-        if values[name] not in known:
-            names = listed(text for text in known if text is not None)
-            problems.append((name, f"needed one of {names}, got {values[name]!r}"))
-    if (lost := values["grip_lost"]) is not None:
-        values["grip_lost"] = lost == _YES_NO[True]
-    time = values["graded_at"]
-    if time is not None and not _is_utc(time):
-        problems.append(("graded_at", f"{_NEEDED_TIME}, got {time!r}"))
     return values
 
 
-def _whole(
-    texts: Mapping[str, str], name: str, least: int, problems: _Problems
-) -> int | None:
-    # None where the cell is missing, or no such number; a repeat is never missing
-    text = texts.get(name, "NA")
-    if text in _MISSING and name != "repeat":
-        return None
-    # more digits than any count has
-    if text.isascii() and text.isdigit() and len(text) < 19 and int(text) >= least:
-        return int(text)
-    problems.append((name, f"needed a whole number from {least}, got {text!r}"))
-    return None
-
-
-def _speed(name: str, text: str, problems: _Problems) -> float:
-    if text in _MISSING:
-        return math.nan
+def _speed(text: str) -> float | str:
     try:
         speed = float(text)
     except ValueError:
-        speed = math.nan
-    if not 0 <= speed < math.inf:
-        problems.append((name, f"needed a speed of 0 or more, got {text!r}"))
-    return speed
+        return text
+    return speed if 0 <= speed < math.inf else text
 
 
-def _speeds(
-    texts: Mapping[str, str], n_stretches: int | None, problems: _Problems
-) -> tuple[float | None, ...] | None:
-    # one a stretch, separated by semicolons
-    text = texts.get("speeds_deg_s", "NA")
-    if text in _MISSING and n_stretches != 1:
-        return () if n_stretches == 0 else None
-    cells = text.split(";")
-    if len(cells) != n_stretches:
-        message = f"needed {n_stretches} separated by semicolons, got {text!r}"
-        problems.append(("speeds_deg_s", message))
-    return tuple(
-        None
-        if cell.strip() in _MISSING
-        else _speed("speeds_deg_s", cell.strip(), problems)
-        for cell in cells
-    )
-
-
-_TEXTS = (
-    *("felt", "grades_from", "device", "code", "first_grade", "graded_at"),
-    "grip_lost",
+_IN_PERSON_COLUMNS = (
+    "source_table",  # where the row is printed
+    "rater",
+    "subject",  # the patient
+    "model",  # the haptic model made of the patient
+    "in_person_grade",
+    "haptic_grade",
+    "note",
 )
-"""Columns of text that a file may lack."""
 
 
-def _check_cells(cells: list[_Cell], scale: Scale, problems: list[_Problem]) -> None:
-    first_lines: dict[tuple[str, str, str, int], int] = {}
-    for cell in cells:
-        if not cell.session:
-            problems.append((cell.line, None, "needed a session, got none"))
-            continue
-        key = (cell.session, cell.rater, cell.model, cell.repeat)
-        first = first_lines.setdefault(key, cell.line)
-        if first != cell.line:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InPersonRow:
+    """One rater's grade of one patient and of the model made of the patient.
+
+    Attributes
+    ----------
+    line : int
+        Line of the file.
+    source_table : str
+        Where the row is printed.
+    rater, subject, model : str
+        Who graded whom, and the haptic model made of the patient.
+    in_person_grade, haptic_grade : str or None
+        The grades; None is missing.
+    note : str
+        A remark.
+    """
+
+    line: int
+    source_table: str
+    rater: str
+    subject: str
+    model: str
+    in_person_grade: str | None
+    haptic_grade: str | None
+    note: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InPerson:
+    """A table of in-person grades.
+
+    Attributes
+    ----------
+    rows : tuple of InPersonRow
+        Its rows, in the order of the file.
+    source_path : Path
+        The file.
+    """
+
+    rows: tuple[InPersonRow, ...]
+    source_path: Path
+
+
+def read_in_person(path: Path | str) -> InPerson:
+    """Read a table of in-person grades.
+
+    Parameters
+    ----------
+    path : Path or str
+        CSV with the columns source_table, rater, subject, model, in_person_grade,
+        haptic_grade, note; others are left aside. An empty cell or NA is a missing
+        grade.
+
+    Returns
+    -------
+    InPerson
+        The table, everything text.
+
+    Raises
+    ------
+    RatingsError
+        If a column is missing, a row lacks source table, rater, subject or model,
+        or is there twice. The message lists up to 20 problems.
+    """
+    rows = _read_rows(Path(path))
+    if not set(_IN_PERSON_COLUMNS) <= set(rows.header):
+        needed = ", ".join(_IN_PERSON_COLUMNS)
+        raise _error(rows, f"needed the columns {needed}, got {', '.join(rows.header)}")
+    problems: list[_Problem] = []
+    seen: dict[tuple[str, str, str], int] = {}
+    graded = []
+    for line, cell in rows.rows:
+        for name in ("source_table", "rater", "subject", "model"):
+            if cell[name] in _MISSING:
+                problems.append((line, name, "needed text, got none"))
+        table, rater, subject = cell["source_table"], cell["rater"], cell["subject"]
+        first = seen.setdefault((table, rater, subject), line)
+        if first != line:
             message = (
-                f"needed one rating of {cell.model!r} by {cell.rater!r} in session "
-                f"{cell.session!r}, line {first} has one already"
+                f"needed one row of {subject!r} by {rater!r} in {table!r}, line "
+                f"{first} has one already"
             )
-            problems.append((cell.line, cell.column, message))
-        grades = {cell.column: cell.grade, "first_grade": cell.first_grade}
-        for column, grade in grades.items():
-            if grade is not None and grade not in scale.grades:
-                message = (
-                    f"needed one of {listed(scale.grades)}, or an empty cell or NA "
-                    f"when missing, got {grade!r}"
-                )
-                problems.append((cell.line, column, message))
+            problems.append((line, None, message))
+        values: dict[str, Any] = {name: cell[name] for name in _IN_PERSON_COLUMNS}
+        for name in ("in_person_grade", "haptic_grade"):
+            values[name] = None if cell[name] in _MISSING else cell[name]
+        graded.append(InPersonRow(line=line, **values))
+    if problems:
+        raise _refusal(rows.path, problems)
+    return InPerson(rows=tuple(graded), source_path=rows.path)
 
 
 def _read_rows(path: Path) -> _CsvRows:
@@ -334,7 +298,9 @@ def _read_rows(path: Path) -> _CsvRows:
         path=path,
         header=header,
         header_line=header_line,
-        rows=tuple(_CsvRow(line=line, cells=cells) for line, cells in records[1:]),
+        rows=[
+            (line, dict(zip(header, cells, strict=True))) for line, cells in records[1:]
+        ],
     )
 
 
@@ -382,18 +348,6 @@ def _check_header(path: Path, line: int, header: tuple[str, ...]) -> None:
         seen.add(name)
     if problems:
         raise _refusal(path, problems)
-
-
-def _find(rows: _CsvRows, role: str) -> int | None:
-    places = [
-        place
-        for place, column in enumerate(rows.header)
-        if column.casefold() in _NAMES[role]
-    ]
-    if len(places) > 1:
-        names = " and ".join(rows.header[place] for place in places)
-        raise _error(rows, f"needed one column for the {role}, got {names}")
-    return places[0] if places else None
 
 
 def _error(rows: _CsvRows, message: str) -> RatingsError:

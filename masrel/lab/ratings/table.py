@@ -3,7 +3,7 @@
 import csv
 import io
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -111,6 +111,15 @@ SOURCES = ("published", "recorded", "simulated", "foreign")
 """Where a rating comes from; "foreign" is a file that does not say."""
 
 _FLOATS = ("mean_speed_deg_s", "min_speed_deg_s", "max_speed_deg_s")
+_WHOLE = {
+    "repeat": 1,
+    "n_stretches": 0,
+    "graded_stretch": 1,
+    "position": 1,
+    "n_attempts": 0,
+}
+"""Columns of whole numbers, and the least that each may hold."""
+
 _TYPES = {"repeat": "int64", **dict.fromkeys(_FLOATS, "float64")}
 """Of columns that are no objects."""
 
@@ -204,132 +213,128 @@ def ratings_from_rows(
     >>> ratings.rows[0].grade
     '1+'
     """
-    complete: list[dict[str, Any]] = [{**_DEFAULTS, **row} for row in rows]
+    complete = [{**_DEFAULTS, **row} for row in rows]
     problems = [
-        f"row {number}: {problem}"
-        for number, row in enumerate(complete, start=1)
-        for problem in _problems(row, scale)
+        f"row {number}: {column}: {message}"
+        for number, column, message in _problems(enumerate(complete, 1), scale, "row")
     ]
-    seen: dict[tuple[object, ...], int] = {}
-    for number, row in enumerate(complete, start=1):
-        key = tuple(row.get(name) for name in RATING_COLUMNS[:4])
-        if seen.setdefault(key, number) != number:
-            problems.append(f"row {number}: {key} is in row {seen[key]} already")
     if problems:
         raise RatingsError("\n".join(problems))
-    for row in complete:
-        row |= {name: float(row[name]) for name in _FLOATS}
-    return _assemble([Rating(**row) for row in complete], scale, source_path)
+    return _assemble(complete, scale, source_path)
 
 
 def _assemble(
-    rows: Iterable[Rating], scale: Scale, source_path: Path | None
+    rows: Iterable[dict[str, Any]], scale: Scale, source_path: Path | None
 ) -> Ratings:
     """Return the table of rows that have been checked."""
-    rows = tuple(rows)
+    ratings = tuple(
+        Rating(**{**row, **{name: float(row[name]) for name in _FLOATS}})
+        for row in rows
+    )
     return Ratings(
-        rows=rows,
+        rows=ratings,
         scale=scale,
         source_path=source_path,
-        simulated=any(row.source == "simulated" for row in rows),
+        simulated=any(row.source == "simulated" for row in ratings),
     )
 
 
 _DEFAULTS: dict[str, object] = {"session": DEFAULT_SESSION, **Rating._field_defaults}
 
-
-def _problems(row: Mapping[str, object], scale: Scale) -> list[str]:
-    problems = [
-        f"{name}: needed text, got {row.get(name)!r}"
-        for name in ("session", "rater", "model")
-        if not isinstance(row.get(name), str) or not row[name]
-    ]
-    repeat, speed, grade = row["repeat"], row["mean_speed_deg_s"], row["grade"]
-    if not isinstance(repeat, int) or isinstance(repeat, bool) or repeat < 1:
-        problems.append(f"repeat: needed a whole number from 1, got {repeat!r}")
-    if not isinstance(speed, int | float) or isinstance(speed, bool):
-        problems.append(f"mean_speed_deg_s: needed a number, got {speed!r}")
-    if grade is not None and grade not in scale.grades:
-        problems.append(
-            f"grade: needed one of {', '.join(scale.grades)} or None, got {grade!r}"
-        )
-    if row["source"] not in SOURCES:
-        problems.append(
-            f"source: needed one of {', '.join(SOURCES)}, got {row['source']!r}"
-        )
-    problems += [
-        f"{name}: needed text or None, got {row[name]!r}"
-        for name in ("grades_from", "device", "code")
-        if row[name] is not None and (not isinstance(row[name], str) or not row[name])
-    ]
-    problems += _stretch_problems(row)
-    problems += _presentation_problems(row, scale)
-    unknown = sorted(set(row) - set(RATING_COLUMNS))
-    if unknown:
-        problems.append(f"unknown columns {', '.join(unknown)}")
-    return problems
-
-
-def _presentation_problems(row: Mapping[str, object], scale: Scale) -> list[str]:
-    """Return what is wrong with what a row says of its presentation."""
-    problems = []
-    for name, least in (("position", 1), ("n_attempts", 0)):
-        number = row[name]
-        if number is not None and not (isinstance(number, int) and number >= least):
-            problems.append(
-                f"{name}: needed a whole number from {least}, got {number!r}"
-            )
-    first, time = row["first_grade"], row["graded_at"]
-    if first is not None and first not in scale.grades:
-        problems.append(
-            f"first_grade: needed one of {', '.join(scale.grades)} or None, "
-            f"got {first!r}"
-        )
-    if time is not None and not (isinstance(time, str) and _is_utc(time)):
-        problems.append(f"graded_at: {_NEEDED_TIME}, got {time!r}")
-    return problems
-
-
 _NEEDED_TIME = "needed a time in UTC such as 2026-05-04T09:30:00Z"
+_NEEDED_SPEED = "needed a speed of 0 or more"
+_NEVER_MISSING = ("session", "rater", "model", "repeat", "source", *_FLOATS)
 
 
-def _is_utc(text: str) -> bool:
-    """Return whether a text is a time in UTC as ISO 8601 writes it."""
+def _is_utc(text: object) -> bool:
+    """Return whether a value is a time in UTC as ISO 8601 writes it."""
     try:
-        return datetime.fromisoformat(text).utcoffset() == timedelta(0)
+        return datetime.fromisoformat(str(text)).utcoffset() == timedelta(0)
     except ValueError:
         return False
 
 
-def _stretch_problems(row: Mapping[str, object]) -> list[str]:
-    """Return what is wrong with what a row says of its stretches."""
-    problems = []
-    for name in ("min_speed_deg_s", "max_speed_deg_s"):
-        if not isinstance(row[name], int | float) or isinstance(row[name], bool):
-            problems.append(f"{name}: needed a number, got {row[name]!r}")
-    n_stretches, graded = row["n_stretches"], row["graded_stretch"]
-    speeds, felt, n_known = row["speeds_deg_s"], row["felt"], 0
-    if isinstance(n_stretches, int) and n_stretches >= 0:
-        n_known = n_stretches
-    elif n_stretches is not None:
-        problems.append(
-            f"n_stretches: needed a whole number from 0, got {n_stretches!r}"
+def _is_text(value: object) -> bool:
+    return isinstance(value, str) and value != ""
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _rules(scale: Scale) -> dict[str, tuple[Callable[[Any], bool], str]]:
+    # what the value of each column must be, and how that is said
+    of_grades = (
+        f"needed one of {', '.join(scale.grades)}, or None (in a file an empty cell or "
+        "NA) when missing"
+    )
+    whole = {
+        # true is no number
+        name: (
+            lambda value, least=least: type(value) is int and value >= least,
+            f"needed a whole number from {least}",
         )
-    if speeds is not None and not (
-        isinstance(speeds, tuple) and len(speeds) == n_known
-    ):
-        problems.append(
-            f"speeds_deg_s: needed one for each of {n_known} stretches, got {speeds!r}"
-        )
-    if graded is not None and not (isinstance(graded, int) and 1 <= graded <= n_known):
-        problems.append(
-            f"graded_stretch: needed one of {n_known} stretches, got {graded!r}"
-        )
-    if not isinstance(row["grip_lost"], bool | None):
-        problems.append(f"grip_lost: needed a bool or None, got {row['grip_lost']!r}")
-    if felt is not None and felt not in FELT:
-        problems.append(f"felt: needed one of {', '.join(FELT)}, got {felt!r}")
-    return problems
+        for name, least in _WHOLE.items()
+    }
+    return {
+        **dict.fromkeys(("session", "rater", "model"), (_is_text, "needed text")),
+        **dict.fromkeys(
+            ("grades_from", "device", "code"), (_is_text, "needed text or None")
+        ),
+        **whole,
+        **dict.fromkeys(_FLOATS, (_is_number, _NEEDED_SPEED)),
+        **dict.fromkeys(
+            ("grade", "first_grade"), (scale.grades.__contains__, of_grades)
+        ),
+        "source": (SOURCES.__contains__, f"needed one of {', '.join(SOURCES)}"),
+        "felt": (FELT.__contains__, f"needed one of {', '.join(FELT)}"),
+        "grip_lost": (lambda value: isinstance(value, bool), "needed yes or no"),
+        "graded_at": (_is_utc, _NEEDED_TIME),
+    }
+
+
+def _problems(
+    rows: Iterable[tuple[int, Mapping[str, Any]]], scale: Scale, place: str
+) -> Iterator[tuple[int, str, str]]:
+    """Yield place, column and message of all that is wrong with rows by their place."""
+    first: dict[tuple[object, ...], int] = {}
+    rules = _rules(scale)
+    for number, row in rows:
+        for column, (holds, needed) in rules.items():
+            value = row.get(column)
+            if value is None and column not in _NEVER_MISSING:
+                continue
+            if not holds(value):
+                yield number, column, f"{needed}, got {value!r}"
+        for column, message in _stretch_problems(row):
+            yield number, column, message
+        for column in sorted(row.keys() - {*RATING_COLUMNS}):
+            yield number, column, "unknown column"
+        session, rater, model, repeat = (row.get(name) for name in RATING_COLUMNS[:4])
+        earlier = first.setdefault((session, rater, model, repeat), number)
+        if earlier != number:
+            message = (
+                f"needed one rating of {model!r} by {rater!r} in session {session!r}, "
+                f"{place} {earlier} has one already"
+            )
+            yield number, "grade", message
+
+
+def _stretch_problems(row: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yield what is wrong with what a row says of each of its stretches."""
+    speeds, graded, n_stretches = (
+        row[name] for name in ("speeds_deg_s", "graded_stretch", "n_stretches")
+    )
+    n_known = n_stretches if type(n_stretches) is int and n_stretches >= 0 else 0
+    if speeds is not None and (not isinstance(speeds, tuple) or len(speeds) != n_known):
+        message = f"needed one for each of {n_known} stretches, got {speeds!r}"
+        yield "speeds_deg_s", message
+    else:
+        for speed in speeds or ():
+            if speed is not None and not _is_number(speed):
+                yield "speeds_deg_s", f"{_NEEDED_SPEED}, got {speed!r}"
+    if type(graded) is int and graded > n_known:
+        yield "graded_stretch", f"needed one of {n_known} stretches, got {graded}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

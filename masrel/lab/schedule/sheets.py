@@ -235,8 +235,8 @@ def schedule_problems(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
             problems.append(
                 f"{path}: needed schedules of the protocol's raters and sessions only, "
                 "got a file of neither: put the rater back into the session (masrel "
-                "withdraw keeps the grades of one who left), or move the file out of "
-                "the study"
+                "record withdraw keeps the grades of one who left), or move the file "
+                "out of the study"
             )
     return tuple(problems)
 

@@ -40,7 +40,7 @@ def output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
     if not files:
         return  # nothing is loaded for it
     from masrel.lab.ratings import read_study_data
-    from masrel.lab.ratings.logs import _of_logs
+    from masrel.lab.ratings.study_data import _of_logs
 
     try:
         if study.logs():

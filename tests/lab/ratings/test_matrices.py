@@ -28,34 +28,23 @@ STUDY = made(
 
 
 def test_a_matrix_is_item_by_rater_of_one_session() -> None:
-    matrix = rating_matrix(STUDY, session="test", models=["HM1", "HM2", "HM3"])
-    assert matrix.items == ("HM1", "HM2", "HM3")
-    assert matrix.raters == ("B", "A", "C")
-    assert matrix.grades == [
-        ["1", "2", "0"],
-        ["1+", None, None],
-        [None, None, None],
-    ]
-    assert matrix.n_missing == 5
-
-
-def test_without_models_all_come_as_they_are_met() -> None:
-    matrix = rating_matrix(STUDY, session="test")
-    assert matrix.items == ("HM2", "HM1")
-    assert matrix.grades == [["1+", None, None], ["1", "2", "0"]]
+    models = ["HM1", "HM2", "HM3"]
+    matrix = rating_matrix(STUDY, session="test", models=models)
+    assert (matrix.items, matrix.raters) == (tuple(models), ("B", "A", "C"))
+    rows = {"HM1": ["1", "2", "0"], "HM2": ["1+", None, None], "HM3": [None] * 3}
+    assert (matrix.grades, matrix.n_missing) == ([*rows.values()], 5)
+    as_they_come = rating_matrix(STUDY, session="test")  # without models
+    assert as_they_come.items == ("HM2", "HM1")
+    assert as_they_come.grades == [rows["HM2"], rows["HM1"]]
 
 
 def test_pairs_are_of_raters_of_both_sessions() -> None:
     pairs = retest_pairs(STUDY, first="test", second="retest", models=["HM1", "HM2"])
-    assert pairs.raters == ("B", "A")
+    assert (pairs.raters, pairs.n_missing) == (("B", "A"), 1)
     assert pairs.pairs == [[["1", "1"], ["1+", "1"]], [["2", "3"], [None, None]]]
-    assert pairs.n_missing == 1
-
-
-def test_no_rater_of_both_sessions_is_no_error() -> None:
     apart = made(("a", "R1", "HM1", "1"), ("b", "R2", "HM1", "1"))
-    pairs = retest_pairs(apart, first="a", second="b")
-    assert (pairs.raters, pairs.items, pairs.pairs) == ((), ("HM1",), [])
+    none = retest_pairs(apart, first="a", second="b")  # which is no error
+    assert (none.raters, none.items, none.pairs) == ((), ("HM1",), [])
 
 
 def test_repeats_are_items_of_their_own() -> None:
