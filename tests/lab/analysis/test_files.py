@@ -1,5 +1,6 @@
 """The analysis as JSON: every digit, a reason for each null, inputs that check."""
 
+import dataclasses
 import hashlib
 import json
 import math
@@ -8,8 +9,17 @@ from typing import Any
 
 import pytest
 
-from masrel.errors import UndefinedStatisticWarning
-from masrel.lab.analysis import Analysis, analyze, as_analysis_document, write_analysis
+from masrel.agreement import fleiss_kappa
+from masrel.errors import ParameterError, UndefinedStatisticWarning
+from masrel.estimates import Estimate, Interval
+from masrel.intervals import estimate
+from masrel.lab.analysis import (
+    Analysis,
+    analyze,
+    as_analysis_document,
+    to_frame,
+    write_analysis,
+)
 from masrel.lab.protocol import protocol_hash
 from masrel.lab.ratings import ratings_csv
 from tests.lab.analysis.studies import (
@@ -45,34 +55,31 @@ def read_back(analysis: Analysis, folder: Path) -> dict[str, Any]:
     return document
 
 
-def test_every_digit_survives(tmp_path: Path) -> None:
+def test_every_digit_survives_beside_the_line_of_the_plan(tmp_path: Path) -> None:
     analysis = published()
-    kappa, _ = read_back(analysis, tmp_path)["estimates"]
+    kappa, lost = read_back(analysis, tmp_path)["estimates"]
     estimate = analysis.estimates[0].estimate
     assert estimate is not None
     assert estimate.interval is not None
     assert kappa["estimate"]["value"] == estimate.value
     assert kappa["estimate"]["interval"]["low"] == estimate.interval.low
     assert kappa["estimate"]["interval"]["method"] == estimate.interval.method
-
-
-def test_a_line_of_the_plan_stands_beside_its_numbers(tmp_path: Path) -> None:
-    _, lost = read_back(published(), tmp_path)["estimates"]
-    assert (lost["id"], lost["models"], lost["coefficient"]) == (
-        "lost",
-        "dummy",
-        "fleiss_kappa",
-    )
-    assert lost["estimate"] is None
+    known = ("lost", "dummy", "fleiss_kappa", None)
+    names = ("id", "models", "coefficient", "estimate")
+    assert tuple(lost[name] for name in names) == known
     assert lost["reason"] == "no dummy model has ratings in session test"
+    write_analysis(published(), tmp_path / "again.json")  # the same bytes
+    first = (tmp_path / "deep" / "analysis.json").read_bytes()
+    assert (tmp_path / "again.json").read_bytes() == first
 
 
 def test_nan_is_null_with_a_reason(tmp_path: Path) -> None:
     (line,) = read_back(undefined(), tmp_path)["estimates"]
-    assert line["estimate"]["value"] is None
-    assert line["estimate"]["reason"]
-    assert line["estimate"]["interval"]["low"] is None
-    assert line["estimate"]["interval"]["reason"]
+    for part in (line["estimate"], line["estimate"]["interval"]):
+        assert part["value" if "value" in part else "low"] is None
+        assert part["reason"]
+    write_analysis(undefined(), tmp_path / "strict.json")  # JSON has no nan
+    assert "NaN" not in (tmp_path / "strict.json").read_text()
 
 
 def test_the_inputs_are_named_by_hashes_anybody_can_check(tmp_path: Path) -> None:
@@ -105,28 +112,43 @@ def test_ratings_without_a_file_are_named_by_their_rows() -> None:
     assert "in_person_sha256" not in found.inputs
 
 
-def test_the_same_analysis_gives_the_same_bytes(tmp_path: Path) -> None:
-    paths = [tmp_path / name for name in ("one.json", "two.json")]
-    for path in paths:
-        write_analysis(published(), path)
-    assert paths[0].read_bytes() == paths[1].read_bytes()
-
-
 def test_parts_nobody_asked_for_are_null() -> None:
     document = as_analysis_document(analyze(protocol_with(), table_v()))
     assert document["intended"] is None
     assert document["speeds"] is None
 
 
-def test_no_value_is_left_that_json_does_not_have() -> None:
-    def leaves(value: object) -> list[object]:
-        if isinstance(value, dict):
-            return [leaf for part in value.values() for leaf in leaves(part)]
-        if isinstance(value, list):
-            return [leaf for part in value for leaf in leaves(part)]
-        return [value]
+RATINGS = [["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"], ["a", "a"]] * 3
 
-    for document in map(as_analysis_document, (published(), undefined())):
-        for leaf in leaves(document):
-            assert leaf is None or isinstance(leaf, str | bool | int | float)
-            assert not (isinstance(leaf, float) and not math.isfinite(leaf))
+
+def test_a_row_holds_every_field_of_an_estimate_and_its_interval() -> None:
+    with_one = estimate("cohen_kappa", RATINGS, target="items", method="jackknife")
+    interval = with_one.interval
+    assert interval is not None
+    row = to_frame([with_one]).iloc[0]
+    for field in dataclasses.fields(Estimate):
+        if field.name != "interval":
+            expected = getattr(with_one, field.name)
+            assert row[field.name] == expected or row[field.name] is expected
+    names = {field.name for field in dataclasses.fields(Interval) if field.repr}
+    for name in names - {"reason"}:
+        assert row[name] == getattr(interval, name) or row[name] is None
+    assert row["interval_reason"] is None
+
+
+def test_columns_are_the_same_with_and_without_intervals() -> None:
+    with_one = estimate("cohen_kappa", RATINGS, target="items")
+    without = fleiss_kappa(RATINGS)
+    frame = to_frame({"one": with_one, "none": without})
+    assert list(frame.index) == ["one", "none"]
+    assert list(frame.columns) == list(to_frame([]).columns)
+    assert list(frame["coefficient"]) == ["cohen_kappa", "fleiss_kappa"]
+    assert math.isnan(frame.loc["none", "low"])
+    assert frame["low"].dtype == frame["value"].dtype == float
+    assert frame["n_items"].dtype == int
+
+
+def test_what_is_no_estimate_is_refused() -> None:
+    kappa = fleiss_kappa(RATINGS)
+    with pytest.raises(ParameterError, match="place 1: needs an Estimate, got float"):
+        to_frame([kappa, kappa.value])  # type: ignore[list-item]
