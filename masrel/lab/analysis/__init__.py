@@ -7,12 +7,7 @@ as JSON in full precision; or a regression of the grades, or estimates as a fram
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from masrel.lab.analysis._analysis_json import (
-        as_analysis_document,
-        to_frame,
-        write_analysis,
-    )
-    from masrel.lab.analysis._gate_results import GateResult, check_gates
+    from masrel.lab.analysis._comparison import GateResult, check_gates
     from masrel.lab.analysis._grading import Effect, GradeRegression, grade_regression
     from masrel.lab.analysis._plan import analyze
     from masrel.lab.analysis._results import (
@@ -29,6 +24,9 @@ if TYPE_CHECKING:
         Speed,
         Speeds,
         SpeedSummary,
+        as_analysis_document,
+        to_frame,
+        write_analysis,
     )
 
 __all__ = [
@@ -58,15 +56,13 @@ __all__ = [
 
 _HOMES = {
     "Effect": "_grading",
-    "GateResult": "_gate_results",
+    "GateResult": "_comparison",
     "GradeRegression": "_grading",
     "analyze": "_plan",
-    "check_gates": "_gate_results",
-    "as_analysis_document": "_analysis_json",
+    "check_gates": "_comparison",
     "grade_regression": "_grading",
-    "to_frame": "_analysis_json",
-    "write_analysis": "_analysis_json",
 }
+"""Name to its module; all others are of `_results`."""
 
 
 def __getattr__(name: str) -> object:

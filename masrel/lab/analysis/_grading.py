@@ -18,7 +18,6 @@ from scipy.optimize import linprog
 from scipy.special import stdtrit
 
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
-from masrel.lab.analysis._exclusions import analysed_ratings
 from masrel.lab.protocol import Protocol, elbow_parameters
 from masrel.lab.ratings import Ratings
 
@@ -174,7 +173,7 @@ def grade_regression(
        https://doi.org/10.1093/biomet/71.1.1
     """
     _check_options(protocol, predictors, session, level)
-    ratings = analysed_ratings(ratings, excluded)
+    ratings = ratings.without(excluded)
     table, n_missing = _predictor_table(protocol, ratings, predictors, models, session)
     grades = tuple(g for g in ratings.scale.grades if (table["grade"] == g).any())
     data, dropped, scale = _standardized(table, grades, predictors)

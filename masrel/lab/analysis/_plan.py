@@ -4,6 +4,7 @@ import hashlib
 import random
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 
 import masrel
 from masrel.agreement import coefficient, cohen_kappa
@@ -19,10 +20,9 @@ from masrel.lab.analysis._descriptions import (
     in_person_agreement,
     intended_agreement,
     presentations,
+    question_summaries,
     stretching_speeds,
 )
-from masrel.lab.analysis._exclusions import analysed_in_person, analysed_ratings
-from masrel.lab.analysis._question_summaries import question_summaries
 from masrel.lab.analysis._results import Analysis, PlannedEstimate, RaterEstimate
 from masrel.lab.protocol import (
     EstimatePlan,
@@ -95,8 +95,10 @@ def analyze(
     _check_known(protocol, ratings)
     inputs = _inputs(protocol, ratings, in_person, answers)
     if excluded:
-        ratings = analysed_ratings(ratings, excluded)
-        in_person = analysed_in_person(in_person, excluded)
+        ratings = ratings.without(excluded)
+        if in_person is not None:
+            rows = tuple(row for row in in_person.rows if row.rater not in excluded)
+            in_person = replace(in_person, rows=rows)
         answers = [each for each in answers if each.rater not in excluded]
     sections = set(report_sections(protocol))
     # descriptions of grades speak of the first session that has ratings

@@ -27,7 +27,7 @@ class CompareOptions:
         if self.against is None:
             return None
         # Imported here, as below: a report that is current is told so without it.
-        from masrel.lab.analysis._number_changes import read_old_analysis
+        from masrel.lab.analysis._comparison import read_old_analysis
         from masrel.lab.protocol import StudyPaths, read_protocol
 
         protocol = read_protocol(StudyPaths(study).protocol)
@@ -37,7 +37,7 @@ class CompareOptions:
         self, old: Mapping[str, Any], new: Mapping[str, Any], *, shows: bool
     ) -> dict[str, object]:
         """Return what has changed as a document, and show it unless JSON is printed."""
-        from masrel.lab.analysis._number_changes import changed_inputs, changes_between
+        from masrel.lab.analysis._comparison import changed_inputs, changes_between
         from masrel.lab.report._jobs import changes_table
         from masrel.tables._tables import as_text
 

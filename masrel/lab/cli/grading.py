@@ -54,7 +54,7 @@ def grading(
     grade, the others held.
     """
     from masrel.lab.analysis import grade_regression
-    from masrel.lab.analysis._analysis_json import plain_fields
+    from masrel.lab.analysis._results import plain_fields
 
     data = read_study(study, ratings_file)
     with warnings_as_notes():

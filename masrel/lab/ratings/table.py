@@ -3,8 +3,8 @@
 import csv
 import io
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -159,6 +159,22 @@ class Ratings:
     def n_missing(self) -> int:
         """How many ratings have no grade."""
         return sum(row.grade is None for row in self.rows)
+
+    def without(self, raters: Collection[str]) -> "Ratings":
+        """Return the ratings of all others, such as are left where some are excluded.
+
+        Parameters
+        ----------
+        raters : collection of str
+            Who is left out.
+
+        Returns
+        -------
+        Ratings
+            The others' ratings.
+        """
+        rows = tuple(row for row in self.rows if row.rater not in raters)
+        return replace(self, rows=rows)
 
     @property
     def table(self) -> "pd.DataFrame":

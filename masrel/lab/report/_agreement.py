@@ -13,8 +13,7 @@ from operator import attrgetter
 from masrel.agreement import strength
 from masrel.estimates import Estimate, Interval
 from masrel.lab.analysis import PlannedEstimate
-from masrel.lab.analysis._category_agreement import category_agreement
-from masrel.lab.analysis._exclusions import analysed_ratings
+from masrel.lab.analysis._report_numbers import category_agreement
 from masrel.lab.report._material import (
     MANY_RATERS,
     NOT_THERE,
@@ -308,7 +307,7 @@ def categories_needs(material: Material) -> PlannedEstimate | Lacking:
 def categories_section(material: Material, entry: PlannedEstimate) -> Iterator[Content]:
     """Show how well raters agree on each grade, by the ratings of the main estimate."""
     level, n_models = material.analysis.level, len(entry.models)
-    ratings = analysed_ratings(material.ratings, material.analysis.excluded)
+    ratings = material.ratings.without(material.analysis.excluded)
     notes = [
         "Agreement: how often, where one rater gave the grade, another rater of the "
         f"model gave it too. Low, High: its {percent(level)} % confidence interval for "

@@ -15,7 +15,7 @@ from typing import Any
 
 from masrel.errors import MissingLettersWarning
 from masrel.lab.analysis import Analysis
-from masrel.lab.analysis._analysis_json import analysis_text
+from masrel.lab.analysis._results import analysis_text
 from masrel.lab.protocol import Protocol, report_sections
 from masrel.lab.ratings import InPerson, Ratings
 from masrel.lab.report._agreement import (

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.lab.analysis import InPersonAgreement, IntendedAgreement, QuestionSummary
-from masrel.lab.analysis._exclusions import analysed_ratings
-from masrel.lab.analysis._given_grades import GivenGrades, given_grades
-from masrel.lab.analysis._question_summaries import FEWEST_RATERS
+from masrel.lab.analysis._descriptions import FEWEST_RATERS
+from masrel.lab.analysis._report_numbers import GivenGrades, given_grades
 from masrel.lab.protocol import report_sections
 from masrel.lab.report._material import FIGURES, MANY_RATERS, Lacking, Material
 from masrel.pages._sections import Content, Drawing, Paragraph
@@ -289,7 +288,7 @@ _Given = tuple[str | None, tuple[GivenGrades, ...]]
 def confusion_needs(material: Material) -> _Given | Lacking:
     """Return a session, and what models of each intended grade were given in it."""
     analysis = material.analysis
-    ratings = analysed_ratings(material.ratings, analysis.excluded)
+    ratings = material.ratings.without(analysis.excluded)
     aims = given_grades(material.protocol, ratings, analysis.level)
     lacks = Lacking("no model with an intended grade has ratings")
     return aims if aims[1] else lacks

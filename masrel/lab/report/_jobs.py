@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from masrel.lab.analysis import Analysis, GateResult, PlannedEstimate
-from masrel.lab.analysis._number_changes import Change
+from masrel.lab.analysis._comparison import Change
 from masrel.lab.report._pages import as_markdown
 from masrel.tables._estimate_words import sentence
 from masrel.tables._tables import Column, Table, Value

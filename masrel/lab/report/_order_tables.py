@@ -4,8 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from itertools import pairwise
 
-from masrel.lab.analysis._exclusions import analysed_ratings
-from masrel.lab.analysis._order_effects import (
+from masrel.lab.analysis._report_numbers import (
     OrderEffect,
     compared,
     order_effects,
@@ -20,7 +19,7 @@ from masrel.tables._tables import Column, Table, percent
 
 def order_needs(material: Material) -> Ratings | Lacking:
     """Return the ratings that are analysed, if they can show any effect of order."""
-    ratings = analysed_ratings(material.ratings, material.analysis.excluded)
+    ratings = material.ratings.without(material.analysis.excluded)
     lacks = Lacking(sentence("order", "nothing"))
     return ratings if compared(material.protocol, ratings) else lacks
 

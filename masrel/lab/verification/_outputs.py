@@ -130,7 +130,7 @@ def _analysis_findings(
     path: Path, analysis: "Analysis", ratings: "Ratings"
 ) -> Iterator[Finding]:
     from masrel.lab.analysis import as_analysis_document
-    from masrel.lab.analysis._analysis_json import ANALYSIS_FORMAT
+    from masrel.lab.analysis._results import ANALYSIS_FORMAT
 
     document = _document(path)
     if document is None:

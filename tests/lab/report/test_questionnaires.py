@@ -170,7 +170,7 @@ def asking(tmp_path: Path) -> Protocol:
 def test_choices_are_counted_analogues_are_in_tenths_and_texts_are_left_out(
     asking: Protocol,
 ) -> None:
-    from masrel.lab.analysis._question_summaries import question_summaries
+    from masrel.lab.analysis._descriptions import question_summaries
 
     def given(question: str, *answers: str | float) -> list[GivenAnswer]:
         like = replace(score(1), questionnaire="q", question=question)

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from masrel.lab.analysis import Speed, Speeds
-from masrel.lab.analysis._given_grades import GivenGrades
+from masrel.lab.analysis._report_numbers import GivenGrades
 from masrel.lab.report._material import MANY_RATERS
 from masrel.lab.schedule._balance import OrderBalance
 from masrel.plots._cells import cells, name_columns, name_rows, room_of

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from masrel.lab.analysis._number_changes import changes_between
+from masrel.lab.analysis._comparison import changes_between
 
 
 def test_the_reason_of_an_interval_is_not_that_of_its_estimate() -> None:

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from scipy.stats import ttest_1samp
 
-from masrel.lab.analysis._order_effects import (
+from masrel.lab.analysis._report_numbers import (
     OrderEffect,
     order_effects,
     place_summaries,

@@ -1,22 +1,134 @@
-"""Whether grades depend on when a model came: its place, its neighbour, its return.
+"""What only a report shows: grades by intended ones, each grade, and effects of order.
 
-A grade counts by its step in the scale, from 0. Every effect is one difference of two
-means for each rater, and its interval is that of a mean difference of pairs.
+Of effects of order a grade counts by its step in the scale, from 0. Each is one
+difference of two means for each rater, and its interval is that of a mean difference of
+pairs.
 """
 
 import math
 import statistics
+import warnings
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
+from masrel.agreement import category_kappa, code_ratings
+from masrel.errors import MasrelWarning
+from masrel.intervals.diagnosis import _category_arrays, _share_interval
+from masrel.lab.analysis._results import PlannedEstimate
 from masrel.lab.protocol import Protocol
-from masrel.lab.ratings import Ratings
+from masrel.lab.ratings import Ratings, rating_matrix
 
 _Pairs = Mapping[str, tuple[list[float], list[float]]]
 """By rater, the values whose means are compared: the first less the second."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GivenGrades:
+    """Grades of the models of one intended grade."""
+
+    intended: str
+    counts: tuple[int, ...]  # of each grade of the scale
+    n_raters: int
+    # part of the grades that are the intended one, and its interval, raters random
+    share: float
+    low: float
+    high: float
+
+    @property
+    def n(self) -> int:
+        """How many grades there are."""
+        return sum(self.counts)
+
+
+def given_grades(
+    protocol: Protocol, ratings: Ratings, level: float
+) -> tuple[str | None, tuple[GivenGrades, ...]]:
+    """Return the first session that has ratings, and its grades by intended ones."""
+    intended = {model.id: model.intended_grade for model in protocol.models}
+    graded = [row for row in ratings.rows if row.grade is not None]
+    present = {row.session for row in graded}
+    session = next((s.id for s in protocol.sessions if s.id in present), None)
+    # how often each rater met each intended grade with each grade
+    met: dict[str, Counter[tuple[str, str]]] = {}
+    for row in graded:
+        aim = intended[row.model]
+        if row.session == session and row.grade is not None and aim is not None:
+            met.setdefault(aim, Counter())[row.rater, row.grade] += 1
+    grades = ratings.scale.grades
+    return session, tuple(
+        _of_aim(aim, met[aim], grades, level) for aim in grades if aim in met
+    )
+
+
+def _of_aim(
+    aim: str, met: Counter[tuple[str, str]], grades: tuple[str, ...], level: float
+) -> GivenGrades:
+    raters = sorted({rater for rater, _ in met})
+    every = np.array([[met[rater, grade] for grade in grades] for rater in raters])
+    # of each rater how many grades, and how many of them the intended one
+    wholes = every.sum(axis=1).astype(np.float64)
+    parts = every[:, grades.index(aim)].astype(np.float64)
+    low, high = _share_interval(
+        level,
+        parts=parts.sum(keepdims=True),
+        wholes=wholes.sum(keepdims=True),
+        squares=np.array([parts @ parts]),
+        products=np.array([parts @ wholes]),
+        whole_squares=np.array([wholes @ wholes]),
+        n_items=np.array([float(len(raters))]),
+    )
+    return GivenGrades(
+        intended=aim,
+        counts=tuple(every.sum(axis=0).tolist()),
+        n_raters=len(raters),
+        share=float(parts.sum() / wholes.sum()),
+        low=float(low[0]),
+        high=float(high[0]),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CategoryAgreement:
+    """Agreement of raters on one grade."""
+
+    grade: str
+    n_ratings: int  # in the grade
+    # specific agreement and its interval, models random; ``nan`` where undefined
+    agreement: float
+    low: float
+    high: float
+    kappa: float  # Fleiss' of the grade against all others; ``nan`` where undefined
+
+
+def category_agreement(
+    entry: PlannedEstimate, ratings: Ratings, level: float
+) -> tuple[CategoryAgreement, ...]:
+    """Return how well raters agree on each grade, by the ratings of a planned line."""
+    matrix = rating_matrix(ratings, session=entry.line.sessions[0], models=entry.models)
+    grades = ratings.scale.grades
+    codes = code_ratings(matrix.grades, grades).codes
+    freq = np.ones(len(codes), dtype=np.int64)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MasrelWarning)  # a grade that nobody gave
+        arrays = _category_arrays(codes, freq, len(grades), level)
+        kappas = [
+            category_kappa(matrix.grades, grade, categories=grades).value
+            for grade in grades
+        ]
+    keys = ("counts", "values", "low", "high")
+    columns = [arrays[f"category_{key}"].tolist() for key in keys]
+    return tuple(
+        CategoryAgreement(
+            grade=grade, n_ratings=n, agreement=value, low=low, high=high, kappa=kappa
+        )
+        for grade, n, value, low, high, kappa in zip(
+            grades, *columns, kappas, strict=True
+        )
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
