@@ -24,9 +24,7 @@ from numpy.typing import NDArray
 
 from masrel.lab.protocol import StudyPaths
 from masrel.lab.recording import RAMPS, read_recording
-from masrel.lab.serve._access import Role
-from masrel.lab.serve._live import SampleTail
-from tests.lab.serve.pages import Served, small_study
+from tests.lab.serve.pages import Role, SampleTail, Served, small_study
 
 PERIOD_S = 1e-3
 TAPPED_AFTER_S = 0.3  # a stop is tapped so long after the arm began to move

@@ -28,6 +28,7 @@ from masrel.lab.protocol import StudyPaths, copy_template, read_protocol
 from masrel.lab.run import GradeCorrection, read_log
 from masrel.lab.serve._access import LIFE_S, ROLES, Access, Role
 from masrel.lab.serve._coordinator import ACTIONS
+from masrel.lab.serve._live import SampleTail
 from masrel.lab.serve._manager import (
     AnswerRefusedError,
     AskOverError,
@@ -44,6 +45,7 @@ __all__ = [
     "AnswerRefusedError",
     "AskOverError",
     "Role",
+    "SampleTail",
     "SessionManager",
     "alone",
     "encryption",
