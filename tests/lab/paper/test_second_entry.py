@@ -78,26 +78,7 @@ def test_a_second_entry_that_was_wrong_is_mended_and_compared_again(
     assert study_remarks(*small) == ()
 
 
-def test_answers_are_compared_too(new_study: New) -> None:
-    small = new_study(("[schedule]", QUESTIONS))
-    rows = filled(small, "1", "2", "3")
-    for row in rows[1:4]:
-        row[4] = "7"
-    rows[4][5:] = ["50", "more"]
-    enter(small, typed(small, rows))
-    rows[2][4], rows[4][5] = "8", "50,5"
-    found = compare(small, typed(small, rows, name="b.csv", delimiter=";"))
-    assert [(d.code, d.column, d.first, d.second) for d in found] == [
-        (rows[2][2], "arm.realism", "7", "8"),
-        (None, "end.tired", "50", "50.5"),
-    ]
-    assert verify_study(small[0]).is_whole
-    remarks = " ".join(study_remarks(*small))  # an answer is private
-    assert "arm.realism (b.csv, row 3)" in remarks
-    assert "50" not in remarks
-
-
-def test_answers_about_the_study_are_compared_with_the_log_they_are_in(
+def test_answers_are_compared_with_the_log_they_are_in(
     new_study: New,
 ) -> None:
     about = QUESTIONS.replace('when = "session"', 'when = "study"')
@@ -108,24 +89,23 @@ def test_answers_about_the_study_are_compared_with_the_log_they_are_in(
         row[4] = "7"
     rows[4][5:] = ["50", "more"]
     enter(small, typed(small, rows))
-    rows[4][5:] = ["5", "more"]
-    second = typed(small, rows, name="b.csv")
-    (found,) = compare(small, second)
-    assert (found.code, found.column) == (None, "end.tired")
-    assert (found.first, found.second) == ("50", "5")
-    (remark,) = study_remarks(study, protocol)
-    assert "sheet differ, end.tired (b.csv, row 5)" in remark
+    code, rows[2][4], rows[4][5] = rows[2][2], "8", "50,5"
+    second = typed(small, rows, name="b.csv", delimiter=";")
+    differences = compare(small, second)
+    assert [(d.code, d.column, d.first, d.second) for d in differences] == [
+        (code, "arm.realism", "7", "8"),
+        (None, "end.tired", "50", "50.5"),
+    ]
+    remarks = " ".join(study_remarks(study, protocol))  # an answer is private
+    assert "arm.realism (b.csv, row 3)" in remarks
+    assert "sheet differ, end.tired (b.csv, row 5)" in remarks
+    assert "50" not in remarks
     # the first was wrong
-    record_answer(
-        study,
-        protocol,
-        "R1",
-        "test",
-        question="end.tired",
-        answer=5.0,
-        who="MK",
-        why="typed wrongly",
-    )
+    reasons = {"who": "MK", "why": "typed wrongly"}
+    of_study = {"question": "end.tired", "answer": 50.5, **reasons}
+    record_answer(study, protocol, "R1", "test", **of_study)
+    of_model = {"question": "arm.realism", "answer": 8, "code": code, **reasons}
+    record_answer(study, protocol, "R1", "test", **of_model)
     assert study_remarks(study, protocol) == ()
     assert compare(small, second) == ()
     assert verify_study(study).is_whole

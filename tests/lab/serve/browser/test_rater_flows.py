@@ -2,8 +2,7 @@
 
 import re
 import signal
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 
 import pytest
 from playwright.sync_api import expect
@@ -346,45 +345,6 @@ def tab_to(visitor: Visitor, selector: str) -> None:
             return
         visitor.page.keyboard.press("Tab")
     raise AssertionError(f"no key leads to {selector}")
-
-
-LANGUAGES = {
-    "de": ("Anleitung", "Weiter"),
-    "fr": ("Consignes", "Continuer"),
-    "es": ("Instrucciones", "Continuar"),
-}
-
-
-@pytest.fixture
-def protocol(stage: Stage) -> Iterator[Path]:
-    """The protocol, which is again what it was when a flow ends, however it ends."""
-    text = stage.study.protocol.read_text(encoding="utf-8")
-    yield stage.study.protocol
-    replace(stage.study.protocol, text)
-
-
-def replace(path: Path, text: str) -> None:
-    """Change a file at once: the server and a session may read it at any time."""
-    beside = path.with_suffix(".new")
-    beside.write_text(text, encoding="utf-8")
-    beside.replace(path)
-
-
-def test_a_page_speaks_the_language_of_its_study(stage: Stage, protocol: Path) -> None:
-    english = protocol.read_text(encoding="utf-8")
-    rater = stage.session(color_scheme="dark")
-    assert "token" not in rater.page.url  # its address stays in no history
-    rater.wait_for("instructions")  # the session has read its protocol
-    ground = rater.page.evaluate("getComputedStyle(document.body).backgroundColor")
-    assert max(int(part) for part in re.findall(r"\d+", ground)[:3]) < 60
-    for language, (title, go_on) in LANGUAGES.items():
-        changed = f'[study]\nlanguage = "{language}"'
-        replace(protocol, english.replace("[study]", changed))
-        rater.page.reload()
-        rater.wait_for("instructions")
-        assert rater.page.locator("html").get_attribute("lang") == language
-        assert rater.page.locator("h1").inner_text() == title
-        assert rater.page.get_by_role("button", name=go_on, exact=True).is_visible()
 
 
 YEARS = {
