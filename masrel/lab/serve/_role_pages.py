@@ -311,29 +311,22 @@ class _CoordinatorPages(_Pages):
 
     def _log(self) -> list[dict[str, Any]]:
         # what is in the log of the session that runs: kinds, codes and times
-        file = self._log_file()
-        if file is None:
+        if self._manager.running is None:
             return []
+        rater, session, is_rehearsal = self._manager.running
+        file: Path | None = self._manager.study.log_file(rater, session)
+        if is_rehearsal:
+            # while one starts, the last one is another rehearsal's
+            starts = self._manager.state()["screen"] == "starting"
+            of_last = last_rehearsal(self._manager.study, rater, session)
+            file = None if starts else of_last
         with contextlib.suppress(MasrelError, OSError):
+            events = () if file is None else read_log(file)[-_N_LOG:]
             return [
-                {
-                    "event": event.kind,
-                    "time_utc": event.time_utc,
-                    **_shown_of(event.fields),
-                }
-                for event in read_log(file)[-_N_LOG:]
+                {"event": each.kind, "time_utc": each.time_utc, **_shown(each.fields)}
+                for each in events
             ]
         return []
-
-    def _log_file(self) -> Path | None:
-        if self._manager.running is None:
-            return None
-        rater, session, is_rehearsal = self._manager.running
-        if not is_rehearsal:
-            return self._manager.study.log_file(rater, session)
-        if self._manager.state()["screen"] == "starting":
-            return None  # the last one is another rehearsal's
-        return last_rehearsal(self._manager.study, rater, session)
 
     def _live(self, tail: SampleTail | None) -> tuple[str, Any]:
         return "live", {"begins": True} if tail is None else _frame(tail)
@@ -365,7 +358,7 @@ class _CoordinatorPages(_Pages):
         return FileResponse(file)
 
 
-def _shown_of(fields: Any) -> dict[str, Any]:
+def _shown(fields: Any) -> dict[str, Any]:
     # of an event: what says no model and no grade's meaning
     names = ("code", "position", "attempt", "grade", "kind", "fault", "why", "who")
     return {name: fields[name] for name in names if fields.get(name) is not None}

@@ -159,30 +159,6 @@ def test_unicode_text_and_utf_16_are_told_from_others(small: Small) -> None:
             enter(small, file, rater="R2")
 
 
-def test_answers_come_with_the_grades(new_study: New) -> None:
-    small = new_study(("[schedule]", QUESTIONS))
-    rows = filled(small, "1", "2", "3")
-    for row, realism in zip(rows[1:4], ("7", "NA", "10"), strict=True):
-        row[4] = realism
-    rows[4][5:] = ["7,5", "größer; schneller"]
-    enter(small, typed(small, rows, delimiter=";"))
-    codes = [row[2] for row in rows[1:4]]
-    log = read_log(small[0].log_file("R1", "test"))
-    answered = {
-        (e.fields["question"], e.fields["code"]): e.fields["answer"]
-        for e in log
-        if e.kind == "answered"
-    }
-    assert answered == {
-        ("realism", codes[0]): 7,
-        ("realism", codes[1]): None,
-        ("realism", codes[2]): 10,
-        ("tired", None): 7.5,
-        ("words", None): "größer; schneller",
-    }
-    assert verify_study(small[0]).is_whole
-
-
 ABOUT_THE_STUDY = """
 [[questionnaires]]
 id = "all"

@@ -146,18 +146,6 @@ async def over(page: Tablet) -> dict[str, Any]:
             await asyncio.sleep(0.05)
 
 
-@pytest.mark.slow
-def test_long_work_is_the_command_itself(study: StudyPaths) -> None:
-    async def run(_: SessionManager, page: Tablet) -> None:
-        for job in ("check", "verify"):
-            await page.done("job", verb=job)
-        jobs = await over(page)
-        assert {job["status"] for job in jobs.values()} == {"done"}
-        assert any("whole" in line for line in jobs["verify"]["lines"])
-
-    with_tablets(study, run, coordinated=True)
-
-
 def test_long_work_runs_once_at_a_time_and_can_be_stopped(study: StudyPaths) -> None:
     async def run(_: SessionManager, page: Tablet) -> None:
         # two screens at once, and one later
@@ -201,21 +189,6 @@ def test_a_protocol_that_is_being_edited_leaves_the_page_its_stream(
         assert after["sessions"] == before["sessions"]
 
     with_tablets(study, run, coordinated=True)
-
-
-def test_the_log_of_a_rehearsal_is_shown_while_it_runs(study: StudyPaths) -> None:
-    async def run(_: SessionManager, page: Tablet, tablet: Tablet) -> None:
-        for is_rehearsal in (False, True):
-            await page.done("start", **R1, rehearsal=is_rehearsal)
-            await tablet.until("ready")
-            state = await page.state()
-            assert state["desk"]["session"]["rehearsal"] is is_rehearsal
-            names = [each["event"] for each in state["log"]]
-            assert names == ["session", "instructed"]
-            await page.done("leave")
-            assert (await page.state())["log"] == []
-
-    with_tablets(study, run, "R1", coordinated=True)
 
 
 def test_files_of_the_report_alone_are_served(study: StudyPaths) -> None:
