@@ -1,10 +1,10 @@
 """``masrel report``: write the report of a study."""
 
 import hashlib
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -15,6 +15,7 @@ from masrel.cli._options import (
     GroupedHelp,
     OutputOptions,
     echo_notes,
+    grouped,
     notes_of_call,
     output_options,
     write_json,
@@ -22,7 +23,6 @@ from masrel.cli._options import (
 from masrel.errors import ParameterError
 from masrel.lab._bounded_files import MAX_TABLE, parse_json, read_regular
 from masrel.lab._once import read_once
-from masrel.lab.cli._comparing import CompareOptions, compare_options
 from masrel.lab.cli._gating import GateOptions, Verdict, gate_options, verdict_of
 from masrel.lab.cli._study_options import ratings_option, read_study, warnings_as_notes
 from masrel.lab.report._report_folder import (
@@ -36,15 +36,76 @@ from masrel.lab.report._report_folder import (
     stale_pages,
 )
 
-if TYPE_CHECKING:
-    from masrel.lab.analysis import Analysis
-    from masrel.lab.protocol import Protocol
-    from masrel.lab.ratings import StudyData
-
 FORMATS = ("html", "markdown", "latex", "docx")
 # They change nothing that is made or said
 _OTHER_OPTIONS = (
     *("cache_folder", "check", "junit", "quiet", "json_file", "against", "no_change"),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _CompareOptions:
+    """What a report is held against, and whether a change is a failure."""
+
+    against: Path | None
+    no_change: bool
+
+    def __post_init__(self) -> None:
+        if self.no_change and self.against is None:
+            raise ParameterError("--no-change: needs --against, the report to compare")
+
+    def read(self, study: Path) -> dict[str, Any] | None:
+        """Return the older analysis of a study; None if nothing is to be compared."""
+        if self.against is None:
+            return None
+        # Imported here, as below: who has a report that is current needs none of it.
+        from masrel.lab.analysis._comparison import read_old_analysis
+        from masrel.lab.protocol import StudyPaths, read_protocol
+
+        protocol = read_protocol(StudyPaths(study).protocol)
+        return read_old_analysis(self.against, protocol.study.id, option="--against")
+
+    def compare(
+        self, old: Mapping[str, Any], new: Mapping[str, Any], *, shows: bool
+    ) -> dict[str, object]:
+        """Return what has changed as a document, and show it unless JSON is printed."""
+        from masrel.lab.analysis._comparison import changed_inputs, changes_between
+        from masrel.lab.report._jobs import changes_table
+        from masrel.tables._tables import as_text
+
+        changes, inputs = changes_between(old, new), changed_inputs(old, new)
+        if shows and changes:
+            simulated = bool(old.get("simulated") or new.get("simulated"))
+            table = changes_table(
+                changes, inputs, str(self.against), simulated=simulated
+            )
+            click.echo(as_text(table))
+        elif shows:
+            click.echo(f"no number has changed since {self.against}")
+            for line in inputs:
+                click.echo(line)
+        return {
+            "against": str(self.against),
+            "changes": [{**asdict(c), "difference": c.difference} for c in changes],
+            "inputs": list(inputs),
+        }
+
+
+_compare_options = grouped(
+    "comparing",
+    _CompareOptions,
+    click.option(
+        "--against",
+        type=click.Path(path_type=Path),
+        metavar="OLD",
+        help="Say, number by number, what has changed since an older report: its "
+        "folder, a study, or an analysis.json.",
+    ),
+    click.option(
+        "--no-change",
+        is_flag=True,
+        help="With --against: exit with 1 if a number has changed.",
+    ),
 )
 
 
@@ -93,7 +154,7 @@ _OTHER_OPTIONS = (
     type=click.Path(path_type=Path, file_okay=False),
     help=f"Folder that has what the last report was made from; default: STUDY/{NOTES}.",
 )
-@compare_options()
+@_compare_options
 @output_options(
     json="Write here what came of gates, --check and --against; - prints it, and "
     "nothing else, on stdout.",
@@ -111,7 +172,7 @@ def report(
     gating: GateOptions,
     include: tuple[str, ...],
     cache_folder: Path | None,
-    comparing: CompareOptions,
+    comparing: _CompareOptions,
     output: OutputOptions,
 ) -> None:
     """Write the report of STUDY: HTML, Markdown, tables and figures.
@@ -131,25 +192,38 @@ def report(
         ratings_file=ratings_file,
     )
     old = comparing.read(study)  # which may be what is replaced
-    making = _Making(build, ratings_file, only, formats, gating, include, output)
-    outcome = making.outcome(check=check)
-    verdict = Verdict(**outcome.shown["verdict"])
+    made_from = build.made_from()  # a file that comes later is a change
+    shown, changes = build.last(made_from), list[str]()
+    if shown is not None:
+        echo_notes(shown["notes"])
+        numbers = read_regular(destination / NUMBERS, most=MAX_TABLE)
+    else:
+        files, shown = _made(
+            study, ratings_file, only, formats, gating, include, output
+        )
+        numbers = files[NUMBERS]
+        if check:
+            changes = list(_changes(files, destination))
+        else:
+            replace_report(destination, files)
+            build.keep(made_from, shown)
+    verdict = Verdict(**shown["verdict"])
     prints_json = output.json_file == STDOUT
-    click.echo(outcome.shown["read"], err=True)
-    names = outcome.shown["pages"]
+    click.echo(shown["read"], err=True)
+    names = shown["pages"]
     pages = [destination / name for name in names if name != "report.md"]
-    for line in outcome.changes if check else pages or [destination / "report.md"]:
+    for line in changes if check else pages or [destination / "report.md"]:
         click.echo(line, err=prints_json)
     document: dict[str, Any] = {"gates": verdict.gates}
     if check:
-        document["check"] = outcome.changes
+        document["check"] = changes
     if old is not None:
-        new = parse_json(outcome.numbers)
+        new = parse_json(numbers)
         document |= comparing.compare(old, new, shows=not prints_json)
     if output.json_file is not None:
         write_json(document, output.json_file)
     verdict.conclude(gating)
-    if outcome.changes or (comparing.no_change and document["changes"]):
+    if changes or (comparing.no_change and document["changes"]):
         click.get_current_context().exit(1)
 
 
@@ -166,80 +240,41 @@ def _notes(study: Path, folder: Path | None) -> Path:
     return folder
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Outcome:
-    """What a call came to, whether anything had to be made or not."""
+def _made(
+    study: Path,
+    ratings_file: Path | None,
+    only: tuple[str, ...],
+    formats: tuple[str, ...],
+    gating: GateOptions,
+    include: tuple[str, ...],
+    output: OutputOptions,
+) -> tuple[dict[str, bytes], dict[str, Any]]:
+    # -> the files of the report, and what is said of it
+    # Imported here: who has a report that is current needs none of it.
+    from tqdm import tqdm
 
-    shown: dict[str, Any]  # what is said of it
-    changes: list[str]  # what a build would change, if it was only looked at
-    numbers: bytes  # the analysis, as the report's folder has it
+    from masrel.lab.analysis import analyze
+    from masrel.lab.report import study_conduct
+    from masrel.lab.report._document import make_report, section_names
+    from masrel.lab.report._material import gather
+    from masrel.lab.report._pages import pandoc_version
+    from masrel.lab.verification import anchors_of
 
-
-@dataclass(frozen=True, slots=True)
-class _Making:
-    """What a report is made with."""
-
-    build: Build
-    ratings_file: Path | None
-    only: tuple[str, ...]
-    formats: tuple[str, ...]
-    gating: GateOptions
-    include: tuple[str, ...]
-    output: OutputOptions
-
-    def outcome(self, *, check: bool) -> _Outcome:
-        """Make the report, or see that it is current."""
-        build = self.build
-        made_from = build.made_from()  # a file that comes later is a change
-        shown = build.last(made_from)
-        if shown is not None:
-            echo_notes(shown["notes"])
-            numbers = read_regular(build.folder / NUMBERS, most=MAX_TABLE)
-            return _Outcome(shown=shown, changes=[], numbers=numbers)
-        files, shown = self._run()
-        changes = _write_or_compare(files, build.folder, check=check)
-        if not check:
-            build.keep(made_from, shown)
-        return _Outcome(shown=shown, changes=changes, numbers=files[NUMBERS])
-
-    def _run(self) -> tuple[dict[str, bytes], dict[str, Any]]:
-        """Return the files of the report, and what is said of it."""
-        # most of what libraries and figures make stays in use
-        with read_once(), collector_off():
-            data = read_study(self.build.study, self.ratings_file)
-            _check_sections(self.only, data.protocol)
-            if {"latex", "docx"} & {*data.protocol.report.formats, *self.formats}:
-                # Imported here: who has a report that is current needs none of it.
-                from masrel.lab.report._pages import pandoc_version
-
-                pandoc_version()
-            gates = self.gating.gates(data.protocol)
-            analysis, files = self._files(data)
-        return files, {
-            # of what is written, not of what is there: others may write there, too
-            "manifest": hashlib.sha256(files[MANIFEST]).hexdigest(),
-            "notes": notes_of_call(),
-            "read": f"read: {data.read}",
-            "pages": [
-                name
-                for name in files
-                if "/" not in name and name not in (MANIFEST, NUMBERS)
-            ],
-            "verdict": asdict(verdict_of(analysis, gates)),
-        }
-
-    def _files(self, data: "StudyData") -> "tuple[Analysis, dict[str, bytes]]":
-        # Imported here: who has a report that is current needs none of it.
-        from tqdm import tqdm
-
-        from masrel.lab.analysis import analyze
-        from masrel.lab.report import study_conduct
-        from masrel.lab.report._document import make_report
-        from masrel.lab.report._material import gather
-        from masrel.lab.verification import anchors_of
-
+    # most of what libraries and figures make stays in use
+    with read_once(), collector_off():
+        data = read_study(study, ratings_file)
+        known = section_names(data.protocol)
+        for name in only:
+            if name not in known:
+                raise ParameterError(
+                    f"--only: needed a section of this report, {', '.join(known)}, got "
+                    f"{name!r}"
+                )
+        if {"latex", "docx"} & {*data.protocol.report.formats, *formats}:
+            pandoc_version()
+        gates = gating.gates(data.protocol)
         conduct = study_conduct(
-            data.paths, data.protocol, file=self.ratings_file, include=self.include
+            data.paths, data.protocol, file=ratings_file, include=include
         )
         with warnings_as_notes():
             analysis = analyze(
@@ -249,13 +284,6 @@ class _Making:
                 answers=data.answers,
                 excluded=data.excluded,
             )
-
-        bar = tqdm(desc="report", unit=" parts", disable=self.output.quiet or None)
-
-        def progress(part: str) -> None:
-            bar.set_postfix_str(part, refresh=False)
-            bar.update()
-
         material = gather(
             data.protocol,
             data.ratings,
@@ -264,38 +292,34 @@ class _Making:
             data.paths.sessions,
             conduct,
         )
+        bar = tqdm(desc="report", unit=" parts", disable=output.quiet or None)
+
+        def progress(part: str) -> None:
+            bar.set_postfix_str(part, refresh=False)
+            bar.update()
+
         with warnings_as_notes(), bar:
-            return analysis, make_report(
+            files = make_report(
                 material,
                 # of what is simulated none, so that it repeats byte for byte
                 anchors=() if data.ratings.simulated else anchors_of(data.paths),
                 progress=progress,
-                raw_csv=self.output.raw_csv,
-                only=self.only,
-                formats=self.formats,
+                raw_csv=output.raw_csv,
+                only=only,
+                formats=formats,
             )
-
-
-def _check_sections(only: Collection[str], protocol: "Protocol") -> None:
-    from masrel.lab.report._document import section_names
-
-    known = section_names(protocol)
-    for name in only:
-        if name not in known:
-            raise ParameterError(
-                f"--only: needed a section of this report, {', '.join(known)}, got "
-                f"{name!r}"
-            )
-
-
-def _write_or_compare(
-    files: Mapping[str, bytes], folder: Path, *, check: bool
-) -> list[str]:
-    # what would change if it is only looked at; else it is written
-    if check:
-        return list(_changes(files, folder))
-    replace_report(folder, files)
-    return []
+    return files, {
+        # of what is written, not of what is there: others may write there, too
+        "manifest": hashlib.sha256(files[MANIFEST]).hexdigest(),
+        "notes": notes_of_call(),
+        "read": f"read: {data.read}",
+        "pages": [
+            name
+            for name in files
+            if "/" not in name and name not in (MANIFEST, NUMBERS)
+        ],
+        "verdict": asdict(verdict_of(analysis, gates)),
+    }
 
 
 def _changes(files: Mapping[str, bytes], folder: Path) -> Iterator[str]:
