@@ -13,7 +13,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::masrel.errors.MasrelWarning")
 CELLS = deciding()
 
 
-@pytest.mark.parametrize("place", range(7, len(CELLS), 10))
+@pytest.mark.parametrize("place", range(7, len(CELLS), 20))
 def test_a_large_study_has_the_coefficients_of_its_population(place: int) -> None:
     cell = CELLS[place]
     population = cell.make()
@@ -43,10 +43,10 @@ def test_kappa_of_fixed_items_by_hand() -> None:
 
 def test_a_study_repeats_and_counts_its_studies() -> None:
     study = Study(name="one", cells=CELLS[4:5], methods=METHODS, seed=1)
-    rows = study.run(6, quiet=True)
-    assert rows.equals(study.run(6, quiet=True))
+    rows = study.run(3, quiet=True)
+    assert rows.equals(study.run(3, quiet=True))
     assert len(rows) == len(METHODS) * len(CELLS[4].coefficients)
-    assert (rows["n_defined"] <= 6).all()
+    assert (rows["n_defined"] <= 3).all()
     inside = rows["coverage"] + rows["truth_below"] + rows["truth_above"]
     assert inside.to_numpy() == pytest.approx(rows["answered"].to_numpy())
     assert pd.api.types.is_numeric_dtype(rows["width"])

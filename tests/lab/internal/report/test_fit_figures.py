@@ -31,6 +31,7 @@ def test_only_slow_trials_have_figures_too() -> None:
     assert sorted(fit_figures(found)) == ["fit_residuals", "fit_slow"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("terms", "law"),
     [
