@@ -129,6 +129,11 @@ def test_events(
     assert [degrees(e.angle) for e in events] == pytest.approx(angles, abs=5e-4)
 
 
+def test_the_clasp_knife_is_in_post_catch_once_it_gives_way() -> None:
+    times, _, phase = stepped(ClaspKnife(), m1())
+    assert times[np.argmax(phase == 2)] == pytest.approx(0.66715, abs=2e-3)
+
+
 def test_gaps_of_the_cogwheel() -> None:
     """From onset, (n + 0.6)/6 to (n + 1)/6, cut where the movement ends."""
     gaps = [e.time for e in Cogwheel().events(m1()) if e.name == "gap"]
