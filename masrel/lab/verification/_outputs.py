@@ -3,11 +3,12 @@
 import hashlib
 import json
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import masrel
 from masrel.errors import MasrelError, MasrelWarning
 from masrel.lab._bounded_files import (
     MAX_RECORDING,
@@ -39,7 +40,8 @@ def output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
     files = [file for file in outputs if file.is_file()]
     if not files:
         return  # nothing is loaded for it
-    from masrel.lab.ratings import read_study_data
+    from masrel.lab.analysis import analyze
+    from masrel.lab.ratings import answers_of, in_person_of, read_study_data
     from masrel.lab.ratings.study_data import _of_logs
 
     try:
@@ -53,7 +55,15 @@ def output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
                 yield doubt(table, "no session log stands behind this table")
         if not {study.analysis_file, manifest} & {*files}:
             return
-        analysis = _analysis_of(study, protocol, ratings)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", MasrelWarning)  # of statistics
+            analysis = analyze(
+                protocol,
+                ratings,
+                in_person=in_person_of(study, ratings),
+                answers=answers_of(study, protocol),
+                excluded=excluded_raters(study),
+            )
     except MasrelError as error:
         for path in files:
             yield broken(path, f"cannot be held against what it is made from: {error}")
@@ -62,23 +72,6 @@ def output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
         yield from _analysis_findings(study.analysis_file, analysis, ratings)
     if manifest.is_file():
         yield from _report_findings(study, manifest, analysis, ratings)
-
-
-def _analysis_of(
-    study: StudyPaths, protocol: Protocol, ratings: "Ratings"
-) -> "Analysis":
-    from masrel.lab.analysis import analyze
-    from masrel.lab.ratings import answers_of, in_person_of
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", MasrelWarning)  # of statistics
-        return analyze(
-            protocol,
-            ratings,
-            in_person=in_person_of(study, ratings),
-            answers=answers_of(study, protocol),
-            excluded=excluded_raters(study),
-        )
 
 
 def _table_findings(
@@ -110,19 +103,17 @@ def _table_findings(
 
 
 def _of_same_table(
-    analysis: "Analysis", inputs: object, ratings: "Ratings"
+    analysis: "Analysis", ratings: "Ratings", inputs: Mapping[str, object]
 ) -> "Analysis":
     # with the hash that was written if it is of the same table in an earlier format
     from masrel.lab.ratings.table import _texts
 
-    sha256 = inputs.get("ratings_sha256") if isinstance(inputs, dict) else None
-    if sha256 == analysis.inputs["ratings_sha256"] or ratings.source_path is not None:
-        return analysis
-    for text in _texts(ratings):
-        if sha256 == hashlib.sha256(text.encode()).hexdigest():
-            return replace(
-                analysis, inputs={**analysis.inputs, "ratings_sha256": sha256}
-            )
+    texts = _texts(ratings) if ratings.source_path is None else ()
+    for text in texts:
+        sha256 = hashlib.sha256(text.encode()).hexdigest()
+        if sha256 == inputs.get("ratings_sha256"):
+            changed = {**analysis.inputs, "ratings_sha256": sha256}
+            return replace(analysis, inputs=changed)
     return analysis
 
 
@@ -141,35 +132,39 @@ def _analysis_findings(
     if problem is not None:
         yield broken(path, problem)
         return
-    analysis = _of_same_table(analysis, document.get("inputs"), ratings)
-    needed = json.loads(json.dumps(as_analysis_document(analysis)))
+    inputs = document.get("inputs")
+    if isinstance(inputs, dict):
+        analysis = _of_same_table(analysis, ratings, inputs)
+    needed = as_analysis_document(analysis)
+    if document.get("masrel_version") != analysis.masrel_version:
+        yield _not_rebuilt(path, document)
+        document, needed = {"inputs": inputs}, {"inputs": needed["inputs"]}
+    leaves, needed_leaves = dict(_leaves(document)), dict(_leaves(needed))
+    for place in (*needed_leaves, *leaves):
+        got, value = (each.get(place, "absent") for each in (leaves, needed_leaves))
+        if got != value:
+            message = f"{place} is {got:.60}, but {value:.60} when it is computed again"
+            yield broken(path, message)
+            return
+
+
+def _not_rebuilt(path: Path, document: Mapping[str, object]) -> Finding:
     version = document.get("masrel_version")
-    if version != analysis.masrel_version:
-        yield doubt(
-            path,
-            f"is of masrel {version}, this is {analysis.masrel_version}: only what it "
-            "was made from is looked at",
-        )
-        document, needed = ({"inputs": d.get("inputs")} for d in (document, needed))
-    difference = _first_difference(document, needed)
-    if difference is not None:
-        yield broken(path, f"{difference} when it is computed again")
+    return doubt(
+        path,
+        f"made by masrel {version}, not rebuilt by this, {masrel.__version__}: only "
+        "what it was made from is looked at",
+    )
 
 
-def _first_difference(got: object, needed: object, place: str = "") -> str | None:
-    # where two documents differ first, in words
-    if isinstance(got, dict) and isinstance(needed, dict):
-        names = [*needed, *(name for name in got if name not in needed)]
-        pairs = [(f"{place}.{n}".lstrip("."), got.get(n), needed.get(n)) for n in names]
-    elif isinstance(got, list) and isinstance(needed, list) and len(got) == len(needed):
-        both = enumerate(zip(got, needed, strict=True))
-        pairs = [(f"{place}[{index}]", *pair) for index, pair in both]
-    elif got == needed and type(got) is type(needed):
-        return None
+def _leaves(value: object, place: str = "") -> Iterator[tuple[str, str]]:
+    # the places of a document, and the JSON of what stands there
+    if isinstance(value, dict | list) and value:
+        pairs = value.items() if isinstance(value, dict) else enumerate(value)
+        for name, part in pairs:
+            yield from _leaves(part, f"{place}.{name}".lstrip("."))
     else:
-        return f"{place} is {json.dumps(got):.60}, but {json.dumps(needed):.60}"
-    differences = (_first_difference(g, n, p) for p, g, n in pairs)
-    return next((difference for difference in differences if difference), None)
+        yield place, json.dumps(value)
 
 
 def _report_findings(
@@ -182,17 +177,19 @@ def _report_findings(
         yield broken(manifest, "needed the manifest of a report, got none")
         return
     if document.get("format") != REPORT_FORMAT:
-        yield broken(
-            manifest,
-            f"needed format {REPORT_FORMAT!r}, got {document.get('format')!r}",
-        )
+        got = document.get("format")
+        yield broken(manifest, f"needed format {REPORT_FORMAT!r}, got {got!r}")
         return
+    numbers = manifest.with_name("analysis.json")
+    made = _document(numbers) if numbers.is_file() else None
+    if made is not None and made.get("masrel_version") != masrel.__version__:
+        yield _not_rebuilt(numbers, made)
     inputs = document.get("inputs")
-    got = dict(inputs) if isinstance(inputs, dict) else {}
-    got.pop("include", None)  # what is shown of the same
-    of_conduct = got.pop("conduct_sha256", None)
-    of_claims = got.pop("claims_sha256", None)
-    if got != _of_same_table(analysis, got, ratings).inputs:
+    of = dict(inputs) if isinstance(inputs, dict) else {}
+    of.pop("include", None)  # what is shown of the same
+    of_conduct = of.pop("conduct_sha256", None)
+    of_claims = of.pop("claims_sha256", None)
+    if of != _of_same_table(analysis, ratings, of).inputs:
         yield broken(
             manifest, "the report is of another protocol or of other ratings: make anew"
         )
@@ -205,6 +202,10 @@ def _report_findings(
     claims = study.claims_file
     if of_claims and of_claims != (_sha256(claims) if claims.is_file() else None):
         yield broken(manifest, f"the report is of other claims than {claims.name}")
+    yield from _file_findings(manifest, files)
+
+
+def _file_findings(manifest: Path, files: Mapping[str, object]) -> Iterator[Finding]:
     for name, needed in files.items():
         path = manifest.parent / name
         if not path.resolve().is_relative_to(manifest.parent.resolve()):
