@@ -93,28 +93,6 @@ def test_showing_draws_nothing_and_the_figure_is_the_same_each_time(
     assert {path: path.read_bytes() for path in study.schedules.iterdir()} == before
 
 
-def test_a_copy_for_a_site_draws_and_verifies_by_itself(
-    masrel: Caller, study: StudyPaths, tmp_path: Path
-) -> None:
-    copy = StudyPaths(tmp_path / "south")
-    made = masrel("schedule", "copy", study.root, "--site", "south", "-o", copy.root)
-    assert (
-        made.out
-        == f"{copy.root}: a copy of the study with the secret of south alone.\n"
-    )
-    assert not study.schedules.exists()
-    assert "2 drawn, 0 kept" in masrel("schedule", copy.root, "--site", "south").out
-    masrel("schedule", study.root)
-    for rater in ("R5", "R6"):
-        file = study.schedule_file(rater, "test")
-        assert copy.schedule_file(rater, "test").read_bytes() == file.read_bytes()
-    for each in (study, copy):
-        verified = masrel("verify", each.root)
-        assert verified.code == 0, verified.err
-        checked = masrel("check", each.root)
-        assert checked.code == 0, checked.err
-
-
 def test_a_row_that_was_forged_is_broken(masrel: Caller, study: StudyPaths) -> None:
     masrel("schedule", study.root)
     file = study.schedule_file("R1", "test")
@@ -125,23 +103,6 @@ def test_a_row_that_was_forged_is_broken(masrel: Caller, study: StudyPaths) -> N
     assert f"broken: {file}: needed row 1, by {study.conduct_file}, got row 4" in (
         verified.err
     )
-
-
-def test_sites_that_drew_by_themselves_are_merged(
-    masrel: Caller, study: StudyPaths, tmp_path: Path
-) -> None:
-    south, both = tmp_path / "south", tmp_path / "both"
-    masrel("schedule", "copy", study.root, "--site", "south", "-o", south)
-    masrel("schedule", study.root, "--site", "north")
-    masrel("schedule", south, "--site", "south")
-    merged = masrel("merge", study.root, south, "-o", both)
-    assert merged.code == 0, merged.err
-    assert masrel("verify", both).code == 0
-    assert "0 drawn, 6 kept" in masrel("schedule", both).out
-    # what the whole study would have drawn, and nothing else
-    masrel("schedule", study.root)
-    for file in sorted(study.schedules.glob("test_*.csv")):
-        assert (both / "schedules" / file.name).read_bytes() == file.read_bytes()
 
 
 def test_the_copy_of_a_site_is_about_that_site_alone(

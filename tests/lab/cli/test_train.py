@@ -233,13 +233,3 @@ def test_a_training_goes_on_with_what_it_was_begun_with(
     assert "needed the training of the models that the protocol has now" in (
         changed_models.err
     )
-
-
-def test_an_adaptive_training_is_taught_and_reported(
-    study: Path, masrel: Caller
-) -> None:
-    changed(study, "[training]", '[training]\norder = "adaptive"')
-    call = ["train", study, "--rater", "R1"]
-    assert "passed after" in masrel(*call, "--grades", "simulated").out
-    document = json.loads(masrel("train", "show", *call[1:], "--json", "-").out)
-    assert document["criterion"]["order"] == "adaptive"
