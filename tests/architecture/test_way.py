@@ -1,9 +1,11 @@
-"""The way of a rating that docs/architecture.md tells is the one that it goes."""
+"""The ways of a rating and of a presentation that docs/architecture.md tells."""
 
 import re
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
+from types import CodeType, FrameType
 
 import masrel
 from tests.cli.process import Caller
@@ -13,25 +15,59 @@ PAGE = (ROOT.parent / "docs" / "architecture.md").read_text("utf-8")
 STOP = re.compile(r"^\| \d+ \| `([\w/]+\.py)` \| `([\w.]+)` \|", re.MULTILINE)
 GRADES = ("1 1 2", "0 0 0", "2 2 2", "3 2 3", "1 1 1", "0 1 0") * 2
 
+Stop = tuple[str, str]  # file and function
+
+
+@contextmanager
+def passing() -> Iterator[dict[Stop, int]]:
+    """Fill in, at its end, what was passed, by the order of first calls."""
+    passed: dict[Stop, int] = {}
+    codes: dict[CodeType, None] = {}
+
+    def note(frame: FrameType, event: str, _: object) -> None:
+        if event == "call":
+            codes.setdefault(frame.f_code)
+
+    sys.setprofile(note)
+    try:
+        yield passed
+    finally:
+        sys.setprofile(None)
+        for code in codes:
+            place = Path(code.co_filename)
+            if place.is_relative_to(ROOT):
+                stop = place.relative_to(ROOT).as_posix(), code.co_qualname
+                passed.setdefault(stop, len(passed))
+
+
+def told(what: str) -> list[Stop]:
+    """Return the stops of the table below a heading."""
+    section = PAGE.partition(f"### The way of one {what}")[2].partition("\n###")[0]
+    return [(file, function) for file, function in STOP.findall(section)]
+
 
 def test_a_rating_goes_the_way_that_is_told(masrel: Caller, tmp_path: Path) -> None:
     rows = [f"P{place} {row}".replace(" ", ",") for place, row in enumerate(GRADES)]
     file = tmp_path / "ratings.csv"
     file.write_text("\n".join(["patient,Kim,Lee,Ann", *rows]), encoding="utf-8")
-    passed: dict[tuple[str, str], int] = {}  # in the order of first calls
-
-    def note(frame: FrameType, event: str, _: object) -> None:
-        place = Path(frame.f_code.co_filename)
-        if event == "call" and place.is_relative_to(ROOT):
-            stop = place.relative_to(ROOT).as_posix(), frame.f_code.co_qualname
-            passed.setdefault(stop, len(passed))
-
-    sys.setprofile(note)
-    try:
+    with passing() as passed:
         done = masrel("agree", file, "--target", "items")
-    finally:
-        sys.setprofile(None)
     assert done.code == 0
-    told = STOP.findall(PAGE)
-    assert 10 <= len(told) <= 15
-    assert told == sorted(told, key=lambda stop: passed[stop])
+    stops = told("rating")
+    assert 10 <= len(stops) <= 15
+    assert stops == sorted(stops, key=lambda stop: passed[stop])
+
+
+def test_a_presentation_goes_the_way_that_is_told(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    study = tmp_path / "study"
+    session = ("--rater", "R1", "--session", "test", "--grades", "simulated")
+    assert masrel("init", study).code == 0
+    with passing() as passed:
+        for call in (("schedule",), ("run", *session), ("report", "--quiet")):
+            command, *options = call
+            assert masrel(command, study, *options).code == 0
+    stops = told("presentation")
+    assert 15 <= len(stops) <= 20
+    assert stops == sorted(stops, key=lambda stop: passed[stop])
