@@ -130,7 +130,7 @@ class StudyPaths:
 
     def recording_file(self, rater: str, session: str, code: str) -> Path:
         """Return the file of the recording of one presentation."""
-        return self.sessions / f"{session}_{rater}" / f"{code}.npz"
+        return self.log_file(rater, session).with_suffix("") / f"{code}.npz"
 
     def training_log_file(self, rater: str) -> Path:
         """Return the file of the log of one rater's training."""

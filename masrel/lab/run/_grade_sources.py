@@ -1,7 +1,6 @@
 """What a source of grades is, and the one that reads them off a script."""
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Protocol, cast
@@ -14,7 +13,7 @@ from masrel.lab.run._state import Felt
 from masrel.lab.schedule import Presentation
 
 if TYPE_CHECKING:
-    from masrel.lab.hess import EmergencyStop, PresentationStatus  # loads numpy
+    from masrel.lab.hess import PresentationStatus  # loads numpy
 
 MAX_FAULTS = 3  # in a row of one presentation; after that nobody is asked any more
 
@@ -167,7 +166,12 @@ class QuestionRequest:
 
 
 class GradeSource(Protocol):
-    """A source of grades: a person, a script, or simulated raters."""
+    """A source of grades: a person, a script, or simulated raters.
+
+    One that is listened to while a model is presented has a method ``listening``, too:
+    it takes the request and the emergency stop, which it may press, and returns what
+    lasts as long as the presentation. For any other the terminal is listened to.
+    """
 
     @property
     def name(self) -> str:
@@ -189,22 +193,6 @@ class GradeSource(Protocol):
 
     def present_again(self, request: GradeRequest, fault: str) -> bool | Skip:
         """Return whether to present it again after a fault, or that it is skipped."""
-        ...
-
-
-class ListeningSource(GradeSource, Protocol):
-    """A source of grades that is listened to while a model is presented.
-
-    To any other source nobody listens but to the terminal.
-    """
-
-    def listening(
-        self, request: GradeRequest, stop: "EmergencyStop"
-    ) -> AbstractContextManager[object]:
-        """Return what lasts as long as the presentation.
-
-        It may press `stop`, or say that the rater is done by ``request.status``.
-        """
         ...
 
 

@@ -45,10 +45,6 @@ class RehearsalPaths(StudyPaths):
         """Return the file of one rater's log."""
         return self.sessions / f"rehearsal_{session}_{rater}.jsonl"
 
-    def recording_file(self, rater: str, session: str, code: str) -> Path:
-        """Return the file of the recording of one presentation."""
-        return self.sessions / f"rehearsal_{session}_{rater}" / f"{code}.npz"
-
 
 def begin_rehearsal(
     study: StudyPaths, protocol: Protocol, rater: str, session: str

@@ -194,38 +194,8 @@ def run_session(
         runner.begin(checksum)
         summary = runner.run(progress)
         if not rehearsal:
-            _ask_about_study(
-                study, protocol, rater, session, grades, runner.correct, now
-            )
+            runner.ask_about_study()
         return summary
-
-
-def _ask_about_study(
-    study: StudyPaths,
-    protocol: Protocol,
-    rater: str,
-    session: str,
-    grades: GradeSource,
-    correct: Callable[[GradeCorrection], None],
-    now: Callable[[], datetime],
-) -> None:
-    # once a rater has completed every session; the answers are the study's
-    sessions = [each.id for each in protocol.sessions if rater in each.raters]
-    if not questions_of(protocol, "study"):
-        return
-    if all(is_complete(study, rater, each) for each in sessions):
-        ask_questions(
-            protocol,
-            "study",
-            with_occasions(grades, protocol),
-            rater=rater,
-            session=session,
-            answered=study_answers(study).get(rater, {}),
-            correct=correct,
-            log=lambda fields: append_event(
-                study, protocol, "answered", {"rater": rater, **fields}, now=now
-            ),
-        )
 
 
 def _check_recordings(
@@ -499,6 +469,30 @@ class _Runner:
                 correct=self.correct,
                 log=lambda fields: self._log.append(
                     "answered", {**fields, "code": code}
+                ),
+            )
+
+    def ask_about_study(self) -> None:
+        """Ask once a rater has completed every session; the answers are the study's."""
+        study, protocol, rater = self._study, self._protocol, self._schedule.rater
+        sessions = [each.id for each in protocol.sessions if rater in each.raters]
+        if not questions_of(protocol, "study"):
+            return
+        if all(is_complete(study, rater, each) for each in sessions):
+            ask_questions(
+                protocol,
+                "study",
+                self._grades,
+                rater=rater,
+                session=self._schedule.session,
+                answered=study_answers(study).get(rater, {}),
+                correct=self.correct,
+                log=lambda fields: append_event(
+                    study,
+                    protocol,
+                    "answered",
+                    {"rater": rater, **fields},
+                    now=self._now,
                 ),
             )
 

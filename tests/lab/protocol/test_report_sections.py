@@ -1,6 +1,7 @@
 """Which sections a report has: those that are named, or all there is something for."""
 
 import msgspec
+import pytest
 
 from masrel.lab.protocol import Protocol, protocol_hash, report_sections
 from tests.lab.analysis.studies import hess2012, plan
@@ -54,3 +55,8 @@ def test_what_a_study_has_nothing_for_is_left_out() -> None:
 def test_no_choice_hashes_as_the_sections_that_once_were_the_default() -> None:
     assert protocol_hash(with_sections(None)) == protocol_hash(with_sections(FORMER))
     assert protocol_hash(with_sections(())) != protocol_hash(with_sections(FORMER))
+
+
+@pytest.mark.parametrize("names", [FORMER, ("methods", "design"), ()])
+def test_sections_that_are_named_stay_as_named(names: tuple[str, ...]) -> None:
+    assert report_sections(with_sections(names)) == names

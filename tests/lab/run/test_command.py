@@ -11,6 +11,7 @@ from masrel.cli import cli
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.run import read_log
 from masrel.lab.schedule import read_schedule
+from tests.cli.process import Caller
 
 Small = tuple[StudyPaths, Protocol]
 
@@ -103,3 +104,20 @@ def test_a_fault_failed_and_a_wrong_rater_is_a_wrong_call(
     wrong = started("run", root, "--rater", "R9", *options)
     assert wrong.returncode == 2
     assert "Traceback" not in faulty.stderr + wrong.stderr
+
+
+def test_a_terminal_sees_the_presentations_counted(
+    small: Small, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    who = ("--rater", "R1", "--session", "test", "--grades", "simulated")
+    done = Caller(monkeypatch, capsys).at_a_terminal("run", small[0].root, *who)
+    assert "3/3" in done.err
+
+
+def test_quiet_says_nothing(
+    small: Small, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    who = ("--rater", "R1", "--session", "test", "--grades", "simulated")
+    run = ("run", small[0].root, *who, "--quiet")
+    done = Caller(monkeypatch, capsys).at_a_terminal(*run)
+    assert (done.code, done.out, done.err) == (0, "", "")

@@ -10,6 +10,8 @@ from masrel.cli import cli
 from masrel.errors import DeviceError, SessionLogError
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.ratings import (
+    Correction,
+    corrections_of,
     ratings_from_logs,
     study_remarks,
 )
@@ -178,3 +180,42 @@ def test_a_grade_is_corrected_at_the_console_while_the_session_runs(
     assert said.count("correct CODE GRADE WHY") == 2
     assert f"needed a code that was graded ({first}), got '{second}'" in said
     assert verify_study(small[0]).is_whole
+
+
+def test_corrections_are_in_the_report_and_only_if_there_are_any(
+    new_study: Callable[..., Small],
+) -> None:
+    brief = '[report]\nsections = ["design"]\n\n[schedule]'
+    study, protocol = new_study(("[schedule]", brief))
+    run_session(
+        *(study, protocol, "R1", "test"),
+        grades=ScriptGrades(["1", "2", "3"]),
+        clock="simulated",
+    )
+    call("report", study.root)
+    page = study.root / "report" / "report.md"
+    assert "Corrected grades" not in page.read_text(encoding="utf-8")
+    shown = read_schedule(study.schedule_file("R1", "test")).presentations[1]
+    for grade in (None, "4"):
+        where = (study, protocol, "R1", "test")
+        record_correction(*where, code=shown.code, grade=grade, **BY)
+    facts = {
+        **{"session": "test", "rater": "R1", "model": shown.model, "repeat": 1},
+        **{"first_grade": "2", **BY},
+    }
+    assert corrections_of(study, protocol) == (
+        Correction(grade=None, **facts),  # type: ignore[arg-type]
+        Correction(grade="4", **facts),  # type: ignore[arg-type]
+    )
+    call("report", study.root)
+    text = page.read_text(encoding="utf-8")
+    assert "Corrected grades" in text
+    assert "| 2 | 4 |" in text
+    assert "Kim" not in text
+    assert "the motor is hot" not in text
+    call("report", study.root, "--include", "notes")
+    text = page.read_text(encoding="utf-8")
+    assert "| 2 | 4 | the motor is hot |" in text
+    call("report", study.root, "--include", "who")
+    text = page.read_text(encoding="utf-8")
+    assert f"{shown.model} | 1 | 2 | 4 | Kim |" in text

@@ -26,6 +26,7 @@ from masrel.lab.run import (
     GradeRequest,
     ScriptGrades,
     SessionSummary,
+    SimulatedGrades,
     read_log,
     run_session,
 )
@@ -356,6 +357,17 @@ def test_the_console_asks_until_there_is_an_answer(new_study: New) -> None:
     assert text.count(f"How real did it feel? {question}") == 3
     assert "needed a whole number, 1 to 10, got '11'." in text
     assert "Anything else? (text; Enter for none; stop): " in text
+
+
+def test_simulated_raters_answer_the_same_each_time(new_study: New) -> None:
+    logs = []
+    for name in ("a", "b"):
+        study, protocol = new_study(("[schedule]", QUESTIONS), name=name)
+        run(study, protocol, grades=SimulatedGrades(protocol))
+        logs.append([e.fields for e in events_of(study) if e.kind == "answered"])
+        assert verify_study(study).findings == ()
+    assert logs[0] == logs[1]
+    assert len({fields["answer"] for fields in logs[0]}) > 2
 
 
 def test_an_answer_is_corrected_by_the_command(new_study: New) -> None:

@@ -80,3 +80,18 @@ def test_a_puck_outside_this_process_needs_a_real_clock(new_study: NewStudy) -> 
     with pytest.raises(ParameterError, match=r"needed the real one for device 'puck'"):
         run_session(study, protocol, "R1", "test", grades=grades, clock="simulated")
     assert not study.log_file("R1", "test").exists()
+
+
+def test_grades_of_a_person_on_an_emulated_puck_are_simulated_too(
+    new_study: NewStudy,
+) -> None:
+    class Person(SimulatedGrades):
+        name = "console"
+        simulated = False
+
+    study, protocol = on_a_puck(new_study)
+    done = run_session(
+        study, protocol, "R1", "test", grades=Person(protocol), clock="simulated"
+    )
+    assert done.simulated
+    assert read_log(study.log_file("R1", "test"))[0].fields["simulated"] is True

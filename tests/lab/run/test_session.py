@@ -36,7 +36,7 @@ from masrel.lab.run import (
     record_correction,
     run_session,
 )
-from masrel.lab.schedule import read_schedule
+from masrel.lab.schedule import Presentation, read_schedule
 from masrel.scales import MODIFIED_ASHWORTH
 
 Small = tuple[StudyPaths, Protocol]
@@ -459,3 +459,14 @@ def test_a_question_mark_says_what_the_grades_mean(small: Small) -> None:
     assert "  1+  tone slightly up: a catch, then" in text
     assert "Phys Ther 1987" in text
     assert "is not a grade" not in text
+
+
+def test_a_script_by_code_and_by_position() -> None:
+    shown = Presentation(position=2, code="K7", model="HM1", repeat=1)
+    request = GradeRequest(
+        rater="R1", session="test", presentation=shown, n_presentations=3, attempt=1
+    )
+    assert ScriptGrades({"K7": "1+"}).grade(request) == "1+"
+    assert ScriptGrades(["1", "2"]).grade(request) == "2"
+    with pytest.raises(ParameterError, match="position 2, code K7"):
+        ScriptGrades({"A": "1"}).grade(request)

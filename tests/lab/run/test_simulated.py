@@ -85,3 +85,22 @@ def test_without_an_intended_grade_nobody_can_be_accurate(new_study: Made) -> No
     _, protocol = new_study(('intended_grade = "1"', ""), ('intended_grade = "2"', ""))
     with pytest.raises(ProtocolError, match="need a model with an intended_grade"):
         SimulatedGrades(protocol)
+
+
+def test_at_the_end_of_the_scale_there_is_one_neighbour(new_study: Made) -> None:
+    _, protocol = new_study(('intended_grade = "1"', 'intended_grade = "0"'))
+    grades = SimulatedGrades(with_settings(protocol, accuracy=0.0))
+    assert {grades.grade(asked("HM1", repeat=n)) for n in range(50)} == {"1"}
+
+
+@pytest.mark.parametrize(("agreement", "equal"), [(1.0, True), (0.0, False)])
+def test_a_retest_can_repeat_everything_or_nothing(
+    small: Small, agreement: float, equal: bool
+) -> None:
+    settings = {"accuracy": 0.5, "retest_agreement": agreement}
+    grades = SimulatedGrades(with_settings(small[1], **settings))
+    first, second = (
+        [grades.grade(asked("HM3", session=s, repeat=i)) for i in range(40)]
+        for s in ("test", "retest")
+    )
+    assert (first == second) is equal

@@ -54,3 +54,22 @@ def test_who_is_free_stretches_one_to_three_times(small: Small) -> None:
     once = [intended_speeds(small[1], ("R1", "test", "HM1", i)) for i in range(n)]
     assert [speeds[:1] for speeds in made] == once  # the first is as it was
     assert all(len(set(speeds)) == len(speeds) for speeds in made)
+
+
+def test_models_of_one_height_count_with_their_mean(new_study: Made) -> None:
+    _, protocol = new_study(("= 2.8", "= 1.4"), ("= 2.1", "= 1.4"))
+    assert severity(protocol, protocol.models[2]) == 2.0  # ranks 1 and 3
+
+
+def test_a_speed_is_never_near_zero(small: Small) -> None:
+    protocol = with_settings(small[1], mean_speed_deg_s=50.0, speed_sd_deg_s=50.0)
+    speeds = [
+        intended_speeds(protocol, ("R1", "test", "HM1", i))[0] for i in range(500)
+    ]
+    assert min(speeds) == 10.0
+
+
+def test_cues_are_followed_at_the_speeds_they_ask_for(small: Small) -> None:
+    rules = PresentationRules(stretches=("slow", "fast", "slow"))
+    cued = msgspec.structs.replace(small[1], presentation=rules)
+    assert intended_speeds(cued, ("R1", "test", "HM1", 1)) == [10.0, 120.0, 10.0]
