@@ -16,7 +16,7 @@ from tqdm import tqdm
 from masrel.lab.hess import HandTraits
 from masrel.lab.recording import PHASES
 from masrel.plots._style import GREY, VERMILLION, finished, house_style
-from tests.lab.hess.held import (
+from tests.lab.hess.test_hands import (
     FREE_END_DEG,
     PRE_CATCH,
     Person,

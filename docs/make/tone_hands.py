@@ -18,7 +18,15 @@ from masrel.plots._style import (
     finished,
     house_style,
 )
-from tests.lab.hess.tone_held import HEAD, KINDS, SEEDS, outcome, presented, raters, row
+from tests.lab.hess.test_tone_held import (
+    HEAD,
+    KINDS,
+    SEEDS,
+    outcome,
+    presented,
+    raters,
+    row,
+)
 
 FIGURE = Path(__file__).parents[1] / "figures" / "tone_held.png"
 

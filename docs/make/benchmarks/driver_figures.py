@@ -27,7 +27,7 @@ from masrel.lab.report._trace_section import measured_panel
 from masrel.plots import draw
 from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import SIMULATED
-from tests.lab.hess.measured import NOTHING, measured, stretch, to_and_fro
+from tests.lab.hess.test_fit_of_recordings import NOTHING, measured, stretch, to_and_fro
 
 START, END = radians(30.0), radians(146.0)
 BACKDRIVE = to_and_fro(100.0 / 1.7)  # with a peak of 110 deg/s

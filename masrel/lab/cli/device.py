@@ -235,8 +235,7 @@ def _friction(session: _Session, arm_is_free: bool) -> None:
     2 N·m, for about 20 s.
     """
     from masrel.lab.hess import EmergencyStop, open_device
-    from masrel.lab.hess._stop import stop_on_key, stop_on_signals
-    from masrel.lab.hess._watchdog import watched
+    from masrel.lab.hess._stop import stop_on_key, stop_on_signals, watched
     from masrel.lab.hess.puck import fit_friction, steady_runs
     from masrel.lab.hess.puck._commissioning import LIMITS, SPEEDS
 

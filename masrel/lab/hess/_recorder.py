@@ -182,59 +182,6 @@ def _from_the_onset(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Spooled:
-    """What a presentation that never ended left."""
-
-    columns: NDArray[np.float64]  # (n_columns, n): its samples, as the loop wrote them
-    channels: tuple[Channel, ...]
-    facts: dict[str, _Fact]  # what was known before the first
-
-
-def read_spool(path: Path) -> Spooled | None:
-    """Return the samples that a dead process left; None when it left none."""
-    data = read_regular(path, most=MAX_RECORDING + _HEADER)
-    if len(data) < _HEADER + _WORD or not data[:_HEADER].strip():
-        return None  # it died while it allocated the file
-    try:
-        return _spooled(parse_json(data[:_HEADER]), data)
-    except (ValueError, KeyError, TypeError) as error:
-        raise RecordingError(
-            f"{path}: needs the samples of a presentation that was cut off, got "
-            f"something else ({error}); move it away to go on"
-        ) from error
-
-
-def _spooled(facts: dict[str, _Fact], data: bytes) -> Spooled | None:
-    # Raises ValueError, KeyError or TypeError where it is no such file.
-    if not isinstance(facts, dict):
-        raise TypeError(f"no facts but {facts}")
-    capacity, rate_hz = facts.pop("capacity"), facts["rate_hz"]
-    channels = _channels_of(facts.pop("channels", []))
-    n_columns = int(facts.pop("n_columns", _N_COLUMNS_ONCE) or 0)
-    if "speed_threshold" in facts:  # as it was once
-        once = float(facts.pop("speed_threshold") or 0.0)
-        facts["speed_threshold_deg_s"] = math.degrees(once)
-    threshold = facts["speed_threshold_deg_s"]
-    if not isinstance(capacity, int) or capacity < 1:
-        raise ValueError(f"a capacity of {capacity}")
-    for fact in (rate_hz, threshold):
-        if not isinstance(fact, int | float):
-            raise TypeError(f"{fact!r} where a number should be")
-    n = float(np.frombuffer(data, np.float64, count=1, offset=_HEADER)[0])
-    if n == 0.0:
-        return None  # not one sample, whether the file is complete or not
-    if not (n.is_integer() and 0.0 < n <= capacity):
-        raise ValueError(f"{n:g} samples where {capacity} fit in")
-    values = np.frombuffer(
-        data, np.float64, count=n_columns * capacity, offset=_HEADER + _WORD
-    )
-    columns = np.zeros((max(n_columns, _N_COLUMNS), int(n)))
-    columns[RECORDING_COLUMNS.index("stretch")] = 1.0  # as without such a column
-    columns[:n_columns] = values.reshape(n_columns, capacity)[:, : int(n)]
-    return Spooled(columns=columns, channels=channels, facts=facts)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Fault:
     """What stopped a presentation.
 
@@ -295,11 +242,24 @@ def cut_off(spool: Path) -> Presented | None:
     RecordingError
         If it is no such file.
     """
-    left = read_spool(spool)
-    if left is None:
-        return None
-    columns = recorded_columns(left.columns, left.channels)
+    data = read_regular(spool, most=MAX_RECORDING + _HEADER)
+    if len(data) < _HEADER + _WORD or not data[:_HEADER].strip():
+        return None  # it died while it allocated the file
+    try:
+        facts = parse_json(data[:_HEADER])
+        if not isinstance(facts, dict):
+            raise TypeError(f"no facts but {facts}")
+        channels = _channels_of(facts.pop("channels", []))
+        written = _written(facts, data)
+        columns = recorded_columns(written, channels)
+    except (ValueError, KeyError, TypeError) as error:
+        raise RecordingError(
+            f"{spool}: needs the samples of a presentation that was cut off, got "
+            f"something else ({error}); move it away to go on"
+        ) from error
     time_s = columns["time_s"]
+    if not time_s.size:
+        return None  # not one sample, whether the file is complete or not
     fault = Fault(
         kind="process",
         message="process: needs one that keeps its recording, this one ended before",
@@ -307,17 +267,42 @@ def cut_off(spool: Path) -> Presented | None:
         torque_nm=float(columns["command_torque_nm"][-1]),
     )
     # What is missing between the first and the last tick; nobody counted why
-    n_due = round(float(np.ptp(time_s)) * float(left.facts["rate_hz"] or 0))
+    n_due = round(float(np.ptp(time_s)) * float(facts["rate_hz"] or 0))
     return as_presented(
         columns,
-        {**left.facts, "scheduling": None},
-        channels=left.channels,
+        {**facts, "scheduling": None},
+        channels=channels,
         ended="fault",
         fault=fault,
         grip_lost=None,
         n_missed_ticks=max(0, n_due + 1 - time_s.size),  # a ramp adds rows
         n_missed_replies=None,
     )
+
+
+def _written(facts: dict[str, _Fact], data: bytes) -> NDArray[np.float64]:
+    # -> (n_columns, n): the samples, as the loop wrote them; `facts` without what is of
+    # the file. Raises ValueError, KeyError or TypeError where it is no such file.
+    capacity, rate_hz = facts.pop("capacity"), facts["rate_hz"]
+    n_columns = int(facts.pop("n_columns", _N_COLUMNS_ONCE) or 0)
+    if "speed_threshold" in facts:  # as it was once
+        once = float(facts.pop("speed_threshold") or 0.0)
+        facts["speed_threshold_deg_s"] = math.degrees(once)
+    if not isinstance(capacity, int) or capacity < 1:
+        raise ValueError(f"a capacity of {capacity}")
+    for fact in (rate_hz, facts["speed_threshold_deg_s"]):
+        if not isinstance(fact, int | float):
+            raise TypeError(f"{fact!r} where a number should be")
+    n = float(np.frombuffer(data, np.float64, count=1, offset=_HEADER)[0])
+    if not (n.is_integer() and 0.0 <= n <= capacity):
+        raise ValueError(f"{n:g} samples where {capacity} fit in")
+    columns = np.zeros((max(n_columns, _N_COLUMNS), int(n)))
+    columns[RECORDING_COLUMNS.index("stretch")] = 1.0  # as without such a column
+    if n:
+        count, offset = n_columns * capacity, _HEADER + _WORD
+        values = np.frombuffer(data, np.float64, count=count, offset=offset)
+        columns[:n_columns] = values.reshape(n_columns, capacity)[:, : int(n)]
+    return columns
 
 
 def as_presented(

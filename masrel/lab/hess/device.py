@@ -114,8 +114,7 @@ class Device(ABC):
         DeviceError
             If the device is not open or does not answer.
         """
-        if self._state != "open":
-            raise self._not_open("read")
+        self._needs_to_be_open("read")
         return self._try("reading", self._read)
 
     def command(self, torque_nm: float) -> None:
@@ -132,8 +131,7 @@ class Device(ABC):
             If the device is not open or does not take it, or the torque is not
             finite; the one before it is then held.
         """
-        if self._state != "open":
-            raise self._not_open("command")
+        self._needs_to_be_open("command")
         if not math.isfinite(torque_nm):
             raise DeviceError(f"{self.name}: needs a finite torque, got {torque_nm}")
         self._try("sending a torque", self._send, torque_nm)
@@ -149,8 +147,7 @@ class Device(ABC):
             If the device is not open, has been idled from outside, or says that
             something is wrong with it.
         """
-        if self._state != "open":
-            raise self._not_open("check")
+        self._needs_to_be_open("check")
         self._try("asking for its state", self._check)
 
     def idle_command(self) -> IdleCommand | None:
@@ -218,10 +215,12 @@ class Device(ABC):
                 f"{self.name}: {act}: {type(error).__name__}: {error}"
             ) from error
 
-    def _not_open(self, wish: str) -> DeviceError:
-        return DeviceError(
-            f"{self.name}: needs an open device to {wish}, this one is {self._state}"
-        )
+    def _needs_to_be_open(self, wish: str) -> None:
+        if self._state != "open":
+            raise DeviceError(
+                f"{self.name}: needs an open device to {wish}, "
+                f"this one is {self._state}"
+            )
 
     @abstractmethod
     def _start(self) -> None:

@@ -1,10 +1,11 @@
 """Hands that move a simulated arm: mass, spring and damper, and an intention."""
 
 import math
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 
@@ -19,33 +20,54 @@ _EXPECTED_DAMPING, _EXPECTED_STIFFNESS, _EXPECTED_INERTIA = 1.26, 3.15, 0.06
 _MOST_CORRECTION = 15.0
 
 
-class Hand(Protocol):
-    """A hand as the simulated arm feels it: mass, spring and damper, an intention."""
+class Hand(ABC):
+    """What moves a simulated arm: mass, spring and damper, and an intention.
 
-    @property
-    def stiffness(self) -> float:
-        """Spring towards the intended angle, N·m/rad."""
+    Parameters
+    ----------
+    start : float
+        Where the arm is before the hand moves, rad.
+    stiffness : float
+        Spring towards the intended angle, N·m/rad.
+    damping : float
+        Damper towards the intended speed, N·m·s/rad.
+    slip_time : float or None
+        Time after the first reading at which the hand lets go for good, s; None for
+        never.
 
-    @property
-    def damping(self) -> float:
-        """Damper towards the intended speed, N·m·s/rad."""
+    Attributes
+    ----------
+    inertia : float
+        What of its own moves with the arm that it holds, kg·m².
+    yields : bool
+        Whether its intention depends on the torque it feels, which `feel` takes.
 
-    @property
-    def inertia(self) -> float:
-        """What of its own moves with the arm that it holds, kg·m²."""
+    Raises
+    ------
+    ParameterError
+        If a value is outside its range.
+    """
 
-    @property
-    def slip_time(self) -> float:
-        """When the hand lets go for good, s; infinite when it never does."""
+    inertia: float = 0.0
+    yields: ClassVar[bool] = False
 
-    @property
-    def start(self) -> float:
-        """Where the arm is before the hand moves, rad."""
+    def __init__(
+        self,
+        *,
+        start: float,
+        stiffness: float,
+        damping: float,
+        slip_time: float | None,
+    ) -> None:
+        _check_positive(stiffness=stiffness, damping=damping)
+        if slip_time is not None and not slip_time >= 0.0:
+            raise ParameterError(f"slip_time: needs 0 or more, got {slip_time}")
+        self.start = start
+        self.stiffness = stiffness
+        self.damping = damping
+        self.slip_time = math.inf if slip_time is None else slip_time
 
-    @property
-    def yields(self) -> bool:
-        """Whether its intention depends on the torque it feels, which `feel` takes."""
-
+    @abstractmethod
     def intended(self, time_s: float) -> tuple[float, float]:
         """Return where the hand means to be.
 
@@ -60,7 +82,7 @@ class Hand(Protocol):
             Intended angle, rad, and speed, rad/s.
         """
 
-    def feel(self, time_s: float, torque: float) -> None:
+    def feel(self, time_s: float, torque: float) -> None:  # noqa: B027 - most feel nothing
         """Take in what the hand feels now.
 
         Parameters
@@ -107,7 +129,7 @@ class _Leg:
         self.since, self.until = -math.inf, math.inf
 
 
-class SimulatedHand:
+class SimulatedHand(Hand):
     """A hand that stretches the arm at an intended speed, once or again and again.
 
     The intention is a trapezoid: rest for `delay`, a short ramp up, constant speed, a
@@ -162,8 +184,6 @@ class SimulatedHand:
     1.5
     """
 
-    yields: ClassVar[bool] = False
-
     def __init__(
         self,
         *,
@@ -186,26 +206,20 @@ class SimulatedHand:
             mean_speed=mean_speed,
             **{f"again[{n}]": speed for n, speed in enumerate(again)},
             return_speed=return_speed,
-            stiffness=stiffness,
-            damping=damping,
             ramp_up=ramp_up,
             ramp_down=ramp_down,
         )
         _check_not_negative(delay=delay, follow_through=follow_through, rest=rest)
-        if slip_time is not None and not slip_time >= 0.0:
-            raise ParameterError(f"slip_time: needs 0 or more, got {slip_time}")
+        super().__init__(
+            start=start, stiffness=stiffness, damping=damping, slip_time=slip_time
+        )
         if not 0.0 <= start < end <= math.pi:
             raise ParameterError(
                 "start, end: need 0 <= start < end <= 180 degrees, "
                 f"got {start} and {end} rad"
             )
-        self.start = start
         self.end = end
         self.mean_speed = mean_speed
-        self.slip_time = math.inf if slip_time is None else slip_time
-        self.stiffness = stiffness
-        self.damping = damping
-        self.inertia = 0.0
         final = end + follow_through
         ways = [(start, final, mean_speed)]  # there, and again back and there
         for speed in again:
@@ -259,9 +273,6 @@ class SimulatedHand:
             return leg.end, 0.0
         fall = speed / leg.ramp_down
         return leg.end - 0.5 * fall * left * left, fall * left
-
-    def feel(self, time_s: float, torque: float) -> None:
-        """Feel nothing: this hand goes on whatever the torque."""
 
 
 class YieldingHand(SimulatedHand):

@@ -1,29 +1,40 @@
-"""The control loop: one presentation at a fixed rate, recorded tick by tick."""
+"""The control loop: one presentation at a fixed rate, recorded tick by tick.
+
+In every case the last torque is zero: without a fault along a raised cosine, while all
+is checked as before; after a fault in a straight line, and with a closed device.
+"""
 
 import math
+import sys
 import warnings
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 
 from masrel._collector import collector_off
 from masrel.errors import (
+    ControllerError,
     DeviceError,
+    DeviceTimeoutError,
+    LimitExceededError,
     OverrunWarning,
     ParameterError,
     RecordingWarning,
 )
 from masrel.lab.hess._clock import Clock, scheduled
 from masrel.lab.hess._course import Course, PresentationStatus, StretchRules
-from masrel.lab.hess._recorder import Presented, Samples, as_presented
-from masrel.lab.hess._signals import speed_margin
-from masrel.lab.hess._stop import EmergencyStop
-from masrel.lab.hess._ticks import Ticks
-from masrel.lab.hess._watchdog import NoWatchdog, Watching
+from masrel.lab.hess._guard import ActiveGuard, Guard
+from masrel.lab.hess._recorder import Fault, Presented, Samples, as_presented
+from masrel.lab.hess._signals import VelocityEstimate, raised_cosine, speed_margin
+from masrel.lab.hess._stop import EmergencyStop, NoWatchdog, Watching
 from masrel.lab.hess.controller import Controller
 from masrel.lab.hess.device import Device
 from masrel.lab.hess.limits import DeviceLimits
-from masrel.lab.recording import _Fact
+from masrel.lab.recording import RAMPS, _Fact
 
+_NONE, _POST_CATCH, _END, _FAULT = range(len(RAMPS))
+
+_CHECK_EVERY_S = 0.05  # how often the device is asked for its state
+_BEAT_EVERY_S = 0.005  # how often the watchdog is told that the loop is alive
 _MAX_DURATION_S = 10.0  # of one stretch
 
 
@@ -158,7 +169,7 @@ def run_presentation(
     n_of_ramps = math.ceil((limits.end_ramp_time + limits.ramp_time) * rate_hz) + 4
     samples = Samples(n_ticks + n_of_ramps, device.channels, file=spool, facts=facts)
     with closing(samples):
-        ticks = Ticks(
+        ticks = _Ticks(
             device,
             controller,
             clock,
@@ -227,3 +238,236 @@ def _check(
         raise ParameterError("controller: needs a new one for every presentation")
     if not device.is_open:
         raise DeviceError(f"{device.name}: needs an open device to present on")
+
+
+class _Ticks:
+    """The loop proper, in plain numbers: a numpy scalar would cost more than a tick."""
+
+    def __init__(
+        self,
+        device: Device,
+        controller: Controller,
+        clock: Clock,
+        limits: DeviceLimits,
+        course: Course,
+        samples: Samples,
+        stop: EmergencyStop,
+        watchdog: Watching,
+    ) -> None:
+        self._device = device
+        self._controller = controller
+        self._clock = clock
+        self._limits = limits
+        self._course = course
+        self._samples = samples
+        self._stop = stop
+        self._watchdog = watchdog
+        self._period_ns = round(1e9 / controller.rate_hz)
+        self.guard = Guard(limits, 1.0 / controller.rate_hz)
+        self._active_guard = ActiveGuard(limits) if controller.is_guarded else None
+        self._estimate = VelocityEstimate()
+        self._start_ns = self._sent_ns = 0
+        self._n_ticks = 0
+        self._sent = 0.0  # the torque that the device holds, N·m
+        self._latest: tuple[float, float, float] | None = None
+        self._last_torques: list[float] = []  # torques yet to be sent, last first, N·m
+        self._is_ending = False
+
+    def run_to_the_end(self, n_ticks: int) -> tuple[str, Fault | None]:
+        """Run ticks -> how they ended, and the fault; the torque is zero afterwards."""
+        try:
+            try:
+                ended = self._run(n_ticks)
+                self._finish()
+            except DeviceError as error:
+                return "fault", self._stopped_by(error)
+            return ended, None
+        except BaseException as error:
+            unsafe = self._close()  # before anything else, whatever came
+            if unsafe is not None:
+                error.add_note(f"closing the device: {unsafe}")
+            raise
+
+    def _run(self, n_ticks: int) -> str:
+        # Until the torque is zero -> how the presentation ended
+        self._n_ticks = n_ticks
+        self._start_ns = self._sent_ns = self._clock.now_ns()
+        tick, ended = self._run_from(0)
+        self._course.end()
+        shares = raised_cosine(self._limits.end_ramp_time, 1e9 / self._period_ns)
+        if shares and self._sent != 0.0:
+            self._last_torques = [self._sent * share for share in reversed(shares)]
+            self._is_ending = True
+            self._n_ticks = sys.maxsize
+            self._run_from(self._wait_for(tick + 1) if ended else tick)
+        return ended or "max-duration"
+
+    def _run_from(self, tick: int) -> tuple[int, str]:
+        # -> the tick it ended at, and what in it ended it, empty for nothing
+        stop, device, beat = self._stop, self._device, self._watchdog.beat
+        check_every = max(1, round(_CHECK_EVERY_S * 1e9 / self._period_ns))
+        beat_every_s = min(_BEAT_EVERY_S, 0.25 * self._limits.watchdog_time)
+        beat_every = max(1, round(beat_every_s * 1e9 / self._period_ns))
+        next_check, next_beat = tick + check_every, tick
+        while tick < self._n_ticks:
+            if stop.reason is not None:
+                stop.check()
+            if tick >= next_beat:
+                beat()
+                next_beat = tick + beat_every
+            if tick >= next_check:
+                device.check()
+                next_check = tick + check_every
+            ended = self._tick()
+            if ended:
+                return tick, ended
+            tick = self._wait_for(tick + 1)
+        return tick, ""
+
+    def _wait_for(self, tick: int) -> int:
+        # Sleeps until the tick is due -> the tick that is due then. Those whose time
+        # is over are skipped and counted: sent late, they would come in a burst.
+        due_ns = self._start_ns + tick * self._period_ns  # absolute: no drift
+        self._clock.sleep_until_ns(due_ns)
+        now_ns = self._clock.now_ns()
+        n_skipped = (now_ns - due_ns) // self._period_ns
+        if n_skipped <= 0:
+            return tick
+        gap_s = (now_ns - self._sent_ns) * 1e-9
+        # none after the last
+        self.guard.missed(tick, min(tick + n_skipped, self._n_ticks), gap_s)
+        return tick + n_skipped
+
+    def _tick(self) -> str:
+        # Read, check, estimate, decide, check, send, record -> why it is over, or empty
+        guard = self.guard
+        try:
+            time_ns, angle, values = self._device.read()
+        except DeviceTimeoutError as error:
+            guard.no_reading(self._time_s(), str(error))
+            return ""  # the device holds its torque
+        time_s = (time_ns - self._start_ns) * 1e-9
+        if not guard.is_new(time_s):
+            guard.no_reading(self._time_s(), f"one of {time_s:.6f} s again")
+            return ""
+        now_ns = self._clock.now_ns()
+        self._latest = (time_s, angle, 0.0)
+        guard.reading(time_s, angle, (now_ns - time_ns) * 1e-9)
+        velocity = self._estimate.update(time_s, angle)
+        self._latest = (time_s, angle, velocity)
+        guard.speed(velocity)
+        controller = self._controller
+        torque = self._decide(time_s, angle, velocity) + guard.soft_stop(angle)
+        if self._is_ending:  # whatever the model asks for
+            # One share a tick, however late it comes: no fall is steeper than this
+            torque = self._last_torques.pop()
+        if self._active_guard is not None:
+            acting = torque if self._is_ending else controller.model_torque
+            self._active_guard.check(angle, velocity, acting)
+        guard.torque(time_s, torque)
+        self._device.command(torque)
+        self._sent = torque
+        self._sent_ns = now_ns
+        if self._samples.channels:
+            self._measure(values)
+        eases = _POST_CATCH if controller.is_easing else _NONE
+        ramp, stretch = _END if self._is_ending else eases, self._course.stretch
+        model, phase = controller.model_torque, controller.phase
+        self._samples.add(
+            (time_s, angle, velocity, model, torque, phase, ramp, stretch)
+        )
+        if self._is_ending:
+            return "" if self._last_torques else "at rest"
+        ended = self._course.update(time_s, angle, velocity, controller.phase)
+        if self._active_guard is not None and self._course.stretch > stretch:
+            self._active_guard.begin_stretch(time_s, angle)
+        return ended
+
+    def _decide(self, time_s: float, angle: float, velocity: float) -> float:
+        try:
+            return self._controller.step(time_s, angle, velocity)
+        except LimitExceededError:  # a lost grip
+            raise
+        except Exception as error:
+            # Whatever a model does wrong, the torque has to be taken back slowly
+            raise ControllerError(
+                f"controller: {type(error).__name__}: {error}"
+            ) from error
+
+    def _measure(self, values: tuple[float, ...]) -> None:
+        try:
+            self._samples.measure(values)
+        except (TypeError, ValueError) as error:
+            names = ", ".join(channel.name for channel in self._samples.channels)
+            raise DeviceError(
+                f"{self._device.name}: needs a number for each of its channels "
+                f"({names}), got {values}"
+            ) from error
+
+    def _time_s(self) -> float:
+        # Since the presentation began
+        return (self._clock.now_ns() - self._start_ns) * 1e-9
+
+    def _finish(self) -> None:
+        # Zero torque, and the watchdog may rest
+        self._device.command(0.0)
+        self._sent = 0.0
+        self._watchdog.rest()
+
+    # After a fault
+
+    def _stopped_by(self, error: DeviceError) -> Fault:
+        time_s, torque, messages = self._time_s(), self._sent, [str(error)]
+        try:
+            self._ramp_down()
+            self._finish()
+        except DeviceError as unsafe:
+            messages.append(f"ramping down: {unsafe}")
+        wrong = self._close()
+        if wrong is not None:
+            messages.append(f"closing it: {wrong}")
+        self._mark(self._clock.now_ns(), 0.0)
+        message = "; ".join(messages)
+        return Fault(kind=error.kind, message=message, time_s=time_s, torque_nm=torque)
+
+    def _ramp_down(self) -> None:
+        # In a straight line to zero, and recorded. Nothing is read any more, because
+        # reading may be what failed.
+        clock, torque = self._clock, self._sent
+        ramp_ns = round(self._limits.ramp_time * 1e9)
+        begun_ns = now_ns = clock.now_ns()
+        self._mark(begun_ns, torque)
+        while torque != 0.0 and ramp_ns:
+            n_elapsed = (now_ns - begun_ns) // self._period_ns  # late ones are skipped
+            next_ns = min((n_elapsed + 1) * self._period_ns, ramp_ns)
+            clock.sleep_until_ns(begun_ns + next_ns)
+            now_ns = clock.now_ns()
+            share = 1.0 - (now_ns - begun_ns) / ramp_ns
+            if share <= 0.0:
+                break
+            self._device.command(torque * share)
+            self._sent = torque * share
+            with suppress(DeviceError):  # `_finish` says so; the ramp has to go on
+                self._watchdog.beat()
+            self._mark(now_ns, self._sent)
+
+    def _mark(self, now_ns: int, torque: float) -> None:
+        # A row without a reading, which holds the last one; none if none was
+        if self._latest is None:
+            return
+        samples = self._samples
+        read_s, angle, velocity = self._latest
+        time_s = max((now_ns - self._start_ns) * 1e-9, read_s)
+        if time_s <= samples.last_time_s:
+            samples.change_last(torque, _FAULT)
+        else:
+            model, phase = self._controller.model_torque, self._controller.phase
+            samples.add((time_s, angle, velocity, model, torque, phase, _FAULT, 0))
+
+    def _close(self) -> str | None:
+        # Zero torque, then let go; -> what went wrong with that, or None
+        try:
+            self._device.close()
+        except DeviceError as error:
+            return str(error)
+        return None

@@ -11,7 +11,6 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.errors import ParameterError
 from masrel.lab.elbow._torque import _stepped
 from masrel.lab.elbow.joint_model import JointModel
 from masrel.lab.elbow.motions import Motion
@@ -20,11 +19,8 @@ from masrel.lab.hess._recorder import Presented
 from masrel.lab.hess._signals import passive_damping
 from masrel.lab.hess.controller import Controller
 from masrel.lab.hess.device import open_device
-from masrel.lab.hess.limits import (
-    DeviceLimits,
-    _check_not_negative,
-    _check_positive,
-)
+from masrel.lab.hess.hand import Hand
+from masrel.lab.hess.limits import DeviceLimits, _check_not_negative
 from masrel.lab.hess.loop import run_presentation
 
 # Between two samples of a motion the hand intends a straight line: at 100 rad/s² it is
@@ -34,7 +30,7 @@ _HAND_STEP_S = 0.0005
 _NEVER_ARRIVES = 2.0 * math.pi  # an angle beyond every range, rad
 
 
-class MotionHand:
+class MotionHand(Hand):
     """A hand that moves a simulated arm along a prescribed motion, then holds it.
 
     It trembles, as a person's hand does that holds an arm against a torque: without
@@ -66,8 +62,6 @@ class MotionHand:
     [1.5, 1.875]
     """
 
-    inertia: ClassVar[float] = 0.0
-    yields: ClassVar[bool] = False
     _TREMOR_RAD_S: ClassVar[float] = 2.0 * math.pi * 9.0  # physiological: 8 to 12 Hz
 
     def __init__(
@@ -79,20 +73,19 @@ class MotionHand:
         damping: float = 40.0,
         tremor: float = math.radians(0.02),
     ) -> None:
-        _check_positive(stiffness=stiffness, damping=damping)
+        super().__init__(
+            start=motion.start,
+            stiffness=stiffness,
+            damping=damping,
+            slip_time=slip_time,
+        )
         _check_not_negative(tremor=tremor)
-        if slip_time is not None and not slip_time >= 0.0:
-            raise ParameterError(f"slip_time: needs 0 or more, got {slip_time}")
         n_steps = math.ceil(motion.duration / _HAND_STEP_S)
         times = np.minimum(np.arange(n_steps + 1) * _HAND_STEP_S, motion.duration)
         self._angles: list[float] = motion.angle(times).tolist()
         self._velocities: list[float] = motion.velocity(times).tolist()
         self._velocities[-1] = 0.0  # from there on it holds
         self._tremor = tremor
-        self.start = motion.start
-        self.slip_time = math.inf if slip_time is None else slip_time
-        self.stiffness = stiffness
-        self.damping = damping
 
     def intended(self, time_s: float) -> tuple[float, float]:
         """Return where the hand means to be.
@@ -121,9 +114,6 @@ class MotionHand:
             angle + left + share * (right - left),
             speed + slow + share * (fast - slow),
         )
-
-    def feel(self, time_s: float, torque: float) -> None:
-        """Feel nothing: this hand goes on whatever the torque."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -29,8 +29,7 @@ from masrel.lab.hess import (
     open_device,
     run_presentation,
 )
-from masrel.lab.hess._stop import stop_on_signals
-from masrel.lab.hess._watchdog import watched
+from masrel.lab.hess._stop import stop_on_signals, watched
 from masrel.lab.protocol import PresentationRules, Protocol, joint_model
 from masrel.lab.recording import (
     RECORDING_COLUMNS,

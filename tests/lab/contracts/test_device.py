@@ -7,7 +7,6 @@ import pkgutil
 import subprocess
 import sys
 import warnings
-from collections.abc import Callable
 from functools import cache
 from itertools import pairwise
 from math import radians
@@ -18,19 +17,14 @@ import pytest
 
 from masrel.errors import DeviceError
 from masrel.lab import hess
-from masrel.lab.elbow import STANDARD_MODELS
 from masrel.lab.hess import (
     BackendOptions,
-    Controller,
     Device,
-    DeviceLimits,
-    Hand,
     PresentationStatus,
     Presented,
     Reading,
     ReplayOptions,
     SimulatedClock,
-    SimulatedHand,
     SimulatedOptions,
     StretchRules,
     TorqueSensor,
@@ -40,90 +34,62 @@ from masrel.lab.hess import (
 )
 from masrel.lab.hess.device import _BACKENDS
 from masrel.lab.recording import MEASURED_TORQUE, Channel, Recording, stretches
-from tests.lab.hess.rig import ScriptedDevice
-
-START, END = radians(30.0), radians(146.0)
-
-Opener = Callable[[SimulatedClock, Hand], Device]
-
-
-def _scripted(clock: SimulatedClock, _hand: Hand) -> Device:
-    device = ScriptedDevice(clock)
-    device.open()
-    return device
-
+from tests.lab.hess.rig import (
+    LIMITS,
+    START,
+    ActingClock,
+    ScriptedDevice,
+    controls,
+    present,
+    stretching,
+)
 
 # A torque sensor, muscles and a trigger
 CHANNELS = (MEASURED_TORQUE, Channel(name="emg_biceps", unit="mv"), Channel(name="key"))
-
-
-def _scripted_with_channels(clock: SimulatedClock, _hand: Hand) -> Device:
-    device = ScriptedDevice(clock)
-    device.channels = CHANNELS
-    device.values = lambda time_s: (2.0, 0.1 * time_s, 0.0)
-    device.open()
-    return device
-
-
 SENSING = SimulatedOptions(torque_sensor=TorqueSensor())
+SPEED = radians(90.0)
 
 
-def _stretching(n_stretches: int = 1) -> SimulatedHand:
-    speed = radians(90.0)
-    again = (speed,) * (n_stretches - 1)
-    return SimulatedHand(
-        start=START, end=END, mean_speed=speed, again=again, returns=True
-    )
+def moving(n_stretches: int = 1):
+    return stretching(90.0, again=(SPEED,) * (n_stretches - 1), returns=n_stretches > 1)
 
 
 @cache
-def _recording(
-    options: BackendOptions | None = None, n_stretches: int = 1
-) -> Recording:
-    clock, hand = SimulatedClock(), _stretching(n_stretches)
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
-    with open_device("simulated", clock=clock, hand=hand, options=options) as device:
-        return run_presentation(
-            device,
-            controller,
-            clock=clock,
-            limits=DeviceLimits(),
-            stretches=StretchRules(n=n_stretches),
-        ).recording
+def _recording(options: BackendOptions | None, n_stretches: int) -> Recording:
+    hand = stretching(90.0, again=(SPEED,) * (n_stretches - 1), returns=True)
+    rules = StretchRules(n=n_stretches)
+    return present(hand=hand, backend=options, stretches=rules).recording
 
 
-def _options(name: str) -> BackendOptions | None:
-    # What a backend needs beside the clock and the hand of the tests
-    return ReplayOptions(recording=_recording()) if name == "replay" else None
+def device_of(
+    backend: str,
+    clock: SimulatedClock,
+    n_stretches: int = 1,
+    *,
+    measures: bool = False,
+    angle=lambda _time_s: START,
+) -> Device:
+    """An open device: every registered name without a line here, and the scripted one.
+
+    It is told to measure something beside the angle where it can.
+    """
+    if backend == "scripted":
+        device = ScriptedDevice(clock, angle)
+        if measures:
+            device.channels = CHANNELS
+            device.values = lambda time_s: (2.0, 0.1 * time_s, 0.0)
+        device.open()
+        return device
+    options = SENSING if measures else None
+    if backend == "replay":  # a recording does not move
+        options = ReplayOptions(recording=_recording(options, n_stretches))
+    hand = moving(n_stretches)
+    return open_device(backend, clock=clock, hand=hand, options=options)
 
 
-def _with_channels(name: str) -> BackendOptions:
-    if name == "replay":
-        return ReplayOptions(recording=_recording(SENSING))
-    return SENSING
-
-
-def _registered(name: str, *, with_channels: bool = False) -> Opener:
-    options = _with_channels if with_channels else _options
-    return lambda clock, hand: open_device(
-        name, clock=clock, hand=hand, options=options(name)
-    )
-
-
-# Every registered name is held to the suite, without a line here; the device that the
-# other tests script is held to it too.
-OPENERS: dict[str, Opener] = {
-    **{name: _registered(name) for name in device_names()},
-    "scripted": _scripted,
-}
+NAMES = [*device_names(), "scripted"]
+MEASURING = ("simulated", "replay", "scripted")
 registered = pytest.mark.parametrize("backend", device_names(), indirect=True)
-# Those that measure anything beside the angle, told to do so
-WITH_CHANNELS: dict[str, Opener] = {
-    "simulated": _registered("simulated", with_channels=True),
-    "replay": _registered("replay", with_channels=True),
-    "scripted": _scripted_with_channels,
-}
-# A recording does not move.
 WITH_ARM = [name for name in device_names() if name != "replay"]
 with_arm = pytest.mark.parametrize("backend", WITH_ARM, indirect=True)
 
@@ -133,15 +99,14 @@ def clock() -> SimulatedClock:
     return SimulatedClock()
 
 
-@pytest.fixture(params=sorted(OPENERS))
+@pytest.fixture(params=NAMES)
 def backend(request: pytest.FixtureRequest) -> str:
     return request.param
 
 
 @pytest.fixture
 def opened(backend: str, clock: SimulatedClock):
-    hand = SimulatedHand(start=START, end=END, mean_speed=radians(90.0))
-    device = OPENERS[backend](clock, hand)
+    device = device_of(backend, clock)
     yield device
     device.close()
 
@@ -158,17 +123,12 @@ def test_a_name_without_a_device_or_without_what_it_needs_is_refused(name: str) 
         open_device(name, clock=SimulatedClock())
 
 
+@registered
 def test_options_of_another_backend_are_refused(backend: str) -> None:
-    class Foreign(BackendOptions):
-        pass
-
-    if backend in device_names():
-        with pytest.raises(
-            DeviceError, match=f"{backend}: needs options .* got Foreign"
-        ):
-            open_device(
-                backend, clock=SimulatedClock(), hand=_stretching(), options=Foreign()
-            )
+    foreign = {"hand": moving(), "options": BackendOptions()}
+    words = f"{backend}: needs options .* got BackendOptions"
+    with pytest.raises(DeviceError, match=words):
+        open_device(backend, clock=SimulatedClock(), **foreign)
 
 
 def test_a_backend_is_imported_when_it_is_chosen() -> None:
@@ -179,7 +139,7 @@ def test_a_backend_is_imported_when_it_is_chosen() -> None:
 
 
 def test_every_registered_name_is_held_to_this_suite() -> None:
-    assert set(OPENERS) == {*device_names(), "scripted"}
+    assert set(NAMES) == {*device_names(), "scripted"}
     assert set(WITH_ARM) == {*device_names()} - {"replay"}
 
 
@@ -200,24 +160,14 @@ def _source(module: str) -> str:
     return Path(found.origin).read_text(encoding="utf-8")
 
 
-# Who it is
-
-
-def test_it_says_its_name_and_whether_hardware_moves(
-    opened: Device, backend: str
-) -> None:
-    assert opened.name == backend
-    assert isinstance(opened.simulated, bool)
-
-
 # Opening and closing
 
 
-def test_it_is_open_when_it_has_been_opened(opened: Device) -> None:
-    assert opened.is_open
-
-
-def test_opening_it_again_does_nothing(opened: Device, clock: SimulatedClock) -> None:
+def test_opening_it_again_does_nothing(
+    opened: Device, clock: SimulatedClock, backend: str
+) -> None:
+    assert opened.name == backend
+    assert isinstance(opened.simulated, bool)
     tick(clock)
     before = opened.read()
     opened.open()
@@ -227,17 +177,17 @@ def test_opening_it_again_does_nothing(opened: Device, clock: SimulatedClock) ->
     assert again.time_ns >= before.time_ns
 
 
-def test_closing_it_twice_does_nothing_more(opened: Device) -> None:
+def test_what_was_closed_stays_closed(opened: Device, backend: str) -> None:
     opened.close()
-    opened.close()
+    opened.close()  # does nothing more
     assert not opened.is_open
-
-
-def test_what_was_closed_is_not_opened_again(opened: Device, backend: str) -> None:
-    opened.close()
     with pytest.raises(DeviceError, match=f"{backend}: needs a new device"):
         opened.open()
     assert not opened.is_open
+    for act in (opened.read, lambda: opened.command(0.0), opened.check):
+        words = f"{backend}: needs an open device to .*, this one is closed"
+        with pytest.raises(DeviceError, match=words):
+            act()
 
 
 def test_a_with_block_gives_the_device_and_closes_it(opened: Device) -> None:
@@ -256,28 +206,12 @@ def test_a_with_block_closes_it_after_an_exception_that_goes_on(
     assert not opened.is_open
 
 
-@pytest.mark.parametrize("wish", ["read", "command"])
-def test_a_closed_device_is_neither_read_nor_commanded(
-    opened: Device, backend: str, wish: str
+def test_a_forgotten_device_warns_and_one_that_was_closed_does_not(
+    backend: str,
 ) -> None:
-    opened.close()
-    words = f"{backend}: needs an open device to {wish}, this one is closed"
-    with pytest.raises(DeviceError, match=words):
-        opened.read() if wish == "read" else opened.command(0.0)
-
-
-def forgotten(backend: str) -> Device:
-    hand = SimulatedHand(start=START, end=END, mean_speed=radians(90.0))
-    return OPENERS[backend](SimulatedClock(), hand)
-
-
-def test_a_forgotten_device_warns(backend: str) -> None:
     with pytest.warns(ResourceWarning, match=f"{backend}: a device was never closed"):
-        forgotten(backend)  # the last reference goes with the statement
-
-
-def test_a_device_that_was_closed_is_forgotten_in_silence(backend: str) -> None:
-    device = forgotten(backend)
+        device_of(backend, SimulatedClock())  # the last reference goes with this
+    device = device_of(backend, SimulatedClock())
     device.close()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -304,36 +238,29 @@ def test_a_forgotten_device_is_left_with_zero_torque(filtering: str) -> None:
     assert commands == [(0, 3.0), (0, 0.0)]
 
 
-def test_closing_sends_zero_torque_before_it_lets_go() -> None:
+@pytest.mark.parametrize("is_deaf", [False, True])
+def test_closing_sends_zero_torque_before_it_lets_go_all_the_same(
+    is_deaf: bool,
+) -> None:
     acts = []
 
     class Watched(ScriptedDevice):
         def _send(self, torque_nm: float) -> None:
             acts.append(torque_nm)
+            if is_deaf:
+                raise DeviceError(f"deaf: does not take {torque_nm} N·m")
 
         def _stop(self) -> None:
             acts.append("stop")
 
-    with Watched(SimulatedClock()) as device:
-        device.command(2.0)
-    assert acts == [2.0, 0.0, "stop"]
-
-
-def test_a_device_that_takes_no_zero_torque_is_let_go_all_the_same() -> None:
-    acts = []
-
-    class Deaf(ScriptedDevice):
-        def _send(self, torque_nm: float) -> None:
-            raise DeviceError(f"deaf: does not take {torque_nm} N·m")
-
-        def _stop(self) -> None:
-            acts.append("stop")
-
-    device = Deaf(SimulatedClock())
+    device = Watched(SimulatedClock())
     device.open()
-    with pytest.raises(DeviceError, match=r"does not take 0\.0"):
+    if is_deaf:
+        with pytest.raises(DeviceError, match=r"does not take 0\.0"):
+            device.close()
+    else:
         device.close()
-    assert acts == ["stop"]
+    assert acts == [0.0, "stop"]
 
 
 def test_an_opening_that_fails_leaves_nothing_to_close() -> None:
@@ -417,11 +344,10 @@ def test_a_later_reading_has_a_later_time(
 # Channels
 
 
-@pytest.fixture(params=[*OPENERS, *(f"{name} with channels" for name in WITH_CHANNELS)])
+@pytest.fixture(params=[*NAMES, *(f"{name} with channels" for name in MEASURING)])
 def measuring(request: pytest.FixtureRequest, clock: SimulatedClock):
     name, _, channels = request.param.partition(" ")
-    hand = SimulatedHand(start=START, end=END, mean_speed=radians(90.0))
-    device = (WITH_CHANNELS if channels else OPENERS)[name](clock, hand)
+    device = device_of(name, clock, measures=bool(channels))
     assert bool(device.channels) == bool(channels)
     yield device
     device.close()
@@ -442,13 +368,8 @@ def test_every_reading_has_a_number_for_each_channel(
 def test_what_it_measures_is_in_the_recording(
     measuring: Device, clock: SimulatedClock
 ) -> None:
-    recording = run_presentation(
-        measuring,
-        Controller(STANDARD_MODELS["HM3"], start_angle=START),
-        clock=clock,
-        limits=DeviceLimits(),
-        max_duration_s=0.2,
-    ).recording
+    options = {"clock": clock, "limits": LIMITS, "max_duration_s": 0.2}
+    recording = run_presentation(measuring, controls(), **options).recording
     assert recording.channels == measuring.channels
     for channel in recording.channels:
         assert np.isfinite(recording.columns[channel.column]).all()
@@ -465,13 +386,6 @@ def test_an_open_device_that_is_well_has_nothing_to_say(
     opened.read()
     opened.check()
     assert opened.is_open
-
-
-def test_a_closed_device_has_no_state(opened: Device, backend: str) -> None:
-    opened.close()
-    words = f"{backend}: needs an open device to check, this one is closed"
-    with pytest.raises(DeviceError, match=words):
-        opened.check()
 
 
 def test_who_else_can_idle_it_is_a_module_that_can(opened: Device) -> None:
@@ -495,33 +409,17 @@ def test_a_torque_that_is_not_finite_is_refused_and_the_device_stays_open(
 
 
 @with_arm
-def test_a_positive_torque_resists_extension(
+def test_a_positive_torque_resists_extension_and_is_held_until_the_next_one(
     backend: str, clock: SimulatedClock
 ) -> None:
-    free = SimulatedHand(
-        start=radians(90.0), end=END, mean_speed=radians(90.0), slip_time=0.0
-    )
+    free = stretching(90.0, start=radians(90.0), slip_time=0.0)
     with open_device(backend, clock=clock, hand=free) as device:
-        before = device.read().angle
+        angles = [device.read().angle]
         device.command(1.0)
-        tick(clock, 200)
-        assert device.read().angle < before - radians(1.0)
-
-
-@with_arm
-def test_a_torque_is_held_until_the_next_one(
-    backend: str, clock: SimulatedClock
-) -> None:
-    free = SimulatedHand(
-        start=radians(90.0), end=END, mean_speed=radians(90.0), slip_time=0.0
-    )
-    with open_device(backend, clock=clock, hand=free) as device:
-        device.read()
-        device.command(1.0)
-        angles = []
         for _ in range(4):
             tick(clock, 50)
             angles.append(device.read().angle)
+        assert angles[-1] < angles[0] - radians(1.0)
         steps = [after - before for before, after in pairwise(angles)]
         # It gains speed all the time.
         assert all(later < earlier < 0.0 for earlier, later in pairwise(steps))
@@ -534,12 +432,7 @@ def test_a_torque_is_held_until_the_next_one(
 def test_a_presentation_runs_on_it(
     opened: Device, backend: str, clock: SimulatedClock
 ) -> None:
-    presented = run_presentation(
-        opened,
-        Controller(STANDARD_MODELS["HM3"], start_angle=START),
-        clock=clock,
-        limits=DeviceLimits(torque=20.0, speed=radians(400.0), missed_ticks=20),
-    )
+    presented = run_presentation(opened, controls(), clock=clock, limits=LIMITS)
     assert presented.fault is None
     assert presented.recording.facts["device"] == backend
     assert presented.recording.facts["simulated"] is opened.simulated
@@ -550,42 +443,17 @@ def test_a_presentation_runs_on_it(
 # Many stretches, and their soft ends
 
 
-def open_for_many(backend: str, clock: SimulatedClock) -> Device:
-    """A device whose arm, or whose recording, is stretched twice."""
-    hand = _stretching(2)
-    if backend == "scripted":
-        device = ScriptedDevice(clock, lambda time_s: hand.intended(time_s)[0])
-        device.open()
-        return device
-    options = None
-    if backend == "replay":
-        options = ReplayOptions(recording=_recording(n_stretches=2))
-    return open_device(backend, clock=clock, hand=hand, options=options)
-
-
-class Saying(SimulatedClock):
-    """A clock on which the rater says done at a time."""
-
-    def __init__(self, status: PresentationStatus) -> None:
-        super().__init__()
-        self.done_ns, self.status = math.inf, status
-
-    def sleep_until_ns(self, deadline_ns: int) -> None:
-        super().sleep_until_ns(deadline_ns)
-        if deadline_ns >= self.done_ns:
-            self.status.done()
-
-
 def presented_many(backend: str, done_s: float = math.inf) -> Presented:
-    status = PresentationStatus()
-    clock = Saying(status)
-    with open_for_many(backend, clock) as device:
-        clock.done_ns = clock.now_ns() + done_s * 1e9
+    hand, status = moving(2), PresentationStatus()
+    clock = ActingClock(math.inf, status.done)
+    angle = lambda time_s: hand.intended(time_s)[0]  # noqa: E731
+    with device_of(backend, clock, 2, angle=angle) as device:
+        clock.at_ns = clock.now_ns() + done_s * 1e9
         presented = run_presentation(
             device,
-            Controller(STANDARD_MODELS["HM4"], start_angle=START),
+            controls("HM4"),
             clock=clock,
-            limits=DeviceLimits(),
+            limits=LIMITS,
             stretches=StretchRules(n=2),
             status=status,
         )

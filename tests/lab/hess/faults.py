@@ -71,29 +71,13 @@ class FaultyDevice(Device):
         self.let_go_s = self.time_s
         self.inner.close()
 
-    def held_nm(self) -> float:
-        """The torque that is left when all is over."""
-        return 0.0 if math.isfinite(self.let_go_s) else self.commands[-1][1]
 
-
-def dropped(start_s: float, n: float = math.inf, every: int = 1) -> ReadFault:
-    """No answer to the first of every so many of n readings from a time on."""
-    count = 0
-
-    def fault(time_s: float, reading: Reading) -> Reading:
-        nonlocal count
-        if time_s < start_s - 1e-9 or count >= n:
-            return reading
-        count += 1
-        if count % every == 1 % every:
-            raise DeviceTimeoutError("no answer within a period")
-        return reading
-
-    return fault
-
-
-def late(start_s: float, by_s: float, n: float = math.inf) -> ReadFault:
-    """Readings that are older by some time; the newest that can be there."""
+def changed(
+    start_s: float,
+    change: Callable[[int, list[Reading]], Reading],
+    n: float = math.inf,
+) -> ReadFault:
+    """Change the first n readings from a time on: which one it is, and all so far."""
     seen: list[Reading] = []
     count = 0
 
@@ -103,64 +87,62 @@ def late(start_s: float, by_s: float, n: float = math.inf) -> ReadFault:
         if time_s < start_s - 1e-9 or count >= n:
             return reading
         count += 1
-        old = [r for r in seen if r.time_ns <= reading.time_ns - round(by_s * 1e9)]
-        return old[-1] if old else seen[0]
+        return change(count, seen)
 
     return fault
+
+
+def dropped(start_s: float, n: float = math.inf, every: int = 1) -> ReadFault:
+    """No answer to the first of every so many of n readings from a time on."""
+
+    def change(count: int, seen: list[Reading]) -> Reading:
+        if count % every == 1 % every:
+            raise DeviceTimeoutError("no answer within a period")
+        return seen[-1]
+
+    return changed(start_s, change, n)
+
+
+def late(start_s: float, by_s: float, n: float = math.inf) -> ReadFault:
+    """Readings that are older by some time; the newest that can be there."""
+
+    def change(_count: int, seen: list[Reading]) -> Reading:
+        newest_ns = seen[-1].time_ns - round(by_s * 1e9)
+        return next((r for r in reversed(seen) if r.time_ns <= newest_ns), seen[0])
+
+    return changed(start_s, change, n)
+
+
+def before(count: int, seen: list[Reading]) -> Reading:
+    """The last reading before the fault."""
+    return seen[max(0, len(seen) - 1 - count)]
 
 
 def repeated(start_s: float, n: float = math.inf) -> ReadFault:
     """The last reading once more, time and all."""
-    before: list[Reading] = []
-    count = 0
-
-    def fault(time_s: float, reading: Reading) -> Reading:
-        nonlocal count
-        if time_s >= start_s - 1e-9 and before and count < n:
-            count += 1
-            return before[0]
-        before[:] = [reading]
-        return reading
-
-    return fault
+    return changed(start_s, before, n)
 
 
 def frozen(start_s: float) -> ReadFault:
     """One angle for ever, with the right times."""
-    held: list[float] = []
-
-    def fault(time_s: float, reading: Reading) -> Reading:
-        if time_s < start_s - 1e-9:
-            held[:] = [reading.angle]
-            return reading
-        return reading._replace(angle=held[0] if held else reading.angle)
-
-    return fault
+    return changed(
+        start_s, lambda n, seen: seen[-1]._replace(angle=before(n, seen).angle)
+    )
 
 
 def shifted(start_s: float, by: float, n: float = math.inf) -> ReadFault:
     """Angles that are off by some rad, n times or from then on."""
-    count = 0
-
-    def fault(time_s: float, reading: Reading) -> Reading:
-        nonlocal count
-        if time_s >= start_s - 1e-9 and count < n:
-            count += 1
-            return reading._replace(angle=reading.angle + by)
-        return reading
-
-    return fault
+    return changed(
+        start_s, lambda _, seen: seen[-1]._replace(angle=seen[-1].angle + by), n
+    )
 
 
 def early(start_s: float, by_s: float) -> ReadFault:
     """Readings from the future: a clock of its own that has run away."""
-
-    def fault(time_s: float, reading: Reading) -> Reading:
-        if time_s < start_s - 1e-9:
-            return reading
-        return reading._replace(time_ns=reading.time_ns + round(by_s * 1e9))
-
-    return fault
+    by_ns = round(by_s * 1e9)
+    return changed(
+        start_s, lambda _, seen: seen[-1]._replace(time_ns=seen[-1].time_ns + by_ns)
+    )
 
 
 def drifting(start_s: float, rate: float) -> ReadFault:
@@ -173,60 +155,38 @@ def drifting(start_s: float, rate: float) -> ReadFault:
     return fault
 
 
-def broken(start_s: float, error: Exception) -> ReadFault:
-    """A reading that raises an error of the device, from a time on."""
-
-    def fault(time_s: float, reading: Reading) -> Reading:
-        if time_s >= start_s - 1e-9:
-            raise error
-        return reading
-
-    return fault
-
-
-def not_taken(start_s: float, n: float = math.inf) -> SendFault:
-    """The device refuses n torques from a time on."""
+def refused(start_s: float, error: Exception, n: float = math.inf) -> SendFault:
+    """Sending n torques raises an error, from a time on."""
     count = 0
 
     def fault(time_s: float, torque: float) -> float | None:
         nonlocal count
         if time_s >= start_s - 1e-9 and count < n:
             count += 1
-            raise DeviceTimeoutError("the torque was not taken within a period")
-        return torque
-
-    return fault
-
-
-def failing(start_s: float, error: Exception) -> SendFault:
-    """Sending one torque raises an error, from a time on."""
-    has_failed = False
-
-    def fault(time_s: float, torque: float) -> float | None:
-        nonlocal has_failed
-        if time_s >= start_s - 1e-9 and not has_failed:
-            has_failed = True
             raise error
         return torque
 
     return fault
+
+
+def not_taken(start_s: float, n: float = math.inf) -> SendFault:
+    """The device refuses n torques from a time on."""
+    error = DeviceTimeoutError("the torque was not taken within a period")
+    return refused(start_s, error, n)
 
 
 def ignored(start_s: float) -> SendFault:
     """The device was idled from outside: it follows no torque and holds none."""
-
-    def fault(time_s: float, torque: float) -> float | None:
-        return torque if time_s < start_s - 1e-9 else 0.0
-
-    return fault
+    return lambda time_s, torque: torque if time_s < start_s - 1e-9 else 0.0
 
 
-def says(start_s: float, error: DeviceError) -> Callable[[float], None]:
-    """What the device answers when it is asked for its state, from a time on."""
+def says(start_s: float, error: Exception) -> Callable[..., Reading]:
+    """Its state is asked for, or a reading, and from a time on it raises an error."""
 
-    def fault(time_s: float) -> None:
+    def fault(time_s: float, reading: Reading | None = None) -> Reading | None:
         if time_s >= start_s - 1e-9:
             raise error
+        return reading
 
     return fault
 

@@ -117,48 +117,36 @@ def sending(fault: f.SendFault) -> Wrap:
 
 
 class InjectedClock(SimulatedClock):
-    """A simulated clock to which things happen some s after `begin`."""
+    """A simulated clock to which things happen some s after `begin`, each once."""
 
-    def __init__(self) -> None:
+    def __init__(self, acts: dict[float, Callable[["InjectedClock"], object]]) -> None:
         super().__init__()
-        self.begin_ns: int | None = None
+        self.begin_ns, self.acts = math.inf, acts
 
     def begin(self) -> None:
         """The device is open: from here on the presentation is timed."""
         self.begin_ns = self.now_ns()
 
-    def is_over(self, at_s: float, deadline_ns: int) -> bool:
-        begin_ns = self.begin_ns
-        return begin_ns is not None and deadline_ns >= begin_ns + round(at_s * 1e9)
-
-
-class Late(InjectedClock):
-    """A machine that is away for some ms at chosen times."""
-
-    def __init__(self, gaps: dict[float, float]) -> None:
-        super().__init__()
-        self.gaps = gaps  # at s -> how long, s
+    def miss(self, gap_s: float) -> None:
+        super().sleep_until_ns(self.now_ns() + round(gap_s * 1e9))
 
     def sleep_until_ns(self, deadline_ns: int) -> None:
         super().sleep_until_ns(deadline_ns)
-        for at_s in [at for at in self.gaps if self.is_over(at, deadline_ns)]:
-            gap_ns = round(self.gaps.pop(at_s) * 1e9)
-            super().sleep_until_ns(deadline_ns + gap_ns)
+        since_ns = deadline_ns - self.begin_ns
+        for at_s in [at for at in self.acts if since_ns >= round(at * 1e9)]:
+            self.acts.pop(at_s)(self)
 
 
-class Signalling(InjectedClock):
+def signalling(at_s: float) -> InjectedClock:
     """Somebody presses Ctrl-C at a time."""
+    return InjectedClock({at_s: lambda _: signal.raise_signal(signal.SIGINT)})
 
-    def __init__(self, at_s: float) -> None:
-        super().__init__()
-        self.at_s = at_s
-        self.is_pressed = False
 
-    def sleep_until_ns(self, deadline_ns: int) -> None:
-        super().sleep_until_ns(deadline_ns)
-        if not self.is_pressed and self.is_over(self.at_s, deadline_ns):
-            self.is_pressed = True
-            signal.raise_signal(signal.SIGINT)
+def late(gaps: dict[float, float]) -> InjectedClock:
+    """A machine that is away for some s at chosen times."""
+    return InjectedClock(
+        {at_s: lambda clock, gap=gap: clock.miss(gap) for at_s, gap in gaps.items()}
+    )
 
 
 class Wrong:
@@ -262,25 +250,25 @@ def injections(stretch: int = 1) -> list[Injection]:
             "bus off while reading",
             catch,
             "device",
-            reading(f.broken(catch, f.BUS_OFF)),
+            reading(f.says(catch, f.BUS_OFF)),
         ),
         device(
             "OSError of the backend while reading",
             catch,
             "device",
-            reading(f.broken(catch, OSError(5, "Input/output error"))),
+            reading(f.says(catch, OSError(5, "Input/output error"))),
         ),
         device(
             "ValueError of the backend while reading",
             catch,
             "device",
-            reading(f.broken(catch, ValueError("no such count"))),
+            reading(f.says(catch, ValueError("no such count"))),
         ),
         device(
             "OSError of the backend while sending",
             catch,
             "device",
-            sending(f.failing(catch, OSError(5, "Input/output error"))),
+            sending(f.refused(catch, OSError(5, "Input/output error"), 1)),
         ),
         device(
             "one torque not taken", catch, "no-answer", sending(f.not_taken(catch, 1))
@@ -304,31 +292,31 @@ def injections(stretch: int = 1) -> list[Injection]:
             name="emergency stop by Ctrl-C",
             at_s=catch,
             expected="emergency-stop",
-            clock=lambda: Signalling(catch),
+            clock=lambda: signalling(catch),
         ),
         Injection(
             name="loop away for 10 ms",
             at_s=catch,
             expected=None,
-            clock=lambda: Late({catch: 0.010}),
+            clock=lambda: late({catch: 0.010}),
         ),
         Injection(
             name="loop away for 25 ms",
             at_s=catch,
             expected="overrun",
-            clock=lambda: Late({catch: 0.025}),
+            clock=lambda: late({catch: 0.025}),
         ),
         Injection(
             name="five times 5 ms in 50 ms",
             at_s=catch,
             expected="overrun",
-            clock=lambda: Late({catch + 0.01 * n: 0.005 for n in range(5)}),
+            clock=lambda: late({catch + 0.01 * n: 0.005 for n in range(5)}),
         ),
         Injection(
             name="loop away for 60 ms",
             at_s=catch,
             expected="overrun",
-            clock=lambda: Late({catch: 0.060}),
+            clock=lambda: late({catch: 0.060}),
         ),
         Injection(
             name="exception in the model",

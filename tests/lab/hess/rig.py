@@ -1,12 +1,17 @@
-"""A bench for the tests: one presentation on the simulated device, and bad devices."""
+"""A bench for the tests: one presentation, on the simulated device or on a script."""
 
 import math
+from collections.abc import Callable, Sequence
 from math import radians
-from typing import ClassVar
+from typing import Any, ClassVar
+
+import numpy as np
 
 from masrel.errors import DeviceTimeoutError
-from masrel.lab.elbow import STANDARD_MODELS
+from masrel.lab.elbow import STANDARD_MODELS, JointModel
+from masrel.lab.elbow._torque import _stepped
 from masrel.lab.hess import (
+    BackendOptions,
     Controller,
     Device,
     DeviceLimits,
@@ -17,34 +22,53 @@ from masrel.lab.hess import (
     open_device,
     run_presentation,
 )
+from masrel.lab.recording import Recording
+
+from .faults import FaultyDevice, ReadFault
 
 START, END = radians(30.0), radians(146.0)
-LIMITS = DeviceLimits(torque=20.0, speed=radians(400.0), missed_ticks=20)
+LIMITS = DeviceLimits()
+MODELS = ("HM1", "HM2", "HM3", "HM4")
+PRE_CATCH, CATCH, POST_CATCH = range(3)  # positions in PHASES
+
+Law = Callable[[float, float, float], float]
+
+
+def stretching(speed_deg_s: float = 92.0, **options: Any) -> SimulatedHand:
+    """A clamp that stretches from 30 to 146 deg."""
+    way = {"start": START, "end": END, "mean_speed": radians(speed_deg_s)}
+    return SimulatedHand(**{**way, **options})
+
+
+def controls(model: str | JointModel = "HM3", **options: Any) -> Controller:
+    joint = STANDARD_MODELS[model] if isinstance(model, str) else model
+    return Controller(joint, **{"start_angle": START, **options})
 
 
 def present(
-    model: str,
-    speed_deg_s: float,
+    model: str | JointModel | Controller = "HM3",
+    speed_deg_s: float = 92.0,
     *,
     slip_time: float | None = None,
-    limits: DeviceLimits = LIMITS,
-    max_duration_s: float = 10.0,
-    start_ns: int = 0,
+    hand: Any = None,
+    clock: SimulatedClock | None = None,
+    read_fault: ReadFault | None = None,
+    range_end: float = END,
+    backend: BackendOptions | None = None,
+    **options: Any,
 ) -> Presented:
-    clock = SimulatedClock(start_ns)
-    hand = SimulatedHand(
-        start=START, end=END, mean_speed=radians(speed_deg_s), slip_time=slip_time
+    """Present on the simulated device; `options` are those of the loop."""
+    clock = clock or SimulatedClock()
+    hand = hand or stretching(speed_deg_s, slip_time=slip_time)
+    if not isinstance(model, Controller):
+        model = controls(model, start_angle=hand.start)
+    inner = open_device(
+        "simulated", clock=clock, hand=hand, range_end=range_end, options=backend
     )
-    controller = Controller(STANDARD_MODELS[model], start_angle=START)
-    with open_device("simulated", clock=clock, hand=hand) as device:
-        return run_presentation(
-            device,
-            controller,
-            clock=clock,
-            limits=limits,
-            max_duration_s=max_duration_s,
-            end_angle=END,
-        )
+    device: Device = inner if read_fault is None else FaultyDevice(inner, read_fault)
+    with inner, device:
+        options = {"limits": LIMITS, "end_angle": END, **options}
+        return run_presentation(device, model, clock=clock, **options)
 
 
 class ScriptedDevice(Device):
@@ -59,6 +83,7 @@ class ScriptedDevice(Device):
         self.values = lambda _time_s: ()
         self.commands: list[tuple[int, float]] = []
         self.n_reads = 0
+        self.late_ns = 0  # how old a reading is
         self.silent_after = math.inf
         self.deaf_after = math.inf
 
@@ -71,7 +96,7 @@ class ScriptedDevice(Device):
             raise DeviceTimeoutError("scripted: no answer")
         now_ns = self.clock.now_ns()
         time_s = (now_ns - self.start_ns) * 1e-9
-        return Reading(now_ns, self.angle(time_s), self.values(time_s))
+        return Reading(now_ns - self.late_ns, self.angle(time_s), self.values(time_s))
 
     def _send(self, torque_nm: float) -> None:
         if len(self.commands) >= self.deaf_after:
@@ -80,3 +105,118 @@ class ScriptedDevice(Device):
 
     def _stop(self) -> None:
         self.stopped = True
+
+
+class Losing(ScriptedDevice):
+    """No answer to some of its questions, by number."""
+
+    def __init__(self, is_lost: Callable[[int], bool], **options) -> None:
+        super().__init__(SimulatedClock(), **options)
+        self.is_lost = is_lost
+
+    def _read(self) -> Reading:
+        reading = super()._read()
+        if self.is_lost(self.n_reads - 1):
+            raise DeviceTimeoutError("scripted: no answer")
+        return reading
+
+
+def scripted(
+    angle: Callable[[float], float] = lambda _time_s: START,
+    model: str | JointModel | Controller = "HM3",
+    *,
+    clock: SimulatedClock | None = None,
+    device: ScriptedDevice | None = None,
+    **options: Any,
+) -> tuple[ScriptedDevice, Presented]:
+    """Present on a scripted device; `options` are those of the loop."""
+    device = device or ScriptedDevice(clock or SimulatedClock(), angle)
+    if not isinstance(model, Controller):
+        model = controls(model, rate_hz=options.get("rate_hz", 1000))
+    options = {"limits": LIMITS, "max_duration_s": 0.02, **options}
+    device.open()
+    presented = run_presentation(device, model, clock=device.clock, **options)
+    device.close()
+    return device, presented
+
+
+def path(points_deg: Sequence[tuple[float, float]]) -> Callable[[float], float]:
+    """An arm that goes in straight lines through (time s, angle deg), and trembles."""
+    times, angles = zip(*points_deg, strict=True)
+
+    def angle(time_s: float) -> float:
+        tremor = 0.02 * math.sin(2.0 * math.pi * 9.0 * time_s)
+        return radians(np.interp(time_s, times, angles) + tremor)
+
+    return angle
+
+
+class Joint:
+    """Any law of time, angle and speed, as a model and its own stepper."""
+
+    kind: ClassVar[str] = "test"
+    range_end: ClassVar[float] = END
+    speed_threshold: ClassVar[float] = radians(20.0)
+
+    def __init__(self, law: Law, *, is_passive: bool = False, phase: int = 0) -> None:
+        self.step, self.is_passive, self.phase = law, is_passive, phase
+        self.n_releases = 0
+
+    def stepper(self, _start_angle: float) -> "Joint":
+        return self
+
+    def release(self) -> None:
+        self.n_releases += 1
+
+    def largest_torque(self, **_stretch: float) -> float:
+        return 1.0
+
+    def largest_slope(self, **_stretch: float) -> tuple[float, float]:
+        return 0.0, 0.0
+
+
+class ActingClock(SimulatedClock):
+    """A simulated clock on which something happens once, when a time has come."""
+
+    def __init__(self, at_s: float, act: Callable[[], object]) -> None:
+        super().__init__()
+        self.at_ns, self.act = at_s * 1e9, act
+
+    def sleep_until_ns(self, deadline_ns: int) -> None:
+        super().sleep_until_ns(deadline_ns)
+        if deadline_ns >= self.at_ns:
+            self.at_ns = math.inf
+            self.act()
+
+
+def law_of(model: JointModel, recording: Recording) -> np.ndarray:
+    """What a model asks for, N·m, where it is fed what was read (n_samples,)."""
+    columns = recording.columns
+    return _stepped(
+        model,
+        START,
+        columns["time_s"],
+        np.rint(columns["angle_deg"] / 0.005) * radians(0.005),  # as it was read
+        np.radians(columns["velocity_deg_s"]),
+    )[0]
+
+
+def same_columns(one: Recording, other: Recording, n: int | None = None) -> bool:
+    """Whether the first samples are the same to the last bit."""
+    return all(
+        column[:n].tobytes() == other.columns[name][:n].tobytes()
+        for name, column in one.columns.items()
+    )
+
+
+def assert_straight_ramp(presented: Presented, kind: str) -> None:
+    """After a fault the torque goes in a straight line to zero within 50 ms."""
+    fault, columns = presented.fault, presented.recording.columns
+    assert fault is not None
+    assert fault.kind == kind
+    since = columns["time_s"] - fault.time_s
+    ramp = since > -1e-9
+    line = fault.torque_nm * (1.0 - since[ramp] / 0.05)
+    np.testing.assert_allclose(columns["command_torque_nm"][ramp], line, atol=1e-6)
+    assert fault.torque_nm == 0.0 or abs(since[-1] - 0.05) < 1e-6
+    assert abs(columns["command_torque_nm"][-1]) < 1e-9

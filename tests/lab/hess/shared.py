@@ -13,9 +13,7 @@ from math import radians
 from pathlib import Path
 from typing import ClassVar
 
-from masrel.lab.elbow import STANDARD_MODELS
 from masrel.lab.hess import (
-    Controller,
     Device,
     DeviceLimits,
     IdleCommand,
@@ -23,11 +21,12 @@ from masrel.lab.hess import (
     RealClock,
     run_presentation,
 )
-from masrel.lab.hess._watchdog import watched
+from masrel.lab.hess._stop import watched
+
+from .rig import START, controls
 
 FORMAT = "=dqq"  # torque N·m; when it was sent or idled, ns; mode: 1 torque, 0 idle
 SIZE = struct.calcsize(FORMAT)
-START = radians(30.0)
 
 
 class SharedFile:
@@ -84,14 +83,12 @@ def prepare(path: str) -> Callable[[], None]:
 
 def main() -> None:
     path, duration_s = Path(sys.argv[1]), float(sys.argv[2])
-    limits = DeviceLimits(missed_ticks=10_000)
-    controller = Controller(STANDARD_MODELS["HM4"], start_angle=START)
     with SharedDevice(path) as device, watched(device, 0.05) as watchdog:
         run_presentation(
             device,
-            controller,
+            controls("HM4"),
             clock=RealClock(),
-            limits=limits,
+            limits=DeviceLimits(missed_ticks=10_000),
             max_duration_s=duration_s,
             watchdog=watchdog,
         )

@@ -2,7 +2,6 @@
 
 import csv
 import math
-from collections.abc import Callable
 from math import radians
 from pathlib import Path
 
@@ -12,22 +11,29 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from masrel.errors import ParameterError
-from masrel.lab.elbow import (
-    STANDARD_MODELS,
-    ConstantSpeed,
-    MinimumJerk,
-    Motion,
-    SampledJoint,
-    trace,
+from masrel.lab.elbow import STANDARD_MODELS, ConstantSpeed, MinimumJerk, trace
+from masrel.lab.hess import (
+    Controller,
+    DeviceLimits,
+    Friction,
+    FrictionCompensation,
 )
-from masrel.lab.hess import Controller, Friction
 from masrel.lab.recording import PHASES
 
-from .rig import END, START, present
+from .rig import (
+    CATCH,
+    END,
+    MODELS,
+    POST_CATCH,
+    PRE_CATCH,
+    START,
+    Losing,
+    controls,
+    present,
+    scripted,
+)
 
 STUDY = Path(__file__).parents[3] / "studies" / "hess2012"
-PRE_CATCH, CATCH, POST_CATCH = range(3)
-MODELS = ("HM1", "HM2", "HM3", "HM4")
 
 
 def table_5() -> list[tuple[str, float]]:
@@ -37,15 +43,11 @@ def table_5() -> list[tuple[str, float]]:
     return [(row["model"], float(row["mean_speed_deg_s"])) for row in rows]
 
 
-def controller(model: str = "HM3", **options) -> Controller:
-    return Controller(STANDARD_MODELS[model], start_angle=START, **options)
-
-
 def stretched(
     model: str = "HM3", speed_deg_s: float = 92.0, until_deg: float = 85.0, **options
 ) -> tuple[Controller, float]:
     # A controller that has seen a stretch at constant speed -> it, the time, s
-    made = controller(model, **options)
+    made = controls(model, **options)
     n = round((until_deg - 30.0) / speed_deg_s * 1e3)
     for tick in range(n + 1):
         angle = START + radians(speed_deg_s) * tick * 1e-3
@@ -61,27 +63,23 @@ def test_table_5_is_whole() -> None:
     assert {model for model, _ in table_5()} == set(MODELS)
 
 
-def constant_speed(start: float, end: float, speed: float) -> Motion:
-    return ConstantSpeed(start=start, end=end, speed=speed)
-
-
-def minimum_jerk(start: float, end: float, speed: float) -> Motion:
-    return MinimumJerk(start=start, end=end, mean_speed=speed)
-
-
-@pytest.mark.parametrize("movement", [constant_speed, minimum_jerk])
+@pytest.mark.parametrize("is_even", [True, False])
 @pytest.mark.parametrize(("model", "speed_deg_s"), table_5())
 def test_it_asks_for_the_torque_of_the_trace_bit_for_bit(
-    model: str, speed_deg_s: float, movement: Callable[[float, float, float], Motion]
+    model: str, speed_deg_s: float, is_even: bool
 ) -> None:
-    motion = movement(START, END, radians(speed_deg_s))
-    made = trace(STANDARD_MODELS[model], motion, rate_hz=1000)
-    stepped = controller(model)
-    samples = zip(
-        made.time.tolist(), made.angle.tolist(), made.velocity.tolist(), strict=True
+    speed = radians(speed_deg_s)
+    motion = (
+        ConstantSpeed(start=START, end=END, speed=speed)
+        if is_even
+        else MinimumJerk(start=START, end=END, mean_speed=speed)
     )
+    made = trace(STANDARD_MODELS[model], motion, rate_hz=1000)
+    stepped = controls(model)
     asked = []
-    for sample in samples:
+    for sample in zip(
+        made.time.tolist(), made.angle.tolist(), made.velocity.tolist(), strict=True
+    ):
         stepped.step(*sample)
         asked.append((stepped.model_torque, stepped.phase))
     torque, phase = np.array(asked).T
@@ -90,52 +88,37 @@ def test_it_asks_for_the_torque_of_the_trace_bit_for_bit(
     assert not stepped.grip_lost
 
 
-@pytest.mark.parametrize("model", MODELS)
-def test_what_a_presentation_records_is_the_law_of_what_it_read(model: str) -> None:
-    columns = present(model, 95.0).recording.columns
-    joint = SampledJoint(STANDARD_MODELS[model], start_angle=START)
-    law = [
-        joint.step(time_s, radians(angle_deg), radians(velocity_deg_s))
-        for time_s, angle_deg, velocity_deg_s in zip(
-            columns["time_s"].tolist(),
-            columns["angle_deg"].tolist(),
-            columns["velocity_deg_s"].tolist(),
-            strict=True,
-        )
-    ]
-    np.testing.assert_allclose(columns["model_torque_nm"], law, rtol=0, atol=1e-9)
-
-
 # Phases
 
 
-@pytest.mark.parametrize("model", ["HM2", "HM3", "HM4"])
-def test_the_phases_come_in_the_order_of_figure_7(model: str) -> None:
-    facts = present(model, 100.0).recording.facts
-    assert facts["phases"] == "pre-catch, catch, post-catch, pre-catch"
-
-
-def test_hm1_reaches_the_end_of_range_within_the_catch() -> None:
-    assert present("HM1", 100.0).recording.facts["phases"] == "pre-catch, catch"
-
-
-def test_a_stretch_below_the_speed_threshold_never_catches() -> None:
-    presented = present("HM4", 18.0)
-    assert presented.recording.facts["phases"] == "pre-catch"
-    assert presented.recording.facts["ended"] == "arrived"
+@pytest.mark.parametrize(
+    ("model", "speed_deg_s", "phases"),
+    [
+        *(
+            (name, 100.0, "pre-catch, catch, post-catch, pre-catch")
+            for name in MODELS[1:]
+        ),
+        ("HM1", 100.0, "pre-catch, catch"),  # it reaches the end of range within it
+        ("HM4", 18.0, "pre-catch"),  # below the speed threshold
+    ],
+)
+def test_the_phases_come_in_the_order_of_figure_7(
+    model: str, speed_deg_s: float, phases: str
+) -> None:
+    facts = present(model, speed_deg_s).recording.facts
+    assert (facts["phases"], facts["ended"]) == (phases, "arrived")
 
 
 def test_the_torque_of_each_phase_by_hand() -> None:
     # HM3 at 80 deg/s from 30 deg; (2): the catch is at 115 - 0.35 × 80 = 87 deg, and
     # it is over after D = 30 deg.
     speed = radians(80.0)
-    made = controller()
+    made = controls()
     found = {}
     for tick in range(1_450):
         angle = START + speed * tick * 1e-3
         made.step(tick * 1e-3, angle, speed)
         found[tick] = (made.phase, made.model_torque)
-    law = STANDARD_MODELS["HM3"]
     caught = next(tick for tick, (phase, _) in found.items() if phase == CATCH)
     left = next(tick for tick, (phase, _) in found.items() if phase == POST_CATCH)
     assert caught == 713  # the first sample beyond 57 deg / 80 deg/s = 0.7125 s
@@ -156,7 +139,6 @@ def test_the_torque_of_each_phase_by_hand() -> None:
         POST_CATCH,
         pytest.approx(pre_catch(caught) + 0.6 * rise + climb),
     )
-    assert law.catch_torque_constant == pytest.approx(2.8)
 
 
 def test_post_catch_ends_when_the_arm_is_slower_than_the_threshold() -> None:
@@ -170,52 +152,114 @@ def test_post_catch_ends_when_the_arm_is_slower_than_the_threshold() -> None:
         angle += radians(speed_deg_s) * 1e-3
         made.step(time_s, angle, radians(speed_deg_s))
     assert speed_deg_s == 18.0
-    assert made.phase == PRE_CATCH
-    assert not made.grip_lost
+    assert (made.phase, made.grip_lost) == (PRE_CATCH, False)
+
+
+def test_at_one_speed_the_models_come_in_the_order_of_their_grades() -> None:
+    # Fig. 9: a higher grade catches earlier, rises and stands higher, lets go sooner
+    limits = DeviceLimits(torque=28.0)
+    made = [present(model, limits=limits).recording.columns for model in MODELS]
+    in_catch = [np.flatnonzero(each["phase"] == CATCH) for each in made]
+    first_last = [(int(found[0]), int(found[-1])) for found in in_catch]
+    angles, rises, travels = np.array(
+        [
+            (
+                each["angle_deg"][first],
+                each["model_torque_nm"][first + 5] - each["model_torque_nm"][first - 1],
+                each["angle_deg"][last] - each["angle_deg"][first],
+            )
+            for each, (first, last) in zip(made, first_last, strict=True)
+        ]
+    ).T
+    assert np.all(np.diff(angles) < 0.0)
+    assert np.all(np.diff(rises) > 0.0)
+    assert rises.min() > 1.5
+    # Only the lowest ends within its catch (section III.C), before it has gone D
+    assert np.all(np.diff(travels[1:]) < 0.0)
+    ended = [bool(np.any(each["phase"] == POST_CATCH)) for each in made]
+    assert ended == [False, True, True, True]
+
+
+# The estimated speed
+
+
+def test_the_speed_is_that_of_a_first_order_low_pass_and_missed_ticks_do_not_bias_it():
+    # A ramp of angle is a step of speed; the exact first-order response after a time t
+    # is v (1 - exp(-180 t)), however the ticks fall. A first reading gives no speed.
+    rng = np.random.default_rng(1)
+    lost = set(rng.choice(np.arange(5, 200), 15, replace=False).tolist())
+    limits = DeviceLimits(missed_replies=9, missed_replies_per_100=99, drift_speed=1e-3)
+
+    device = Losing(lost.__contains__, angle=lambda time_s: START + 1.5 * time_s)
+    made = scripted(device=device, limits=limits, max_duration_s=0.2)[1].recording
+    time_s = made.columns["time_s"][: made.n_presented]
+    speed = np.radians(made.columns["velocity_deg_s"][: made.n_presented])
+    assert time_s.size == 185
+    np.testing.assert_allclose(speed, 1.5 * -np.expm1(-180.0 * time_s), rtol=1e-9)
 
 
 # Friction
 
-
-@pytest.mark.parametrize("speed_deg_s", [60.0, -60.0])
-def test_compensation_helps_the_motion(speed_deg_s: float) -> None:
-    # 0.9 (0.168 × 1.0472 + 0.189) = 0.3284 N·m less to resist an extension, as much
-    # more to resist a flexion.
-    made = controller()
-    command = made.step(0.0, START, radians(speed_deg_s))
-    helping = math.copysign(0.9 * (0.168 * radians(60.0) + 0.189), speed_deg_s)
-    assert command == pytest.approx(made.model_torque - helping, rel=1e-12)
-    assert (made.model_torque - command) * speed_deg_s > 0.0
+SPEEDS = st.floats(-6.0, 6.0)
 
 
-@given(st.floats(-6.0, 6.0), st.floats(0.3, 2.5))
+def friction_torque(velocity: float) -> float:
+    # (7) without inertia, with the source's B and β
+    return 0.168 * velocity + math.copysign(0.189, velocity)
+
+
+def test_the_defaults_are_those_identified_for_equation_7() -> None:
+    assert Friction() == Friction(inertia=0.0097, viscous=0.168, coulomb=0.189)
+
+
+@pytest.mark.parametrize(
+    ("share", "speed", "options", "torque"),
+    [
+        (0.9, 2.0, {}, 0.4725),  # 0.9 (0.168 × 2 + 0.189) = 0.9 × 0.525
+        (0.9, -2.0, {}, -0.4725),
+        # inside the dead zone only the viscous part
+        (0.5, radians(0.09), {}, 0.5 * 0.168 * radians(0.09)),
+        (0.5, 0.0, {}, 0.0),
+        # halfway up the ramp half of the Coulomb part
+        (1.0, 0.2, {"dead_zone": 0.1, "full_speed": 0.3}, 0.168 * 0.2 + 0.189 / 2),
+    ],
+)
+def test_the_whole_friction_is_scaled_by_the_share(
+    share: float, speed: float, options: dict, torque: float
+) -> None:
+    compensation = FrictionCompensation(Friction(), share=share, **options)
+    assert compensation.torque(speed) == pytest.approx(torque, rel=1e-12)
+    made = controls(compensation=share, **options)
+    command = made.step(0.0, START, speed)
+    assert made.model_torque - command == pytest.approx(torque, rel=1e-12)
+    plain = controls(compensation=0.0)  # friction changes the command, not the model
+    assert plain.step(0.0, START, speed) == plain.model_torque == made.model_torque
+
+
+@given(SPEEDS, st.floats(0.3, 2.5), st.floats(0.0, 1.0))
 def test_by_default_friction_is_under_compensated(
-    velocity: float, angle: float
+    velocity: float, angle: float, share: float
 ) -> None:
     # The hand feels the command and the friction: never less than the model's
     # torque against its motion, and at most a tenth of B more, or β within the ramp.
-    made = controller()
+    helping = FrictionCompensation(Friction(), share=share).torque(velocity)
+    assert helping * velocity >= 0.0
+    assert abs(helping) <= abs(friction_torque(velocity)) * (1 + 1e-12)
+    made = controls()
     command = made.step(0.0, angle, velocity)
-    friction = 0.168 * velocity + math.copysign(0.189, velocity)
+    friction = friction_torque(velocity)
     excess = (command + friction - made.model_torque) * math.copysign(1.0, velocity)
     assert excess >= 0.0
     if abs(velocity) >= radians(5.0):
         assert excess == pytest.approx(0.1 * abs(friction), rel=1e-9)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
-def test_the_share_scales_the_compensation(share: float) -> None:
-    made = controller(compensation=share, friction=Friction(viscous=0.2, coulomb=0.1))
-    command = made.step(0.0, START, 2.0)
-    assert made.model_torque - command == pytest.approx(share * 0.5)
-
-
-def test_friction_changes_the_command_and_not_the_model() -> None:
-    with_it, without = controller(), controller(compensation=0.0)
-    for made in (with_it, without):
-        made.step(0.0, 1.0, 1.5)
-    assert with_it.model_torque == without.model_torque
-    assert without.step(0.001, 1.0015, 1.5) == without.model_torque
+@given(SPEEDS | st.floats(-0.05, 0.05), st.floats(0.0, 1e-4))
+def test_compensation_never_jumps(velocity: float, change: float) -> None:
+    # Steepest from 0.1 to 2 deg/s: 0.168 + 0.189 / radians(1.9) = 5.87 N·m per rad/s
+    compensation = FrictionCompensation(Friction(), share=1.0)
+    step = compensation.torque(velocity + change) - compensation.torque(velocity)
+    assert abs(step) <= 5.87 * change + 1e-12
 
 
 # Lost grip
@@ -242,11 +286,24 @@ def test_a_sudden_fall_of_speed_releases_to_pre_catch_at_once(
     assert made.model_torque < before
 
 
-def braked(share: float, rate_hz: int = 1000, **options: float) -> tuple[bool, float]:
-    """Take `share` of what a loose arm loses off it -> grip lost, and after which s."""
-    made = controller(rate_hz=rate_hz, **options)
+# `share` of what a loose arm loses is taken off it. One that gives way half as fast is
+# held; what a loose one loses goes by its inertia.
+@pytest.mark.parametrize(
+    ("share", "options", "is_lost"),
+    [
+        *((1.0, {"rate_hz": rate_hz}, True) for rate_hz in (500, 1000, 4000)),
+        *((0.7, {"rate_hz": rate_hz}, True) for rate_hz in (500, 1000, 4000)),
+        *((0.5, {"rate_hz": rate_hz}, False) for rate_hz in (500, 1000, 4000)),
+        (1.0, {"loose_inertia": 0.03}, False),
+        (0.5, {"loose_inertia": 0.08}, True),
+    ],
+)
+def test_an_arm_that_nothing_but_the_torque_brakes_has_been_let_go(
+    share: float, options: dict, is_lost: bool
+) -> None:
+    made = controls(**options)
     speed, angle = radians(92.0), START
-    period, tick = 1.0 / rate_hz, 0
+    period, tick = 1.0 / made.rate_hz, 0
     while angle < radians(95.0):
         made.step(tick * period, angle, speed)
         angle, tick = angle + speed * period, tick + 1
@@ -256,35 +313,36 @@ def braked(share: float, rate_hz: int = 1000, **options: float) -> tuple[bool, f
         speed -= share * made.model_torque / 0.06 * period
         made.step(tick * period, angle, speed)
         tick += 1
-    return made.grip_lost, (tick - began) * period
+    assert made.grip_lost is is_lost
+    if share == 1.0 and is_lost:
+        assert (tick - began) * period <= 0.006
 
 
-@pytest.mark.parametrize("rate_hz", [500, 1000, 4000])
-def test_an_arm_that_nothing_but_the_torque_brakes_has_been_let_go(
-    rate_hz: int,
+@pytest.mark.parametrize(
+    ("model", "until_deg", "late_s", "angle_deg", "speed_deg_s", "is_lost"),
+    [
+        # Ticks are missed: it gives way by a fifth of what a loose one would in 20 ms
+        ("HM3", 85.0, 0.02, 86.5, None, False),
+        ("HM3", 60.0, 0.001, 60.0, -60.0, False),  # in pre-catch it means nothing
+        # the end of range stops the arm
+        ("HM2", 142.5, 0.001, 142.9, 10.0, True),
+        ("HM2", 142.5, 0.001, 143.1, 10.0, False),
+    ],
+)
+def test_what_else_slows_an_arm_down_is_no_lost_grip(
+    model: str,
+    until_deg: float,
+    late_s: float,
+    angle_deg: float,
+    speed_deg_s: float | None,
+    is_lost: bool,
 ) -> None:
-    lost, after_s = braked(1.0, rate_hz)
-    assert lost
-    assert after_s <= 0.006
-
-
-@pytest.mark.parametrize("rate_hz", [500, 1000, 4000])
-def test_an_arm_that_gives_way_half_as_fast_is_held(rate_hz: int) -> None:
-    assert not braked(0.5, rate_hz)[0]
-    assert braked(0.7, rate_hz)[0]
-
-
-def test_what_a_loose_arm_loses_goes_by_its_inertia() -> None:
-    assert not braked(1.0, loose_inertia=0.03)[0]
-    assert braked(0.5, loose_inertia=0.08)[0]
-
-
-def test_ticks_that_are_missed_are_no_lost_grip() -> None:
-    # An arm that gives way by a fifth of what a loose one would, 20 ms later
-    made, time_s = stretched()
+    made, time_s = stretched(model, until_deg=until_deg)
     speed = radians(92.0) - 0.2 * made.model_torque / 0.06 * 0.02
-    made.step(time_s + 0.02, radians(86.5), speed)
-    assert not made.grip_lost
+    if speed_deg_s is not None:
+        speed = radians(speed_deg_s)
+    made.step(time_s + late_s, radians(angle_deg), speed)
+    assert made.grip_lost is is_lost
 
 
 def test_an_arm_that_is_led_back_slowly_and_then_faster_has_not_been_let_go() -> None:
@@ -295,72 +353,94 @@ def test_an_arm_that_is_led_back_slowly_and_then_faster_has_not_been_let_go() ->
     assert (made.phase, made.grip_lost) == (PRE_CATCH, False)  # the law's own end
 
 
-def test_in_pre_catch_a_fall_of_speed_means_nothing() -> None:
-    made, time_s = stretched(until_deg=60.0)
-    made.step(time_s + 1e-3, radians(60.0), radians(-60.0))
-    assert not made.grip_lost
-
-
-def test_the_end_of_range_stops_the_arm_without_a_lost_grip() -> None:
-    for beyond_deg, lost in ((142.9, True), (143.1, False)):
-        made, time_s = stretched("HM2", until_deg=142.5)
-        assert made.phase == POST_CATCH
-        made.step(time_s + 1e-3, radians(beyond_deg), radians(10.0))
-        assert made.grip_lost is lost
-
-
-def test_after_a_lost_grip_the_arm_that_runs_on_is_not_caught_again() -> None:
+def test_after_a_lost_grip_the_arm_is_caught_again_when_it_was_moved_back() -> None:
     made, time_s = stretched()
-    for tick in range(1, 400):
+    for tick in range(1, 400):  # that runs on
         angle, speed = radians(85.0 + 0.05 * tick), radians(50.0)
         made.step(time_s + tick * 1e-3, angle, speed)
         assert made.phase == PRE_CATCH
         assert made.model_torque == pytest.approx(pre_catch_torque(angle, speed))
-
-
-def test_moved_back_and_stretched_again_it_catches_again() -> None:
-    made, time_s = stretched()
-    made.step(time_s + 1e-3, radians(85.0), radians(-50.0))
-    assert (made.phase, made.grip_lost) == (PRE_CATCH, True)
-    time_s += 0.01
-    for tick in range(700):
+    time_s += 0.4
+    made.step(time_s, radians(85.0), radians(-50.0))
+    for tick in range(1, 700):
         angle = START + radians(92.0) * tick * 1e-3
         made.step(time_s + tick * 1e-3, angle, radians(92.0))
     assert made.phase == CATCH
     assert made.grip_lost  # it was, in this presentation
 
 
-def test_a_hand_that_slips_off_the_simulated_arm_is_noticed() -> None:
-    held = present("HM4", 100.0)
-    caught_s = held.recording.columns["time_s"][
-        np.flatnonzero(held.recording.columns["phase"] == CATCH)[0]
-    ]
-    slipped = present("HM4", 100.0, slip_time=float(caught_s) + 0.02)
-    columns = slipped.recording.columns
-    assert slipped.fault is None
-    assert slipped.recording.facts["grip_lost"] is True
-    assert held.recording.facts["grip_lost"] is False
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("share", [0.1, 0.8])
+def test_after_a_slip_the_torque_is_that_of_pre_catch_and_the_arm_slow_enough(
+    model: str, share: float
+) -> None:
+    # Section III.B.3: the slowest and the fastest stretch of Table V of this model.
     # 11.3 N·m on 0.06 kg·m² take 40 deg/s in 3.7 ms; the estimate follows 5.6 ms later.
-    lost = np.flatnonzero((columns["phase"] == 0) & (columns["time_s"] > caught_s))[0]
-    assert 0.0 < columns["time_s"][lost] - caught_s - 0.02 <= 0.010
-    assert columns["command_torque_nm"][lost - 1] > 10.0
-    assert abs(columns["command_torque_nm"][lost]) < 4.0
-    assert np.all(columns["phase"][lost:] == 0)
+    options = {"limits": DeviceLimits(torque=28.0), "max_duration_s": 3.0}
+    speeds = [speed for name, speed in table_5() if name == model]
+    for speed in (min(speeds), max(speeds)):
+        held = present(model, speed, **options).recording
+        assert held.facts["grip_lost"] is False
+        for phase in (CATCH, POST_CATCH):
+            at = np.flatnonzero(held.columns["phase"] == phase)
+            if at.size < 50:
+                continue
+            slip_s = float(held.columns["time_s"][at[int(share * at.size)]]) + 0.0003
+            slipped = present(model, speed, slip_time=slip_s, **options)
+            assert slipped.fault is None
+            assert slipped.recording.facts["grip_lost"] is True
+            columns = slipped.recording.columns
+            after = columns["time_s"] > slip_s
+            released = int(np.flatnonzero(after & (columns["phase"] == PRE_CATCH))[0])
+            at_end = columns["angle_deg"][columns["time_s"] < slip_s + 0.02].max() > 143
+            # docs/driver.md says so
+            most_ms = 29.0 if at_end else 10.0
+            assert (columns["time_s"][released] - slip_s) * 1e3 <= most_ms
+            # From then on it is (1), and never anything else
+            law = pre_catch_torque(
+                np.radians(columns["angle_deg"][released:]),
+                np.radians(columns["velocity_deg_s"][released:]),
+            )
+            found = columns["model_torque_nm"][released:]
+            np.testing.assert_allclose(found, law, atol=1e-9)
+            assert np.abs(columns["velocity_deg_s"][after]).max() < 250.0
+
+
+def test_the_speed_after_a_slip_is_that_of_the_pre_catch_spring() -> None:
+    # k (θ - θ_rest) against b θ̇ alone: 3.15 · 2.02 / 1.26 = 5.06 rad/s, 290 deg/s, is
+    # where it would tend to from 146 deg; the arm's inertia keeps it below.
+    tended = np.degrees(3.15 * radians(116.0) / 1.26)
+    assert tended == pytest.approx(290.0, abs=0.1)
+    slipped = present("HM2", 80.0, slip_time=1.55, max_duration_s=3.0)
+    assert -slipped.recording.columns["velocity_deg_s"].min() < tended
 
 
 # What is refused
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("make", "change", "words"),
     [
-        ({"slip_speed_drop": 0.0}, "slip_speed_drop: needs more than 0"),
-        ({"slip_speed_drop": math.nan}, "slip_speed_drop: needs more than 0"),
-        ({"loose_inertia": 0.0}, "loose_inertia: needs more than 0"),
-        ({"rate_hz": 0}, "rate_hz: needs 1 or more, got 0"),
-        ({"compensation": 1.1}, r"share: needs \[0, 1\], got 1.1"),
+        (controls, {"slip_speed_drop": 0.0}, "slip_speed_drop: needs more than 0"),
+        (controls, {"slip_speed_drop": math.nan}, "slip_speed_drop: needs more than 0"),
+        (controls, {"loose_inertia": 0.0}, "loose_inertia: needs more than 0"),
+        (controls, {"rate_hz": 0}, "rate_hz: needs 1 or more, got 0"),
+        (
+            controls,
+            {"post_catch_ramp": 1.1},
+            "post_catch_ramp: needs 0 to 1 s, got 1.1",
+        ),
+        (controls, {"compensation": 1.1}, r"share: needs \[0, 1\], got 1.1"),
+        (controls, {"compensation": -0.1}, r"share: needs \[0, 1\]"),
+        (controls, {"compensation": math.nan}, r"share: needs \[0, 1\]"),
+        (controls, {"dead_zone": -0.1}, "dead_zone, full_speed"),
+        (controls, {"dead_zone": 0.2, "full_speed": 0.1}, "dead_zone, full_speed"),
+        (controls, {"dead_zone": 0.1, "full_speed": 0.1}, "dead_zone, full_speed"),
+        (Friction, {"inertia": 0.0}, "inertia"),
+        (Friction, {"viscous": -1.0}, "viscous"),
+        (Friction, {"coulomb": math.inf}, "coulomb"),
     ],
 )
-def test_an_impossible_controller_is_refused(change, words: str) -> None:
+def test_an_impossible_controller_is_refused(make, change: dict, words: str) -> None:
     with pytest.raises(ParameterError, match=words):
-        controller(**change)
+        make(**change)

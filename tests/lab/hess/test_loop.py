@@ -16,27 +16,34 @@ from masrel.errors import (
     OverrunWarning,
     ParameterError,
 )
-from masrel.lab.elbow import STANDARD_MODELS
 from masrel.lab.hess import (
-    Controller,
     DeviceLimits,
     RealClock,
     SimulatedClock,
-    SimulatedHand,
     open_device,
     run_presentation,
 )
 from masrel.lab.recording import RECORDING_COLUMNS, write_recording
 
-from .rig import LIMITS, START, ScriptedDevice, present
+from .rig import (
+    LIMITS,
+    START,
+    ActingClock,
+    ScriptedDevice,
+    controls,
+    present,
+    same_columns,
+    scripted,
+    stretching,
+)
 
 PERIOD_NS = 1_000_000
+# For arms that begin where the model asks for torque at once
+LOADED = replace(LIMITS, standing_torque=20.0)
 
 
 class LateClock(SimulatedClock):
     """A simulated clock whose sleep returns late at chosen deadlines."""
-
-    __slots__ = ("deadlines", "overshoots")
 
     def __init__(self, overshoots: dict[int, int], start_ns: int = 0) -> None:
         super().__init__(start_ns)
@@ -49,21 +56,6 @@ class LateClock(SimulatedClock):
         super().sleep_until_ns(deadline_ns + late_ns)
 
 
-def rest(clock, *, angle=lambda _time_s: START, limits=LIMITS, **options):
-    # One presentation of HM3 on a scripted device -> device, presented
-    device = ScriptedDevice(clock, angle)
-    options = {"max_duration_s": 0.02, "rate_hz": 1000, **options}
-    controller = Controller(
-        STANDARD_MODELS["HM3"], start_angle=START, rate_hz=options["rate_hz"]
-    )
-    device.open()
-    presented = run_presentation(
-        device, controller, clock=clock, limits=limits, **options
-    )
-    device.close()
-    return device, presented
-
-
 def ticks_ms(device: ScriptedDevice) -> list[float]:
     # When a torque was sent during the ticks: the closing zeros are left out.
     return [time_ns / PERIOD_NS for time_ns, _ in device.commands[:-2]]
@@ -72,82 +64,68 @@ def ticks_ms(device: ScriptedDevice) -> list[float]:
 # Pace
 
 
-def test_every_tick_comes_at_its_absolute_deadline() -> None:
-    device, _ = rest(SimulatedClock(start_ns=7_000_000))
-    assert ticks_ms(device) == list(range(7, 27))
-
-
-def test_a_little_lateness_does_not_move_the_deadlines_after_it() -> None:
-    # Every sleep returns 0.3 ms late: with relative waits the last of 20 ticks would
-    # be 5.7 ms late.
-    clock = LateClock({n * PERIOD_NS: 300_000 for n in range(1, 21)})
-    device, presented = rest(clock)
-    assert ticks_ms(device) == [0.0, *(n + 0.3 for n in range(1, 20))]
-    assert clock.deadlines == [n * PERIOD_NS for n in range(1, 21)]
-    assert presented.n_missed_ticks == 0
-
-
-def test_a_late_tick_is_skipped_and_counted_never_sent_in_a_burst() -> None:
-    # The sleep for tick 5 returns at 8.4 ms: 5, 6 and 7 are over, 8 is due.
-    clock = LateClock({5 * PERIOD_NS: 3_400_000})
-    with pytest.warns(OverrunWarning, match="missed 3 ticks, which were skipped"):
-        device, presented = rest(clock)
-    assert ticks_ms(device) == [0, 1, 2, 3, 4, 8.4, *range(9, 20)]
-    assert presented.n_missed_ticks == 3
-    assert presented.recording.facts["n_missed_ticks"] == 3
-    assert presented.fault is None
-
-
-def test_a_tick_one_nanosecond_before_the_next_one_is_late_but_not_missed() -> None:
-    clock = LateClock({5 * PERIOD_NS: PERIOD_NS - 1})
-    device, presented = rest(clock)
-    assert presented.n_missed_ticks == 0
-    assert len(ticks_ms(device)) == 20
-
-
-def test_the_presentation_is_not_prolonged_by_what_it_missed() -> None:
-    clock = LateClock({15 * PERIOD_NS: 30 * PERIOD_NS})
-    with pytest.warns(OverrunWarning):
-        device, presented = rest(clock, limits=limits_with(missed_ticks=30))
-    assert ticks_ms(device) == list(range(15))
+@pytest.mark.parametrize(
+    ("late", "options", "ticks", "n_missed"),
+    [
+        ({}, {}, range(20), 0),
+        ({}, {"rate_hz": 250}, range(0, 20, 4), 0),
+        # With relative waits the last of 20 ticks would be 5.7 ms late.
+        (
+            dict.fromkeys(range(1, 21), 0.3),
+            {},
+            [0, *(n + 0.3 for n in range(1, 20))],
+            0,
+        ),
+        # The sleep for tick 5 returns at 8.4 ms: 5, 6 and 7 are over, 8 is due.
+        ({5: 3.4}, {}, [0, 1, 2, 3, 4, 8.4, *range(9, 20)], 3),
+        # One nanosecond before the next it is late, not missed
+        ({5: 0.999_999}, {}, [0, 1, 2, 3, 4, 5.999_999, *range(6, 20)], 0),
+        # 15 to 19 are missed: there was no 20th to miss
+        ({15: 30}, {"limits": DeviceLimits(missed_ticks=30)}, range(15), 5),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::masrel.errors.OverrunWarning")
+def test_ticks_come_at_absolute_deadlines_or_are_skipped_and_counted(
+    late: dict[int, float], options: dict, ticks: list[float], n_missed: int
+) -> None:
+    clock = LateClock({n * PERIOD_NS: round(ms * 1e6) for n, ms in late.items()})
+    device, presented = scripted(clock=clock, **options)
+    assert ticks_ms(device) == pytest.approx(list(ticks), abs=1e-9)
+    assert set(clock.deadlines) <= {n * PERIOD_NS for n in range(21)}
+    assert presented.n_missed_ticks == n_missed
+    assert presented.recording.facts["n_missed_ticks"] == n_missed
     assert presented.recording.facts["ended"] == "max-duration"
-    assert presented.n_missed_ticks == 5  # 15 to 19: there was no 20th to miss
 
 
 def test_the_time_in_the_recording_begins_at_zero_and_shows_the_gap() -> None:
     clock = LateClock({1_000_000_005: 2_000_000}, start_ns=999_000_005)
-    with pytest.warns(OverrunWarning):
-        _, presented = rest(clock)
+    with pytest.warns(OverrunWarning, match="missed 2 ticks, which were skipped"):
+        _, presented = scripted(clock=clock)
     time_ms = presented.recording.columns["time_s"] * 1e3
     assert time_ms == pytest.approx([0, *range(3, 20)], abs=1e-9)
 
 
-def test_another_rate_has_another_period() -> None:
-    device, presented = rest(SimulatedClock(), rate_hz=250)
-    assert ticks_ms(device) == [0, 4, 8, 12, 16]
-    assert presented.recording.facts["rate_hz"] == 250
+@pytest.mark.parametrize(("apart_s", "fault"), [(0.11, None), (0.09, "overrun")])
+@pytest.mark.filterwarnings("ignore::masrel.errors.OverrunWarning")
+def test_a_long_presentation_may_miss_ticks_at_the_rate_of_a_short_one(
+    apart_s: float, fault: str | None
+) -> None:
+    # one tick every 0.11 s: 18 or 19 of any 2000, but 45 in 5 s
+    at = (round(n * apart_s * 1e3) for n in range(1, 500))
+    clock = LateClock({tick * PERIOD_NS: 1_200_000 for tick in at if tick < 5000})
+    _, presented = scripted(clock=clock, max_duration_s=5.0)
+    assert (presented.fault and presented.fault.kind) == fault
+    assert presented.n_missed_ticks == (45 if fault is None else 21)
 
 
 # Faults
 
 
-# For arms that begin where the model asks for torque at once
-LOADED = replace(LIMITS, standing_torque=20.0)
-
-
-def limits_with(**change: float) -> DeviceLimits:
-    usual = {"torque": 20.0, "speed": radians(400.0), "missed_ticks": 20}
-    return DeviceLimits(**{**usual, **change})
-
-
 def test_too_fast_an_arm_is_a_fault_that_is_named_and_latched() -> None:
     clock = SimulatedClock()
-    hand = SimulatedHand(start=START, end=radians(146.0), mean_speed=radians(130.0))
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
-    device = open_device("simulated", clock=clock, hand=hand)
-    presented = run_presentation(
-        device, controller, clock=clock, limits=limits_with(speed=radians(100.0))
-    )
+    device = open_device("simulated", clock=clock, hand=stretching(130.0))
+    limits = DeviceLimits(speed=radians(100.0))
+    presented = run_presentation(device, controls(), clock=clock, limits=limits)
     assert presented.fault is not None
     assert presented.fault.message.startswith(
         "speed: needs at most 100 deg/s, the arm moves"
@@ -156,17 +134,16 @@ def test_too_fast_an_arm_is_a_fault_that_is_named_and_latched() -> None:
     for act in (device.open, device.read, lambda: device.command(0.0)):
         with pytest.raises(DeviceError):
             act()
-    fresh = Controller(STANDARD_MODELS["HM3"], start_angle=START)
     with pytest.raises(DeviceError, match="needs an open device to present on"):
-        run_presentation(device, fresh, clock=clock, limits=LIMITS)
+        run_presentation(device, controls(), clock=clock, limits=LIMITS)
 
 
 def test_a_fault_leaves_the_recording_up_to_its_moment() -> None:
-    presented = present("HM3", 130.0, limits=limits_with(speed=radians(100.0)))
+    limits = DeviceLimits(speed=radians(100.0))
+    presented = present("HM3", 130.0, limits=limits)
     columns, facts = presented.recording.columns, presented.recording.facts
     assert facts["fault"] == presented.fault.message
-    assert facts["fault_kind"] == "speed"
-    assert facts["ended"] == "fault"
+    assert (facts["fault_kind"], facts["ended"]) == ("speed", "fault")
     before = columns["time_s"] < presented.fault.time_s
     assert np.all(np.abs(columns["velocity_deg_s"][before]) <= 100.0)
     # From then on what was too much is held, and the torque goes down to zero.
@@ -178,37 +155,27 @@ def test_a_fault_leaves_the_recording_up_to_its_moment() -> None:
         np.testing.assert_array_equal(kept, whole[name][: kept.size])
 
 
-@pytest.mark.parametrize("ramp_time", [0.0, 0.02, 0.05, 0.1])
-def test_a_fault_brings_the_torque_to_zero_in_a_straight_line(ramp_time) -> None:
-    limits = limits_with(torque=9.0, ramp_time=ramp_time)
-    presented = present("HM4", 110.0, limits=limits)
-    columns, fault = presented.recording.columns, presented.fault
-    since = columns["time_s"] - fault.time_s
-    torque = columns["command_torque_nm"][since >= 0.0]
-    since = since[since >= 0.0]
-    assert fault.torque_nm > 4.0  # what was sent in the last tick before
-    line = fault.torque_nm * (1.0 - since / ramp_time) if ramp_time else [0.0]
-    np.testing.assert_allclose(torque, line, atol=1e-9)
-    assert torque[-1] == 0.0
-    assert since[-1] <= ramp_time + 1e-9
-
-
+# 0.5 rad from where the model begins its spring gives 3.15 times that, until the arm is
+# where it cannot be.
 @pytest.mark.parametrize(
-    ("rate_hz", "ramp_time"), [(300, 0.1), (100, 0.095), (7, 0.1), (1000, 0.0505)]
+    ("rate_hz", "ramp_time"),
+    [
+        *((1000, time_s) for time_s in (0.0, 0.02, 0.05, 0.0505, 0.1)),
+        *((300, 0.1), (100, 0.095), (7, 0.1)),
+    ],
 )
-def test_a_ramp_is_over_in_time_at_any_rate(rate_hz: int, ramp_time: float) -> None:
-    # 0.5 rad from where the model begins its spring gives 3.15 times that, until the
-    # arm is where it cannot be.
-    device, presented = rest(
-        SimulatedClock(),
-        angle=lambda t: START + 0.5 if t < 0.5 else radians(-8.0),
+def test_a_fault_brings_the_torque_to_zero_in_a_straight_line(
+    rate_hz: int, ramp_time: float
+) -> None:
+    device, presented = scripted(
+        lambda t: START + 0.5 if t < 0.5 else radians(-8.0),
         rate_hz=rate_hz,
         max_duration_s=2.0,
-        limits=limits_with(ramp_time=ramp_time, watchdog_time=1.0),
+        limits=DeviceLimits(ramp_time=ramp_time, watchdog_time=1.0),
     )
-    fault = presented.fault
+    fault, columns = presented.fault, presented.recording.columns
     assert fault is not None
-    assert fault.torque_nm == pytest.approx(1.575)
+    assert fault.torque_nm == pytest.approx(1.575)  # sent in the last tick before
     since_s = [time_ns * 1e-9 - fault.time_s for time_ns, _ in device.commands]
     torques = [torque for _, torque in device.commands]
     zero_s = since_s[torques.index(0.0)]
@@ -216,22 +183,30 @@ def test_a_ramp_is_over_in_time_at_any_rate(rate_hz: int, ramp_time: float) -> N
     for at_s, torque in zip(since_s, torques, strict=True):
         if 0.0 < at_s < zero_s:
             assert torque == pytest.approx(1.575 * (1.0 - at_s / ramp_time))
+    assert columns["command_torque_nm"][-1] == 0.0
+    assert columns["time_s"][-1] <= fault.time_s + ramp_time + 1e-9
+
+
+class Heard:
+    """What a watchdog hears, ms; from a time on it has ended."""
+
+    def __init__(self, ends_ms: float = math.inf) -> None:
+        self.clock, self.said, self.ends_ms = SimulatedClock(), [], ends_ms
+
+    def beat(self) -> None:
+        self.said.append(self.clock.now_ns() / PERIOD_NS)
+        if self.said[-1] >= self.ends_ms:
+            raise DeviceError("watchdog: has ended")
+
+    def rest(self) -> None:
+        self.beat()
+        self.said[-1] = "rest"
 
 
 def test_a_watchdog_that_ends_does_not_make_the_torque_fall_at_once() -> None:
-    class Ending:
-        def beat(self) -> None:
-            if clock.now_ns() >= 200 * PERIOD_NS:
-                raise DeviceError("watchdog: has ended")
-
-        rest = beat
-
-    clock = SimulatedClock()
-    device, presented = rest(
-        clock,
-        angle=lambda _: START + 0.5,
-        max_duration_s=0.4,
-        watchdog=Ending(),
+    heard = Heard(ends_ms=200.0)
+    device, presented = scripted(
+        lambda _: START + 0.5, clock=heard.clock, watchdog=heard, max_duration_s=0.4
     )
     assert presented.fault is not None
     assert presented.fault.message == (
@@ -241,11 +216,26 @@ def test_a_watchdog_that_ends_does_not_make_the_torque_fall_at_once() -> None:
     assert ramp[:50] == pytest.approx([1.575 * (1 - n / 50) for n in range(1, 51)])
 
 
-def test_at_a_fault_zero_is_the_last_torque_and_the_device_is_let_go() -> None:
-    clock = SimulatedClock()
-    device, presented = rest(
-        clock, angle=lambda t: START if t < 0.0095 else radians(-8.0)
+@pytest.mark.parametrize(
+    ("duration_s", "limits", "said"),
+    [
+        (0.021, LIMITS, [0.0, 5.0, 10.0, 15.0, 20.0, "rest"]),
+        # four times before it would be too late
+        (0.005, DeviceLimits(watchdog_time=0.004), [0.0, 1.0, 2.0, 3.0, 4.0, "rest"]),
+    ],
+)
+def test_the_watchdog_hears_in_time_and_is_let_rest_at_the_end(
+    duration_s: float, limits: DeviceLimits, said: list
+) -> None:
+    heard = Heard()
+    scripted(
+        clock=heard.clock, watchdog=heard, max_duration_s=duration_s, limits=limits
     )
+    assert heard.said == said
+
+
+def test_at_a_fault_zero_is_the_last_torque_and_the_device_is_let_go() -> None:
+    device, presented = scripted(lambda t: START if t < 0.0095 else radians(-8.0))
     assert presented.fault.message == (
         "range: needs -5.0 to 185.0 deg, the arm is at -8.0 deg"
     )
@@ -254,33 +244,8 @@ def test_at_a_fault_zero_is_the_last_torque_and_the_device_is_let_go() -> None:
     assert len(device.commands) == 12  # ticks 0 to 9, and zero twice
 
 
-def test_more_missed_ticks_than_allowed_are_a_fault() -> None:
-    clock = LateClock({5 * PERIOD_NS: 3_400_000})
-    with pytest.warns(OverrunWarning, match="missed 3 ticks"):
-        device, presented = rest(clock, limits=limits_with(missed_ticks=2))
-    assert presented.fault.message == (
-        "missed ticks: needs at most 2 of any 2000, the loop missed 3 of 3"
-    )
-    assert device.commands[-1] == (8_400_000, 0.0)
-    assert presented.n_missed_ticks == 3
-    assert presented.recording.columns["time_s"][-1] == pytest.approx(8.4e-3)
-
-
-@pytest.mark.parametrize(("apart_s", "fault"), [(0.11, None), (0.09, "overrun")])
-def test_a_long_presentation_may_miss_ticks_at_the_rate_of_a_short_one(
-    apart_s: float, fault: str | None
-) -> None:
-    # one tick every 0.11 s: 18 or 19 of any 2000, but 45 in 5 s
-    at = (round(n * apart_s * 1e3) for n in range(1, 500))
-    clock = LateClock({tick * PERIOD_NS: 1_200_000 for tick in at if tick < 5000})
-    with pytest.warns(OverrunWarning):
-        _, presented = rest(clock, max_duration_s=5.0)
-    assert (presented.fault and presented.fault.kind) == fault
-    assert presented.n_missed_ticks == (45 if fault is None else 21)
-
-
 def test_a_torque_above_the_limit_is_never_sent_and_stops_the_presentation() -> None:
-    presented = present("HM4", 110.0, limits=limits_with(torque=5.0))
+    presented = present("HM4", 110.0, limits=DeviceLimits(torque=5.0))
     columns = presented.recording.columns
     assert presented.fault is not None
     assert presented.fault.message.startswith("torque: needs at most 5 N·m, got 1")
@@ -294,48 +259,51 @@ def test_a_torque_above_the_limit_is_never_sent_and_stops_the_presentation() -> 
     assert columns["phase"][~since][-1] == 0
 
 
-def test_a_torque_that_is_no_number_is_a_fault() -> None:
-    clock = SimulatedClock()
-    device = ScriptedDevice(clock)
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=math.nan)
-    with device:
-        presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
-    words = "model: needs a torque that is a finite number, got nan"
-    assert presented.fault.message == words
-    assert [torque for _, torque in device.commands] == [0.0, 0.0]  # end, closing
+def failing(**after: float) -> ScriptedDevice:
+    device = ScriptedDevice(SimulatedClock(), lambda time_s: START + 2.0 * time_s)
+    vars(device).update(after)
+    return device
 
 
-@pytest.mark.parametrize("attribute", ["silent_after", "deaf_after"])
-def test_a_device_that_fails_is_a_fault_with_its_own_words(attribute: str) -> None:
-    clock = SimulatedClock()
-    device = ScriptedDevice(clock)
-    setattr(device, attribute, 6)
-    device.open()
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
-    presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
+SILENT = (
+    "missed replies: needs a new reading after at most 2 ticks without, got 3 in a row "
+    "(scripted: no answer)"
+)
+DEAF = "scripted: does not listen"
+
+
+# Two ticks without a reading are let pass, a command that is not taken is not.
+@pytest.mark.parametrize(
+    ("after", "kind", "message", "last_s"),
+    [
+        ({"silent_after": 6}, "missed-replies", SILENT, 58e-3),  # and the ramp
+        (
+            {"deaf_after": 6},
+            "no-answer",
+            f"{DEAF}; ramping down: {DEAF}; closing it: {DEAF}",
+            7e-3,
+        ),
+        (
+            {"silent_after": 6, "deaf_after": 6},
+            "missed-replies",
+            f"{SILENT}; ramping down: {DEAF}; closing it: {DEAF}",
+            9e-3,
+        ),
+        ({"silent_after": 0}, "missed-replies", SILENT, None),
+    ],
+)
+def test_a_device_that_fails_is_a_fault_with_its_own_words(
+    after: dict[str, int], kind: str, message: str, last_s: float | None, tmp_path
+) -> None:
+    device, presented = scripted(device=failing(**after))
     assert presented.fault is not None
-    assert "scripted: " in presented.fault.message
+    assert (presented.fault.kind, presented.fault.message) == (kind, message)
     assert not device.is_open
     assert device.stopped  # also when it does not take the zero
-    # Two ticks without a reading are let pass, a command that is not taken is not.
-    late = {"silent_after": 8e-3, "deaf_after": 6e-3}[attribute]
-    assert presented.recording.columns["time_s"][-1] == pytest.approx(late)
-    kind = {"silent_after": "missed-replies", "deaf_after": "no-answer"}[attribute]
-    assert presented.fault.kind == kind
-
-
-def test_what_goes_wrong_while_closing_is_added_to_the_fault() -> None:
-    clock = SimulatedClock()
-    device = ScriptedDevice(clock)
-    device.silent_after = device.deaf_after = 6
-    device.open()
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
-    presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
-    assert presented.fault.message == (
-        "missed replies: needs a new reading after at most 2 ticks without, got 3 in a "
-        "row (scripted: no answer); ramping down: scripted: does not listen; "
-        "closing it: scripted: does not listen"
-    )
+    write_recording(presented.recording, tmp_path / "a.npz")
+    times = presented.recording.columns["time_s"].tolist()
+    # nothing was moved by one that never answers
+    assert times[-1:] == ([] if last_s is None else [pytest.approx(last_s)])
 
 
 def test_replies_that_come_again_after_two_ticks_are_no_fault() -> None:
@@ -346,45 +314,10 @@ def test_replies_that_come_again_after_two_ticks_are_no_fault() -> None:
                 raise DeviceTimeoutError("scripted: no answer")
             return reading
 
-    clock = SimulatedClock()
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
-    with Patchy(clock) as device:
-        presented = run_presentation(
-            device, controller, clock=clock, limits=LIMITS, max_duration_s=0.03
-        )
+    _, presented = scripted(device=Patchy(SimulatedClock()), max_duration_s=0.03)
     assert presented.fault is None
     assert presented.recording.facts["n_missed_replies"] == 6
     assert presented.recording.n_samples == 24  # nothing is recorded without a reading
-
-
-def test_readings_that_are_not_newer_than_the_last_one_are_a_fault() -> None:
-    class StuckDevice(ScriptedDevice):
-        def _read(self):
-            reading = super()._read()
-            return reading._replace(time_ns=min(reading.time_ns, 5 * PERIOD_NS))
-
-    clock = SimulatedClock()
-    device = StuckDevice(clock)
-    device.open()
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
-    presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
-    assert presented.fault is not None
-    assert presented.fault.kind == "missed-replies"
-    assert presented.fault.message.endswith("(one of 0.005000 s again)")
-    assert not device.is_open
-
-
-def test_a_device_that_never_answers_leaves_an_empty_recording(tmp_path) -> None:
-    clock = SimulatedClock()
-    device = ScriptedDevice(clock)
-    device.silent_after = 0
-    device.open()
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
-    presented = run_presentation(device, controller, clock=clock, limits=LIMITS)
-    assert presented.fault.message.endswith("(scripted: no answer)")
-    assert presented.recording.n_samples == 0
-    assert presented.recording.facts["phases"] == ""
-    write_recording(presented.recording, tmp_path / "empty.npz")
 
 
 @pytest.mark.parametrize("angle", [math.nan, math.inf, -math.inf, radians(200.0)])
@@ -392,9 +325,7 @@ def test_a_fault_of_the_encoder_leaves_a_recording_that_can_be_written(
     angle: float, tmp_path
 ) -> None:
     # The arm moves at 57 deg/s, 1 rad/s, when the encoder fails.
-    _, presented = rest(
-        SimulatedClock(), angle=lambda t: START + t if t < 0.0175 else angle
-    )
+    _, presented = scripted(lambda t: START + t if t < 0.0175 else angle)
     assert presented.fault is not None
     assert presented.fault.message.startswith("range: ")
     write_recording(presented.recording, tmp_path / "fault.npz")
@@ -403,33 +334,26 @@ def test_a_fault_of_the_encoder_leaves_a_recording_that_can_be_written(
     assert facts["mean_speed_deg_s"] is None  # no catch, and the last angle is wrong
 
 
-@pytest.mark.parametrize(("angle_deg", "pushed_nm"), [(183.0, 6.0), (-2.0, -4.0)])
+@pytest.mark.parametrize(
+    ("angle_deg", "pushed_nm"),
+    [(183.0, 6.0), (182.5, 5.0), (-2.0, -4.0), (0.0, 0.0), (180.0, 0.0)],
+)
 def test_a_soft_stop_pushes_back_and_the_model_does_not_know(
     angle_deg: float, pushed_nm: float
 ) -> None:
     # 10 N·m over 5 deg: 3 deg into the upper one 6 N·m, 2 deg into the lower one -4.
-    clock = SimulatedClock()
     start = radians(angle_deg)
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=start)
-    with ScriptedDevice(clock, lambda _: start) as device:
-        presented = run_presentation(
-            device, controller, clock=clock, limits=LOADED, max_duration_s=0.05
+    for limits, expected in (
+        (LOADED, pushed_nm),
+        (replace(LOADED, soft_stop_torque=0.0), 0.0),
+    ):
+        _, presented = scripted(
+            lambda _: start, controls(start_angle=start), limits=limits
         )
-    columns = presented.recording.columns
-    pushed = columns["command_torque_nm"][: presented.recording.n_presented]
-    np.testing.assert_allclose(pushed, pushed_nm, rtol=1e-12)
-    np.testing.assert_array_equal(columns["model_torque_nm"], 0.0)
-
-
-def test_an_arm_that_is_not_at_its_start_is_a_fault_before_any_torque() -> None:
-    # At 145 deg the spring alone would ask for 3.15 · 115° = 6.3 N·m.
-    device, presented = rest(SimulatedClock(), angle=lambda _: radians(145.0))
-    fault = presented.fault
-    assert fault is not None
-    assert fault.kind == "start"
-    assert "at 145.0 deg asks for 6.322 N·m; bring it to where" in fault.message
-    assert fault.torque_nm == 0.0
-    assert [torque for _, torque in device.commands] == [0.0] * len(device.commands)
+        columns = presented.recording.columns
+        pushed = columns["command_torque_nm"][: presented.recording.n_presented]
+        np.testing.assert_allclose(pushed, expected, rtol=1e-12, atol=1e-12)
+        np.testing.assert_array_equal(columns["model_torque_nm"], 0.0)
 
 
 def test_the_device_is_asked_for_its_state_every_50_ms() -> None:
@@ -439,110 +363,42 @@ def test_the_device_is_asked_for_its_state_every_50_ms() -> None:
         def _check(self) -> None:
             asked.append(self.clock.now_ns() / PERIOD_NS)
 
-    clock = SimulatedClock()
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
-    with Asked(clock) as device:
-        run_presentation(
-            device, controller, clock=clock, limits=LIMITS, max_duration_s=0.21
-        )
+    scripted(device=Asked(SimulatedClock()), max_duration_s=0.21)
     assert asked == [50.0, 100.0, 150.0, 200.0]
-
-
-def test_the_watchdog_hears_every_5_ms_and_is_let_rest_at_the_end() -> None:
-    heard = []
-
-    class Watching:
-        def beat(self) -> None:
-            heard.append(clock.now_ns() / PERIOD_NS)
-
-        def rest(self) -> None:
-            heard.append("rest")
-
-    clock = SimulatedClock()
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
-    with ScriptedDevice(clock) as device:
-        run_presentation(
-            device,
-            controller,
-            clock=clock,
-            limits=LIMITS,
-            max_duration_s=0.021,
-            watchdog=Watching(),
-        )
-    assert heard == [0.0, 5.0, 10.0, 15.0, 20.0, "rest"]
-
-
-def test_a_watchdog_that_waits_less_hears_more_often() -> None:
-    heard = []
-
-    class Watching:
-        def beat(self) -> None:
-            heard.append(clock.now_ns() / PERIOD_NS)
-
-        def rest(self) -> None:
-            pass
-
-    clock = SimulatedClock()
-    limits = limits_with(watchdog_time=0.004)
-    rest(clock, watchdog=Watching(), limits=limits, max_duration_s=0.005)
-    assert heard == [0.0, 1.0, 2.0, 3.0, 4.0]  # four times before it would be too late
 
 
 # Exceptions that are no fault of the device
 
 
+# In a tick, with a device that takes no zero, and within the ramp of a fault, which is
+# noticed in tick 12: ten ticks, and eight commands of the ramp
 @pytest.mark.parametrize("interruption", [KeyboardInterrupt, SystemExit, OSError])
-def test_an_exception_leaves_zero_torque_and_a_closed_device(interruption) -> None:
-    class InterruptedClock(SimulatedClock):
-        def sleep_until_ns(self, deadline_ns: int) -> None:
-            super().sleep_until_ns(deadline_ns)
-            if deadline_ns == 7 * PERIOD_NS:
-                raise interruption
+@pytest.mark.parametrize(
+    ("at_ms", "after", "n_sent"),
+    [
+        (7, {}, 8),
+        (7, {"deaf_after": 7}, 7),
+        (21, {"silent_after": 10, "deaf_after": 18}, 18),
+    ],
+)
+def test_an_exception_leaves_zero_torque_and_a_closed_device(
+    interruption: type[BaseException], at_ms: int, after: dict[str, int], n_sent: int
+) -> None:
+    def interrupt() -> None:
+        raise interruption
 
-    clock = InterruptedClock()
-    device = ScriptedDevice(clock)
-    device.open()
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
-    with pytest.raises(interruption):
-        run_presentation(device, controller, clock=clock, limits=LIMITS)
-    assert device.commands[-1] == (7 * PERIOD_NS, 0.0)
+    device = failing(**after)
+    device.clock = ActingClock(at_ms * 1e-3, interrupt)
+    with pytest.raises(interruption) as caught:
+        scripted(device=device, max_duration_s=1.0)
+    assert len(device.commands) == n_sent
     assert device.stopped
     assert not device.is_open
-
-
-def test_an_exception_says_when_the_zero_was_not_taken() -> None:
-    class InterruptedClock(SimulatedClock):
-        def sleep_until_ns(self, deadline_ns: int) -> None:
-            raise KeyboardInterrupt(deadline_ns)
-
-    clock = InterruptedClock()
-    device = ScriptedDevice(clock)
-    device.deaf_after = 1
-    device.open()
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
-    with pytest.raises(KeyboardInterrupt) as caught:
-        run_presentation(device, controller, clock=clock, limits=LIMITS)
-    assert caught.value.__notes__ == ["closing the device: scripted: does not listen"]
-
-
-def test_an_exception_within_the_ramp_of_a_fault_is_treated_alike() -> None:
-    class InterruptedClock(SimulatedClock):
-        def sleep_until_ns(self, deadline_ns: int) -> None:
-            super().sleep_until_ns(deadline_ns)
-            if deadline_ns > 20 * PERIOD_NS:  # the fault is noticed in tick 12
-                raise KeyboardInterrupt
-
-    clock = InterruptedClock()
-    device = ScriptedDevice(clock, lambda time_s: START + 2.0 * time_s)
-    device.silent_after = 10
-    device.deaf_after = 18  # ten ticks, and eight commands of the ramp
-    device.open()
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
-    with pytest.raises(KeyboardInterrupt) as caught:
-        run_presentation(device, controller, clock=clock, limits=LIMITS)
-    assert len(device.commands) == 18
-    assert caught.value.__notes__ == ["closing the device: scripted: does not listen"]
-    assert device.stopped
+    if not after:
+        assert device.commands[-1] == (at_ms * PERIOD_NS, 0.0)
+    else:
+        said = ["closing the device: scripted: does not listen"]
+        assert caught.value.__notes__ == said
 
 
 @pytest.mark.parametrize("collecting", [True, False])
@@ -558,7 +414,7 @@ def test_the_collector_is_off_during_the_ticks_and_as_before_afterwards(
     was = gc.isenabled()
     try:
         (gc.enable if collecting else gc.disable)()
-        rest(SimulatedClock(), angle=angle)
+        scripted(angle)
         assert gc.isenabled() is collecting
     finally:
         (gc.enable if was else gc.disable)()
@@ -582,23 +438,16 @@ def test_it_ends_when_the_arm_has_rested_at_the_end() -> None:
 @pytest.mark.parametrize(("start_deg", "end_deg"), [(0.0, 146.0), (30.0, 180.0)])
 def test_a_stretch_may_use_the_whole_range(start_deg: float, end_deg: float) -> None:
     # The end stop gives way by 0.03 deg: beyond 180 deg, and no fault.
-    start, end, clock = radians(start_deg), radians(end_deg), SimulatedClock()
-    hand = SimulatedHand(start=start, end=end, mean_speed=radians(90.0))
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=start)
-    with open_device("simulated", clock=clock, hand=hand, range_end=end) as device:
-        presented = run_presentation(
-            device, controller, clock=clock, limits=LIMITS, end_angle=end
-        )
+    start, end = radians(start_deg), radians(end_deg)
+    hand = stretching(90.0, start=start, end=end)
+    presented = present(hand=hand, range_end=end, end_angle=end)
     assert presented.fault is None
     assert presented.recording.facts["ended"] == "arrived"
 
 
 def test_a_rest_before_the_end_does_not_end_it() -> None:
-    device, presented = rest(
-        SimulatedClock(),
-        angle=lambda _: radians(142.9),
-        max_duration_s=0.3,
-        limits=LOADED,
+    device, presented = scripted(
+        lambda _: radians(142.9), max_duration_s=0.3, limits=LOADED
     )
     assert presented.recording.facts["ended"] == "max-duration"
     assert presented.recording.n_presented == 300
@@ -607,16 +456,11 @@ def test_a_rest_before_the_end_does_not_end_it() -> None:
 
 def test_a_rest_that_is_broken_off_begins_anew() -> None:
     # At 145 deg, but between 50 and 60 ms back at 120 deg.
-    def angle(time_s: float) -> float:
-        return radians(120.0 if 0.0495 < time_s < 0.0605 else 145.0)
-
     lenient = {"speed": 1e5, "torque": 1e5, "torque_rate": 1e9, "jump_angle": 10.0}
-
-    _, presented = rest(
-        SimulatedClock(),
-        angle=angle,
+    _, presented = scripted(
+        lambda time_s: radians(120.0 if 0.0495 < time_s < 0.0605 else 145.0),
         max_duration_s=1.0,
-        limits=limits_with(**lenient, frozen_time=1.0, standing_torque=20.0),
+        limits=DeviceLimits(**lenient, frozen_time=1.0, standing_torque=20.0),
     )
     # There again at 61 ms, at rest when the low-pass has forgotten the jump.
     assert presented.recording.facts["ended"] == "arrived"
@@ -633,38 +477,32 @@ def test_a_hand_that_never_arrives_is_stopped_at_the_longest_duration() -> None:
 
 def test_without_a_fault_it_ends_with_zero_torque_and_stays_open() -> None:
     clock = SimulatedClock()
-    device = ScriptedDevice(clock, lambda _: radians(145.0))
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
-    with device:
-        presented = run_presentation(device, controller, clock=clock, limits=LOADED)
+    with ScriptedDevice(clock, lambda _: radians(145.0)) as device:
+        used = controls()
+        presented = run_presentation(device, used, clock=clock, limits=LOADED)
         assert presented.recording.facts["ended"] == "arrived"
         assert device.is_open
         assert [torque for _, torque in device.commands[-2:]] == [0.0, 0.0]
         assert device.commands[-3][1] > 0.0
+        with pytest.raises(ParameterError, match="controller: needs a new one"):
+            run_presentation(device, used, clock=clock, limits=LOADED)
+        assert device.is_open
 
 
 # The result
 
 
 def test_the_same_presentation_twice_is_the_same_to_the_last_bit() -> None:
-    first, second = present("HM4", 73.0), present("HM4", 73.0)
-    assert first.recording.facts == second.recording.facts
-    for name in RECORDING_COLUMNS:
-        column = first.recording.columns[name]
-        assert column.tobytes() == second.recording.columns[name].tobytes()
-
-
-@pytest.mark.parametrize("start_ns", [1, 86_400_000_000_000])
-def test_the_zero_of_the_clock_changes_nothing_but_rounding(start_ns: int) -> None:
-    first, second = present("HM2", 100.0), present("HM2", 100.0, start_ns=start_ns)
-    for name in RECORDING_COLUMNS:
-        np.testing.assert_allclose(
-            second.recording.columns[name], first.recording.columns[name], atol=1e-9
-        )
+    first, second = present("HM4", 73.0).recording, present("HM4", 73.0).recording
+    assert first.facts == second.facts
+    assert same_columns(first, second)
+    later = present("HM4", 73.0, clock=SimulatedClock(86_400_000_000_000)).recording
+    for name, column in first.columns.items():
+        np.testing.assert_allclose(later.columns[name], column, atol=1e-9)
 
 
 def test_the_facts_say_how_it_went() -> None:
-    presented = present("HM3", 92.0)
+    presented = present()
     facts = presented.recording.facts
     assert facts["simulated"] is True
     assert facts["device"] == "simulated"
@@ -680,34 +518,29 @@ def test_the_facts_say_how_it_went() -> None:
 def test_with_a_real_clock_it_goes_the_same_way() -> None:
     # A short stretch, 100 to 146 deg at 110 deg/s: about 0.6 s with the rests. How
     # late the machine is may differ, so every tick may be missed without a fault.
-    start, hand = radians(100.0), {"end": radians(146.0), "mean_speed": radians(110.0)}
-    found = []
-    for clock in (RealClock(), SimulatedClock()):
-        controller = Controller(STANDARD_MODELS["HM1"], start_angle=start)
-        moved = SimulatedHand(start=start, **hand)
-        with open_device("simulated", clock=clock, hand=moved) as device:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", OverrunWarning)
-                presented = run_presentation(
-                    device,
-                    controller,
-                    clock=clock,
-                    limits=limits_with(missed_ticks=2_000, watchdog_time=1.0),
-                    max_duration_s=1.4,
-                )
-        found.append(presented)
-    real, simulated = (presented.recording for presented in found)
+    limits = DeviceLimits(missed_ticks=2_000, watchdog_time=1.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", OverrunWarning)
+        real, simulated = (
+            present(
+                "HM1",
+                hand=stretching(110.0, start=radians(100.0)),
+                clock=clock,
+                limits=limits,
+                max_duration_s=1.4,
+            ).recording
+            for clock in (RealClock(), SimulatedClock())
+        )
     assert real.facts["fault"] is None
     assert real.facts["ended"] == simulated.facts["ended"] == "arrived"
     assert real.facts["phases"] == simulated.facts["phases"]
-    assert np.all(np.diff(real.columns["time_s"]) > 0.0)
+    times = real.columns["time_s"]
+    assert np.all(np.diff(times) > 0.0)
     # Every tick was run or counted as missed.
-    n_ticks = real.n_samples + found[0].n_missed_ticks
-    assert n_ticks == math.floor(real.columns["time_s"][-1] * 1000) + 1
+    n_ticks = real.n_samples + real.facts["n_missed_ticks"]
+    assert n_ticks == math.floor(times[-1] * 1000) + 1
     angles = np.interp(
-        real.columns["time_s"],
-        simulated.columns["time_s"],
-        simulated.columns["angle_deg"],
+        times, simulated.columns["time_s"], simulated.columns["angle_deg"]
     )
     np.testing.assert_allclose(real.columns["angle_deg"], angles, atol=2.0)
 
@@ -716,67 +549,29 @@ def test_with_a_real_clock_it_goes_the_same_way() -> None:
 
 
 @pytest.mark.parametrize(
-    "change",
+    ("change", "words"),
     [
-        {"rate_hz": 0},
-        {"max_duration_s": 0.0},
-        {"max_duration_s": math.inf},
-        {"max_duration_s": math.nan},
-        {"end_angle": math.nan},
-        {"end_angle": math.inf},
+        ({"rate_hz": 0}, "rate_hz"),
+        ({"max_duration_s": 0.0}, "max_duration_s"),
+        ({"max_duration_s": math.inf}, "max_duration_s"),
+        ({"max_duration_s": math.nan}, "max_duration_s"),
+        ({"end_angle": math.nan}, "end_angle"),
+        ({"end_angle": math.inf}, "end_angle"),
+        ({"rate_hz": 250}, "needs the controller's 1000 Hz, got 250"),
+        # A watchdog that cannot hear every tick in time
+        (
+            {"limits": DeviceLimits(watchdog_time=0.0015)},
+            "watchdog_time: needs two ticks or more",
+        ),
+        ({"rate_hz": 7}, "watchdog_time: needs two ticks or more, at 7 Hz"),
     ],
 )
-def test_what_cannot_be_run_is_refused_before_anything_moves(change) -> None:
-    clock = SimulatedClock()
-    device = ScriptedDevice(clock)
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
-    options = {"rate_hz": 1000, "max_duration_s": 1.0, **change}
-    name = next(iter(change))
+def test_what_cannot_be_run_is_refused_before_anything_moves(
+    change: dict, words: str
+) -> None:
+    device = ScriptedDevice(SimulatedClock())
     with device:
-        with pytest.raises(ParameterError, match=name):
-            run_presentation(device, controller, clock=clock, limits=LIMITS, **options)
+        with pytest.raises(ParameterError, match=words):
+            scripted(device=device, model=controls(), **change)
         assert device.n_reads == 0
         assert device.commands == []
-
-
-@pytest.mark.parametrize(("rate_hz", "watchdog_time"), [(7, 0.1), (1000, 0.0015)])
-def test_a_watchdog_that_cannot_hear_every_tick_in_time_is_refused(
-    rate_hz: int, watchdog_time: float
-) -> None:
-    clock = SimulatedClock()
-    limits = limits_with(watchdog_time=watchdog_time)
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START, rate_hz=rate_hz)
-    with (
-        ScriptedDevice(clock) as device,
-        pytest.raises(ParameterError, match="watchdog_time: needs two ticks or more"),
-    ):
-        run_presentation(
-            device, controller, clock=clock, limits=limits, rate_hz=rate_hz
-        )
-
-
-def test_a_rate_that_is_not_the_controllers_is_refused() -> None:
-    clock = SimulatedClock()
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START, rate_hz=250)
-    with (
-        ScriptedDevice(clock) as device,
-        pytest.raises(ParameterError, match="needs the controller's 250 Hz, got 1000"),
-    ):
-        run_presentation(device, controller, clock=clock, limits=LIMITS)
-
-
-def test_a_controller_that_has_been_used_is_refused() -> None:
-    clock = SimulatedClock()
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
-    with ScriptedDevice(clock, lambda _: radians(145.0)) as device:
-        run_presentation(device, controller, clock=clock, limits=LOADED)
-        with pytest.raises(ParameterError, match="controller: needs a new one"):
-            run_presentation(device, controller, clock=clock, limits=LOADED)
-        assert device.is_open
-
-
-def test_a_closed_device_is_refused() -> None:
-    clock = SimulatedClock()
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
-    with pytest.raises(DeviceError, match="scripted: needs an open device to present"):
-        run_presentation(ScriptedDevice(clock), controller, clock=clock, limits=LIMITS)

@@ -1,5 +1,6 @@
 """The simulated device: an arm that sticks, slides, stops, and a hand that moves it."""
 
+import time
 from math import pi, radians
 
 import pytest
@@ -8,6 +9,7 @@ from masrel.errors import ParameterError
 from masrel.lab.hess import (
     HandTraits,
     HumanHand,
+    RealClock,
     SimulatedClock,
     SimulatedHand,
     open_device,
@@ -73,13 +75,9 @@ def test_the_encoder_reads_multiples_of_its_step_and_the_same_twice(bench) -> No
     for angle in bench.run(1.0):
         assert angle / STEP == pytest.approx(round(angle / STEP), abs=1e-6)
     assert bench.device.read() == bench.device.read()
-
-
-def test_a_gap_in_the_readings_does_not_change_where_the_arm_is() -> None:
-    often, once = Bench(None), Bench(None)
-    with often.device, once.device:
-        angle = often.run(0.7)[-1]
-        once.clock.sleep_until_ns(700_000_000)
+    once = Bench(None)  # a gap in the readings does not change where the arm is
+    with once.device:
+        once.clock.sleep_until_ns(1_000_000_000)
         assert once.device.read().angle == angle
 
 
@@ -130,3 +128,31 @@ def test_a_sensor_reads_what_a_heavy_hand_gives_the_arm() -> None:
             clock.sleep_until_ns(clock.now_ns() + 1_000_000)
     # a step of the encoder is 0.0052 N·m·s of 0.0597 kg·m²
     assert given == pytest.approx(0.0597 * speed, abs=0.009)
+
+
+# Clocks
+
+
+def test_the_real_clock_is_never_early_and_sleeps_but_for_the_end_of_a_wait() -> None:
+    clock = RealClock()
+    for wait_ns in (0, 200_000, 3_000_000):
+        deadline = clock.now_ns() + wait_ns
+        clock.sleep_until_ns(deadline)
+        assert clock.now_ns() >= deadline
+    before, began = time.monotonic(), time.thread_time()
+    clock.sleep_until_ns(clock.now_ns() - 10_000_000_000)  # has passed
+    assert time.monotonic() - before < 1.0
+    clock.sleep_until_ns(clock.now_ns() + 200_000_000)
+    assert time.thread_time() - began < 0.05
+
+
+def test_the_simulated_clock_stands_still_until_told_to_sleep_and_never_goes_back() -> (
+    None
+):
+    clock = SimulatedClock(start_ns=7)
+    assert [clock.now_ns(), clock.now_ns()] == [7, 7]
+    for deadline_ns in (1_000, 10):
+        clock.sleep_until_ns(deadline_ns)
+        assert clock.now_ns() == 1_000
+    with pytest.raises(ParameterError, match="start_ns: needs 0 or more, got -1"):
+        SimulatedClock(start_ns=-1)

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from masrel.errors import OverrunWarning
-from masrel.lab.elbow import STANDARD_MODELS, SampledJoint
+from masrel.lab.elbow import STANDARD_MODELS
 from masrel.lab.hess import (
-    Controller,
     DeviceLimits,
     EmergencyStop,
     HandDistribution,
@@ -21,16 +20,29 @@ from masrel.lab.hess import (
     SimulatedHand,
     StretchRules,
     YieldingHand,
-    open_device,
-    run_presentation,
 )
 from masrel.lab.recording import RAMPS, stretches
 
 from . import faults as f
-from .rig import LIMITS, START, ScriptedDevice, present
-from .test_random_faults import Disturbed
+from .rig import LIMITS, MODELS, START, ActingClock, controls, law_of, present, scripted
 
 POST_CATCH, END, FAULT = (RAMPS.index(name) for name in RAMPS[1:])
+
+
+class Disturbed(SimulatedClock):
+    """A clock with gaps, that can press a button."""
+
+    def __init__(self, gaps: dict[float, float], stop: EmergencyStop) -> None:
+        super().__init__()
+        self.gaps, self.stop = dict(gaps), stop
+        self.press_at = math.inf
+
+    def sleep_until_ns(self, deadline_ns: int) -> None:
+        super().sleep_until_ns(deadline_ns)
+        for at_s in [at for at in self.gaps if deadline_ns >= at * 1e9]:
+            super().sleep_until_ns(deadline_ns + round(self.gaps.pop(at_s) * 1e9))
+        if deadline_ns >= self.press_at * 1e9:
+            self.stop.press("test")
 
 
 def steepest(torque: float, ramp_s: float, rate_hz: int = 1000) -> float:
@@ -40,7 +52,9 @@ def steepest(torque: float, ramp_s: float, rate_hz: int = 1000) -> float:
     return math.pi / 2.0 * abs(torque) / ramp_s / rate_hz + 1e-9
 
 
-def assert_soft(presented: Presented, limits: DeviceLimits, post_catch_s: float) -> int:
+def assert_soft(
+    presented: Presented, limits: DeviceLimits = LIMITS, post_catch_s: float = 0.1
+) -> int:
     """Hold every fall under a ramp to its bound -> how many ramps there were."""
     columns = presented.recording.columns
     ramp, torque = columns["ramp"], columns["command_torque_nm"]
@@ -68,7 +82,7 @@ def assert_soft(presented: Presented, limits: DeviceLimits, post_catch_s: float)
 
 
 def test_an_end_on_arrival_is_a_raised_cosine_from_the_torque_that_stands() -> None:
-    recording = present("HM3", 92.0).recording
+    recording = present().recording
     torque, end = recording.columns["command_torque_nm"], recording.n_presented
     assert recording.facts["ended"] == "arrived"
     stood = torque[end - 1]
@@ -82,15 +96,15 @@ def test_an_end_on_arrival_is_a_raised_cosine_from_the_torque_that_stands() -> N
 
 
 def test_a_time_limit_in_mid_stretch_ends_softly() -> None:
-    presented = present("HM3", 92.0, max_duration_s=0.7)
+    presented = present(max_duration_s=0.7)
     recording = presented.recording
     assert (presented.fault, recording.facts["ended"]) == (None, "max-duration")
     assert recording.columns["command_torque_nm"][recording.n_presented - 1] > 8.0
-    assert assert_soft(presented, LIMITS, 0.1) == 1
+    assert assert_soft(presented) == 1
 
 
 def test_post_catch_ends_from_the_torque_that_stands_to_that_of_the_law() -> None:
-    recording = present("HM4", 92.0).recording
+    recording = present("HM4").recording
     columns, ramp = recording.columns, recording.columns["ramp"]
     (rows,) = np.nonzero(ramp == POST_CATCH)
     assert len(rows) == 99  # the hundredth is the law's again
@@ -106,33 +120,28 @@ def test_post_catch_ends_from_the_torque_that_stands_to_that_of_the_law() -> Non
     )
 
 
-@pytest.mark.parametrize("model", sorted(STANDARD_MODELS))
+@pytest.mark.parametrize("model", MODELS)
 def test_while_no_ramp_is_active_it_is_the_law_to_the_last_bit(model: str) -> None:
-    presented = present(model, 92.0)
-    columns = presented.recording.columns
-    at_once = Controller(STANDARD_MODELS[model], start_angle=START, post_catch_ramp=0.0)
-    joint = SampledJoint(STANDARD_MODELS[model], start_angle=START)
-    for time_s, angle, velocity, law, command, ramp in zip(
+    recording = present(model).recording
+    columns = recording.columns
+    law = law_of(STANDARD_MODELS[model], recording)
+    np.testing.assert_allclose(columns["model_torque_nm"], law, rtol=0.0, atol=1e-9)
+    at_once = controls(model, post_catch_ramp=0.0)
+    samples = zip(
         columns["time_s"].tolist(),
         np.radians(columns["angle_deg"]).tolist(),
         np.radians(columns["velocity_deg_s"]).tolist(),
-        columns["model_torque_nm"].tolist(),
-        columns["command_torque_nm"].tolist(),
-        columns["ramp"].tolist(),
         strict=True,
-    ):
-        assert joint.step(time_s, angle, velocity) == pytest.approx(law, abs=1e-9)
-        plain = at_once.step(time_s, angle, velocity)
-        if ramp == 0.0:  # degrees in the recording cost the last bits
-            assert plain == pytest.approx(command, abs=1e-9)
-
-
-@pytest.mark.parametrize("model", sorted(STANDARD_MODELS))
-def test_two_controllers_differ_under_the_ramp_alone(model: str) -> None:
-    soft, hard = (
-        Controller(STANDARD_MODELS[model], start_angle=START, post_catch_ramp=ramp)
-        for ramp in (0.1, 0.0)
     )
+    plain = np.array([at_once.step(*sample) for sample in samples])
+    is_plain = columns["ramp"] == 0.0  # degrees in the recording cost the last bits
+    off = np.abs(plain - columns["command_torque_nm"])[is_plain]
+    assert off.max() <= 1e-9
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_two_controllers_differ_under_the_ramp_alone(model: str) -> None:
+    soft, hard = (controls(model, post_catch_ramp=ramp) for ramp in (0.1, 0.0))
     n_easing = 0
     for tick in range(6000):  # three times there and back
         time_s = tick * 1e-3
@@ -146,7 +155,7 @@ def test_two_controllers_differ_under_the_ramp_alone(model: str) -> None:
 
 
 def test_a_grip_that_is_lost_under_the_ramp_ends_it_at_once() -> None:
-    controller = Controller(STANDARD_MODELS["HM4"], start_angle=START)
+    controller = controls("HM4")
 
     def step(tick: int, angle_deg: float, speed_deg_s: float) -> float:
         return controller.step(tick * 1e-3, radians(angle_deg), radians(speed_deg_s))
@@ -162,20 +171,14 @@ def test_a_grip_that_is_lost_under_the_ramp_ends_it_at_once() -> None:
 
 
 def test_a_fault_under_the_ramp_of_an_end_ramps_from_there() -> None:
-    clock, stop = SimulatedClock(), EmergencyStop()
-
-    def angle(time_s: float) -> float:
-        if time_s > 0.15:
-            stop.press("test")
-        return radians(145.0)
-
-    limits = dataclasses.replace(LIMITS, standing_torque=20.0)
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
-    with ScriptedDevice(clock, angle) as device:
-        presented = run_presentation(
-            device, controller, clock=clock, limits=limits, stop=stop
-        )
-        assert not device.is_open
+    stop = EmergencyStop()
+    _, presented = scripted(
+        lambda _time_s: radians(145.0),
+        clock=ActingClock(0.15, lambda: stop.press("test")),
+        limits=dataclasses.replace(LIMITS, standing_torque=20.0),
+        max_duration_s=10.0,
+        stop=stop,
+    )
     columns, fault = presented.recording.columns, presented.fault
     assert fault is not None
     assert fault.kind == "emergency-stop"
@@ -184,52 +187,28 @@ def test_a_fault_under_the_ramp_of_an_end_ramps_from_there() -> None:
     assert set(ramp) == {0.0, END, FAULT}
     assert np.all(np.diff(ramp) >= 0.0)
     assert 0.0 < fault.torque_nm < columns["command_torque_nm"][0]
-    assert assert_soft(presented, limits, 0.1) == 2
+    assert assert_soft(presented) == 2
 
 
 def test_ticks_that_are_missed_under_the_ramp_make_it_longer_and_no_steeper() -> None:
     clock = Disturbed({0.75: 0.007}, EmergencyStop())
-    hand = SimulatedHand(start=START, end=radians(146.0), mean_speed=radians(92.0))
-    controller = Controller(STANDARD_MODELS["HM3"], start_angle=START)
-    with (
-        open_device("simulated", clock=clock, hand=hand) as device,
-        pytest.warns(OverrunWarning),
-    ):
-        presented = run_presentation(
-            device, controller, clock=clock, limits=LIMITS, max_duration_s=0.7
-        )
+    with pytest.warns(OverrunWarning):
+        presented = present(clock=clock, max_duration_s=0.7)
     assert presented.n_missed_ticks == 7
     columns = presented.recording.columns
     assert np.count_nonzero(columns["ramp"] == END) == 100
     assert columns["time_s"][-1] == pytest.approx(0.806, abs=1e-6)
-    assert assert_soft(presented, LIMITS, 0.1) == 1
+    assert assert_soft(presented) == 1
 
 
 def test_both_may_be_at_once() -> None:
-    clock = SimulatedClock()
-    hand = SimulatedHand(start=START, end=radians(146.0), mean_speed=radians(92.0))
     limits = dataclasses.replace(LIMITS, end_ramp_time=0.0)
-    controller = Controller(
-        STANDARD_MODELS["HM3"], start_angle=START, post_catch_ramp=0.0
-    )
-    with open_device("simulated", clock=clock, hand=hand) as device:
-        recording = run_presentation(
-            device, controller, clock=clock, limits=limits
-        ).recording
+    recording = present(controls(post_catch_ramp=0.0), limits=limits).recording
     assert set(recording.columns["ramp"]) == {0.0}
     assert recording.columns["command_torque_nm"][-1] > 5.0
 
 
 # Random ones
-
-
-def random_clock(rng: np.random.Generator, longest_s: float) -> Disturbed:
-    """A clock that is away at times, and may press the emergency stop."""
-    gaps = {float(at): 0.004 for at in rng.uniform(0.0, longest_s, rng.integers(0, 3))}
-    clock = Disturbed(gaps, EmergencyStop())
-    if rng.random() < 0.1:
-        clock.press_at = float(rng.uniform(0.1, longest_s))
-    return clock
 
 
 def random_hand(
@@ -241,19 +220,16 @@ def random_hand(
         speeds = [max(speed, radians(60.0)) for speed in speeds]
     slips = float(rng.uniform(0.2, 1.5 * n_stretches)) if rng.random() < 0.15 else None
     way = {"start": start, "end": end, "mean_speed": speeds[0], "again": speeds[1:]}
-    way["returns"] = n_stretches > 1
+    way |= {"returns": n_stretches > 1, "slip_time": slips}
     rest, back = float(rng.uniform(0.0, 0.2)), radians(rng.uniform(40.0, 130.0))
     kind = rng.random()
     if kind < 0.4:
-        return YieldingHand(**way, slip_time=slips, rest=0.5 * rest)
+        return YieldingHand(**way, rest=0.5 * rest)
     if kind < 0.6 and n_stretches > 1:
         traits = HandDistribution().sample(rng)
-        return HumanHand(
-            traits, **way, slip_time=slips, rest=2.0 * rest, return_speed=back
-        )
+        return HumanHand(traits, **way, rest=2.0 * rest, return_speed=back)
     return SimulatedHand(
         **way,
-        slip_time=slips,
         stiffness=rng.uniform(100.0, 600.0),
         damping=rng.uniform(5.0, 40.0),
         ramp_down=rng.uniform(0.05, 0.3),
@@ -266,7 +242,10 @@ def random_presentation(seed: int, n_stretches: int = 1) -> tuple[int, int]:
     """Present at random, hold every end to its bound -> its ramps and its stretches."""
     rng = np.random.default_rng([2012, n_stretches, seed])
     longest_s = 1.5 * n_stretches
-    clock = random_clock(rng, longest_s)
+    gaps = {float(at): 0.004 for at in rng.uniform(0.0, longest_s, rng.integers(0, 3))}
+    clock = Disturbed(gaps, EmergencyStop())
+    if rng.random() < 0.1:
+        clock.press_at = float(rng.uniform(0.1, longest_s))
     start, end = radians(rng.uniform(10.0, 80.0)), radians(rng.uniform(110.0, 146.0))
     hand = random_hand(rng, start, end, n_stretches)
     limits = DeviceLimits(
@@ -276,37 +255,25 @@ def random_presentation(seed: int, n_stretches: int = 1) -> tuple[int, int]:
     post_catch_s = float(rng.uniform(0.05, 0.3))
     at_s = rng.uniform(0.1, longest_s)
     fault = [
-        None,
-        None,
-        None,
-        f.dropped(at_s, 3),
-        f.dropped(at_s, 2),
-        f.shifted(at_s, f.JUMP),
-        f.frozen(at_s),
+        *(None, None, None, f.dropped(at_s, 3), f.dropped(at_s, 2)),
+        *(f.shifted(at_s, f.JUMP), f.frozen(at_s)),
     ][rng.integers(7)]
     model = STANDARD_MODELS[f"HM{rng.integers(1, 5)}"]
     model = dataclasses.replace(model, catch_rise=float(rng.choice([0.0, 0.03])))
-    inner = open_device("simulated", clock=clock, hand=hand, range_end=radians(146.0))
-    device = f.FaultyDevice(inner, read_fault=fault)
-    device.open()
-    controller = Controller(model, start_angle=start, post_catch_ramp=post_catch_s)
     rules = StretchRules(n=n_stretches if rng.random() < 0.5 else None)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", OverrunWarning)
-        presented = run_presentation(
-            device,
-            controller,
+        presented = present(
+            controls(model, start_angle=start, post_catch_ramp=post_catch_s),
+            hand=hand,
             clock=clock,
+            read_fault=fault,
             limits=limits,
             stop=clock.stop,
             end_angle=end,
             stretches=rules if n_stretches > 1 else None,
             max_duration_s=float(rng.uniform(0.2, 2.0)) * longest_s,
         )
-    try:
-        device.close()
-    finally:
-        inner.close()
     assert_no_catch_ends_at_once(presented)
     n_ramps = assert_soft(presented, limits, post_catch_s)
     return n_ramps, len(stretches(presented.recording))
@@ -321,31 +288,18 @@ def assert_no_catch_ends_at_once(presented: Presented) -> None:
         assert np.all(ramp[ends] != 0.0)
 
 
-def assert_random_ones_are_soft(n: int, n_stretches: int = 1) -> None:
+@pytest.mark.parametrize(
+    ("n", "n_stretches"),
+    [
+        (20, 1),
+        (5, 3),
+        pytest.param(1000, 3, marks=pytest.mark.slow),
+        pytest.param(10_000, 1, marks=pytest.mark.long),
+        pytest.param(10_000, 3, marks=pytest.mark.long),
+    ],
+)
+def test_random_presentations_end_softly(n: int, n_stretches: int) -> None:
     made = [random_presentation(seed, n_stretches) for seed in range(n)]
     n_ramps, n_made = np.sum(made, axis=0)
     assert n_ramps > 1.1 * n  # hardly one is without an end under torque
     assert n_made > 0.4 * n_stretches * n
-
-
-def test_some_random_presentations_end_softly() -> None:
-    assert_random_ones_are_soft(20)
-
-
-def test_some_random_presentations_of_many_stretches_end_softly() -> None:
-    assert_random_ones_are_soft(5, 3)
-
-
-@pytest.mark.slow
-def test_a_thousand_random_presentations_of_many_stretches_end_softly() -> None:
-    assert_random_ones_are_soft(1000, 3)
-
-
-@pytest.mark.long
-def test_ten_thousand_random_presentations_end_softly() -> None:
-    assert_random_ones_are_soft(10_000)
-
-
-@pytest.mark.long
-def test_ten_thousand_random_presentations_of_many_stretches_end_softly() -> None:
-    assert_random_ones_are_soft(10_000, 3)

@@ -17,15 +17,13 @@ from masrel.lab.hess.puck._commissioning import (
     steady_runs,
     zero,
 )
-from masrel.lab.hess.puck._properties import (
-    PropertyTable,
-    property_table,
-    read_property_table,
-)
 from masrel.lab.hess.puck._puck_options import (
     EmulatorOptions,
     InjectedFault,
+    PropertyTable,
     PuckOptions,
+    property_table,
+    read_property_table,
 )
 
 __all__ = [

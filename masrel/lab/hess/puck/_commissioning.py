@@ -17,16 +17,20 @@ from masrel.errors import DeviceError, DeviceTimeoutError, ParameterError
 from masrel.lab.hess._clock import Clock
 from masrel.lab.hess._guard import Guard
 from masrel.lab.hess._signals import VelocityEstimate
-from masrel.lab.hess._stop import EmergencyStop
-from masrel.lab.hess._watchdog import NoWatchdog, Watching
+from masrel.lab.hess._stop import EmergencyStop, NoWatchdog, Watching
 from masrel.lab.hess.device import Device
 from masrel.lab.hess.hand import Hand
 from masrel.lab.hess.limits import DeviceLimits
 from masrel.lab.hess.puck._bus import MAX_NODE, Link
 from masrel.lab.hess.puck._emulator import join
-from masrel.lab.hess.puck._node import AwakePuck, PuckNode, identify
-from masrel.lab.hess.puck._properties import ASLEEP, READY, STATUS, PropertyTable
-from masrel.lab.hess.puck._puck_options import PuckOptions
+from masrel.lab.hess.puck._puck_device import AwakePuck, PuckNode, identify
+from masrel.lab.hess.puck._puck_options import (
+    ASLEEP,
+    READY,
+    STATUS,
+    PropertyTable,
+    PuckOptions,
+)
 
 _PROBE_PATIENCE_S = 0.01  # public drivers wait 1 and 100 ms
 _REPORTED = ("MODE", "CTS", "IPNM", "MT", "GRPA", "GRPB", "GRPC", "TEMP", "VBUS")

@@ -35,7 +35,7 @@ from masrel.lab.hess.puck._bus import (
     reply_identifiers,
     split_identifier,
 )
-from masrel.lab.hess.puck._properties import (
+from masrel.lab.hess.puck._puck_options import (
     ASLEEP,
     BROKEN,
     ERROR,
@@ -48,14 +48,12 @@ from masrel.lab.hess.puck._properties import (
     STATUS,
     TORQUE,
     VERSION,
-    Transmission,
-    property_table,
-)
-from masrel.lab.hess.puck._puck_options import (
     EmulatorOptions,
     FaultKind,
     InjectedFault,
     PuckOptions,
+    Transmission,
+    property_table,
 )
 
 _SETTING_NS = 110_000  # six bytes on the bus

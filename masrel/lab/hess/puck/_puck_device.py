@@ -1,24 +1,79 @@
-"""The puck as a device: read and commanded once a tick, idled when it is closed."""
+"""One puck: asked and told, brought up from its monitor, driven as a device, let go.
 
+Source of the order: Barrett WAM Arm User's Manual D1001 AH.00, pp. 46-48, and what
+the two public drivers of the arm do. The permanent memory is never written. In the
+process of a watchdog `prepare` joins the bus.
+"""
+
+import atexit
 import itertools
 import math
+from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 
 from masrel.errors import (
     BusError,
     DeviceError,
     DeviceTimeoutError,
+    FrameError,
     IdledError,
     LimitExceededError,
+    ParameterError,
 )
-from masrel.lab.hess._clock import SimulatedClock
+from masrel.lab.hess._clock import Clock, RealClock, SimulatedClock
 from masrel.lab.hess.device import Device, DeviceSetup, IdleCommand, Reading
 from masrel.lab.hess.limits import DeviceLimits
-from masrel.lab.hess.puck._bus import Link
+from masrel.lab.hess.puck._bus import (
+    BUS_OFF,
+    BUS_RESTARTED,
+    MAX_TORQUE,
+    Frame,
+    Link,
+    decode_position,
+    decode_value,
+    encode_get,
+    encode_value,
+    open_link,
+    reply_identifiers,
+)
 from masrel.lab.hess.puck._emulator import PuckEmulator, join
-from masrel.lab.hess.puck._node import AwakePuck, Identity, PuckNode, identify
-from masrel.lab.hess.puck._properties import TORQUE
-from masrel.lab.hess.puck._puck_options import PuckOptions
+from masrel.lab.hess.puck._puck_options import (
+    ASLEEP,
+    ID,
+    IDLE,
+    READY,
+    ROLE,
+    SERIAL_NUMBER,
+    STATUS,
+    TORQUE,
+    VERSION,
+    PropertyTable,
+    PuckOptions,
+    Transmission,
+    property_table,
+)
+
+_SAMPLING_NS = 75_000
+"""From a request to the sample of the encoder, as one of the public drivers has it."""
+
+# What every puck answers; requested for the order of the answers, not for the values
+_MARKERS = (VERSION, ROLE, SERIAL_NUMBER, ID, STATUS)
+
+_MAX_WAITING = 1000  # frames; more than fit on the bus in 50 ms
+_MAX_OVERDUE = 30  # more than fit on the bus in 1 ms
+_MAX_ERROR_FRAMES = 10  # on a bus of one joint there should be none
+
+_ROLE_MASK = 0x1F  # the other bits of ROLE say what encoder it has
+_MOTOR_KIND = 0
+_OFF_BUS_S = 1.2  # a waking puck leaves the bus; public drivers wait 1.0 and 1.2 s
+_COUNT_TOLERANCE = 2  # an arm that is held moves the encoder by no more
+_SETTING_TIME_S = 0.001  # a setting takes 0.11 ms on the bus
+
+_PATIENCE_S = 0.1  # to let go; also what a bus needs that restarts itself after bus off
+_REPLY_PATIENCE_S = 0.005
+_BLIND_AFTER_S = 0.05
+_PAUSE_S = 0.001  # between two attempts
 
 _MAX_UNANSWERED = 2  # polls in a row; one may get lost
 _MAX_LOST_TORQUES = 1  # in a row; the next comes after a tick
@@ -28,6 +83,342 @@ _MAX_LOST_TORQUES = 1  # in a row; the next comes after a tick
 _SHARED_INTERFACES = frozenset({"socketcan", "udp_multicast"})
 
 _channels = itertools.count(1)
+
+
+class PuckNode:
+    """One puck, as this end of the bus speaks to it."""
+
+    def __init__(self, link: Link, clock: Clock, puck: int) -> None:
+        self._link = link
+        self._clock = clock
+        self._position_reply, self._property_reply = reply_identifiers(puck)
+        self._in_doubt = False  # whether a position may still come for an old request
+        self._n_overdue = 0  # frames that came after the deadline
+        self._markers = itertools.cycle(_MARKERS)
+        self.puck = puck
+        self.values: dict[int, int] = {}  # the last of each property, by its number
+        self.n_foreign = self.n_late = self.n_errors = 0  # frames
+
+    def set(self, number: int, value: int) -> None:
+        """Set a property; a puck does not acknowledge it."""
+        self._link.send(Frame(self.puck, encode_value(number, value)))
+
+    def request(self, number: int) -> int:
+        """Request a property without waiting, and return when, ns; see `values`."""
+        return self._link.send(Frame(self.puck, encode_get(number)))
+
+    def get(self, number: int, *, patience_s: float = 0.05) -> int:
+        """Request a property, wait for the reply, and return its value."""
+        self.receive_waiting()
+        self.values.pop(number, None)
+        deadline_ns = self.request(number) + round(patience_s * 1e9)
+        self._n_overdue = 0
+        while number not in self.values:
+            frame = self._next_frame(deadline_ns)
+            if frame is None:
+                raise DeviceTimeoutError(
+                    f"puck {self.puck}: no answer for property {number} within "
+                    f"{patience_s * 1e3:g} ms"
+                )
+            self._sort(frame)
+        return self.values.pop(number)
+
+    def position(self, number: int, *, patience_s: float) -> tuple[int, int]:
+        """Request the position -> when it was sampled, ns, and the count."""
+        # A reply does not say to which request it belongs. So what waits is thrown
+        # away first. After a request that was not answered in time, whose reply may
+        # only be late, the next is followed by one for another property, a different
+        # one each time: a puck answers requests in their order, so that the last
+        # position before that reply is the one that was requested now.
+        self.receive_waiting()
+        request_ns = self.request(number)
+        marker = next(self._markers) if self._in_doubt else None
+        if marker is not None:
+            self.values.pop(marker, None)
+            self.request(marker)
+        counts = self._marked_position(request_ns + round(patience_s * 1e9), marker)
+        if counts is None:
+            raise DeviceTimeoutError(
+                f"puck {self.puck}: no position within {patience_s * 1e3:g} ms"
+            )
+        return min(request_ns + _SAMPLING_NS, self._clock.now_ns()), counts
+
+    def _marked_position(self, deadline_ns: int, marker: int | None) -> int | None:
+        # The first position that comes; with a marker, the last before its reply
+        last: int | None = None
+        self._n_overdue = 0
+        while last is None if marker is None else marker not in self.values:
+            frame = self._next_frame(deadline_ns)
+            if frame is None:
+                self.n_late += last is not None  # that of an earlier request
+                self._in_doubt = True
+                return None
+            counts = self._sort(frame)
+            if counts is not None:
+                self.n_late += last is not None
+                last = counts
+        self._in_doubt = False  # nothing earlier can come any more
+        return last
+
+    def _next_frame(self, deadline_ns: int) -> Frame | None:
+        # What waits is taken after the deadline too, because this end may be late;
+        # but only so many frames, because others may never fall silent.
+        if self._clock.now_ns() > deadline_ns:
+            self._n_overdue += 1
+            if self._n_overdue > _MAX_OVERDUE:
+                return None
+        return self._link.receive(deadline_ns)
+
+    def receive_waiting(self) -> None:
+        """Receive all frames that wait: late replies, errors, frames of others."""
+        for _ in range(_MAX_WAITING):
+            frame = self._link.receive(0)
+            if frame is None:
+                return
+            self.n_late += self._sort(frame) is not None
+        raise BusError(f"puck {self.puck}: the bus is flooded with frames", "flooded")
+
+    def _sort(self, frame: Frame) -> int | None:
+        # The position that a frame holds; keeps note of all else
+        if frame.is_error:
+            self._count_error(frame.identifier)
+        elif frame.identifier == self._position_reply:
+            return decode_position(frame.data)
+        elif frame.identifier == self._property_reply:
+            number, value = decode_value(frame.data)
+            self.values[number] = value
+        else:
+            self.n_foreign += 1
+        return None
+
+    def _count_error(self, error_class: int) -> None:
+        if error_class & BUS_RESTARTED:
+            return
+        if error_class & BUS_OFF:
+            raise BusError(
+                f"puck {self.puck}: bus off, the host's controller has given up",
+                "bus-off",
+            )
+        self.n_errors += 1
+        if self.n_errors > _MAX_ERROR_FRAMES:
+            raise BusError(
+                f"puck {self.puck}: needs at most {_MAX_ERROR_FRAMES} error frames, "
+                f"the bus has reported {self.n_errors}, the last of class "
+                f"{error_class:#05x}",
+                "error-frames",
+            )
+
+    def now_ns(self) -> int:
+        """Return the time."""
+        return self._clock.now_ns()
+
+    def wait(self, duration_s: float) -> None:
+        """Let time pass without sending a frame."""
+        self._clock.sleep_until_ns(self._clock.now_ns() + round(duration_s * 1e9))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Identity:
+    """What a puck says of itself before anything is set."""
+
+    puck: int  # its node
+    is_awake: bool  # whether it has left its monitor
+    firmware: int  # VERS
+    role: int  # ROLE
+
+    @property
+    def kind(self) -> int:
+        """Its kind: on other kinds the same numbers mean other things."""
+        return self.role & _ROLE_MASK
+
+    def table(self, properties: PropertyTable | None) -> PropertyTable:
+        """Return the user's property numbers of a motor's puck, or its firmware's."""
+        if self.kind != _MOTOR_KIND:
+            raise DeviceError(
+                f"puck {self.puck}: needs a motor's puck, its ROLE is {self.kind}"
+            )
+        return properties or property_table(self.firmware)
+
+
+def identify(node: PuckNode, *, patience_s: float = 0.05) -> Identity:
+    """Request who a puck is; nothing is set."""
+    status = node.get(STATUS, patience_s=patience_s)
+    if status not in (ASLEEP, READY):
+        raise DeviceError(f"puck {node.puck}: needs STAT 0 or 2, it reports {status}")
+    return Identity(
+        puck=node.puck,
+        is_awake=status == READY,
+        firmware=node.get(VERSION, patience_s=patience_s),
+        role=node.get(ROLE, patience_s=patience_s),
+    )
+
+
+class AwakePuck:
+    """A puck that is awake, idle and configured for the driver."""
+
+    # Making one wakes the puck if it sleeps, idles it, and sets what the driver needs.
+
+    def __init__(
+        self,
+        node: PuckNode,
+        identity: Identity,
+        table: PropertyTable,
+        options: PuckOptions,
+    ) -> None:
+        self.node = node
+        self.table = table  # numbers of its properties
+        # Whether it is woken now, and so does not know where the arm is
+        self.was_asleep = not identity.is_awake
+        if self.was_asleep:
+            self._wake()
+        # It may still hold the torque of a driver that was killed.
+        self._set("T", 0)
+        self._set("MODE", IDLE)
+        # Masks of a whole arm: 1 and 2 are packed torques for pucks 1-4 and 5-7.
+        arm_half = 1 if node.puck <= 4 else 2
+        for name, group in (("GRPA", 0), ("GRPB", arm_half), ("GRPC", 4)):
+            self._set(name, group)
+        self.transmission = self._read_transmission(options)  # what it counts in
+        largest = options.largest_torque
+        self.max_units = math.floor(largest / self.transmission.torque_step)
+        if not 0 < self.max_units <= MAX_TORQUE:
+            raise DeviceError(
+                f"puck {node.puck}: largest_torque needs 1 to {MAX_TORQUE} current "
+                f"units, {largest:g} N·m are {self.max_units}"
+            )
+        self._set("MT", self.max_units)
+
+    def _wake(self) -> None:
+        # Talking to a puck that has left the bus may throw the host off it, too.
+        node = self.node
+        node.set(STATUS, READY)
+        node.wait(_OFF_BUS_S)
+        status = node.get(STATUS)
+        if status != READY:
+            raise DeviceError(
+                f"puck {node.puck}: needs STAT {READY} after waking, got {status}"
+            )
+
+    def _read_transmission(self, options: PuckOptions) -> Transmission:
+        counts, units = self._get("CTS"), self._get("IPNM")
+        if counts < 1 or units < 1:
+            raise DeviceError(
+                f"puck {self.node.puck}: needs CTS and IPNM above 0, got {counts} "
+                f"and {units}"
+            )
+        return Transmission(
+            counts_per_turn=counts,
+            units_per_nm=units,
+            gear_ratio=options.gear_ratio,
+            direction=options.direction,
+        )
+
+    def _get(self, name: str) -> int:
+        return self.node.get(self.table.number(name))
+
+    def _set(self, name: str, value: int) -> None:
+        # A setting is not acknowledged: it is read back.
+        self.node.set(self.table.settable(name), value)
+        actual = self._get(name)
+        if actual != value:
+            raise DeviceError(
+                f"puck {self.node.puck}: {name} needs {value}, reads {actual}"
+            )
+
+    def set_position(self, angle: float) -> int:
+        """Set the position of an idle puck, and return the count that it reports."""
+        node, table = self.node, self.table
+        if not 0.0 <= angle <= math.pi:
+            raise ParameterError(f"angle: needs 0 to 180 degrees, got {angle} rad")
+        mode = self._get("MODE")
+        if mode != IDLE:  # its position is about to jump
+            raise DeviceError(
+                f"puck {node.puck}: needs MODE {IDLE} to be zeroed, is {mode}"
+            )
+        target = self.transmission.counts(angle)
+        node.set(table.settable("P"), target)
+        node.wait(_SETTING_TIME_S)
+        _, counts = node.position(table.number("P"), patience_s=0.05)
+        if abs(counts - target) > _COUNT_TOLERANCE:
+            raise DeviceError(
+                f"puck {node.puck}: needs a position of {target} counts after zeroing, "
+                f"got {counts}"
+            )
+        return counts
+
+    def activate(self, *, checks_torque: bool) -> None:
+        """Go into torque mode with zero torque, and see whether T reads back."""
+        node, table = self.node, self.table
+        self._set("T", 0)
+        node.set(table.settable("MODE"), TORQUE)
+        mode = self._get("MODE")
+        if mode != TORQUE:  # on a whole arm its safety module decides
+            raise DeviceError(
+                f"puck {node.puck}: needs MODE {TORQUE}, stays in {mode}; is an "
+                "emergency stop pressed, or does a safety module want to be activated?"
+            )
+        if not checks_torque:
+            return
+        # One current unit is 0.007 N·m, less than friction holds.
+        node.set(table.settable("T"), 1)
+        torque = self._get("T")
+        self._set("T", 0)
+        if torque != 1:  # then lost torques could not be noticed
+            raise DeviceError(
+                f"puck {node.puck}: needs a T that reads back what it was set to, set "
+                f"to 1 it reads {torque}; checks_torque = false goes without"
+            )
+
+    def release(self) -> None:
+        """Zero the torque and idle it, until it confirms."""
+        table = self.table
+        release(self.node, torque_id=table.number("T"), mode_id=table.number("MODE"))
+
+
+def release(node: PuckNode, *, torque_id: int, mode_id: int) -> None:
+    """Zero the torque and idle a puck, again and again until it confirms."""
+    start_ns = node.now_ns()
+    reason = "it does not go to idle"
+    while (since_s := (node.now_ns() - start_ns) * 1e-9) < _PATIENCE_S:
+        try:
+            node.set(torque_id, 0)
+            if _is_asleep(node, blindly=since_s > _BLIND_AFTER_S):
+                return
+            node.set(mode_id, IDLE)
+            node.set(mode_id, IDLE)  # twice: a regular loss may not hit both
+            if node.get(mode_id, patience_s=_REPLY_PATIENCE_S) == IDLE:
+                return
+        except (BusError, DeviceTimeoutError, FrameError) as error:
+            reason = str(error)
+        node.wait(_PAUSE_S)
+    raise DeviceError(
+        f"puck {node.puck}: not idle after {_PATIENCE_S * 1e3:g} ms ({reason}); it may "
+        "hold its last torque: SWITCH ITS SUPPLY OFF"
+    )
+
+
+def _is_asleep(node: PuckNode, *, blindly: bool) -> bool:
+    # A puck that was reset drives nothing, and the number of MODE is that of LOCK, of
+    # its memory. One that is silent for long is taken to be awake: idling it matters
+    # more.
+    try:
+        return node.get(STATUS, patience_s=_REPLY_PATIENCE_S) == ASLEEP
+    except (BusError, DeviceTimeoutError, FrameError):
+        if blindly:
+            return False
+        raise
+
+
+def prepare(
+    interface: str, channel: str, puck: str, torque_id: str, mode_id: str
+) -> Callable[[], None]:
+    """Join the bus, as the watchdog's process, and return what releases the puck."""
+    clock = RealClock()
+    accepted = reply_identifiers(int(puck))
+    link = open_link(interface, channel, clock=clock, accepted=accepted)
+    atexit.register(link.close)
+    node = PuckNode(link, clock, int(puck))
+    return lambda: release(node, torque_id=int(torque_id), mode_id=int(mode_id))
 
 
 class PuckDevice(Device):
@@ -192,7 +583,7 @@ class PuckDevice(Device):
             return None
         numbers = (options.puck, self._torque_id, self._mode_id)
         return IdleCommand(
-            "masrel.lab.hess.puck._node",
+            "masrel.lab.hess.puck._puck_device",
             (options.interface, options.channel, *map(str, numbers)),
         )
 

@@ -1,16 +1,14 @@
 """A bench for the tests: an emulated puck on a bus inside the process.
 
-It alone looks inside the driver; `tests/lab/internal/hess/puck` tests its parts.
+It alone looks inside the driver; `tests/lab/internal/hess/test_codec.py` tests its bus.
 """
 
 from dataclasses import dataclass, replace
 from itertools import count
 from math import radians
 
-from masrel.lab.elbow import STANDARD_MODELS
 from masrel.lab.hess import (
-    Controller,
-    DeviceLimits,
+    DeviceSetup,
     Hand,
     Presented,
     SimulatedClock,
@@ -22,25 +20,15 @@ from masrel.lab.hess import (
 from masrel.lab.hess.puck import EmulatorOptions, InjectedFault, Link, PuckOptions
 from masrel.lab.hess.puck._bus import open_link
 from masrel.lab.hess.puck._emulator import PuckEmulator
-from masrel.lab.hess.puck._node import PuckNode
-from masrel.lab.hess.puck._properties import Transmission
-from masrel.lab.hess.puck._puck_device import PuckDevice
-from masrel.lab.hess.puck._puck_options import FaultKind
+from masrel.lab.hess.puck._puck_device import PuckDevice, PuckNode, build, release
+from masrel.lab.hess.puck._puck_options import FaultKind, Transmission
+from tests.lab.hess.rig import END, LIMITS, controls, stretching
 
-START, END = radians(30.0), radians(146.0)
-LIMITS = DeviceLimits(torque=20.0, speed=radians(400.0), missed_ticks=20)
+__all__ = ["open_link", "release"]
 
 PUCK = Transmission(counts_per_turn=4096, units_per_nm=2700)
 
 _channels = count()
-
-
-def stretching(speed_deg_s: float = 92.0, n_stretches: int = 1) -> SimulatedHand:
-    speed = radians(speed_deg_s)
-    again = (speed,) * (n_stretches - 1)
-    return SimulatedHand(
-        start=START, end=END, mean_speed=speed, again=again, returns=n_stretches > 1
-    )
 
 
 def loose(start_deg: float = 90.0) -> SimulatedHand:
@@ -94,6 +82,11 @@ def opened(
     return device
 
 
+def unopened(hand: Hand, *faults: InjectedFault) -> PuckDevice:
+    options = puck_options(hand, emulator={"faults": faults})
+    return build(DeviceSetup(clock=SimulatedClock(), hand=hand, options=options))
+
+
 def presented(
     *faults: InjectedFault,
     model: str = "HM3",
@@ -102,12 +95,13 @@ def presented(
     **changes,
 ) -> tuple[Presented, PuckDevice, SimulatedClock]:
     """One presentation on an emulated puck; the device is closed afterwards."""
-    clock, hand = SimulatedClock(), stretching(speed_deg_s, n_stretches)
-    controller = Controller(STANDARD_MODELS[model], start_angle=START)
+    speed, clock = radians(speed_deg_s), SimulatedClock()
+    again = {"again": (speed,) * (n_stretches - 1), "returns": n_stretches > 1}
+    hand = stretching(speed_deg_s, **again)
     with opened(clock, hand, emulator={"faults": faults, **changes}) as device:
         done = run_presentation(
             device,
-            controller,
+            controls(model),
             clock=clock,
             limits=LIMITS,
             end_angle=END,

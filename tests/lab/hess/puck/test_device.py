@@ -1,9 +1,13 @@
-"""The puck's device above the bus: opening, options, torque mode, closing."""
+"""The puck as a device: opening, options, torque mode, closing; its properties."""
 
 from dataclasses import replace
-from math import degrees
+from math import degrees, radians
+from pathlib import Path
 
+import can
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from masrel.errors import (
     BusError,
@@ -13,23 +17,46 @@ from masrel.errors import (
     LimitExceededError,
     ParameterError,
 )
-from masrel.lab.hess import (
-    BackendOptions,
-    RealClock,
-    SimulatedClock,
-    open_device,
+from masrel.lab.hess import BackendOptions, RealClock, SimulatedClock, open_device
+from masrel.lab.hess.puck import (
+    EmulatorOptions,
+    Frame,
+    Link,
+    PropertyTable,
+    PuckOptions,
+    connected,
+    property_table,
+    read_property_table,
+    zero,
 )
-from masrel.lab.hess.puck import EmulatorOptions, PuckOptions, property_table
 from tests.lab.hess.puck.rig import (
     PUCK,
+    PuckDevice,
+    bench,
     fault,
     loose,
     opened,
     presented,
     puck_options,
-    stretching,
     told,
+    unopened,
 )
+from tests.lab.hess.rig import stretching
+
+STAT, MODE, CTS, IPNM, GRPA = 5, 8, 68, 86, 26
+
+
+def failing(*faults, **options) -> tuple[SimulatedClock, PuckDevice]:
+    """A device that holds 2 N·m on a puck that fails."""
+    clock = SimulatedClock()
+    device = opened(clock, loose(), emulator={"faults": faults}, **options)
+    device.command(2.0)
+    return clock, device
+
+
+def wait(clock: SimulatedClock, time_s: float) -> None:
+    clock.sleep_until_ns(clock.now_ns() + round(time_s * 1e9))
+
 
 # Opening
 
@@ -53,21 +80,27 @@ def test_it_wakes_is_told_everything_and_goes_into_torque_mode() -> None:
         assert device.emulator.n_disturbances == 0
         assert device.identity.firmware == 148
         assert device.transmission == PUCK
+    with opened(SimulatedClock(), stretching(), puck=6) as device:
+        assert ("GRPB", 2) in told(device)  # pucks 5 to 7 are in the other group
 
 
 def test_one_that_is_awake_keeps_its_position() -> None:
-    hand = loose(90.0)
     options = {"emulator": {"awake": True}, "angle_after_reset": None}
-    with opened(SimulatedClock(), hand, **options) as device:
+    with opened(SimulatedClock(), loose(90.0), **options) as device:
         assert not {"STAT", "P"} & {name for name, _ in told(device)}
         assert degrees(device.read().angle) == pytest.approx(90.0, abs=0.0024)
 
 
-def test_pucks_5_to_7_listen_to_the_other_packed_group() -> None:
-    with opened(SimulatedClock(), stretching(), puck=6) as device:
-        assert ("GRPB", 2) in told(device)
+def test_a_driver_that_was_killed_leaves_no_torque_to_the_next() -> None:
+    with opened(SimulatedClock(), loose(), emulator={"awake": True}) as device:
+        device.command(-3.0)
+        device._bring_up()  # what the next driver does on the same puck
+        assert ("T", 0) in told(device)[-13:]
+        assert device.emulator.torque == 0
 
 
+# The last of these is awake, but zeroed at another turn: 90 deg with the gear of
+# another device
 @pytest.mark.parametrize(
     ("emulator", "changes", "words"),
     [
@@ -79,83 +112,159 @@ def test_pucks_5_to_7_listen_to_the_other_packed_group() -> None:
             {},
             "needs firmware 65 to 113, or 119 or later, got 116",
         ),
-        ({"units_per_nm": 2700, "wake_s": 1.5}, {}, "puck 1: no answer for property 5"),
+        ({"wake_s": 1.5}, {}, "puck 1: no answer for property 5"),
         ({}, {"largest_torque": 60.0}, "largest_torque needs 1 to 8191 current units"),
         ({}, {"largest_torque": 0.001}, "largest_torque needs 1 to 8191 current units"),
+        (
+            {"awake": True},
+            {"gear_ratio": 8.0, "largest_torque": 9.0},
+            r"it reports 211\.\d; run masrel device zero",
+        ),
+        (
+            {"faults": (fault("dropped-torques", 0.0),)},
+            {},
+            r"needs a T that reads back .* reads 0",
+        ),
     ],
 )
-def test_what_it_cannot_drive_is_not_opened(
+def test_what_it_cannot_drive_is_not_opened_and_the_bus_is_left_to_others(
     emulator: dict, changes: dict, words: str
 ) -> None:
+    hand = loose(90.0)
+    options = puck_options(hand, emulator=emulator, **changes)
     with pytest.raises(DeviceError, match=words):
-        opened(SimulatedClock(), stretching(), emulator=emulator, **changes)
+        open_device("puck", clock=SimulatedClock(), hand=hand, options=options)
+    well = puck_options(hand, emulator={})
+    again = replace(well, channel=options.channel)
+    with open_device("puck", clock=SimulatedClock(), hand=hand, options=again):
+        pass
 
 
-def test_a_table_of_ones_own_opens_an_unknown_firmware() -> None:
-    table = property_table(148)
-    emulator = {"firmware": 116, "properties": table}
-    options = {"emulator": emulator, "properties": table}
-    with opened(SimulatedClock(), stretching(), **options) as device:
-        assert device.identity.firmware == 116
-
-
-def test_an_arm_that_cannot_be_there_is_refused() -> None:
-    # Awake, but zeroed at another turn: 90 deg with the gear of another device
-    options = {"emulator": {"awake": True}, "gear_ratio": 8.0, "largest_torque": 9.0}
-    with pytest.raises(
-        DeviceError, match=r"it reports 211\.\d; run masrel device zero"
-    ):
-        opened(SimulatedClock(), loose(90.0), **options)
-
-
-def test_nobody_there_is_said() -> None:
-    options = PuckOptions(interface="virtual", channel="empty")
-    with pytest.raises(DeviceTimeoutError, match="puck 1: no answer for property 5"):
-        open_device("puck", clock=RealClock(), options=options)
-
-
-def test_a_bus_that_is_not_there_is_said() -> None:
-    options = PuckOptions(interface="socketcan", channel="can-none")
-    with pytest.raises(BusError, match="cannot open channel 'can-none' of interface"):
-        open_device("puck", clock=RealClock(), options=options)
+@pytest.mark.parametrize("kind", ["bus-off", "dropped-replies", "dropped-torques"])
+def test_a_puck_that_fails_while_it_is_activated_is_idled(kind) -> None:
+    device = unopened(loose(), fault(kind, 0.0, end_s=0.06))
+    with pytest.raises(DeviceError):
+        device.open()
+    assert not device.is_open
+    assert device.emulator.mode == 0
 
 
 @pytest.mark.parametrize(
-    "interface", ["canalystii", "kvaser", "neovi", "pcan", "slcan", "socketcand"]
+    ("interface", "channel", "error", "words"),
+    [
+        ("virtual", "empty", DeviceTimeoutError, "no answer for property 5"),
+        ("socketcan", "can-none", BusError, "cannot open channel 'can-none' of inter"),
+        ("telepathy", "1", BusError, "of interface 'telepathy'"),
+        # Each of python-can's interfaces says so in a way of its own.
+        *(
+            (
+                name,
+                "0",
+                BusError,
+                f"puck: cannot open channel '0' of interface '{name}'",
+            )
+            for name in (
+                *("canalystii", "kvaser", "neovi"),
+                *("pcan", "slcan", "socketcand"),
+            )
+        ),
+    ],
 )
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-def test_an_adapter_that_is_not_there_is_said(interface: str) -> None:
-    # Each of python-can's interfaces says so in a way of its own.
-    options = PuckOptions(interface=interface, channel="0")
-    words = f"puck: cannot open channel '0' of interface '{interface}'"
-    with pytest.raises(BusError, match=words):
+def test_a_bus_or_an_adapter_that_is_not_there_is_said(
+    interface: str, channel: str, error: type[DeviceError], words: str
+) -> None:
+    options = PuckOptions(interface=interface, channel=channel)
+    with pytest.raises(error, match=words):
         open_device("puck", clock=RealClock(), options=options)
 
 
-def test_an_interface_that_nobody_knows_is_said() -> None:
-    options = PuckOptions(interface="telepathy", channel="1")
-    with pytest.raises(BusError, match="of interface 'telepathy'"):
-        open_device("puck", clock=RealClock(), options=options)
+@pytest.mark.parametrize("all_nodes", [False, True])
+def test_the_kernel_filters_unless_all_nodes_are_to_be_received(
+    all_nodes: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    filters = []
+    real = can.Bus
+
+    def bus(**settings):
+        filters.append(settings["can_filters"])
+        return real(interface="virtual", channel="nodes", ignore_config=True)
+
+    monkeypatch.setattr(can, "Bus", bus)
+    with connected(PuckOptions(), clock=RealClock(), all_nodes=all_nodes):
+        pass
+    assert [one is None for one in filters] == [all_nodes]
+
+
+# Waking, configuring, zeroing: what is refused of a puck that answers oddly
+
+
+class Altered(Link):
+    """A bus on which some properties, and maybe the position, read otherwise."""
+
+    values: dict[int, list[int]]  # what comes in turn, the last one for ever
+    counts: int | None
+
+    def receive(self, deadline_ns: int) -> Frame | None:
+        frame = super().receive(deadline_ns)
+        if frame is None:
+            return None
+        if frame.identifier == 0x423 and self.counts is not None:
+            return frame._replace(data=self.counts.to_bytes(3, "big"))
+        said = self.values.get(frame.data[0] & 0x7F)
+        if frame.identifier != 0x426 or not said:
+            return frame
+        value = said.pop(0) if len(said) > 1 else said[0]
+        data = frame.data[:2] + value.to_bytes(4, "little", signed=True)
+        return frame._replace(data=data)
+
+
+def zeroed(
+    values: dict[int, list[int]] | None = None,
+    counts: int | None = None,
+    angle_deg: float = 90.0,
+) -> int:
+    one = bench()
+    link = Altered(one.link._bus, one.clock, peer=one.emulator)
+    link.values, link.counts = values or {}, counts
+    try:
+        return zero(link, one.clock, PuckOptions(), angle=radians(angle_deg))
+    finally:
+        one.close()
+
+
+@pytest.mark.parametrize(
+    ("values", "counts", "words"),
+    [
+        ({STAT: [0]}, None, "puck 1: needs STAT 2 after waking, got 0"),
+        ({CTS: [0]}, None, "puck 1: needs CTS and IPNM above 0, got 0 and 2700"),
+        ({IPNM: [-3]}, None, "puck 1: needs CTS and IPNM above 0, got 4096 and -3"),
+        ({GRPA: [9]}, None, "puck 1: GRPA needs 0, reads 9"),
+        ({MODE: [3]}, None, "puck 1: MODE needs 0, reads 3"),
+        # under torque
+        ({MODE: [0, 2]}, None, "needs MODE 0 to be zeroed, is 2"),
+        ({}, 19248, "needs a position of 19251 counts after zeroing, got 19248"),
+    ],
+)
+def test_answers_that_make_no_sense_are_refused(
+    values: dict[int, list[int]], counts: int | None, words: str
+) -> None:
+    with pytest.raises(DeviceError, match=words):
+        zeroed(values, counts)
+    assert zeroed(counts=19251 + 2) == 19253
 
 
 # Options
-
-
-class Foreign(BackendOptions):
-    pass
 
 
 @pytest.mark.parametrize(
     ("setup", "words"),
     [
         ({}, "puck: needs options that say on which bus it is"),
-        ({"options": Foreign()}, "of type PuckOptions, got Foreign"),
+        ({"options": BackendOptions()}, "of type PuckOptions, got BackendOptions"),
         ({"options": PuckOptions()}, "needs a real clock"),
         ({"options": PuckOptions(), "hand": loose()}, "got a hand alone"),
-        (
-            {"options": puck_options(loose())},
-            "got an emulator alone",
-        ),
+        ({"options": puck_options(loose())}, "got an emulator alone"),
     ],
 )
 def test_a_setup_that_contradicts_itself_is_refused(setup: dict, words: str) -> None:
@@ -181,6 +290,12 @@ def test_options_out_of_range_are_refused(changes: dict, words: str) -> None:
         PuckOptions(**changes)
 
 
+@pytest.mark.parametrize("angle_deg", [-0.1, 180.1, float("nan")])
+def test_no_arm_is_beyond_its_ends(angle_deg: float) -> None:
+    with pytest.raises(ParameterError, match="angle: needs 0 to 180 degrees"):
+        zeroed(angle_deg=angle_deg)
+
+
 @pytest.mark.parametrize(
     ("interface", "channel", "moves"),
     [
@@ -198,6 +313,80 @@ def test_options_say_whether_hardware_may_move(
     assert options.moves_hardware is moves
 
 
+# Numbers of properties, of a firmware or from a file
+
+# The least that a table needs
+REQUIRED = {
+    **{"MODE": 8, "T": 42, "MT": 43, "P": 48, "CTS": 68},
+    **{"IPNM": 86, "GRPA": 26, "GRPB": 27, "GRPC": 28},
+}
+
+
+@pytest.mark.parametrize("firmware", [65, 113, 119, 131, 132, 148, 200])
+def test_known_firmware_has_the_numbers_that_the_driver_needs(firmware: int) -> None:
+    table = property_table(firmware)
+    assert {name: table.number(name) for name in REQUIRED} == REQUIRED
+    two = (table.number("EN"), table.number("HOLD"))
+    assert two == ((94, 77) if firmware >= 132 else (77, 94))  # they change places
+
+
+@given(st.integers(-1, 64) | st.integers(114, 118))
+def test_unknown_firmware_is_refused(firmware: int) -> None:
+    with pytest.raises(DeviceError, match=rf"puck: needs firmware .* got {firmware}$"):
+        property_table(firmware)
+
+
+@pytest.mark.parametrize("name", ["SAVE", "LOAD", "DEF", "LOCK", "KP"])
+def test_what_writes_its_memory_is_never_set(name: str) -> None:
+    words = f"{name} writes the puck's permanent memory"
+    if name == "KP":
+        words = "property KP is not in this firmware's"
+    with pytest.raises(DeviceError, match=words):
+        property_table(148).settable(name)
+
+
+def test_a_table_of_ones_own_opens_an_unknown_firmware(tmp_path: Path) -> None:
+    path = tmp_path / "puck.toml"
+    lines = [f"{name} = {number}" for name, number in REQUIRED.items()]
+    path.write_text("\n".join(["[properties]", *lines]))
+    table = read_property_table(path)
+    assert table.numbers == REQUIRED
+    emulator = {"firmware": 116, "properties": table}
+    options = {"emulator": emulator, "properties": table}
+    with opened(SimulatedClock(), stretching(), **options) as device:
+        assert device.identity.firmware == 116
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", r"needs one table, \[properties\]"),
+        ("properties = 3", r"needs one table, \[properties\]"),
+        ("[properties", "not TOML"),
+        ("[properties]\nT = 42", "properties: need MODE, MT, "),
+        ("[properties]\nT = '42'", "properties.T: needs a whole number, got '42'"),
+        ({"MT": 42}, "needs a number of its own, 42 is taken by"),
+        ({"MT": 49}, "needs a number of its own, 49 is taken by"),  # P takes 48 and 49
+        ({"T": 5}, "properties.T: needs 8 to 126, got 5"),
+        ({"T": 128}, "properties.T: needs 8 to 126, got 128"),
+    ],
+)
+def test_a_table_that_is_none_or_contradicts_itself_is_refused(
+    tmp_path: Path, text: str | dict[str, int], words: str
+) -> None:
+    path = tmp_path / "puck.toml"
+
+    def table() -> PropertyTable:
+        if isinstance(text, dict):
+            return PropertyTable(numbers={**REQUIRED, **text})
+        path.write_text(text)
+        return read_property_table(path)
+
+    with pytest.raises(ParameterError, match=words) as caught:
+        table()
+    assert str(caught.value).startswith(str(path)) is isinstance(text, str)
+
+
 # In torque mode
 
 
@@ -210,31 +399,31 @@ def test_it_says_when_the_encoder_was_sampled() -> None:
 
 def test_it_refuses_a_torque_above_its_own_limit() -> None:
     with opened(SimulatedClock(), loose(), largest_torque=10.0) as device:
-        device.command(9.99)
-        with pytest.raises(LimitExceededError, match="at most 10 N·m") as caught:
-            device.command(10.01)
-        assert caught.value.kind == "torque"
+        for torque in (9.99, -9.99):
+            device.command(torque)
+            with pytest.raises(LimitExceededError, match="at most 10 N·m") as caught:
+                device.command(torque + 0.02 * (1 if torque > 0.0 else -1))
+            assert caught.value.kind == "torque"
 
 
 def test_a_mode_that_was_changed_is_noticed_when_checked() -> None:
-    clock = SimulatedClock()
-    with opened(clock, loose(), emulator={"faults": (fault("idled", 0.05),)}) as device:
+    clock, device = failing(fault("idled", 0.05))
+    with device:
         device.check()
-        clock.sleep_until_ns(clock.now_ns() + 100_000_000)
+        wait(clock, 0.1)
         with pytest.raises(IdledError, match="somebody else has set it to 0"):
             device.check()
 
 
 def test_a_puck_that_does_not_say_its_mode_is_noticed_when_checked() -> None:
-    clock = SimulatedClock()
-    faults = (fault("dropped-replies", 0.01, end_s=0.1),)
-    with opened(clock, loose(), emulator={"faults": faults}) as device:
-        clock.sleep_until_ns(clock.now_ns() + 20_000_000)
+    clock, device = failing(fault("dropped-replies", 0.01, end_s=0.1))
+    with device:
+        wait(clock, 0.02)
         device.check()
         device.check()
         with pytest.raises(DeviceTimeoutError, match="3 times in a row"):
             device.check()
-        clock.sleep_until_ns(clock.now_ns() + 100_000_000)
+        wait(clock, 0.1)
 
 
 @pytest.mark.parametrize(
@@ -256,23 +445,16 @@ def test_a_presentation_runs_on_every_kind_of_puck(traits: dict) -> None:
     assert device.emulator.n_memory_writes == 0
 
 
-# A presentation
-
-
 def test_what_is_recorded_is_what_the_puck_was_told() -> None:
     done, device, _ = presented()
-    commands = done.recording.columns["command_torque_nm"]
-    units = [
-        setting.value for setting in device.emulator.settings if setting.name == "T"
-    ]
-    n_before, n_after = 4, 3  # bringing it up; the end, closing, idling
-    told_units = units[n_before : len(units) - n_after + 1]
-    assert told_units[: commands.size - 1] == [
-        PUCK.units(float(torque)) for torque in commands[:-1]
-    ]
+    commands = done.recording.columns["command_torque_nm"][:-1].tolist()
+    units = [value for name, value in told(device) if name == "T"]
+    n_before = 4  # bringing it up; then the end, closing, idling
+    sent = units[n_before : n_before + len(commands)]
+    assert sent == [PUCK.units(torque) for torque in commands]
     off = [
         abs(PUCK.torque(unit) - torque)
-        for unit, torque in zip(told_units, commands[:-1], strict=False)
+        for unit, torque in zip(sent, commands, strict=True)
     ]
     assert max(off) <= 0.5 * PUCK.torque_step * (1.0 + 1e-12)
 
@@ -281,9 +463,7 @@ def test_what_is_recorded_is_what_the_puck_was_told() -> None:
 
 
 def test_closing_zeroes_idles_and_waits_for_the_word() -> None:
-    clock = SimulatedClock()
-    device = opened(clock, loose())
-    device.command(2.0)
+    _, device = failing()
     device.close()
     assert told(device)[-5:] == [
         ("T", -287),
@@ -296,10 +476,8 @@ def test_closing_zeroes_idles_and_waits_for_the_word() -> None:
 
 
 def test_a_puck_that_does_not_confirm_is_called_out() -> None:
-    clock = SimulatedClock()
-    device = opened(clock, loose(), emulator={"faults": (fault("unplugged", 0.01),)})
-    device.command(2.0)
-    clock.sleep_until_ns(clock.now_ns() + 20_000_000)
+    clock, device = failing(fault("unplugged", 0.01))
+    wait(clock, 0.02)
     begun_ns = clock.now_ns()
     with pytest.raises(DeviceError, match=r"not idle after 100 ms .* ITS SUPPLY OFF"):
         device.close()
@@ -307,45 +485,47 @@ def test_a_puck_that_does_not_confirm_is_called_out() -> None:
     assert device.emulator.torque == -287  # it holds it for ever
 
 
-def test_an_opening_that_fails_leaves_the_bus_to_others() -> None:
-    hand = loose()
-    options = puck_options(hand, emulator={"role": 2})
-    with pytest.raises(DeviceError):
-        open_device("puck", clock=SimulatedClock(), hand=hand, options=options)
-    again = replace(options, emulator=EmulatorOptions())
-    with open_device(
-        "puck", clock=SimulatedClock(), hand=hand, options=again
-    ) as device:
-        assert device.is_open
-
-
-def test_a_puck_that_was_reset_is_not_told_to_idle() -> None:
-    # Asleep, 8 is no longer its mode but the lock of its memory
-    clock = SimulatedClock()
-    device = opened(clock, loose(), emulator={"faults": (fault("reset", 0.01),)})
-    device.command(2.0)
-    clock.sleep_until_ns(clock.now_ns() + 20_000_000)
+@pytest.mark.parametrize(
+    ("one", "waited_s", "options"),
+    [
+        # Asleep after it was reset, 8 is no longer its mode but the lock of its memory
+        (fault("reset", 0.01), 0.02, {}),
+        # Off for 30 ms, which nobody has noticed yet
+        (fault("bus-off", 0.01, end_s=0.04), 0.015, {}),
+        # A torque that does not read back can be gone without
+        (fault("dropped-torques", 0.0), 0.0, {"checks_torque": False}),
+    ],
+)
+def test_a_puck_that_comes_back_is_idled_and_its_memory_not_written(
+    one, waited_s: float, options: dict
+) -> None:
+    clock, device = failing(one, **options)
+    assert device.is_open
+    wait(clock, waited_s)
     device.close()
+    assert device.emulator.mode == 0
     assert device.emulator.n_memory_writes == 0
 
 
-def test_a_torque_that_does_not_read_back_can_be_gone_without() -> None:
-    faults = (fault("dropped-torques", 0.0),)
-    clock, hand = SimulatedClock(), loose()
-    with pytest.raises(DeviceError, match=r"needs a T that reads back .* reads 0"):
-        opened(clock, hand, emulator={"faults": faults})
-    options = {"emulator": {"faults": faults}, "checks_torque": False}
-    with opened(SimulatedClock(), loose(), **options) as device:
-        device.command(1.0)
-        assert device.is_open
+@pytest.mark.parametrize(
+    ("faults", "said"),
+    [
+        ((), "the bus cannot be left"),
+        ((fault("unplugged", 0.4),), "SWITCH ITS SUPPLY OFF"),  # more important
+    ],
+)
+def test_an_adapter_that_does_not_let_go_is_a_fault_of_the_bus(faults, said) -> None:
+    # As one on a serial port does that has been pulled out
+    clock, device = failing(*faults)
+    bus = device._link._bus
+    shut_down = bus.shutdown
 
+    def stuck() -> None:
+        shut_down()
+        raise can.CanOperationError("no such port")
 
-def test_a_bus_that_comes_back_while_closing_is_used() -> None:
-    # Off for 30 ms, which nobody has noticed yet
-    clock = SimulatedClock()
-    faults = (fault("bus-off", 0.01, end_s=0.04),)
-    device = opened(clock, loose(), emulator={"faults": faults})
-    device.command(2.0)
-    clock.sleep_until_ns(clock.now_ns() + 15_000_000)
-    device.close()
-    assert device.emulator.mode == 0
+    bus.shutdown = stuck
+    wait(clock, 0.5)
+    with pytest.raises(DeviceError, match=said):
+        device.close()
+    bus.shutdown = shut_down

@@ -1,4 +1,4 @@
-"""A loop that is killed mid-presentation, on buses that two processes can share.
+"""A loop that is killed, on buses that two processes can share; and python-can.
 
 python-can's bus inside a process cannot be shared; its multicast bus can, and so can
 SocketCAN's virtual device where the kernel has one.
@@ -22,7 +22,7 @@ import pytest
 
 from masrel.errors import BusError
 from masrel.lab.hess import RealClock, SimulatedClock, open_device
-from masrel.lab.hess._watchdog import watched
+from masrel.lab.hess._stop import watched
 from masrel.lab.hess.puck import EmulatorOptions, PuckOptions
 from tests.lab.hess.puck.rig import END, PuckEmulator, loose, open_link, opened
 
@@ -36,7 +36,7 @@ LOOP = """
 import sys, time
 from masrel.lab.hess import RealClock, open_device
 from masrel.lab.hess.puck import PuckOptions
-from masrel.lab.hess._watchdog import watched
+from masrel.lab.hess._stop import watched
 
 options = PuckOptions(interface=sys.argv[1], channel=sys.argv[2], patience_s=1.0)
 device = open_device("puck", clock=RealClock(), options=options)
@@ -171,6 +171,45 @@ def test_a_bus_inside_the_process_has_no_watchdog() -> None:
     with opened(SimulatedClock(), loose()) as device:
         assert device.idle_command() is None
         assert watched(device, TIMEOUT_S) is None
+
+
+# What needs python-can, and what does without
+
+
+def run(code: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import masrel.lab.hess.puck",
+        "import masrel.lab.hess.puck._bus",
+        "from masrel.lab.hess.puck import fit_friction, steady_runs",
+        "from masrel.lab.hess.puck import PuckOptions; PuckOptions()",
+        "from masrel.cli import cli\ntry: cli(['device', '-h'])\nexcept SystemExit: 0",
+    ],
+)
+def test_names_options_codec_and_help_load_no_python_can(code: str) -> None:
+    done = run(f"{code}\nimport sys\nsys.exit('can' in sys.modules)")
+    assert done.returncode == 0, done.stderr
+
+
+def test_without_python_can_a_puck_says_what_to_install() -> None:
+    code = (
+        "import sys\n"
+        "sys.modules['can'] = None\n"  # as if it were not there
+        "sys.argv = ['masrel', 'device', 'probe']\n"
+        "from masrel.cli import main\n"
+        "main()"
+    )
+    done = run(code)
+    assert done.returncode == 1
+    assert done.stderr == (
+        "masrel: puck: needs python-can; install it with: pip install 'masrel[can]'\n"
+    )
 
 
 if __name__ == "__main__":
