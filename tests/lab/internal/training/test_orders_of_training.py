@@ -1,11 +1,16 @@
-"""Which model comes next: blocks, and what was misgraded more often."""
+"""Which model comes next, and what a presentation counts."""
 
 from collections import Counter
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from masrel.lab.training import Lesson
+from masrel.lab.protocol import StudyPaths, copy_template, read_protocol
+from masrel.lab.run import read_log
+from masrel.lab.training import Lesson, SimulatedTrainee, train_rater
+from masrel.lab.training._lessons import record_of
 from masrel.lab.training._trainees import (
     adaptive_weights,
     draw_blocks,
@@ -100,3 +105,34 @@ def test_what_a_presentation_counts_by_hand() -> None:
     assert adaptive_weights(models, wrong, 2) == pytest.approx(expected)
     models, wrong = np.array([1, 0, 0]), np.array([True, True, False])
     assert adaptive_weights(models, wrong, 2) == pytest.approx([1.0, 1.5, 1.0])
+
+
+RULES = """
+[training]
+order = "adaptive"
+kappa_insufficient = 0.3
+kappa_sufficient = 0.95
+false_pass = 0.2
+window = 24
+max_presentations = 32
+"""
+
+
+def test_a_training_begun_without_weights_ends_without(tmp_path: Path) -> None:
+    copy_template("small", tmp_path / "study")
+    paths = StudyPaths(tmp_path / "study")
+    with paths.protocol.open("a", encoding="utf-8") as file:
+        file.write(RULES)
+    protocol = read_protocol(paths.protocol)
+    trainee = SimulatedTrainee(protocol)
+    now = train_rater(paths, protocol, "R1", grades=trainee, clock="simulated")
+    log = paths.training_log_file("R1")
+    first, *others = read_log(log)
+    fields = {k: v for k, v in first.fields.items() if k != "is_weighted"}
+    old = record_of(log, [replace(first, fields=fields), *others], protocol)
+    code = {grade: at for at, grade in enumerate(old.criterion.grades)}
+    intended = np.array([code[one.intended] for one in old.lessons])
+    given = np.array([code[one.grade] for one in old.lessons])
+    alike = old.criterion.evidence(intended, given)
+    assert old.evidence() == pytest.approx(alike, abs=0.0)
+    assert now.evidence() != pytest.approx(alike)
