@@ -4,6 +4,7 @@ By requests, and by pages in a real browser.
 """
 
 import asyncio
+import contextlib
 import hmac
 import json
 import shutil
@@ -387,7 +388,8 @@ def test_no_page_does_what_only_ours_may(
             browser = await web.chromium.launch(**options)
             page = await browser.new_page()
             await page.goto(server.access.new_address("rater"))
-            if await page.get_by_text("Go on").count():
+            # the page goes on by itself, but where its guard is out
+            with contextlib.suppress(api.TimeoutError):
                 await page.get_by_text("Go on").click(timeout=1000)
             await page.wait_for_url("**/rater")
             has_worked = await attack(page, victim, server)
