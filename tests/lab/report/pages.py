@@ -157,28 +157,15 @@ def page_of(files: ReportFiles) -> Page:
 
 def markdown_tables(text: str) -> list[list[list[str]]]:
     """Tables of a Markdown page: rows of cells, escapes undone."""
-    tables: list[list[list[str]]] = []
-    inside = False
-    for line in text.splitlines():
-        if not line.startswith("|"):
-            inside = False
-            continue
-        if not inside:
-            tables.append([])
-        inside = True
-        if not line.startswith(("|:", "|-")):
-            tables[-1].append(_cells(line))
-    return tables
+    found = re.findall(r"(?:^\|.*\n)+", text, re.M)
+    return [
+        [
+            [re.sub(r"\\(.)", r"\1", cell).strip() for cell in _BAR.split(line[1:-1])]
+            for line in table.splitlines()
+            if not line.startswith(("|:", "|-"))
+        ]
+        for table in found
+    ]
 
 
-def _cells(line: str) -> list[str]:
-    cells, escaped = [""], False
-    for letter in line.strip()[1:-1]:
-        if escaped or letter not in "\\|":
-            cells[-1] += letter
-            escaped = False
-        elif letter == "\\":
-            escaped = True
-        else:
-            cells.append("")
-    return [cell.strip() for cell in cells]
+_BAR = re.compile(r"(?<!\\)\|")

@@ -10,16 +10,16 @@ import pytest
 
 from masrel.errors import RatingsError
 from masrel.lab.analysis import QuestionSummary, analyze
-from masrel.lab.protocol import Occasions, Protocol, StudyPaths, read_protocol
+from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.ratings import (
     GivenAnswer,
-    StudyData,
     answers_csv,
     read_answers,
     read_study_data,
     write_answers,
 )
 from masrel.lab.report import write_report
+from tests.lab.analysis.studies import ratings
 from tests.lab.protocol.documents import changed, write
 
 HESS = StudyPaths(Path(__file__).parents[3] / "studies" / "hess2012")
@@ -28,22 +28,6 @@ HESS = StudyPaths(Path(__file__).parents[3] / "studies" / "hess2012")
 def summaries_of(*answers: GivenAnswer) -> tuple[QuestionSummary, ...]:
     data = read_study_data(HESS, read_protocol(HESS.protocol))
     return analyze(data.protocol, data.ratings, answers=answers).questionnaires
-
-
-def public(data: StudyData) -> StudyData:
-    """The study with questions whose answers may stand beside their raters."""
-    asked = [
-        msgspec.structs.replace(
-            each,
-            questions=tuple(
-                msgspec.structs.replace(question, public=True)
-                for question in each.questions
-            ),
-        )
-        for each in data.protocol.questionnaires
-    ]
-    protocol = msgspec.structs.replace(data.protocol, questionnaires=tuple(asked))
-    return replace(data, protocol=protocol)
 
 
 def score(answer: int | None, rater: str = "R1") -> GivenAnswer:
@@ -121,29 +105,15 @@ def test_what_few_raters_answered_shows_nobodys_answer(tmp_path: Path) -> None:
 
 
 def test_one_answer_has_no_deviation_and_an_excluded_rater_none() -> None:
-    data = public(read_study_data(HESS, read_protocol(HESS.protocol)))
+    data = read_study_data(HESS, read_protocol(HESS.protocol))
+    document = msgspec.to_builtins(data.protocol)
+    document["questionnaires"][0]["questions"][0]["public"] = True  # of few, too
+    asked = msgspec.convert(document, Protocol)
     answers = (score(5), score(9, "R2"))
-    analysis = analyze(data.protocol, data.ratings, answers=answers, excluded=["R2"])
+    analysis = analyze(asked, data.ratings, answers=answers, excluded=["R2"])
     (summary,) = analysis.questionnaires
     assert (summary.n, summary.mean) == (1, 5.0)
     assert summary.sd != summary.sd
-
-
-def test_the_design_says_what_is_practised_and_when_there_are_breaks(
-    tmp_path: Path,
-) -> None:
-    data = read_study_data(HESS, read_protocol(HESS.protocol))
-    occasions = Occasions(practice=("HM1", "D02"), break_after=8)
-    report = msgspec.structs.replace(data.protocol.report, sections=("design",))
-    protocol = msgspec.structs.replace(
-        data.protocol, occasions=occasions, report=report
-    )
-    files = write_report(
-        protocol, data.ratings, analyze(protocol, data.ratings), tmp_path
-    )
-    text = files.markdown.read_text(encoding="utf-8")
-    assert "begins with practice on HM1, D02, which is not rated." in text
-    assert "A break of 5 min comes after every 8 presentations." in text
 
 
 CHOICE = {
@@ -170,20 +140,18 @@ def asking(tmp_path: Path) -> Protocol:
 def test_choices_are_counted_analogues_are_in_tenths_and_texts_are_left_out(
     asking: Protocol,
 ) -> None:
-    from masrel.lab.analysis._descriptions import question_summaries
-
     def given(question: str, *answers: str | float) -> list[GivenAnswer]:
         like = replace(score(1), questionnaire="q", question=question)
         return [replace(like, answer=answer) for answer in answers]
 
-    again, sure, note = question_summaries(
-        asking,
-        [
-            *given("again", "no", "no", "yes"),
-            *given("sure", 0, 9.9, 10, 100),
-            *given("note", "it stuck"),
-        ],
-    )
+    answers = [
+        *given("again", "no", "no", "yes"),
+        *given("sure", 0, 9.9, 10, 100),
+        *given("note", "it stuck"),
+    ]
+    rows = ratings(("test", "R1", "HM1", "1"))
+    analysis = analyze(asking, rows, answers=answers)
+    again, sure, note = analysis.questionnaires
     assert [(c.label, c.n) for c in again.counts] == [("yes", 1), ("no", 2)]
     assert [c.n for c in sure.counts] == [2, 1, 0, 0, 0, 0, 0, 0, 0, 1]
     assert sure.counts[0].label == "0–10"
