@@ -184,14 +184,14 @@ def name_traces(
     axes: Axes, stretches: Sequence[Stretch], quantity: Against, names: Sequence[str]
 ) -> None:
     """Write names at catches, or ends, above each other where they would overlap."""
+    # over the angle at the ends: the catches of a model are side by side
     axes.autoscale_view()  # otherwise done only when it is drawn
     point = axes.figure.dpi / 72.0
     left, right = axes.bbox.x0 / point, axes.bbox.x1 / point
     places = []
     for name, stretch in zip(names, stretches, strict=False):
-        x, y = _points(stretch, quantity)[
-            :, int(np.argmax(stretch.phase == _CATCH)) or -1
-        ]
+        begins = int(np.argmax(stretch.phase == _CATCH)) * (quantity in _LABELS)
+        x, y = _points(stretch, quantity)[:, begins or -1]
         places.append(
             (*(axes.transData.transform((x, y)) / point), x, y, short_name(name))
         )

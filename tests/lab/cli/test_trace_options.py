@@ -136,14 +136,16 @@ def test_a_schematic_names_the_parts_of_a_catch(
     assert path.stat().st_size > 10_000
 
 
-def test_phases_are_shaded_of_the_first_speed_that_catches(tmp_path: Path) -> None:
+def test_a_figure_explains_its_phases_where_one_catches(tmp_path: Path) -> None:
     path = tmp_path / "one.svg"
-    for speeds, shaded in ((("10", "60", "90"), "60"), (("10", "12"), None)):
+    phases = ["pre-catch", "catch", "post-catch"]
+    for speeds, explained in ((("10", "60", "90"), phases), (("10", "12"), [])):
         asked = [part for speed in speeds for part in ("--speed-deg-s", speed)]
         assert run("--model", "HM3", *asked, "--figure", path).exit_code == 0
         # text of an SVG is kept beside its shapes, as a comment
-        said = re.findall(r"<!-- (catch, \d+ deg/s) -->", path.read_text("utf-8"))
-        assert said == ([] if shaded is None else [f"catch, {shaded} deg/s"])
+        texts = re.findall(r"<!-- (.*?) -->", path.read_text("utf-8"))
+        assert [text for text in texts if text in phases] == explained
+        assert [f"{speed} deg/s" in texts for speed in speeds] == [True] * len(speeds)
 
 
 def test_lines_of_a_figure_have_as_many_points_as_pixels(tmp_path: Path) -> None:
