@@ -12,6 +12,7 @@ import io
 import sys
 import unicodedata
 import warnings
+from collections.abc import Callable
 from typing import Any, NoReturn
 
 import click
@@ -63,9 +64,6 @@ GROUPS = {
     },
 }
 """Commands with their summaries, as --help shows them."""
-
-SUMMARIES = {name: text for part in GROUPS.values() for name, text in part.items()}
-"""Command to summary. The command ``x`` is ``x`` of the module ``x``."""
 
 RENAMED = {
     "trace": "joint trace",
@@ -178,36 +176,47 @@ def _renamed(old: str, ctx: click.Context) -> click.UsageError:
     return click.UsageError(f"masrel {old} is now masrel {RENAMED[old]}", ctx)
 
 
-class AllCommands(Commands):
-    """All of ``masrel``: a command is imported only when it is called."""
+class ListedCommands(Commands):
+    """A group with a list of its commands: one is imported only when it is called."""
+
+    def __init__(
+        self,
+        *args: Any,
+        parts: dict[str, dict[str, str]],
+        place: Callable[[str], str],
+        **attrs: Any,
+    ) -> None:
+        # parts: titles, names and summaries, as --help shows them; place: the module
+        # of a command
+        super().__init__(*args, **attrs)
+        self.parts, self.place = parts, place
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
         """Return every name."""
-        return list(SUMMARIES)
+        return [name for part in self.parts.values() for name in part]
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return a command and what is left to it; say what an old one is called."""
         for old in (" ".join(args[:2]), args[0]):
-            if old in RENAMED and args[0] not in SUMMARIES:
+            if old in RENAMED and args[0] not in self.list_commands(ctx):
                 raise _renamed(old, ctx)
         return super().resolve_command(ctx, args)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import a command."""
-        if cmd_name not in SUMMARIES:
+        known = self.list_commands(ctx)
+        if cmd_name not in known:
             if ctx.resilient_parsing:  # as it is where a shell completes names
                 return None
             from difflib import get_close_matches  # loaded only for an error
 
-            near = get_close_matches(cmd_name, SUMMARIES, n=1)
+            near = get_close_matches(cmd_name, known, n=1)
             hint = f" Did you mean '{near[0]}'?" if near else ""
             ctx.fail(f"No such command '{cmd_name}'.{hint}")
-        package = "masrel.cli" if cmd_name in _STATISTICS else "masrel.lab.cli"
-        command: click.Command = getattr(
-            importlib.import_module(f"{package}.{cmd_name}"), cmd_name
-        )
+        module = importlib.import_module(self.place(cmd_name))
+        command: click.Command = getattr(module, cmd_name)
         return command
 
     def format_commands(
@@ -216,12 +225,19 @@ class AllCommands(Commands):
         formatter: click.HelpFormatter,
     ) -> None:
         """List the summaries, so that --help imports no command."""
-        for title, commands in GROUPS.items():
+        for title, commands in self.parts.items():
             with formatter.section(title):
                 formatter.write_dl(list(commands.items()))
 
 
-cli = AllCommands(
+def _module_of(command: str) -> str:
+    place = "masrel.cli" if command in _STATISTICS else "masrel.lab.cli"
+    return f"{place}.{command}"
+
+
+cli = ListedCommands(
+    parts=GROUPS,
+    place=_module_of,
     context_settings={"help_option_names": ["-h", "--help"]},
     add_help_option=False,
     help="\b\nAgreement of any file of ratings, and studies on a simulator of "

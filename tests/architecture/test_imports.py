@@ -64,6 +64,14 @@ def test_sub_packages_come_on_first_use() -> None:
     assert "numpy" in loaded_after("import masrel\nmasrel.lab.elbow.STANDARD_MODELS")
 
 
+@pytest.mark.parametrize(
+    "group", ["joint", "record", "paper", "schedule", "status", "train"]
+)
+def test_a_group_lists_its_commands_without_numpy(group: str) -> None:
+    code = f"from masrel.cli import cli\ncli([{group!r}, '--help'])"
+    assert loaded_after(code) & HEAVY == set()
+
+
 def test_the_pages_load_their_server_only_when_they_are_served() -> None:
     libraries = {"starlette", "uvicorn", "segno", "anyio", "jinja2"}
     code = "from masrel.lab.cli import serve\nserve.serve(['--help'])"

@@ -10,27 +10,36 @@ import click
 
 import masrel
 from masrel._files import write_file
-from masrel.cli import Commands
+from masrel.cli import ListedCommands
 from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.cli._paths import InputFile, refuse_inputs
 from masrel.errors import ParameterError
 from masrel.lab._bounded_files import MAX_SMALL, parse_toml, read_regular
-from masrel.lab.cli._fit import fit, friction
-from masrel.lab.cli._joints import tardieu
-from masrel.lab.cli._trace import trace
 
 if TYPE_CHECKING:
     from masrel.lab.elbow import ElbowParameters
     from masrel.tables._tables import Table
 
 
-@click.group("joint", cls=Commands)
+_COMMANDS = {
+    "trace": "Phases, peak torque and samples of stretches of models.",
+    "tardieu": "R2, R1 and their difference, by stretches at three speeds.",
+    "fit": "Identify the joint behind recordings of slow and fast stretches.",
+    "friction": "Fit the friction of a device to recordings of backdriving.",
+    "between": "Put models at even steps between neighbours, to hide standards.",
+}
+_MODULES = {"trace": "_trace", "tardieu": "_joints", "between": "joint"}
+
+
+@click.group(
+    "joint",
+    cls=ListedCommands,
+    parts={"Commands": _COMMANDS},
+    place=lambda name: f"masrel.lab.cli.{_MODULES.get(name, '_fit')}",
+)
 def joint() -> None:
     """Traces of joints, joints of recordings, and models between models."""
 
-
-for _command in (trace, tardieu, fit, friction):
-    joint.add_command(_command)
 
 _PLACES = ("name", "from", "to", "way", "file")  # what JSON says beside the content
 _RULE = (
@@ -49,7 +58,7 @@ class _Source:
     simulated: bool  # whether it comes from simulated recordings
 
 
-@joint.command("between")
+@click.command("between")
 @click.argument(
     "models", nargs=-1, required=True, metavar="MODEL MODEL...", type=InputFile()
 )
@@ -77,7 +86,7 @@ class _Source:
     json="Write everything as JSON here; - prints it, and nothing else, on stdout.",
     makes_folder=True,
 )
-def _between(
+def between(
     models: tuple[str, ...],
     n_models: int,
     folder: Path | None,

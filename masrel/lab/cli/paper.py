@@ -15,10 +15,10 @@ from masrel.lab.cli._study_options import (
     several,
     warnings_as_notes,
 )
-from masrel.lab.protocol import Protocol, StudyPaths
 
 if TYPE_CHECKING:
     from masrel.lab.paper import SheetDifference
+    from masrel.lab.protocol import Protocol, StudyPaths
 
 
 @click.group("paper", cls=Commands)
@@ -34,8 +34,8 @@ def paper() -> None:
 )
 @click.option("--site", "sites", multiple=True, help="Id of a site; default: all.")
 def _print(
-    paths: StudyPaths,
-    protocol: Protocol,
+    paths: "StudyPaths",
+    protocol: "Protocol",
     raters: tuple[str, ...],
     sessions: tuple[str, ...],
     sites: tuple[str, ...],
@@ -76,8 +76,8 @@ _sheet_options = several(
 )
 @click.option("--device", help="What presented the models; default: none.")
 def _enter(
-    paths: StudyPaths,
-    protocol: Protocol,
+    paths: "StudyPaths",
+    protocol: "Protocol",
     file: Path,
     rater: str,
     session: str,
@@ -114,8 +114,8 @@ def _enter(
 @paper.command("again")
 @_sheet_options
 def _again(
-    paths: StudyPaths,
-    protocol: Protocol,
+    paths: "StudyPaths",
+    protocol: "Protocol",
     file: Path,
     rater: str,
     session: str,

@@ -1,7 +1,7 @@
 """``masrel record``: what somebody states of a study, with who says so."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -9,8 +9,10 @@ from masrel.cli import Commands
 from masrel.cli._options import Decorator
 from masrel.errors import ParameterError
 from masrel.lab.cli._study_options import id_option, of_study, session_option, several
-from masrel.lab.conduct._statements import SEVERITIES, NoteKind, Standing
-from masrel.lab.protocol import Protocol, StudyPaths
+
+if TYPE_CHECKING:
+    from masrel.lab.conduct._statements import NoteKind, Standing
+    from masrel.lab.protocol import Protocol, StudyPaths
 
 
 @click.group("record", cls=Commands)
@@ -37,8 +39,8 @@ def _of_session(*options: Decorator) -> Decorator:
     return several(of_study, id_option, session_option, *options, _who, _why)
 
 
-def _add_note(kind: NoteKind, text: str, *options: Decorator) -> None:
-    def command(study: StudyPaths, protocol: Protocol, **fields: Any) -> None:
+def _add_note(kind: "NoteKind", text: str, *options: Decorator) -> None:
+    def command(study: "StudyPaths", protocol: "Protocol", **fields: Any) -> None:
         from masrel.lab.conduct import record_note
 
         record_note(study, protocol, kind=kind, **fields)
@@ -61,7 +63,7 @@ _add_note(
 _add_note(
     "adverse-event",
     "Record TEXT, an adverse event, as a note is recorded.",
-    click.option("--severity", type=click.Choice(SEVERITIES)),
+    click.option("--severity", metavar="mild|moderate|severe"),
     click.option("--action", help="What was done about it."),
     click.option("--outcome", help="What came of it."),
 )
@@ -79,8 +81,8 @@ def _or_missing(text: str) -> str | None:
     ),
 )
 def _correct(
-    study: StudyPaths,
-    protocol: Protocol,
+    study: "StudyPaths",
+    protocol: "Protocol",
     rater: str,
     session: str,
     grade: str,
@@ -100,8 +102,8 @@ def _correct(
 @record.command("skip")
 @_of_session(_code)
 def _skip(
-    study: StudyPaths,
-    _: Protocol,
+    study: "StudyPaths",
+    _: "Protocol",
     rater: str,
     session: str,
     code: str,
@@ -129,8 +131,8 @@ def _skip(
     click.option("--code", help="Of which presentation."),
 )
 def _answer(
-    study: StudyPaths,
-    protocol: Protocol,
+    study: "StudyPaths",
+    protocol: "Protocol",
     rater: str,
     session: str,
     answer: str,
@@ -160,8 +162,8 @@ def _say_corrected(what: str, now: str | None, log: Path) -> None:
 @click.argument("values", metavar="FIELD=VALUE...", nargs=-1, required=True)
 @_who
 def _set(
-    study: StudyPaths,
-    protocol: Protocol,
+    study: "StudyPaths",
+    protocol: "Protocol",
     rater: str,
     values: tuple[str, ...],
     who: str,
@@ -186,9 +188,9 @@ def _set(
     click.echo(f"{', '.join(by_field)} of {rater} recorded: {study.conduct_file}")
 
 
-def _add_standing(name: str, standing: Standing, words: str, text: str) -> None:
+def _add_standing(name: str, standing: "Standing", words: str, text: str) -> None:
     def command(
-        study: StudyPaths, protocol: Protocol, rater: str, **reasons: Any
+        study: "StudyPaths", protocol: "Protocol", rater: str, **reasons: Any
     ) -> None:
         from masrel.lab.conduct import record_standing
 
@@ -229,8 +231,8 @@ _add_standing(
 @click.option("--who", required=True, help="Who is to know.")
 @_why
 def _unblind(
-    study: StudyPaths,
-    protocol: Protocol,
+    study: "StudyPaths",
+    protocol: "Protocol",
     code: str | None,
     every: bool,
     **fields: Any,

@@ -11,12 +11,11 @@ from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.errors import SessionLogError
 from masrel.lab._once import read_once
 from masrel.lab.cli._study_options import of_study
-from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.protocol._values import field_heading
 
 if TYPE_CHECKING:
     from masrel.lab._event_log import Event
     from masrel.lab.progress import RaterProgress, SessionProgress
+    from masrel.lab.protocol import Protocol, StudyPaths
     from masrel.tables._tables import Table
 
 
@@ -32,7 +31,7 @@ def status() -> None:
 @read_once()
 @of_study
 @output_options(json="Write it as JSON here; - prints it, and nothing else.")
-def _study(paths: StudyPaths, protocol: Protocol, output: OutputOptions) -> None:
+def _study(paths: "StudyPaths", protocol: "Protocol", output: OutputOptions) -> None:
     """Say how far STUDY is: every session, what happened beside them, one next step.
 
     By the logs alone, whose chains are verified; no recording is read, nothing is
@@ -159,7 +158,7 @@ def _minute(time_utc: str) -> str:
     json="Write the list here; - prints it, and nothing else.",
     csv="Print the list as CSV.",
 )
-def _raters(paths: StudyPaths, protocol: Protocol, output: OutputOptions) -> None:
+def _raters(paths: "StudyPaths", protocol: "Protocol", output: OutputOptions) -> None:
     """List the raters of STUDY: how far each came, and what is known of him or her."""
     from masrel.lab.progress import rater_progress, session_progress
 
@@ -187,6 +186,7 @@ def _raters(paths: StudyPaths, protocol: Protocol, output: OutputOptions) -> Non
 def _raters_table(
     raters: "tuple[RaterProgress, ...]", protocol: "Protocol", *, simulated: bool
 ) -> "Table":
+    from masrel.lab.protocol._values import field_heading
     from masrel.tables._tables import Column, Table
 
     has_sites = any(rater.site for rater in raters)

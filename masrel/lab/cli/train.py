@@ -16,9 +16,9 @@ from masrel.lab.cli._study_options import (
     of_study,
     warnings_as_notes,
 )
-from masrel.lab.protocol import Protocol, StudyPaths, scale_of
 
 if TYPE_CHECKING:
+    from masrel.lab.protocol import Protocol, StudyPaths
     from masrel.lab.run import GradeSource
     from masrel.lab.training import Lesson
 
@@ -40,8 +40,8 @@ def train() -> None:
 @clock_option
 @output_options(quiet="No closing line.")
 def _train(
-    paths: StudyPaths,
-    protocol: Protocol,
+    paths: "StudyPaths",
+    protocol: "Protocol",
     rater: str,
     grades: Literal["console", "simulated"],
     clock: Literal["real", "simulated"] | None,
@@ -82,9 +82,10 @@ def _show_grade(lesson: "Lesson") -> None:
 
 
 def _source(
-    grades: Literal["console", "simulated"], protocol: Protocol
+    grades: Literal["console", "simulated"], protocol: "Protocol"
 ) -> "GradeSource":
     if grades == "console":
+        from masrel.lab.protocol import scale_of
         from masrel.lab.run import ConsoleGrades
 
         return ConsoleGrades(scale_of(protocol))
@@ -109,8 +110,8 @@ def _source(
     csv="The learning curve as CSV, every digit kept.",
 )
 def _show(
-    paths: StudyPaths,
-    protocol: Protocol,
+    paths: "StudyPaths",
+    protocol: "Protocol",
     rater: str,
     level: float,
     page: Path | None,
