@@ -83,29 +83,9 @@ def outputs_over_records(bench: Bench) -> None:
     assert contents(bench.study) == before
 
 
-def two_studies_from_one_template(bench: Bench) -> None:
-    sheets = []
-    for name in ("a", "b"):
-        root = bench.study.parent / name
-        assert bench.masrel("init", root).code == 0
-        assert bench.masrel("schedule", root).code == 0
-        sheets.append((root / "schedules" / "test_R1_sheet.csv").read_bytes())
-        assert (root / "schedules").stat().st_mode & 0o077 == 0
-    assert sheets[0] != sheets[1]
-
-
 def a_presentation_that_always_faults(bench: Bench) -> None:
     bench.edit("protocol.toml", "torque_limit_nm = 20.0", "torque_limit_nm = 19.1")
     assert "HM4" in bench("check", code=2).err
-
-
-def one_changed_number(bench: Bench) -> None:
-    bench.edit("protocol.toml", "catch_travel_deg = 10.0", "catch_travel_deg = 12.0")
-    said = bench("check", code=2).err.splitlines()
-    changed = [line for line in said if "catch_travel_deg" in line]
-    assert len(changed) == 1
-    assert "10" in changed[0]
-    assert "12" in changed[0]
 
 
 def a_protocol_named_as_the_study(bench: Bench) -> None:

@@ -11,7 +11,6 @@ from masrel.lab.analysis._report_numbers import (
     place_summaries,
 )
 from masrel.lab.ratings import Ratings, ratings_from_rows
-from masrel.lab.report._material import sentence
 from masrel.scales import MODIFIED_ASHWORTH
 from tests.lab.analysis.studies import protocol_with
 
@@ -59,11 +58,9 @@ def test_the_interval_is_students_t_over_raters() -> None:
         for rater in of
     }
     later = {"R1": ("HM3", "HM4"), "R2": ("HM2", "HM1"), "R3": ("HM4", "HM3")}
+    half = {True: 0.5, False: -0.5}
     by_rater = [
-        sum(
-            deviation[rater, model] * (0.5 if model in last else -0.5)
-            for model in steps
-        )
+        sum(deviation[rater, model] * half[model in last] for model in steps)
         for rater, last in later.items()
     ]
     place = effects(rows)["place"]
@@ -172,9 +169,3 @@ def test_places_are_counted_in_quarters_and_halves() -> None:
         (1, 1, 2, 2),
         (2, 3, 4, 2),
     ]
-
-
-def test_every_kind_of_effect_has_its_words() -> None:
-    kinds = ("place", "neighbour", "again", "session")
-    texts = {sentence("order", kind, first="A", last="B") for kind in kinds}
-    assert len(texts) == 4
