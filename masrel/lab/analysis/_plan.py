@@ -34,12 +34,11 @@ from masrel.lab.protocol import (
 from masrel.lab.ratings import (
     GivenAnswer,
     InPerson,
+    Rating,
     Ratings,
-    RetestPairs,
     answers_csv,
     rating_matrix,
     ratings_csv,
-    ratings_from_rows,
     retest_pairs,
 )
 
@@ -203,20 +202,15 @@ def unanswered(line: EstimatePlan, protocol: Protocol) -> str | None:
     """Return why there is no estimate even once every rating is there, or None."""
     # whatever the grades; they are random ones here
     grades, rng = protocol.scale.grades, random.Random(line.id)
-    rows = [
-        {
-            "session": session.id,
-            "rater": rater,
-            "model": model.id,
-            "repeat": repeat,
-            "grade": rng.choice(grades),
-        }
+    rows = tuple(
+        Rating(session.id, rater, model.id, repeat, rng.choice(grades))
         for session in protocol.sessions
         for rater in session.raters
         for model in protocol.models
         for repeat in range(1, protocol.schedule.repeats + 1)
-    ]
-    whole = ratings_from_rows(rows, scale_of(protocol))
+    )
+    scale = scale_of(protocol)
+    whole = Ratings(rows=rows, scale=scale, source_path=None, simulated=False)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MasrelWarning)
         try:
@@ -281,44 +275,30 @@ def _retest(
     if not pairs.raters:
         reason = f"no rater has ratings in both {first} and {second}"
         return PlannedEstimate(line=line, reason=reason)
-    over_raters = coefficient(line.coefficient).shape == "pairs"
-    compute = _over_raters if over_raters else _each_rater
-    estimate, by_rater = compute(line, protocol, pairs)
+    scale, estimate = scale_of(protocol), None
+    weighed = [scale.weigh(of_rater) for of_rater in pairs.pairs]
+    if coefficient(line.coefficient).shape == "pairs":
+        estimate = _compute(line, protocol, weighed, line.id)
+        by_rater = [
+            cohen_kappa(of_rater, categories=scale.values, weights=line.weights)
+            for of_rater in weighed
+        ]
+    else:
+        by_rater = [
+            _compute(line, protocol, of_rater, f"{line.id}/{rater}")
+            for rater, of_rater in zip(pairs.raters, weighed, strict=True)
+        ]
     return PlannedEstimate(
         line=line,
         items=pairs.items,
         raters=pairs.raters,
         n_missing=pairs.n_missing,
         estimate=estimate,
-        by_rater=by_rater,
+        by_rater=tuple(
+            RaterEstimate(rater=rater, estimate=of_rater)
+            for rater, of_rater in zip(pairs.raters, by_rater, strict=True)
+        ),
     )
-
-
-def _over_raters(
-    line: EstimatePlan, protocol: Protocol, pairs: RetestPairs
-) -> tuple[Estimate, tuple[RaterEstimate, ...]]:
-    scale = scale_of(protocol)
-    weighed = [scale.weigh(of_rater) for of_rater in pairs.pairs]
-    estimate = _compute(line, protocol, weighed, line.id)
-    by_rater = [
-        cohen_kappa(of_rater, categories=scale.values, weights=line.weights)
-        for of_rater in weighed
-    ]
-    return estimate, tuple(
-        RaterEstimate(rater=rater, estimate=of_rater)
-        for rater, of_rater in zip(pairs.raters, by_rater, strict=True)
-    )
-
-
-def _each_rater(
-    line: EstimatePlan, protocol: Protocol, pairs: RetestPairs
-) -> tuple[None, tuple[RaterEstimate, ...]]:
-    scale, by_rater = scale_of(protocol), []
-    for rater, grades in zip(pairs.raters, pairs.pairs, strict=True):
-        purpose = f"{line.id}/{rater}"
-        estimate = _compute(line, protocol, scale.weigh(grades), purpose)
-        by_rater.append(RaterEstimate(rater=rater, estimate=estimate))
-    return None, tuple(by_rater)
 
 
 def _compute(
