@@ -5,6 +5,7 @@ import hmac
 import itertools
 import os
 import stat
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from masrel.lab.schedule import (
     schedule_problems,
     write_schedules,
 )
-from tests.lab.internal.schedule.test_stream import words_from
+from tests.lab.internal.schedule.test_stream import words_from, words_of
 from tests.lab.schedule.studies import SECRET, protocol_of, with_secret
 
 MODELS = ("HM1", "HM2", "HM3", "HM4", "D01", "D02", "D03", "D04")
@@ -54,6 +55,48 @@ def shuffled(words: Iterator[int]) -> list[str]:
 def coded(words: Iterator[int]) -> Iterator[str]:
     for word in words:
         yield f"{word % 1800 // 18:02d}{LETTERS[word % 1800 % 18]}"
+
+
+def attack(sheet: list[str], rater: str, seeds: range) -> list[str] | None:
+    """The order behind a sheet, by trying seeds; None when no seed gives the codes."""
+    for seed in seeds:
+        tried = coded(words_of(f'["masrel",{seed},"codes","test","{rater}"]'))
+        if all(code == next(tried) for code in sheet):
+            return shuffled(words_of(f'["masrel",{seed},"schedule","test","{rater}"]'))
+    return None
+
+
+def test_the_attack_recovers_the_order_of_a_draw_from_the_seed_alone() -> None:
+    drawn = draw_schedule(protocol_of(models=MODELS, seed=20240), "R1", "test")
+    assert attack(codes(drawn), "R1", range(30_000)) == order(drawn)
+
+
+def test_the_attack_recovers_nothing_of_a_draw_from_a_secret(tmp_path: Path) -> None:
+    # The seed is among those that are tried: it stands in the protocol.
+    study, protocol = StudyPaths(tmp_path), protocol_of(models=MODELS, seed=20240)
+    write_schedules(protocol, study)
+    sheet = sheet_codes(study, "R1")
+    assert attack(sheet, "R1", range(30_000)) is None
+
+
+def test_codes_say_nothing_about_the_order_over_secrets() -> None:
+    # Over 6000 secrets the order of 3 models and the rank order of their codes are a
+    # table of 6 by 6 with 166.7 expected in each cell: chi-square with 35 degrees of
+    # freedom is above 85.6 with probability 5e-6. Secrets are fixed.
+    protocol, counts = protocol_of(models=("A", "B", "C")), Counter()
+    for number in range(6000):
+        secret = hashlib.sha256(str(number).encode()).digest()[:16]
+        drawn = draw_schedule(protocol, "R1", "test", secret=secret)
+        ranks = tuple(sorted(range(3), key=codes(drawn).__getitem__))
+        counts[tuple(order(drawn)), ranks] += 1
+    expected = 6000 / 36
+    chi_square = sum(
+        (counts[cell] - expected) ** 2 / expected
+        for cell in itertools.product(
+            itertools.permutations("ABC"), itertools.permutations(range(3))
+        )
+    )
+    assert chi_square < 85.6
 
 
 # The test vector of docs/record.md, from HMAC-SHA256 and PCG64 in Python integers.
