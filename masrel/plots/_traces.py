@@ -29,6 +29,8 @@ Quantity = Literal["torque", "angle"]
 
 Against = Quantity | Literal["torque over angle"]
 """What is drawn against time, or against the angle."""
+_NamePlace = tuple[float, float, tuple[float, float], str]
+"""How far up and across, in points; the point that is named, and its name."""
 
 _LABELS: dict[Quantity, str] = {"torque": "torque (N·m)", "angle": "angle (deg)"}
 _CATCH = 1  # position in _PHASES
@@ -183,20 +185,35 @@ def phase_handles(stretches: Sequence[Stretch]) -> list[Line2D]:
 def name_traces(
     axes: Axes, stretches: Sequence[Stretch], quantity: Against, names: Sequence[str]
 ) -> None:
-    """Write names at catches, or ends, above each other where they would overlap."""
-    # over the angle at the ends: the catches of a model are side by side
+    """Write names above catches, or beside ends, where none covers another."""
     axes.autoscale_view()  # otherwise done only when it is drawn
     point = axes.figure.dpi / 72.0
-    left, right = axes.bbox.x0 / point, axes.bbox.x1 / point
-    places = []
+    places: list[_NamePlace] = []
     for name, stretch in zip(names, stretches, strict=False):
+        # over the angle at the ends: the catches of a model are side by side
         begins = int(np.argmax(stretch.phase == _CATCH)) * (quantity in _LABELS)
         x, y = _points(stretch, quantity)[:, begins or -1]
-        places.append(
-            (*(axes.transData.transform((x, y)) / point), x, y, short_name(name))
-        )
+        across, up = axes.transData.transform((x, y)) / point
+        places.append((up, across, (x, y), short_name(name)))
+    places.sort(key=lambda place: place[0])
+    (_above_catches if quantity in _LABELS else _beside_ends)(axes, places)
+
+
+def _beside_ends(axes: Axes, places: Sequence[_NamePlace]) -> None:
+    lowest = -np.inf
+    for up, _, end, name in places:
+        lowest = max(up, lowest + _LINE)
+        axes.annotate(
+            name, end, (4.0, lowest - up), textcoords="offset points",
+            ha="left", va="center", fontsize=_LETTERS, color=GREY,
+        )  # fmt: skip
+
+
+def _above_catches(axes: Axes, places: Sequence[_NamePlace]) -> None:
+    point = axes.figure.dpi / 72.0
+    left, right = axes.bbox.x0 / point, axes.bbox.x1 / point
     taken: list[tuple[float, float, float]] = []  # ends, and bottom, in points
-    for across, up, x, y, name in sorted(places, key=lambda place: place[1]):
+    for up, across, catch, name in places:
         half = 0.5 * _LETTER * len(name) + 1.0
         middle, bottom = min(max(across, left + half), right - half), up + 3.0
         for low, high, other in sorted(taken, key=lambda of: of[2]):
@@ -208,7 +225,7 @@ def name_traces(
                 bottom = other + _LINE
         taken.append((middle - half, middle + half, bottom))
         axes.annotate(
-            name, (x, y), (middle - across, bottom - up), textcoords="offset points",
+            name, catch, (middle - across, bottom - up), textcoords="offset points",
             ha="center", va="bottom", fontsize=_LETTERS, color=GREY, zorder=5,
             bbox={"facecolor": PAGE, "edgecolor": "none", "alpha": 0.8, "pad": 0.3},
         )  # fmt: skip
