@@ -11,6 +11,7 @@ import subprocess
 import unicodedata
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Literal
 
@@ -164,4 +165,15 @@ def test_a_page_can_be_read_in_every_window_and_on_paper(
 
 def words(text: str) -> Counter[str]:
     """Return how often each word is met, however its letters are composed."""
-    return Counter(re.findall(r"\S+", unicodedata.normalize("NFKC", text)))
+    # a line may end after any syllable of Hangul; without a font that has them
+    # Chromium's paper lacks some
+    syllables = "[가-힣]|" if has_hangul() else ""
+    text = unicodedata.normalize("NFKC", text)
+    return Counter(re.findall(rf"{syllables}[^\s가-힣]+", text))
+
+
+@cache
+def has_hangul() -> bool:
+    """Return whether a font here has Hangul."""
+    call = ["fc-list", ":lang=ko", "family"]
+    return bool(shutil.which(call[0]) and subprocess.check_output(call))
