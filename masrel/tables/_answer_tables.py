@@ -474,7 +474,10 @@ def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> "Drawn":
             "--figure: shows coefficients of agreement, got only estimates in the "
             "units of the ratings"
         )
-    population = _POPULATIONS[target]
+    intervals = [row.estimate.interval for row in rows if row.estimate.interval]
+    targets = {interval.target for interval in intervals}
+    # the axis has the population of all, as of an ICC for other items and raters
+    common = targets.pop() if len(targets) == 1 else target
     several = len({row.group for row in rows}) > 1
     drawn, label = [], "agreement (1 is perfect)"
     for row in rows:
@@ -482,12 +485,11 @@ def agreement_forest(rows: Sequence[AgreementRow], target: Target) -> "Drawn":
         details = []
         if interval := row.estimate.interval:
             details += ["one-sided"] if interval.is_one_sided else []
-            is_other = interval.target != target
+            is_other = interval.target != common
             details += [f"other {_POPULATIONS[interval.target]}"] if is_other else []
         group = row.group if several else ""
         detail = ", ".join(details)
         drawn.append(forest_row(row.title, row.estimate, detail=detail, group=group))
-    intervals = (row.estimate.interval for row in rows)
-    if any(of is not None and of.reason is None for of in intervals):
-        label += f"; intervals for other {population}"
+    if any(interval.reason is None for interval in intervals):
+        label += f"; intervals for other {_POPULATIONS[common]}"
     return Drawn(FOREST, (tuple(drawn), label))

@@ -64,3 +64,16 @@ def test_the_figure_says_what_the_table_says(masrel: Caller, tmp_path: Path) -> 
     assert "posterior density" in svg
     assert "resamples" not in svg
     assert "SIMULATED" not in svg
+
+
+@pytest.mark.usefixtures("readable")
+def test_the_axis_has_the_population_that_all_intervals_are_for(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    file = tmp_path / "icc.svg"
+    call = ("--coefficients", "icc_a1", "--target", "items")
+    masrel("agree", TABLE_V, *call, "--figure", file)
+    svg = file.read_text("utf-8")
+    # the one interval of ICC(A,1) is not for the items that were asked for alone
+    assert "intervals for other items and raters" in svg
+    assert ">other items and raters<" not in svg
