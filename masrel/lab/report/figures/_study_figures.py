@@ -2,6 +2,7 @@
 
 import math
 import textwrap
+from collections import defaultdict
 from collections.abc import Sequence
 from typing import Any
 
@@ -105,6 +106,11 @@ def _speed_row(
     sessions: Sequence[str],
 ) -> None:
     width = 0.76 / len(sessions)
+    order = {rater: place for place, rater in enumerate(raters)}
+    of_column: defaultdict[tuple[str, str], list[Speed]] = defaultdict(list)
+    known = (speed for speed in speeds.values if speed.rater in order)
+    for speed in sorted(known, key=lambda speed: order[speed.rater]):
+        of_column[speed.session, speed.model].append(speed)
     for column in speeds.by_model:
         if column.name not in models:
             continue
@@ -112,13 +118,7 @@ def _speed_row(
         middle = models.index(column.name) - 0.38 + width * (place + 0.5)
         ends = [middle - 0.45 * width, middle + 0.45 * width]
         axes.plot(ends, [column.mean] * 2, color=BLACK, linewidth=1.6, zorder=2.5)
-        values = [
-            speed
-            for rater in raters
-            for speed in speeds.values
-            if (speed.session, speed.model, speed.rater)
-            == (column.session, column.name, rater)
-        ]
+        values = of_column[column.session, column.name]
         look = _SESSION_LOOKS[place % len(_SESSION_LOOKS)]
         _draw_speeds(axes, values, raters, (middle, 0.9 * width), look)
     names = [short_name(model) for model in models]
