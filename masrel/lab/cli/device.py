@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from tqdm import tqdm
 
-from masrel.cli import Commands
+from masrel.cli._commands import Commands
 from masrel.cli._options import STDOUT, OutputOptions, output_options, write_output
 from masrel.cli._paths import InputFile
 from masrel.lab.cli._study_options import several

@@ -10,7 +10,7 @@ import click
 
 import masrel
 from masrel._files import write_file
-from masrel.cli import ListedCommands
+from masrel.cli._commands import ListedCommands
 from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.cli._paths import InputFile, refuse_inputs
 from masrel.errors import ParameterError

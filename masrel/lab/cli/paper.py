@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli import Commands
+from masrel.cli._commands import Commands
 from masrel.cli._paths import InputFile
 from masrel.lab.cli._study_options import (
     id_option,

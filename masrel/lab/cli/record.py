@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from masrel.cli import Commands
+from masrel.cli._commands import Commands
 from masrel.cli._options import Decorator
 from masrel.errors import ParameterError
 from masrel.lab.cli._study_options import id_option, of_study, session_option, several

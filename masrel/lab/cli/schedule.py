@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli import STUDY, Commands
+from masrel.cli._commands import STUDY, Commands
 from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.lab.cli._study_options import of_study
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli import STUDY, Commands
+from masrel.cli._commands import STUDY, Commands
 from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.errors import SessionLogError
 from masrel.lab._once import read_once

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from masrel._files import write_file
-from masrel.cli import STUDY, Commands
+from masrel.cli._commands import STUDY, Commands
 from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.cli._paths import OutputFile
 from masrel.lab.cli._study_options import (
