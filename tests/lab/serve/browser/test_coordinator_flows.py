@@ -77,15 +77,15 @@ def test_a_page_loaded_again_shows_the_session_that_runs(stage: Stage) -> None:
 
 def test_an_emergency_stop_of_the_coordinator(slow_stage: Stage) -> None:
     coordinator, rater = slow_stage.coordinator, start(slow_stage)
-    empty = coordinator.page.evaluate("document.getElementById('live').toDataURL()")
+    sight = "document.getElementById('live').toDataURL()"
+    empty = coordinator.page.evaluate(sight)
     rater.begin()
+    # the arm is seen as it moves; only then is it stopped
+    coordinator.page.wait_for_function(f"empty => {sight} !== empty", arg=empty)
     press(coordinator.page, "Emergency stop")
     rater.wait_for("fault")
     sees(coordinator, "coordinator's page")
     assert slow_stage.kinds()[-1] == "fault"
-    # the arm was seen as it moved
-    drawn = coordinator.page.evaluate("document.getElementById('live').toDataURL()")
-    assert drawn != empty
     form(coordinator.page, "New address for a tablet")
     coordinator.page.locator("img.qr").wait_for()
     assert broken(coordinator) == []
