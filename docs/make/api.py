@@ -16,31 +16,18 @@ MODULES = (
     "masrel.intervals",
     "masrel.audit",
     "masrel.planning",
+    "masrel.ratings",
+    "masrel.plots",
+    "masrel.scales",
+    "masrel.estimates",
+    "masrel.errors",
+    "masrel.lab",
     "masrel.lab.elbow",
     "masrel.lab.elbow.tone",
     "masrel.lab.elbow.identification",
     "masrel.lab.hess",
     "masrel.lab.hess.puck",
-    "masrel.lab.protocol",
-    "masrel.lab.schedule",
-    "masrel.lab.conduct",
-    "masrel.lab.run",
-    "masrel.lab.training",
-    "masrel.lab.paper",
-    "masrel.lab.progress",
-    "masrel.ratings",
-    "masrel.lab.ratings",
-    "masrel.lab.analysis",
-    "masrel.lab.verification",
-    "masrel.lab.merging",
-    "masrel.lab.report",
-    "masrel.lab.checklist",
-    "masrel.lab.export",
-    "masrel.plots",
-    "masrel.scales",
-    "masrel.estimates",
     "masrel.lab.recording",
-    "masrel.errors",
 )
 
 
@@ -53,6 +40,8 @@ def page() -> str:
         "`help(name)` has the rest:",
         "parameters with shapes and units, every error, the source of the formula, an "
         "example that runs.",
+        "",
+        "Other packages of the laboratory serve its commands; their names may change.",
     ]
     for name in MODULES:
         module = importlib.import_module(name)

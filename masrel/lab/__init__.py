@@ -8,25 +8,48 @@ and two libraries that know nothing of studies::
 
     elbow       the spastic joint: events, torque, traces
     hess        the driver of the simulator, on a simulated device by default
+
+Its interface is the command line, the files, these two libraries, recordings, and what
+is exported here. Names of the other packages serve its commands, and may change.
 """
 
 import importlib
-from types import ModuleType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from masrel.lab.analysis import analyze
+    from masrel.lab.protocol import StudyPaths, read_protocol
+    from masrel.lab.ratings import read_study_data
+    from masrel.lab.report import write_report
+    from masrel.lab.run import SimulatedGrades, run_session
+
+_HOMES = {
+    "SimulatedGrades": "run",
+    "StudyPaths": "protocol",
+    "analyze": "analysis",
+    "read_protocol": "protocol",
+    "read_study_data": "ratings",
+    "run_session": "run",
+    "write_report": "report",
+}
 
 __all__ = [
-    "analysis",
+    "SimulatedGrades",
+    "StudyPaths",
+    "analyze",
     "elbow",
     "hess",
-    "protocol",
-    "ratings",
-    "report",
-    "run",
-    "schedule",
+    "read_protocol",
+    "read_study_data",
+    "run_session",
+    "write_report",
 ]
 
 
-def __getattr__(name: str) -> ModuleType:
-    # Packages are loaded on first use (PEP 562): importing masrel.lab costs nothing.
+def __getattr__(name: str) -> object:
+    # All is loaded on first use (PEP 562): importing masrel.lab costs nothing.
+    if name in _HOMES:
+        return getattr(importlib.import_module(f"masrel.lab.{_HOMES[name]}"), name)
     if name in __all__:
         return importlib.import_module(f"masrel.lab.{name}")
     raise AttributeError(f"module 'masrel.lab' has no attribute {name!r}")
