@@ -1,7 +1,6 @@
-"""Bootstrap intervals beside other packages: time and memory.
+"""Bootstrap intervals beside scipy's: time and memory.
 
-Part of ``python -m docs.make.benchmarks.intervals``. Peers that are not
-installed are left out.
+Part of ``python -m docs.make.benchmarks.intervals``.
 """
 
 import time
@@ -14,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.intervals import bootstrap
-from tests.benchmarks.peers import present
 from tests.benchmarks.sidebyside import Timing, peak_megabytes, side_by_side
 
 Codes = NDArray[np.int64]
@@ -52,15 +50,6 @@ def gwet(counts: NDArray[np.int64]) -> float:
     observed = ((counts * (counts - 1)).sum(axis=1) / (r * (r - 1))).mean()
     shares = (counts / r[:, None]).mean(axis=0)
     chance = (shares * (1.0 - shares)).sum() / (counts.shape[1] - 1)
-    return float((observed - chance) / (1.0 - chance))
-
-
-def lean_fleiss(counts: NDArray[np.int64]) -> float:
-    """Fleiss' kappa of complete ratings, in as few numpy calls as it takes."""
-    r = counts[0].sum()
-    observed = ((counts * counts).sum() / len(counts) - r) / (r * (r - 1))
-    shares = counts.sum(axis=0) / (r * len(counts))
-    chance = shares @ shares
     return float((observed - chance) / (1.0 - chance))
 
 
@@ -137,33 +126,6 @@ def scipy_vectorized(
     return tuple(found.confidence_interval)
 
 
-def arch_loop(
-    counts: Codes, formula: Formula, n_resamples: int, seed: int = 1
-) -> tuple[float, ...]:
-    """arch.bootstrap.IIDBootstrap with a Python statistic."""
-    from arch.bootstrap import IIDBootstrap
-
-    found = IIDBootstrap(counts, seed=seed).conf_int(
-        formula, reps=n_resamples, method="percentile"
-    )
-    return tuple(found.ravel())
-
-
-def resample_loop(
-    counts: Codes, formula: Formula, n_resamples: int, seed: int = 1
-) -> tuple[float, ...]:
-    """resample.bootstrap with a Python statistic."""
-    from resample.bootstrap import confidence_interval
-
-    return confidence_interval(  # type: ignore[no-any-return]
-        formula,
-        counts,
-        size=n_resamples,
-        ci_method="percentile",
-        random_state=seed,
-    )
-
-
 def by_items(quick: bool) -> list[Comparison]:
     """10 000 percentile resamples of each coefficient and size, turn by turn."""
     lines = []
@@ -186,14 +148,6 @@ def _compare(
         "scipy, a Python statistic": lambda: scipy_loop(counts, formula, size),
         "scipy, vectorized": lambda: scipy_vectorized(counts, name, size),
     }
-    if name == "fleiss_kappa":
-        works["scipy, the leanest statistic"] = lambda: scipy_loop(
-            counts, lean_fleiss, size
-        )
-    if present(["arch"]):
-        works["arch"] = lambda: arch_loop(counts, formula, size)
-    if present(["resample"]):
-        works["resample"] = lambda: resample_loop(counts, formula, size)
     return Comparison(
         name=f"{name}, {n:,} × {codes.shape[1]}",
         times=side_by_side(works, turns=turns, clock=time.process_time),

@@ -4,11 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from docs.make.benchmarks.parts import write_part
 from tests.benchmarks.bootstrap import OURS, Comparison
-from tests.benchmarks.jackknives import FROM_COUNTS, FROM_RATINGS
 from tests.benchmarks.sidebyside import Timing
 
 
@@ -18,7 +15,6 @@ class Results:
 
     comparisons: Sequence[Comparison]
     exact: Sequence[tuple[str, str, Timing]]
-    jackknives: Mapping[str, Mapping[str, Timing]]
     megabytes: Mapping[str, float]
 
 
@@ -38,7 +34,6 @@ def write_page(
         "",
         *_bootstrap(results),
         *_exact(results),
-        *_jackknife(results),
         *_memory(results),
     ]
     write_part(path, "intervals", text)
@@ -52,10 +47,8 @@ def _bootstrap(results: Results) -> list[str]:
         "### Bootstrap, 10 000 resamples drawn",
         "",
         "A percentile interval of items, from ratings, drawn. "
-        "Each peer is given counts, and calls a Python",
-        "function of one resample; the leanest statistic is all numpy that the formula "
-        "needs, without checks; vectorized, it is of",
-        "many resamples at once.",
+        "`scipy.stats.bootstrap` is given counts, and calls a Python",
+        "function of one resample; vectorized, it is of many resamples at once.",
         "",
         "| study | masrel | " + " | ".join(peers) + " |",
         "|---|---|" + "---|" * len(peers),
@@ -73,7 +66,7 @@ def _bootstrap(results: Results) -> list[str]:
     return [
         *text,
         "",
-        "At 10 000 items peers draw 500 resamples, times 20.",
+        "At 10 000 items scipy draws 500 resamples, times 20.",
         "",
     ]
 
@@ -91,28 +84,6 @@ def _exact(results: Results) -> list[str]:
     return [*text, ""]
 
 
-def _jackknife(results: Results) -> list[str]:
-    text = [
-        "### Jackknife of items",
-        "",
-        "masrel takes ratings and gives the interval. A loop over statsmodels leaves "
-        "out one item at a time and calls",
-        "`fleiss_kappa(aggregate_raters(rest)[0])`, as a matrix of ratings takes, or "
-        "`fleiss_kappa(rest)` of a table that was counted",
-        "beforehand, and stops at the values. At 10 000 items every fiftieth is left "
-        "out, times 50.",
-        "",
-        "| study | masrel | loop from ratings | ratio | loop from counts | ratio |",
-        "|---|---|---|---|---|---|",
-    ]
-    for study, times in results.jackknives.items():
-        cells = [study, _time(times[OURS])]
-        for way in (FROM_RATINGS, FROM_COUNTS):
-            cells += [_time(times[way]), _ratio(times, way, OURS)]
-        text.append("| " + " | ".join(cells) + " |")
-    return [*text, ""]
-
-
 def _memory(results: Results) -> list[str]:
     shown = ", ".join(f"{kind} {mb:.0f} MB" for kind, mb in results.megabytes.items())
     return [
@@ -124,12 +95,6 @@ def _memory(results: Results) -> list[str]:
         "delta method below 50 MB. A million clusters",
         "or rows that nearly all differ take less than 1 GB.",
     ]
-
-
-def _ratio(times: Mapping[str, Timing], peer: str, ours: str) -> str:
-    ratio = times[peer].median / times[ours].median
-    spread = float(np.hypot(times[peer].spread, times[ours].spread))
-    return f"{_number(ratio)} ± {100 * spread:.0f} %"
 
 
 def _number(ratio: float) -> str:

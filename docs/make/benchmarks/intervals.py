@@ -1,4 +1,4 @@
-"""Intervals beside other packages: ratios of time, and memory.
+"""Intervals beside scipy's: ratios of time, and memory.
 
 ``python -m docs.make.benchmarks.intervals [--quick]`` writes its part of
 ``docs/benchmarks.md``. Times gate nothing.
@@ -12,7 +12,6 @@ from pathlib import Path
 import masrel
 from docs.make.benchmarks.interval_page import Results, write_page
 from tests.benchmarks.bootstrap import by_items, exact_cost, memory
-from tests.benchmarks.jackknives import jackknives
 from tests.benchmarks.peers import present
 from tests.benchmarks.sidebyside import one_thread
 
@@ -27,14 +26,13 @@ def main() -> None:
     with warnings.catch_warnings(), one_thread():
         warnings.simplefilter("ignore")
         results = Results(
-            jackknives=jackknives(quick),
             comparisons=by_items(quick),
             exact=exact_cost(quick),
             megabytes=memory(quick),
         )
     if quick:
         return
-    packages = ["numpy", "scipy", "arch", "resample", "statsmodels"]
+    packages = ["numpy", "scipy"]
     machine = f"{platform.machine()}, Python {platform.python_version()}"
     versions = {"masrel": masrel.__version__, **present(packages)}
     write_page(DOCS / "benchmarks.md", results, versions, machine)
