@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from masrel.intervals import estimate
 from masrel.lab.protocol import Training
-from masrel.lab.training import Calibration, Criterion, calibrate, confusion
+from masrel.lab.training import Criterion, calibrate, confusion
+from masrel.lab.training._criterion import Calibration
 from masrel.lab.training._trainees import (
     SKILLS,
     adaptive_weights,

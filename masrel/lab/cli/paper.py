@@ -103,11 +103,12 @@ def _enter(
             on=None if on is None else on.date(),
             device=device or NO_DEVICE,
         )
-    n_missing = entered.n_presentations - entered.n_graded
+    n_graded = len(entered.grades)
+    n_missing = len(entered.presented) - n_graded
     without = f", {n_missing} missing," if n_missing else ""
     click.echo(
-        f"session {session} of {rater} is entered: {entered.n_graded} grades from "
-        f"paper{without} in {entered.log_file}. Then: masrel ratings"
+        f"session {session} of {rater} is entered: {n_graded} grades from paper"
+        f"{without} in {paths.log_file(rater, session)}. Then: masrel ratings"
     )
 
 

@@ -2,7 +2,7 @@
 
 import hashlib
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime, time
 from pathlib import Path
@@ -15,8 +15,8 @@ from masrel._files import check_inside
 from masrel.errors import ParameterError, RatingsError, SessionLogError
 from masrel.lab._event_log import Event, SessionLog, utc_now
 from masrel.lab.conduct._study_log import append_event, stated, study_answers
-from masrel.lab.paper._differences import SheetDifference, sheet_differences
 from masrel.lab.paper._form import (
+    NO_GRADE,
     FilledRow,
     Form,
     TypedSheet,
@@ -25,6 +25,7 @@ from masrel.lab.paper._form import (
     read_typed,
 )
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
+from masrel.lab.protocol._values import Answer
 from masrel.lab.run._around import interval_fields
 from masrel.lab.run._state import FORMAT, FROM_PAPER, SessionState, replay
 from masrel.lab.schedule.sheets import _drawn_schedule
@@ -40,26 +41,32 @@ _DEVICE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EnteredSheet:
-    """What came of entering a sheet.
+class SheetDifference:
+    """A cell in which the second entry of a sheet differs from the log.
 
     Attributes
     ----------
-    rater, session : str
-        Whose sheet.
-    n_presentations : int
-        Presentations on it.
-    n_graded : int
-        Those that have a grade.
-    log_file : Path
-        The log it was entered into.
+    code : str or None
+        Of the presentation; None for a question about the session or the study.
+    column : str
+        ``"grade"``, or the column of a question.
+    first, second : str
+        What the log has and what the second file has; "NA" where that is nothing.
+    file : str
+        Name of the second file.
+    row : int
+        Its row.
+    who : str
+        Who typed it.
     """
 
-    rater: str
-    session: str
-    n_presentations: int
-    n_graded: int
-    log_file: Path
+    code: str | None
+    column: str
+    first: str
+    second: str
+    file: str
+    row: int
+    who: str
 
 
 def enter_sheet(
@@ -73,7 +80,7 @@ def enter_sheet(
     on: date | None = None,
     device: str = NO_DEVICE,
     now: Callable[[], datetime] = utc_now,
-) -> EnteredSheet:
+) -> SessionState:
     """Bring a sheet that was filled in on paper into a session log.
 
     The whole sheet is entered or nothing of it: a process that dies in between goes on
@@ -101,8 +108,8 @@ def enter_sheet(
 
     Returns
     -------
-    EnteredSheet
-        How much there was on it.
+    SessionState
+        Where the session stands, complete.
 
     Raises
     ------
@@ -142,16 +149,8 @@ def enter_sheet(
                 _answer_about_study(study, protocol, row, form.rater, now)
             else:
                 _enter(row, sheet, reasons, state, log)
-        n_presentations = len(form.codes)
-        log.append("complete", {"n_presentations": n_presentations})
-        n_graded = len(replay(log.path, log.events).grades)
-    return EnteredSheet(
-        rater=rater,
-        session=session,
-        n_presentations=n_presentations,
-        n_graded=n_graded,
-        log_file=log_file,
-    )
+        log.append("complete", {"n_presentations": len(form.codes)})
+        return replay(log.path, log.events)
 
 
 def filled_sheet(
@@ -421,3 +420,34 @@ def _reenter(
         before = state.reentered.get((row.code, column))
         if before is None or dict(before.fields) != cell:
             log.append("reentered", cell)
+
+
+def sheet_differences(
+    state: SessionState, of_study: Mapping[tuple[str, str], Answer]
+) -> tuple[SheetDifference, ...]:
+    """Return in what the last second entry of a sheet differs from the logs."""
+    first: dict[tuple[str | None, str], object] = {
+        (code, "grade"): grade for code, grade in state.grades.items()
+    }
+    for (questionnaire, question), answer in of_study.items():
+        first[None, f"{questionnaire}.{question}"] = answer
+    for (questionnaire, question, code), answer in state.answers.items():
+        first[code, f"{questionnaire}.{question}"] = answer
+    differences = [
+        SheetDifference(
+            code=code,
+            column=column,
+            first=_shown(first.get((code, column))),
+            second=_shown(event.fields["value"]),
+            file=str(event.fields["file"]),
+            row=int(str(event.fields["row"])),
+            who=str(event.fields["who"]),
+        )
+        for (code, column), event in state.reentered.items()
+        if event.fields["value"] != first.get((code, column))
+    ]
+    return tuple(sorted(differences, key=lambda each: each.row))
+
+
+def _shown(value: object) -> str:
+    return NO_GRADE if value is None else str(value)

@@ -8,8 +8,9 @@ from masrel.errors import MasrelError, SessionLogError
 from masrel.lab._event_log import Event
 from masrel.lab.conduct import excluded_raters, read_conduct
 from masrel.lab.conduct._study_log import study_answers
-from masrel.lab.paper._differences import StudyAnswers, sheet_differences
+from masrel.lab.paper._entry import sheet_differences
 from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.protocol._values import Answer
 from masrel.lab.run._state import SessionState, read_session
 from masrel.lab.schedule import read_schedule
 
@@ -264,7 +265,9 @@ def _of_skips(study: StudyPaths, log: Path, include: Collection[str]) -> Iterato
 
 
 def _of_second_entries(
-    study: StudyPaths, log: Path, of_study: Mapping[str, StudyAnswers]
+    study: StudyPaths,
+    log: Path,
+    of_study: Mapping[str, Mapping[tuple[str, str], Answer]],
 ) -> Iterator[str]:
     state = _state_of(log)
     of_rater = of_study.get(str(state.header.get("rater")), {})

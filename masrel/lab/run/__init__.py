@@ -9,33 +9,29 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from masrel.lab._event_log import Event, SessionLog, read_log
-    from masrel.lab.run._corrections import (
+    from masrel.lab.run._around import (
         record_answer,
         record_correction,
         record_skip,
     )
     from masrel.lab.run._grade_sources import (
-        GradeCorrection,
         GradeRequest,
         GradeSource,
-        OccasionSource,
         QuestionRequest,
         ScriptGrades,
+        SimulatedGrades,
         Skip,
         StretchGrade,
     )
     from masrel.lab.run._settings import model_controller
-    from masrel.lab.run._simulated_raters import SimulatedGrades
     from masrel.lab.run.console import ConsoleGrades
     from masrel.lab.run.session import SessionSummary, run_session
 
 __all__ = [
     "ConsoleGrades",
     "Event",
-    "GradeCorrection",
     "GradeRequest",
     "GradeSource",
-    "OccasionSource",
     "QuestionRequest",
     "ScriptGrades",
     "SessionLog",
@@ -52,24 +48,22 @@ __all__ = [
 ]
 
 _HOMES = {
-    "masrel.lab.run._corrections": (
+    "masrel.lab.run._around": (
         "record_answer",
         "record_correction",
         "record_skip",
     ),
     "masrel.lab.run._grade_sources": (
-        "GradeCorrection",
         "GradeRequest",
         "GradeSource",
-        "OccasionSource",
         "QuestionRequest",
         "ScriptGrades",
+        "SimulatedGrades",
         "Skip",
         "StretchGrade",
     ),
     "masrel.lab._event_log": ("Event", "SessionLog", "read_log"),
     "masrel.lab.run._settings": ("model_controller",),
-    "masrel.lab.run._simulated_raters": ("SimulatedGrades",),
     "masrel.lab.run.console": ("ConsoleGrades",),
     "masrel.lab.run.session": ("SessionSummary", "run_session"),
 }

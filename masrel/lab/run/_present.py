@@ -6,8 +6,8 @@ import functools
 import hashlib
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from masrel.lab.hess import (
     Clock,
     DeviceLimits,
     EmergencyStop,
-    Fault,
     HandDistribution,
     HumanHand,
     PresentationStatus,
@@ -41,18 +40,18 @@ from masrel.lab.recording import (
     stretches,
     write_recording,
 )
-from masrel.lab.run._grade_sources import GradeRequest
+from masrel.lab.run._grade_sources import (
+    GradeRequest,
+    hand_seed,
+    intended_speeds,
+    key_of,
+    sensor_seed,
+)
 from masrel.lab.run._settings import (
     backend_options,
     device_limits,
     has_simulated_hand,
     model_controller,
-)
-from masrel.lab.run._simulated_raters import (
-    hand_seed,
-    intended_speeds,
-    key_of,
-    sensor_seed,
 )
 from masrel.lab.run._state import Felt
 
@@ -153,13 +152,11 @@ _FORMATS = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Outcome:
-    """What a presentation left."""
+class Outcome(NamedTuple):
+    """What a presentation left, as a log says it, whatever it was for."""
 
-    logged: dict[str, _Facts]  # what a log says of it, whatever it is for
-    fault: Fault | None  # what stopped it, or None
-    fault_fields: dict[str, _Facts]  # what a log says of the fault, if there is one
+    logged: dict[str, _Facts]
+    fault: dict[str, _Facts]  # what stopped it; empty where nothing did
 
 
 def present(
@@ -339,23 +336,18 @@ def _outcome(
     asked_for = protocol.presentation.stretches
     cues = dict(enumerate(asked_for if isinstance(asked_for, tuple) else (), start=1))
     r1_deg, r2_deg = _tardieu_angles(made, cues, recording)
-    fault, felt, fault_fields = None, None, dict[str, _Facts]()
+    felt, fault = None, dict[str, _Facts]()
     if facts["fault"] is None:
         start = math.radians(protocol.stretch.start_deg)
         felt = _felt(made, joint_model(protocol, model), start)
     else:
-        fault = Fault(
-            kind=str(facts["fault_kind"]),
-            message=str(facts["fault"]),
-            time_s=float(facts["fault_time_s"] or 0.0),
-            torque_nm=float(facts["fault_torque_nm"] or 0.0),
-        )
-        fault_fields = {
-            "kind": fault.kind,
-            "words": fault.message,
-            "time_s": fault.time_s,
-            "torque_nm": fault.torque_nm,
-            "last_200_ms": _before(fault, recording),
+        time_s = float(facts["fault_time_s"] or 0.0)
+        fault = {
+            "kind": str(facts["fault_kind"]),
+            "words": str(facts["fault"]),
+            "time_s": time_s,
+            "torque_nm": float(facts["fault_torque_nm"] or 0.0),
+            "last_200_ms": _before(time_s, recording),
         }
     of_each: list[dict[str, _Fact]] = [
         {
@@ -373,7 +365,7 @@ def _outcome(
         # before the catch; None when the arm never moved
         "mean_speed_deg_s": None if speed is None else float(speed),
         "n_missed_ticks": int(facts["n_missed_ticks"] or 0),
-        "fault": None if fault is None else fault.message,
+        "fault": fault.get("words"),
         "simulated": bool(facts["simulated"]),
         "stretches": of_each,
         "ended": str(facts["ended"]),
@@ -384,13 +376,13 @@ def _outcome(
         "r2_deg": r2_deg,
         "grip_lost": None if lost is None else bool(lost),
     }
-    return Outcome(logged=logged, fault=fault, fault_fields=fault_fields)
+    return Outcome(logged, fault)
 
 
-def _before(fault: Fault, recording: Recording) -> str:
+def _before(time_s: float, recording: Recording) -> str:
     # the rows from 200 ms before a fault until the torque was zero, as CSV
     columns = recording.columns
-    first = int(np.searchsorted(columns["time_s"], fault.time_s - _BEFORE_FAULT_S))
+    first = int(np.searchsorted(columns["time_s"], time_s - _BEFORE_FAULT_S))
     lines = [",".join(RECORDING_COLUMNS)]
     for row in range(first, recording.n_samples):
         cells = (

@@ -47,8 +47,7 @@ class Presenter:
         *,
         occasion: str,
         named_by: tuple[str, ...],
-        known_by: tuple[str, ...] = (),
-        kind: Literal["presented", "practised"] = "presented",
+        has_schedule: bool = True,
     ) -> None:
         self._protocol = protocol
         self._grades = grades
@@ -56,10 +55,7 @@ class Presenter:
         self._log = log
         self._occasion = occasion  # what it is for, in messages
         self._named_by = named_by  # fields of a presentation in each of its events
-        self._known_by = known_by  # and those in the event `kind` alone
-        self._kind = kind  # of event that says what was presented
-        self.n_again = 0  # presentations beyond the first
-        self.n_faults = 0
+        self._has_schedule = has_schedule  # that says which model it was
 
     def rate(self, first: GradeRequest) -> StretchGrade | Skip:
         """Present until the grade comes, or nobody wants it any more.
@@ -69,14 +65,13 @@ class Presenter:
         try:
             return self._until_graded(first)
         except SessionStoppedError as error:
-            named = self._fields(first, self._named_by)
-            self._log.append("stopped", {**named, "why": str(error)})
+            fields = {**self._named(first), "why": str(error)}
+            self._log.append("stopped", fields)
             raise
 
     def _until_graded(self, first: GradeRequest) -> StretchGrade | Skip:
         attempt, n_faults = self._attempts_before(first), 0
-        request = dataclasses.replace(first, attempt=attempt + 1)
-        attempt += self._recovered(request)
+        attempt += self._recovered(dataclasses.replace(first, attempt=attempt + 1))
         while True:
             attempt += 1
             request = dataclasses.replace(first, attempt=attempt, n_faults=n_faults)
@@ -84,29 +79,27 @@ class Presenter:
             request = dataclasses.replace(request, status=status)
             self._grades.make_ready(request)
             outcome = self._present(request)
-            n_faults = 0 if outcome.fault is None else n_faults + 1
-            known = ["n_stretches", "ended"]
-            if outcome.fault is None:
-                known += ["felt", "grip_lost"]
+            n_faults = n_faults + 1 if outcome.fault else 0
+            known = ("n_stretches", "ended", "felt", "grip_lost")
             made: dict[str, Any] = {name: outcome.logged[name] for name in known}
             request = dataclasses.replace(
                 request, status=None, n_faults=n_faults, **made
             )
             answer: StretchGrade | Skip | None
-            if outcome.fault is None:
-                answer = self._checked(request, self._grades.grade(request))
+            if outcome.fault:
+                answer = self._after_fault(request, str(outcome.fault["words"]))
             else:
-                answer = self._after_fault(request, outcome.fault.message)
+                answer = self._checked(request, self._grades.grade(request))
             if answer is not None:
                 return answer
 
     def _attempts_before(self, request: GradeRequest) -> int:
         # how often it was presented before this process
-        named = self._fields(request, self._named_by).items()
+        kind, named = _kind_of(request), self._named(request).items()
         before = [
             event
             for event in self._log.events
-            if event.kind == self._kind and named <= event.fields.items()
+            if event.kind == kind and named <= event.fields.items()
         ]
         for event in before:  # a process may have died between the log and this
             file = self._log.path.parent / str(event.fields["recording"])
@@ -133,11 +126,10 @@ class Presenter:
             stop=stop,
             listening=getattr(self._grades, "listening", _at_terminal),
         )
-        self.n_again += request.attempt > 1
         self._log_presented(request, outcome, file)
         if stop.reason in _TERMINATING:
             raise SessionStoppedError(
-                f"{self._occasion} was stopped by {stop.reason} at presentation "
+                f"{self._place(request)} was stopped by {stop.reason} at presentation "
                 f"{request.presentation.position}; the same command goes on there"
             )
         return outcome
@@ -150,18 +142,20 @@ class Presenter:
     def _log_presented(
         self, request: GradeRequest, outcome: Outcome, file: Path
     ) -> None:
-        fields = self._fields(request, self._named_by) | {"attempt": request.attempt}
-        known = self._fields(request, self._known_by)
-        self._log.append(self._kind, {**fields, **known, **outcome.logged})
-        if outcome.fault is not None:
-            self.n_faults += 1
-            self._log.append("fault", {**fields, **outcome.fault_fields})
+        fields = self._named(request) | {"attempt": request.attempt}
+        shown = {"model": request.presentation.model}
+        if self._has_schedule and not request.practice:
+            shown.clear()
+        self._log.append(_kind_of(request), {**fields, **shown, **outcome.logged})
+        if outcome.fault:
+            self._log.append("fault", {**fields, **outcome.fault})
         spool_of(file).unlink(missing_ok=True)  # only now is it of no use
 
-    def _fields(
-        self, request: GradeRequest, names: tuple[str, ...]
-    ) -> dict[str, _Facts]:
-        return {name: getattr(request.presentation, name) for name in names}
+    def _named(self, request: GradeRequest) -> dict[str, _Facts]:
+        return {name: getattr(request.presentation, name) for name in self._named_by}
+
+    def _place(self, request: GradeRequest) -> str:
+        return f"practice of {self._occasion}" if request.practice else self._occasion
 
     def _after_fault(self, request: GradeRequest, fault: str) -> Skip | None:
         answer = self._grades.present_again(request, fault)
@@ -169,8 +163,9 @@ class Presenter:
             return answer
         if not answer:
             raise DeviceError(
-                f"{self._occasion}: presentation {request.presentation.position}, code "
-                f"{request.presentation.code}, was stopped by a fault: {fault}"
+                f"{self._place(request)}: presentation "
+                f"{request.presentation.position}, code {request.presentation.code}, "
+                f"was stopped by a fault: {fault}"
             )
         return None
 
@@ -193,3 +188,8 @@ class Presenter:
                 f"stretch of {code}: needed one of {n_stretches}, from 1, got {stretch}"
             )
         return grade
+
+
+def _kind_of(request: GradeRequest) -> Literal["presented", "practised"]:
+    # of the event that says what was presented
+    return "practised" if request.practice else "presented"

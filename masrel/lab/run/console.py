@@ -10,8 +10,8 @@ from masrel.errors import ParameterError, SessionLogError, SessionStoppedError
 from masrel.lab.protocol import PresentationRules, Question
 from masrel.lab.protocol._values import Answer, checked_answer
 from masrel.lab.run._grade_sources import (
-    GradeCorrection,
     GradeRequest,
+    GradeSource,
     QuestionRequest,
     Skip,
     StretchGrade,
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _CUE_EVERY_S = 0.05  # how often it is looked whether a stretch is over
 
 
-class ConsoleGrades:
+class ConsoleGrades(GradeSource):
     """A person at the console, who is told positions and blinded codes only.
 
     The words ``again`` and ``stop`` in place of a grade present the model again and
@@ -94,12 +94,12 @@ class ConsoleGrades:
                 self._say("To correct a grade: correct CODE GRADE WHY.\n")
                 continue
             try:
-                request.correct(correction)
-                self._say(f"{correction.code} is corrected in the log.\n")
+                request.correct(**correction)
+                self._say(f"{correction['code']} is corrected in the log.\n")
             except (ParameterError, SessionLogError) as error:
                 self._say(f"{error}.\n")
 
-    def _correction(self, rater: str, words: str) -> GradeCorrection | None:
+    def _correction(self, rater: str, words: str) -> dict[str, str | None] | None:
         code, _, rest = words.partition(" ")
         grades = (*self._scale.grades, "NA")  # no scale has such a grade
         begins = [grade for grade in grades if rest.startswith(f"{grade} ")]
@@ -107,9 +107,8 @@ class ConsoleGrades:
         why = rest.removeprefix(grade).strip()
         if not grade or not why:
             return None
-        return GradeCorrection(
-            code=code, grade=None if grade == "NA" else grade, who=rater, why=why
-        )
+        grade_now = None if grade == "NA" else grade
+        return {"code": code, "grade": grade_now, "who": rater, "why": why}
 
     def grade(self, request: GradeRequest) -> str | StretchGrade | None:
         """Ask for the grade until it is one of the scale.

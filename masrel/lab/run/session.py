@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 import masrel
 from masrel._files import check_inside
@@ -27,19 +28,13 @@ from masrel.lab.protocol._values import questions_of
 from masrel.lab.recording import _Fact, _Facts
 from masrel.lab.run._around import (
     ask_questions,
+    correct_in_session,
     days_since,
     interval_fields,
     is_complete,
     last_time,
 )
-from masrel.lab.run._corrections import correct_in_session
-from masrel.lab.run._grade_sources import (
-    GradeCorrection,
-    GradeRequest,
-    GradeSource,
-    Skip,
-    with_occasions,
-)
+from masrel.lab.run._grade_sources import GradeRequest, GradeSource, Skip
 from masrel.lab.run._present import spool_of
 from masrel.lab.run._presenter import CLOCKS, ClockName, Presenter
 from masrel.lab.run._rehearsal import (
@@ -71,12 +66,6 @@ class SessionSummary:
         Presentations of the schedule.
     n_graded : int
         Those that have a grade: all but those skipped or corrected to missing.
-    n_graded_before : int
-        Those already graded when it was started.
-    n_again : int
-        Presentations beyond the first of a code, in this run.
-    n_faults : int
-        Presentations a fault stopped, in this run.
     simulated : bool
         Whether grades or device are simulated.
     n_set_aside : int
@@ -91,9 +80,6 @@ class SessionSummary:
     session: str
     n_presentations: int
     n_graded: int
-    n_graded_before: int
-    n_again: int
-    n_faults: int
     n_set_aside: int
     simulated: bool
     rehearsal: bool
@@ -156,8 +142,8 @@ def run_session(
         If a model asks for more torque than the device may send.
     ParameterError
         If the device or `clock` is unknown or they do not fit each other, the rater
-        was withdrawn, the session may not begin yet or any more, or the source lacks a
-        method that the protocol needs, or gives a grade or an answer that cannot be.
+        was withdrawn, the session may not begin yet or any more, or the source is
+        none, or gives a grade or an answer that cannot be.
     DeviceError
         If the device cannot be used, or faults are not to be tried again.
     SessionStoppedError
@@ -173,6 +159,10 @@ def run_session(
     MasrelWarning
         If the session begins out of order, and the protocol lets it.
     """
+    if not isinstance(grades, GradeSource):
+        raise ParameterError(
+            f"grades: needed a GradeSource, got {type(grades).__name__}"
+        )
     _check_device(clock, protocol)
     refuse_withdrawn(study, rater)
     if rehearsal:
@@ -253,26 +243,19 @@ class _Runner:
         self._study = study
         self._protocol = protocol
         self._schedule = schedule
-        self._grades = with_occasions(grades, protocol)
+        self._grades = grades
         self._clock = clock
         self._log = log
         self._now = now
         self._state: SessionState = replay(log.path, log.events)
         self._practice = practice_presentations(protocol)
-        occasion = f"session {schedule.session} of {schedule.rater}"
-        named_by = ("code", "position")
         self._presenter = Presenter(
-            protocol, grades, clock, log, occasion=occasion, named_by=named_by
-        )
-        self._practice_presenter = Presenter(
             protocol,
             grades,
             clock,
             log,
-            occasion=f"practice of {occasion}",
-            named_by=named_by,
-            known_by=("model",),  # it has no schedule that says so
-            kind="practised",
+            occasion=f"session {schedule.session} of {schedule.rater}",
+            named_by=("code", "position"),
         )
 
     @property
@@ -370,7 +353,6 @@ class _Runner:
 
     def run(self, progress: Callable[[Presentation], object] | None) -> SessionSummary:
         """Present and ask until every presentation has its grade or is skipped."""
-        n_graded_before = len(self._state.grades)
         if not self._state.is_complete:
             self._prepare()
         for presentation in self._shown:
@@ -385,15 +367,11 @@ class _Runner:
             self._ask(None)
             self._log.append("complete", {"n_presentations": len(self._shown)})
         state = replay(self._log.path, self._log.events)
-        presenters = (self._presenter, self._practice_presenter)
         return SessionSummary(
             rater=self._schedule.rater,
             session=self._schedule.session,
             n_presentations=len(self._shown),
             n_graded=len(state.grades),
-            n_graded_before=n_graded_before,
-            n_again=sum(presenter.n_again for presenter in presenters),
-            n_faults=sum(presenter.n_faults for presenter in presenters),
             n_set_aside=state.n_set_aside,
             simulated=self._is_simulated,
             rehearsal=self._is_rehearsal,
@@ -410,7 +388,7 @@ class _Runner:
             self._log.append("instructed", {"text": text})
         for presentation in self._practice:
             if presentation.code not in self._state.practice.settled:
-                self._rate_by(self._practice_presenter, presentation, "practice-")
+                self._rate_by(presentation, "practice-")
 
     def _take_break(self, presentation: Presentation) -> None:
         occasions, after = self._protocol.occasions, presentation.position - 1
@@ -430,18 +408,16 @@ class _Runner:
         self._log.append("break", fields)
 
     def _rate(self, presentation: Presentation) -> None:
-        if self._rate_by(self._presenter, presentation, ""):
+        if self._rate_by(presentation, ""):
             self._ask(presentation)
 
-    def _rate_by(
-        self, presenter: Presenter, presentation: Presentation, prefix: str
-    ) -> bool:
+    def _rate_by(self, presentation: Presentation, prefix: str) -> bool:
         # whether it was graded, not skipped
         fields: dict[str, _Fact] = {
             "code": presentation.code,
             "position": presentation.position,
         }
-        grade = presenter.rate(self._request(presentation))
+        grade = self._presenter.rate(self._request(presentation))
         if isinstance(grade, Skip):
             reasons = stated(who=grade.who, why=grade.why)
             self._log.append(f"{prefix}skipped", {**fields, **reasons})
@@ -527,9 +503,9 @@ class _Runner:
             last=self._last_grade(),
         )
 
-    def correct(self, correction: GradeCorrection) -> None:
+    def correct(self, **correction: Any) -> None:
         """Correct a grade of the session while it goes on."""
-        correct_in_session(self._log, self._protocol, correction)
+        correct_in_session(self._log, self._protocol, **correction)
 
     def _last_grade(self) -> tuple[str, str | None] | None:
         state = replay(self._log.path, self._log.events)

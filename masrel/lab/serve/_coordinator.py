@@ -1,19 +1,28 @@
-"""What a coordinator's page has done: sessions, what commands record, and long work."""
+"""The coordinator's page: sessions, what commands record, long work, and the report."""
 
 import asyncio
 import contextlib
 import dataclasses
+import json
+import math
 import os
 import re
+import secrets
 import signal
 import sys
-from collections import deque
+from collections import OrderedDict, deque
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import Any
 
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, Response
+
 from masrel.errors import MasrelError, ParameterError
+from masrel.lab._event_log import read_log
 from masrel.lab._once import read_once
 from masrel.lab.conduct import (
     allot_schedules,
@@ -25,10 +34,12 @@ from masrel.lab.conduct import (
 from masrel.lab.conduct._study_log import check_choice, check_rater
 from masrel.lab.progress import next_step, rater_progress, session_progress
 from masrel.lab.protocol import StudyPaths, read_protocol
-from masrel.lab.run import GradeCorrection, record_answer, record_skip
+from masrel.lab.run import record_answer, record_skip
+from masrel.lab.run._rehearsal import last_rehearsal
 from masrel.lab.run._settings import torque_problems
 from masrel.lab.serve._access import Access, qr_svg
 from masrel.lab.serve._manager import SessionManager
+from masrel.lab.serve._role_pages import Pages, SampleTail
 
 Fields = Mapping[str, Any]
 """What a page sends; texts, but for what is either so or not."""
@@ -36,6 +47,9 @@ Fields = Mapping[str, Any]
 JOBS = ("ratings", "report", "verify", "check", "plan")
 """Commands that a coordinator can start from the page."""
 
+_EVERY = 5  # rows of the recording for one point of the live view
+_N_ACTS = 1000  # of which it is known what came of them
+_N_LOG = 200  # events of the running session that are shown
 _N_LINES = 60
 _N_BYTES = 4096
 _LINE_END = re.compile(r"[\r\n]+")  # a bar of progress comes back to where it began
@@ -134,20 +148,16 @@ def needed(fields: Fields, *names: str) -> dict[str, Any]:
     return texts
 
 
-class Coordinator:
-    """What the coordinator of one study does at a page.
+class CoordinatorPages(Pages):
+    """The coordinator's page of one study, and its report."""
 
-    Attributes
-    ----------
-    jobs : Jobs
-        Long work.
-    """
+    role = "coordinator"
 
     def __init__(self, manager: SessionManager, access: Access) -> None:
-        self._manager, self._access = manager, access
+        super().__init__(manager, access)
         self._study = manager.study
-        self.jobs = Jobs(manager.study, manager.note_change)
-        manager.at_close.append(self.jobs.close)
+        self._jobs = Jobs(manager.study, manager.note_change)
+        manager.at_close.append(self._jobs.close)
         self._actions: dict[str, Callable[[Fields], Awaitable[Any]]] = {
             "start": self._start,
             "leave": self._leave,
@@ -155,13 +165,76 @@ class Coordinator:
             "tablet": self._tablet,
             "job": self._job,
         }
+        # what came of each act, by its name and all that its page sent, an id with it
+        self._acts: OrderedDict[str, asyncio.Task[dict[str, Any]]] = OrderedDict()
+        self._overview: dict[str, Any] = {}  # the last one that could be read
 
-    def knows(self, name: str) -> bool:
-        """Return whether there is such an action."""
-        return name in (*self._actions, *ACTIONS)
+    async def _shown(self, request: Request) -> dict[str, Any]:  # noqa: ARG002 - as all
+        # a protocol that is being edited ends no stream of a session that runs
+        problem = {}
+        try:
+            self._overview = await asyncio.to_thread(overview, self._study)
+        except (MasrelError, OSError) as error:
+            if not self._overview:
+                raise
+            problem = {"problem": str(error)}
+        return {
+            "desk": {**self._manager.state(), "notes": self._manager.notes},
+            "jobs": self._jobs.state(),
+            "log": await asyncio.to_thread(self._log),
+            "overview": {**self._overview, **problem},
+        }
 
-    async def act(self, name: str, fields: Fields) -> dict[str, Any]:
-        """Do something, and return in ``text`` what was done."""
+    def _log(self) -> list[dict[str, Any]]:
+        # what is in the log of the session that runs: kinds, codes and times
+        if self._manager.running is None:
+            return []
+        rater, session, is_rehearsal = self._manager.running
+        file: Path | None = self._study.log_file(rater, session)
+        if is_rehearsal:
+            # while one starts, the last one is another rehearsal's
+            starts = self._manager.state()["screen"] == "starting"
+            of_last = last_rehearsal(self._study, rater, session)
+            file = None if starts else of_last
+        with contextlib.suppress(MasrelError, OSError):
+            events = () if file is None else read_log(file)[-_N_LOG:]
+            return [
+                {"event": each.kind, "time_utc": each.time_utc, **_shown(each.fields)}
+                for each in events
+            ]
+        return []
+
+    def _live(self, tail: SampleTail | None) -> tuple[str, Any]:
+        return "live", {"begins": True} if tail is None else _frame(tail)
+
+    async def act(self, request: Request) -> Response:
+        """Do what the page asks, once however often it sends the same."""
+        name, fields = request.path_params["action"], request.state.fields
+        if name == "stop":
+            self._manager.stop("coordinator's page")
+            return JSONResponse({"text": "The emergency stop is pressed."})
+        if name not in (*self._actions, *ACTIONS):
+            raise HTTPException(404)
+        if not isinstance(fields.get("id"), str):  # from no page that sends it again
+            fields["id"] = secrets.token_hex(8)
+        sent = json.dumps([name, fields], sort_keys=True)
+        if sent not in self._acts:
+            acting = self._done(name, fields)
+            self._acts[sent] = asyncio.create_task(acting)
+            if len(self._acts) > _N_ACTS:
+                self._acts.popitem(last=False)
+        return JSONResponse(await asyncio.shield(self._acts[sent]))
+
+    async def report(self, request: Request) -> Response:
+        """Answer with a file of the report that was built."""
+        path = request.path_params["path"]
+        file = await asyncio.to_thread(_report_file, self._study, path)
+        if file is None:
+            raise HTTPException(404)
+        return FileResponse(file)
+
+    async def _done(self, name: str, fields: Fields) -> dict[str, Any]:
+        # what was done, in `text`
         if name in self._actions:
             outcome = await self._actions[name](fields)
             return outcome if isinstance(outcome, dict) else {"text": outcome}
@@ -191,7 +264,7 @@ class Coordinator:
         texts = needed(fields, "code", "grade", *_SIGNED)
         if texts["grade"] == "NA":
             texts["grade"] = None
-        await self._manager.correct(**where, correction=GradeCorrection(**texts))
+        await self._manager.correct(**where, **texts)
         return f"{texts['code']} is corrected; what it was stays in the log."
 
     async def _tablet(self, fields: Fields) -> dict[str, Any]:
@@ -209,10 +282,36 @@ class Coordinator:
         command = needed(fields, "verb")["verb"]
         check_choice("job", command, JOBS)
         if fields.get("cancel") is True:
-            self.jobs.cancel(command)
+            self._jobs.cancel(command)
             return f"{command} is stopped."
-        await self.jobs.start(command)
+        await self._jobs.start(command)
         return f"{command} is started."
+
+
+def _shown(fields: Any) -> dict[str, Any]:
+    # of an event: what says no model and no grade's meaning
+    names = ("code", "position", "attempt", "grade", "kind", "fault", "why", "who")
+    return {name: fields[name] for name in names if fields.get(name) is not None}
+
+
+def _frame(tail: SampleTail) -> dict[str, Any] | None:
+    columns = ("time_s", "angle_deg", "command_torque_nm", "phase")
+    rows = tail.new_rows(*columns, every=_EVERY)
+    seconds, angles, torques, phases = rows.values()
+    if not seconds:
+        return None
+    return {
+        "time_s": [round(value, 3) for value in seconds],
+        "angle_deg": [round(math.degrees(value), 2) for value in angles],
+        "torque_nm": [round(value, 3) for value in torques],
+        "phase": [int(value) for value in phases],
+    }
+
+
+def _report_file(study: StudyPaths, path: str) -> Path | None:
+    folder = (study.root / "report").resolve()
+    file = (folder / (path or "report.html")).resolve()
+    return file if file.is_relative_to(folder) and file.is_file() else None
 
 
 @dataclass(slots=True, eq=False)

@@ -14,13 +14,14 @@ import sys
 import time
 from collections import deque
 from collections.abc import Awaitable, Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from masrel.errors import MasrelError, ParameterError
 from masrel.lab.conduct._study_log import check_choice
 from masrel.lab.protocol import StudyPaths, read_protocol
-from masrel.lab.run import GradeCorrection, record_correction
+from masrel.lab.run import record_correction
 from masrel.lab.run._presenter import ClockName
 from masrel.lab.serve._session_process import MAX_LINE, Message, encoded
 
@@ -271,11 +272,13 @@ class SessionManager:
         self,
         rater: str,
         session: str,
-        correction: GradeCorrection,
         *,
         rehearsal: bool = False,
+        **correction: Any,
     ) -> None:
         """Correct a grade, of the session that runs or of another one.
+
+        What it should have been as `masrel.lab.run.record_correction` takes it.
 
         Raises
         ------
@@ -283,20 +286,20 @@ class SessionManager:
             As `masrel.lab.run.record_correction` raises it, or if a model is presented
             in that session now.
         """
-        running, fields = self._running, asdict(correction)
+        running = self._running
         if self.running != (rater, session, rehearsal) or running is None:
             if rehearsal:
                 raise ParameterError("rehearsal: needed the one that runs to correct")
             protocol = await asyncio.to_thread(read_protocol, self.study.protocol)
             where = (self.study, protocol, rater, session)
-            await asyncio.to_thread(record_correction, *where, **fields)
+            await asyncio.to_thread(record_correction, *where, **correction)
             self.note_change()
             return
         if running.message.get("kind") != "ask":
             raise ParameterError("grade: needed a presentation that is over to correct")
         future = _future()
         running.corrections.append(future)
-        running.send({"kind": "correct", **fields})
+        running.send({"kind": "correct", **correction})
         await asyncio.shield(future)
 
     @property

@@ -1,110 +1,145 @@
-"""What the rater's and the coordinator's page ask of the server, as an application."""
+"""The page of a role, and what is live on it; the rater's page.
+
+The loop writes the samples of a presentation into a file that is mapped into memory and
+was allocated before it began; whoever maps it too reads what is there, and nobody waits
+for anybody.
+"""
 
 import asyncio
 import contextlib
 import json
-import math
-import mimetypes
-import secrets
+import mmap
 import time
 import tomllib
-from collections import OrderedDict
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar
 
-from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import (
-    FileResponse,
     HTMLResponse,
     JSONResponse,
     Response,
     StreamingResponse,
 )
-from starlette.routing import Route
 
 from masrel.errors import MasrelError
-from masrel.lab._event_log import read_log
-from masrel.lab.protocol import StudyPaths, read_protocol
-from masrel.lab.recording import PHASES
-from masrel.lab.run import GradeCorrection
-from masrel.lab.run._rehearsal import last_rehearsal
+from masrel.lab._bounded_files import parse_json
+from masrel.lab.hess._recorder import _HEADER, _WORD
+from masrel.lab.protocol import read_protocol
+from masrel.lab.recording import PHASES, RECORDING_COLUMNS
 from masrel.lab.serve._access import Access, Role
-from masrel.lab.serve._coordinator import Coordinator, overview
-from masrel.lab.serve._live import LiveTail, SampleTail
 from masrel.lab.serve._manager import (
     AnsweredError,
     AnswerRefusedError,
     AskOverError,
     SessionManager,
 )
-from masrel.lab.serve._middleware import Middleware, page
+from masrel.lab.serve._middleware import page
 
 _BEAT_S = 5.0
 """A page takes a stream for lost that says nothing for three times this."""
 
 _FRAME_S = 0.04  # between two looks at the samples
-_EVERY = 5  # rows of the recording for one point of the live view
-_N_ACTS = 1000  # of which it is known what came of them
-_N_LOG = 200  # events of the running session that are shown
 _PRESENTED = ("code", "position", "practice", "again")  # which presentation it is
-_HERE = Path(__file__).parent
-
-
-def make_app(manager: SessionManager, access: Access) -> Middleware:
-    """Return the application: every request passes `Middleware` first."""
-    coordinator = _CoordinatorPages(manager, access)
-    routes = [Route("/report/{path:path}", coordinator.report), _static()]
-    for pages in (_RaterPages(manager, access), coordinator):
-        role = pages.role
-        routes += [
-            Route(f"/{role}", pages.page),
-            Route(f"/{role}/state", pages.state),
-            Route(f"/{role}/events", pages.events),
-            Route(f"/{role}/{{action}}", pages.act, methods=["POST"]),
-        ]
-    kinds = (HTTPException, MasrelError, OSError, Exception)
-    failures = dict.fromkeys(kinds, _failure)
-    return Middleware(Starlette(routes=routes, exception_handlers=failures), access)
-
-
-def _static() -> Route:
-    # Read once: no path of a request reaches the disk.
-    files = {path.name: path.read_bytes() for path in (_HERE / "static").glob("*.*")}
-
-    async def show(request: Request) -> Response:
-        name = request.path_params["name"]
-        if name not in files:
-            raise HTTPException(404)
-        return Response(files[name], media_type=mimetypes.guess_type(name)[0])
-
-    return Route("/static/{name}", show)
-
-
-async def _failure(_: Request, error: Exception) -> Response:
-    status, why = 500, "The server failed; see its terminal."
-    if isinstance(error, HTTPException):
-        status = error.status_code
-        why = "There is no such page." if status == 404 else error.detail
-    elif isinstance(error, MasrelError):
-        status, why = 422, str(error)
-    elif isinstance(error, OSError):
-        why = error.strerror or why
-        why = f"{error.filename}: {why}" if error.filename else why
-    return JSONResponse({"why": why}, status_code=status)
+HERE = Path(__file__).parent
 
 
 @cache
 def words_in(language: str) -> dict[str, Any]:
     """Return the rater's words by what they are for; ``meanings`` by scale, grade."""
-    text = (_HERE / "words" / f"{language}.toml").read_text(encoding="utf-8")
+    text = (HERE / "words" / f"{language}.toml").read_text(encoding="utf-8")
     return tomllib.loads(text)
 
 
-class _Pages:
+class SampleTail:
+    """A file of samples, open for reading while another process writes it.
+
+    Attributes
+    ----------
+    n_stretches_over : int
+        Stretches that are over, as far as rows were read.
+    """
+
+    def __init__(self, file: Path) -> None:
+        with open(file, "rb") as source:
+            self._map = mmap.mmap(source.fileno(), 0, access=mmap.ACCESS_READ)
+        try:
+            facts = parse_json(self._map[:_HEADER])
+            capacity = int(facts["capacity"])
+            n_values = 1 + int(facts["n_columns"]) * capacity
+            if len(self._map) < _HEADER + _WORD * n_values:
+                raise ValueError("it is being allocated")
+        except (ValueError, KeyError, TypeError):
+            self._map.close()
+            raise FileNotFoundError(f"{file}: no samples yet") from None
+        self._values = memoryview(self._map)[_HEADER:].cast("d")
+        starts = range(1, 1 + capacity * len(RECORDING_COLUMNS), capacity)
+        self._starts = dict(zip(RECORDING_COLUMNS, starts, strict=True))
+        self._n_read = 0
+        self._stretch = 0
+        self.n_stretches_over = 0
+
+    def new_rows(self, *columns: str, every: int = 1) -> dict[str, Sequence[float]]:
+        """Return what came since the last call, in the units of the loop (rad, N·m).
+
+        Of every so many rows one, and the last.
+        """
+        first, n = self._n_read, int(self._values[0])
+        rows = [*range(first, n - 1, every), *([n - 1] if n > first else [])]
+        self._n_read = n
+        self._count_stretches(rows)
+        return {
+            name: [self._values[self._starts[name] + row] for row in rows]
+            for name in columns
+        }
+
+    def _count_stretches(self, rows: Sequence[int]) -> None:
+        start = self._starts["stretch"]
+        for row in rows:
+            stretch = int(self._values[start + row])
+            if stretch != self._stretch:
+                self.n_stretches_over = max(
+                    self.n_stretches_over, self._stretch, stretch - 1
+                )
+                self._stretch = stretch
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._values.release()
+        self._map.close()
+
+
+class LiveTail:
+    """The samples of whatever is presented now."""
+
+    def __init__(self) -> None:
+        self._file: Path | None = None
+        self._tail: SampleTail | None = None
+
+    def news(self, file: Path | None) -> Iterator[SampleTail | None]:
+        """Yield None where a presentation begins, and then its samples."""
+        if self._tail is not None:
+            yield self._tail  # also the last ones of one that is over
+            if file != self._file:
+                self.close()
+        elif file is not None:
+            try:
+                self._tail, self._file = SampleTail(file), file
+            except (OSError, ValueError):
+                return
+            yield None
+
+    def close(self) -> None:
+        """Let go of the samples."""
+        if self._tail is not None:
+            self._tail.close()
+        self._file = self._tail = None
+
+
+class Pages:
     """The page of one role: itself, what it shows, and each change of that."""
 
     role: ClassVar[Role]
@@ -178,7 +213,7 @@ def _event_text(kind: str, data: object) -> str:
     return f"event: {kind}\ndata: {json.dumps(data, ensure_ascii=False)}\n\n"
 
 
-class _RaterPages(_Pages):
+class RaterPages(Pages):
     """The rater's page of one study; a tablet sees its own rater's sessions only."""
 
     role = "rater"
@@ -256,8 +291,8 @@ class _RaterPages(_Pages):
         if not isinstance(grade, str) or not isinstance(why, str):
             raise HTTPException(422, "needed a grade, and why it is corrected")
         rater, session, rehearsal = running
-        correction = GradeCorrection(code=last["code"], grade=grade, who=rater, why=why)
-        await self._manager.correct(rater, session, correction, rehearsal=rehearsal)
+        correction = {"code": code, "grade": grade, "who": rater, "why": why}
+        await self._manager.correct(rater, session, rehearsal=rehearsal, **correction)
 
     def _check_own(self, request: Request) -> None:
         # whether what runs is a session of this tablet's rater
@@ -279,106 +314,3 @@ class _RaterPages(_Pages):
         which = {name: state[name] for name in ("server", "version")}
         screen = "other" if session else "waiting"
         return {"screen": screen, "session": None, "ask": None, **which}
-
-
-class _CoordinatorPages(_Pages):
-    """The coordinator's page of one study, and its report."""
-
-    role = "coordinator"
-
-    def __init__(self, manager: SessionManager, access: Access) -> None:
-        super().__init__(manager, access)
-        self._coordinator = Coordinator(manager, access)
-        # what came of each act, by its name and all that its page sent, an id with it
-        self._acts: OrderedDict[str, asyncio.Task[dict[str, Any]]] = OrderedDict()
-        self._overview: dict[str, Any] = {}  # the last one that could be read
-
-    async def _shown(self, request: Request) -> dict[str, Any]:  # noqa: ARG002 - as all
-        # a protocol that is being edited ends no stream of a session that runs
-        problem = {}
-        try:
-            self._overview = await asyncio.to_thread(overview, self._manager.study)
-        except (MasrelError, OSError) as error:
-            if not self._overview:
-                raise
-            problem = {"problem": str(error)}
-        return {
-            "desk": {**self._manager.state(), "notes": self._manager.notes},
-            "jobs": self._coordinator.jobs.state(),
-            "log": await asyncio.to_thread(self._log),
-            "overview": {**self._overview, **problem},
-        }
-
-    def _log(self) -> list[dict[str, Any]]:
-        # what is in the log of the session that runs: kinds, codes and times
-        if self._manager.running is None:
-            return []
-        rater, session, is_rehearsal = self._manager.running
-        file: Path | None = self._manager.study.log_file(rater, session)
-        if is_rehearsal:
-            # while one starts, the last one is another rehearsal's
-            starts = self._manager.state()["screen"] == "starting"
-            of_last = last_rehearsal(self._manager.study, rater, session)
-            file = None if starts else of_last
-        with contextlib.suppress(MasrelError, OSError):
-            events = () if file is None else read_log(file)[-_N_LOG:]
-            return [
-                {"event": each.kind, "time_utc": each.time_utc, **_shown(each.fields)}
-                for each in events
-            ]
-        return []
-
-    def _live(self, tail: SampleTail | None) -> tuple[str, Any]:
-        return "live", {"begins": True} if tail is None else _frame(tail)
-
-    async def act(self, request: Request) -> Response:
-        """Do what the page asks, once however often it sends the same."""
-        name, fields = request.path_params["action"], request.state.fields
-        if name == "stop":
-            self._manager.stop("coordinator's page")
-            return JSONResponse({"text": "The emergency stop is pressed."})
-        if not self._coordinator.knows(name):
-            raise HTTPException(404)
-        if not isinstance(fields.get("id"), str):  # from no page that sends it again
-            fields["id"] = secrets.token_hex(8)
-        sent = json.dumps([name, fields], sort_keys=True)
-        if sent not in self._acts:
-            acting = self._coordinator.act(name, fields)
-            self._acts[sent] = asyncio.create_task(acting)
-            if len(self._acts) > _N_ACTS:
-                self._acts.popitem(last=False)
-        return JSONResponse(await asyncio.shield(self._acts[sent]))
-
-    async def report(self, request: Request) -> Response:
-        """Answer with a file of the report that was built."""
-        path = request.path_params["path"]
-        file = await asyncio.to_thread(_report_file, self._manager.study, path)
-        if file is None:
-            raise HTTPException(404)
-        return FileResponse(file)
-
-
-def _shown(fields: Any) -> dict[str, Any]:
-    # of an event: what says no model and no grade's meaning
-    names = ("code", "position", "attempt", "grade", "kind", "fault", "why", "who")
-    return {name: fields[name] for name in names if fields.get(name) is not None}
-
-
-def _frame(tail: SampleTail) -> dict[str, Any] | None:
-    columns = ("time_s", "angle_deg", "command_torque_nm", "phase")
-    rows = tail.new_rows(*columns, every=_EVERY)
-    seconds, angles, torques, phases = rows.values()
-    if not seconds:
-        return None
-    return {
-        "time_s": [round(value, 3) for value in seconds],
-        "angle_deg": [round(math.degrees(value), 2) for value in angles],
-        "torque_nm": [round(value, 3) for value in torques],
-        "phase": [int(value) for value in phases],
-    }
-
-
-def _report_file(study: StudyPaths, path: str) -> Path | None:
-    folder = (study.root / "report").resolve()
-    file = (folder / (path or "report.html")).resolve()
-    return file if file.is_relative_to(folder) and file.is_file() else None

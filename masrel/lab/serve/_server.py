@@ -1,4 +1,4 @@
-"""The server: its connections, its certificate, how it starts and how it stops."""
+"""The application and its server: connections, certificate, how it starts and stops."""
 
 import asyncio
 import contextlib
@@ -6,6 +6,7 @@ import errno
 import fcntl
 import ipaddress
 import logging
+import mimetypes
 import os
 import signal
 import socket
@@ -17,16 +18,22 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import uvicorn
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from masrel._files import make_folder
-from masrel.errors import ParameterError
+from masrel.errors import MasrelError, ParameterError
 from masrel.lab.hess._clock import off_the_loop
 from masrel.lab.protocol import StudyPaths
 from masrel.lab.serve._access import Access
+from masrel.lab.serve._coordinator import CoordinatorPages
 from masrel.lab.serve._manager import SessionManager
 from masrel.lab.serve._middleware import Middleware
-from masrel.lab.serve._role_pages import make_app
+from masrel.lab.serve._role_pages import HERE, RaterPages
 
 _REQUEST_S = 10.0  # in which a request must have come in whole
 _IDLE_S = 30  # that a connection may wait for its next request
@@ -227,6 +234,49 @@ def alone(study: StudyPaths) -> Iterator[None]:
                 "another masrel serve has open"
             ) from None
         yield
+
+
+def make_app(manager: SessionManager, access: Access) -> Middleware:
+    """Return the application: every request passes `Middleware` first."""
+    coordinator = CoordinatorPages(manager, access)
+    routes = [Route("/report/{path:path}", coordinator.report), _static()]
+    for pages in (RaterPages(manager, access), coordinator):
+        role = pages.role
+        routes += [
+            Route(f"/{role}", pages.page),
+            Route(f"/{role}/state", pages.state),
+            Route(f"/{role}/events", pages.events),
+            Route(f"/{role}/{{action}}", pages.act, methods=["POST"]),
+        ]
+    kinds = (HTTPException, MasrelError, OSError, Exception)
+    failures = dict.fromkeys(kinds, _failure)
+    return Middleware(Starlette(routes=routes, exception_handlers=failures), access)
+
+
+def _static() -> Route:
+    # Read once: no path of a request reaches the disk.
+    files = {path.name: path.read_bytes() for path in (HERE / "static").glob("*.*")}
+
+    async def show(request: Request) -> Response:
+        name = request.path_params["name"]
+        if name not in files:
+            raise HTTPException(404)
+        return Response(files[name], media_type=mimetypes.guess_type(name)[0])
+
+    return Route("/static/{name}", show)
+
+
+async def _failure(_: Request, error: Exception) -> Response:
+    status, why = 500, "The server failed; see its terminal."
+    if isinstance(error, HTTPException):
+        status = error.status_code
+        why = "There is no such page." if status == 404 else error.detail
+    elif isinstance(error, MasrelError):
+        status, why = 422, str(error)
+    elif isinstance(error, OSError):
+        why = error.strerror or why
+        why = f"{error.filename}: {why}" if error.filename else why
+    return JSONResponse({"why": why}, status_code=status)
 
 
 async def serve(

@@ -28,8 +28,8 @@ from masrel.lab.hess._clock import may_use
 from masrel.lab.protocol import StudyPaths, read_protocol, scale_of
 from masrel.lab.protocol._values import Answer, checked_answer
 from masrel.lab.run import (
-    GradeCorrection,
     GradeRequest,
+    GradeSource,
     QuestionRequest,
     Skip,
     StretchGrade,
@@ -78,7 +78,7 @@ class Channel:
                 yield json.loads(line)
 
 
-class PageGrades:
+class PageGrades(GradeSource):
     """A person at a page, who is told positions and blinded codes only."""
 
     name: ClassVar[str] = "browser"
@@ -265,7 +265,7 @@ class PageGrades:
                 case {"kind": "answer", "n": self._n_asked}:
                     return message
                 case {"kind": "correct", **fields}:
-                    self._correct(request, GradeCorrection(**fields))
+                    self._correct(request, fields)
                 case {"kind": "stop"}:
                     why = f"by an emergency stop ({message['who']})"
                     raise _stopped(request, why)
@@ -273,17 +273,17 @@ class PageGrades:
                     raise _stopped(request, message.get("why", "on request"))
 
     def _correct(
-        self, request: GradeRequest | QuestionRequest, correction: GradeCorrection
+        self, request: GradeRequest | QuestionRequest, correction: Message
     ) -> None:
         try:
             if request.correct is None:
                 raise ParameterError("needed a session whose grades can be corrected")
-            request.correct(correction)
+            request.correct(**correction)
         except (ParameterError, SessionLogError) as error:
             self._channel.send("not-corrected", why=f"{error}")
             return
-        if self._last is not None and self._last[0] == correction.code:
-            self._last = correction.code, correction.grade
+        if self._last is not None and self._last[0] == correction["code"]:
+            self._last = correction["code"], correction["grade"]
         self._channel.send("corrected", last=_as_fields(self._last))
 
 

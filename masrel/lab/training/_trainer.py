@@ -15,7 +15,7 @@ from masrel.errors import ParameterError, ProtocolError, SessionLogError
 from masrel.lab._event_log import SessionLog, utc_now
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
 from masrel.lab.recording import _Fact
-from masrel.lab.run._grade_sources import GradeRequest, GradeSource, Skip, Unattended
+from masrel.lab.run._grade_sources import GradeRequest, GradeSource, Skip
 from masrel.lab.run._presenter import ClockName, Presenter
 from masrel.lab.run._settings import moves_hardware
 from masrel.lab.run.session import _check_device
@@ -159,7 +159,7 @@ class _Trainer:
             log,
             occasion=f"training of {rater}",
             named_by=("position",),
-            known_by=("model",),  # it has no schedule that says so
+            has_schedule=False,
         )
         self._intended = {
             model.id: model.intended_grade
@@ -312,7 +312,7 @@ def _block(models: Sequence[str], stream: Stream) -> list[str]:
             return block
 
 
-class SimulatedTrainee(Unattended):
+class SimulatedTrainee(GradeSource):
     """A trainee who confuses neighbouring grades less and less.
 
     The grade depends on the seed of ``[simulated_raters]``, the rater, the model and

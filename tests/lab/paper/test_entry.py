@@ -88,8 +88,7 @@ def test_a_sheet_becomes_a_complete_session_of_a_person(small: Small) -> None:
     study, protocol = small
     rows = filled(small, "1+", "NA", "3")
     file = typed(small, [row[1:] for row in rows])  # as masrel schedule writes it
-    summary = enter(small, file)
-    assert (summary.n_presentations, summary.n_graded) == (3, 2)  # type: ignore[attr-defined]
+    enter(small, file)
     log = read_log(study.log_file("R1", "test"))
     assert [event.kind for event in log] == ["session", *["entered"] * 3, "complete"]
     head, first = log[0].fields, log[1].fields

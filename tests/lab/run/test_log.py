@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import stat
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -40,88 +41,65 @@ def test_what_is_appended_is_what_is_read(tmp_path: Path) -> None:
 
 
 def test_the_chain_is_the_one_the_documentation_describes(tmp_path: Path) -> None:
+    path = tmp_path / "sessions" / "a.jsonl"
+    for n_events in (2, 3):  # opened again it goes on
+        filled(path, n_events)
     previous = "0" * 64
-    for line in filled(tmp_path / "a.jsonl").read_bytes().splitlines():
+    for line in path.read_bytes().splitlines():
         assert json.loads(line)["previous"] == previous
         previous = hashlib.sha256(line).hexdigest()
-
-
-def test_each_event_is_synced_before_append_returns(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    synced: list[int] = []
-    fsync = os.fsync
-
-    def counted(descriptor: int) -> None:
-        fsync(descriptor)
-        synced.append(os.fstat(descriptor).st_size)
-
-    with SessionLog.open(tmp_path / "a.jsonl") as log:
-        monkeypatch.setattr(os, "fsync", counted)
-        for number in (1, 2, 3):
-            log.append("grade", {"code": "A"})
-            assert len(synced) == number
-            assert synced[-1] == log.path.stat().st_size
-
-
-def test_the_name_of_a_new_log_is_synced(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    synced: list[str] = []
-    fsync = os.fsync
-
-    def noted(descriptor: int) -> None:
-        fsync(descriptor)
-        synced.append(os.readlink(f"/proc/self/fd/{descriptor}"))
-
-    monkeypatch.setattr(os, "fsync", noted)
-    with SessionLog.open(tmp_path / "a.jsonl"):
-        assert synced == [str(tmp_path)]
-
-
-def test_a_log_and_its_folder_are_their_owners_alone(tmp_path: Path) -> None:
-    path = filled(tmp_path / "sessions" / "a.jsonl")
+    assert [event.line for event in read_log(path)] == [1, 2, 3, 4, 5]
     modes = [stat.S_IMODE(each.stat().st_mode) for each in (path.parent, path)]
     assert modes == [0o700, 0o600]
 
 
-def test_a_reopened_log_goes_on_with_the_chain(tmp_path: Path) -> None:
-    path = filled(tmp_path / "a.jsonl", 2)
-    filled(path, 3)
-    assert [event.line for event in read_log(path)] == [1, 2, 3, 4, 5]
+def test_a_log_and_each_of_its_events_are_synced_before_anything_follows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[tuple[str, int]] = []
+    fsync = os.fsync
+
+    def noted(descriptor: int) -> None:
+        fsync(descriptor)
+        name = os.readlink(f"/proc/self/fd/{descriptor}")
+        synced.append((name, os.fstat(descriptor).st_size))
+
+    monkeypatch.setattr(os, "fsync", noted)
+    with SessionLog.open(tmp_path / "a.jsonl") as log:
+        assert [name for name, _ in synced] == [str(tmp_path)]  # that of the new log
+        for number in (2, 3, 4):
+            log.append("grade", {"code": "A"})
+            assert len(synced) == number
+            assert synced[-1] == (str(log.path), log.path.stat().st_size)
 
 
-@pytest.mark.parametrize("number", [1, 2, 3])
-def test_a_changed_line_is_found_with_its_file_and_line(
-    tmp_path: Path, number: int
+Lines = list[bytes]
+
+
+@pytest.mark.parametrize(
+    ("forged", "number"),
+    [
+        *(
+            (
+                lambda a, n=n: [*a[: n - 1], a[n - 1].replace(b"1+", b"2 "), *a[n:]],
+                n + 1,
+            )
+            for n in (1, 2, 3)
+        ),
+        *((lambda a, n=n: [*a[: n - 1], *a[n:]], n) for n in (1, 2, 3)),
+        (lambda a: [a[0], a[2], a[1], a[3]], 2),
+    ],
+)
+def test_a_line_that_is_changed_removed_or_exchanged_is_found(
+    tmp_path: Path, forged: Callable[[Lines], Lines], number: int
 ) -> None:
     path = filled(tmp_path / "a.jsonl")
-    lines = path.read_bytes().splitlines(keepends=True)
-    lines[number - 1] = lines[number - 1].replace(b"1+", b"2 ")
-    path.write_bytes(b"".join(lines))
-    with pytest.raises(SessionLogError, match=rf"a\.jsonl: line {number + 1}: needed"):
-        read_log(path)
-    with pytest.raises(SessionLogError, match=f"line {number + 1}"):
-        SessionLog.open(path)
-
-
-@pytest.mark.parametrize("number", [1, 2, 3])
-def test_a_removed_line_is_found(tmp_path: Path, number: int) -> None:
-    path = filled(tmp_path / "a.jsonl")
-    lines = path.read_bytes().splitlines(keepends=True)
-    del lines[number - 1]
-    path.write_bytes(b"".join(lines))
-    with pytest.raises(SessionLogError, match=rf"line {number}: needed previous"):
-        read_log(path)
-
-
-def test_exchanged_lines_are_found(tmp_path: Path) -> None:
-    path = filled(tmp_path / "a.jsonl")
-    lines = path.read_bytes().splitlines(keepends=True)
-    lines[1], lines[2] = lines[2], lines[1]
-    path.write_bytes(b"".join(lines))
-    with pytest.raises(SessionLogError, match="line 2: needed previous"):
-        read_log(path)
+    path.write_bytes(b"".join(forged(path.read_bytes().splitlines(keepends=True))))
+    for read in (read_log, SessionLog.open):
+        with pytest.raises(
+            SessionLogError, match=rf"a\.jsonl: line {number}: needed p"
+        ):
+            read(path)
 
 
 @pytest.mark.parametrize(
@@ -141,18 +119,8 @@ def test_a_line_that_is_no_event_is_refused(tmp_path: Path, line: bytes) -> None
     path.write_bytes(path.read_bytes() + line + b"\n")
     with pytest.raises(SessionLogError, match=r"a\.jsonl: line 2: "):
         read_log(path)
-
-
-def test_a_missing_log_is_named(tmp_path: Path) -> None:
     with pytest.raises(SessionLogError, match=r"gone\.jsonl: no such session log"):
         read_log(tmp_path / "gone.jsonl")
-
-
-def test_an_empty_log_has_no_events(tmp_path: Path) -> None:
-    path = tmp_path / "a.jsonl"
-    path.touch()
-    assert read_log(path) == ()
-    assert len(read_log(filled(path, 1))) == 1
 
 
 @settings(
@@ -188,36 +156,25 @@ def test_a_log_cut_anywhere_keeps_every_whole_event(tmp_path: Path, cut: int) ->
         assert not beside.exists()
 
 
-def test_a_torn_log_is_not_read_as_if_it_were_whole(tmp_path: Path) -> None:
-    path = filled(tmp_path / "a.jsonl", 2)
-    path.write_bytes(path.read_bytes()[:-10])
-    with pytest.raises(SessionLogError, match="line 2: ends without a newline"):
-        read_log(path)
-
-
-def test_a_crash_during_the_recovery_loses_nothing(tmp_path: Path) -> None:
-    # The event that takes the torn bytes' place is itself torn.
-    path = filled(tmp_path / "a.jsonl", 2)
+def test_a_torn_line_is_set_aside_whole_whatever_happens_meanwhile(
+    tmp_path: Path,
+) -> None:
+    path, beside = filled(tmp_path / "a.jsonl", 2), tmp_path / "a.jsonl.torn"
     whole = path.read_bytes()
-    path.write_bytes(whole + b'{"event": "recov')
+    torn = (
+        b'{"event": "correction", "why": "' + b"long " * 400
+    )  # longer than "recovered"
+    path.write_bytes(whole + torn)
+    with pytest.raises(SessionLogError, match="line 3: ends without a newline"):
+        read_log(path)
     SessionLog.open(path, now=noon).close()
-    recovered = path.read_bytes()
-    path.write_bytes(recovered[:-30])
+    assert beside.read_bytes() == torn + b"\n"
+    # the event that takes its place is itself torn
+    path.write_bytes(path.read_bytes()[:-30])
     SessionLog.open(path, now=noon).close()
     assert [event.kind for event in read_log(path)] == ["grade"] * 2 + ["recovered"]
     assert path.read_bytes().startswith(whole)
-    assert (tmp_path / "a.jsonl.torn").read_bytes().startswith(b'{"event": "recov\n')
-
-
-def test_a_torn_line_longer_than_the_event_in_its_place_is_gone_whole(
-    tmp_path: Path,
-) -> None:
-    path = filled(tmp_path / "a.jsonl", 1)
-    torn = b'{"event": "correction", "why": "' + b"long " * 400
-    path.write_bytes(path.read_bytes() + torn)
-    SessionLog.open(path, now=noon).close()
-    assert [event.kind for event in read_log(path)] == ["grade", "recovered"]
-    assert (tmp_path / "a.jsonl.torn").read_bytes() == torn + b"\n"
+    assert beside.read_bytes().startswith(torn + b'\n{"event": "recov')
 
 
 def test_after_a_failed_write_nothing_follows_on_the_line(
@@ -266,20 +223,17 @@ def test_a_full_disk_during_the_recovery_closes_the_log_once(
     assert [event.kind for event in read_log(path)][-1] == "recovered"
 
 
-def test_a_log_has_one_writer(tmp_path: Path) -> None:
+def test_a_log_has_one_writer_and_is_closed_once(tmp_path: Path) -> None:
     with (
-        SessionLog.open(tmp_path / "a.jsonl"),
+        SessionLog.open(tmp_path / "a.jsonl") as log,
         pytest.raises(SessionLogError, match="another process has this log open"),
     ):
         SessionLog.open(tmp_path / "a.jsonl")
-    SessionLog.open(tmp_path / "a.jsonl").close()
-
-
-def test_closing_twice_is_harmless(tmp_path: Path) -> None:
-    log = SessionLog.open(tmp_path / "a.jsonl")
-    log.close()
-    log.close()
-    assert not log.is_open
+    other = SessionLog.open(tmp_path / "a.jsonl")
+    log.close()  # again: the descriptor is another file's now
+    assert (log.is_open, other.is_open) == (False, True)
+    other.append("grade", {"code": "A"})
+    other.close()
 
 
 @pytest.mark.parametrize("fact", [float("nan"), float("inf"), "\ud800", [1], {"a": 1}])

@@ -338,7 +338,7 @@ def test_a_rehearsal_that_was_stopped_is_gone_on_with(small: Small) -> None:
         run(small, source, rehearsal=True)
     assert "REHEARSAL, no rating of the study. Presentation 1 of 3" in said.getvalue()
     summary = run(small, console("\n2\n\n3\n")[0], rehearsal=True)
-    assert (summary.n_graded_before, summary.rehearsal) == (1, True)
+    assert (summary.n_graded, summary.rehearsal) == (3, True)
     assert summary.log_file.parent.name == "1"
 
 
@@ -366,5 +366,5 @@ def test_a_rehearsal_of_another_secret_is_left_and_another_begun(small: Small) -
     lines = before.read_bytes()
     small[0].published_secret_file.unlink()
     summary = run(small, SimulatedGrades(small[1]), rehearsal=True)
-    assert (summary.n_graded_before, summary.log_file.parent.name) == (0, "2")
+    assert (summary.n_graded, summary.log_file.parent.name) == (3, "2")
     assert before.read_bytes() == lines

@@ -403,7 +403,7 @@ def test_an_answer_is_corrected_by_the_command(new_study: New) -> None:
     assert finding.message.endswith("masrel ratings writes it anew")
 
 
-def test_a_source_without_the_method_is_refused_before_anything_happens(
+def test_what_is_no_source_of_grades_is_refused_before_anything_happens(
     new_study: New,
 ) -> None:
     study, protocol = new_study(("[schedule]", QUESTIONS))
@@ -413,7 +413,5 @@ def test_a_source_without_the_method_is_refused_before_anything_happens(
         simulated = True
         make_ready = grade = present_again = None
 
-    with pytest.raises(
-        ParameterError, match="a method answer, as the protocol has questionnaires"
-    ):
+    with pytest.raises(ParameterError, match="grades: needed a GradeSource, got Old"):
         run(study, protocol, grades=Old())

@@ -25,18 +25,24 @@ from starlette.types import Message, Receive, Scope, Send
 
 from masrel.lab.conduct import allot_schedules
 from masrel.lab.protocol import StudyPaths, copy_template, read_protocol
-from masrel.lab.run import GradeCorrection, read_log
+from masrel.lab.run import read_log
 from masrel.lab.serve._access import LIFE_S, ROLES, Access, Role
 from masrel.lab.serve._coordinator import ACTIONS
-from masrel.lab.serve._live import SampleTail
 from masrel.lab.serve._manager import (
     AnswerRefusedError,
     AskOverError,
     SessionManager,
 )
 from masrel.lab.serve._middleware import Middleware
-from masrel.lab.serve._role_pages import make_app
-from masrel.lab.serve._server import alone, encryption, hosts, listen, serve
+from masrel.lab.serve._role_pages import SampleTail
+from masrel.lab.serve._server import (
+    alone,
+    encryption,
+    hosts,
+    listen,
+    make_app,
+    serve,
+)
 
 __all__ = [
     "ACTIONS",
@@ -144,9 +150,9 @@ def small_study(
     return study
 
 
-def correction(code: object, grade: str | None) -> GradeCorrection:
+def correction(code: object, grade: str | None) -> dict[str, str | None]:
     """That a rater's grade was another one."""
-    return GradeCorrection(code=str(code), grade=grade, who="R1", why="wrong button")
+    return {"code": str(code), "grade": grade, "who": "R1", "why": "wrong button"}
 
 
 class Page:

@@ -56,13 +56,13 @@ def test_a_correction_sent_again_is_entered_once(study: StudyPaths) -> None:
             (code, "7", "needed one of 0, 1"),
         ):
             with pytest.raises(ParameterError, match=match):
-                await manager.correct("R1", "test", correction(wrong, grade))
+                await manager.correct("R1", "test", **correction(wrong, grade))
         with pytest.raises(ParameterError, match="rehearsal"):
-            await manager.correct("R1", "test", correction(code, "2"), rehearsal=True)
+            await manager.correct("R1", "test", **correction(code, "2"), rehearsal=True)
         for grade in ("3", "3", "1", "3"):
-            await manager.correct("R1", "test", correction(code, grade))
+            await manager.correct("R1", "test", **correction(code, grade))
         await manager.leave()
-        await manager.correct("R1", "test", correction(code, "3"))
+        await manager.correct("R1", "test", **correction(code, "3"))
 
     at(study, act)
     assert [each["grade"] for each in logged(study, "correction")] == ["3", "1", "3"]
@@ -133,7 +133,7 @@ def test_an_emergency_stop_is_a_fault_and_what_it_stopped_can_be_skipped(
         assert (await page.until("presenting"))["ask"] is None
         await n_sampled(manager, 20)
         with pytest.raises(ParameterError, match="needed a presentation that is over"):
-            await manager.correct("R1", "test", correction("999", "1"))
+            await manager.correct("R1", "test", **correction("999", "1"))
         for _ in range(3):  # one press is meant
             manager.stop("rater's page")
         fault = await page.until("fault")

@@ -120,7 +120,7 @@ def by_the_browser(study: StudyPaths, rater: Rater) -> None:
                 await manager.leave()
                 continue
             if screen == "ready" and (wrong := rater.corrects(code)):
-                await manager.correct("R1", "test", correction(wrong, "0"))
+                await manager.correct("R1", "test", **correction(wrong, "0"))
             elif screen == "grade":
                 grade = rater.grade(code)
                 given = {"again": True} if grade is None else {"grade": grade}

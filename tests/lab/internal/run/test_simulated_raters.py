@@ -7,7 +7,7 @@ import msgspec
 import pytest
 
 from masrel.lab.protocol import PresentationRules, Protocol, StudyPaths
-from masrel.lab.run._simulated_raters import intended_speeds, severity
+from masrel.lab.run._grade_sources import intended_speeds, severity
 from tests.lab.run.test_simulated import with_settings
 
 Made = Callable[..., tuple[StudyPaths, Protocol]]
