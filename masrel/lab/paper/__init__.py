@@ -4,8 +4,9 @@ In: a protocol and drawn schedules. Out: printable sheets without a model's name
 session logs whose grades are from paper.
 """
 
-from masrel.lab.paper._entry import SheetDifference, compare_sheet, enter_sheet
+from masrel.lab.paper._entry import compare_sheet, enter_sheet
 from masrel.lab.paper._printing import PaperSheets, write_sheets
+from masrel.lab.run._state import SheetDifference
 
 __all__ = [
     "PaperSheets",

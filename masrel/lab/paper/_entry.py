@@ -2,8 +2,7 @@
 
 import hashlib
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
 from datetime import date, datetime, time
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +15,6 @@ from masrel.errors import ParameterError, RatingsError, SessionLogError
 from masrel.lab._event_log import Event, SessionLog, utc_now
 from masrel.lab.conduct._study_log import append_event, stated, study_answers
 from masrel.lab.paper._form import (
-    NO_GRADE,
     FilledRow,
     Form,
     TypedSheet,
@@ -25,9 +23,15 @@ from masrel.lab.paper._form import (
     read_typed,
 )
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
-from masrel.lab.protocol._values import Answer
 from masrel.lab.run._around import interval_fields
-from masrel.lab.run._state import FORMAT, FROM_PAPER, SessionState, replay
+from masrel.lab.run._state import (
+    FORMAT,
+    FROM_PAPER,
+    SessionState,
+    SheetDifference,
+    replay,
+    sheet_differences,
+)
 from masrel.lab.schedule.sheets import _drawn_schedule
 
 if TYPE_CHECKING:
@@ -38,35 +42,6 @@ NO_DEVICE = "none"
 """What logs call the device where nobody says what presented the models."""
 
 _DEVICE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SheetDifference:
-    """A cell in which the second entry of a sheet differs from the log.
-
-    Attributes
-    ----------
-    code : str or None
-        Of the presentation; None for a question about the session or the study.
-    column : str
-        ``"grade"``, or the column of a question.
-    first, second : str
-        What the log has and what the second file has; "NA" where that is nothing.
-    file : str
-        Name of the second file.
-    row : int
-        Its row.
-    who : str
-        Who typed it.
-    """
-
-    code: str | None
-    column: str
-    first: str
-    second: str
-    file: str
-    row: int
-    who: str
 
 
 def enter_sheet(
@@ -420,34 +395,3 @@ def _reenter(
         before = state.reentered.get((row.code, column))
         if before is None or dict(before.fields) != cell:
             log.append("reentered", cell)
-
-
-def sheet_differences(
-    state: SessionState, of_study: Mapping[tuple[str, str], Answer]
-) -> tuple[SheetDifference, ...]:
-    """Return in what the last second entry of a sheet differs from the logs."""
-    first: dict[tuple[str | None, str], object] = {
-        (code, "grade"): grade for code, grade in state.grades.items()
-    }
-    for (questionnaire, question), answer in of_study.items():
-        first[None, f"{questionnaire}.{question}"] = answer
-    for (questionnaire, question, code), answer in state.answers.items():
-        first[code, f"{questionnaire}.{question}"] = answer
-    differences = [
-        SheetDifference(
-            code=code,
-            column=column,
-            first=_shown(first.get((code, column))),
-            second=_shown(event.fields["value"]),
-            file=str(event.fields["file"]),
-            row=int(str(event.fields["row"])),
-            who=str(event.fields["who"]),
-        )
-        for (code, column), event in state.reentered.items()
-        if event.fields["value"] != first.get((code, column))
-    ]
-    return tuple(sorted(differences, key=lambda each: each.row))
-
-
-def _shown(value: object) -> str:
-    return NO_GRADE if value is None else str(value)

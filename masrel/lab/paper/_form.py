@@ -19,10 +19,8 @@ from masrel.lab._bounded_files import (
 )
 from masrel.lab.protocol import Protocol, Question
 from masrel.lab.protocol._values import Answer, When, checked_answer, questions_of
+from masrel.lab.run._state import NO_GRADE
 from masrel.lab.schedule import Schedule
-
-NO_GRADE = "NA"
-"""What is typed where a presentation has no grade."""
 
 FIRST_COLUMNS = ("sheet", "position", "code", "grade")
 """Columns of every sheet that is typed in; those of questions follow."""

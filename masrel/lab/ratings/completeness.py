@@ -8,10 +8,9 @@ from masrel.errors import MasrelError, SessionLogError
 from masrel.lab._event_log import Event
 from masrel.lab.conduct import excluded_raters, read_conduct
 from masrel.lab.conduct._study_log import study_answers
-from masrel.lab.paper._entry import sheet_differences
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.protocol._values import Answer
-from masrel.lab.run._state import SessionState, read_session
+from masrel.lab.run._state import SessionState, read_session, sheet_differences
 from masrel.lab.schedule import read_schedule
 
 

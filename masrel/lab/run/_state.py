@@ -32,6 +32,9 @@ the other."""
 FROM_PERSONS = (*AT_THE_DEVICE, FROM_PAPER)
 """Sources of grades, by the names that logs have them by, that are a person's."""
 
+NO_GRADE = "NA"
+"""What is typed where a presentation has no grade."""
+
 FORMAT = 2
 """Version of session logs; those of version 1 are read, and finished, too."""
 
@@ -415,3 +418,63 @@ def _apply_to_code(state: CodesState, kind: str, event: Event, source: str) -> N
         state.grades[code] = str(grade)
         if isinstance(stretch := event.fields.get("stretch"), int):
             state.graded_stretches[code] = stretch
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SheetDifference:
+    """A cell in which the second entry of a sheet differs from the log.
+
+    Attributes
+    ----------
+    code : str or None
+        Of the presentation; None for a question about the session or the study.
+    column : str
+        ``"grade"``, or the column of a question.
+    first, second : str
+        What the log has and what the second file has; "NA" where that is nothing.
+    file : str
+        Name of the second file.
+    row : int
+        Its row.
+    who : str
+        Who typed it.
+    """
+
+    code: str | None
+    column: str
+    first: str
+    second: str
+    file: str
+    row: int
+    who: str
+
+
+def sheet_differences(
+    state: SessionState, of_study: "Mapping[tuple[str, str], Answer]"
+) -> tuple[SheetDifference, ...]:
+    """Return in what the last second entry of a sheet differs from the logs."""
+    first: dict[tuple[str | None, str], object] = {
+        (code, "grade"): grade for code, grade in state.grades.items()
+    }
+    for (questionnaire, question), answer in of_study.items():
+        first[None, f"{questionnaire}.{question}"] = answer
+    for (questionnaire, question, code), answer in state.answers.items():
+        first[code, f"{questionnaire}.{question}"] = answer
+    differences = [
+        SheetDifference(
+            code=code,
+            column=column,
+            first=_shown(first.get((code, column))),
+            second=_shown(event.fields["value"]),
+            file=str(event.fields["file"]),
+            row=int(str(event.fields["row"])),
+            who=str(event.fields["who"]),
+        )
+        for (code, column), event in state.reentered.items()
+        if event.fields["value"] != first.get((code, column))
+    ]
+    return tuple(sorted(differences, key=lambda each: each.row))
+
+
+def _shown(value: object) -> str:
+    return NO_GRADE if value is None else str(value)
