@@ -1,14 +1,18 @@
-"""Sessions in real time with a server: lateness, a flood, emergency stops.
+"""Sessions in real time with a server and without: lateness, taps, emergency stops.
 
 Lateness follows from the recordings alone, so that nothing is measured in the loop.
+``docs.make.benchmarks.serving`` makes the page of it.
 """
 
 import contextlib
 import os
+import signal
 import socket
+import subprocess
+import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -53,25 +57,50 @@ class Lateness:
         """Of every tick, s."""
         return np.concatenate(self.late)
 
+    def resampled(
+        self, share: float, rng: np.random.Generator, n: int = 1000
+    ) -> tuple[Values, Values]:
+        """Draw the seconds anew -> a quantile, s, and missed ticks of each draw."""
+        # by seconds, for late ticks come in bursts -> (n,), (n,)
+        n_seconds, late = len(self.late), self.all
+        order = np.argsort(late)
+        second = np.repeat(np.arange(n_seconds), [part.size for part in self.late])
+        late, second = late[order], second[order]
+        quantiles, missed = np.empty(n), np.empty(n)
+        for draw in range(n):
+            drawn = rng.integers(n_seconds, size=n_seconds)
+            times = np.bincount(drawn, minlength=n_seconds)
+            below = np.cumsum(times[second])
+            quantiles[draw] = late[np.searchsorted(below, share * below[-1])]
+            missed[draw] = times @ self.missed
+        return quantiles, missed
+
 
 def long_study(root: Path, seconds: float) -> StudyPaths:
     """One whose presentations go on for so long in all."""
-    n_stretches = round(seconds / 4 / STRETCH_S)
-    many = f"stretches = {n_stretches}\ntime_limit_s = 600.0\n"
+    n_stretches = max(2, round(seconds / 4 / STRETCH_S))
     lenient = "missed_ticks_limit = 100000\nmissed_replies_limit = 20\n"
     return small_study(
         root,
         "",
-        ("stretches = 1\n", many if n_stretches > 1 else "stretches = 1\n"),
+        ("stretches = 1\n", f"stretches = {n_stretches}\ntime_limit_s = 600.0\n"),
         ("missed_ticks_limit = 20\n", lenient + "jump_limit_deg = 5.0\n"),
     )
 
 
+def by_masrel_run(study: StudyPaths) -> None:
+    """Run the session without a server."""
+    command = [sys.executable, "-W", "ignore", "-m", "masrel", "run", str(study.root)]
+    options = "--rater R1 --session test --grades simulated --clock real --quiet"
+    subprocess.run([*command, *options.split()], check=True)
+
+
 class Tablet:
-    """A rater's page in a browser."""
+    """A rater's page in a browser, and how long each of its answers took."""
 
     def __init__(self, browser: httpx.Client) -> None:
         self.browser = browser
+        self.took_s: dict[str, list[float]] = {}
 
     def state(self) -> dict[str, Any]:
         """What is shown."""
@@ -84,8 +113,12 @@ class Tablet:
 
     def tap(self, path: str, body: dict[str, Any]) -> dict[str, Any]:
         """Send what a tap sends -> what is shown when the answer is there."""
+        began = time.perf_counter()
         answer = self.browser.post(path, json=body)
+        took_s = time.perf_counter() - began
         answer.raise_for_status()
+        screen = next(iter(body.get("answer", {"stop": None})))
+        self.took_s.setdefault(screen, []).append(took_s)
         return dict(answer.json()["state"])
 
     def session(self, during: Callable[["Tablet"], None] | None = None) -> None:
@@ -132,32 +165,38 @@ def streamed(browser: httpx.Client, role: Role) -> Iterator[None]:
 
 @contextmanager
 def flooded(browser: httpx.Client, rate_hz: float) -> Iterator[list[int]]:
-    """Ask for a rater's state at a rate -> how often it was asked, at the end."""
+    """Send a rater's requests at a rate, from a process of its own -> how many."""
     host, _, port = str(browser.base_url.netloc.decode()).partition(":")
     cookies = "; ".join(f"{name}={text}" for name, text in browser.cookies.items())
-    request = (
-        f"GET /rater/state HTTP/1.1\r\nHost: {host}:{port}\r\nCookie: {cookies}\r\n\r\n"
-    ).encode()
     sent: list[int] = []
-    over = threading.Event()
-
-    def flood(connection: socket.socket) -> None:
-        n_sent, began = 0, time.monotonic()
-        while not over.wait(0.005):
-            n_due = int((time.monotonic() - began) * rate_hz) - n_sent
-            connection.sendall(request * n_due)
-            n_sent += n_due
-        sent.append(n_sent)
-
-    with socket.create_connection((host, int(port))) as connection:
-        for work in (_drain, flood):
-            client = threading.Thread(target=work, args=(connection,), daemon=True)
-            client.start()
+    command = [sys.executable, "-m", "tests.benchmarks.bench_serve", host, port]
+    with subprocess.Popen(
+        [*command, cookies, str(rate_hz)], stdout=subprocess.PIPE, text=True
+    ) as client:
         try:
             yield sent
         finally:
-            over.set()
-            client.join()
+            client.send_signal(signal.SIGTERM)
+            sent.append(int(client.communicate()[0] or 0))
+
+
+def flood(host: str, port: int, cookies: str, rate_hz: float) -> None:
+    """Ask for a rater's state at a rate until SIGTERM, and print how often."""
+    signals: list[int] = []  # an Event would wait for its own lock
+    signal.signal(signal.SIGTERM, lambda number, _: signals.append(number))
+    request = (
+        f"GET /rater/state HTTP/1.1\r\nHost: {host}:{port}\r\nCookie: {cookies}\r\n\r\n"
+    ).encode()
+    n_sent, began = 0, time.monotonic()
+    with socket.create_connection((host, port)) as connection:
+        reader = threading.Thread(target=_drain, args=(connection,), daemon=True)
+        reader.start()
+        while not signals:
+            time.sleep(0.005)
+            n_due = int((time.monotonic() - began) * rate_hz) - n_sent
+            connection.sendall(request * n_due)
+            n_sent += n_due
+    print(n_sent)
 
 
 def _drain(connection: socket.socket) -> None:
@@ -240,3 +279,12 @@ class Stops:
         if is_ramp.any():
             first_s = float(recording.columns["time_s"][is_ramp][0])
             self._took_s.append(began_s + first_s - now_s)
+
+
+def quantile_ms(values_s: Sequence[float] | Values, share: float) -> float:
+    """A quantile, ms."""
+    return float(np.quantile(np.asarray(values_s), share)) * 1e3
+
+
+if __name__ == "__main__":
+    flood(sys.argv[1], int(sys.argv[2]), sys.argv[3], float(sys.argv[4]))

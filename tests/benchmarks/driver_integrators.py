@@ -1,10 +1,13 @@
-"""The simulated arm by the package and by scipy's solver, on one stretch.
+"""The simulated arm by three integrators: time against error, on one stretch.
 
-The commands of one presentation of HM3 are put to the same arm and hand; the arm's
-turns, sticking, breaking away and end stop are located as events.
+The commands of one presentation of HM3 are put to the same arm and hand again and
+again. What is right is scipy's DOP853 at rtol 1e-12, with the arm's turns, sticking,
+breaking away and end stop located as events.
 """
 
+import itertools
 import math
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import radians
@@ -67,6 +70,37 @@ def chosen(torques: list[float], step_ns: int) -> Values:
         plant.advance(tick * 1_000_000)
         out[tick] = plant.hand_torque
         plant.command(torque, tick * 1_000_000)
+    return out
+
+
+def semi_implicit_euler(torques: list[float], step: float) -> Values:
+    """Speed first, then angle; the arm sticks where β can hold it."""
+    moved = hand()
+    n = round(TICK / step)
+    delay = round(ARM.delay / step)
+    decay = math.exp(-step / ARM.lag_time)
+    out = np.empty(len(torques))
+    angle, velocity, motor, target = START, 0.0, 0.0, 0.0
+    pending = 0.0
+    for tick, torque in enumerate(torques):
+        out[tick] = felt(moved, tick * TICK, angle, velocity)
+        for part in range(n):
+            if part == delay:
+                target = pending
+            if part == 0:
+                pending = quantized(torque)
+                if delay == 0:
+                    target = pending
+            time_s = tick * TICK + part * step
+            motor = target + (motor - target) * decay
+            force = felt(moved, time_s, angle, velocity) - motor - VISCOUS * velocity
+            if angle > ARM.range_end:
+                force += ARM.stop_stiffness * (ARM.range_end - angle)
+                force -= ARM.stop_damping * velocity
+            free = velocity + step * force / INERTIA
+            brake = step * COULOMB / INERTIA
+            velocity = math.copysign(max(abs(free) - brake, 0.0), free)
+            angle += step * velocity
     return out
 
 
@@ -156,3 +190,54 @@ def _until(
         if made.t_events[0].size or made.t_events[1].size:
             arm.change(start, state)
     return state
+
+
+def timed(run: Callable[[], Values]) -> tuple[float, Values]:
+    start = time.thread_time()  # of the processor: others work on this machine, too
+    values = run()
+    return time.thread_time() - start, values
+
+
+def measured(
+    reference_rtol: float = 1e-12, repeats: int = 5
+) -> dict[str, list[tuple[float, float, float]]]:
+    """Name -> (setting, seconds per simulated second, largest error N·m)."""
+    torques = commands()
+    right = by_solve_ivp(torques, "DOP853", reference_rtol)
+    found: dict[str, list[tuple[float, float, float]]] = {}
+
+    def add(name: str, setting: float, run: Callable[[], Values], n: int) -> None:
+        took, values = min((timed(run) for _ in range(n)), key=lambda pair: pair[0])
+        error = float(np.abs(values - right).max())
+        found.setdefault(name, []).append(
+            (setting, took / (len(torques) * TICK), error)
+        )
+
+    for step_ns in (1_000_000, 500_000, 250_000, 125_000, 62_500):
+        add(
+            "exact step",
+            step_ns * 1e-9,
+            lambda step_ns=step_ns: chosen(torques, step_ns),
+            repeats,
+        )
+    for step_us in (500, 250, 125, 50, 20, 10, 5):
+        add(
+            "semi-implicit Euler",
+            step_us * 1e-6,
+            lambda step_us=step_us: semi_implicit_euler(torques, step_us * 1e-6),
+            3,
+        )
+    for method, rtol in itertools.product(("RK45", "LSODA"), (1e-3, 1e-5, 1e-7, 1e-9)):
+        add(
+            f"solve_ivp {method}",
+            rtol,
+            lambda method=method, rtol=rtol: by_solve_ivp(torques, method, rtol),
+            1,
+        )
+    return found
+
+
+if __name__ == "__main__":
+    for name, points in measured().items():
+        for setting, seconds, error in points:
+            print(f"{name:22} {setting:8.2g}  {seconds:9.5f} s/s  {error:.2e} N·m")

@@ -18,11 +18,11 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
-from docs.make.benchmarks.verification import processor_s
 
 import masrel
 from docs.make.benchmarks.parts import write_part
 from docs.make.benchmarks.reading import COMPILED
+from docs.make.benchmarks.verification import processor_s
 from tests.benchmarks.many_ratings import many_ratings
 
 ROOT = Path(__file__).parents[3]

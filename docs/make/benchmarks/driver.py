@@ -33,6 +33,7 @@ from masrel.lab.hess import (
     run_presentation,
 )
 from masrel.lab.hess._clock import real_time
+from tests.benchmarks import driver_integrators
 
 START, END = radians(30.0), radians(146.0)
 STRETCH_S = 116.0 / 92.0
@@ -242,6 +243,11 @@ def main() -> None:
     tick_costs()
     late = lateness(float(sys.argv[1]) if len(sys.argv) > 1 else 60.0)
     driver_figures.draw_lateness(late, FIGURES / "driver_lateness.png")
+    integrators = driver_integrators.measured()
+    for name, points in integrators.items():
+        for setting, seconds, error in points:
+            print(f"{name:22} {setting:8.2g}  {seconds:9.5f} s/s  {error:.2e} N·m")
+    driver_figures.draw_integrators(integrators, FIGURES / "driver_integrators.png")
     driver_figures.draw_traces(FIGURES / "driver_traces.png")
     driver_figures.draw_measured(FIGURES / "driver_measured.png")
     driver_figures.draw_backdrive(FIGURES / "driver_backdrive.png")

@@ -39,6 +39,12 @@ BLACK, GREY, BLUE, ORANGE, VERMILLION, GREEN = (
     "#D55E00",
     "#009E73",
 )
+STYLES = {
+    "exact step": (BLUE, "o", "-"),
+    "semi-implicit Euler": (VERMILLION, "s", "--"),
+    "solve_ivp RK45": (GREEN, "^", "-."),
+    "solve_ivp LSODA": (GREY, "D", ":"),
+}
 LINES = {"HM1": ":", "HM2": "-.", "HM3": "--", "HM4": "-"}
 COLOURS = {"HM1": GREEN, "HM2": ORANGE, "HM3": VERMILLION, "HM4": BLUE}
 
@@ -47,6 +53,42 @@ def _figure(width: float = 5.6, height: float = 3.6) -> Figure:
     mpl.rcParams.update({"font.size": 9, "axes.spines.top": False})
     mpl.rcParams.update({"axes.spines.right": False, "savefig.dpi": 200})
     return Figure(figsize=(width, height), layout="constrained")
+
+
+def draw_integrators(
+    integrators: Mapping[str, list[tuple[float, float, float]]], path: Path
+) -> None:
+    """Draw the processor time of a simulated second against the largest error."""
+    figure = _figure()
+    axes = figure.add_subplot()
+    for name, points in integrators.items():
+        colour, marker, line = STYLES[name]
+        axes.loglog(
+            [seconds for _, seconds, _ in points],
+            [error for *_, error in points],
+            color=colour,
+            marker=marker,
+            linestyle=line,
+            markersize=5,
+            label=name,
+        )
+    for setting, seconds, error in integrators["exact step"]:
+        if setting == 0.0005:
+            axes.annotate(
+                "as shipped: 0.5 ms",
+                (seconds, error),
+                (7, 1),
+                textcoords="offset points",
+                color=BLUE,
+                ha="left",
+            )
+    axes.axhline(18.8 / 2700.0, color=GREY, linewidth=0.8)
+    axes.text(0.05, 18.8 / 2700.0 * 1.2, "torque quantum", color=GREY, ha="center")
+    axes.set_xlabel("processor time of a simulated second (s)")
+    axes.set_ylabel("largest error of the hand's torque (N·m)")
+    axes.grid(color="#DDDDDD", linewidth=0.6)
+    axes.legend(frameon=False, loc="lower left", fontsize=8)
+    figure.savefig(path)
 
 
 def draw_lateness(loops: Mapping[str, NDArray[np.float64]], path: Path) -> None:

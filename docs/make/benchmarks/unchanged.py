@@ -13,10 +13,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from docs.make.benchmarks.verification import processor_s
-
 import masrel
 from docs.make.benchmarks.parts import write_part
+from docs.make.benchmarks.verification import processor_s
 from masrel.lab.protocol import copy_template
 
 DOCS = Path(__file__).parents[2]
