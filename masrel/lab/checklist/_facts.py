@@ -20,8 +20,8 @@ from masrel.lab.report._design import (
 )
 from masrel.lab.report._material import TARGETS, coefficient_name
 from masrel.lab.run._state import read_session
-from masrel.lab.schedule import read_schedule
 from masrel.lab.schedule._orders import orders_in_words
+from masrel.lab.schedule.presentation import _read_drawn
 from masrel.tables._estimate_words import sentence
 from masrel.tables._tables import counted, number, percent
 
@@ -74,12 +74,8 @@ def gather_facts(paths: StudyPaths, protocol: Protocol) -> StudyFacts:
         analysis = analyze(
             protocol, ratings, in_person=data.in_person, excluded=data.excluded
         )
-    pairs = [(rater, each.id) for each in protocol.sessions for rater in each.raters]
-    drawn = [
-        read_schedule(file)
-        for pair in pairs
-        if (file := paths.schedule_file(*pair)).is_file()
-    ]
+    pairs = protocol.rater_sessions
+    drawn = [schedule for _, schedule in _read_drawn(paths, pairs)]
     is_published = paths.published_secret_file.is_file()
     begun = (_session(rater, paths.log_file(rater, each)) for rater, each in pairs)
     sessions = tuple(session for session in begun if session is not None)

@@ -2,7 +2,7 @@
 
 import contextlib
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import click
@@ -13,6 +13,7 @@ from masrel.lab.cli._study_options import echo_remarks, study_argument
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol, scale_of
 from masrel.lab.ratings import study_remarks
 from masrel.lab.schedule import concealment_notes, schedule_problems
+from masrel.tables._tables import counted
 
 
 @click.command("check")
@@ -38,20 +39,16 @@ def check(study: Path) -> None:
         click.echo(problem, err=True)
     echo_remarks(notes)
     if problems:
-        click.echo(f"masrel: {study}: {_count(problems, 'problem')}", err=True)
+        click.echo(f"masrel: {study}: {counted(len(problems), 'problem')}", err=True)
         sys.exit(2)
-    places = [(rater, s.id) for s in protocol.sessions for rater in s.raters]
+    places = protocol.rater_sessions
     n_drawn = sum(paths.schedule_file(*place).is_file() for place in places)
     click.echo(
-        f"{study}: no problems. {_count(protocol.models, 'model')}, "
-        f"{_count(protocol.raters, 'rater')}, "
-        f"{_count(protocol.sessions, 'session')}; "
-        f"{n_drawn} of {_count(places, 'schedule')} drawn."
+        f"{study}: no problems. {counted(len(protocol.models), 'model')}, "
+        f"{counted(len(protocol.raters), 'rater')}, "
+        f"{counted(len(protocol.sessions), 'session')}; "
+        f"{n_drawn} of {counted(len(places), 'schedule')} drawn."
     )
-
-
-def _count(things: Sequence[object], noun: str) -> str:
-    return f"{len(things)} {noun}" + ("" if len(things) == 1 else "s")
 
 
 def _plan_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
@@ -107,12 +104,10 @@ def _record_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
 def _sheet_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
     from masrel.lab.paper._form import off_scale
 
-    for session in protocol.sessions:
-        for rater in session.raters:
-            place = (rater, session.id)
-            for file in (study.sheet_file(*place), study.typed_file(*place)):
-                if file.is_file():
-                    yield from off_scale(file, protocol.scale.grades)
+    for place in protocol.rater_sessions:
+        for file in (study.sheet_file(*place), study.typed_file(*place)):
+            if file.is_file():
+                yield from off_scale(file, protocol.scale.grades)
 
 
 def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:

@@ -58,10 +58,11 @@ def demo(out: Path, template: str | None, output: OutputOptions) -> None:
 
 def _publish_secret(study: StudyPaths) -> None:
     # A demo hides nothing, and is the same each time.
-    from masrel.lab.schedule._secret import N_BYTES, secret_text
+    from masrel.lab.schedule._secret import N_BYTES, SECRET_TEXT
 
     if not study.published_secret_file.exists():
-        write_file(study.published_secret_file, secret_text(bytes(range(N_BYTES))))
+        text = SECRET_TEXT.format(bytes(range(N_BYTES)).hex())
+        write_file(study.published_secret_file, text)
 
 
 def _simulate(study: StudyPaths, output: OutputOptions) -> None:
@@ -77,7 +78,7 @@ def _simulate(study: StudyPaths, output: OutputOptions) -> None:
 
     protocol = read_protocol(study.protocol)
     allot_schedules(study, protocol)
-    occasions = [(s.id, rater) for s in protocol.sessions for rater in s.raters]
+    occasions = protocol.rater_sessions
     n_presentations = len(occasions) * len(protocol.models) * protocol.schedule.repeats
     with tqdm(
         total=n_presentations,
@@ -85,7 +86,7 @@ def _simulate(study: StudyPaths, output: OutputOptions) -> None:
         unit="",
         disable=output.quiet or None,
     ) as bar:
-        for session, rater in occasions:
+        for rater, session in occasions:
             run_session(
                 study,
                 protocol,

@@ -96,16 +96,11 @@ def _draw(
     """
     from masrel.lab.conduct import allot_schedules
     from masrel.lab.schedule import site_of_copy
-    from masrel.lab.schedule._secret import site_of
+    from masrel.lab.schedule._secret import rater_sessions_at
 
     site = site or site_of_copy(paths)
     written = set(allot_schedules(paths, protocol, site=site, redraw=redraw))
-    places = [
-        (rater, session.id)
-        for session in protocol.sessions
-        for rater in session.raters
-        if site in (None, site_of(protocol, rater))
-    ]
+    places = rater_sessions_at(protocol, site)
     n_new = sum(paths.schedule_file(*place) in written for place in places)
     click.echo(
         f"{paths.schedules}: {n_new} drawn, {len(places) - n_new} kept. Give raters "

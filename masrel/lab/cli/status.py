@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -79,12 +79,12 @@ def _study(paths: "StudyPaths", protocol: "Protocol", output: OutputOptions) -> 
 
 
 _COUNTS = {
-    "Practised": "n_practised",
-    "Breaks": "n_breaks",
-    "Answers": "n_answers",
-    "Skipped": "n_skipped",
-    "Faults": "n_faults",
-    "Corrections": "n_corrections",
+    "n_practised": "Practised",
+    "n_breaks": "Breaks",
+    "n_answers": "Answers",
+    "n_skipped": "Skipped",
+    "n_faults": "Faults",
+    "n_corrections": "Corrections",
 }
 """Columns that are there when any session has something in them."""
 
@@ -94,50 +94,42 @@ def _sessions_table(
     sessions: "Sequence[SessionProgress]",
     raters: "Sequence[RaterProgress]",
 ) -> "Table":
-    from masrel.tables._tables import Column, Table
+    from masrel.tables._tables import Column, table_of
 
-    status = {rater.rater: rater.status for rater in raters}
-    n_complete = sum(session.stage == "complete" for session in sessions)
-    counts = {
-        heading: key
-        for heading, key in _COUNTS.items()
-        if any(getattr(session, key) for session in sessions)
+    absent = {
+        r.rater: f", {r.status}"
+        for r in raters
+        if r.status in ("withdrawn", "excluded")
     }
-    return Table(
-        name="status",
-        caption=f"Study {study}: {n_complete} of {len(sessions)} sessions complete",
-        columns=(
+    rows = [
+        {
+            **asdict(each),
+            "stage": each.stage + absent.get(each.rater, ""),
+            "graded": f"{each.n_graded} of {each.n_presentations}",
+            "last": each.last_time_utc
+            and f"{_minute(each.last_time_utc)} {each.last_event}",
+        }
+        for each in sessions
+    ]
+    n_complete = sum(session.stage == "complete" for session in sessions)
+    return table_of(
+        "status",
+        f"Study {study}: {n_complete} of {len(sessions)} sessions complete",
+        (
             Column(key="session", heading="Session", align="left"),
             Column(key="rater", heading="Rater", align="left"),
             Column(key="stage", heading="Stage", align="left"),
             Column(key="graded", heading="Graded"),
-            *(Column(key=key, heading=heading) for heading, key in counts.items()),
+            *(
+                Column(key=key, heading=heading)
+                for key, heading in _COUNTS.items()
+                if any(row[key] for row in rows)
+            ),
             Column(key="last", heading="Last event (UTC)", align="left"),
         ),
-        rows=tuple(
-            (
-                session.session,
-                session.rater,
-                _stage(session, status.get(session.rater)),
-                f"{session.n_graded} of {session.n_presentations}",
-                *(getattr(session, key) for key in counts.values()),
-                _last_event(session),
-            )
-            for session in sessions
-        ),
+        rows,
         data="simulated" if any(s.simulated for s in sessions) else "recorded",
     )
-
-
-def _stage(session: "SessionProgress", status: str | None) -> str:
-    is_out = status in ("withdrawn", "excluded")
-    return f"{session.stage}, {status}" if is_out else session.stage
-
-
-def _last_event(session: "SessionProgress") -> str | None:
-    if session.last_time_utc is None:
-        return None
-    return f"{_minute(session.last_time_utc)} {session.last_event}"
 
 
 def _event_line(event: "Event") -> str:
@@ -165,58 +157,48 @@ def _raters(paths: "StudyPaths", protocol: "Protocol", output: OutputOptions) ->
     sessions = session_progress(paths, protocol)
     raters = rater_progress(paths, protocol, sessions)
     simulated = any(session.simulated for session in sessions)
+    rows = [
+        {
+            "rater": rater.rater,
+            "site": rater.site,
+            "status": rater.status,
+            "is_late": rater.is_late,
+            "fields": dict(rater.values),
+        }
+        for rater in raters
+    ]
     write_output(
         output,
-        document=lambda: {
-            "raters": [
-                {
-                    "rater": rater.rater,
-                    "site": rater.site,
-                    "status": rater.status,
-                    "is_late": rater.is_late,
-                    "fields": dict(rater.values),
-                }
-                for rater in raters
-            ]
-        },
-        text=lambda: _raters_table(raters, protocol, simulated=simulated),
+        document=lambda: {"raters": rows},
+        text=lambda: _raters_table(rows, protocol, simulated=simulated),
     )
 
 
 def _raters_table(
-    raters: "tuple[RaterProgress, ...]", protocol: "Protocol", *, simulated: bool
+    rows: list[dict[str, Any]], protocol: "Protocol", *, simulated: bool
 ) -> "Table":
     from masrel.lab.protocol._values import field_heading
-    from masrel.tables._tables import Column, Table
+    from masrel.tables._tables import Column, table_of
 
-    has_sites = any(rater.site for rater in raters)
-    columns = [Column(key="rater", heading="Rater", align="left")]
-    columns += [Column(key="site", heading="Site", align="left")] * has_sites
-    columns.append(Column(key="status", heading="Status", align="left"))
-    columns.append(Column(key="late", heading="Late", align="left"))
-    for name, field in protocol.rater_fields.items():
-        is_number = field.type in ("whole", "number")
-        columns.append(
+    has_sites = any(row["site"] for row in rows)
+    columns = (
+        Column(key="rater", heading="Rater", align="left"),
+        *[Column(key="site", heading="Site", align="left")] * has_sites,
+        Column(key="status", heading="Status", align="left"),
+        Column(key="late", heading="Late", align="left"),
+        *(
             Column(
                 key=name,
                 heading=field_heading(name, field),
-                align="right" if is_number else "left",
+                align="right" if field.type in ("whole", "number") else "left",
             )
-        )
-    rows = (
-        (
-            each.rater,
-            *[each.site] * has_sites,
-            each.status,
-            "yes" if each.is_late else None,
-            *each.values.values(),
-        )
-        for each in raters
+            for name, field in protocol.rater_fields.items()
+        ),
     )
-    return Table(
-        name="raters",
-        caption=f"Raters of study {protocol.study.id}",
-        columns=tuple(columns),
-        rows=tuple(rows),
-        data="simulated" if simulated else "recorded",
-    )
+    cells = [
+        {**row["fields"], **row, "late": "yes" if row["is_late"] else None}
+        for row in rows
+    ]
+    caption = f"Raters of study {protocol.study.id}"
+    data = "simulated" if simulated else "recorded"
+    return table_of("raters", caption, columns, cells, data=data)

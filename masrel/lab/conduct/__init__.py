@@ -4,7 +4,6 @@ In: a protocol and drawn schedules. Out: ``conduct.jsonl``, an append-only log o
 study.
 """
 
-from masrel.lab.conduct._allotment import allot_schedules
 from masrel.lab.conduct._statements import (
     excluded_raters,
     rater_values,
@@ -13,7 +12,7 @@ from masrel.lab.conduct._statements import (
     record_standing,
     record_unblinding,
 )
-from masrel.lab.conduct._study_log import read_conduct
+from masrel.lab.conduct._study_log import allot_schedules, read_conduct
 
 __all__ = [
     "allot_schedules",

@@ -1,6 +1,6 @@
 """What somebody states of a study, with who says so: each one event of its log."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from datetime import datetime
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -21,7 +21,8 @@ from masrel.lab.protocol._values import (
     needed_of,
     parsed_value,
 )
-from masrel.lab.schedule import Presentation, Schedule, read_schedule
+from masrel.lab.schedule import Presentation, Schedule
+from masrel.lab.schedule.presentation import _read_drawn
 
 if TYPE_CHECKING:
     from masrel.lab.recording import _Fact  # loads numpy
@@ -360,9 +361,14 @@ def record_unblinding(
         If it cannot be written.
     """
     reasons = stated(who=who, why=why)
+    meant = [
+        pair
+        for pair in protocol.rater_sessions
+        if rater in (None, pair[0]) and session in (None, pair[1])
+    ]
     revealed = tuple(
         (schedule, shown)
-        for schedule in _schedules(study, protocol, rater, session)
+        for _, schedule in _read_drawn(study, meant)
         for shown in schedule.presentations
         if code in (None, shown.code)
     )
@@ -383,14 +389,3 @@ def record_unblinding(
         where |= {"rater": schedule.rater, "session": schedule.session}
     append_event(study, protocol, "unblinded", {**where, **reasons}, now=now)
     return revealed
-
-
-def _schedules(
-    study: StudyPaths, protocol: Protocol, rater: str | None, session: str | None
-) -> Iterator[Schedule]:
-    for each in protocol.sessions:
-        for of_rater in each.raters:
-            file = study.schedule_file(of_rater, each.id)
-            is_meant = rater in (None, of_rater) and session in (None, each.id)
-            if is_meant and file.exists():
-                yield read_schedule(file)

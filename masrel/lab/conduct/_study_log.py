@@ -1,13 +1,15 @@
-"""The log of a study: what happened beside its sessions, event after event.
+"""The log of a study: what happened beside its sessions, and rows that it allots.
 
 ``conduct.jsonl`` is a chain of events as a session log is one.
 """
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import datetime
+from functools import partial
 from heapq import merge
 from itertools import accumulate
 from pathlib import Path
@@ -26,6 +28,10 @@ from masrel.lab._event_log import (
 )
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.protocol._values import Answer
+from masrel.lab.schedule import write_schedules
+from masrel.lab.schedule._orders import WITH_ROWS
+from masrel.lab.schedule._secret import site_of
+from masrel.lab.schedule.presentation import _read_drawn
 
 if TYPE_CHECKING:
     from masrel.lab.recording import _Fact  # loads numpy
@@ -214,3 +220,126 @@ def merged_log_problems(study: StudyPaths) -> Iterator[tuple[Path, str]]:
     for log in sorted(study.merged_conduct.glob("*")):
         if log not in named:
             yield log, "is in conduct/, and no merged study has it"
+
+
+def allot_schedules(
+    study: StudyPaths,
+    protocol: Protocol,
+    *,
+    site: str | None = None,
+    redraw: bool = False,
+    now: Callable[[], datetime] = utc_now,
+) -> tuple[Path, ...]:
+    """Draw every schedule that is not there yet, its row allotted by the study's log.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol. Where its scheme has no rows, nothing is logged.
+    site : str, optional
+        Of the raters of this site alone; sites must be strata.
+    redraw : bool
+        Draw stale or damaged schedules anew; a rater's row stays the same.
+    now : callable, optional
+        Gives the time of day, aware.
+
+    Returns
+    -------
+    tuple of Path
+        The files written; empty when all were there.
+
+    Raises
+    ------
+    ScheduleError
+        As :func:`masrel.lab.schedule.write_schedules` does; no row is allotted then.
+    SessionLogError
+        If the log of the study's conduct is damaged.
+    OSError
+        If the system refuses a folder or file.
+    """
+    has_rows = protocol.schedule.scheme in WITH_ROWS
+    allot = partial(_allot, study, protocol, now) if has_rows else None
+    return write_schedules(protocol, study, redraw=redraw, site=site, allot=allot)
+
+
+def _allot(
+    study: StudyPaths,
+    protocol: Protocol,
+    now: Callable[[], datetime],
+    places: Sequence[tuple[str, str]],
+) -> dict[tuple[str, str], int]:
+    """Return the rows of raters in sessions; those without one get the next."""
+    scheme = protocol.schedule.scheme
+    with open_conduct(study, protocol, now=now) as log:  # nobody else allots meanwhile
+        rows = _Rows(events_of_logs(study))
+        allotted = {}
+        for rater, session in places:
+            design = (session, site_of(protocol, rater), scheme)
+            row, _ = rows.of_rater.get((rater, *design), (rows.n[design] + 1, None))
+            if (rater, *design) not in rows.of_rater:
+                names = ("rater", "session", "site", "scheme", "row")
+                fields = dict(zip(names, (rater, *design, row), strict=True))
+                rows.add(log.path, log.append("allotted", fields))
+            allotted[rater, session] = row
+    return allotted
+
+
+_Design = tuple[str, str | None, str]  # session, site, scheme
+
+
+class _Rows:
+    """The rows that events of logs allotted, in order, and what is wrong with these.
+
+    Nobody asks for a row: whoever comes next gets the next one that no event has, in
+    the session and at the site; a row that was allotted once stays that rater's.
+    """
+
+    def __init__(self, events: Iterable[tuple[Path, Event]]) -> None:
+        # row of a rater, and the log that has it; how many of each design there are
+        self.of_rater: dict[tuple[str, str, str | None, str], tuple[int, Path]] = {}
+        self.n: Counter[_Design] = Counter()
+        self.problems: list[tuple[Path, str]] = []
+        for log, event in events:
+            if event.kind == "allotted":
+                self.add(log, event)
+
+    def add(self, log: Path, event: Event) -> None:
+        """Take in an event, and note what is wrong with it."""
+        fields = event.fields
+        rater, session, scheme = (
+            str(fields[k]) for k in ("rater", "session", "scheme")
+        )
+        design = session, str(fields["site"]) if fields["site"] else None, scheme
+        prior, _ = self.of_rater.get((rater, *design), (None, None))
+        if prior is not None and prior == fields["row"]:
+            return  # the log of another copy of the study has it, too
+        self.n[design] += 1
+        row = self.n[design]
+        where = f"line {event.line}: allotted: rater {rater} in session {session}"
+        if fields["row"] != row:
+            needed = f"needed row {row}, the next one, got {fields['row']}"
+            self.problems.append((log, f"{where}: {needed}"))
+        if prior is None:
+            self.of_rater[rater, *design] = row, log
+        else:
+            needed = f"needed a rater without a row, got one with row {prior}"
+            self.problems.append((log, f"{where}: {needed}"))
+
+
+def allotment_problems(
+    study: StudyPaths, protocol: Protocol
+) -> Iterator[tuple[Path, str]]:
+    """Yield where allotted rows, or rows of schedules, are not those of the logs."""
+    # of a merged study the logs of its sites
+    rows = _Rows(events_of_logs(study))
+    yield from rows.problems
+    logs = listed(map(str, study.conduct_logs() or [study.conduct_file]))
+    drawn = _read_drawn(study, protocol.rater_sessions, skips_damaged=True)
+    for path, schedule in drawn:
+        design = (schedule.session, schedule.site, schedule.scheme)
+        row, log = rows.of_rater.get((schedule.rater, *design), (None, logs))
+        if schedule.row != row and schedule.scheme in WITH_ROWS:
+            by = "a row that was allotted" if row is None else f"row {row}"
+            yield path, f"needed {by}, by {log}, got row {schedule.row}"

@@ -448,3 +448,8 @@ class Protocol(_Table, frozen=True, kw_only=True):
     training: Training = Training()
     analysis: Analysis = Analysis()
     report: Report = Report()
+
+    @property
+    def rater_sessions(self) -> list[tuple[str, str]]:
+        """Ids of every rater and session that come together, session by session."""
+        return [(rater, each.id) for each in self.sessions for rater in each.raters]

@@ -10,9 +10,8 @@ from pathlib import Path
 import msgspec
 
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
-from masrel.lab.schedule import Presentation, Schedule
+from masrel.lab.schedule import Presentation, Schedule, draw_schedule
 from masrel.lab.schedule._secret import StudySecret, find_secret, new_secret
-from masrel.lab.schedule.presentation import _draw_with_key
 
 _COMPLETE = b'{"event": "complete"'  # how the last line of a finished log begins
 
@@ -97,6 +96,6 @@ def _draw(
         protocol.schedule, seed=seed, scheme="random-order"
     )
     of_rehearsal = msgspec.structs.replace(protocol, schedule=scheme)
-    schedule = _draw_with_key(of_rehearsal, rater, session, key=secret, row=None)
+    schedule = draw_schedule(of_rehearsal, rater, session, secret=secret)
     shown = [[p.code, p.model, p.repeat] for p in schedule.presentations]
     return schedule, hashlib.sha256(json.dumps(shown).encode()).hexdigest()

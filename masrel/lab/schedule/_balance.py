@@ -7,12 +7,8 @@ from itertools import chain, groupby, pairwise
 
 from masrel.errors import ScheduleError
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.schedule._secret import checked_site, site_of
-from masrel.lab.schedule.presentation import (
-    Schedule,
-    check_schedule,
-    read_schedule,
-)
+from masrel.lab.schedule._secret import checked_site, rater_sessions_at, site_of
+from masrel.lab.schedule.presentation import Schedule, _read_drawn, check_schedule
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,15 +53,12 @@ def order_balance(
     protocol: Protocol, study: StudyPaths, site: str | None = None
 ) -> tuple[OrderBalance, ...]:
     """Count the drawn schedules of a study, or of one of its sites."""
-    checked_site(protocol, site)
+    pairs = rater_sessions_at(protocol, checked_site(protocol, site))
     drawn: dict[tuple[str, str | None], list[Schedule]] = {}
-    for session in protocol.sessions:
-        for rater in session.raters:
-            file, at = study.schedule_file(rater, session.id), site_of(protocol, rater)
-            if site in (None, at) and file.exists():
-                schedule = read_schedule(file)
-                check_schedule(schedule, protocol)
-                drawn.setdefault((session.id, at), []).append(schedule)
+    for _, schedule in _read_drawn(study, pairs):
+        check_schedule(schedule, protocol)
+        group = schedule.session, site_of(protocol, schedule.rater)
+        drawn.setdefault(group, []).append(schedule)
     if not drawn:
         raise ScheduleError(f"{study.schedules}: needed drawn schedules, got none")
     return tuple(

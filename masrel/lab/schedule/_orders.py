@@ -82,24 +82,29 @@ def _numbered(order: Sequence[str]) -> list[tuple[str, int]]:
 
 def orders_in_words(rules: ScheduleScheme) -> str:
     """Say which orders a scheme draws, to follow "meets the models in"."""
-    limits = []
-    if rules.scheme == "no-immediate-repeat":
-        limits.append("no model comes twice in a row")
-    if rules.standards_apart:
-        limits.append("no two standards come in a row")
-    if rules.max_same_grade is not None:
-        limits.append(f"at most {rules.max_same_grade} of one grade come in a row")
-    if limits:
-        return f"an order drawn from all in which {' and '.join(limits)}"
-    if rules.scheme == "williams":
-        return "an order of a Williams design, which balances places and what follows"
-    if rules.scheme == "latin-square":
-        return "an order of a Latin square, which balances places"
-    if rules.scheme == "blocks" and rules.blocks_by == "role":
-        return "a random order with standards and dummies in a block each"
-    if rules.scheme == "blocks":
-        return "a random order in which each comes once before any comes again"
-    return "a random order"
+    n_same = rules.max_same_grade
+    limits = (
+        (rules.scheme == "no-immediate-repeat", "no model comes twice in a row"),
+        (rules.standards_apart, "no two standards come in a row"),
+        (n_same is not None, f"at most {n_same} of one grade come in a row"),
+    )
+    if any(is_one for is_one, _ in limits):
+        words = " and ".join(limit for is_one, limit in limits if is_one)
+        return f"an order drawn from all in which {words}"
+    by = rules.blocks_by if rules.scheme == "blocks" else None
+    return _IN_WORDS[rules.scheme, by]
+
+
+_IN_WORDS = {
+    ("random-order", None): "a random order",
+    ("williams", None): "an order of a Williams design, which balances places and what "
+    "follows",
+    ("latin-square", None): "an order of a Latin square, which balances places",
+    ("blocks", "role"): "a random order with standards and dummies in a block each",
+    ("blocks", "repeat"): "a random order in which each comes once before any comes "
+    "again",
+}
+"""Schemes without limits, and what is blocked, to words for them."""
 
 
 def _check_row(scheme: str, row: int | None) -> None:

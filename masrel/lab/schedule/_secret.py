@@ -25,6 +25,9 @@ from masrel.lab.protocol.study import _check_new_folder
 N_BYTES = 16
 """Bytes of a secret: 128 bits, which nobody can try one by one."""
 
+SECRET_TEXT = "format: 1\nsecret: {}\n"
+"""The text of the file of a study's secret, with its hexadecimal digits."""
+
 _TEXT = re.compile(r"format: 1\nsecret: ([0-9a-f]{32})\n?")
 _SITE_TEXT = re.compile(
     r"format: 2\nsite: ([A-Za-z0-9][A-Za-z0-9_.-]{0,31})\nsecret: ([0-9a-f]{32})\n"
@@ -42,8 +45,12 @@ class StudySecret:
 
     @classmethod
     def of_study(cls, secret: bytes) -> Self:
-        """Return the secret of a study with its commitment."""
-        return cls(commitment_of(secret), secret)
+        """Return the secret of a study with its commitment; refuse another length."""
+        if len(secret) != N_BYTES:
+            raise ScheduleError(f"secret: needed {N_BYTES} bytes, got {len(secret)}")
+        # it says which secret was used without saying it
+        commitment = hashlib.sha256(_named("commitment", secret.hex())).hexdigest()
+        return cls(commitment, secret)
 
     def of(self, site: str | None) -> bytes:
         """Return what a site's orders are drawn from; of no site the study's."""
@@ -55,29 +62,17 @@ class StudySecret:
                 f"that of site {self.site} alone, whose raters masrel schedule draws "
                 f"with --site {self.site}"
             )
-        return site_secret(self.secret, str(site))
+        # says nothing of the study's secret or another site's
+        return hmac.digest(self.secret, _named("site", str(site)), "sha256")[:N_BYTES]
 
     def draws(self, site: str | None, commitment: str | None) -> bool:
         """Return whether it can draw again what was drawn for a site."""
         return self.commitment == commitment and self.site in (None, site)
 
 
-def site_secret(secret: bytes, site: str) -> bytes:
-    """Return the secret of a site, which says nothing of the study's or another's."""
-    name = json.dumps(["masrel", "site", site], separators=(",", ":"))
-    return hmac.digest(secret, name.encode("ascii"), "sha256")[:N_BYTES]
-
-
-def commitment_of(secret: bytes) -> str:
-    """Return the SHA-256 that says which secret was used without saying it."""
-    name = json.dumps(["masrel", "commitment", secret.hex()], separators=(",", ":"))
-    return hashlib.sha256(name.encode("ascii")).hexdigest()
-
-
-def check_secret(secret: bytes) -> None:
-    """Refuse a secret of another length."""
-    if len(secret) != N_BYTES:
-        raise ScheduleError(f"secret: needed {N_BYTES} bytes, got {len(secret)}")
+def _named(*parts: str | int) -> bytes:
+    # what a hash is of: a JSON array without spaces, all but ASCII escaped
+    return json.dumps(["masrel", *parts], separators=(",", ":")).encode("ascii")
 
 
 def find_secret(study: StudyPaths) -> StudySecret | None:
@@ -100,22 +95,9 @@ def new_secret(study: StudyPaths) -> StudySecret:
     """Draw the secret of a study and keep it where only its owner can read it."""
     secret = secrets.token_bytes(N_BYTES)
     make_folder(study.secret_file.parent, mode=0o700)
-    text = secret_text(secret)
+    text = SECRET_TEXT.format(secret.hex())
     write_files({study.secret_file: text}, within=study.root, mode=0o600)
     return StudySecret.of_study(secret)
-
-
-def site_secret_text(key: StudySecret, site: str) -> str:
-    """Return the text of the file of a site's secret, derived from the study's."""
-    return (
-        f"format: 2\nsite: {site}\nsecret: {key.of(site).hex()}\n"
-        f"commitment: {key.commitment}\n"
-    )
-
-
-def secret_text(secret: bytes) -> str:
-    """Return the text of the file of a secret."""
-    return f"format: 1\nsecret: {secret.hex()}\n"
 
 
 def _read(file: Path) -> StudySecret:
@@ -135,6 +117,12 @@ def site_of(protocol: Protocol, rater: str) -> str | None:
     if protocol.schedule.strata == "none":
         return None
     return {each.id: each.site for each in protocol.raters}[rater]
+
+
+def rater_sessions_at(protocol: Protocol, site: str | None) -> list[tuple[str, str]]:
+    """Return every rater and session of a site, or of the study."""
+    pairs = protocol.rater_sessions
+    return [pair for pair in pairs if site in (None, site_of(protocol, pair[0]))]
 
 
 def checked_site(protocol: Protocol, site: str | None) -> str | None:
@@ -215,7 +203,11 @@ def copy_for_site(
         for file in (*dict.fromkeys(files), study.protocol.name)
     }
     key = find_secret(study) or new_secret(study)
-    secret = {copy.secret_file: site_secret_text(key, site).encode()}
+    text = (
+        f"format: 2\nsite: {site}\nsecret: {key.of(site).hex()}\n"
+        f"commitment: {key.commitment}\n"
+    )
+    secret = {copy.secret_file: text.encode()}
     _check_new_folder(destination, secret | contents)
     make_folder(copy.secret_file.parent, mode=0o700)
     write_files(secret | contents, within=destination, mode=0o600)
@@ -239,7 +231,7 @@ class Stream:
     # some streams learns neither the secret nor any other stream.
 
     def __init__(self, seed: int, *purpose: str, secret: bytes | None = None) -> None:
-        name = json.dumps(["masrel", seed, *purpose], separators=(",", ":")).encode()
+        name = _named(seed, *purpose)
         if secret is None:
             digest = hashlib.sha256(name).digest()
         else:
@@ -266,15 +258,12 @@ class Stream:
         # number has exactly the same chance.
         n_words = max(1, -(-(limit - 1).bit_length() // 64))
         usable = _N_WORDS**n_words // limit * limit
-        while (number := self._joined(n_words)) >= usable:
-            pass
+        number: int = usable
+        while number >= usable:
+            number = 0
+            for _ in range(n_words):
+                number = number * _N_WORDS + self.word()
         return number % limit
-
-    def _joined(self, n_words: int) -> int:
-        number = 0
-        for _ in range(n_words):
-            number = number * _N_WORDS + self.word()
-        return number
 
     def shuffle(self, items: MutableSequence[_T]) -> None:
         """Put `items` into a random order in place, each order equally likely."""

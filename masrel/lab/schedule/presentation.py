@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,9 +17,9 @@ from masrel.lab._bounded_files import (
     read_regular,
 )
 from masrel.lab._once import once
-from masrel.lab.protocol import Protocol, presented_hash, protocol_hash
+from masrel.lab.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
 from masrel.lab.schedule._orders import WITH_ROWS, draw_order
-from masrel.lab.schedule._secret import Stream, StudySecret, check_secret, site_of
+from masrel.lab.schedule._secret import Stream, StudySecret, site_of
 
 # No letter that reads as a digit (I, O, Q, S, Z), that makes a number of the code
 # (E), or that says left or right (L, R).
@@ -97,7 +97,7 @@ def draw_schedule(
     rater: str,
     session: str,
     *,
-    secret: bytes | None = None,
+    secret: bytes | StudySecret | None = None,
     row: int | None = None,
 ) -> Schedule:
     """Draw the order and the blinded codes of one rater in one session.
@@ -108,9 +108,10 @@ def draw_schedule(
         The study's protocol; its seed, models and repeats decide the draw.
     rater, session : str
         Their ids.
-    secret : bytes, optional
-        16 random bytes that decide the draw together with the seed. Without them the
-        seed alone does, and who knows it knows every order.
+    secret : bytes or StudySecret, optional
+        16 random bytes that decide the draw together with the seed, or the secret that
+        a study or the copy of a site has. Without it the seed alone decides, and who
+        knows it knows every order.
     row : int, optional
         Row of a design, from 1; schemes ``williams`` and ``latin-square`` need one,
         the others have none. :func:`masrel.lab.conduct.allot_schedules` allots them.
@@ -135,26 +136,12 @@ def draw_schedule(
     strata. With a secret nobody can tell one stream from the other without it: all
     codes of a study say nothing about its orders.
     """
-    if secret is not None:
-        check_secret(secret)
-    key = None if secret is None else StudySecret.of_study(secret)
-    return _draw_with_key(protocol, rater, session, key=key, row=row)
-
-
-def _draw_with_key(
-    protocol: Protocol,
-    rater: str,
-    session: str,
-    *,
-    key: StudySecret | None,
-    row: int | None,
-) -> Schedule:
-    """Draw the order and the codes of one rater from the secret of study or site."""
+    key = StudySecret.of_study(secret) if isinstance(secret, bytes) else secret
     _require_place(protocol, rater, session)
     site = site_of(protocol, rater)
-    secret = None if key is None else key.of(site)
-    shown = draw_order(protocol, rater, session, site=site, row=row, secret=secret)
-    stream = Stream(protocol.schedule.seed, "codes", session, rater, secret=secret)
+    drawn_by = None if key is None else key.of(site)
+    shown = draw_order(protocol, rater, session, site=site, row=row, secret=drawn_by)
+    stream = Stream(protocol.schedule.seed, "codes", session, rater, secret=drawn_by)
     codes = _draw_codes(protocol, len(shown), stream)
     return Schedule(
         study=protocol.study.id,
@@ -336,6 +323,20 @@ def read_schedule(path: Path) -> Schedule:
         raise ScheduleError("\n".join(problems))
     whole: dict[str, Any] = {key: int(head[key]) for key in _WHOLE if key in head}
     return Schedule(**(head | whole), presentations=tuple(rows))
+
+
+def _read_drawn(
+    study: StudyPaths, pairs: Iterable[tuple[str, str]], *, skips_damaged: bool = False
+) -> Iterator[tuple[Path, Schedule]]:
+    """Yield files and schedules of raters in sessions, of those that are there."""
+    for pair in pairs:
+        file = study.schedule_file(*pair)
+        if file.exists():
+            try:
+                yield file, read_schedule(file)
+            except ScheduleError:  # which `schedule_problems` has
+                if not skips_damaged:
+                    raise
 
 
 def _read_lines(path: Path) -> list[str]:

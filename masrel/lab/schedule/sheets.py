@@ -6,7 +6,6 @@ import os
 import shlex
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,30 +25,20 @@ from masrel.lab.schedule._secret import (
     checked_site,
     find_secret,
     new_secret,
+    rater_sessions_at,
     site_of,
 )
 from masrel.lab.schedule.presentation import (
     Schedule,
-    _draw_with_key,
     _format_problem,
+    _read_drawn,
     _require_place,
     _schedule_text,
     _sheet_text,
     check_schedule,
+    draw_schedule,
     read_schedule,
 )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _ScheduleFiles:
-    """One rater in one session, and the files that belong to the two."""
-
-    rater: str
-    session: str
-    schedule: Path
-    sheet: Path
-    typed: Path  # there once the sheet has been printed
-    log: Path
 
 
 def _drawn_schedule(
@@ -77,8 +66,8 @@ def _require_its_own(schedule: Schedule, file: Path, rater: str, session: str) -
         )
 
 
-_Places = Sequence[tuple[str, str]]
-"""Raters, each with a session."""
+_RaterSession = tuple[str, str]
+"""A rater and a session."""
 
 
 def write_schedules(
@@ -87,7 +76,8 @@ def write_schedules(
     *,
     redraw: bool = False,
     site: str | None = None,
-    allot: Callable[[_Places], Mapping[tuple[str, str], int]] | None = None,
+    allot: Callable[[Sequence[_RaterSession]], Mapping[_RaterSession, int]]
+    | None = None,
 ) -> tuple[Path, ...]:
     """Draw every schedule that is not there yet, with its blinded sheet.
 
@@ -127,22 +117,19 @@ def write_schedules(
     OSError
         If the system refuses a folder or file.
     """
-    every = _every_schedule(protocol, study, checked_site(protocol, site))
+    every = rater_sessions_at(protocol, checked_site(protocol, site))
+    faults = {place: _fault(study, place, protocol) for place in every}
     problems: list[str] = []
     texts: dict[Path, str | bytes] = {}
-    to_draw: list[_ScheduleFiles] = []
     stale: list[str] = []
-    for files in every:
-        fault = _fault(files, protocol)
+    for place, fault in faults.items():
         if fault is None:
-            if not files.sheet.exists():
-                texts[files.sheet] = _sheet_text(read_schedule(files.schedule))
-            continue
-        to_draw.append(files)
-        message, drawn_from = fault
-        if drawn_from is not None and not redraw:
-            stale.append(drawn_from)
-        elif (problem := _refusal(files, message, redraw=redraw)) is not None:
+            if not study.sheet_file(*place).exists():
+                schedule = read_schedule(study.schedule_file(*place))
+                texts[study.sheet_file(*place)] = _sheet_text(schedule)
+        elif fault[1] is not None and not redraw:
+            stale.append(fault[1])
+        elif (problem := _refusal(study, place, fault[0], redraw=redraw)) is not None:
             problems.append(problem)
     problems += (
         f"{sentence}; --redraw draws those anew whose sessions have not begun"
@@ -150,7 +137,7 @@ def write_schedules(
     )
     if problems:
         raise ScheduleError("\n".join(problems))
-    if to_draw:
+    if to_draw := [place for place, fault in faults.items() if fault is not None]:
         texts |= _drawn_texts(protocol, study, to_draw, allot)
     make_folder(study.schedules, mode=0o700)
     write_files(texts, within=study.root)
@@ -160,8 +147,8 @@ def write_schedules(
 def _drawn_texts(
     protocol: Protocol,
     study: StudyPaths,
-    to_draw: Sequence[_ScheduleFiles],
-    allot: Callable[[_Places], Mapping[tuple[str, str], int]] | None,
+    to_draw: Sequence[_RaterSession],
+    allot: Callable[[Sequence[_RaterSession]], Mapping[_RaterSession, int]] | None,
 ) -> dict[Path, str | bytes]:
     if protocol.schedule.scheme in WITH_ROWS and allot is None:
         raise ScheduleError(
@@ -172,20 +159,19 @@ def _drawn_texts(
         raise ScheduleError(f"{study.protocol}: {problem}")
     key = find_secret(study)
     if key is not None:
-        for files in to_draw:  # refused before a row is allotted
-            key.of(site_of(protocol, files.rater))
+        for rater, _ in to_draw:  # refused before a row is allotted
+            key.of(site_of(protocol, rater))
     texts: dict[Path, str | bytes] = {}
     drawn_from = _content_file(study, presented_hash(protocol))
     if not drawn_from.exists():
         texts[drawn_from] = presented_content(protocol)
-    rows = {} if allot is None else allot([(f.rater, f.session) for f in to_draw])
+    rows = {} if allot is None else allot(to_draw)
     key = key or new_secret(study)
-    for files in to_draw:
-        place = (files.rater, files.session)
-        drawn = _draw_with_key(protocol, *place, key=key, row=rows.get(place))
+    for place in to_draw:
+        drawn = draw_schedule(protocol, *place, secret=key, row=rows.get(place))
         # The sheet gets its name first: one without its schedule is drawn anew.
-        texts[files.sheet] = _sheet_text(drawn)
-        texts[files.schedule] = _schedule_text(drawn)
+        texts[study.sheet_file(*place)] = _sheet_text(drawn)
+        texts[study.schedule_file(*place)] = _schedule_text(drawn)
     return texts
 
 
@@ -212,32 +198,32 @@ def schedule_problems(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
         return (str(error),)
     if (problem := order_problem(protocol)) is not None:
         return (f"{study.protocol}: {problem}",)
-    every = _every_schedule(protocol, study)
+    every = protocol.rater_sessions
     problems: list[str] = []
     stale: list[str] = []
-    for files in every:
-        if not files.schedule.exists():
+    for place in every:
+        if not study.schedule_file(*place).exists():
             continue
-        fault = _fault(files, protocol)
+        fault = _fault(study, place, protocol)
         if fault is None:
-            schedule = read_schedule(files.schedule)
-            problem = _sheet_fault(files, schedule)
-            problem = problem or _draw_fault(files, schedule, protocol, secret)
+            schedule = read_schedule(study.schedule_file(*place))
+            problem = _sheet_fault(study.sheet_file(*place), schedule)
+            problem = problem or _draw_fault(study, schedule, protocol, secret)
             problems += filter(None, [problem])
         elif fault[1] is None:
             problems.append(fault[0])
         else:
             stale.append(fault[1])
     problems += _stale_sentences(protocol, study, stale, len(every))
-    expected = {path for files in every for path in (files.schedule, files.sheet)}
-    for path in sorted(study.schedules.glob("*.csv")):
-        if path not in expected:
-            problems.append(
-                f"{path}: needed schedules of the protocol's raters and sessions only, "
-                "got a file of neither: put the rater back into the session (masrel "
-                "record withdraw keeps the grades of one who left), or move the file "
-                "out of the study"
-            )
+    expected = {study.schedule_file(*place) for place in every}
+    expected |= {study.sheet_file(*place) for place in every}
+    problems += (
+        f"{path}: needed schedules of the protocol's raters and sessions only, got a "
+        "file of neither: put the rater back into the session (masrel record withdraw "
+        "keeps the grades of one who left), or move the file out of the study"
+        for path in sorted(study.schedules.glob("*.csv"))
+        if path not in expected
+    )
     return tuple(problems)
 
 
@@ -260,11 +246,8 @@ def concealment_notes(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
         that they may.
     """
     secret = find_secret(study)
-    schedules = [
-        read_schedule(files.schedule)
-        for files in _every_schedule(protocol, study)
-        if files.schedule.exists() and _fault(files, protocol) is None
-    ]
+    fitting = [p for p in protocol.rater_sessions if _fault(study, p, protocol) is None]
+    schedules = [schedule for _, schedule in _read_drawn(study, fitting)]
     from_seed = sum(each.commitment is None for each in schedules)
     of_others = sum(
         each.commitment is not None
@@ -315,34 +298,19 @@ def _open_to_others(study: StudyPaths) -> Iterator[str]:
         )
 
 
-def _every_schedule(
-    protocol: Protocol, study: StudyPaths, site: str | None = None
-) -> list[_ScheduleFiles]:
-    return [
-        _ScheduleFiles(
-            rater=rater,
-            session=session.id,
-            schedule=study.schedule_file(rater, session.id),
-            sheet=study.sheet_file(rater, session.id),
-            typed=study.typed_file(rater, session.id),
-            log=study.log_file(rater, session.id),
-        )
-        for session in protocol.sessions
-        for rater in session.raters
-        if site in (None, site_of(protocol, rater))
-    ]
-
-
-def _fault(files: _ScheduleFiles, protocol: Protocol) -> tuple[str, str | None] | None:
+def _fault(
+    study: StudyPaths, place: _RaterSession, protocol: Protocol
+) -> tuple[str, str | None] | None:
     """Return why the file of a schedule cannot be used as it is, or None.
 
     With it of a stale one comes the hash of what was presented when it was drawn.
     """
-    if not files.schedule.exists():
-        return f"{files.schedule}: needed a schedule file, got none", None
+    file = study.schedule_file(*place)
+    if not file.exists():
+        return f"{file}: needed a schedule file, got none", None
     try:
-        schedule = read_schedule(files.schedule)
-        _require_its_own(schedule, files.schedule, files.rater, files.session)
+        schedule = read_schedule(file)
+        _require_its_own(schedule, file, *place)
     except ScheduleError as error:
         return str(error), None
     try:
@@ -350,31 +318,35 @@ def _fault(files: _ScheduleFiles, protocol: Protocol) -> tuple[str, str | None] 
     except ScheduleError as error:
         drawn_from = schedule.presented_sha256
         is_stale = drawn_from != presented_hash(protocol)
-        return f"{files.schedule}: {error}", drawn_from if is_stale else None
+        return f"{file}: {error}", drawn_from if is_stale else None
     return None
 
 
-def _refusal(files: _ScheduleFiles, fault: str, *, redraw: bool) -> str | None:
+def _refusal(
+    study: StudyPaths, place: _RaterSession, fault: str, *, redraw: bool
+) -> str | None:
     # Why a schedule with this fault may not be drawn, or None.
+    log, sheet = study.log_file(*place), study.sheet_file(*place)
+    typed = study.typed_file(*place)  # there once the sheet has been printed
     rules = (
         (
-            files.log.exists(),
-            f"It was not drawn, because the session has begun: {files.log} was "
+            log.exists(),
+            f"It was not drawn, because the session has begun: {log} was "
             "recorded by the schedule there was. Bring back that schedule and its "
             "protocol, or move the log out of the study",
         ),
         (
-            files.sheet.exists() and _is_filled_in(files.sheet),
-            f"It was not drawn, because {files.sheet} has grades on it. Move the sheet "
-            "out of the study first",
+            sheet.exists() and _is_filled_in(sheet),
+            f"It was not drawn, because {sheet} has grades on it. Move the sheet out "
+            "of the study first",
         ),
         (
-            files.typed.exists(),
+            typed.exists(),
             "It was not drawn, because its sheet was printed, and what is on paper "
-            f"could not be entered any more. Move {files.typed} out of the study first",
+            f"could not be entered any more. Move {typed} out of the study first",
         ),
         (
-            files.schedule.exists() and not redraw,
+            study.schedule_file(*place).exists() and not redraw,
             "It was kept; --redraw draws it anew",
         ),
     )
@@ -383,36 +355,33 @@ def _refusal(files: _ScheduleFiles, fault: str, *, redraw: bool) -> str | None:
 
 def _is_filled_in(sheet: Path) -> bool:
     # A blank sheet's rows, and none but they, end at the comma before the grade.
-    rows = [row for row in _sheet_lines(sheet) if not row.startswith("#")][1:]
-    return any(not row.endswith(",") for row in rows if row)
+    _, rows = _read_sheet(sheet)
+    return any(not row.endswith(",") for row in rows)
 
 
-def _sheet_lines(sheet: Path) -> list[str]:
+def _read_sheet(sheet: Path) -> tuple[list[str], list[str]]:
+    # every line, and those below the names of the columns
     data = read_regular(sheet, most=MAX_SMALL)
-    return data.decode("utf-8", errors="replace").splitlines()
+    lines = data.decode("utf-8", errors="replace").splitlines()
+    return lines, [line for line in lines if line and not line.startswith("#")][1:]
 
 
-def _sheet_fault(files: _ScheduleFiles, schedule: Schedule) -> str | None:
+def _sheet_fault(sheet: Path, schedule: Schedule) -> str | None:
     # The sheet may be missing or have grades, but its codes are the schedule's.
-    if not files.sheet.exists():
+    if not sheet.exists():
         return None
-    lines = _sheet_lines(files.sheet)
-    problem = _format_problem(lines)
-    if problem is not None:
-        return f"{files.sheet}: {problem}"
-    below = [line for line in lines if line and not line.startswith("#")][1:]
-    rows = [tuple(row.split(",")[:2]) for row in below]
-    expected = [(str(s.position), s.code) for s in schedule.presentations]
-    if rows == expected:
+    lines, rows = _read_sheet(sheet)
+    if (problem := _format_problem(lines)) is not None:
+        return f"{sheet}: {problem}"
+    expected = [[str(s.position), s.code] for s in schedule.presentations]
+    if [row.split(",")[:2] for row in rows] == expected:
         return None
-    return (
-        f"{files.sheet}: needed the positions and codes of {files.schedule.name}, "
-        "got others"
-    )
+    of_schedule = f"{schedule.session}_{schedule.rater}.csv"
+    return f"{sheet}: needed the positions and codes of {of_schedule}, got others"
 
 
 def _draw_fault(
-    files: _ScheduleFiles,
+    study: StudyPaths,
     schedule: Schedule,
     protocol: Protocol,
     secret: StudySecret | None,
@@ -420,20 +389,17 @@ def _draw_fault(
     # Whether the study's secret draws another order or other codes than are there.
     if secret is None or not secret.draws(schedule.site, schedule.commitment):
         return None
-    drawn = _draw_with_key(
-        protocol, files.rater, files.session, key=secret, row=schedule.row
-    )
+    place = schedule.rater, schedule.session
+    drawn = draw_schedule(protocol, *place, secret=secret, row=schedule.row)
     if drawn.presentations == schedule.presentations:
         return None
     return (
-        f"{files.schedule}: needed the order and codes that the study's secret draws, "
-        "got others"
+        f"{study.schedule_file(*place)}: needed the order and codes that the study's "
+        "secret draws, got others"
     )
 
 
 _SHOWN = 4  # keys that are named
-
-_NOT_SET = object()
 
 
 def _content_file(study: StudyPaths, sha256: str) -> Path:
@@ -465,37 +431,27 @@ def _changes(protocol: Protocol, file: Path, sha256: str) -> str:
     before, now = (
         dict(_leaves(json.loads(text))) for text in (drawn, presented_content(protocol))
     )
-    # of a model that is new or gone its place in the list says all
-    gone = {k for k in before.keys() ^ now.keys() if k.startswith("models.")}
-    both = {k.split(".")[1] for k in before if k.startswith("models.")} & {
-        k.split(".")[1] for k in now if k.startswith("models.")
+    # of a model that is new or gone the list of models says all
+    in_both = {key[1] for key in before if key[1:]} & {key[1] for key in now if key[1:]}
+    changed = {
+        ".".join(key): (before.get(key, "not set"), now.get(key, "not set"))
+        for key in now | before
+        if before.get(key) != now.get(key)
+        and (key[0] != "models" or not key[1:] or key[1] in in_both)
     }
-    keys = [
-        key
-        for key in [*now, *(key for key in before if key not in now)]
-        if before.get(key, _NOT_SET) != now.get(key, _NOT_SET)
-        and (key not in gone or key.split(".")[1] in both)
-    ]
-    shown = [
-        f"{key} was {_text(before.get(key, _NOT_SET))} and is "
-        f"{_text(now.get(key, _NOT_SET))}"
-        for key in keys[:_SHOWN]
-    ]
-    more = len(keys) - _SHOWN
-    return ", ".join(shown) + (f", and {more} more keys differ" if more > 0 else "")
+    shown = [f"{key} was {was} and is {is_}" for key, (was, is_) in changed.items()]
+    more = len(shown) - _SHOWN
+    others = f", and {more} more keys differ" if more > 0 else ""
+    return ", ".join(shown[:_SHOWN]) + others
 
 
-def _leaves(content: Any, place: str = "") -> Iterator[tuple[str, object]]:
-    # keys of a document with dots between; models by their ids, and the list of these
-    if place == "models":
-        yield place, [model["id"] for model in content]
+def _leaves(content: Any, *keys: str) -> Iterator[tuple[tuple[str, ...], str]]:
+    # values of a document as JSON by their keys; models by their ids, and these
+    if keys == ("models",):
+        yield keys, json.dumps([model["id"] for model in content], ensure_ascii=False)
         content = {model["id"]: model for model in content}
     if isinstance(content, dict):
         for key, value in content.items():
-            yield from _leaves(value, f"{place}.{key}".lstrip("."))
+            yield from _leaves(value, *keys, key)
     else:
-        yield place, content
-
-
-def _text(value: object) -> str:
-    return "not set" if value is _NOT_SET else json.dumps(value, ensure_ascii=False)
+        yield keys, json.dumps(content, ensure_ascii=False)

@@ -8,8 +8,7 @@ from typing import Any
 
 from masrel.errors import ProtocolError, SessionLogError
 from masrel.lab._once import read_once
-from masrel.lab.conduct._allotment import allotment_problems
-from masrel.lab.conduct._study_log import merged_log_problems
+from masrel.lab.conduct._study_log import allotment_problems, merged_log_problems
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.schedule import schedule_problems
 from masrel.lab.verification._log_findings import Finding, broken, doubt

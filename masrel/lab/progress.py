@@ -1,4 +1,8 @@
-"""Where sessions and raters of a study stand, by its logs, and what comes next."""
+"""How far a study is: every session, every rater, and what to do next.
+
+In: a protocol, its schedules and logs. Out: where each session stands, what became of
+each rater, and one next step.
+"""
 
 import csv
 import io
@@ -11,16 +15,27 @@ from pathlib import Path
 from typing import Literal
 
 from masrel._files import safe_cell
-from masrel.errors import ScheduleError, SessionLogError
+from masrel.errors import SessionLogError
 from masrel.lab._event_log import Event, events_before_torn
 from masrel.lab.conduct import excluded_raters, rater_values, read_conduct
 from masrel.lab.protocol import Protocol, StudyPaths, protocol_hash
 from masrel.lab.protocol._values import FieldValue
 from masrel.lab.run._state import SessionState, read_session, replay
-from masrel.lab.schedule import read_schedule, site_of_copy
-from masrel.lab.schedule._secret import site_of
+from masrel.lab.schedule import site_of_copy
+from masrel.lab.schedule._secret import rater_sessions_at
+from masrel.lab.schedule.presentation import _read_drawn
 
-SessionStage = Literal["not drawn", "drawn", "begun", "complete", "unreadable"]
+__all__ = [
+    "NextStep",
+    "RaterProgress",
+    "SessionProgress",
+    "next_step",
+    "rater_progress",
+    "raters_csv",
+    "session_progress",
+]
+
+_SessionStage = Literal["not drawn", "drawn", "begun", "complete", "unreadable"]
 """How far a session came."""
 
 
@@ -54,7 +69,7 @@ class SessionProgress:
 
     session: str
     rater: str
-    stage: SessionStage
+    stage: _SessionStage
     n_presentations: int
     n_graded: int = 0
     n_skipped: int = 0
@@ -95,13 +110,8 @@ def session_progress(
     OSError
         If a log that is there cannot be read.
     """
-    site = site_of_copy(study)
-    return tuple(
-        _progress(study, protocol, rater, session.id)
-        for session in protocol.sessions
-        for rater in session.raters
-        if site in (None, site_of(protocol, rater))
-    )
+    pairs = rater_sessions_at(protocol, site_of_copy(study))
+    return tuple(_progress(study, protocol, *pair) for pair in pairs)
 
 
 def _progress(
@@ -109,7 +119,7 @@ def _progress(
 ) -> SessionProgress:
     n_presentations = len(protocol.models) * protocol.schedule.repeats
     log = study.log_file(rater, session)
-    stage: SessionStage = "not drawn"
+    stage: _SessionStage = "not drawn"
     if study.schedule_file(rater, session).exists():
         stage = "drawn"
     events, state, problem = _events(log)
@@ -156,7 +166,7 @@ def _events(log: Path) -> tuple[tuple[Event, ...], SessionState, str | None]:
         return (), SessionState(), problem
 
 
-RaterStatus = Literal["planned", "begun", "complete", "withdrawn", "excluded"]
+_RaterStatus = Literal["planned", "begun", "complete", "withdrawn", "excluded"]
 """What became of a rater; of two that hold the later one."""
 
 
@@ -182,7 +192,7 @@ class RaterProgress:
 
     rater: str
     site: str | None
-    status: RaterStatus
+    status: _RaterStatus
     is_late: bool
     values: Mapping[str, FieldValue | None] = field(hash=False)
 
@@ -240,7 +250,7 @@ def rater_progress(
     )
 
 
-def _reached(stages: set[str]) -> RaterStatus:
+def _reached(stages: set[str]) -> _RaterStatus:
     if stages == {"complete"}:
         return "complete"
     return "begun" if stages & {"begun", "complete", "unreadable"} else "planned"
@@ -250,14 +260,9 @@ def _late_raters(study: StudyPaths, protocol: Protocol) -> set[str]:
     # A rater who joins is put into the protocol, whose hash the schedules carry that
     # are drawn from then on.
     drawn_from: dict[str, str] = {}
-    for session in protocol.sessions:
-        for rater in session.raters:
-            file = study.schedule_file(rater, session.id)
-            if rater not in drawn_from and file.exists():
-                try:
-                    drawn_from[rater] = read_schedule(file).protocol_sha256
-                except ScheduleError:
-                    continue  # masrel check says so
+    # what is damaged masrel check says
+    for _, drawn in _read_drawn(study, protocol.rater_sessions, skips_damaged=True):
+        drawn_from.setdefault(drawn.rater, drawn.protocol_sha256)
     in_force = _protocols_in_force(study, protocol)
     late = set()
     for site in {rater.site for rater in protocol.raters}:
@@ -272,12 +277,11 @@ def _protocols_in_force(study: StudyPaths, protocol: Protocol) -> list[tuple[str
     # raters, each with the hash of the protocol under which a session of theirs began,
     # in order of time; then every rater with that of the protocol as it is now
     begun: list[tuple[str, str, str]] = []
-    for session in protocol.sessions:
-        for rater in session.raters:
-            events, state, _ = _events(study.log_file(rater, session.id))
-            if "protocol_sha256" in state.header:
-                sha256 = str(state.header["protocol_sha256"])
-                begun.append((events[0].time_utc, rater, sha256))
+    for rater, session in protocol.rater_sessions:
+        events, state, _ = _events(study.log_file(rater, session))
+        if "protocol_sha256" in state.header:
+            sha256 = str(state.header["protocol_sha256"])
+            begun.append((events[0].time_utc, rater, sha256))
     begun.sort(key=itemgetter(0))
     now = protocol_hash(protocol)
     return [pair[1:] for pair in begun] + [(each.id, now) for each in protocol.raters]
@@ -333,7 +337,7 @@ def raters_csv(
     return f"{head}# format: 1\n{text.getvalue()}"
 
 
-def raters_text(study: StudyPaths, protocol: Protocol) -> str:
+def _raters_text(study: StudyPaths, protocol: Protocol) -> str:
     """Return the table of raters as protocol and logs have it now."""
     sessions = session_progress(study, protocol)
     raters = rater_progress(study, protocol, sessions)
