@@ -9,10 +9,10 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from itertools import pairwise
+from itertools import chain, pairwise
 from math import comb, prod
 from operator import mul
-from typing import Self, TypeVar
+from typing import TypeVar
 
 _T = TypeVar("_T")
 
@@ -96,6 +96,14 @@ Cell = tuple[int | None, bool]
 
 _Sizes = tuple[int, int]  # dummies, standards
 
+_Remainder = tuple[tuple[int, ...], int, int]
+"""Presentations that are left of each cell, the last cell, and its run of a grade.
+
+Cells are counted grade by grade, those without one last; of each dummies, standards.
+"""
+
+_NOTHING = -2  # in the place of the last cell: of no grade, and no standard
+
 MAX_REMAINDERS = 100_000
 """What may be left of a word, at most, for it to be counted; some seconds."""
 
@@ -124,22 +132,32 @@ class PartedRuns:
 
     def count(self) -> int:
         """Return how many such words there are."""
-        return self._completions(_Remainder(self.grades, self.free))
+        return self._completions(self._whole())
 
     def word(self, number: int) -> list[Cell]:
         """Return the word of a number below `count`."""
-        left = _Remainder(self.grades, self.free)
-        word = []
-        while left.n_letters:
+        left, word = self._whole(), list[Cell]()
+        while any(left[0]):
             options = ((each, self._completions(each)) for each in self._after(left))
             left, number = _pick(number, options)
-            word.append((left.grade, left.is_standard))
+            grade, is_standard = divmod(left[1], 2)
+            word.append(
+                (None if grade == len(self.grades) else grade, bool(is_standard))
+            )
         return word
 
-    def _completions(self, left: "_Remainder") -> int:
-        if not left.n_letters:
+    def _whole(self) -> _Remainder:
+        return tuple(chain(*self.grades, self.free)), _NOTHING, 0
+
+    def _completions(self, left: _Remainder) -> int:
+        sizes, last, run = left
+        if not any(sizes):
             return 1
-        key = left.without_names()
+        # Words go on in as many ways whichever grade has so much left; that of the last
+        # presentation is no longer like the others.
+        *grades, free = zip(sizes[::2], sizes[1::2], strict=True)
+        of_last = grades.pop(last // 2) if 0 <= last // 2 < len(grades) else None
+        key = (*sorted(grades), of_last, free, last % 2, run)
         if key not in self._counts:
             total = 0
             for each in self._after(left):
@@ -147,46 +165,16 @@ class PartedRuns:
             self._counts[key] = total
         return self._counts[key]
 
-    def _after(self, left: "_Remainder") -> "Iterator[_Remainder]":
+    def _after(self, left: _Remainder) -> Iterator[_Remainder]:
         # by grade, then without one; of each a dummy, then a standard
-        for grade in (*range(len(left.grades)), None):
-            sizes = left.free if grade is None else left.grades[grade]
-            run = 1 if grade != left.grade or grade is None else left.run + 1
-            for is_standard in (False, True):
-                is_apart = not (is_standard and left.is_standard)
-                if sizes[is_standard] and run <= self.longest and is_apart:
-                    yield left.less(grade, is_standard=is_standard, run=run)
-
-
-@dataclass(frozen=True, slots=True)
-class _Remainder:
-    """What is left of a word, and how the part before it ends."""
-
-    grades: tuple[_Sizes, ...]
-    free: _Sizes
-    grade: int | None = None  # of the last presentation
-    is_standard: bool = False
-    run: int = 0
-
-    @property
-    def n_letters(self) -> int:
-        return sum(map(sum, self.grades)) + sum(self.free)
-
-    def less(self, grade: int | None, *, is_standard: bool, run: int) -> Self:
-        """Return what is left after another presentation."""
-        taken = (not is_standard, is_standard)
-        sizes = self.free if grade is None else self.grades[grade]
-        rest = (sizes[0] - taken[0], sizes[1] - taken[1])
-        if grade is None:
-            return type(self)(self.grades, rest, None, is_standard, run)
-        grades = (*self.grades[:grade], rest, *self.grades[grade + 1 :])
-        return type(self)(grades, self.free, grade, is_standard, run)
-
-    def without_names(self) -> tuple[object, ...]:
-        """Return what decides how many words go on from here."""
-        others = sorted(s for i, s in enumerate(self.grades) if i != self.grade)
-        last = None if self.grade is None else self.grades[self.grade]
-        return (*others, last, self.free, self.is_standard, self.run)
+        sizes, last, run_before = left
+        for cell, n_left in enumerate(sizes):
+            grade, is_standard = divmod(cell, 2)
+            has_grade = grade < len(self.grades)
+            run = run_before + 1 if has_grade and grade == last // 2 else 1
+            is_apart = not (is_standard and last % 2)
+            if n_left and run <= self.longest and is_apart:
+                yield (*sizes[:cell], n_left - 1, *sizes[cell + 1 :]), cell, run
 
 
 @lru_cache(maxsize=64)
