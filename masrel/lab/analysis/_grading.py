@@ -7,8 +7,8 @@ quantitative measures indicating the degree of spasticity" (section V).
 import math
 import sys
 import warnings
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -176,23 +176,37 @@ def grade_regression(
     ratings = ratings.without(excluded)
     table, n_missing = _predictor_table(protocol, ratings, predictors, models, session)
     grades = tuple(g for g in ratings.scale.grades if (table["grade"] == g).any())
-    data, dropped, scale = _standardized(table, grades, predictors)
-    reason = None
-    if _is_separated(data):
-        reason = _SEPARATED
+    raters, names = pd.factorize(table["rater"])
+    if len(grades) < 2 or len(names) < 2:
+        raise RatingsError(
+            "a regression of grades needs two grades and two raters or more, got "
+            f"{len(grades)} and {len(names)} in {len(table)} ratings with every "
+            "predictor"
+        )
+    used, dropped = _independent(table, predictors)
+    values = table[used].to_numpy(dtype=np.float64)
+    scale = values.std(axis=0, ddof=1)
+    values = (values - values.mean(axis=0)) / scale  # (n_ratings, n_predictors)
+    codes = np.array([grades.index(grade) for grade in table["grade"]])
+    reason = _SEPARATED if _is_separated(values, codes) else None
+    if reason is not None:
         warnings.warn(reason, UndefinedStatisticWarning, stacklevel=2)
-    fit = _undefined(data) if reason else _fit(data)
-    counts = np.bincount(data.codes)
+        n_values = len(used), len(used), len(grades) - 1
+        fit, log_likelihood = [np.full(n, math.nan) for n in n_values], math.nan
+    else:
+        fit, log_likelihood = _fit(values, codes, raters.astype(np.int64))
+    quantile = float(stdtrit(len(names) - 1, 0.5 + 0.5 * level))
+    counts = np.bincount(codes)
     return GradeRegression(
-        effects=_effects(fit, scale, int(data.raters.max()) + 1, level),
-        dropped=dropped,
-        thresholds=tuple(fit.thresholds.tolist()),
+        effects=_effects(used, scale, fit, quantile),
+        dropped=tuple(dropped),
+        thresholds=tuple(fit[2].tolist()),
         grades=grades,
         n_ratings=len(table),
-        n_raters=table["rater"].nunique(),
+        n_raters=len(names),
         n_models=table["model"].nunique(),
         n_missing=n_missing,
-        log_likelihood=fit.log_likelihood,
+        log_likelihood=log_likelihood,
         log_likelihood_alone=float((counts * np.log(counts / counts.sum())).sum()),
         level=level,
         simulated=ratings.simulated,
@@ -247,27 +261,6 @@ def _predictor_table(
     return complete, len(table) - len(complete)
 
 
-def _standardized(
-    table: pd.DataFrame, grades: tuple[str, ...], predictors: Sequence[str]
-) -> tuple["_OrdinalData", tuple[tuple[str, str], ...], dict[str, float]]:
-    # what is regressed, what is dropped and why, and the standard deviations
-    n_raters = table["rater"].nunique()
-    if len(grades) < 2 or n_raters < 2:
-        raise RatingsError(
-            "a regression of grades needs two grades and two raters or more, got "
-            f"{len(grades)} and {n_raters} in {len(table)} ratings with every predictor"
-        )
-    names, dropped = _independent(table, predictors)
-    values = table[names].to_numpy(dtype=np.float64)
-    scale = values.std(axis=0, ddof=1)
-    data = _OrdinalData(
-        values=(values - values.mean(axis=0)) / scale,
-        codes=np.array([grades.index(g) for g in table["grade"]]),
-        raters=pd.factorize(table["rater"])[0].astype(np.int64),
-    )
-    return data, tuple(dropped), dict(zip(names, scale.tolist(), strict=True))
-
-
 def _independent(
     table: pd.DataFrame, predictors: Sequence[str]
 ) -> tuple[list[str], list[tuple[str, str]]]:
@@ -295,10 +288,10 @@ def _independent(
 
 
 def _effects(
-    fit: "_OrdinalFit", scale: Mapping[str, float], n_raters: int, level: float
+    names: Sequence[str], scale: _Floats, fit: Sequence[_Floats], quantile: float
 ) -> tuple[Effect, ...]:
-    quantile = float(stdtrit(n_raters - 1, 0.5 + 0.5 * level))
-    errors = np.sqrt(np.diag(fit.covariance)).tolist()
+    # scale: standard deviation of each predictor; fit: β and its errors
+    columns = (of.tolist() for of in (scale, *fit[:2]))
     return tuple(
         Effect(
             predictor=name,
@@ -309,51 +302,27 @@ def _effects(
             low=_odds_ratio(value - quantile * error),
             high=_odds_ratio(value + quantile * error),
         )
-        for (name, per), value, error in zip(
-            scale.items(), fit.coefficients.tolist(), errors, strict=True
-        )
+        for name, per, value, error in zip(names, *columns, strict=True)
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _OrdinalData:
-    """Grades and what they are regressed on."""
-
-    # (n_ratings, n_predictors): standardized predictors
-    values: _Floats = field(compare=False, repr=False)
-    # (n_ratings,): grades, 0 for the least that was given
-    codes: NDArray[np.int64] = field(compare=False, repr=False)
-    # (n_ratings,): who gave them, from 0 on
-    raters: NDArray[np.int64] = field(compare=False, repr=False)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _OrdinalFit:
-    """A regression of grades."""
-
-    coefficients: _Floats = field(compare=False, repr=False)  # (n_predictors,): β
-    # (n_predictors, n_predictors): of their errors, clustered by rater
-    covariance: _Floats = field(compare=False, repr=False)
-    thresholds: _Floats = field(compare=False, repr=False)  # (n_grades - 1,): τ
-    log_likelihood: float  # at the maximum
-
-
-def _is_separated(data: _OrdinalData) -> bool:
+def _is_separated(values: _Floats, codes: NDArray[np.int64]) -> bool:
     """Say whether the likelihood has no maximum, by a linear program."""
+    # standardized predictors; grades, 0 for the least that was given
     # [1] Albert, A., Anderson, J. A. (1984). On the existence of maximum likelihood
     # estimates in logistic regression models. Biometrika, 71(1), 1-10.
     # https://doi.org/10.1093/biomet/71.1.1
     # A direction (β, τ) in which no rating's interval τ_(g-1) < x·β < τ_g shrinks at
     # either end, and some end moves away: then the likelihood grows for ever.
-    n, p = data.values.shape
-    n_thresholds = int(data.codes.max())
-    upper, lower = data.codes < n_thresholds, data.codes > 0
+    n, p = values.shape
+    n_thresholds = int(codes.max())
+    upper, lower = codes < n_thresholds, codes > 0
     rows = np.zeros((int(upper.sum() + lower.sum()), p + n_thresholds))
     ends = int(upper.sum())
-    rows[:ends, :p] = data.values[upper]
-    rows[np.arange(ends), p + data.codes[upper]] = -1.0  # x·β ≤ τ_g
-    rows[ends:, :p] = -data.values[lower]
-    rows[np.arange(ends, rows.shape[0]), p + data.codes[lower] - 1] = 1.0
+    rows[:ends, :p] = values[upper]
+    rows[np.arange(ends), p + codes[upper]] = -1.0  # x·β ≤ τ_g
+    rows[ends:, :p] = -values[lower]
+    rows[np.arange(ends, rows.shape[0]), p + codes[lower] - 1] = 1.0
     optimum = linprog(
         rows.sum(axis=0),  # the smaller, the further the ends move away
         A_ub=rows,
@@ -364,37 +333,25 @@ def _is_separated(data: _OrdinalData) -> bool:
     return bool(optimum.fun < -1e-7 * n)
 
 
-def _fit(data: _OrdinalData) -> _OrdinalFit:
+def _fit(
+    values: _Floats, codes: NDArray[np.int64], raters: NDArray[np.int64]
+) -> tuple[list[_Floats], float]:
     """Fit the regression by maximum likelihood."""
+    # -> β and its standard errors, clustered by rater, and τ; the log-likelihood there
     from statsmodels.miscmodels.ordinal_model import OrderedModel
 
-    model = OrderedModel(data.codes, data.values, distr="logit")
+    model = OrderedModel(codes, values, distr="logit")
     result = model.fit(method="bfgs", disp=False, gtol=1e-8, maxiter=1000)
-    p = data.values.shape[1]
+    p = values.shape[1]
     inverse = np.linalg.inv(model.hessian(result.params))
     scores = np.asarray(model.score_obs(result.params))
-    n_raters = int(data.raters.max()) + 1
+    n_raters = int(raters.max()) + 1
     by_rater = np.zeros((n_raters, scores.shape[1]))
-    np.add.at(by_rater, data.raters, scores)
+    np.add.at(by_rater, raters, scores)
     meat = by_rater.T @ by_rater * n_raters / (n_raters - 1)
-    covariance = (inverse @ meat @ inverse)[:p, :p]
+    errors = np.sqrt(np.diag((inverse @ meat @ inverse)[:p, :p]))
     thresholds = np.asarray(model.transform_threshold_params(result.params))[1:-1]
-    return _OrdinalFit(
-        coefficients=np.asarray(result.params[:p]),
-        covariance=covariance,
-        thresholds=thresholds,
-        log_likelihood=float(result.llf),
-    )
-
-
-def _undefined(data: _OrdinalData) -> _OrdinalFit:
-    n_predictors = data.values.shape[1]
-    return _OrdinalFit(
-        coefficients=np.full(n_predictors, math.nan),
-        covariance=np.full((n_predictors, n_predictors), math.nan),
-        thresholds=np.full(int(data.codes.max()), math.nan),
-        log_likelihood=math.nan,
-    )
+    return [np.asarray(result.params[:p]), errors, thresholds], float(result.llf)
 
 
 def _odds_ratio(coefficient: float) -> float:

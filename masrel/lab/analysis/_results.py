@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
@@ -400,7 +400,7 @@ def as_analysis_document(analysis: Analysis) -> dict[str, object]:
         elif dataclasses.is_dataclass(value):
             document[field.name] = _with_inputs(value, analysis)
         elif value or field.name not in _LATER:
-            document[field.name] = _plain(value)
+            document[field.name] = as_plain(value)
     return document
 
 
@@ -503,30 +503,23 @@ def _row(result: object, place: int) -> dict[str, object]:
 
 def _with_inputs(part: object, analysis: Analysis) -> dict[str, object]:
     # A line of the plan reads best beside its numbers.
-    named = {**plain_fields(getattr(part, "line", None)), **plain_fields(part)}
-    named.pop("line", None)
-    return {**named, "inputs": dict(analysis.inputs)}
+    named = as_plain(part)
+    line = named.pop("line", {})
+    return {**line, **named, "inputs": dict(analysis.inputs)}
 
 
-def plain_fields(part: object) -> dict[str, object]:
-    """Return the fields of a result as plain values for JSON, ``nan`` as None."""
-    if isinstance(part, msgspec.Struct):
-        part = msgspec.structs.asdict(part)
-    elif dataclasses.is_dataclass(part):
-        names = (field.name for field in dataclasses.fields(part))
-        part = {name: getattr(part, name) for name in names}
-    if not isinstance(part, Mapping):
-        return {}
-    return {str(name): _plain(value) for name, value in part.items()}
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, Interval):
+def as_plain(value: object) -> Any:
+    """Return a result as plain values for JSON, ``nan`` as None."""
+    if isinstance(value, Estimate | Interval):
         return as_document(value)
-    if dataclasses.is_dataclass(value) or isinstance(value, msgspec.Struct | Mapping):
-        return plain_fields(value)
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
+    if isinstance(value, msgspec.Struct):
+        value = msgspec.structs.asdict(value)
+    elif dataclasses.is_dataclass(value):
+        names = (field.name for field in dataclasses.fields(value))
+        value = {name: getattr(value, name) for name in names}
+    if isinstance(value, Mapping):
+        return {str(name): as_plain(part) for name, part in value.items()}
     if isinstance(value, tuple | list):
-        return [_plain(part) for part in value]
-    return value
+        return [as_plain(part) for part in value]
+    is_undefined = isinstance(value, float) and not math.isfinite(value)
+    return None if is_undefined else value

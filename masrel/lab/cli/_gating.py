@@ -1,4 +1,7 @@
-"""Options by which a verb fails when the numbers do not keep their limits."""
+"""Options by which a verb fails when the numbers do not keep their limits.
+
+What a job is told of them: estimates and gates as JUnit and as Markdown.
+"""
 
 import math
 import os
@@ -16,7 +19,9 @@ from masrel.lab._bounded_files import read_regular
 from masrel.lab._durable_files import no_follow
 
 if TYPE_CHECKING:
-    from masrel.lab.analysis import Analysis, GateResult
+    from collections.abc import Sequence
+
+    from masrel.lab.analysis import Analysis, GateResult, PlannedEstimate
     from masrel.lab.protocol import Gate, Protocol
 
 _LARGEST_SUMMARY = 1 << 20  # GitHub takes no more of a step
@@ -85,16 +90,82 @@ class Verdict:
 def verdict_of(analysis: "Analysis", gates: "tuple[Gate, ...]") -> Verdict:
     """Hold an analysis against gates."""
     from masrel.lab.analysis import check_gates
-    from masrel.lab.report._jobs import job_summary, junit_text
 
     results = check_gates(analysis, gates)
     return Verdict(
         holds=all(result.holds for result in results),
         gates=tuple(map(_as_document, results)),
         lines=tuple(map(str, results)),
-        junit=junit_text(analysis, results),
-        summary=job_summary(analysis, results),
+        junit=_junit_text(analysis, results),
+        summary=_job_summary(analysis, results),
     )
+
+
+def _junit_text(analysis: "Analysis", gates: "Sequence[GateResult]") -> str:
+    # a test case an estimate and a gate, without times
+    from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+    suite = Element("testsuite", name=f"masrel {analysis.study}")
+    for planned in analysis.estimates:
+        case = SubElement(
+            suite, "testcase", classname="estimates", name=planned.line.id, time="0"
+        )
+        reason = _absence(planned)
+        if reason is not None:
+            SubElement(case, "skipped", message=reason)
+        else:
+            SubElement(case, "system-out").text = _words(planned)
+    for result in gates:
+        case = SubElement(
+            suite, "testcase", classname="gates", name=str(result.gate), time="0"
+        )
+        if not result.holds:
+            SubElement(case, "failure", message=str(result))
+    n_failures, n_skipped = (
+        len(suite.findall(f"*/{of}")) for of in ("failure", "skipped")
+    )
+    suite.attrib |= {"time": "0", "tests": str(len(suite)), "errors": "0"}
+    suite.attrib |= {"failures": str(n_failures), "skipped": str(n_skipped)}
+    indent(suite)
+    return tostring(suite, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _job_summary(analysis: "Analysis", gates: "Sequence[GateResult]") -> str:
+    # estimates and gates as Markdown
+    from masrel.lab.report._pages import as_markdown
+
+    lines = [f"## {analysis.study}", ""]
+    if analysis.simulated:
+        lines += ["**SIMULATED DATA**", ""]
+    lines += [
+        f"- {as_markdown(f'{planned.line.id}: {_words(planned)}')}"
+        for planned in analysis.estimates
+    ]
+    if gates:
+        lines += ["", "| gate | |", "|---|---|"]
+        lines += [
+            f"| {'holds' if result.holds else '**fails**'} | "
+            f"{as_markdown(str(result))} |"
+            for result in gates
+        ]
+    return "\n".join([*lines, ""]) + "\n"
+
+
+def _words(planned: "PlannedEstimate") -> str:
+    if planned.estimate is None:
+        return f"not in these data ({planned.reason})."
+    from masrel.tables._estimate_words import sentence
+
+    return sentence(planned.estimate)
+
+
+def _absence(planned: "PlannedEstimate") -> str | None:
+    # why there is no number, or None
+    if planned.estimate is None:
+        return planned.reason or "there is none of all raters together"
+    if math.isnan(planned.estimate.value):
+        return planned.estimate.reason
+    return None
 
 
 def _as_document(result: "GateResult") -> dict[str, object]:

@@ -54,7 +54,7 @@ def grading(
     grade, the others held.
     """
     from masrel.lab.analysis import grade_regression
-    from masrel.lab.analysis._results import plain_fields
+    from masrel.lab.analysis._results import as_plain
 
     data = read_study(study, ratings_file)
     with warnings_as_notes():
@@ -69,7 +69,7 @@ def grading(
         )
     write_output(
         output,
-        document=lambda: plain_fields(regression),
+        document=lambda: as_plain(regression),
         text=lambda: _table(regression),
     )
 

@@ -1,10 +1,10 @@
 """``masrel report``: write the report of a study."""
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -36,7 +36,12 @@ from masrel.lab.report._report_folder import (
     stale_pages,
 )
 
+if TYPE_CHECKING:
+    from masrel.lab.analysis._comparison import Change
+    from masrel.tables._tables import Table
+
 FORMATS = ("html", "markdown", "latex", "docx")
+_LONGEST = 40  # letters of a text in a cell
 # They change nothing that is made or said
 _OTHER_OPTIONS = (
     *("cache_folder", "check", "junit", "quiet", "json_file", "against", "no_change"),
@@ -70,25 +75,52 @@ class _CompareOptions:
     ) -> dict[str, object]:
         """Return what has changed as a document, and show it unless JSON is printed."""
         from masrel.lab.analysis._comparison import changed_inputs, changes_between
-        from masrel.lab.report._jobs import changes_table
         from masrel.tables._tables import as_text
 
         changes, inputs = changes_between(old, new), changed_inputs(old, new)
         if shows and changes:
-            simulated = bool(old.get("simulated") or new.get("simulated"))
-            table = changes_table(
-                changes, inputs, str(self.against), simulated=simulated
-            )
-            click.echo(as_text(table))
+            is_simulated = bool(old.get("simulated") or new.get("simulated"))
+            click.echo(as_text(self._table(changes, inputs, is_simulated)))
         elif shows:
-            click.echo(f"no number has changed since {self.against}")
-            for line in inputs:
-                click.echo(line)
+            click.echo(
+                "\n".join((f"no number has changed since {self.against}", *inputs))
+            )
         return {
             "against": str(self.against),
             "changes": [{**asdict(c), "difference": c.difference} for c in changes],
             "inputs": list(inputs),
         }
+
+    def _table(
+        self, changes: "Sequence[Change]", inputs: Sequence[str], is_simulated: bool
+    ) -> "Table":
+        from masrel.tables._tables import Column, Table
+
+        return Table(
+            name="changes",
+            caption=f"What has changed since {self.against}",
+            columns=(
+                Column(key="of", heading="Of", align="left"),
+                Column(key="field", heading="What", align="left"),
+                Column(key="old", heading="Before", digits=4),
+                Column(key="new", heading="Now", digits=4),
+                Column(key="difference", heading="Difference", digits=4),
+            ),
+            rows=tuple(
+                (c.of, c.field, _short(c.old), _short(c.new), c.difference)
+                for c in changes
+            ),
+            in_units=tuple(range(len(changes))),
+            notes=tuple(inputs),
+            data="simulated" if is_simulated else "",
+        )
+
+
+def _short(value: str | float | None) -> str | float | None:
+    # a reason is a sentence; JSON has the whole of it
+    if isinstance(value, str) and len(value) > _LONGEST:
+        return f"{value[: _LONGEST - 1]}…"
+    return value
 
 
 _compare_options = grouped(
@@ -180,15 +212,17 @@ def report(
     The analysis is computed from the protocol's plan; the same inputs give the
     same bytes. Where nothing has changed since the last report, nothing is written.
     """
-    if destination is None:
-        destination = study / "report"
-        check_inside(destination, study)
-    refuse_record(destination / "report.html")  # before anything is computed
+    folder, notes = destination or study / "report", cache_folder or study / NOTES
+    for option, place in ((destination, folder), (cache_folder, notes)):
+        if option is None:
+            check_inside(place, study)
+        refuse_record(place / "report.html")  # before anything is computed
+    params = click.get_current_context().params
     build = Build(
         study=study,
-        folder=destination,
-        notes=_notes(study, cache_folder),
-        options=_options_of_call(),
+        folder=folder,
+        notes=notes,
+        options={k: str(v) for k, v in params.items() if k not in _OTHER_OPTIONS},
         ratings_file=ratings_file,
     )
     old = comparing.read(study)  # which may be what is replaced
@@ -196,23 +230,22 @@ def report(
     shown, changes = build.last(made_from), list[str]()
     if shown is not None:
         echo_notes(shown["notes"])
-        numbers = read_regular(destination / NUMBERS, most=MAX_TABLE)
+        numbers = read_regular(folder / NUMBERS, most=MAX_TABLE)
     else:
         files, shown = _made(
             study, ratings_file, only, formats, gating, include, output
         )
         numbers = files[NUMBERS]
         if check:
-            changes = list(_changes(files, destination))
+            changes = _changes(files, folder)
         else:
-            replace_report(destination, files)
+            replace_report(folder, files)
             build.keep(made_from, shown)
     verdict = Verdict(**shown["verdict"])
     prints_json = output.json_file == STDOUT
     click.echo(shown["read"], err=True)
-    names = shown["pages"]
-    pages = [destination / name for name in names if name != "report.md"]
-    for line in changes if check else pages or [destination / "report.md"]:
+    pages = [folder / name for name in shown["pages"] if name != "report.md"]
+    for line in changes if check else pages or [folder / "report.md"]:
         click.echo(line, err=prints_json)
     document: dict[str, Any] = {"gates": verdict.gates}
     if check:
@@ -225,19 +258,6 @@ def report(
     verdict.conclude(gating)
     if changes or (comparing.no_change and document["changes"]):
         click.get_current_context().exit(1)
-
-
-def _options_of_call() -> dict[str, str]:
-    params = click.get_current_context().params
-    return {k: str(v) for k, v in params.items() if k not in _OTHER_OPTIONS}
-
-
-def _notes(study: Path, folder: Path | None) -> Path:
-    if folder is None:
-        folder = study / NOTES
-        check_inside(folder, study)
-    refuse_record(folder / "any")
-    return folder
 
 
 def _made(
@@ -284,13 +304,9 @@ def _made(
                 answers=data.answers,
                 excluded=data.excluded,
             )
+        in_person, folder = data.in_person, data.paths.sessions
         material = gather(
-            data.protocol,
-            data.ratings,
-            analysis,
-            data.in_person,
-            data.paths.sessions,
-            conduct,
+            data.protocol, data.ratings, analysis, in_person, folder, conduct
         )
         bar = tqdm(desc="report", unit=" parts", disable=output.quiet or None)
 
@@ -322,9 +338,10 @@ def _made(
     }
 
 
-def _changes(files: Mapping[str, bytes], folder: Path) -> Iterator[str]:
-    for name in changed_files(folder, files):
-        is_there = (folder / name).exists()
-        yield f"{folder / name}: {'would change' if is_there else 'would be new'}"
-    for path in (*stale_assets(folder, files), *stale_pages(folder, files)):
-        yield f"{path}: would go"
+def _changes(files: Mapping[str, bytes], folder: Path) -> list[str]:
+    places = (folder / name for name in changed_files(folder, files))
+    return [
+        *(f"{p}: would {'change' if p.exists() else 'be new'}" for p in places),
+        *(f"{path}: would go" for path in stale_assets(folder, files)),
+        *(f"{path}: would go" for path in stale_pages(folder, files)),
+    ]

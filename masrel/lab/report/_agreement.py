@@ -5,15 +5,20 @@ The table of coefficients is narrow on a page, and has every field in the CSV.
 
 import dataclasses
 import math
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from operator import attrgetter
 
-from masrel.agreement import strength
+import numpy as np
+
+from masrel.agreement import category_kappa, code_ratings, strength
+from masrel.errors import MasrelWarning
 from masrel.estimates import Estimate, Interval
+from masrel.intervals.diagnosis import _category_arrays
 from masrel.lab.analysis import PlannedEstimate
-from masrel.lab.analysis._report_numbers import category_agreement
+from masrel.lab.ratings import Ratings, rating_matrix
 from masrel.lab.report._material import (
     MANY_RATERS,
     NOT_THERE,
@@ -329,12 +334,29 @@ def categories_section(material: Material, entry: PlannedEstimate) -> Iterator[C
             Column(key="high", heading="High", digits=3),
             Column(key="kappa", heading="κ", digits=3),
         ),
-        rows=tuple(
-            (of.grade, 0, *[None] * 4)
-            if of.n_ratings == 0
-            else (of.grade, of.n_ratings, of.agreement, of.low, of.high, of.kappa)
-            for of in category_agreement(entry, ratings, level)
-        ),
+        rows=tuple(_category_rows(entry, ratings, level)),
         notes=tuple(notes),
         data=material.data,
     )
+
+
+def _category_rows(
+    entry: PlannedEstimate, ratings: Ratings, level: float
+) -> Iterator[tuple[Value, ...]]:
+    # specific agreement on each grade with its interval, models random, and Fleiss'
+    # kappa of the grade against all others
+    matrix = rating_matrix(ratings, session=entry.line.sessions[0], models=entry.models)
+    grades = ratings.scale.grades
+    codes = code_ratings(matrix.grades, grades).codes
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MasrelWarning)  # a grade that nobody gave
+        freq = np.ones(len(codes), dtype=np.int64)
+        arrays = _category_arrays(codes, freq, len(grades), level)
+        kappas = [
+            category_kappa(matrix.grades, grade, categories=grades).value
+            for grade in grades
+        ]
+    keys = ("counts", "values", "low", "high")
+    columns = [arrays[f"category_{key}"].tolist() for key in keys]
+    for grade, n, *values in zip(grades, *columns, kappas, strict=True):
+        yield grade, n, *(values if n else [None] * 4)

@@ -345,7 +345,7 @@ def fit_figures(fit: ElbowFit | FrictionFit) -> dict[str, dict[Form, bytes]]:
         views |= {"fit_trials": "fast", "fit_catches": "catches"}
     return {
         name: draw(
-            Drawn(f"masrel.lab.report.figures._fit_figures:{view}_figure", (fit,)),
+            Drawn(f"masrel.lab.report._fit_figures:{view}_figure", (fit,)),
             stamp=SIMULATED * fit.simulated,
         )
         for name, view in views.items()

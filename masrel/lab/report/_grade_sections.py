@@ -10,9 +10,9 @@ from operator import attrgetter
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel.intervals.diagnosis import _share_interval
 from masrel.lab.analysis import InPersonAgreement, IntendedAgreement, QuestionSummary
 from masrel.lab.analysis._descriptions import FEWEST_RATERS
-from masrel.lab.analysis._report_numbers import GivenGrades, given_grades
 from masrel.lab.protocol import report_sections
 from masrel.lab.report._material import FIGURES, MANY_RATERS, Lacking, Material
 from masrel.pages._sections import Content, Drawing, Paragraph
@@ -200,7 +200,7 @@ def _counted_blocks(material: Material, grid: _Grid) -> Iterator[Content]:
 
 
 def intended_needs(material: Material) -> IntendedAgreement | Lacking:
-    """Return how often the intended grade was given."""
+    """Return how often the intended grade was result."""
     result = material.analysis.intended
     if result is not None and result.models:
         return result
@@ -282,50 +282,98 @@ def in_person_section(
     )
 
 
-_Given = tuple[str | None, tuple[GivenGrades, ...]]
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _GivenGrades:
+    """Grades of the first session that has some, by intended ones."""
+
+    session: str
+    intended: list[str]
+    counts: NDArray[np.int64]  # (n_intended, n_grades)
+    # which part is the intended grade, and the ends of its interval, raters random
+    shares: NDArray[np.float64]  # (3, n_intended)
 
 
-def confusion_needs(material: Material) -> _Given | Lacking:
-    """Return a session, and what models of each intended grade were given in it."""
-    analysis = material.analysis
-    ratings = material.ratings.without(analysis.excluded)
-    aims = given_grades(material.protocol, ratings, analysis.level)
-    lacks = Lacking("no model with an intended grade has ratings")
-    return aims if aims[1] else lacks
+def confusion_needs(material: Material) -> _GivenGrades | Lacking:
+    """Return what models of each intended grade were given in the first session."""
+    analysis, grades = material.analysis, material.ratings.scale.grades
+    aims = {model.id: model.intended_grade for model in material.protocol.models}
+    graded = [
+        row
+        for row in material.ratings.without(analysis.excluded).rows
+        if row.grade is not None
+    ]
+    present = {row.session for row in graded}
+    session = next((s for s in material.sessions if s in present), "")
+    aimed = [r for r in graded if r.session == session and aims[r.model] is not None]
+    intended = [grade for grade in grades if grade in {aims[r.model] for r in aimed}]
+    if not intended:
+        return Lacking("no model with an intended grade has ratings")
+    raters = sorted({row.rater for row in aimed})
+    counts = np.zeros((len(intended), len(raters), len(grades)), dtype=np.int64)
+    for row in aimed:
+        aim, rater = intended.index(str(aims[row.model])), raters.index(row.rater)
+        counts[aim, rater, grades.index(str(row.grade))] += 1
+    chosen = [grades.index(grade) for grade in intended]
+    return _GivenGrades(
+        session=session,
+        intended=intended,
+        counts=counts.sum(axis=1),
+        shares=_shares(counts, chosen, analysis.level),
+    )
+
+
+def _shares(
+    counts: NDArray[np.int64], chosen: Sequence[int], level: float
+) -> NDArray[np.float64]:
+    # (n_intended, n_raters, n_grades) -> (3, n_intended): share and interval of those
+    # grades that are the chosen one
+    wholes = counts.sum(axis=2).astype(np.float64)  # (n_intended, n_raters)
+    parts = counts[np.arange(len(chosen)), :, chosen].astype(np.float64)
+    low, high = _share_interval(
+        level,
+        parts=parts.sum(axis=1),
+        wholes=wholes.sum(axis=1),
+        squares=(parts**2).sum(axis=1),
+        products=(parts * wholes).sum(axis=1),
+        whole_squares=(wholes**2).sum(axis=1),
+        n_items=(wholes > 0.0).sum(axis=1).astype(np.float64),
+    )
+    return np.array([parts.sum(axis=1) / wholes.sum(axis=1), low, high])
 
 
 _CONFUSION = "Grades given for each intended grade"
 
 
-def confusion_section(material: Material, aims: _Given) -> Iterator[Content]:
-    """Show which grades models of each intended grade were given."""
-    session, rows = aims
+def confusion_section(material: Material, result: _GivenGrades) -> Iterator[Content]:
+    """Show which grades models of each intended grade were result."""
     grades, level = material.ratings.scale.grades, material.analysis.level
-    n_met = sum(row.counts[grades.index(row.intended)] for row in rows)
+    caption = f"{_CONFUSION}, session {result.session}"
+    framed = np.array([[grade == aim for grade in grades] for aim in result.intended])
     yield Paragraph(
-        text=f"Of {counted(sum(row.n for row in rows), 'grade')} of models with an "
-        f"intended grade, {n_met} are the intended one."
+        text=f"Of {counted(int(result.counts.sum()), 'grade')} of models with an "
+        f"intended grade, {result.counts[framed].sum()} are the intended one."
     )
     texts = [
-        f"intended {row.intended}: "
-        + ", ".join(f"{n} of {g}" for g, n in zip(grades, row.counts, strict=True) if n)
-        for row in rows
+        f"intended {aim}: "
+        + ", ".join(f"{n} of {g}" for g, n in zip(grades, counts, strict=True) if n)
+        for aim, counts in zip(result.intended, result.counts.tolist(), strict=True)
     ]
+    pictured = (result.intended, result.counts, framed, result.shares, grades, level)
     yield Drawing(
         name="confusion",
         caption=(
-            f"{_CONFUSION}, session {session}. Above: how often; darker is a larger "
+            f"{caption}. Above: how often; darker is a larger "
             "part of the row, and the intended grade is framed. Below: the part as "
             f"intended, with its {percent(level)} % confidence interval for other "
             "raters like these."
         ),
         alt=f"Counts of grades given. {'; '.join(texts)}.",
-        content=Drawn(FIGURES + "_study_figures:aim_pictures", (rows, grades, level)),
+        content=Drawn(FIGURES + "_study_figures:aim_pictures", pictured),
         stamp=material.stamp,
     )
     yield Table(
         name="confusion",
-        caption=f"{_CONFUSION}, session {session}",
+        caption=caption,
         columns=(
             Column(key="intended_grade", heading="Intended", align="left"),
             *(Column(key=f"grade_{grade}", heading=grade) for grade in grades),
@@ -335,13 +383,13 @@ def confusion_section(material: Material, aims: _Given) -> Iterator[Content]:
             Column(key="high", heading="High", digits=1),
         ),
         rows=tuple(
-            (
-                row.intended,
-                *row.counts,
-                row.n,
-                *(100.0 * share for share in (row.share, row.low, row.high)),
+            (aim, *counts, sum(counts), *shares)
+            for aim, counts, shares in zip(
+                result.intended,
+                result.counts.tolist(),
+                (100.0 * result.shares.T).tolist(),
+                strict=True,
             )
-            for row in rows
         ),
         notes=(
             "Rows: the grade a model was built for; columns: the grades given. Where "
@@ -356,7 +404,7 @@ def confusion_section(material: Material, aims: _Given) -> Iterator[Content]:
 
 _RECONSTRUCTED = (
     "Reconstructed answers are one set that fits the published mean and standard "
-    "deviation, not the answers that were given."
+    "deviation, not the answers that were result."
 )
 
 _WITHHELD = (

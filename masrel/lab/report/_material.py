@@ -19,7 +19,7 @@ from masrel.tables._tables import SIMULATED, SIMULATED_DEVICE, percent
 if TYPE_CHECKING:
     from masrel.lab.report._conduct import StudyConduct
 
-FIGURES = "masrel.lab.report.figures."
+FIGURES = "masrel.lab.report."
 """Where the functions are that draw what no file of ratings has."""
 
 # From more than so many on, a figure shows distributions instead of every one.

@@ -1,35 +1,212 @@
-"""Orders: whether grades depend on them, and how even drawn schedules are."""
+"""Orders: whether grades depend on them, and how even drawn schedules are.
 
-from collections.abc import Iterator, Sequence
+A grade counts by its step in the scale, from 0. Each effect of order is one difference
+of two means for each rater, and its interval is that of a mean difference of pairs.
+"""
+
+import math
+import statistics
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from itertools import pairwise
+from operator import attrgetter
 
-from masrel.lab.analysis._report_numbers import (
-    OrderEffect,
-    compared,
-    order_effects,
-    place_summaries,
-)
-from masrel.lab.ratings import Ratings
+import numpy as np
+
+from masrel.lab.protocol import Protocol
+from masrel.lab.ratings import Rating, Ratings
 from masrel.lab.report._material import Lacking, Material, sentence
 from masrel.lab.schedule._balance import OrderBalance
 from masrel.pages._sections import Content, Paragraph
-from masrel.tables._tables import Column, Table, percent
+from masrel.tables._tables import Column, Table, Value, percent
+
+_Steps = Mapping[Rating, float]
+"""By rating, the step of its grade, or how far that is from others'."""
+
+_Pairs = Mapping[str, tuple[list[float], list[float]]]
+"""By rater, the values whose means are compared: the first less the second."""
+
+
+def place_rows(protocol: Protocol, ratings: Ratings) -> list[tuple[Value, ...]]:
+    """Return the grades of every quarter of each session, or half of a short one.
+
+    A row has the places, the session, the number of grades, the mean of what they
+    differ from those of their model, and how many of standard models there are and are
+    the intended ones.
+    """
+    steps = _steps(protocol, ratings)
+    deviations = _deviations(steps)
+    intended = {m.id: m.intended_grade for m in protocol.models if m.role == "standard"}
+    rows: list[tuple[Value, ...]] = []
+    for session in dict.fromkeys(row.session for row in steps):
+        of_session = [r for r in deviations if r.session == session and r.position]
+        n_places = max((r.position or 0 for r in of_session), default=0)
+        n_parts = 4 if n_places >= 8 else 2
+        ends = [part * n_places // n_parts for part in range(n_parts + 1)]
+        for first, last in pairwise(ends if n_places > 1 else ()):
+            inside = [r for r in of_session if first < (r.position or 0) <= last]
+            aims = [(r.grade, aim) for r in inside if (aim := intended.get(r.model))]
+            mean = (
+                statistics.fmean(deviations[r] for r in inside) if inside else math.nan
+            )
+            n_intended = sum(grade == aim for grade, aim in aims)
+            part = _part(first, last)
+            rows.append((part, session, len(inside), mean, len(aims), n_intended))
+    return rows
+
+
+def effect_rows(
+    protocol: Protocol, ratings: Ratings, level: float
+) -> list[tuple[tuple[Value, ...], str | None]]:
+    """Return the effects that the ratings can show, and why one has no interval.
+
+    A row has the question, the numbers of raters and of pairs of grades, how many of
+    these are equal, and the mean difference with the ends of its interval, in steps.
+    """
+    return [_effect_row(*each, level) for each in _compared(protocol, ratings)]
+
+
+def _compared(
+    protocol: Protocol, ratings: Ratings
+) -> list[tuple[str, list[str], _Pairs]]:
+    # what can be compared: the kind of effect, its sessions and its values
+    steps = _steps(protocol, ratings)
+    deviations = _deviations(steps)
+    by_session: dict[str, list[Rating]] = defaultdict(list)
+    for row in steps:
+        by_session[row.session].append(row)
+    sessions = list(by_session)
+    first, second = ([r for r in steps if r.repeat == n] for n in (1, 2))
+    again = _paired(steps, first, second, ("session", "rater", "model"))
+    shared = "rater", "model", "repeat"
+    every = [
+        ("place", sessions, _halves(deviations)),
+        ("neighbour", sessions, _neighbours(steps, deviations)),
+        ("again", sessions, again),
+        *(
+            ("session", [a, b], _paired(steps, by_session[a], by_session[b], shared))
+            for a, b in pairwise(sessions)
+        ),
+    ]
+    return [each for each in every if each[2]]
+
+
+def _steps(protocol: Protocol, ratings: Ratings) -> dict[Rating, float]:
+    # of every grade, sessions in the protocol's order
+    steps = {grade: step for step, grade in enumerate(ratings.scale.grades)}
+    order = {session.id: place for place, session in enumerate(protocol.sessions)}
+    rows = sorted(ratings.rows, key=lambda row: order[row.session])
+    return {row: steps[row.grade] for row in rows if row.grade is not None}
+
+
+def _deviations(steps: _Steps) -> dict[Rating, float]:
+    # of every grade from the mean of its model in its session, where raters share it
+    groups: dict[tuple[str, str], list[Rating]] = defaultdict(list)
+    for row in steps:
+        groups[row.session, row.model].append(row)
+    deviations: dict[Rating, float] = {}
+    for group in groups.values():
+        if len({row.rater for row in group}) > 1:
+            mean = statistics.fmean(steps[row] for row in group)
+            deviations |= {row: steps[row] - mean for row in group}
+    return deviations
+
+
+def _halves(deviations: _Steps) -> _Pairs:
+    # deviations in the second half of a session, and in the first
+    last: dict[str, int] = {}
+    for row in deviations:
+        last[row.session] = max(last.get(row.session, 0), row.position or 0)
+    return _complete(
+        (row.rater, 2 * row.position > last[row.session], deviation)
+        for row, deviation in deviations.items()
+        if row.position is not None
+    )
+
+
+def _neighbours(steps: _Steps, deviations: _Steps) -> _Pairs:
+    # deviations after a model that was graded higher by all, and after a lower one
+    places = {(r.session, r.rater, r.position): r for r in deviations}
+
+    def after_another() -> Iterator[tuple[str, bool, float]]:
+        for row, deviation in deviations.items():
+            if row.position is None:
+                continue
+            before = places.get((row.session, row.rater, row.position - 1))
+            if before is None:
+                continue
+            # the mean of a model is a grade of it less that grade's deviation
+            change = steps[before] - deviations[before] - (steps[row] - deviation)
+            if abs(change) > 1e-9:
+                yield row.rater, change > 0.0, deviation
+
+    return _complete(after_another())
+
+
+def _complete(values: Iterable[tuple[str, bool, float]]) -> _Pairs:
+    # rater, whether it is of the first kind, value: of raters who have both kinds
+    by_rater: dict[str, tuple[list[float], list[float]]] = {}
+    for rater, is_first, value in values:
+        by_rater.setdefault(rater, ([], []))[not is_first].append(value)
+    return {rater: both for rater, both in by_rater.items() if all(both)}
+
+
+def _paired(
+    steps: _Steps, first: list[Rating], again: list[Rating], shared: tuple[str, ...]
+) -> _Pairs:
+    # grades given again, and the first ones, of what has these columns in common
+    columns = attrgetter(*shared)
+    before = {columns(row): steps[row] for row in first}
+    by_rater: dict[str, tuple[list[float], list[float]]] = {}
+    for row in again:
+        if columns(row) in before:
+            later, earlier = by_rater.setdefault(row.rater, ([], []))
+            later.append(steps[row])
+            earlier.append(before[columns(row)])
+    return by_rater
+
+
+def _effect_row(
+    kind: str, sessions: Sequence[str], pairs: _Pairs, level: float
+) -> tuple[tuple[Value, ...], str | None]:
+    means = [
+        [statistics.fmean(values) for values in of_rater] for of_rater in pairs.values()
+    ]
+    differences = np.array([first - second for first, second in means])
+    n, mean, reason = len(means), float(differences.mean()), None
+    low = high = math.nan
+    if n == 1:
+        reason = "one rater has no spread"
+    elif (sd := float(differences.std(ddof=1))) <= 1e-12:
+        reason = "it is the same for every rater"
+    else:
+        from scipy.special import stdtrit  # loaded only when an interval needs it
+
+        half = float(stdtrit(n - 1, 0.5 + 0.5 * level)) / math.sqrt(n) * sd
+        low, high = mean - half, mean + half
+    n_pairs = n_equal = None  # where means of many are compared
+    if kind in ("again", "session"):
+        both = [zip(*of_rater, strict=True) for of_rater in pairs.values()]
+        equal = [one == other for of_rater in both for one, other in of_rater]
+        n_pairs, n_equal = len(equal), sum(equal)
+    question = sentence("order", kind, first=sessions[0], last=sessions[-1])
+    return (question, n, n_pairs, n_equal, mean, low, high), reason
 
 
 def order_needs(material: Material) -> Ratings | Lacking:
     """Return the ratings that are analysed, if they can show any effect of order."""
     ratings = material.ratings.without(material.analysis.excluded)
     lacks = Lacking(sentence("order", "nothing"))
-    return ratings if compared(material.protocol, ratings) else lacks
+    return ratings if _compared(material.protocol, ratings) else lacks
 
 
 def order_section(material: Material, ratings: Ratings) -> Iterator[Content]:
     """Show grades by place, after other models, and when a model came again."""
     protocol, level = material.protocol, material.analysis.level
-    effects = order_effects(protocol, ratings, level)
+    effects = effect_rows(protocol, ratings, level)
     yield Paragraph(text=sentence("order", "steps"))
-    if places := place_summaries(protocol, ratings):
+    if places := place_rows(protocol, ratings):
         yield Table(
             name="grades_by_place",
             caption="Grades by the place of the presentation in its session",
@@ -41,17 +218,7 @@ def order_section(material: Material, ratings: Ratings) -> Iterator[Content]:
                 Column(key="n_standard", heading="Of standard models"),
                 Column(key="n_intended", heading="As intended"),
             ),
-            rows=tuple(
-                (
-                    _part(of.first - 1, of.last),
-                    of.session,
-                    of.n,
-                    of.deviation,
-                    of.n_standard,
-                    of.n_intended,
-                )
-                for of in places
-            ),
+            rows=tuple(places),
             data=material.data,
         )
     else:
@@ -68,33 +235,17 @@ def order_section(material: Material, ratings: Ratings) -> Iterator[Content]:
             Column(key="low", heading="Low", digits=2),
             Column(key="high", heading="High", digits=2),
         ),
-        rows=tuple(
-            (
-                _question(of),
-                of.n_raters,
-                of.n_pairs,
-                of.n_equal,
-                of.mean,
-                of.low,
-                of.high,
-            )
-            for of in effects
-        ),
+        rows=tuple(row for row, _ in effects),
         notes=(
             sentence("order", "intervals", level=percent(level)),
             *(
-                f"{_question(of)}: no interval, as {of.reason}."
-                for of in effects
-                if of.reason is not None
+                f"{question}: no interval, as {reason}."
+                for (question, *_), reason in effects
+                if reason is not None
             ),
         ),
         data=material.data,
     )
-
-
-def _question(effect: OrderEffect) -> str:
-    first, *_, last = (*effect.sessions, effect.sessions[-1])
-    return sentence("order", effect.kind, first=first, last=last)
 
 
 _CONCEALED = (

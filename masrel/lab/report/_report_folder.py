@@ -65,11 +65,11 @@ def report_files(
     """Return every file of a report in the order in which they are written."""
     # pandoc: its version, where it made a page
     # Imported here: whether a report is current is known without it.
-    from masrel.lab.verification._outputs import REPORT_FORMAT
+    from masrel.lab.verification.record import _REPORT_FORMAT
 
     written = {**assets.contents, **pages}
     document = {
-        "format": REPORT_FORMAT,
+        "format": _REPORT_FORMAT,
         "inputs": dict(inputs),
         "files": {place: _hash(data) for place, data in written.items()},
         **({} if pandoc is None else {"pandoc": pandoc}),

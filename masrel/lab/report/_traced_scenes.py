@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from masrel.lab.elbow import ElbowParameters, JointModel, Motion, Outline, Trace
     from masrel.lab.elbow.tone import ToneModel
 
-_FIGURES = "masrel.lab.report.figures._stretch_figures:"
+_FIGURES = "masrel.lab.report._stretch_figures:"
 
 SCENE_OUTPUTS = {
     "residual-torque": "residual_torque_nm",

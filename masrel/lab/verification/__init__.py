@@ -12,7 +12,7 @@ from masrel.lab.verification._log_findings import (
     read_anchors,
     write_anchors,
 )
-from masrel.lab.verification._sessions import SessionRecord, VerifiedTraining
+from masrel.lab.verification._sessions import SessionRecord
 from masrel.lab.verification.record import Verification, verify_sessions, verify_study
 
 __all__ = [
@@ -20,7 +20,6 @@ __all__ = [
     "Finding",
     "SessionRecord",
     "Verification",
-    "VerifiedTraining",
     "anchor_findings",
     "anchors_of",
     "read_anchors",

@@ -4,7 +4,7 @@ import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, Literal, TypeVar
+from typing import Any, Literal
 
 from masrel.errors import ParameterError, ScheduleError
 from masrel.lab._bounded_files import MAX_SMALL, read_regular
@@ -32,17 +32,17 @@ from masrel.lab.verification._log_findings import (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SessionRecord:
-    """One rater's session, as its log has it.
+    """One rater's session, rehearsal or training, as its log has it.
 
     Attributes
     ----------
     session, rater : str
-        Whose session.
-    stage : {"not begun", "begun", "complete", "unreadable"}
-        How far it came.
+        Whose session; that of a training is ``"training"``.
+    stage : {"not begun", "begun", "complete", "passed", "not passed", "unreadable"}
+        How far it came; a training is passed or not.
     n_presentations, n_graded, n_skipped, n_corrections : int
-        Presentations of the schedule, those with a grade, those skipped after a
-        fault, and corrections.
+        Presentations of the schedule or in a training, those with a grade, those
+        skipped after a fault, and corrections.
     n_recordings : int
         Recordings that the log names.
     rehearsal : int or None
@@ -51,7 +51,9 @@ class SessionRecord:
 
     session: str
     rater: str
-    stage: Literal["not begun", "begun", "complete", "unreadable"]
+    stage: Literal[
+        "not begun", "begun", "complete", "passed", "not passed", "unreadable"
+    ]
     n_presentations: int = 0
     n_graded: int = 0
     n_skipped: int = 0
@@ -61,50 +63,18 @@ class SessionRecord:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class VerifiedTraining:
-    """One rater's training, as its log has it.
+class CheckedLog:
+    """How far a log came, what is wrong with it, and the recordings it speaks for."""
 
-    Attributes
-    ----------
-    rater : str
-        Whose training.
-    stage : {"begun", "passed", "not passed", "unreadable"}
-        How far it came.
-    n_graded, n_recordings : int
-        Presentations with a grade, and recordings that the log names.
-    """
-
-    rater: str
-    stage: Literal["begun", "passed", "not passed", "unreadable"]
-    n_graded: int = 0
-    n_recordings: int = 0
-
-
-_Record = TypeVar("_Record", SessionRecord, VerifiedTraining)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CheckedLog(Generic[_Record]):
-    """How far a log came, what is wrong with it, and the files it speaks for."""
-
-    record: _Record
-    findings: tuple[Finding, ...]
-    files: frozenset[Path]
-
-
-def _checked(
-    record: _Record,
-    findings: Sequence[Finding],
-    log: Path,
-    recordings: Sequence[Path] = (),
-) -> CheckedLog[_Record]:
-    files = {log, *recordings, *(path.with_suffix(".json") for path in recordings)}
-    return CheckedLog(record=record, findings=tuple(findings), files=frozenset(files))
+    record: SessionRecord
+    findings: Sequence[Finding]
+    log: Path
+    recordings: Sequence[Path] = ()
 
 
 def check_session(
     study: StudyPaths, protocol: Protocol, session: str, rater: str
-) -> CheckedLog[SessionRecord]:
+) -> CheckedLog:
     """Hold a log against its schedule, and its recordings against the log."""
     file, log = study.schedule_file(rater, session), study.log_file(rater, session)
     schedule, findings = None, []
@@ -121,18 +91,17 @@ def check_session(
         findings.append(problem)
     if state is None or schedule is None:
         is_none = problem is None and not events
-        stage: Literal["not begun", "unreadable"] = (
-            "not begun" if is_none else "unreadable"
+        record = SessionRecord(
+            session=session,
+            rater=rater,
+            stage="not begun" if is_none else "unreadable",
         )
-        record = SessionRecord(session=session, rater=rater, stage=stage)
-        return _checked(record, findings, log)
+        return CheckedLog(record=record, findings=findings, log=log)
     checksum = hashlib.sha256(read_regular(file, most=MAX_SMALL)).hexdigest()
     return _against_schedule(study, protocol, schedule, events, state, checksum)
 
 
-def check_rehearsal(
-    study: StudyPaths, protocol: Protocol, log: Path
-) -> CheckedLog[SessionRecord]:
+def check_rehearsal(study: StudyPaths, protocol: Protocol, log: Path) -> CheckedLog:
     """Hold a rehearsal's log against its draw, and its recordings against the log."""
     number = int(log.parent.name) if log.parent.name.isdecimal() else 0
     paths = RehearsalPaths(study.root, number)
@@ -156,7 +125,7 @@ def check_rehearsal(
         record = SessionRecord(
             session=name, rater="", rehearsal=number, stage="unreadable"
         )
-        return _checked(record, problems[:1], log)
+        return CheckedLog(record=record, findings=problems[:1], log=log)
     is_changed = state.header["presented_sha256"] != presented_hash(protocol)
     try:
         drawn = None if is_changed else drawn_rehearsal(paths, protocol, rater, session)
@@ -186,7 +155,7 @@ def _against_schedule(
     events: Sequence[Event],
     state: SessionState,
     checksum: str,
-) -> CheckedLog[SessionRecord]:
+) -> CheckedLog:
     # checksum: of the schedule's file
     log = study.log_file(schedule.rater, schedule.session)
     needed = {
@@ -227,7 +196,7 @@ def _checked_session(
     state: SessionState,
     findings: Sequence[Finding],
     n_presentations: int,
-) -> CheckedLog[SessionRecord]:
+) -> CheckedLog:
     rater, session = str(state.header["rater"]), str(state.header["session"])
     recordings = [
         study.sessions / str(event.fields["recording"]) for event in state.all_presented
@@ -243,7 +212,8 @@ def _checked_session(
         n_recordings=len(recordings),
         rehearsal=study.number if isinstance(study, RehearsalPaths) else None,
     )
-    return _checked(record, findings, study.log_file(rater, session), recordings)
+    log = study.log_file(rater, session)
+    return CheckedLog(record=record, findings=findings, log=log, recordings=recordings)
 
 
 def _answer_findings(
@@ -316,16 +286,13 @@ def _recording_findings(
     yield from recording_findings(path, shown[code], of, event, where)
 
 
-def check_training(
-    study: StudyPaths, protocol: Protocol, log: Path
-) -> CheckedLog[VerifiedTraining]:
+def check_training(study: StudyPaths, protocol: Protocol, log: Path) -> CheckedLog:
     """Hold a training's log against the protocol, and its recordings against it."""
     rater = log.stem
     events, _, problem = checked_log(log, _read_training)
     if problem is not None:
-        return _checked(
-            VerifiedTraining(rater=rater, stage="unreadable"), [problem], log
-        )
+        record = SessionRecord(session="training", rater=rater, stage="unreadable")
+        return CheckedLog(record=record, findings=[problem], log=log)
     head, of_study = events[0].fields, {"study": protocol.study.id, "rater": rater}
     findings = [*unlike(log, "line 1", of_study, head)]
     if head["presented_sha256"] != presented_hash(protocol):
@@ -347,13 +314,15 @@ def check_training(
             path, folder, code, {code: shown}, of, event, log
         )
     ends = [event.fields["passed"] for event in events if event.kind == "complete"]
-    record = VerifiedTraining(
+    record = SessionRecord(
+        session="training",
         rater=rater,
         stage="begun" if not ends else "passed" if ends[0] else "not passed",
+        n_presentations=len({str(event.fields["position"]) for event in presented}),
         n_graded=sum(event.kind == "grade" for event in events),
         n_recordings=len(presented),
     )
-    return _checked(record, findings, log, recordings)
+    return CheckedLog(record=record, findings=findings, log=log, recordings=recordings)
 
 
 def _read_training(log: Path) -> tuple[tuple[Event, ...], None]:

@@ -1,26 +1,49 @@
-"""The record of a study, from protocol to analysis, each file held against the last."""
+"""The record of a study, from protocol to report, each file held against the last."""
 
+import hashlib
+import json
 import os
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
-from masrel.errors import ProtocolError, SessionLogError
+import masrel
+from masrel.errors import MasrelError, MasrelWarning, ProtocolError, SessionLogError
+from masrel.lab._bounded_files import (
+    MAX_RECORDING,
+    MAX_TABLE,
+    format_problem,
+    parse_json,
+    read_regular,
+)
 from masrel.lab._once import read_once
-from masrel.lab.conduct._study_log import allotment_problems, merged_log_problems
+from masrel.lab.conduct import excluded_raters
+from masrel.lab.conduct._study_log import (
+    allotment_problems,
+    conduct_hash,
+    merged_log_problems,
+)
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.schedule import schedule_problems
 from masrel.lab.verification._log_findings import Finding, broken, doubt
-from masrel.lab.verification._outputs import output_findings
 from masrel.lab.verification._sessions import (
     CheckedLog,
     SessionRecord,
-    VerifiedTraining,
     check_rehearsal,
     check_session,
     check_training,
 )
+
+if TYPE_CHECKING:
+    from masrel.lab.analysis import Analysis
+    from masrel.lab.ratings import Ratings
+
+_REPORT_FORMAT = "masrel report 1"
+"""What the manifest of a report says its format is."""
+
+_SHOWN = 20  # differences of the table that are listed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,7 +54,7 @@ class Verification:
     ----------
     sessions : tuple of SessionRecord
         Every session of the protocol, one line a rater.
-    trainings : tuple of VerifiedTraining
+    trainings : tuple of SessionRecord
         Every training that has a log, by rater.
     rehearsals : tuple of SessionRecord
         Every rehearsal that has a log.
@@ -41,7 +64,7 @@ class Verification:
     """
 
     sessions: tuple[SessionRecord, ...]
-    trainings: tuple[VerifiedTraining, ...] = ()
+    trainings: tuple[SessionRecord, ...] = ()
     rehearsals: tuple[SessionRecord, ...] = ()
     findings: tuple[Finding, ...]
 
@@ -94,7 +117,7 @@ def verify_study(study: StudyPaths) -> Verification:
             findings=(
                 *_of_problems(study.schedules, schedule_problems(protocol, study)),
                 *record.findings,
-                *output_findings(study, protocol),
+                *_output_findings(study, protocol),
             ),
         )
 
@@ -166,25 +189,17 @@ def _of_problems(path: Path, problems: Iterable[str]) -> tuple[Finding, ...]:
 
 
 def _unnamed(
-    folder: Path, checked: Sequence[CheckedLog[Any]], whose: str
+    folder: Path, checked: Sequence[CheckedLog], whose: str
 ) -> Iterator[Finding]:
     # what lies in a folder of logs and no log speaks for
-    named = {str(path) for of_log in checked for path in of_log.files}
+    recordings = [path for of_log in checked for path in of_log.recordings]
+    facts = [path.with_suffix(".json") for path in recordings]
+    logs = {of_log.log: of_log.record.stage for of_log in checked}
+    named = {*map(str, (*logs, *recordings, *facts))}
     # what a log that cannot be read names, nobody can say
-    unknown = {
-        path
-        for of_log in checked
-        if of_log.record.stage == "unreadable"
-        for path in of_log.files
-    }
+    unknown = {log for log, stage in logs.items() if stage == "unreadable"}
     # where a process may have died, or is, between a recording and the log
-    going_on = {
-        path.with_suffix("")
-        for of_log in checked
-        if of_log.record.stage == "begun"
-        for path in of_log.files
-        if path.suffix == ".jsonl"
-    }
+    going_on = {log.with_suffix("") for log in logs if logs[log] == "begun"}
     there = (
         f"{parent}{os.sep}{name}"
         for parent, folders, files in os.walk(folder)
@@ -210,3 +225,199 @@ def _unnamed(
             yield broken(path, "is a recording that no log of the protocol names")
         else:
             yield doubt(path, f"is in {folder.name}/, and no log names it")
+
+
+def _output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]:
+    # of everything that was made from the logs
+    table, manifest = study.ratings_file, study.report / "manifest.json"
+    tables = (table, study.answers_file, study.raters_file)
+    outputs = (*tables, study.analysis_file, manifest)
+    files = [file for file in outputs if file.is_file()]
+    if not files:
+        return  # nothing is loaded for it
+    from masrel.lab.analysis import analyze
+    from masrel.lab.ratings import answers_of, in_person_of, read_study_data
+    from masrel.lab.ratings.study_data import _of_logs
+
+    try:
+        if study.logs():
+            # recordings have been held against the logs before
+            ratings = _of_logs(study, protocol, check_recordings=False)
+            yield from _table_findings(study, protocol, ratings)
+        else:
+            ratings = read_study_data(study, protocol).ratings
+            if table.is_file():
+                yield doubt(table, "no session log stands behind this table")
+        if not {study.analysis_file, manifest} & {*files}:
+            return
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", MasrelWarning)  # of statistics
+            analysis = analyze(
+                protocol,
+                ratings,
+                in_person=in_person_of(study, ratings),
+                answers=answers_of(study, protocol),
+                excluded=excluded_raters(study),
+            )
+    except MasrelError as error:
+        for path in files:
+            yield broken(path, f"cannot be held against what it is made from: {error}")
+        return
+    if study.analysis_file.is_file():
+        yield from _analysis_findings(study.analysis_file, analysis, ratings)
+    if manifest.is_file():
+        yield from _report_findings(study, manifest, analysis, ratings)
+
+
+def _table_findings(
+    study: StudyPaths, protocol: Protocol, ratings: "Ratings"
+) -> Iterator[Finding]:
+    from masrel.lab.progress import _raters_text
+    from masrel.lab.ratings import answers_csv, answers_from_logs
+    from masrel.lab.ratings.study_data import _table_differences
+    from masrel.lab.ratings.table import _FORMAT, _texts
+
+    made: dict[Path, tuple[Callable[[], Iterable[str]], int]] = {
+        study.ratings_file: (lambda: _texts(ratings), _FORMAT),
+        study.answers_file: (
+            lambda: [answers_csv(answers_from_logs(study, protocol))],
+            1,
+        ),
+        study.raters_file: (lambda: [_raters_text(study, protocol)], 1),
+    }
+    for path, (texts, newest) in made.items():
+        if not path.is_file():
+            continue
+        differences = list(_table_differences(path, texts(), newest=newest))
+        for difference in differences[:_SHOWN]:
+            yield broken(path, f"{difference}; masrel ratings writes it anew")
+        if len(differences) > _SHOWN:
+            yield broken(
+                path, f"there are {len(differences) - _SHOWN} more differences"
+            )
+
+
+def _of_same_table(
+    analysis: "Analysis", ratings: "Ratings", inputs: Mapping[str, object]
+) -> "Analysis":
+    # with the hash that was written if it is of the same table in an earlier format
+    from masrel.lab.ratings.table import _texts
+
+    texts = _texts(ratings) if ratings.source_path is None else ()
+    for text in texts:
+        sha256 = hashlib.sha256(text.encode()).hexdigest()
+        if sha256 == inputs.get("ratings_sha256"):
+            changed = {**analysis.inputs, "ratings_sha256": sha256}
+            return replace(analysis, inputs=changed)
+    return analysis
+
+
+def _analysis_findings(
+    path: Path, analysis: "Analysis", ratings: "Ratings"
+) -> Iterator[Finding]:
+    from masrel.lab.analysis import as_analysis_document
+    from masrel.lab.analysis._results import ANALYSIS_FORMAT
+
+    document = _document(path)
+    if document is None:
+        yield broken(path, "needed a JSON object, got none")
+        return
+    document = {"format": 1, **document}  # which was not said once
+    problem = format_problem(document["format"], newest=ANALYSIS_FORMAT)
+    if problem is not None:
+        yield broken(path, problem)
+        return
+    inputs = document.get("inputs")
+    if isinstance(inputs, dict):
+        analysis = _of_same_table(analysis, ratings, inputs)
+    needed = as_analysis_document(analysis)
+    if document.get("masrel_version") != analysis.masrel_version:
+        yield _not_rebuilt(path, document)
+        document, needed = {"inputs": inputs}, {"inputs": needed["inputs"]}
+    leaves, needed_leaves = dict(_leaves(document)), dict(_leaves(needed))
+    for place in (*needed_leaves, *leaves):
+        got, value = (each.get(place, "absent") for each in (leaves, needed_leaves))
+        if got != value:
+            message = f"{place} is {got:.60}, but {value:.60} when it is computed again"
+            yield broken(path, message)
+            return
+
+
+def _not_rebuilt(path: Path, document: Mapping[str, object]) -> Finding:
+    version = document.get("masrel_version")
+    return doubt(
+        path,
+        f"made by masrel {version}, not rebuilt by this, {masrel.__version__}: only "
+        "what it was made from is looked at",
+    )
+
+
+def _leaves(value: object, place: str = "") -> Iterator[tuple[str, str]]:
+    # the places of a document, and the JSON of what stands there
+    if isinstance(value, dict | list) and value:
+        pairs = value.items() if isinstance(value, dict) else enumerate(value)
+        for name, part in pairs:
+            yield from _leaves(part, f"{place}.{name}".lstrip("."))
+    else:
+        yield place, json.dumps(value)
+
+
+def _report_findings(
+    study: StudyPaths, manifest: Path, analysis: "Analysis", ratings: "Ratings"
+) -> Iterator[Finding]:
+    # of the pages and assets that a report consists of, and what it was made from
+    document = _document(manifest)
+    files = None if document is None else document.get("files")
+    if document is None or not isinstance(files, dict):
+        yield broken(manifest, "needed the manifest of a report, got none")
+        return
+    if document.get("format") != _REPORT_FORMAT:
+        got = document.get("format")
+        yield broken(manifest, f"needed format {_REPORT_FORMAT!r}, got {got!r}")
+        return
+    numbers = manifest.with_name("analysis.json")
+    made = _document(numbers) if numbers.is_file() else None
+    if made is not None and made.get("masrel_version") != masrel.__version__:
+        yield _not_rebuilt(numbers, made)
+    inputs = document.get("inputs")
+    of = dict(inputs) if isinstance(inputs, dict) else {}
+    of.pop("include", None)  # what is shown of the same
+    of_conduct = of.pop("conduct_sha256", None)
+    of_claims = of.pop("claims_sha256", None)
+    if of != _of_same_table(analysis, ratings, of).inputs:
+        yield broken(
+            manifest, "the report is of another protocol or of other ratings: make anew"
+        )
+    if of_conduct != conduct_hash(study):
+        yield broken(
+            manifest,
+            "the report is not of what has happened beside the sessions, by "
+            f"{study.conduct_file.name}: make anew",
+        )
+    claims = study.claims_file
+    if of_claims and of_claims != (_sha256(claims) if claims.is_file() else None):
+        yield broken(manifest, f"the report is of other claims than {claims.name}")
+    yield from _file_findings(manifest, files)
+
+
+def _file_findings(manifest: Path, files: Mapping[str, object]) -> Iterator[Finding]:
+    for name, needed in files.items():
+        path = manifest.parent / name
+        if not path.resolve().is_relative_to(manifest.parent.resolve()):
+            yield broken(manifest, f"names a file outside the report, {name}")
+        elif not path.is_file():
+            yield broken(path, "needed a file of the report, got none")
+        elif _sha256(path) != needed:
+            yield broken(path, "is not the file that the report was written with")
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(read_regular(path, most=MAX_RECORDING)).hexdigest()
+
+
+def _document(path: Path) -> dict[str, object] | None:
+    try:
+        document = parse_json(read_regular(path, most=MAX_TABLE))
+    except ValueError:
+        return None
+    return document if isinstance(document, dict) else None

@@ -17,8 +17,8 @@ from masrel.lab.elbow import STANDARD_MODELS, ConstantSpeed, outline
 from masrel.lab.protocol import read_protocol, scale_of
 from masrel.lab.ratings import read_study_ratings
 from masrel.lab.report import write_report
-from masrel.lab.report.figures._stretch_figures import TracePanel, View, trace_figure
-from masrel.lab.report.figures._study_figures import speed_figure
+from masrel.lab.report._stretch_figures import TracePanel, View, trace_figure
+from masrel.lab.report._study_figures import speed_figure
 from masrel.plots import draw
 from masrel.plots._drawn_values import Drawn
 from tests.benchmarks.many_ratings import many_ratings
@@ -38,7 +38,7 @@ def speeds(n_raters: int) -> Drawn:
     )
     by_model = tuple(summary(f"HM{model}") for model in range(4))
     shown = Speeds(values=values, by_model=by_model, by_rater=(), n_missing=0)
-    drawer = "masrel.lab.report.figures._study_figures:speed_figure"
+    drawer = "masrel.lab.report._study_figures:speed_figure"
     return Drawn(drawer, (shown, raters, 60.0))
 
 
@@ -69,7 +69,7 @@ def panel(n_stretches: int, *, has_band: bool, is_graded: bool = False) -> Trace
 
 
 def traces(*panels: TracePanel, view: View = "time") -> Drawn:
-    drawer = "masrel.lab.report.figures._stretch_figures:trace_figure"
+    drawer = "masrel.lab.report._stretch_figures:trace_figure"
     return Drawn(drawer, (panels, view))
 
 

@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
 from masrel.lab.analysis import Speed, Speeds
-from masrel.lab.analysis._report_numbers import GivenGrades
 from masrel.lab.report._material import MANY_RATERS
 from masrel.lab.schedule._balance import OrderBalance
 from masrel.plots._cells import cells, name_columns, name_rows, room_of
@@ -38,19 +38,21 @@ _SESSION_LOOKS = (("o", BLUE), ("s", ORANGE), ("^", VERMILLION), ("v", GREY))
 
 
 def aim_pictures(
-    rows: Sequence[GivenGrades], grades: Sequence[str], level: float
+    aims: Sequence[str],
+    counts: NDArray[np.int64],
+    framed: NDArray[np.bool_],
+    shares: NDArray[np.float64],
+    grades: Sequence[str],
+    level: float,
 ) -> list[tuple[str, Picture]]:
     """Return grades by intended ones, and below them the part as intended."""
-    aims = [row.intended for row in rows]
-    counts = np.array([row.counts for row in rows])
-    framed = np.array([[grade == aim for grade in grades] for aim in aims])
     names = "intended grade", "grade given"
-    value, low, high = np.array([(row.share, row.low, row.high) for row in rows]).T
-    shares = value, low, high, counts.sum(axis=1), aims, level
     label = "part of the grades that is the intended one"
+    value, low, high = shares
+    shown = value, low, high, counts.sum(axis=1), aims, level
     return [
         ("", counts_picture(counts, aims, grades, framed, names)),
-        ("", categories_picture(*shares, label)),
+        ("", categories_picture(*shown, label)),
     ]
 
 

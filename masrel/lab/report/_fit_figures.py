@@ -5,7 +5,7 @@ https://doi.org/10.1109/TNSRE.2012.2195330, Figs. 2 to 5 and 8.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,10 +13,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from masrel.lab.analysis import _fit_residuals as residuals
-from masrel.lab.elbow.identification import ElbowFit, FrictionFit
-from masrel.lab.elbow.identification._catches import Catch
-from masrel.lab.elbow.identification._model_file import QUANTITIES
+from masrel.lab.elbow.identification import ElbowFit, FittedParameter, FrictionFit
+from masrel.lab.elbow.identification._catches import (
+    Catch,
+    CatchLevels,
+    Law,
+    catch_levels,
+)
+from masrel.lab.elbow.identification._model_file import QUANTITIES, Quantity
 from masrel.lab.report._fits import FRICTION
 from masrel.plots._style import BLACK, BLUE, GREY, ORANGE
 from masrel.tables._tables import interval_text, number
@@ -24,6 +28,8 @@ from masrel.tables._tables import interval_text, number
 _MAX_SLOW_COLUMNS = 4
 _BINS, _MIN_IN_BIN = 40, 20
 _MAX_POINTS = 6000  # more than a print resolves say nothing
+
+_BEFORE_CATCH = ("damping", "stiffness", "inertia")
 
 _DASHES = (0, (5, 1.5))
 _MEASURED: dict[str, Any] = {"color": GREY, "label": "measured"}
@@ -74,8 +80,9 @@ def slow_figure(fit: ElbowFit) -> Figure:
         time = part.time - part.time[0]
         top.plot(time, part.measured, linewidth=0.5, **_MEASURED)
         top.plot(time, fit.fitted_torque[place], color=BLACK, linewidth=1.5, **law)
-        error = 100.0 * residuals.slow_error(fit, place)
-        top.set_title(f"mean error {number(error, 1)} %")
+        error = np.abs(part.measured - fit.fitted_torque[place]).mean()
+        percent = number(100.0 * float(error) / float(np.abs(part.measured).mean()), 1)
+        top.set_title(f"mean error {percent} %")
         bottom.plot(time, np.degrees(part.velocity), **_THIN)
         bottom.set_xlabel("time (s)")
     grid[1, 0].set_ylim(bottom=0.0)  # last: else what comes later is cut off
@@ -155,7 +162,7 @@ def _fast_trial(column: Sequence[Axes], fit: ElbowFit, place: int) -> None:
 
 def catches_figure(fit: ElbowFit) -> Figure:
     """Return what all catches say of L and α, D, H and Q."""
-    catches, readings = residuals.catches(fit), residuals.catch_readings(fit)
+    catches, readings = _catches(fit), _catch_readings(fit)
     peaks = np.array([levels.peak for _, levels in readings])
     levels = np.array([levels.residual for _, levels in readings])
     speeds = np.degrees(np.array([catch.speed for catch, _ in readings]))
@@ -185,8 +192,7 @@ def catches_figure(fit: ElbowFit) -> Figure:
     return figure
 
 
-def _parameter_text(fit: ElbowFit, name: str, digits: int) -> str:
-    estimate, quantity = fit[name], QUANTITIES[name]
+def _parameter_text(estimate: FittedParameter, quantity: Quantity, digits: int) -> str:
     unit = "" if quantity.unit == "1" else f" {quantity.unit}"
     if math.isnan(estimate.value):
         return f"{quantity.symbol} not determined"
@@ -194,22 +200,26 @@ def _parameter_text(fit: ElbowFit, name: str, digits: int) -> str:
         end * quantity.factor for end in (estimate.value, estimate.low, estimate.high)
     )
     text = f"{quantity.symbol} = {number(value, digits)}"
-    if math.isclose(high - value, value - low, rel_tol=1e-9):
-        return f"{text} ± {number(high - value, digits)}{unit}"
     if math.isnan(estimate.standard_error):
         return text + unit
+    if math.isclose(high - value, value - low, rel_tol=1e-9):
+        return f"{text} ± {number(high - value, digits)}{unit}"
     return f"{text}{unit} {interval_text(low, high, digits)}"
+
+
+def _fitted(fit: ElbowFit, name: str, digits: int) -> str:
+    return _parameter_text(fit[name], QUANTITIES[name], digits)
 
 
 def _catch_angles(axes: Axes, fit: ElbowFit, catches: Sequence[Catch]) -> None:
     speeds = np.degrees([catch.mean_speed for catch in catches])
     axes.plot(speeds, np.degrees([catch.angle for catch in catches]), **_DOT)
-    title = _parameter_text(fit, "catch_angle_constant", 1)
+    title = _fitted(fit, "catch_angle_constant", 1)
     if not math.isnan(fit["catch_angle_constant"].value + fit["catch_slope"].value):
         at = np.linspace(speeds.min() - 5.0, speeds.max() + 5.0, 400)
-        law = np.degrees(residuals.catch_angle_law(fit, np.radians(at)))
+        law = np.degrees(_catch_angle_law(fit, np.radians(at)))
         axes.plot(at, law, **_LAW)
-        title += f"\n{_parameter_text(fit, 'catch_slope', 3)}"
+        title += f"\n{_fitted(fit, 'catch_slope', 3)}"
     axes.set_title(title)
 
 
@@ -233,7 +243,7 @@ def _catch_travels(axes: Axes, fit: ElbowFit, catches: Sequence[Catch]) -> None:
     axes.set_ylim(0.0, 1.25 * longest)
     if any(catch.end is None for catch in catches):
         axes.legend(loc="lower right")
-    axes.set_title(_parameter_text(fit, "catch_travel", 2))
+    axes.set_title(_fitted(fit, "catch_travel", 2))
 
 
 def _through_zero(
@@ -247,15 +257,15 @@ def _through_zero(
         axes.plot([0.0, end], [0.0, slope * end * math.pi / per], **_LAW)
         axes.set_xlim(0.0, end)
         axes.set_ylim(bottom=0.0)
-    axes.set_title(_parameter_text(fit, name, 3))
+    axes.set_title(_fitted(fit, name, 3))
 
 
 def residuals_figure(fit: ElbowFit) -> Figure:
     """Return residual torque against angle and time, and residual catch angles."""
-    angle, torque = residuals.slow_residuals(fit)
+    angle, torque = _slow_residuals(fit)
     panels = [("slow trials", "angle (deg)", np.degrees(angle), torque)]
     if any(trial.after is not None for trial in fit.trials):
-        since = residuals.fast_residuals(fit)
+        since = _fast_residuals(fit)
         panels.append(("fast trials", "time since the catch (s)", *since))
     has_line = not math.isnan(fit["catch_slope"].value)
     n_panels = len(panels) + has_line
@@ -267,17 +277,17 @@ def residuals_figure(fit: ElbowFit) -> Figure:
             x[::every], y[::every], linestyle="none", marker=".", markersize=1.2,
             color=GREY, alpha=0.35, rasterized=True,
         )  # fmt: skip
-        middles = residuals.binned_means(x, y, _BINS, _MIN_IN_BIN)
+        middles = _binned_means(x, y)
         axes.plot(*middles, color=BLACK, linewidth=1.4)
         reach = 1.05 * float(np.quantile(np.abs(y), 0.999))
         _left(axes, title, label, "measured − fitted (N·m)", reach)
         if label.startswith("time"):
             axes.axvline(0.0, color=BLACK, linewidth=0.7, linestyle=(0, (1, 1.5)))
     if has_line:
-        catches = residuals.catches(fit)
+        catches = _catches(fit)
         speeds = np.array([catch.mean_speed for catch in catches])
         angles = np.array([catch.angle for catch in catches])
-        left = np.degrees(angles - residuals.catch_angle_law(fit, speeds))
+        left = np.degrees(angles - _catch_angle_law(fit, speeds))
         grid[-1].plot(np.degrees(speeds), left, "o", color=BLACK, markersize=3.5)
         reach, label = 1.2 * float(np.abs(left).max()) or 1.0, "measured − fitted (deg)"
         _left(grid[-1], "catch angles", "mean speed (deg/s)", label, reach)
@@ -287,6 +297,74 @@ def residuals_figure(fit: ElbowFit) -> Figure:
 def _left(axes: Axes, title: str, across: str, up: str, reach: float) -> None:
     axes.axhline(0.0, **_ZERO)
     axes.set(title=title, xlabel=across, ylabel=up, ylim=(-reach, reach))
+
+
+def _slow_residuals(fit: ElbowFit) -> tuple[_Floats, _Floats]:
+    # angles (rad) of all slow samples, and measured - fitted torque
+    return _joined(
+        (trial.pre_catch.angle, trial.pre_catch.measured - law)
+        for trial, law in zip(fit.trials, fit.fitted_torque, strict=True)
+        if trial.pace == "slow"
+    )
+
+
+def _fast_residuals(fit: ElbowFit) -> tuple[_Floats, _Floats]:
+    # times since the catch of all fast samples, and measured - fitted torque
+    return _joined(
+        (
+            np.concatenate([trial.pre_catch.time, after.time]) - trial.catch.time,
+            np.concatenate([trial.pre_catch.measured, after.measured]) - law,
+        )
+        for trial, law in zip(fit.trials, fit.fitted_torque, strict=True)
+        if trial.catch is not None and (after := trial.after) is not None
+    )
+
+
+def _joined(parts: Iterable[tuple[_Floats, _Floats]]) -> tuple[_Floats, _Floats]:
+    x, y = zip(*parts, strict=True)
+    return np.concatenate(x), np.concatenate(y)
+
+
+def _binned_means(x: _Floats, y: _Floats) -> tuple[_Floats, _Floats]:
+    # middles of bins of x and the means of y in them, each (_BINS,)
+    edges = np.linspace(x.min(), x.max(), _BINS + 1)
+    bins = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, _BINS - 1)
+    count = np.bincount(bins, minlength=_BINS)
+    total = np.bincount(bins, weights=y, minlength=_BINS)
+    means = np.where(count >= _MIN_IN_BIN, total / np.maximum(count, 1), np.nan)
+    return 0.5 * (edges[1:] + edges[:-1]), means  # a bin of too few has no mean
+
+
+def _catch_angle_law(fit: ElbowFit, mean_speed: _Floats) -> _Floats:
+    # the fitted catch angles (rad) of mean speeds (rad/s)
+    constant, slope = fit["catch_angle_constant"].value, fit["catch_slope"].value
+    constants = fit.constants
+    law = constant - slope * np.maximum(mean_speed, constants.slowest_mean_speed)  # (2)
+    return np.maximum(law, constants.smallest_catch_angle)  # (6)
+
+
+def _catches(fit: ElbowFit) -> list[Catch]:
+    return [trial.catch for trial in fit.trials if trial.catch is not None]
+
+
+def _catch_readings(fit: ElbowFit) -> list[tuple[Catch, CatchLevels]]:
+    # the catches whose peak and residual of (3) can be read off the torque
+    values = {e.name: e.value for e in fit.estimates}
+    held: dict[str, Any] = {
+        name: values[name] if term == "fitted" else term
+        for name, term in fit.arm.items()
+        if name not in ("offset", "drift") and term != "off"
+    }
+    joint: dict[str, Any] = {n: values[n] for n in _BEFORE_CATCH if n in values}
+    names = [trial.name for trial in fit.trials]
+    drifts = dict(zip(names, fit.drifts, strict=True))
+    law = Law(**joint, **held, drifts=drifts)
+    readings = []
+    for trial in fit.trials:
+        levels = catch_levels(trial, law, fit.constants)
+        if trial.catch is not None and levels is not None:
+            readings.append((trial.catch, levels))
+    return readings
 
 
 def friction_figure(fit: FrictionFit) -> Figure:
@@ -310,12 +388,6 @@ def friction_figure(fit: FrictionFit) -> Figure:
         axes.set_xlabel(label)
     left.set_ylabel("backdriving torque (N·m)")
     figure.legend(loc="outside lower center", ncols=2)
-    lines = []
-    for name, quantity in FRICTION.items():
-        estimate = fit[name]
-        text = f"{quantity.symbol} = {number(estimate.value, 4)}"
-        if not math.isnan(estimate.high):
-            text += f" ± {number(estimate.high - estimate.value, 4)}"
-        lines.append(f"{text} {quantity.unit}")
+    lines = [_parameter_text(fit[name], of, 4) for name, of in FRICTION.items()]
     right.set_title("\n".join(lines), fontsize=8)
     return figure

@@ -5,12 +5,8 @@ from typing import Any
 import pytest
 from scipy.stats import ttest_1samp
 
-from masrel.lab.analysis._report_numbers import (
-    OrderEffect,
-    order_effects,
-    place_summaries,
-)
 from masrel.lab.ratings import Ratings, ratings_from_rows
+from masrel.lab.report._order_tables import effect_rows, place_rows
 from masrel.scales import MODIFIED_ASHWORTH
 from tests.lab.analysis.studies import protocol_with
 
@@ -26,18 +22,24 @@ def presented(**orders: str) -> Ratings:
     return ratings_from_rows(rows, MODIFIED_ASHWORTH)
 
 
-def effects(rows: Ratings) -> dict[str, OrderEffect]:
-    return {each.kind: each for each in order_effects(protocol_with(), rows, 0.95)}
+PLACE = "Second half of a session less first half"
+NEIGHBOUR = "After a model graded higher less after one graded lower"
+AGAIN = "Second presentation in a session less first"
+
+
+def effects(rows: Ratings) -> dict[object, tuple[Any, ...]]:
+    """By question: raters, pairs, equal ones, mean, ends, and why there are none."""
+    found = effect_rows(protocol_with(), rows, 0.95)
+    return {question: (*row, reason) for (question, *row), reason in found}
 
 
 def test_the_second_half_is_held_against_the_first() -> None:
     rows = presented(R1="HM1=0 HM2=3", R2="HM2=2 HM1=1")
     # steps: HM1 0 of R1 and 1 of R2, HM2 4 and 3; so half a step below the mean of the
     # model in the first half and half a step above in the second, for both
-    place = effects(rows)["place"]
-    assert place.mean == pytest.approx(1.0)
-    assert place.n_raters == 2
-    assert place.reason == "it is the same for every rater"
+    n_raters, _, _, mean, *_, reason = effects(rows)[PLACE]
+    assert (n_raters, mean) == (2, pytest.approx(1.0))
+    assert reason == "it is the same for every rater"
 
 
 def test_the_interval_is_students_t_over_raters() -> None:
@@ -63,10 +65,9 @@ def test_the_interval_is_students_t_over_raters() -> None:
         sum(deviation[rater, model] * half[model in last] for model in steps)
         for rater, last in later.items()
     ]
-    place = effects(rows)["place"]
     expected = ttest_1samp(by_rater, 0.0).confidence_interval(0.95)
-    assert place.mean == pytest.approx(sum(by_rater) / 3)
-    assert (place.low, place.high) == pytest.approx((expected.low, expected.high))
+    numbers = (sum(by_rater) / 3, expected.low, expected.high)
+    assert effects(rows)[PLACE][3:6] == pytest.approx(numbers)
 
 
 def test_a_grade_drawn_to_the_one_before_is_an_effect_of_the_neighbour() -> None:
@@ -87,11 +88,11 @@ def test_a_grade_drawn_to_the_one_before_is_an_effect_of_the_neighbour() -> None
     # R1: HM2 after HM4 +1/2, HM1 after HM2 0, so 1/4 after a higher one; HM2 after HM1
     # -1/2 after a lower one: 3/4. R2: HM2 after HM1 -1/2 and HM4 after HM2 0, so -1/4
     # after a lower one; HM2 after HM4 +1/2: 3/4.
-    assert found["neighbour"].mean == pytest.approx(0.75)
+    assert found[NEIGHBOUR][3] == pytest.approx(0.75)
     # the second time HM2 is a step lower for R1 and a step higher for R2
-    again = found["again"]
-    assert (again.mean, again.n_pairs, again.n_equal) == (0.0, 2, 0)
-    assert again.low < 0.0 < again.high
+    n_raters, n_pairs, n_equal, mean, low, high, _ = found[AGAIN]
+    assert (n_raters, n_pairs, n_equal, mean) == (2, 2, 0, 0.0)
+    assert low < 0.0 < high
 
 
 def test_a_session_is_held_against_the_one_before() -> None:
@@ -107,13 +108,10 @@ def test_a_session_is_held_against_the_one_before() -> None:
             ("retest", "R2", "HM1", "1"),
         )
     ]
-    (session,) = order_effects(
-        protocol_with(), ratings_from_rows(rows, MODIFIED_ASHWORTH), 0.95
-    )
+    ((question, found),) = effects(ratings_from_rows(rows, MODIFIED_ASHWORTH)).items()
     # R1 half a step up on average, R2 none; R3 has no second grade
-    assert (session.kind, session.sessions) == ("session", ("test", "retest"))
-    assert (session.n_raters, session.n_pairs, session.n_equal) == (2, 3, 2)
-    assert session.mean == 0.25
+    assert question == "Session retest less session test"
+    assert found[:4] == (2, 3, 2, 0.25)
 
 
 def test_models_that_are_milder_or_more_severe_are_no_effect() -> None:
@@ -127,12 +125,8 @@ def test_models_that_are_milder_or_more_severe_are_no_effect() -> None:
         }
     )
     found = effects(rows)
-    assert {kind: each.mean for kind, each in found.items()} == {
-        "place": 0.0,
-        "neighbour": 0.0,
-    }
-    for part in place_summaries(protocol_with(), rows):
-        assert part.deviation == 0.0
+    assert {name: of[3] for name, of in found.items()} == {PLACE: 0.0, NEIGHBOUR: 0.0}
+    assert {row[3] for row in place_rows(protocol_with(), rows)} == {0.0}
 
 
 def test_one_rater_has_no_interval_and_no_place_no_effect() -> None:
@@ -140,32 +134,22 @@ def test_one_rater_has_no_interval_and_no_place_no_effect() -> None:
         {"session": session, "rater": "R1", "model": "HM1", "grade": grade}
         for session, grade in (("test", "1"), ("retest", "1+"))
     ]
-    (only,) = order_effects(
-        protocol_with(), ratings_from_rows(rows, MODIFIED_ASHWORTH), 0.95
-    )
-    assert (only.mean, only.reason) == (1.0, "one rater has no spread")
-    assert only.low != only.low
+    (found,) = effects(ratings_from_rows(rows, MODIFIED_ASHWORTH)).values()
+    assert (found[3], found[-1]) == (1.0, "one rater has no spread")
+    assert found[4] != found[4]
     one = ratings_from_rows(rows[:1], MODIFIED_ASHWORTH)
-    assert order_effects(protocol_with(), one, 0.95) == ()
-    assert place_summaries(protocol_with(), one) == ()
+    assert effects(one) == {}
+    assert place_rows(protocol_with(), one) == []
 
 
 def test_places_are_counted_in_quarters_and_halves() -> None:
     order = " ".join(f"D{n:02}=1" for n in range(1, 9))
-    rows = presented(R1=order, R2=order)
-    parts = place_summaries(protocol_with(), rows)
-    assert [(p.first, p.last, p.n) for p in parts] == [
-        (1, 2, 4),
-        (3, 4, 4),
-        (5, 6, 4),
-        (7, 8, 4),
+    parts = place_rows(protocol_with(), presented(R1=order, R2=order))
+    assert [(places, n, n_standard) for places, _, n, _, n_standard, _ in parts] == [
+        (places, 4, 0) for places in ("1–2", "3–4", "5–6", "7–8")
     ]
-    assert all(part.n_standard == 0 for part in parts)
-    short = place_summaries(
+    short = place_rows(
         protocol_with(), presented(R1="HM1=1 HM2=2 HM3=2", R2="HM3=2 HM1=0 HM2=1+")
     )
     # intended are 1, 1+ and 2: R1 HM1; R2 HM3 in the first place; then HM3; HM2
-    assert [(p.first, p.last, p.n_standard, p.n_intended) for p in short] == [
-        (1, 1, 2, 2),
-        (2, 3, 4, 2),
-    ]
+    assert [(row[0], *row[4:]) for row in short] == [("1", 2, 2), ("2–3", 4, 2)]
