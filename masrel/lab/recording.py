@@ -12,6 +12,7 @@ import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
@@ -268,44 +269,34 @@ def stretches(recording: Recording) -> tuple[Stretch, ...]:
     >>> stretch.onset_s, stretch.end_s, round(stretch.mean_speed_deg_s, 6)
     (0.1, 0.3, 60.0)
     """
-    columns, threshold = recording.columns, _threshold_deg_s(recording)
-    number = columns["stretch"].astype(np.int64)
-    starts = np.flatnonzero((np.diff(number, prepend=0) != 0) & (number > 0))
-    was_stopped = recording.facts.get("fault") is not None
+    number = recording.columns["stretch"]
+    changes = np.flatnonzero(np.diff(number)) + 1
     return tuple(
-        _stretch(
-            {name: column[start:end] for name, column in columns.items()},
-            threshold,
-            was_stopped and end >= recording.n_presented,
-        )
-        for start, end in zip(starts.tolist(), _ends(number, starts), strict=True)
+        _stretch(recording, start, end)
+        for start, end in pairwise([0, *changes.tolist(), recording.n_samples])
+        if start < end and number[start] > 0.0
     )
 
 
-def _threshold_deg_s(recording: Recording) -> float:
-    # ν_th, deg/s
+def _stretch(recording: Recording, start: int, end: int) -> Stretch:
+    # What the samples from one to before another are
+    columns = {name: column[start:end] for name, column in recording.columns.items()}
     threshold = recording.facts.get("speed_threshold_deg_s")
-    return _USUAL_THRESHOLD_DEG_S if threshold is None else float(threshold)
-
-
-def _ends(number: NDArray[np.int64], starts: NDArray[np.intp]) -> list[int]:
-    # number (n_samples,), starts (n_stretches,) -> the first sample after each
-    changes = np.flatnonzero(np.diff(number, append=0) != 0) + 1
-    return [int(changes[changes > start][0]) for start in starts]
-
-
-def _stretch(columns: _Columns, threshold_deg_s: float, stopped: bool) -> Stretch:
-    time_s, catch = columns["time_s"], _catch(columns)
-    torque = columns["model_torque_nm"]
-    moving = columns["velocity_deg_s"] >= threshold_deg_s
+    if threshold is None:
+        threshold = _USUAL_THRESHOLD_DEG_S
+    moving = columns["velocity_deg_s"] >= float(threshold)
+    time_s, torque = columns["time_s"], columns["model_torque_nm"]
+    catches = np.flatnonzero(columns["phase"] == _CATCH)
+    catch = int(catches[0]) if catches.size else None  # where the first one began
     # One that was stopped before its catch has no mean speed of its own.
-    has_speed = catch is not None or not stopped
+    was_stopped = recording.facts.get("fault") is not None
+    has_speed = catch is not None or not (was_stopped and end >= recording.n_presented)
     return Stretch(
         number=int(columns["stretch"][0]),
         onset_s=float(time_s[0]),
         end_s=float(time_s[-1]),
         mean_speed_deg_s=(
-            _mean_speed_deg_s(columns, threshold_deg_s) if has_speed else None
+            _mean_speed_deg_s(columns, moving, catch) if has_speed else None
         ),
         catch_angle_deg=None if catch is None else float(columns["angle_deg"][catch]),
         catch_time_s=None if catch is None else float(time_s[catch]),
@@ -323,11 +314,7 @@ def _main_stretch(recording: Recording) -> Stretch | None:
     if len(made) > 1:
         return next((one for one in made if one.reached_threshold), made[0])
     n_rows = recording.n_presented  # what the law did under the ramp, nobody felt
-    if not n_rows:
-        return None
-    columns = {name: column[:n_rows] for name, column in recording.columns.items()}
-    stopped = recording.facts.get("fault") is not None
-    return _stretch(columns, _threshold_deg_s(recording), stopped)
+    return _stretch(recording, 0, n_rows) if n_rows else None
 
 
 def _residual(columns: _Columns, catch: int) -> float:
@@ -340,24 +327,16 @@ def _residual(columns: _Columns, catch: int) -> float:
 def _phases(columns: _Columns) -> tuple[Phase, ...]:
     # Their names in the order they came
     codes = columns["phase"].astype(np.int64)
-    if codes.size == 0:
-        return ()
     changes = np.flatnonzero(np.diff(codes)) + 1
     return tuple(PHASES[codes[index]] for index in (0, *changes))
 
 
-def _catch(columns: _Columns) -> int | None:
-    # The sample at which the first catch began
-    catches = np.flatnonzero(columns["phase"] == _CATCH)
-    return int(catches[0]) if catches.size else None
-
-
-def _mean_speed_deg_s(columns: _Columns, threshold_deg_s: float) -> float | None:
+def _mean_speed_deg_s(
+    columns: _Columns, moving: NDArray[np.bool_], last: int | None
+) -> float | None:
     # Angle travelled over time, deg/s, from the onset to the first catch: v̄ of (2). An
     # arm that was slower than ν_th in between has begun anew. Without a catch, from the
     # first to the last sample at ν_th or above; None without extension.
-    moving = columns["velocity_deg_s"] >= threshold_deg_s
-    last = _catch(columns)
     if last is not None:
         slower = np.flatnonzero(~moving[:last])
         onset = int(slower[-1]) + 1 if slower.size else 0

@@ -24,11 +24,12 @@ from masrel.lab.hess import (
     Controller,
     Device,
     DeviceLimits,
+    HandTraits,
+    HumanHand,
     Reading,
     RealClock,
     SimulatedClock,
     SimulatedHand,
-    YieldingHand,
     open_device,
     run_presentation,
 )
@@ -114,7 +115,7 @@ def tick_costs(turns: int = 40) -> None:
     kinds = {
         "prescribed motion": lambda: None,
         "simulated arm and hand": lambda: SimulatedHand(**options),
-        "the same, a hand that yields": lambda: YieldingHand(**options),
+        "the same, a person's hand": lambda: HumanHand(HandTraits(), **options),
     }
     costs: dict[str, list[float]] = {name: [] for name in kinds}
     speeds: dict[str, list[float]] = {name: [] for name in kinds}

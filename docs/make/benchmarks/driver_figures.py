@@ -17,7 +17,6 @@ from masrel.lab.hess import (
     Friction,
     SimulatedClock,
     SimulatedHand,
-    YieldingHand,
     open_device,
     run_presentation,
 )
@@ -112,8 +111,8 @@ def draw_lateness(loops: Mapping[str, NDArray[np.float64]], path: Path) -> None:
 def recorded(model: str, speed_deg_s: float, **options) -> Recording:
     """One presentation on the simulated device."""
     clock = SimulatedClock()
-    kind = YieldingHand if options.pop("yields", False) else SimulatedHand
-    hand = kind(start=START, end=END, mean_speed=radians(speed_deg_s), **options)
+    speed = radians(speed_deg_s)
+    hand = SimulatedHand(start=START, end=END, mean_speed=speed, **options)
     controller = Controller(STANDARD_MODELS[model], start_angle=START)
     with open_device("simulated", clock=clock, hand=hand) as device:
         return run_presentation(

@@ -22,7 +22,6 @@ from masrel.lab.hess.hand import (
     HandTraits,
     HumanHand,
     SimulatedHand,
-    YieldingHand,
 )
 from masrel.lab.hess.limits import DeviceLimits
 from masrel.lab.hess.loop import run_presentation
@@ -56,7 +55,6 @@ __all__ = [
     "SimulatedOptions",
     "StretchRules",
     "TorqueSensor",
-    "YieldingHand",
     "cut_off",
     "device_names",
     "open_device",

@@ -68,22 +68,17 @@ class Samples:
         n_columns = _N_COLUMNS + len(channels)
         # How many samples there are, and after it column by column
         n_values = 1 + n_columns * capacity
-        self._map = None
-        if file is None:
-            values: memoryview[float] = memoryview(array("d", bytes(_WORD * n_values)))
-        else:
-            layout: dict[str, object] = {"capacity": capacity, "n_columns": n_columns}
-            if channels:
-                layout["channels"] = [asdict(channel) for channel in channels]
-            header = json.dumps({**(facts or {}), **layout}).encode()
-            if len(header) > _HEADER:
-                raise ParameterError(
-                    f"channels: need names that fit into {_HEADER} bytes, "
-                    f"got {len(channels)} channels"
-                )
-            self._map = _laid_down(file, header, n_values)
-            values = memoryview(self._map)[_HEADER:].cast("d")
-        self._values = values
+        layout: dict[str, object] = {"capacity": capacity, "n_columns": n_columns}
+        if channels:
+            layout["channels"] = [asdict(channel) for channel in channels]
+        header = json.dumps({**(facts or {}), **layout}).encode()
+        if len(header) > _HEADER:
+            raise ParameterError(
+                f"channels: need names that fit into {_HEADER} bytes, "
+                f"got {len(channels)} channels"
+            )
+        self._map = _laid_down(file, header, _HEADER + _WORD * n_values)
+        self._values = values = memoryview(self._map)[_HEADER:].cast("d")
         starts = range(1, n_values, max(capacity, 1))
         self._columns = [values[start : start + capacity] for start in starts]
         self._written = self._columns[:_N_COLUMNS]
@@ -126,12 +121,13 @@ class Samples:
         """Let go of the memory, and of the file."""
         for view in (*self._columns, self._values):
             view.release()
-        if self._map is not None:
-            self._map.close()
+        self._map.close()
 
 
-def _laid_down(file: Path, header: bytes, n_values: int) -> mmap.mmap:
-    n_bytes = _HEADER + _WORD * n_values
+def _laid_down(file: Path | None, header: bytes, n_bytes: int) -> mmap.mmap:
+    # All of it, in memory or on disk, before anything moves
+    if file is None:
+        return mmap.mmap(-1, n_bytes)
     make_folder(file.parent)
     try:
         with open(file, "w+b", opener=no_follow) as opened:

@@ -3,7 +3,6 @@
 import copy
 import math
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 
@@ -12,10 +11,6 @@ from masrel.lab.hess._clock import Clock
 from masrel.lab.hess._signals import VelocityEstimate
 from masrel.lab.hess.device import BackendOptions, Device, DeviceSetup, Reading
 from masrel.lab.recording import Recording
-
-_MAX_PATHS = 64
-
-_Path: TypeAlias = "tuple[float, _Path] | None"  # an angle, and those before it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +51,7 @@ class ReplayDevice(Device):
             )
         self._clock = clock
         self._times_ns = [round(time * 1e9) for time in times.tolist()]
-        self._angles, self.is_exact = recorded_angles(
+        self._angles = _as_read(
             [time_ns * 1e-9 for time_ns in self._times_ns],
             columns["angle_deg"][:n_readings].tolist(),
             columns["velocity_deg_s"][:n_readings].tolist(),
@@ -98,37 +93,37 @@ def build(setup: DeviceSetup) -> ReplayDevice:
     return ReplayDevice(options.recording, clock=setup.clock)
 
 
-def recorded_angles(
+def _as_read(
     times_s: list[float], angles_deg: list[float], velocities_deg_s: list[float]
-) -> tuple[list[float], bool]:
-    """Return the angles that were read, and whether they are so to the last bit."""
-    # A recording keeps angles in degrees, and from radians to degrees and back a float
-    # may end one last bit aside. The speed that was estimated from the angles is
-    # recorded too and tells such neighbours apart. One last bit of an angle is many of
-    # a speed over 1 ms, so few paths live long.
-    paths: list[tuple[_Path, VelocityEstimate]] = [(None, VelocityEstimate())]
-    for time_s, angle, velocity in zip(
-        times_s, angles_deg, velocities_deg_s, strict=True
-    ):
-        candidates = _radians_of(angle)
-        longer: list[tuple[_Path, VelocityEstimate]] = []
-        for path, estimate in paths:
-            for candidate in candidates:
-                updated = copy.copy(estimate)
-                if _degrees(updated.update(time_s, candidate)) == velocity:
-                    longer.append(((candidate, path), updated))
-        if not longer:
-            return [math.radians(angle) for angle in angles_deg], False
-        paths = longer[:_MAX_PATHS]
-    return _angles_of(paths[0][0]), True
+) -> list[float]:
+    # The angles as they were read, rad: to the last bit, where the speed beside them
+    # was estimated from them. A recording keeps angles in degrees, and from radians to
+    # degrees and back a float may end one last bit aside. One last bit of an angle is
+    # many of a speed over 1 ms, so that the first angle decides on all others.
+    rows = list(zip(times_s, angles_deg, velocities_deg_s, strict=True))
+    for first in _radians_of(angles_deg[0]):
+        angles = _from_the_first(first, rows)
+        if len(angles) == len(rows):
+            return angles
+    return [math.radians(angle) for angle in angles_deg]
 
 
-def _angles_of(path: _Path) -> list[float]:
-    angles = []
-    while path is not None:
-        angle, path = path
-        angles.append(angle)
-    return angles[::-1]
+def _from_the_first(
+    first: float, rows: list[tuple[float, float, float]]
+) -> list[float]:
+    # As many angles as give the speeds that are recorded
+    estimate, angles = VelocityEstimate(), [first]
+    estimate.update(rows[0][0], first)
+    for time_s, angle_deg, velocity in rows[1:]:
+        for angle in _radians_of(angle_deg):
+            updated = copy.copy(estimate)
+            if _degrees(updated.update(time_s, angle)) == velocity:
+                angles.append(angle)
+                estimate = updated
+                break
+        else:
+            break
+    return angles
 
 
 def _radians_of(angle_deg: float) -> list[float]:

@@ -79,7 +79,7 @@ def propagator(
     system[2, 2] = -decay
     system[3, 4] = 1.0
     exponential = _exponential(system * step)
-    angle_row, speed_row = exponential[0].tolist(), exponential[1].tolist()
+    angle_row, speed_row = exponential[:2].tolist()
     lag_left = float(exponential[2, 2]) if lag_time > 0.0 else 0.0
     return (*angle_row, *speed_row, lag_left)
 
@@ -123,17 +123,11 @@ class Plant:
                 f"{parameters.range_end} rad with a start at {hand.start} rad"
             )
         friction = parameters.friction
-        self._hand = hand
+        self._hand, self._arm = hand, parameters
         self._yields = hand.yields
-        self._arm_inertia = parameters.arm_inertia
         self._inertia = friction.inertia + parameters.arm_inertia  # nobody's hand
-        self._viscous = friction.viscous
         self._coulomb = friction.coulomb
         self._range_end = parameters.range_end
-        self._stop_stiffness = parameters.stop_stiffness
-        self._stop_damping = parameters.stop_damping
-        self._torque_step = parameters.torque_step
-        self._lag_time = parameters.lag_time
         self._delay_ns = round(parameters.delay * 1e9)
         self.step_ns = parameters.step_ns
         self._start_ns = self.now_ns = 0
@@ -170,8 +164,9 @@ class Plant:
         stop = 0.0
         if self._contact:
             beyond = self.angle - (self._range_end if self._contact == _UPPER else 0.0)
-            stop = self._stop_stiffness * beyond + self._stop_damping * self.velocity
-        return self._pull_of(self._arm_inertia) - stop
+            stop = self._arm.stop_stiffness * beyond
+            stop += self._arm.stop_damping * self.velocity
+        return self._pull_of(self._arm.arm_inertia) - stop
 
     def _pull_of(self, inertia: float) -> float:
         # The muscles' torque less what moves the hand and so much of the arm, N·m
@@ -204,7 +199,7 @@ class Plant:
 
     def command(self, torque_nm: float, now_ns: int) -> None:
         """Command a torque, which the motor begins to follow after its delay."""
-        torque_nm = _rounded(torque_nm, self._torque_step)
+        torque_nm = _rounded(torque_nm, self._arm.torque_step)
         self._pending.append((now_ns + self._delay_ns, torque_nm))
 
     def advance(self, now_ns: int) -> None:
@@ -215,8 +210,7 @@ class Plant:
             if pending and pending[0][0] <= self.now_ns:
                 self._follow(pending.popleft()[1])
                 continue
-            if not self._try_step(0):
-                self._step_in_parts()
+            self._step(0)
             self.now_ns += step_ns
             # From integers, so that rounding does not add up.
             self._time = (self.now_ns - self._start_ns) * 1e-9
@@ -226,20 +220,17 @@ class Plant:
 
     def _follow(self, torque_nm: float) -> None:
         # The motor's torque goes on from where it is.
-        self._lag = self._lag + self._commanded - torque_nm if self._lag_time else 0.0
+        self._lag = (
+            self._lag + self._commanded - torque_nm if self._arm.lag_time else 0.0
+        )
         self._commanded = torque_nm
         self._force = self._force_at(self._time)
 
-    def _step_in_parts(self) -> None:
-        # Something changes within this step: parts of a half, a quarter, ... of it,
-        # each as long as the place reached allows.
-        done, total = 0, 1 << _MAX_HALVINGS
-        while done < total:
-            size = done & -done or total >> 1
-            level = _MAX_HALVINGS + 1 - size.bit_length()
-            while not self._try_step(level):
-                level += 1
-            done += total >> level
+    def _step(self, level: int) -> None:
+        # A part of a step, half as long per level; its halves where something changes
+        if not self._try_step(level):
+            self._step(level + 1)
+            self._step(level + 1)
 
     def _force_at(self, time_s: float) -> float:
         # Torque on the arm that depends on neither its angle nor its speed, N·m
@@ -249,20 +240,21 @@ class Plant:
             angle, speed = hand.intended(time_s)
             force += hand.stiffness * angle + hand.damping * speed
         if self._contact == _UPPER:
-            force += self._stop_stiffness * self._range_end
+            force += self._arm.stop_stiffness * self._range_end
         return force
 
     def _stiffness(self) -> float:
         stiffness = self._hand.stiffness if self._holds else 0.0
-        return stiffness + (self._stop_stiffness if self._contact else 0.0)
+        return stiffness + (self._arm.stop_stiffness if self._contact else 0.0)
 
     def _damping(self) -> float:
-        damping = self._viscous + (self._hand.damping if self._holds else 0.0)
-        return damping + (self._stop_damping if self._contact else 0.0)
+        damping = self._hand.damping if self._holds else 0.0
+        damping += self._arm.stop_damping if self._contact else 0.0
+        return self._arm.friction.viscous + damping
 
     def _try_step(self, level: int) -> bool:
-        # One part of a step, half as long per level -> whether it was taken. It is
-        # not when something changes within it, unless the part is the shortest.
+        # -> whether a part of a step was taken. It is not when something changes
+        # within it, unless the part is the shortest.
         step = self.step_ns * 1e-9 / (1 << level)
         end = self._time + step
         force, new_force = self._force, self._force_at(end)
@@ -298,7 +290,7 @@ class Plant:
     def _propagator(self, step: float, level: int) -> Propagator:
         inertia = self._inertia + (self._hand.inertia if self._holds else 0.0)
         factors = propagator(
-            inertia, self._damping(), self._stiffness(), self._lag_time, step
+            inertia, self._damping(), self._stiffness(), self._arm.lag_time, step
         )
         self._propagators[self._holds, self._contact, level] = factors
         return factors

@@ -2,10 +2,11 @@
 
 import math
 from abc import ABC, abstractmethod
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -94,39 +95,44 @@ class Hand(ABC):
         """
 
 
-class _Leg:
-    """One way of a hand, there or back: a trapezoid of speed between two rests."""
+class _Piece(NamedTuple):
+    """A piece of the intention with an even acceleration, until the next one begins."""
 
-    # Raises ParameterError where the ramps leave nothing between them
+    begins_s: float
+    time_s: float  # at which it has this angle and speed: where it begins or ends
+    angle: float  # rad
+    speed: float  # rad/s
+    acceleration: float  # rad/s²
 
-    def __init__(
-        self,
-        start: float,
-        end: float,
-        speed: float,
-        *,
-        delay: float,
-        ramp_up: float,
-        ramp_down: float,
-    ) -> None:
-        way = end - start
-        self.speed = speed = math.copysign(speed, way)  # negative on the way back
-        ramps = 0.5 * speed * (ramp_up + ramp_down)
-        cruise = way - ramps
-        if cruise / speed <= 0.0:
-            raise ParameterError(
-                f"mean_speed: needs ramps shorter than the stretch, at {abs(speed)} "
-                f"rad/s they take {abs(ramps):.3g} of {abs(way):.3g} rad"
-            )
-        self.start, self.end = start, end
-        self.ramp_up, self.ramp_down = ramp_up, ramp_down
-        self.delay = delay  # when it leaves, s
-        self.cruise_time = delay + ramp_up  # when it has its speed, s; and where, rad
-        self.cruise_angle = start + 0.5 * speed * ramp_up
-        self.brake_time = self.cruise_time + cruise / speed  # when it begins to brake
-        self.final_time = self.brake_time + ramp_down  # when it is there
-        # When it comes after the leg before, and when the next one comes
-        self.since, self.until = -math.inf, math.inf
+
+def _way(
+    start: float,
+    end: float,
+    speed: float,
+    *,
+    leaves_s: float,
+    ramp_up: float,
+    ramp_down: float,
+) -> list[_Piece]:
+    # There or back: a trapezoid of speed, and rest at its end
+    way = end - start
+    speed = math.copysign(speed, way)  # negative on the way back
+    ramps = 0.5 * speed * (ramp_up + ramp_down)
+    cruise = way - ramps
+    if cruise / speed <= 0.0:
+        raise ParameterError(
+            f"mean_speed: needs ramps shorter than the stretch, at {abs(speed)} "
+            f"rad/s they take {abs(ramps):.3g} of {abs(way):.3g} rad"
+        )
+    cruise_s = leaves_s + ramp_up
+    brake_s = cruise_s + cruise / speed
+    rest_s = brake_s + ramp_down
+    return [
+        _Piece(leaves_s, leaves_s, start, 0.0, speed / ramp_up),
+        _Piece(cruise_s, cruise_s, start + 0.5 * speed * ramp_up, speed, 0.0),
+        _Piece(brake_s, rest_s, end, 0.0, -speed / ramp_down),
+        _Piece(rest_s, rest_s, end, 0.0, 0.0),
+    ]
 
 
 class SimulatedHand(Hand):
@@ -226,21 +232,26 @@ class SimulatedHand(Hand):
             ways += [(final, start, return_speed), (start, final, speed)]
         if returns:
             ways.append((final, start, return_speed))
-        self._legs: list[_Leg] = []
-        for way in ways:
+        self._pieces = [_Piece(-math.inf, 0.0, start, 0.0, 0.0)]  # at rest
+        for from_angle, to_angle, speed in ways:
             # No hand is as brisk where it brings the arm back
-            brisk = ramp_up if way[1] > way[0] else max(ramp_up, ramp_down)
-            leg = _Leg(*way, delay=delay, ramp_up=brisk, ramp_down=ramp_down)
-            if self._legs:
-                self._legs[-1].until = leg.since = delay
-            self._legs.append(leg)
-            delay = leg.final_time + rest
-        self._leg = self._legs[0]
+            is_back = to_angle < from_angle
+            self._pieces += _way(
+                from_angle,
+                to_angle,
+                speed,
+                leaves_s=delay,
+                ramp_up=max(ramp_up, ramp_down) if is_back else ramp_up,
+                ramp_down=ramp_down,
+            )
+            delay = self.final_time + rest
+        self._begins = [piece.begins_s for piece in self._pieces]
+        self._piece = self._pieces[0]  # the last that was asked for
 
     @property
     def final_time(self) -> float:
         """When it means to have made its last way, s."""
-        return self._legs[-1].final_time
+        return self._pieces[-1].begins_s
 
     def intended(self, time_s: float) -> tuple[float, float]:
         """Return where the hand means to be.
@@ -255,134 +266,13 @@ class SimulatedHand(Hand):
         tuple of float
             Intended angle, rad, and speed, rad/s.
         """
-        leg = self._leg
-        if not leg.since <= time_s < leg.until:
-            leg = next(leg for leg in self._legs if leg.since <= time_s < leg.until)
-            self._leg = leg
-        speed = leg.speed
-        if leg.cruise_time <= time_s < leg.brake_time:
-            return leg.cruise_angle + speed * (time_s - leg.cruise_time), speed
-        if time_s <= leg.delay:
-            return leg.start, 0.0
-        if time_s < leg.cruise_time:
-            since = time_s - leg.delay
-            rise = speed / leg.ramp_up
-            return leg.start + 0.5 * rise * since * since, rise * since
-        left = leg.final_time - time_s
-        if left <= 0.0:
-            return leg.end, 0.0
-        fall = speed / leg.ramp_down
-        return leg.end - 0.5 * fall * left * left, fall * left
-
-
-class YieldingHand(SimulatedHand):
-    """A hand that slows down where the arm resists, and speeds up where it gives.
-
-    The intention of a `SimulatedHand` is gone through at a rate r between 0 and 1
-    that follows 1 / (1 + `yielding`·|τ|) of the torque τ it feels, with a first-order
-    lag of `reaction_time`. So the hand brakes after a catch, as a person's does who
-    meets a resistance. It is still no model of a person.
-
-    Parameters
-    ----------
-    start : float
-        Where the stretch starts, rad.
-    end : float
-        Where it is meant to end, rad.
-    mean_speed : float
-        Speed between the ramps where nothing resists, rad/s.
-    slip_time : float or None, optional
-        Time after the first reading at which the hand lets go, s; None for never.
-    yielding : float, optional
-        1/(N·m); the default halves the speed at 10 N·m.
-    reaction_time : float, optional
-        In s; the default is a long-latency reflex rather than a decision.
-    again : sequence of float, optional
-        Speeds of the stretches after the first, rad/s.
-    rest : float, optional
-        How long it rests at either end between them where nothing resists, s.
-    returns : bool, optional
-        Whether it rests and brings the arm back after the last stretch, too.
-
-    Raises
-    ------
-    ParameterError
-        If a value is outside its range or the ramps take more than the stretch.
-
-    Examples
-    --------
-    >>> hand = YieldingHand(start=0.5, end=2.5, mean_speed=1.5)
-    >>> for tick in range(1000):
-    ...     hand.feel(tick * 1e-3, 10.0)
-    >>> round(hand.intended(1.0)[1], 2)
-    0.75
-    """
-
-    yields: ClassVar[bool] = True
-
-    def __init__(
-        self,
-        *,
-        start: float,
-        end: float,
-        mean_speed: float,
-        slip_time: float | None = None,
-        yielding: float = 0.1,
-        reaction_time: float = 0.08,
-        again: Sequence[float] = (),
-        rest: float = 0.1,
-        returns: bool = False,
-    ) -> None:
-        super().__init__(
-            start=start,
-            end=end,
-            mean_speed=mean_speed,
-            slip_time=slip_time,
-            again=again,
-            rest=rest,
-            returns=returns,
+        self._piece = piece = self._pieces[bisect_right(self._begins, time_s) - 1]
+        _, anchor_s, angle, speed, acceleration = piece
+        since = time_s - anchor_s
+        return (
+            angle + (speed + 0.5 * acceleration * since) * since,
+            speed + acceleration * since,
         )
-        _check_not_negative(yielding=yielding)
-        _check_positive(reaction_time=reaction_time)
-        self._yielding = yielding
-        self._reaction_time = reaction_time
-        self._rate = 1.0
-        self._felt_at = 0.0  # s
-        self._intended_at = 0.0  # how far it has gone through its intention, s
-
-    def intended(self, time_s: float) -> tuple[float, float]:
-        """Return where the hand means to be, as far as it has felt.
-
-        Parameters
-        ----------
-        time_s : float
-            Time after the first reading, s.
-
-        Returns
-        -------
-        tuple of float
-            Intended angle, rad, and speed, rad/s.
-        """
-        since = time_s - self._felt_at
-        angle, speed = super().intended(self._intended_at + self._rate * since)
-        return angle, self._rate * speed
-
-    def feel(self, time_s: float, torque: float) -> None:
-        """Adapt the rate to a torque.
-
-        Parameters
-        ----------
-        time_s : float
-            Time after the first reading, s; never earlier than the one before.
-        torque : float
-            Torque of its spring and damper, N·m.
-        """
-        since = time_s - self._felt_at
-        self._intended_at += self._rate * since
-        self._felt_at = time_s
-        target = 1.0 / (1.0 + self._yielding * abs(torque))
-        share = -math.expm1(-since / self._reaction_time)
-        self._rate += share * (target - self._rate)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -632,18 +522,13 @@ class HumanHand(SimulatedHand):
         expected = _EXPECTED_DAMPING * speed + _EXPECTED_STIFFNESS * (
             angle - self.start
         )
-        expected += (_EXPECTED_INERTIA + self.inertia) * self._acceleration(time_s)
+        piece = self._piece  # of `intended` at this time
+        if time_s > piece.begins_s:
+            inertia = _EXPECTED_INERTIA + self.inertia
+            expected += inertia * piece.acceleration
         turned = 2.0 * math.pi * self._traits.tremor_hz * time_s
         tremor = self._tremor * math.sin(turned + self._traits.tremor_phase)
         return expected + tremor + self._correction
-
-    def _acceleration(self, time_s: float) -> float:
-        leg = self._leg  # of `intended` at this time
-        if leg.delay < time_s < leg.cruise_time:
-            return leg.speed / leg.ramp_up
-        if leg.brake_time < time_s < leg.final_time:
-            return -leg.speed / leg.ramp_down
-        return 0.0
 
     def feel(self, time_s: float, torque: float) -> None:
         """Feel where the arm is, and correct for where it was a reaction ago.

@@ -26,7 +26,6 @@ from masrel.lab.hess import (
     Presented,
     SimulatedClock,
     SimulatedHand,
-    YieldingHand,
     open_device,
 )
 
@@ -90,23 +89,6 @@ def test_it_means_to_press_against_the_end_and_may_bring_the_arm_back() -> None:
     assert moved.intended(moved.final_time + 1.0) == (0.5, 0.0)
 
 
-def test_a_yielding_hand_slows_after_a_catch_and_one_that_yields_nothing_not() -> None:
-    def speeds(hand: SimulatedHand) -> tuple[np.ndarray, list[float]]:
-        columns = present("HM4", hand=hand, max_duration_s=3.0).recording.columns
-        caught = int(np.flatnonzero(columns["phase"] == 1)[0])
-        at = columns["velocity_deg_s"][[caught, caught + 90]]
-        return columns["angle_deg"], at.tolist()
-
-    way = {"start": radians(30.0), "end": radians(146.0), "mean_speed": radians(80.0)}
-    usual, stiff = speeds(SimulatedHand(**way))
-    same, _ = speeds(YieldingHand(**way, yielding=0.0, rest=0.3))
-    _, soft = speeds(YieldingHand(**way))
-    np.testing.assert_allclose(usual, same, atol=1e-6)
-    assert stiff[1] == pytest.approx(80.0, abs=3.0)
-    assert soft[0] < 80.0  # the pre-catch torque slows it, too
-    assert soft[1] < 0.85 * soft[0]
-
-
 @pytest.mark.parametrize(
     ("make", "change", "words"),
     [
@@ -126,8 +108,6 @@ def test_a_yielding_hand_slows_after_a_catch_and_one_that_yields_nothing_not() -
         (clamp, {"again": (0.0,)}, r"again\[0\]: needs more than 0"),
         (clamp, {"again": (1.0, math.nan)}, r"again\[1\]: needs more than 0"),
         (clamp, {"again": (1.0, 60.0)}, "ramps shorter than the stretch"),
-        (YieldingHand, {**STRETCH, "yielding": -1.0}, "yielding"),
-        (YieldingHand, {**STRETCH, "reaction_time": 0.0}, "reaction_time"),
         (HandTraits, {"stiffness": 0.0}, "stiffness: needs more than 0, got 0.0"),
         (HandTraits, {"damping": math.inf}, "damping: needs more than 0"),
         (HandTraits, {"inertia": -1.0}, "inertia: needs more than 0"),

@@ -16,9 +16,7 @@ from masrel.lab.hess import (
     DeviceLimits,
     Reading,
     SimulatedClock,
-    SimulatedHand,
     StretchRules,
-    YieldingHand,
     render,
 )
 
@@ -543,13 +541,10 @@ def test_one_that_creeps_slower_still_is_a_stretch_that_does_not_end() -> None:
     assert np.abs(shown.recording.columns["command_torque_nm"]).max() < 1.0
 
 
-@pytest.mark.parametrize("kind", [SimulatedHand, YieldingHand])
 @pytest.mark.parametrize("speed", [2.0, 4.0, 4.5, 5.0, 7.5, 10.0, 15.0, 20.0, 24.0])
 @pytest.mark.parametrize("start_deg", [30.0, 100.003])
-def test_a_slow_stretch_is_no_drift(
-    kind: type[SimulatedHand], speed: float, start_deg: float
-) -> None:
-    hand = kind(start=radians(start_deg), end=END, mean_speed=radians(speed))
+def test_a_slow_stretch_is_no_drift(speed: float, start_deg: float) -> None:
+    hand = stretching(speed, start=radians(start_deg))
     # until it has gone as far as a drift may
     assert present(hand=hand, max_duration_s=0.2 + 3.0 / speed).fault is None
 

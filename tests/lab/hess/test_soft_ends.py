@@ -19,7 +19,6 @@ from masrel.lab.hess import (
     SimulatedClock,
     SimulatedHand,
     StretchRules,
-    YieldingHand,
 )
 from masrel.lab.recording import RAMPS, stretches
 
@@ -214,7 +213,7 @@ def test_both_may_be_at_once() -> None:
 def random_hand(
     rng: np.random.Generator, start: float, end: float, n_stretches: int
 ) -> SimulatedHand:
-    """A clamp, a hand that yields or that of a person; it may let go."""
+    """A clamp or the hand of a person; it may let go."""
     speeds = [radians(speed) for speed in rng.uniform(15.0, 140.0, n_stretches)]
     if n_stretches > 1:
         speeds = [max(speed, radians(60.0)) for speed in speeds]
@@ -223,9 +222,7 @@ def random_hand(
     way |= {"returns": n_stretches > 1, "slip_time": slips}
     rest, back = float(rng.uniform(0.0, 0.2)), radians(rng.uniform(40.0, 130.0))
     kind = rng.random()
-    if kind < 0.4:
-        return YieldingHand(**way, rest=0.5 * rest)
-    if kind < 0.6 and n_stretches > 1:
+    if kind < 0.5 and n_stretches > 1:
         traits = HandDistribution().sample(rng)
         return HumanHand(traits, **way, rest=2.0 * rest, return_speed=back)
     return SimulatedHand(

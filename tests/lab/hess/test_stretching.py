@@ -15,7 +15,6 @@ from masrel.lab.hess import (
     Presented,
     SimulatedHand,
     StretchRules,
-    YieldingHand,
 )
 from masrel.lab.recording import stretches
 
@@ -40,7 +39,6 @@ def led(points_deg: list[tuple[float, float]], **options) -> Presented:
 
 HANDS = {
     "clamp": lambda: SimulatedHand(**BACK),
-    "yielding": lambda: YieldingHand(**BACK),
     "human": lambda: HumanHand(HandTraits(), **BACK),
 }
 

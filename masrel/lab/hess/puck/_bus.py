@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 BITRATE = 1_000_000
 """Bits a second on a Puck's bus."""
 
+MAX_TORQUE = 8191
+"""Current units: the most that 14 bits with sign can say, as on a bus of four pucks."""
+
 # Classes of error in the identifier of SocketCAN's error frames (linux/can/error.h)
 BUS_OFF, BUS_RESTARTED = 0x040, 0x100
 
@@ -40,11 +43,9 @@ _FILTERS_IN_KERNEL = frozenset({"socketcan"})
 # sender, and the receiver (p. 46). The host is node 0, so that its frames to one puck
 # have the puck's number.
 
-HOST = 0
 SAFETY_NODE = 10  # watches a whole arm; has nothing to say to a driver of one joint
 MAX_NODE = 31
 
-TORQUE_GROUP = 1  # packed torques for pucks 1-4
 POSITION_GROUP = 3  # where pucks answer a request for P
 PROPERTY_GROUP = 6  # where they answer any other
 
@@ -59,15 +60,6 @@ def from_node(sender: int, group: int) -> int:
 def reply_identifiers(puck: int) -> tuple[int, int]:
     """Return under which identifiers a puck sends positions, and other properties."""
     return from_node(puck, POSITION_GROUP), from_node(puck, PROPERTY_GROUP)
-
-
-def split_identifier(identifier: int) -> tuple[int, int, bool]:
-    """Return the sender of a frame, its receiver, and whether that is a group."""
-    return (
-        identifier >> 5 & MAX_NODE,
-        identifier & MAX_NODE,
-        bool(identifier & _GROUP_FLAG),
-    )
 
 
 # Properties: a byte with the property's number, then the value, lowest byte first
@@ -88,14 +80,12 @@ def _checked(number: int) -> int:
     return number
 
 
-def encode_value(number: int, value: int, *, size: int = 6) -> bytes:
-    """Return the data that set a property, or with which a puck answers: 4 or 6."""
+def encode_value(number: int, value: int) -> bytes:
+    """Return the data that set a property, or with which a puck answers."""
     try:
-        in_bytes = value.to_bytes(size - 2, "little", signed=True)
+        in_bytes = value.to_bytes(4, "little", signed=True)
     except OverflowError as error:
-        raise FrameError(
-            f"value: needs {8 * (size - 2)} bits with sign, got {value}"
-        ) from error
+        raise FrameError(f"value: needs 32 bits with sign, got {value}") from error
     return bytes((_VALUE_FLAG | _checked(number), 0)) + in_bytes
 
 
@@ -122,49 +112,20 @@ def _malformed(needs: str, data: bytes) -> FrameError:
 # ignores the two bits above them, the other needs the upper one to be set. Three more
 # bytes are the position of a second encoder, which this driver does not use.
 
-_POSITION_FLAG = 0x800000
 _POSITION_MASK = 0x3FFFFF
-_POSITION_BITS = 22
 
 
-def encode_position(counts: int, *, flagged: bool = False) -> bytes:
+def encode_position(counts: int) -> bytes:
     """Return the data with which a puck answers a request for its position."""
-    flag = _POSITION_FLAG if flagged else 0
-    return (flag | counts & _POSITION_MASK).to_bytes(3, "big")
+    return (counts & _POSITION_MASK).to_bytes(3, "big")
 
 
 def decode_position(data: bytes) -> int:
     """Return the lowest 22 bits of the encoder's count, signed: it wraps."""
     if len(data) not in (3, 6):
         raise _malformed("position: needs 3 or 6 bytes", data)
-    return _signed(int.from_bytes(data[:3], "big"), _POSITION_BITS)
-
-
-def _signed(value: int, n_bits: int) -> int:
-    # The lowest bits as a two's complement
-    sign = 1 << n_bits - 1
-    return (value & 2 * sign - 1 ^ sign) - sign
-
-
-# Packed torques: four times 14 bits, highest byte first (p. 47). The driver reads but
-# never sends them: on a bus with other pucks the frame sets the torque of each of them,
-# and which of the four a puck obeys depends on its PIDX and groups.
-
-MAX_TORQUE = 8191  # current units; the most that 14 bits with sign can say
-
-_TORQUE_BITS = 14
-_N_PACKED = 4
-
-
-def decode_torques(data: bytes) -> tuple[int, ...]:
-    """Return the torques of four pucks."""
-    if len(data) != 8 or not data[0] & _VALUE_FLAG:
-        raise _malformed("torques: need 8 bytes, the first from 80 up", data)
-    packed = int.from_bytes(data[1:], "big")
-    return tuple(
-        _signed(packed >> _TORQUE_BITS * slot, _TORQUE_BITS)
-        for slot in reversed(range(_N_PACKED))
-    )
+    value, sign = int.from_bytes(data[:3], "big"), 1 << 21  # two's complement
+    return (value & _POSITION_MASK ^ sign) - sign
 
 
 # Frames, by python-can

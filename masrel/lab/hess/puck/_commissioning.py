@@ -7,8 +7,8 @@ equation (7) of the source fitted to the mean torque at each speed.
 
 import math
 import statistics
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,7 +80,6 @@ _PROBE_TRAVEL = math.radians(1.0)
 _PERIOD_NS = 1_000_000
 
 
-@contextmanager
 def connected(
     options: PuckOptions,
     *,
@@ -88,7 +87,7 @@ def connected(
     hand: Hand | None = None,
     range_end: float = math.radians(146.0),
     all_nodes: bool = False,
-) -> Iterator[Link]:
+) -> Link:
     """Join a bus for a while, with an emulated puck on it where there is a hand.
 
     Parameters
@@ -104,21 +103,20 @@ def connected(
     all_nodes : bool, optional
         Whether to receive the frames of all nodes rather than of one puck.
 
-    Yields
-    ------
+    Returns
+    -------
     Link
-        This end of the bus.
+        This end of the bus, for a ``with`` block.
 
     Raises
     ------
     DeviceError
-        If the bus cannot be opened, or left without an error before that.
+        If the bus cannot be opened.
     """
     link, _ = join(
         options, clock=clock, hand=hand, range_end=range_end, all_nodes=all_nodes
     )
-    with link:
-        yield link
+    return link
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,6 @@ setting; it brakes the arm when idle; and it holds its last torque for ever.
 
 import heapq
 import math
-import threading
 from collections import Counter, deque
 from collections.abc import Callable
 from typing import NamedTuple
@@ -19,21 +18,17 @@ from masrel.lab.hess.hand import Hand
 from masrel.lab.hess.puck._bus import (
     BUS_OFF,
     BUS_RESTARTED,
-    HOST,
     POSITION_GROUP,
     PROPERTY_GROUP,
     SAFETY_NODE,
-    TORQUE_GROUP,
     Frame,
     Link,
     decode_request,
-    decode_torques,
     encode_position,
     encode_value,
     from_node,
     open_link,
     reply_identifiers,
-    split_identifier,
 )
 from masrel.lab.hess.puck._puck_options import (
     ASLEEP,
@@ -61,7 +56,6 @@ _SAMPLING_NS = 75_000  # from a request to the sample
 _REPLY_NS = 150_000  # to the end of the reply
 _DUPLICATE_NS = 100_000
 _BRAKING_STEP_NS = 500_000
-_NAP_NS = 10_000_000  # of an emulator with a thread of its own
 _MAX_SETTINGS = 10_000  # that are remembered
 
 _PROTOCOL_ERROR = 0x088  # class of an error frame: protocol violation, bus error
@@ -76,7 +70,7 @@ _UNIVERSAL = {
     STATUS: "STAT",
 }
 _MONITOR = {8: "LOCK", 9: "SAVE", 10: "LOAD"}
-_FACTORY = {"MT": 4860, "PIDX": 1, "GRPA": 0, "GRPB": 2, "GRPC": 5, "POLES": 12}
+_FACTORY = {"MT": 4860, "GRPA": 0, "GRPB": 2, "GRPC": 5, "POLES": 12}
 _MEASURED = {"TEMP": 31, "PTEMP": 33, "THERM": 30, "VBUS": 48}
 
 
@@ -171,7 +165,7 @@ class _Faults:
 
 
 class PuckEmulator:
-    """A puck, served by whoever shares its thread, or by a thread of its own."""
+    """A puck, served by whoever waits for it."""
 
     def __init__(
         self,
@@ -228,16 +222,6 @@ class PuckEmulator:
             self._take_in(frame, self._clock.now_ns())
         self._act(self._clock.now_ns())
 
-    def run(self, stop: threading.Event) -> None:
-        """Serve until `stop` is set; for a thread or process of its own."""
-        while not stop.is_set():
-            nap_ns = self._clock.now_ns() + _NAP_NS
-            due_ns = self.next_due_ns()
-            frame = self.link.receive(nap_ns if due_ns is None else min(due_ns, nap_ns))
-            if frame is not None:
-                self._take_in(frame, self._clock.now_ns())
-            self._act(self._clock.now_ns())
-
     def close(self) -> None:
         """Leave the bus."""
         self.link.close()
@@ -256,7 +240,9 @@ class PuckEmulator:
     # What comes from the bus
 
     def _take_in(self, frame: Frame, now_ns: int) -> None:
-        if frame.is_error or not self._is_addressed(frame) or self._is_cut_off(now_ns):
+        # A frame of the host to one puck has its number: the host is node 0
+        is_addressed = frame.identifier == self._puck and not frame.is_error
+        if not is_addressed or self._is_cut_off(now_ns):
             return
         if self._is_waking:
             self.n_disturbances += 1
@@ -266,29 +252,16 @@ class PuckEmulator:
             except FrameError:
                 return  # a puck does not answer what it does not understand
 
-    def _is_addressed(self, frame: Frame) -> bool:
-        sender, receiver, is_group = split_identifier(frame.identifier)
-        if is_group:
-            groups = [self._values[name] for name in ("GRPA", "GRPB", "GRPC")]
-            return sender == HOST and receiver in groups
-        return sender == HOST and receiver == self._puck
-
     def _is_cut_off(self, now_ns: int) -> bool:
         # Whether no frame comes or goes
         active = self.faults.active
         return bool(active("unplugged", now_ns) or active("bus-off", now_ns))
 
     def _obey(self, frame: Frame, now_ns: int) -> None:
-        done_ns = now_ns + _SETTING_NS
-        if frame.identifier & 0x1F == TORQUE_GROUP and len(frame.data) == 8:
-            place = (self._values["PIDX"] - 1) % 4
-            torque = decode_torques(frame.data)[place]
-            self._at(done_ns, lambda due: self._drive(torque, due))
-            return
         number, value = decode_request(frame.data)
         if value is not None:
             new = value
-            self._at(done_ns, lambda due: self._set(number, new, due))
+            self._at(now_ns + _SETTING_NS, lambda due: self._set(number, new, due))
         elif self._name(number) == "P":
             self._at(now_ns + _SAMPLING_NS, self._sample)
             self._interfere(now_ns)
@@ -325,7 +298,6 @@ class PuckEmulator:
         self._is_awake, self._is_waking = True, False
 
     def _drive(self, units: int, now_ns: int) -> None:
-        # A torque, as the packed frame for four pucks sets it too
         most = self._values["MT"]
         self.torque = max(-most, min(most, units))
         if self.mode == TORQUE:
@@ -374,7 +346,7 @@ class PuckEmulator:
 
     def _interfere(self, now_ns: int) -> None:
         # What else is on the bus when a position is requested
-        if self._options.is_noisy or self.faults.hit("foreign-frames", now_ns):
+        if self.faults.hit("foreign-frames", now_ns):
             other = self._puck % 31 + 1
             for frame in (
                 Frame(from_node(SAFETY_NODE, 0), bytes(8)),
@@ -393,11 +365,8 @@ class PuckEmulator:
         value = self._value(number)
         if value is None:
             return
-        fits = -(2**15) <= value < 2**15
-        data = encode_value(
-            number, value, size=self._options.reply_bytes if fits else 6
-        )
-        self._answer(Frame(reply_identifiers(self._puck)[1], data), now_ns)
+        reply = Frame(reply_identifiers(self._puck)[1], encode_value(number, value))
+        self._answer(reply, now_ns)
 
     def _value(self, number: int) -> int | None:
         name = self._name(number)
@@ -411,11 +380,9 @@ class PuckEmulator:
 
     def _sample(self, now_ns: int) -> None:
         counts = self._encoder_counts(self.motor.counts(now_ns), now_ns)
-        data = encode_position(counts + self._offset, flagged=self._options.is_flagged)
-        if self._options.has_secondary:
-            data += encode_position(-counts)
-        frame = Frame(reply_identifiers(self._puck)[0], data)
-        self._answer(frame, now_ns + _REPLY_NS - _SAMPLING_NS)
+        data = encode_position(counts + self._offset)
+        reply = Frame(reply_identifiers(self._puck)[0], data)
+        self._answer(reply, now_ns + _REPLY_NS - _SAMPLING_NS)
 
     def _encoder_counts(self, counts: int, now_ns: int) -> int:
         # What a faulty encoder makes of a count

@@ -37,7 +37,7 @@ from masrel.lab.hess.puck._bus import (
     open_link,
     reply_identifiers,
 )
-from masrel.lab.hess.puck._emulator import PuckEmulator, join
+from masrel.lab.hess.puck._emulator import join
 from masrel.lab.hess.puck._puck_options import (
     ASLEEP,
     ID,
@@ -97,7 +97,7 @@ class PuckNode:
         self._markers = itertools.cycle(_MARKERS)
         self.puck = puck
         self.values: dict[int, int] = {}  # the last of each property, by its number
-        self.n_foreign = self.n_late = self.n_errors = 0  # frames
+        self.n_foreign = self.n_errors = 0  # frames
 
     def set(self, number: int, value: int) -> None:
         """Set a property; a puck does not acknowledge it."""
@@ -150,12 +150,10 @@ class PuckNode:
         while last is None if marker is None else marker not in self.values:
             frame = self._next_frame(deadline_ns)
             if frame is None:
-                self.n_late += last is not None  # that of an earlier request
                 self._in_doubt = True
                 return None
             counts = self._sort(frame)
             if counts is not None:
-                self.n_late += last is not None
                 last = counts
         self._in_doubt = False  # nothing earlier can come any more
         return last
@@ -175,7 +173,7 @@ class PuckNode:
             frame = self._link.receive(0)
             if frame is None:
                 return
-            self.n_late += self._sort(frame) is not None
+            self._sort(frame)
         raise BusError(f"puck {self.puck}: the bus is flooded with frames", "flooded")
 
     def _sort(self, frame: Frame) -> int | None:
@@ -441,11 +439,6 @@ class PuckDevice(Device):
         self._n_unanswered = 0
         self._asked_units = 0  # the torque it was set to when its torque was requested
         self._n_lost = 0
-        self._link: Link
-        self._node: PuckNode
-        self._puck: AwakePuck
-        self.emulator: PuckEmulator | None
-        self.identity: Identity
 
     def _start(self) -> None:
         setup, options = self._setup, self._options

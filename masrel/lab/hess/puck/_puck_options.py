@@ -384,14 +384,6 @@ class EmulatorOptions:
         Turns of its motor for one of the elbow.
     direction : {1, -1}
         Whether its counts grow with extension.
-    reply_bytes : {6, 4}
-        Size of an answer that fits in either.
-    is_flagged : bool
-        Whether bit 7 of a position is set.
-    has_secondary : bool
-        Whether positions carry that of a second encoder.
-    is_noisy : bool
-        Whether others speak on the bus, too.
     braking : float
         Damping by the windings while it is idle, N·m·s/rad at the elbow; chosen.
     properties : PropertyTable or None
@@ -414,18 +406,12 @@ class EmulatorOptions:
     units_per_nm: int = 2700
     gear_ratio: float = GEAR_RATIO
     direction: Literal[1, -1] = 1
-    reply_bytes: Literal[6, 4] = 6
-    is_flagged: bool = False
-    has_secondary: bool = False
-    is_noisy: bool = False
     braking: float = 1.0
     properties: PropertyTable | None = None
     faults: tuple[InjectedFault, ...] = ()
 
     def __post_init__(self) -> None:
         _check_not_negative(wake_s=self.wake_s, braking=self.braking)
-        if self.reply_bytes not in (4, 6):
-            raise ParameterError(f"reply_bytes: needs 4 or 6, got {self.reply_bytes}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -115,13 +115,5 @@ def told(device: PuckDevice) -> list[tuple[str, int]]:
     return [(setting.name, setting.value) for setting in device.emulator.settings]
 
 
-def packed_torques(first: int, second: int, third: int, fourth: int) -> bytes:
-    """Bytes that set T (42) of four pucks; the driver reads such frames, sends none."""
-    packed = 0
-    for torque in (first, second, third, fourth):
-        packed = packed << 14 | torque & 0x3FFF
-    return bytes((0x80 | 42,)) + packed.to_bytes(7, "big")
-
-
 def fault(kind: FaultKind, start_s: float = 0.4, **more) -> InjectedFault:
     return InjectedFault(kind=kind, start_s=start_s, **more)

@@ -89,7 +89,12 @@ def test_what_is_wrong_with_a_puck_is_found(
         (loose(45.0), {"awake": True}, "position", "45.00 deg"),
         (loose(), {}, "position", "0.00 deg; not zeroed yet"),  # it was woken
         # noise of others does no harm
-        (loose(), {"is_noisy": True}, "error frames", "0, and 4000 frames of others"),
+        (
+            loose(),
+            {"awake": True, "faults": (fault("foreign-frames", 0.02),), "n": 2},
+            "error frames",
+            "0, and 3928 frames of others",
+        ),
     ],
 )
 def test_a_puck_that_is_well_passes_everything(

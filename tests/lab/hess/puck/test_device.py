@@ -24,7 +24,6 @@ from masrel.lab.hess.puck import (
     Link,
     PropertyTable,
     PuckOptions,
-    connected,
     property_table,
     read_property_table,
     zero,
@@ -177,23 +176,6 @@ def test_a_bus_or_an_adapter_that_is_not_there_is_said(
     options = PuckOptions(interface=interface, channel=channel)
     with pytest.raises(error, match=words):
         open_device("puck", clock=RealClock(), options=options)
-
-
-@pytest.mark.parametrize("all_nodes", [False, True])
-def test_the_kernel_filters_unless_all_nodes_are_to_be_received(
-    all_nodes: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    filters = []
-    real = can.Bus
-
-    def bus(**settings):
-        filters.append(settings["can_filters"])
-        return real(interface="virtual", channel="nodes", ignore_config=True)
-
-    monkeypatch.setattr(can, "Bus", bus)
-    with connected(PuckOptions(), clock=RealClock(), all_nodes=all_nodes):
-        pass
-    assert [one is None for one in filters] == [all_nodes]
 
 
 # Waking, configuring, zeroing: what is refused of a puck that answers oddly
@@ -429,10 +411,6 @@ def test_a_puck_that_does_not_say_its_mode_is_noticed_when_checked() -> None:
 @pytest.mark.parametrize(
     "traits",
     [
-        {"is_flagged": True},
-        {"has_secondary": True},
-        {"reply_bytes": 4},
-        {"is_noisy": True},
         {"counts_per_turn": 40960},
         {"units_per_nm": 2562},
         {"firmware": 65},

@@ -1,6 +1,6 @@
 """The emulated puck, frame by frame: every trait a driver has to cope with."""
 
-from math import degrees, radians
+from math import degrees
 
 import pytest
 
@@ -19,12 +19,11 @@ from tests.lab.hess.puck.rig import (
     fault,
     loose,
     open_link,
-    packed_torques,
     release,
 )
 
 VERS, ROLE, STAT = 0, 1, 5
-MODE, T, MT, P, CTS, IPNM, GRPA, PIDX = 8, 42, 43, 48, 68, 86, 26, 70
+MODE, T, MT, P, CTS, IPNM = 8, 42, 43, 48, 68, 86
 AT_90_DEG = 19251  # of 77004.8 counts in 360 deg
 
 
@@ -98,12 +97,9 @@ def test_an_answer_takes_150_microseconds_and_the_encoder_is_read_after_75(on) -
 @pytest.mark.parametrize(
     ("traits", "number", "data"),
     [
-        ({"reply_bytes": 4}, IPNM, "d600 8c0a"),  # 2700
-        ({"reply_bytes": 6}, IPNM, "d600 8c0a0000"),
-        ({"reply_bytes": 4, "counts_per_turn": 40960}, CTS, "c400 00a00000"),
+        ({}, IPNM, "d600 8c0a0000"),  # 2700
+        ({"counts_per_turn": 40960}, CTS, "c400 00a00000"),
         ({}, P, "004b33"),
-        ({"is_flagged": True}, P, "804b33"),
-        ({"has_secondary": True}, P, "004b33 3fb4cd"),
     ],
 )
 def test_what_it_answers(on, traits: dict, number: int, data: str) -> None:
@@ -122,8 +118,7 @@ def test_positions_wrap_at_22_bits(on, counts: int) -> None:
 @pytest.mark.parametrize(
     ("identifier", "data", "n"),
     [
-        (0x400 | 2, b"\x30", 1),  # its factory groups are 0, 2, 5
-        (0x400 | 1, b"\x30", 0),
+        (1, b"\x30", 1),
         (2, b"\x30", 0),  # another puck's
         (0x426, b"\x30", 0),  # from itself
         (1, b"", 0),
@@ -135,15 +130,6 @@ def test_it_answers_what_is_for_it_and_means_something(
     on, identifier: int, data: bytes, n: int
 ) -> None:
     assert len(answers(on(awake=True), identifier, data)) == n
-    # a group that it was told is answered
-    assert len(answers(told(on(awake=True), (GRPA, 1)), 0x401, b"\x30")) == 1
-
-
-def test_noise_of_others_does_not_hide_its_answer(on) -> None:
-    one = on(awake=True, is_noisy=True)
-    assert [position(one) for _ in range(3)] == [AT_90_DEG] * 3
-    assert one.node.n_foreign == 12
-    assert 0x540 in {frame.identifier for frame in answers(one, 1, b"\x30")}
 
 
 # Torque
@@ -158,10 +144,12 @@ def test_it_holds_its_last_torque_for_ever_but_not_idle(on) -> None:
     assert angle_deg(one) > 145.9
 
 
-def test_its_own_limit_clips(on) -> None:
+def test_its_own_limit_clips_and_writes_of_its_memory_are_counted(on) -> None:
     one = told(on(awake=True), (MT, 100), (MODE, 2), (T, 8000))
     assert one.node.get(T) == 100
     assert told(one, (T, -8000)).node.get(T) == -100
+    told(one, *((number, -1) for number in (30, 31, 32)))
+    assert one.emulator.n_memory_writes == 3  # SAVE, LOAD, DEF
 
 
 def test_idle_it_brakes(on) -> None:
@@ -175,17 +163,6 @@ def test_idle_it_brakes(on) -> None:
     assert 0.0 < coasted_deg((T, 0), (MODE, 0)) < 0.3 * coasted_deg((T, 0))
 
 
-def test_it_obeys_its_place_in_a_packed_frame_and_counts_writes_of_its_memory(
-    on,
-) -> None:
-    for slot in (1, 2, 3, 4):
-        one = told(on(awake=True), (GRPA, 1), (PIDX, slot), (MODE, 2))
-        answers(one, 0x401, packed_torques(10, 20, 30, 40))
-        assert one.node.get(T) == 10 * slot
-    told(one, *((number, -1) for number in (30, 31, 32)))
-    assert one.emulator.n_memory_writes == 3  # SAVE, LOAD, DEF
-
-
 # Faults; they begin when it is first put into torque mode. What comes of each in a
 # presentation is in `test_faults`.
 
@@ -193,29 +170,6 @@ def test_it_obeys_its_place_in_a_packed_frame_and_counts_writes_of_its_memory(
 def failing(on, kind, start_s: float = 0.0, **more) -> Bench:
     one = on(awake=True, faults=(fault(kind, start_s, **more),))
     return told(one, (MODE, 2))
-
-
-def test_a_late_answer_is_not_taken_for_the_next_one(on) -> None:
-    # Each comes 1.2 ms late, for the first 2 ms; the arm moves meanwhile.
-    faults = (fault("late-replies", 0.1, end_s=0.102, size=0.0012),)
-    one = on(awake=True, hand=loose(45.0), faults=faults)
-    told(one, (T, 288), (MODE, 2), wait_s=0.0995)
-    n_lost, previous = 0, (0, 0)
-    for _ in range(12):
-        next_ns = one.clock.now_ns() + 1_000_000
-        try:
-            sampled_ns, counts = one.node.position(P, patience_s=0.001)
-        except DeviceTimeoutError:
-            n_lost += 1
-            previous = (0, 0)
-        else:
-            if previous[0]:  # the speed between readings is that of the arm
-                speed = (counts - previous[1]) / (sampled_ns - previous[0]) * 1e9
-                true = one.emulator.motor.plant.velocity / radians(360 / 77004.8)
-                assert speed == pytest.approx(true, rel=0.06)
-            previous = sampled_ns, counts
-        one.clock.sleep_until_ns(next_ns)
-    assert (n_lost, one.node.n_late) == (2, 2)
 
 
 def test_answers_come_in_the_order_of_their_questions(on) -> None:
@@ -295,7 +249,6 @@ def test_a_puck_that_cannot_be_heard_is_idled_all_the_same(on) -> None:
     ("make", "options", "words"),
     [
         (EmulatorOptions, {"wake_s": -1.0}, "wake_s: needs 0 or more, got -1.0"),
-        (EmulatorOptions, {"reply_bytes": 5}, "reply_bytes: needs 4 or 6, got 5"),
         (
             InjectedFault,
             {"kind": "fire", "start_s": 0.0},

@@ -83,7 +83,12 @@ def served(interface: str) -> Iterator[tuple[str, str, PuckEmulator]]:
         options=EmulatorOptions(awake=True),
     )
     stop = threading.Event()
-    thread = threading.Thread(target=emulator.run, args=(stop,), daemon=True)
+
+    def serve() -> None:
+        while not stop.wait(0.0001):
+            emulator.serve()
+
+    thread = threading.Thread(target=serve, daemon=True)
     thread.start()
     try:
         yield interface, channel, emulator
