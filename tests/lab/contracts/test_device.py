@@ -443,12 +443,13 @@ def test_a_presentation_runs_on_it(
 # Many stretches, and their soft ends
 
 
-def presented_many(backend: str, done_s: float = math.inf) -> Presented:
+def presented_many(backend: str, done_s: float | None = None) -> Presented:
     hand, status = moving(2), PresentationStatus()
-    clock = ActingClock(math.inf, status.done)
+    clock = ActingClock({})
     angle = lambda time_s: hand.intended(time_s)[0]  # noqa: E731
     with device_of(backend, clock, 2, angle=angle) as device:
-        clock.at_ns = clock.now_ns() + done_s * 1e9
+        if done_s is not None:
+            clock.acts[clock.now_ns() * 1e-9 + done_s] = lambda _: status.done()
         presented = run_presentation(
             device,
             controls("HM4"),

@@ -11,7 +11,7 @@ from math import radians
 from typing import ClassVar
 
 from masrel.errors import DeviceError, DeviceTimeoutError, EmergencyStopError
-from masrel.lab.hess import Device, Reading
+from masrel.lab.hess import Clock, Device, Reading
 
 # Since the first reading: time s, the true reading -> what the loop gets
 ReadFault = Callable[[float, Reading], Reading]
@@ -24,6 +24,7 @@ class FaultyDevice(Device):
     """Reads and commands another device through faults."""
 
     inner: Device
+    clock: Clock
     read_fault: ReadFault | None = None
     send_fault: SendFault | None = None
     check_fault: Callable[[float], None] | None = None
@@ -52,8 +53,7 @@ class FaultyDevice(Device):
 
     def _send(self, torque_nm: float) -> None:
         if self.start_ns is not None:  # commands come between readings, too
-            now_ns = self.inner.read().time_ns
-            self.time_s = (now_ns - self.start_ns) * 1e-9
+            self.time_s = (self.clock.now_ns() - self.start_ns) * 1e-9
         torque: float | None = torque_nm
         if self.send_fault is not None:
             torque = self.send_fault(self.time_s, torque_nm)
@@ -64,6 +64,7 @@ class FaultyDevice(Device):
     def _check(self) -> None:
         if self.check_fault is not None:
             self.check_fault(self.time_s)
+        self.inner.check()
 
     def _stop(self) -> None:
         if self.time_s >= self.cut_s - 1e-9:

@@ -6,7 +6,6 @@
 import contextlib
 import errno
 import math
-import os
 import pathlib
 import signal
 import tempfile
@@ -20,9 +19,9 @@ import numpy as np
 
 from masrel.errors import OverrunWarning
 from masrel.lab.hess import (
+    Clock,
     Controller,
     Device,
-    SimulatedClock,
     SimulatedHand,
     StretchRules,
     open_device,
@@ -35,6 +34,7 @@ from masrel.lab.run._presenter import CLOCKS
 from masrel.lab.schedule import write_schedules
 
 from . import faults as f
+from .rig import ActingClock, missing
 
 PROTOCOL = """
 [study]
@@ -75,7 +75,7 @@ def later_s(stretch: int, speed_deg_s: float = 92.0) -> float:
     return round((stretch - 1) * there_and_back, 3)
 
 
-Wrap = Callable[[Device], Device]
+Wrap = Callable[[Device, Clock], f.FaultyDevice]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,11 +86,25 @@ class Injection:
     at_s: float
     expected: str | None  # kind of fault; None where it is let pass
     wrap: Wrap | None = None
-    clock: Callable[[], SimulatedClock] | None = None
-    controller: Callable[[Protocol, str], Controller] | None = None
+    acts: dict = field(default_factory=dict)  # of an `ActingClock`
+    model: Callable[[float], float] | None = None  # what it makes of its torque
     slip: bool = False
     full_disk: bool = False
     speed: float = 92.0
+
+    def first(self, n_stretches: int) -> dict[str, object]:
+        """Return what the first presentation has that others have not."""
+        again = (radians(self.speed),) * (n_stretches - 1)
+        slips = self.at_s if self.slip else None
+        rules = {"stretches": StretchRules(n=n_stretches), "max_duration_s": None}
+        return {
+            "wrap": self.wrap or f.FaultyDevice,
+            "acts": self.acts,
+            "model": self.model,
+            "full_disk": self.full_disk,
+            "hand": {"again": again, "returns": bool(again), "slip_time": slips},
+            "loop": rules if again else {},
+        }
 
 
 @dataclass(kw_only=True)
@@ -108,45 +122,16 @@ class Outcome:
     events: list[str] = field(default_factory=list)
 
 
+def faulty(**faults) -> Wrap:
+    return lambda inner, clock: f.FaultyDevice(inner, clock, **faults)
+
+
 def reading(fault: f.ReadFault) -> Wrap:
-    return lambda inner: f.FaultyDevice(inner, read_fault=fault)
+    return faulty(read_fault=fault)
 
 
 def sending(fault: f.SendFault) -> Wrap:
-    return lambda inner: f.FaultyDevice(inner, send_fault=fault)
-
-
-class InjectedClock(SimulatedClock):
-    """A simulated clock to which things happen some s after `begin`, each once."""
-
-    def __init__(self, acts: dict[float, Callable[["InjectedClock"], object]]) -> None:
-        super().__init__()
-        self.begin_ns, self.acts = math.inf, acts
-
-    def begin(self) -> None:
-        """The device is open: from here on the presentation is timed."""
-        self.begin_ns = self.now_ns()
-
-    def miss(self, gap_s: float) -> None:
-        super().sleep_until_ns(self.now_ns() + round(gap_s * 1e9))
-
-    def sleep_until_ns(self, deadline_ns: int) -> None:
-        super().sleep_until_ns(deadline_ns)
-        since_ns = deadline_ns - self.begin_ns
-        for at_s in [at for at in self.acts if since_ns >= round(at * 1e9)]:
-            self.acts.pop(at_s)(self)
-
-
-def signalling(at_s: float) -> InjectedClock:
-    """Somebody presses Ctrl-C at a time."""
-    return InjectedClock({at_s: lambda _: signal.raise_signal(signal.SIGINT)})
-
-
-def late(gaps: dict[float, float]) -> InjectedClock:
-    """A machine that is away for some s at chosen times."""
-    return InjectedClock(
-        {at_s: lambda clock, gap=gap: clock.miss(gap) for at_s, gap in gaps.items()}
-    )
+    return faulty(send_fault=fault)
 
 
 class Wrong:
@@ -163,15 +148,6 @@ class Wrong:
         return torque if time_s < self.at_s - 1e-9 else self.act(torque)
 
 
-def model(at_s: float, act: Callable[[float], float]):
-    def made(protocol: Protocol, name: str) -> Controller:
-        controller = model_controller(protocol, name)
-        controller._joint = Wrong(controller._joint, at_s, act)
-        return controller
-
-    return made
-
-
 def _fail(_torque: float) -> float:
     raise ZeroDivisionError("float division by zero")
 
@@ -185,9 +161,17 @@ def injections(stretch: int = 1) -> list[Injection]:
         return Injection(name=name, at_s=at_s, expected=expected, wrap=wrap, **options)
 
     def check(error) -> Wrap:
-        return lambda inner: f.FaultyDevice(
-            inner, send_fault=f.ignored(catch), check_fault=f.says(catch, error)
-        )
+        return faulty(send_fault=f.ignored(catch), check_fault=f.says(catch, error))
+
+    def away(name: str, gaps: dict[float, float], expected: str | None) -> Injection:
+        acts = missing(gaps)
+        return Injection(name=name, at_s=catch, expected=expected, acts=acts)
+
+    def wrong(name: str, at_s: float, act, expected: str) -> Injection:
+        return Injection(name=name, at_s=at_s, expected=expected, model=act)
+
+    def slip(name: str, at_s: float) -> Injection:
+        return Injection(name=name, at_s=at_s, expected=None, slip=True)
 
     lost = "missed-replies"
     return [
@@ -280,9 +264,7 @@ def injections(stretch: int = 1) -> list[Injection]:
             "bus cut for good",
             catch,
             "no-answer",
-            lambda inner: f.FaultyDevice(
-                inner, send_fault=f.not_taken(catch), cut_s=catch
-            ),
+            faulty(send_fault=f.not_taken(catch), cut_s=catch),
         ),
         device("idled from outside", catch, "device", check(f.IDLED)),
         device(
@@ -292,65 +274,24 @@ def injections(stretch: int = 1) -> list[Injection]:
             name="emergency stop by Ctrl-C",
             at_s=catch,
             expected="emergency-stop",
-            clock=lambda: signalling(catch),
+            acts={catch: lambda _: signal.raise_signal(signal.SIGINT)},
         ),
-        Injection(
-            name="loop away for 10 ms",
-            at_s=catch,
-            expected=None,
-            clock=lambda: late({catch: 0.010}),
+        away("loop away for 10 ms", {catch: 0.010}, None),
+        away("loop away for 25 ms", {catch: 0.025}, "overrun"),
+        away(
+            "five times 5 ms in 50 ms",
+            {catch + 0.01 * n: 0.005 for n in range(5)},
+            "overrun",
         ),
-        Injection(
-            name="loop away for 25 ms",
-            at_s=catch,
-            expected="overrun",
-            clock=lambda: late({catch: 0.025}),
-        ),
-        Injection(
-            name="five times 5 ms in 50 ms",
-            at_s=catch,
-            expected="overrun",
-            clock=lambda: late({catch + 0.01 * n: 0.005 for n in range(5)}),
-        ),
-        Injection(
-            name="loop away for 60 ms",
-            at_s=catch,
-            expected="overrun",
-            clock=lambda: late({catch: 0.060}),
-        ),
-        Injection(
-            name="exception in the model",
-            at_s=catch,
-            expected="controller",
-            controller=model(catch, _fail),
-        ),
-        Injection(
-            name="model gives no number",
-            at_s=catch,
-            expected="model",
-            controller=model(catch, lambda _: math.nan),
-        ),
-        Injection(
-            name="model gives nothing",
-            at_s=catch,
-            expected="model",
-            controller=model(catch, lambda _: None),
-        ),
-        Injection(
-            name="model gives 35 N·m",
-            at_s=catch,
-            expected="torque",
-            controller=model(catch, lambda _: 35.0),
-        ),
-        Injection(
-            name="model jumps to 17 N·m",
-            at_s=pre,
-            expected="torque-rate",
-            controller=model(pre, lambda _: 17.0),
-        ),
-        Injection(name="grip lost in pre-catch", at_s=pre, expected=None, slip=True),
-        Injection(name="grip lost in the catch", at_s=catch, expected=None, slip=True),
-        Injection(name="grip lost in post-catch", at_s=post, expected=None, slip=True),
+        away("loop away for 60 ms", {catch: 0.060}, "overrun"),
+        wrong("exception in the model", catch, _fail, "controller"),
+        wrong("model gives no number", catch, lambda _: math.nan, "model"),
+        wrong("model gives nothing", catch, lambda _: None, "model"),
+        wrong("model gives 35 N·m", catch, lambda _: 35.0, "torque"),
+        wrong("model jumps to 17 N·m", pre, lambda _: 17.0, "torque-rate"),
+        slip("grip lost in pre-catch", pre),
+        slip("grip lost in the catch", catch),
+        slip("grip lost in post-catch", post),
         Injection(name="full disk", at_s=catch, expected="process", full_disk=True),
     ]
 
@@ -432,72 +373,49 @@ def _injected(
     n_stretches: int,
 ) -> Iterator[None]:
     # The first presentation alone gets the fault, and as many stretches
-    first = {"device": True, "clock": True, "controller": True}
-
-    def is_first(what: str) -> bool:
-        was, first[what] = first[what], False
-        return was
+    first: dict = injection.first(n_stretches)
+    written, run = presenting.write_recording, presenting.run_presentation
 
     def open_faulty(name: str, **options) -> Device:
-        inner = opener(name, **options)
-        wrap = injection.wrap if is_first("device") else None
-        device = (wrap or f.FaultyDevice)(inner)
+        clock, inner = options["clock"], opener(name, **options)
+        device = first.pop("wrap", f.FaultyDevice)(inner, clock)
         device.open()
-        if isinstance(options["clock"], InjectedClock):
-            options["clock"].begin()
+        clock.begin_ns = clock.now_ns()  # from here on the presentation is timed
         devices.append(device)
         return device
 
-    def clock() -> SimulatedClock:
-        use = is_first("clock") and injection.clock is not None
-        return injection.clock() if use else SimulatedClock()
+    def clock() -> ActingClock:
+        made = ActingClock(first.pop("acts", {}))
+        made.begin_ns = math.inf
+        return made
 
     def controller(protocol: Protocol, name: str) -> Controller:
-        use = is_first("controller") and injection.controller is not None
-        return (injection.controller if use else model_controller)(protocol, name)
-
-    written = presenting.write_recording
-    disk_is_full = [injection.full_disk]
+        made = model_controller(protocol, name)
+        if (act := first.pop("model", None)) is not None:
+            made._joint = Wrong(made._joint, injection.at_s, act)
+        return made
 
     def write(recording, path):
-        if disk_is_full.pop() if disk_is_full else False:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+        if first.pop("full_disk", False):
+            raise OSError(errno.ENOSPC, "full", str(path))
         return written(recording, path)
 
-    with (
-        mock.patch.object(presenting, "open_device", open_faulty),
-        mock.patch.object(presenting, "model_controller", controller),
-        mock.patch.object(presenting, "write_recording", write),
-        mock.patch.dict(CLOCKS, {"simulated": clock}),
-        _stretching(injection, n_stretches),
-    ):
-        yield
-
-
-@contextlib.contextmanager
-def _stretching(injection: Injection, n_stretches: int) -> Iterator[None]:
-    # The hand of the first presentation slips, and stretches so often
-    first = {"hand", "loop"}
-    run = presenting.run_presentation
-
     def hand(**options) -> SimulatedHand:
-        if "hand" in first:
-            first.remove("hand")
-            options["again"] = (options["mean_speed"],) * (n_stretches - 1)
-            options["returns"] = n_stretches > 1
-            options["slip_time"] = injection.at_s if injection.slip else None
-        return SimulatedHand(**options)
+        return SimulatedHand(**options | first.pop("hand", {}))
 
     def run_first(*arguments, **options):
-        if "loop" in first and n_stretches > 1:
-            first.remove("loop")
-            options["stretches"] = StretchRules(n=n_stretches)
-            options["max_duration_s"] = None
-        return run(*arguments, **options)
+        return run(*arguments, **options | first.pop("loop", {}))
 
     with (
-        mock.patch.object(presenting, "SimulatedHand", hand),
-        mock.patch.object(presenting, "run_presentation", run_first),
+        mock.patch.multiple(
+            presenting,
+            open_device=open_faulty,
+            model_controller=controller,
+            write_recording=write,
+            SimulatedHand=hand,
+            run_presentation=run_first,
+        ),
+        mock.patch.dict(CLOCKS, {"simulated": clock}),
     ):
         yield
 
@@ -515,12 +433,13 @@ def small_study(
     return study, protocol
 
 
+def cell(value: float, digits: int) -> str:
+    """One number of a table; nothing where there is none."""
+    return "" if math.isnan(value) else f"{value:.{digits}f}"
+
+
 def row(made: Outcome) -> str:
     """One row of the table in docs/driver.md."""
-
-    def cell(value: float, digits: int) -> str:
-        return "" if math.isnan(value) else f"{value:.{digits}f}"
-
     zero = cell(made.zero_ms, 0)
     if math.isnan(made.zero_ms) and made.kind not in (None, "released", "process"):
         zero = "never"

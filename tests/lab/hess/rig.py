@@ -65,7 +65,9 @@ def present(
     inner = open_device(
         "simulated", clock=clock, hand=hand, range_end=range_end, options=backend
     )
-    device: Device = inner if read_fault is None else FaultyDevice(inner, read_fault)
+    device: Device = inner
+    if read_fault is not None:
+        device = FaultyDevice(inner, clock, read_fault)
     with inner, device:
         options = {"limits": LIMITS, "end_angle": END, **options}
         return run_presentation(device, model, clock=clock, **options)
@@ -176,17 +178,27 @@ class Joint:
 
 
 class ActingClock(SimulatedClock):
-    """A simulated clock on which something happens once, when a time has come."""
+    """A simulated clock on which things happen, each once, at some s of the test."""
 
-    def __init__(self, at_s: float, act: Callable[[], object]) -> None:
-        super().__init__()
-        self.at_ns, self.act = at_s * 1e9, act
+    def __init__(
+        self, acts: dict[float, Callable[["ActingClock"], object]], start_ns: int = 0
+    ) -> None:
+        super().__init__(start_ns)
+        self.acts, self.begin_ns = dict(acts), start_ns
+
+    def miss(self, gap_s: float) -> None:
+        super().sleep_until_ns(self.now_ns() + round(gap_s * 1e9))
 
     def sleep_until_ns(self, deadline_ns: int) -> None:
         super().sleep_until_ns(deadline_ns)
-        if deadline_ns >= self.at_ns:
-            self.at_ns = math.inf
-            self.act()
+        since_ns = deadline_ns - self.begin_ns
+        for at_s in [at for at in self.acts if since_ns >= round(at * 1e9)]:
+            self.acts.pop(at_s)(self)
+
+
+def missing(gaps: dict[float, float]) -> dict[float, Callable[[ActingClock], None]]:
+    """A machine that is away for some s at chosen times."""
+    return {at: lambda clock, gap=gap: clock.miss(gap) for at, gap in gaps.items()}
 
 
 def law_of(model: JointModel, recording: Recording) -> np.ndarray:

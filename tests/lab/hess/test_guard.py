@@ -224,7 +224,7 @@ def test_an_arm_that_slips_under_the_guards_torque_stays_below_the_limit(
         way[time_s] = inner.read().angle  # while the torque is taken back, too
         return torque
 
-    with inner, FaultyDevice(inner, send_fault=look) as device:
+    with inner, FaultyDevice(inner, clock, send_fault=look) as device:
         presented = run_presentation(
             device, controls(joint), clock=clock, limits=limits
         )

@@ -26,15 +26,16 @@ from .rig import (
     END,
     MODELS,
     START,
+    ActingClock,
     Joint,
     Losing,
     ScriptedDevice,
     controls,
+    missing,
     present,
     scripted,
     stretching,
 )
-from .test_loop import LateClock
 
 STEP = radians(0.005)  # of the encoder
 MS = 1e-3
@@ -438,9 +439,11 @@ def test_the_share_is_that_of_any_hundred_ticks(
 def test_a_loop_that_is_away_too_often_or_too_long_is_named(
     late_ms: dict[int, float], limits: dict, words: str | None, n_missed: int
 ) -> None:
-    late = {tick * 1_000_000: round(ms * 1e6) for tick, ms in late_ms.items()}
+    gaps = {tick * 1e-3: ms * 1e-3 for tick, ms in late_ms.items()}
     device, presented = scripted(
-        clock=LateClock(late), limits=DeviceLimits(**limits), max_duration_s=2.2
+        clock=ActingClock(missing(gaps)),
+        limits=DeviceLimits(**limits),
+        max_duration_s=2.2,
     )
     assert presented.n_missed_ticks == n_missed
     if words is None:

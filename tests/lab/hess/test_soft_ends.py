@@ -16,32 +16,25 @@ from masrel.lab.hess import (
     HandDistribution,
     HumanHand,
     Presented,
-    SimulatedClock,
     SimulatedHand,
     StretchRules,
 )
 from masrel.lab.recording import RAMPS, stretches
 
 from . import faults as f
-from .rig import LIMITS, MODELS, START, ActingClock, controls, law_of, present, scripted
+from .rig import (
+    LIMITS,
+    MODELS,
+    START,
+    ActingClock,
+    controls,
+    law_of,
+    missing,
+    present,
+    scripted,
+)
 
 POST_CATCH, END, FAULT = (RAMPS.index(name) for name in RAMPS[1:])
-
-
-class Disturbed(SimulatedClock):
-    """A clock with gaps, that can press a button."""
-
-    def __init__(self, gaps: dict[float, float], stop: EmergencyStop) -> None:
-        super().__init__()
-        self.gaps, self.stop = dict(gaps), stop
-        self.press_at = math.inf
-
-    def sleep_until_ns(self, deadline_ns: int) -> None:
-        super().sleep_until_ns(deadline_ns)
-        for at_s in [at for at in self.gaps if deadline_ns >= at * 1e9]:
-            super().sleep_until_ns(deadline_ns + round(self.gaps.pop(at_s) * 1e9))
-        if deadline_ns >= self.press_at * 1e9:
-            self.stop.press("test")
 
 
 def steepest(torque: float, ramp_s: float, rate_hz: int = 1000) -> float:
@@ -173,7 +166,7 @@ def test_a_fault_under_the_ramp_of_an_end_ramps_from_there() -> None:
     stop = EmergencyStop()
     _, presented = scripted(
         lambda _time_s: radians(145.0),
-        clock=ActingClock(0.15, lambda: stop.press("test")),
+        clock=ActingClock({0.15: lambda _: stop.press("test")}),
         limits=dataclasses.replace(LIMITS, standing_torque=20.0),
         max_duration_s=10.0,
         stop=stop,
@@ -190,7 +183,7 @@ def test_a_fault_under_the_ramp_of_an_end_ramps_from_there() -> None:
 
 
 def test_ticks_that_are_missed_under_the_ramp_make_it_longer_and_no_steeper() -> None:
-    clock = Disturbed({0.75: 0.007}, EmergencyStop())
+    clock = ActingClock(missing({0.75: 0.007}))
     with pytest.warns(OverrunWarning):
         presented = present(clock=clock, max_duration_s=0.7)
     assert presented.n_missed_ticks == 7
@@ -240,9 +233,9 @@ def random_presentation(seed: int, n_stretches: int = 1) -> tuple[int, int]:
     rng = np.random.default_rng([2012, n_stretches, seed])
     longest_s = 1.5 * n_stretches
     gaps = {float(at): 0.004 for at in rng.uniform(0.0, longest_s, rng.integers(0, 3))}
-    clock = Disturbed(gaps, EmergencyStop())
+    clock, stop = ActingClock(missing(gaps)), EmergencyStop()
     if rng.random() < 0.1:
-        clock.press_at = float(rng.uniform(0.1, longest_s))
+        clock.acts[float(rng.uniform(0.1, longest_s))] = lambda _: stop.press("test")
     start, end = radians(rng.uniform(10.0, 80.0)), radians(rng.uniform(110.0, 146.0))
     hand = random_hand(rng, start, end, n_stretches)
     limits = DeviceLimits(
@@ -266,7 +259,7 @@ def random_presentation(seed: int, n_stretches: int = 1) -> tuple[int, int]:
             clock=clock,
             read_fault=fault,
             limits=limits,
-            stop=clock.stop,
+            stop=stop,
             end_angle=end,
             stretches=rules if n_stretches > 1 else None,
             max_duration_s=float(rng.uniform(0.2, 2.0)) * longest_s,

@@ -52,7 +52,7 @@ def test_it_stays_pressed_by_whoever_pressed_it_first() -> None:
 
 def test_pressed_in_a_catch_it_takes_the_torque_back_within_a_tenth_of_a_second():
     stop = EmergencyStop()
-    clock = ActingClock(0.7, lambda: stop.press("test"))
+    clock = ActingClock({0.7: lambda _: stop.press("test")})
     presented = present(clock=clock, stop=stop)
     fault, columns = presented.fault, presented.recording.columns
     assert fault is not None

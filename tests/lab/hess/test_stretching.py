@@ -101,7 +101,7 @@ def test_stretches_end_where_the_rater_says_done(
     n: int | None, done_s: float, n_made: int
 ) -> None:
     status = PresentationStatus()
-    clock = ActingClock(done_s, status.done)
+    clock = ActingClock({done_s: lambda _: status.done()})
     presented = shown(SimulatedHand(**WAY), n, status=status, clock=clock)
     recording = presented.recording
     assert (presented.fault, recording.facts["ended"]) == (None, "done")

@@ -172,7 +172,7 @@ class Heard:
 def simulated(clock: SimulatedClock, **faults) -> FaultyDevice:
     """The simulated device with a free arm at 60 deg, and what is wrong."""
     inner = open_device("simulated", clock=clock, hand=loose(60.0))
-    device = FaultyDevice(inner, **faults)
+    device = FaultyDevice(inner, clock, **faults)
     device.open()
     return device
 
@@ -295,7 +295,7 @@ def test_an_arm_that_is_caught_while_it_turns_is_let_go_soon() -> None:
 
 def test_an_emergency_stop_ends_it() -> None:
     stop = EmergencyStop()
-    clock = ActingClock(0.5, lambda: stop.press("test"))
+    clock = ActingClock({0.5: lambda _: stop.press("test")})
     with simulated(clock) as device:
         error = turned(device, clock, "emergency stop: test", stop=stop)
     assert isinstance(error, EmergencyStopError)
