@@ -1,9 +1,4 @@
-"""Hands that move the arm: what they intend, and what the driver makes of people's.
-
-``before`` is how a lost grip was noticed once: by a fall of speed by more than 40 deg/s
-within 10 ms, or by an arm that moved backwards faster than 20 deg/s. An arm that stood
-for half a second under 2 N·m was a fault once, however it had come to rest.
-"""
+"""Hands that move the arm: what they intend, and what the driver makes of people's."""
 
 import math
 from collections.abc import Iterator
@@ -29,7 +24,7 @@ from masrel.lab.hess import (
     open_device,
 )
 
-from .rig import CATCH, END, MODELS, PRE_CATCH, START, law_of, present, stretching
+from .rig import CATCH, END, MODELS, PRE_CATCH, START, law_of, present
 
 PAGE = Path(__file__).parents[3] / "docs" / "driver.md"
 STRETCH = {"start": 0.5, "end": 2.5, "mean_speed": 1.5}
@@ -221,9 +216,6 @@ class Outcome:
     lost: bool
     is_law: bool  # whether the torque is that of the law, fed what was read
     recoiled: bool  # whether the arm sprang back so fast that the law ended the catch
-    lost_before: bool
-    clamp_stood: bool  # a clamp of the same stiffness and damping, for half a second
-    clamp_lost_before: bool
     slip_s: float  # until the model was released
 
 
@@ -249,15 +241,9 @@ def presented(
 
 
 def outcome(person: Person) -> Outcome:
-    """Present to the hand while it holds on, while it lets go, and to a clamp."""
-    traits, made = person.traits, presented(person)
-    clamp = stretching(
-        mean_speed=person.mean_speed, stiffness=traits.stiffness, damping=traits.damping
-    )
+    """Present to the hand while it holds on, and while it lets go."""
+    made = presented(person)
     columns = held_columns(made)
-    clamped = held_columns(present(person.model, hand=clamp))
-    stood = _stood_at(clamped)
-    clamped = {name: column[:stood] for name, column in clamped.items()}
     law = law_of(STANDARD_MODELS[person.model], made.recording)
     asked = made.recording.columns["model_torque_nm"]
     phase = columns["phase"]
@@ -267,9 +253,6 @@ def outcome(person: Person) -> Outcome:
         lost=bool(made.recording.facts["grip_lost"]),
         is_law=np.allclose(asked, law, rtol=0.0, atol=1e-9),
         recoiled=bool(np.any((phase[:-1] == CATCH) & (phase[1:] == PRE_CATCH))),
-        lost_before=_lost_before(columns),
-        clamp_stood=stood is not None,
-        clamp_lost_before=_lost_before(clamped),
         slip_s=_released_after(person, columns),
     )
 
@@ -278,25 +261,6 @@ def held_columns(made: Presented) -> dict[str, NDArray[np.float64]]:
     """Return the columns without the ramp at the end."""
     n_rows = made.recording.n_presented
     return {name: column[:n_rows] for name, column in made.recording.columns.items()}
-
-
-def _stood_at(columns: dict[str, NDArray[np.float64]]) -> int | None:
-    # Where an arm had stood for half a second under 2 N·m, which was a fault once
-    moved = np.flatnonzero(np.diff(columns["angle_deg"], prepend=math.nan) != 0.0)
-    since = np.searchsorted(moved, np.arange(columns["time_s"].size), side="right")
-    stood = columns["time_s"] - columns["time_s"][moved[since - 1]]
-    at = np.flatnonzero((stood > 0.5) & (np.abs(columns["command_torque_nm"]) > 2.0))
-    return int(at[0]) if at.size else None
-
-
-def _lost_before(columns: dict[str, NDArray[np.float64]]) -> bool:
-    velocity = columns["velocity_deg_s"]
-    drop = np.zeros_like(velocity)
-    drop[10:] = velocity[:-10] - velocity[10:]
-    sudden = (drop > 40.0) & (columns["angle_deg"] < FREE_END_DEG)
-    # What a sample decides by is the phase of the one before
-    in_catch = columns["phase"][:-1] != PRE_CATCH
-    return bool(np.any(in_catch & (sudden | (velocity < -20.0))[1:]))
 
 
 def slip_time(person: Person, held: dict[str, NDArray[np.float64]]) -> float:
@@ -327,9 +291,8 @@ def shares(columns: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
 
 
 HEAD = (
-    "| stiffness, N·m/rad | hands | clamp: grip lost before | clamp: standing torque "
-    "| hand: grip lost before | grip lost | standing torque | torque of the law "
-    "| sprang back | slip noticed, ms | latest |\n" + "|---" * 11 + "|"
+    "| stiffness, N·m/rad | hands | grip lost | standing torque | torque of the law "
+    "| sprang back | slip noticed, ms | latest |\n" + "|---" * 8 + "|"
 )
 
 
@@ -338,9 +301,6 @@ def row(low: float, high: float, outcomes: list[Outcome]) -> str:
     chosen = [o for o in outcomes if low <= o.person.traits.stiffness <= high]
     slips = [1e3 * o.slip_s for o in chosen]
     counts = (
-        sum(o.clamp_lost_before for o in chosen),
-        sum(o.clamp_stood for o in chosen),
-        sum(o.lost_before for o in chosen),
         sum(o.lost for o in chosen),
         sum(o.fault is not None for o in chosen),
         sum(o.is_law for o in chosen),
@@ -399,7 +359,6 @@ def test_soft_hands_are_told_from_lost_grips(n: int, seed: int) -> None:
     outcomes = [outcome(person) for person in people(n, seed)]
     assert_told_apart(outcomes)
     if n == 40:
-        assert sum(o.lost_before for o in outcomes) > 0  # which they were not, once
         assert not any(o.recoiled for o in outcomes if o.person.traits.stiffness > 30.0)
 
 
