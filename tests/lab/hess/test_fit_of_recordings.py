@@ -4,7 +4,6 @@ from dataclasses import replace
 from math import radians
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from masrel.errors import RecordingError, RecordingWarning
@@ -143,30 +142,6 @@ def test_a_fit_says_which_torque_it_took(
         "Torque of 4 of 9 rec",
         "Torque of 5 of 9 rec",
     ]
-
-
-def test_another_column_can_be_named(recordings: list[Path]) -> None:
-    names = {"torque": "command_torque_nm"}
-    sent = read_movement(recordings[4], columns=names, units={"torque": "nm"})
-    assert sent.torque_source == "recorded"
-    usual = read_movement(recordings[4])
-    assert np.abs(sent.torque - usual.torque).max() > 0.3
-
-
-def test_samples_without_a_number_are_left_out_and_counted(tmp_path: Path) -> None:
-    recording = measured(STANDARD_MODELS["HM3"], stretch(90.0))
-    torque = recording.columns[MEASURED].copy()
-    torque[100:150] = np.nan
-    columns = {**recording.columns, MEASURED: torque}
-    path = tmp_path / "a.npz"
-    holey = Recording(
-        columns=columns, facts=recording.facts, channels=recording.channels
-    )
-    write_recording(holey, path)
-    words = rf"50 rows have an empty cell \({MEASURED} 50\) and are left out"
-    with pytest.warns(RecordingWarning, match=words):
-        movement = read_movement(path)
-    assert movement.time.size == recording.n_presented - 50
 
 
 def test_a_sensor_that_failed_is_said_again_where_it_is_read(tmp_path: Path) -> None:

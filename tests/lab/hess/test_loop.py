@@ -449,20 +449,6 @@ def test_the_same_presentation_twice_is_the_same_to_the_last_bit() -> None:
         np.testing.assert_allclose(later.columns[name], column, atol=1e-9)
 
 
-def test_the_facts_say_how_it_went() -> None:
-    presented = present()
-    facts = presented.recording.facts
-    assert facts["simulated"] is True
-    assert facts["device"] == "simulated"
-    assert facts["fault"] is None
-    assert facts["phases"] == "pre-catch, catch, post-catch, pre-catch"
-    # θ_catch = L - α v̄ of (2) at the mean speed that the recording gives
-    assert facts["catch_angle_deg"] == pytest.approx(
-        115.0 - 0.35 * facts["mean_speed_deg_s"], abs=0.2
-    )
-    assert presented.n_missed_ticks == 0
-
-
 def test_with_a_real_clock_it_goes_the_same_way() -> None:
     # A short stretch, 100 to 146 deg at 110 deg/s: about 0.6 s with the rests. How
     # late the machine is may differ, so every tick may be missed without a fault.

@@ -47,8 +47,7 @@ def played_back(recording: Recording, model: str, *, start_ns: int = 0) -> Recor
 # The same inputs give the same torques
 
 
-@pytest.mark.parametrize("model", ["HM1", "HM2", "HM3", "HM4"])
-@pytest.mark.parametrize("speed_deg_s", [40.0, 72.0, 100.0])
+@pytest.mark.parametrize(("model", "speed_deg_s"), [("HM1", 100.0), ("HM4", 40.0)])
 def test_it_gives_the_same_torques_bit_for_bit(
     model: str, speed_deg_s: float, tmp_path: Path
 ) -> None:
@@ -74,15 +73,6 @@ def test_it_does_so_for_what_a_puck_counted_and_where_replies_were_missed(
     rows_are_missing = np.diff(first.columns["time_s"]).max() > 0.0025
     assert rows_are_missing == bool(faults)
     assert same_columns(played_back(first, "HM3"), first)
-
-
-def test_another_model_gives_other_torques() -> None:
-    first = present("HM2").recording
-    again = played_back(first, "HM4")
-    assert np.array_equal(again.columns["angle_deg"], first.columns["angle_deg"])
-    assert not np.array_equal(
-        again.columns["model_torque_nm"], first.columns["model_torque_nm"]
-    )
 
 
 def test_after_a_fault_the_recording_ends() -> None:

@@ -45,18 +45,6 @@ def bench(request: pytest.FixtureRequest):
 held = pytest.mark.parametrize("bench", [(None,)], indirect=True)
 
 
-@pytest.mark.parametrize(
-    ("torque", "moves"), [(0.188, 0), (-0.188, 0), (0.25, -1), (-0.25, 1)]
-)
-def test_below_coulomb_friction_it_sticks_and_above_goes_against_the_command(
-    bench: Bench, torque: float, moves: int
-) -> None:
-    start = bench.device.read().angle
-    bench.device.command(torque)  # positive resists extension
-    way = bench.run(0.5)[-1] - start
-    assert (way > 0.0) - (way < 0.0) == moves
-
-
 @held
 def test_the_end_stop_holds_the_arm_within_a_fifth_of_a_degree(bench: Bench) -> None:
     assert max(bench.run(2.0)) <= radians(146.2)
@@ -79,27 +67,6 @@ def test_the_encoder_reads_multiples_of_its_step_and_the_same_twice(bench) -> No
     with once.device:
         once.clock.sleep_until_ns(1_000_000_000)
         assert once.device.read().angle == angle
-
-
-@held
-def test_the_hand_moves_it_as_it_intends_and_presses_as_hard_as_it_resists(
-    bench: Bench,
-) -> None:
-    # Between the stops, at rest: 10 N·m, which is 1436 quanta, 9.9988 N·m;
-    # friction carries up to 0.189 of it.
-    bench.device.command(10.0)
-    angles = bench.run(0.8)
-    assert (angles[799] - angles[399]) / 0.4 == pytest.approx(1.5, rel=0.01)
-    bench.run(3.0)
-    assert bench.device.hand_torque == pytest.approx(9.9988, abs=0.1891)
-
-
-@pytest.mark.parametrize("bench", [(0.3997,)], indirect=True)
-def test_a_hand_that_has_let_go_gives_no_torque(bench: Bench) -> None:
-    bench.run(0.3)
-    assert bench.device.hand_torque != 0.0
-    bench.run(0.4)
-    assert bench.device.hand_torque == 0.0
 
 
 @pytest.mark.parametrize("range_end", [0.9, 3.2])

@@ -18,7 +18,7 @@ from masrel.lab.hess import (
 )
 from masrel.lab.recording import stretches
 
-from .rig import END, START, ActingClock, law_of, path, present, scripted
+from .rig import END, START, law_of, path, present, scripted
 
 SPEEDS = (radians(92.0), radians(60.0), radians(110.0))
 WAY = {"start": START, "end": END, "mean_speed": SPEEDS[0], "again": SPEEDS[1:]}
@@ -94,21 +94,6 @@ def test_an_arm_that_is_not_brought_back_is_held_to_the_time_limit() -> None:
     recording = led(way, n=2, time_limit=4.0).recording
     assert recording.facts["ended"] == "time-limit"
     assert recording.n_presented == pytest.approx(4550, abs=100)
-
-
-@pytest.mark.parametrize(("n", "done_s", "n_made"), [(None, 5.0, 2), (1, 0.6, 1)])
-def test_stretches_end_where_the_rater_says_done(
-    n: int | None, done_s: float, n_made: int
-) -> None:
-    status = PresentationStatus()
-    clock = ActingClock({done_s: lambda _: status.done()})
-    presented = shown(SimulatedHand(**WAY), n, status=status, clock=clock)
-    recording = presented.recording
-    assert (presented.fault, recording.facts["ended"]) == (None, "done")
-    assert len(stretches(recording)) == n_made
-    assert stretches(recording)[-1].end_s == pytest.approx(done_s)
-    assert recording.columns["time_s"][-1] == pytest.approx(done_s + 0.1)
-    assert (status.n_stretches, status.is_armed) == (n_made, False)
 
 
 def test_a_stretch_that_goes_on_at_the_time_limit_goes_on_to_its_end() -> None:

@@ -172,17 +172,6 @@ def failing(on, kind, start_s: float = 0.0, **more) -> Bench:
     return told(one, (MODE, 2))
 
 
-def test_answers_come_in_the_order_of_their_questions(on) -> None:
-    # Late until 2 ms after the beginning, and then not: nobody is overtaken.
-    one = failing(on, "late-replies", 0.001, end_s=0.002)
-    numbers = [CTS, IPNM, STAT, VERS]
-    for number in numbers:
-        one.node.request(number)
-        one.node.wait(0.0006)
-    answered = answers(one, 2, b"")
-    assert [frame.data[0] & 0x7F for frame in answered] == numbers
-
-
 def test_the_babbling_of_others_is_bounded(on) -> None:
     one = on(awake=True)
     for _ in range(1001):
