@@ -3,6 +3,7 @@
 import hashlib
 import json
 import math
+import re
 import shutil
 from collections.abc import Callable
 from functools import partialmethod
@@ -84,14 +85,6 @@ def test_each_stretch_leaves_its_facts_until_the_rater_is_done(new_study: New) -
     assert max(counts) > 1
 
 
-@pytest.mark.parametrize(("rule", "n"), [("2", 2), ('["slow", "fast"]', 2)])
-def test_as_many_are_made_as_are_asked_for(new_study: New, rule: str, n: int) -> None:
-    small = with_rules(new_study, f"stretches = {rule}")
-    run(small, SimulatedGrades(small[1]))
-    ended = {(e.fields["ended"], e.fields["n_stretches"]) for e in shown(small)}
-    assert ended == {("stretches", n)}
-
-
 def test_a_cued_presentation_has_r1_and_r2(new_study: New) -> None:
     small = with_rules(new_study, 'stretches = ["slow", "fast"]')
     run(small, SimulatedGrades(small[1]))
@@ -99,6 +92,7 @@ def test_a_cued_presentation_has_r1_and_r2(new_study: New) -> None:
     speeds = tuple(math.radians(speed) for speed in (10.0, 60.0, 120.0))
     for presentation, event in zip(schedule.presentations, shown(small), strict=True):
         fields = event.fields
+        assert (fields["ended"], fields["n_stretches"]) == ("stretches", 2)
         slow, fast = fields["stretches"]
         assert (slow["cue"], fast["cue"]) == ("slow", "fast")
         assert (slow["reached_threshold"], slow["mean_speed_deg_s"]) == (False, None)
@@ -139,19 +133,27 @@ def until_fast(study: Small, code: str) -> float:
 SLOW = "[simulated_raters]\nmean_speed_deg_s = 12.0\nspeed_sd_deg_s = 0.0\n"
 
 
-def slowly(new_study: New) -> Small:
+def test_what_was_too_slow_is_said_to_the_rater_counted_and_graded_all_the_same(
+    new_study: New,
+) -> None:
     settings = ("[simulated_raters]", f'[report]\nsections = ["grades"]\n\n{SLOW}')
     rules = ("[schedule]", '[presentation]\nstretches = "free"\n\n[schedule]')
-    return new_study(settings, rules)
-
-
-def test_a_rater_is_told_what_was_too_slow_and_may_grade_it(new_study: New) -> None:
-    small = slowly(new_study)
+    small = new_study(settings, rules)
     source, said = console("\n1\n\nagain\n\n2\n\n3\n")
     run(small, source)
     assert said.getvalue().count("too slow to feel the catch: once more?") == 4
     assert {event.fields["felt"] for event in shown(small)} == {"below-threshold"}
     assert ratings_from_logs(*small).table["felt"].tolist() == ["below-threshold"] * 3
+    page = small[0].root / "report" / "report.md"
+    for words, text in (
+        (["ratings"], "3 after stretches too slow to feel the catch"),
+        (["analyze"], "In 3 of 3 presentations the stretches were too slow"),
+        (["report", "--quiet"], "none reached ν\\_th in 3, and none came to the catch"),
+    ):
+        output = CliRunner().invoke(cli, [*words, str(small[0].root)]).output
+        if page.exists():
+            output = page.read_text(encoding="utf-8")
+        assert text in " ".join(output.split())
 
 
 def test_a_rater_is_told_that_the_time_limit_ended_a_presentation(
@@ -163,20 +165,6 @@ def test_a_rater_is_told_that_the_time_limit_ended_a_presentation(
     ended = [event.fields["ended"] for event in shown(small)]
     words = "no stretch begins later than 1 s after the first movement."
     assert said.getvalue().count(words) == ended.count("time-limit") > 0
-
-
-def test_what_was_too_slow_is_counted(new_study: New) -> None:
-    small = slowly(new_study)
-    run(small, SimulatedGrades(small[1]))
-    root = str(small[0].root)
-    said = CliRunner().invoke(cli, ["ratings", root]).output
-    assert "3 after stretches too slow to feel the catch" in said
-    said = " ".join(CliRunner().invoke(cli, ["analyze", root]).output.split())
-    assert "In 3 of 3 presentations the stretches were too slow" in said
-    out = small[0].root / "report"
-    CliRunner().invoke(cli, ["report", root, "-o", str(out), "--quiet"])
-    page = " ".join((out / "report.md").read_text(encoding="utf-8").split())
-    assert r"none reached ν\_th in 3, and none came to the catch" in page
 
 
 def test_a_grip_that_was_lost_stands_in_the_table_and_the_report(
@@ -236,20 +224,19 @@ def test_no_grade_rests_on_a_stretch_that_was_not_made(small: Small) -> None:
 
 
 def test_a_button_is_asked_of_a_device_that_has_one(new_study: New) -> None:
-    rules = ("stretches = 2", 'done_with = "button"')
+    rules = ('stretches = "free"', 'done_with = "button"')
     simulated = with_rules(new_study, *rules)
     run(simulated, SimulatedGrades(simulated[1]))
     puck = '[device]\nbackend = "puck"\npuck_interface = "virtual"\n\n'
     small = with_rules(new_study, *rules, further=puck, name="other")
     message = (
-        r"device.backend: needed one with a button \(simulated\), as "
-        r"presentation.done_with asks for, got 'puck'"
+        r"device.backend: needed one with a button \(simulated\), as .* got 'puck'"
     )
     with pytest.raises(ParameterError, match=message):
         run(small, SimulatedGrades(small[1]))
     checked = CliRunner().invoke(cli, ["check", str(small[0].root)])
     assert checked.exit_code == 2
-    assert "device.backend: needed one with a button" in checked.output
+    assert re.search(message, checked.output)
 
 
 def test_a_session_of_format_1_is_read_and_finished(tmp_path: Path) -> None:
@@ -296,75 +283,57 @@ def test_a_table_of_format_1_is_what_its_logs_say(
         read_study_data(study, read_protocol(study.protocol))
 
 
-def test_nothing_of_a_rehearsal_is_a_rating(new_study: New) -> None:
-    small = with_rules(new_study, 'stretches = "free"')
-    study, protocol = small
+def rehearsed(small: Small) -> tuple[Path, list[object]]:
+    """The log of a whole rehearsal, and its codes in order."""
+    log = run(small, SimulatedGrades(small[1]), rehearsal=True).log_file
+    return log, [e.fields["code"] for e in read_log(log) if e.kind == "grade"]
+
+
+def test_nothing_of_a_rehearsal_is_a_rating(new_study: New, tmp_path: Path) -> None:
+    study, protocol = small = with_rules(new_study, 'stretches = "free"')
+    same = (StudyPaths(tmp_path / "same"), protocol)
+    shutil.copytree(study.root, same[0].root)
+    other = (StudyPaths(tmp_path / "other"), protocol)
+    other[0].root.mkdir()  # it draws a secret of its own
     call = ["run", str(study.root), "--rater", "R1", "--session", "test", "--rehearse"]
-    simulated = [*call, "--grades", "simulated"]
-    for number in (1, 2):
-        done = CliRunner().invoke(cli, simulated)
-        assert done.exit_code == 0, done.output
-        assert "REHEARSAL: nothing of it enters the ratings" in done.output
-        assert "none is a rating of the study" in done.output
-        folder = study.root / "rehearsals" / str(number)
-        log = read_log(folder / "rehearsal_test_R1.jsonl")
-        assert log[0].fields["rehearsal"] is True
-        codes = [event.fields["code"] for event in log if event.kind == "grade"]
-        session = read_schedule(study.schedule_file("R1", "test")).presentations
-        assert codes != [presentation.code for presentation in session]
-        for file in folder.rglob("*.npz"):
-            assert read_recording(file).facts["rehearsal"] is True
+    done = CliRunner().invoke(cli, [*call, "--grades", "simulated"])
+    assert "REHEARSAL: nothing of it enters the ratings" in done.output
+    assert "none is a rating of the study" in done.output
+    log, codes = rehearsed(small)
+    assert log == study.root / "rehearsals" / "2" / "rehearsal_test_R1.jsonl"
+    assert read_log(log)[0].fields["rehearsal"] is True
+    facts = [read_recording(file).facts for file in log.parent.rglob("*.npz")]
+    assert [each["rehearsal"] for each in facts] == [True] * 3
+    session = read_schedule(study.schedule_file("R1", "test")).presentations
+    assert codes != [presentation.code for presentation in session]
+    # it is drawn from the secret
+    assert [rehearsed(same)[1], rehearsed(same)[1]][1] == codes
+    assert [rehearsed(other)[1], rehearsed(other)[1]][1] != codes
+    assert other[0].secret_file.is_file()
     assert not study.sessions.exists()
     run(small, SimulatedGrades(protocol))
     assert len(ratings_from_logs(study, protocol).table) == 3
-
-
-def test_a_rehearsal_among_the_sessions_is_refused(new_study: New) -> None:
-    small = with_rules(new_study, "stretches = 2")
-    run(small, SimulatedGrades(small[1]), rehearsal=True)
-    study = small[0]
-    log = study.root / "rehearsals" / "1" / "rehearsal_test_R1.jsonl"
-    study.sessions.mkdir()
-    log.rename(study.log_file("R1", "test"))
+    log.replace(study.log_file("R1", "test"))
     with pytest.raises(
         ValueError, match="needed the log of a session, got that of a r"
     ):
         ratings_from_logs(*small)
 
 
-def test_a_rehearsal_that_was_stopped_is_gone_on_with(small: Small) -> None:
+@pytest.mark.parametrize("same_secret", [True, False])
+def test_a_rehearsal_that_was_stopped_is_gone_on_with(
+    small: Small, same_secret: bool
+) -> None:
     source, said = console("\n1\n\nstop\n")
     with pytest.raises(RuntimeError, match="presentation 2 of 3"):
         run(small, source, rehearsal=True)
     assert "REHEARSAL, no rating of the study. Presentation 1 of 3" in said.getvalue()
-    summary = run(small, console("\n2\n\n3\n")[0], rehearsal=True)
-    assert (summary.n_graded, summary.rehearsal) == (3, True)
-    assert summary.log_file.parent.name == "1"
-
-
-def rehearsed(small: Small) -> list[object]:
-    # the codes of a whole rehearsal, in order
-    log = run(small, SimulatedGrades(small[1]), rehearsal=True).log_file
-    return [e.fields["code"] for e in read_log(log) if e.kind == "grade"]
-
-
-def test_a_rehearsal_is_drawn_from_the_secret(small: Small, tmp_path: Path) -> None:
-    other = (StudyPaths(tmp_path / "other"), small[1])
-    same = (StudyPaths(tmp_path / "same"), small[1])
-    shutil.copytree(small[0].root, same[0].root)
-    other[0].root.mkdir()  # it draws a secret of its own
-    codes = rehearsed(small)
-    assert rehearsed(same) == codes
-    assert rehearsed(other) != codes
-    assert other[0].secret_file.is_file()
-
-
-def test_a_rehearsal_of_another_secret_is_left_and_another_begun(small: Small) -> None:
-    with pytest.raises(RuntimeError, match="presentation 2 of 3"):
-        run(small, console("\n1\n\nstop\n")[0], rehearsal=True)
     before = small[0].root / "rehearsals" / "1" / "rehearsal_test_R1.jsonl"
     lines = before.read_bytes()
-    small[0].published_secret_file.unlink()
-    summary = run(small, SimulatedGrades(small[1]), rehearsal=True)
-    assert (summary.n_graded, summary.log_file.parent.name) == (3, "2")
-    assert before.read_bytes() == lines
+    if not same_secret:  # it is left, and another begun
+        small[0].published_secret_file.unlink()
+    n_left = 2 if same_secret else 3
+    summary = run(small, console("\n2\n" * n_left)[0], rehearsal=True)
+    assert (summary.n_graded, summary.rehearsal) == (3, True)
+    assert (summary.log_file == before) is same_secret
+    assert (before.read_bytes() == lines) is not same_secret
