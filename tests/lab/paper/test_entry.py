@@ -1,4 +1,4 @@
-"""Sheets that were filled in on paper, typed, and brought into session logs."""
+"""Sheets that were filled in on paper, typed, and brought into logs, once and again."""
 
 import csv
 import io
@@ -8,7 +8,9 @@ from datetime import UTC, date, datetime
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from masrel.cli import cli
 from masrel.errors import (
     MasrelError,
     MasrelWarning,
@@ -17,10 +19,15 @@ from masrel.errors import (
     SessionLogError,
 )
 from masrel.lab.analysis import analyze
-from masrel.lab.paper import compare_sheet, enter_sheet, write_sheets
+from masrel.lab.paper import SheetDifference, compare_sheet, enter_sheet, write_sheets
 from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.ratings import corrections_of, ratings_from_logs, read_study_data
-from masrel.lab.run import read_log, record_correction
+from masrel.lab.ratings import (
+    corrections_of,
+    ratings_from_logs,
+    read_study_data,
+    study_remarks,
+)
+from masrel.lab.run import read_log, record_answer, record_correction
 from masrel.lab.schedule import read_schedule
 from masrel.lab.verification import verify_study
 from tests.lab.paper.conftest import QUESTIONS
@@ -44,6 +51,15 @@ def filled(
     rows = blank(small, rater, session)
     for row, grade in zip(rows[1:], grades, strict=False):
         row[3] = grade
+    return rows
+
+
+def answered_sheet(small: Small) -> Rows:
+    """A sheet with grades and an answer to each question that needs one."""
+    rows = filled(small, "1", "2", "3")
+    for row in rows[1:4]:
+        row[4] = "7"
+    rows[4][5] = "50"
     return rows
 
 
@@ -217,7 +233,9 @@ def test_a_wrong_cell_is_named_with_its_row(
     assert refusal(small, rows) == message
 
 
-def test_another_raters_sheet_is_refused_with_whose_it_is(small: Small) -> None:
+def test_another_sheet_is_refused_with_whose_it_is(
+    small: Small, new_study: New
+) -> None:
     others = filled(small, "1", "2", "3", rater="R2")
     own = blank(small)
     assert refusal(small, others) == (
@@ -228,9 +246,6 @@ def test_another_raters_sheet_is_refused_with_whose_it_is(small: Small) -> None:
         "needed the sheet of rater R1 in session test, got that of rater R2 in session "
         "test"
     )
-
-
-def test_a_sheet_of_another_study_is_refused(small: Small, new_study: New) -> None:
     other = new_study(('id = "three"', 'id = "four"'), name="other")
     rows = filled(other, "1", "2", "3")
     assert refusal(small, rows).endswith(
@@ -239,7 +254,9 @@ def test_a_sheet_of_another_study_is_refused(small: Small, new_study: New) -> No
     )
 
 
-def test_a_sheet_is_entered_once(small: Small) -> None:
+def test_a_sheet_is_entered_once_and_into_no_session_of_the_console(
+    small: Small, new_study: New
+) -> None:
     file = typed(small, filled(small, "1", "2", "3"))
     enter(small, file)
     before = small[0].log_file("R1", "test").read_bytes()
@@ -252,12 +269,17 @@ def test_a_sheet_is_entered_once(small: Small) -> None:
         )
         assert "by MK from typed.csv, row 2" in str(caught.value)
     assert small[0].log_file("R1", "test").read_bytes() == before
-
-
-def test_a_session_of_the_console_takes_no_sheet(small: Small) -> None:
-    run(small, console("\n1\n\n2\n\n3\n")[0])
+    by_console = new_study(name="console")
+    rows = filled(by_console, "1", "2", "3")
+    file = typed(by_console, rows)
+    with pytest.raises(SessionLogError, match="needed a first entry of the sheet"):
+        compare(by_console, file)
+    assert not by_console[0].log_file("R1", "test").exists()
+    run(by_console, console("\n1\n\n2\n\n3\n")[0])
     with pytest.raises(SessionLogError, match="begun with grades = console: needed"):
-        enter(small, typed(small, filled(small, "1", "2", "3")))
+        enter(by_console, file)
+    with pytest.raises(SessionLogError, match=r"got one with grades = console$"):
+        compare(by_console, file)
 
 
 @pytest.mark.parametrize("n_events", [0, 2, 5, 9])
@@ -265,10 +287,7 @@ def test_a_process_that_dies_in_the_middle_goes_on(
     n_events: int, new_study: New
 ) -> None:
     small = new_study(("[schedule]", QUESTIONS))
-    rows = filled(small, "1", "2", "3")
-    for row in rows[1:4]:
-        row[4] = "7"
-    rows[4][5] = "50"
+    rows = answered_sheet(small)
     file = typed(small, rows)
     log = small[0].log_file("R1", "test")
     enter(small, file)
@@ -370,10 +389,7 @@ def test_a_mutated_sheet_is_entered_whole_or_refused_in_words(
         ("[schedule]", QUESTIONS.replace('"session"', '"study"')),
         ('raters = ["R1"]', 'raters = ["R2"]'),
     )
-    rows = filled(small, "1", "2", "3")
-    for row in rows[1:4]:
-        row[4] = "7"
-    rows[4][5] = "50"
+    rows = answered_sheet(small)
     log, file = study.log_file("R1", "test"), study.root / "mutated.csv"
     n_entered = 0
     for seed in seeds:
@@ -406,3 +422,108 @@ def answered(study: StudyPaths) -> list[tuple[object, ...]]:
     """Return what the log of conduct has of answers about the study."""
     log = read_log(study.conduct_file)
     return [tuple(e.fields.values()) for e in log if e.kind == "answered"]
+
+
+def compare(small: Small, file: Path, who: str = "JL") -> tuple[SheetDifference, ...]:
+    return compare_sheet(*small, file, "R1", "test", who=who)
+
+
+def entered_twice(small: Small, second: str) -> tuple[Rows, Path]:
+    """A sheet 1+, 2, NA that was typed again with another first grade."""
+    rows = filled(small, "1+", "2", "NA")
+    enter(small, typed(small, rows))
+    rows[1][3] = second
+    return rows, typed(small, [*rows, [""]], name="second.csv")
+
+
+def test_entries_that_agree_are_confirmed_and_change_nothing(small: Small) -> None:
+    _, second = entered_twice(small, "1+")
+    before = ratings_from_logs(*small).table
+    assert compare(small, second) == ()
+    assert ratings_from_logs(*small).table.equals(before)
+    kinds = [e.kind for e in read_log(small[0].log_file("R1", "test"))]
+    assert kinds[-4:] == ["complete", *["reentered"] * 3]
+    assert verify_study(small[0]).is_whole
+    assert study_remarks(*small) == ()
+    with pytest.raises(ParameterError, match="needed somebody else than who typed the"):
+        compare(small, second, who=" mk ")
+    with pytest.raises(RatingsError, match=r"the file that was entered as typed\.csv"):
+        compare(small, small[0].root / "typed.csv")
+
+
+@pytest.mark.parametrize("wrong", ["the first", "the second"])
+def test_a_difference_is_named_and_stays_a_remark_until_it_is_settled(
+    small: Small, wrong: str
+) -> None:
+    study, protocol = small
+    rows, second = entered_twice(small, "1")  # as a spreadsheet may make of 1+
+    code, log = rows[1][2], study.log_file("R1", "test")
+    (difference,) = compare(small, second)
+    assert (difference.code, difference.column, difference.row) == (code, "grade", 2)
+    assert (difference.first, difference.second) == ("1+", "1")
+    (remark,) = study_remarks(study, protocol)
+    assert remark == (
+        f"sessions/test_R1.jsonl: the two entries of its sheet differ, code {code}, "
+        "grade: the first has 1+, the second 1 (second.csv, row 2). The first counts "
+        "until one is mended."
+    )
+    before = log.read_bytes()
+    compare(small, second)  # nothing new
+    assert log.read_bytes() == before
+    if wrong == "the first":
+        reasons = {"who": "MK", "why": "typed wrongly"}
+        correction = {"code": code, "grade": "1", **reasons}
+        record_correction(study, protocol, "R1", "test", **correction)
+    else:
+        rows[1][3] = "1+"
+        assert compare(small, typed(small, [*rows, [""]], name="mended.csv")) == ()
+    assert study_remarks(study, protocol) == ()
+
+
+def test_answers_are_compared_with_the_log_they_are_in(
+    new_study: New,
+) -> None:
+    about = QUESTIONS.replace('when = "session"', 'when = "study"')
+    small = new_study(("[schedule]", about), ('raters = ["R1"]', 'raters = ["R2"]'))
+    study, protocol = small
+    rows = answered_sheet(small)
+    rows[4][6] = "more"
+    enter(small, typed(small, rows))
+    code, rows[2][4], rows[4][5] = rows[2][2], "8", "50,5"
+    second = typed(small, rows, name="b.csv", delimiter=";")
+    differences = compare(small, second)
+    assert [(d.code, d.column, d.first, d.second) for d in differences] == [
+        (code, "arm.realism", "7", "8"),
+        (None, "end.tired", "50", "50.5"),
+    ]
+    remarks = " ".join(study_remarks(study, protocol))  # an answer is private
+    assert "arm.realism (b.csv, row 3)" in remarks
+    assert "sheet differ, end.tired (b.csv, row 5)" in remarks
+    assert "50" not in remarks
+    # the first was wrong
+    reasons = {"who": "MK", "why": "typed wrongly"}
+    of_study = {"question": "end.tired", "answer": 50.5, **reasons}
+    record_answer(study, protocol, "R1", "test", **of_study)
+    of_model = {"question": "arm.realism", "answer": 8, "code": code, **reasons}
+    record_answer(study, protocol, "R1", "test", **of_model)
+    assert study_remarks(study, protocol) == ()
+    assert compare(small, second) == ()
+    assert verify_study(study).is_whole
+
+
+def test_the_command_lists_differences_and_what_to_do(small: Small) -> None:
+    rows, second = entered_twice(small, "3")
+    call = ["paper", "again", str(small[0].root), str(second), "--rater", "R1"]
+    call += ["--session", "test", "--who", "JL"]
+    result = CliRunner().invoke(cli, call)
+    assert result.exit_code == 1
+    first, then = result.output.splitlines()
+    assert first == f"second.csv: row 2: code {rows[1][2]}: grade: first 1+, second 3"
+    assert "masrel record correct --code" in then
+    rows[1][3] = "1+"
+    typed(small, [*rows, [""]], name="second.csv")
+    result = CliRunner().invoke(cli, call)
+    assert (result.exit_code, result.output) == (
+        0,
+        "session test of R1: both entries agree\n",
+    )

@@ -1,41 +1,102 @@
-"""Run a session and die by SIGKILL at one line of its log: ROOT LINE N_BYTES.
+"""Run a session in each of many copies of a study and die in it by SIGKILL.
 
-The process dies while it writes the given line, after that many bytes of it.
+``line N_BYTES ROOT...``: in the nth copy while its nth line of the log is written,
+after so many bytes of it. ``moment SEED WHOLE ROOT...``: at a tick of the loop that is
+drawn, or, each fourth, at a call that changes a file, of so many as the session that is
+run in WHOLE has. Each copy has a process of its own, forked from this one.
 """
 
+import json
 import os
+import random
 import signal
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
+from masrel.lab.hess import SimulatedClock
 from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.run import SimulatedGrades, run_session
 
+FILE_CALLS = ("write", "fsync", "replace", "ftruncate")
 
-def die_at(fatal_line: int, n_bytes: int) -> None:
-    """Let `os.write` write some bytes of its n-th line, and no more ever."""
+
+def die() -> None:
+    """End as a process ends whose machine loses its power."""
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def die_at_line(fatal: int, n_bytes: int) -> None:
+    """Let `os.write` write some bytes of its nth line, and no more ever."""
     write = os.write
     n_lines = 0
 
     def write_or_die(descriptor: int, data: bytes) -> int:
         nonlocal n_lines
         n_lines += os.readlink(f"/proc/self/fd/{descriptor}").endswith(".jsonl")
-        if n_lines == fatal_line:
+        if n_lines == fatal:
             write(descriptor, bytes(data)[:n_bytes])
-            os.kill(os.getpid(), signal.SIGKILL)
+            die()
         return write(descriptor, data)
 
     os.write = write_or_die
 
 
-def main(root: Path, fatal_line: int, n_bytes: int) -> None:
-    """Run a session that dies."""
-    die_at(fatal_line, n_bytes)
+def die_at_moment(kind: str, fatal: int | None) -> dict[str, int]:
+    """Count ticks and calls that change a file, and die at one of them -> how many."""
+    n = {"tick": 0, "file": 0}
+
+    def counting(of: str, call: Callable[..., object]) -> Callable[..., object]:
+        def counted(*arguments: object, **options: object) -> object:
+            n[of] += 1
+            if of == kind and n[of] == fatal:
+                die()
+            return call(*arguments, **options)
+
+        return counted
+
+    sleep = counting("tick", SimulatedClock.sleep_until_ns)
+    SimulatedClock.sleep_until_ns = sleep  # type: ignore[method-assign,assignment]
+    for name in FILE_CALLS:
+        setattr(os, name, counting("file", getattr(os, name)))
+    return n
+
+
+def session(root: Path) -> None:
+    """Run the session of the first rater."""
     study = StudyPaths(root)
     protocol = read_protocol(study.protocol)
     grades = SimulatedGrades(protocol)
     run_session(study, protocol, "R1", "test", grades=grades, clock="simulated")
 
 
+def forked(root: Path, prepare: Callable[..., object], *arguments: object) -> int:
+    """Run the session in another process -> how that ended."""
+    process = os.fork()
+    if process == 0:
+        n = prepare(*arguments)
+        session(root)
+        (root / "counts").write_text(json.dumps(n))
+        os._exit(0)
+    return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+
+
+def main(mode: str, number: int, *roots: Path) -> None:
+    """Die in each copy."""
+    drawn, n = random.Random(number), {"tick": 0, "file": 0}
+    if mode == "moment":
+        whole, *roots = roots
+        if forked(whole, die_at_moment, "tick", None):
+            sys.exit("the whole session failed")
+        n = json.loads((whole / "counts").read_text())
+    for index, root in enumerate(roots):
+        kind = "tick" if index % 4 else "file"
+        how = (die_at_line, index + 1, number)
+        if mode == "moment":
+            how = (die_at_moment, kind, drawn.randint(1, n[kind]))
+        if (status := forked(root, *how)) != -signal.SIGKILL:
+            sys.exit(f"{root}: ended with {status}, not killed at {how}")
+
+
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))
+    main(sys.argv[1], int(sys.argv[2]), *map(Path, sys.argv[3:]))

@@ -1,19 +1,44 @@
-"""``masrel run`` and ``masrel ratings`` as they are typed."""
+"""``masrel run``, ``ratings`` and ``record`` as they are typed: who graded, and what is
+skipped, corrected to missing, or graded late."""
 
-import subprocess
+import io
 import sys
 from collections.abc import Callable
+from functools import partial
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
 from masrel.cli import cli
-from masrel.lab.protocol import Protocol, StudyPaths
-from masrel.lab.run import read_log
+from masrel.errors import DeviceError, SessionLogError
+from masrel.lab.protocol import Protocol, StudyPaths, scale_of
+from masrel.lab.ratings import (
+    Correction,
+    corrections_of,
+    ratings_from_logs,
+    read_study_ratings,
+    study_remarks,
+    write_ratings,
+)
+from masrel.lab.run import (
+    ScriptGrades,
+    SimulatedGrades,
+    read_log,
+    record_correction,
+    record_skip,
+    run_session,
+)
 from masrel.lab.schedule import read_schedule
-from tests.cli.process import Caller
+from masrel.lab.verification import verify_study
+from tests.cli.process import Caller, Done
+from tests.lab.run.test_session import console, run
 
 Small = tuple[StudyPaths, Protocol]
+
+R1 = ("--rater", "R1", "--session", "test")
+BY = {"who": "Kim", "why": "the motor is hot"}
+KIM = ("--who", "Kim", "--why", "the motor is hot")
 
 
 def typed(*arguments: object, answers: str = "", code: int = 0) -> tuple[str, str]:
@@ -25,17 +50,44 @@ def typed(*arguments: object, answers: str = "", code: int = 0) -> tuple[str, st
     return result.stdout, result.stderr
 
 
-def started(*arguments: object, answers: str = "") -> subprocess.CompletedProcess[str]:
-    """A process of its own, because the exit code of an error is `main`'s."""
-    command = [sys.executable, "-c", "from masrel.cli import main; main()"]
-    command += [str(argument) for argument in arguments]
-    return subprocess.run(command, input=answers, capture_output=True, text=True)
+def by_console(small: Small, answers: str) -> str:
+    """What a person is told who types answers."""
+    source, said = console(answers)
+    run(small, source)
+    return said.getvalue()
+
+
+def codes(small: Small) -> list[str]:
+    schedule = read_schedule(small[0].schedule_file("R1", "test"))
+    return [shown.code for shown in schedule.presentations]
+
+
+def grades(small: Small) -> list[object]:
+    table = ratings_from_logs(*small).table
+    return [None if grade != grade else grade for grade in table["grade"]]
+
+
+@pytest.fixture
+def faulty(new_study: Callable[..., Small]) -> Small:
+    """A study whose speed limit every stretch exceeds."""
+    limit = "[device]\nspeed_limit_deg_s = 30.0\n\n[schedule]"
+    return new_study(("[schedule]", limit))
+
+
+@pytest.fixture
+def masrel(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., Done]:
+    def call(*words: object, answers: str = "") -> Done:
+        monkeypatch.setattr(sys, "stdin", io.StringIO(answers))
+        return Caller(monkeypatch, capsys).at_a_terminal(*words)
+
+    return call
 
 
 def test_simulated_sessions_become_a_table(small: Small) -> None:
     study, _ = small
-    who = ("--rater", "R1", "--session", "test")
-    out, err = typed("run", study.root, *who, "--grades", "simulated")
+    out, err = typed("run", study.root, *R1, "--grades", "simulated")
     assert out.startswith("session test of R1 is complete: 3 grades (simulated) in ")
     assert err == ""  # no terminal, no bar
     header = read_log(study.log_file("R1", "test"))[0].fields
@@ -49,24 +101,6 @@ def test_simulated_sessions_become_a_table(small: Small) -> None:
     assert other.read_bytes() == first
 
 
-def test_a_person_is_asked_and_may_be_corrected(small: Small) -> None:
-    study, _ = small
-    who = ("--rater", "R1", "--session", "test")
-    run = ("run", study.root, *who)
-    out, _ = typed(*run, "--clock", "simulated", answers="\n1\n\n1+\n\n3\n")
-    assert "Presentation 3 of 3" in out
-    shown = read_schedule(study.schedule_file("R1", "test")).presentations[1]
-    correct = ("record", "correct", study.root, *who, "--code", shown.code)
-    correct += ("--grade", "2", "--who", "Kim", "--why", "misheard")
-    for _ in range(2):
-        said, _ = typed(*correct)
-        assert f"{shown.code} of R1, session test, is now 2" in said
-    typed("ratings", study.root)
-    rows = study.ratings_file.read_text(encoding="utf-8").splitlines()
-    (row,) = [row for row in rows if f",{shown.model}," in row]
-    assert row.split(",")[4] == "2"
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -77,47 +111,191 @@ def test_a_person_is_asked_and_may_be_corrected(small: Small) -> None:
 def test_a_call_that_makes_no_sense_is_refused(
     small: Small, options: list[str], message: str
 ) -> None:
-    who = ("--rater", "R1", "--session", "test")
-    _, err = typed("run", small[0].root, *who, *options, code=2)
+    _, err = typed("run", small[0].root, *R1, *options, code=2)
     assert message in err
 
 
-def test_a_session_that_was_stopped_failed_and_says_how_to_go_on(
-    small: Small,
-) -> None:
-    run = ("run", small[0].root, "--rater", "R1", "--session", "test")
-    done = started(*run, "--clock", "simulated", answers="\n1\n")
-    assert done.returncode == 1
-    assert "the same command goes on there" in done.stderr
-    assert "Traceback" not in done.stderr
-
-
-def test_a_fault_failed_and_a_wrong_rater_is_a_wrong_call(
-    new_study: Callable[..., Small],
+def test_a_stop_and_a_fault_end_with_1_and_a_wrong_rater_with_2(
+    small: Small, new_study: Callable[..., Small], masrel: Callable[..., Done]
 ) -> None:
     limit = "[device]\nspeed_limit_deg_s = 30.0\n\n[schedule]"
-    root = new_study(("[schedule]", limit))[0].root
+    fast = new_study(("[schedule]", limit), name="fast")[0].root
+    stopped = masrel("run", small[0].root, *R1, "--clock", "simulated", answers="\n1\n")
     options = ("--session", "test", "--grades", "simulated", "--quiet")
-    faulty = started("run", root, "--rater", "R1", *options)
-    assert (faulty.returncode, faulty.stdout) == (1, "")
-    assert "was stopped by a fault: speed" in faulty.stderr
-    wrong = started("run", root, "--rater", "R9", *options)
-    assert wrong.returncode == 2
-    assert "Traceback" not in faulty.stderr + wrong.stderr
+    faulty = masrel("run", fast, "--rater", "R1", *options)
+    wrong = masrel("run", fast, "--rater", "R9", *options)
+    assert (stopped.code, faulty.code, wrong.code) == (1, 1, 2)
+    assert "the same command goes on there" in stopped.err
+    assert "was stopped by a fault: speed" in faulty.err
+    assert faulty.out == ""
 
 
-def test_a_terminal_sees_the_presentations_counted(
-    small: Small, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_a_terminal_sees_the_presentations_counted_unless_quiet(
+    new_study: Callable[..., Small], masrel: Callable[..., Done]
 ) -> None:
-    who = ("--rater", "R1", "--session", "test", "--grades", "simulated")
-    done = Caller(monkeypatch, capsys).at_a_terminal("run", small[0].root, *who)
-    assert "3/3" in done.err
+    call = (*R1, "--grades", "simulated")
+    assert "3/3" in masrel("run", new_study()[0].root, *call).err
+    quiet = masrel("run", new_study(name="other")[0].root, *call, "--quiet")
+    assert (quiet.code, quiet.out, quiet.err) == (0, "", "")
 
 
-def test_quiet_says_nothing(
-    small: Small, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_a_person_skips_what_faults_and_the_session_becomes_complete(
+    faulty: Small,
 ) -> None:
-    who = ("--rater", "R1", "--session", "test", "--grades", "simulated")
-    run = ("run", small[0].root, *who, "--quiet")
-    done = Caller(monkeypatch, capsys).at_a_terminal(*run)
-    assert (done.code, done.out, done.err) == (0, "", "")
+    study, protocol = faulty
+    said = by_console(faulty, "\nskip\nskip too fast\n" + "\nSKIP again\n" * 2)
+    assert "To skip it needs a reason" in said
+    log = read_log(study.log_file("R1", "test"))
+    assert [event.kind for event in log[1:]] == [
+        *["presented", "fault", "skipped"] * 3,
+        "complete",
+    ]
+    place = {"code": codes(faulty)[0], "position": 1}
+    assert log[3].fields == {**place, "who": "R1", "why": "too fast"}
+    assert grades(faulty) == [None, None, None]
+    verification = verify_study(study)
+    assert not verification.findings
+    (record,) = (r for r in verification.sessions if r.stage == "complete")
+    assert (record.n_graded, record.n_skipped) == (0, 3)
+    remarks = study_remarks(study, protocol)
+    assert len(remarks) == 3
+    assert "skipped after a fault by R1: too fast. Its grade is missing" in remarks[0]
+    out, _ = typed("verify", study.root)
+    assert "complete, 0 of 3 graded, 3 skipped, 3 rec" in out
+
+
+def test_a_fault_is_skipped_later_and_its_grade_given_later_still(
+    faulty: Small,
+) -> None:
+    study, protocol = faulty
+    with pytest.raises(DeviceError):
+        by_console(faulty, "\nno\n")
+    first, second, _ = codes(faulty)
+    said, _ = typed("record", "skip", study.root, *R1, "--code", first, *KIM)
+    assert f"{first} of R1, session test, is skipped" in said
+    with pytest.raises(SessionLogError, match=r"and is not skipped yet \(none\)"):
+        record_skip(study, "R1", "test", code=first, **BY)
+    with pytest.raises(SessionLogError, match=r"was presented \(.*\), got"):
+        record_correction(*faulty, "R1", "test", code=second, grade="1", **BY)
+    assert "Presentation 1 of 3" not in by_console(faulty, "\nskip a\n\nskip b\n")
+    correct = ("record", "correct", study.root, *R1, "--code", first)
+    typed(*correct, "--grade", "1+", *KIM)
+    assert grades(faulty) == ["1+", None, None]
+    assert len(study_remarks(study, protocol)) == 2
+    assert not verify_study(study).findings
+
+
+def test_a_grade_is_corrected_to_missing_and_back_and_not_skipped(small: Small) -> None:
+    study, _ = small
+    run(small, ScriptGrades(["1", "2", "3"]))
+    first = codes(small)[0]
+    correct = ("record", "correct", study.root, *R1, "--code", first, *KIM)
+    said, _ = typed(*correct, "--grade", "NA")
+    assert f"{first} of R1, session test, is now missing" in said
+    assert grades(small) == [None, "2", "3"]
+    with pytest.raises(SessionLogError, match="needed a code that has a grade"):
+        record_correction(*small, "R1", "test", code=first, grade=None, **BY)
+    with pytest.raises(SessionLogError, match="needed a code that a fault stopped"):
+        record_skip(small[0], "R1", "test", code=first, **BY)
+    assert not verify_study(study).findings
+    for _ in range(2):
+        said, _ = typed(*correct, "--grade", "4")
+        assert f"{first} of R1, session test, is now 4" in said
+    assert grades(small) == ["4", "2", "3"]
+
+
+def test_what_was_presented_and_graded_late_is_not_presented_again(
+    small: Small,
+) -> None:
+    with pytest.raises(RuntimeError, match="stopped on request"):
+        by_console(small, "\nstop\n")
+    record_correction(*small, "R1", "test", code=codes(small)[0], grade="2", **BY)
+    assert "Presentation 1 of 3" not in by_console(small, "\n1\n\n3\n")
+    assert grades(small) == ["2", "1", "3"]
+    assert not verify_study(small[0]).findings
+
+
+def test_a_grade_is_corrected_at_the_console_while_the_session_runs(
+    small: Small,
+) -> None:
+    first, second, _ = codes(small)
+    lines = [
+        *["", "1+"],
+        f"correct {first}",  # neither grade nor reason
+        f"correct {second} 2 it was softer",  # has no grade yet
+        f"correct {first} 5 it was softer",  # no grade of the scale
+        *["", f"correct {first} 2 pressed the wrong key", "3"],
+        *[f"correct {second} NA the arm was held wrongly", "", "0"],
+    ]
+    said = by_console(small, "".join(f"{line}\n" for line in lines))
+    assert grades(small) == ["2", None, "0"]
+    log = read_log(small[0].log_file("R1", "test"))
+    corrections = [event.fields for event in log if event.kind == "correction"]
+    assert [(c["code"], c["grade"], c["why"]) for c in corrections] == [
+        (first, "2", "pressed the wrong key"),
+        (second, None, "the arm was held wrongly"),
+    ]
+    assert said.count("correct CODE GRADE WHY") == 2
+    assert f"needed a code that was graded ({first}), got '{second}'" in said
+    assert verify_study(small[0]).is_whole
+
+
+def test_corrections_are_in_the_report_and_only_if_there_are_any(
+    new_study: Callable[..., Small],
+) -> None:
+    brief = '[report]\nsections = ["design"]\n\n[schedule]'
+    study, protocol = small = new_study(("[schedule]", brief))
+    run(small, ScriptGrades(["1", "2", "3"]))
+
+    def page(*options: str) -> str:
+        typed("report", study.root, *options)
+        return (study.root / "report" / "report.md").read_text(encoding="utf-8")
+
+    assert "Corrected grades" not in page()
+    shown = read_schedule(study.schedule_file("R1", "test")).presentations[1]
+    for grade in (None, "4"):
+        record_correction(*small, "R1", "test", code=shown.code, grade=grade, **BY)
+    facts = {"session": "test", "rater": "R1", "model": shown.model, "repeat": 1}
+    made = partial(Correction, first_grade="2", **facts, **BY)  # type: ignore[arg-type]
+    corrections = corrections_of(study, protocol)
+    assert corrections == (made(grade=None), made(grade="4"))
+    text = page()
+    assert "Corrected grades" in text
+    assert "| 2 | 4 |" in text
+    assert not [private for private in ("Kim", "the motor is hot") if private in text]
+    assert "| 2 | 4 | the motor is hot |" in page("--include", "notes")
+    assert f"{shown.model} | 1 | 2 | 4 | Kim |" in page("--include", "who")
+
+
+@pytest.mark.parametrize("source", ["a person", "both"])
+def test_who_graded_and_on_which_device_are_two_facts_and_both_are_said(
+    new_study: Callable[..., Small], source: str
+) -> None:
+    short = '[report]\nsections = ["design", "intended"]\n\n[simulated_raters]'
+    small = study, protocol = new_study(("[simulated_raters]", short))
+    by_console(small, "\n1\n\n2\n\n3\n")
+    other = console("\n1\n\n2\n\n3\n")[0] if source == "a person" else None
+    second = other or SimulatedGrades(protocol)
+    run_session(*small, "R2", "test", grades=second, clock="simulated")
+    logged = ratings_from_logs(*small)
+    assert (logged.simulated, logged.n_from_persons) == (True, 3 if not other else 6)
+    write_ratings(logged, study.ratings_file)
+    read = read_study_ratings(study.ratings_file, scale_of(protocol))
+    for table in (logged.table, read.table):
+        columns = (table["rater"], table["grades_from"], table["device"])
+        assert set(zip(*columns, strict=True)) == {
+            ("R1", "console", "simulated"),
+            ("R2", second.name, "simulated"),
+        }
+    typed("report", study.root, "--quiet")
+    for file in (Path("report.html"), Path("report.md")):
+        text = (study.report / file).read_text("utf-8")
+        if other:
+            assert "no person" not in text
+            assert "every simulated rater" not in text
+            assert "SIMULATED DATA" not in text
+            assert "SIMULATED DEVICE – persons gave these grades, none of them" in text
+            assert "Simulated device." in text
+        else:
+            assert "no person gave some of these grades" in text
+            assert "console: R1; simulated: R2" in text

@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -74,10 +73,35 @@ def go_on(small: Small) -> None:
     run_session(*small, "R1", "test", grades=grades, clock="simulated")
 
 
-def killed_at(root: Path, line: int, n_bytes: int) -> None:
-    command = [sys.executable, str(KILLER), str(root), str(line), str(n_bytes)]
-    died = subprocess.run(command, capture_output=True, text=True)
-    assert died.returncode == -signal.SIGKILL, died.stderr
+def killed(
+    small: Small, folder: Path, mode: str, number: int, n_copies: int
+) -> list[StudyPaths]:
+    """Copies of a study whose session was killed; of moments the first is whole."""
+    copies = [StudyPaths(folder / f"killed_{n}") for n in range(n_copies)]
+    for copy in copies:
+        shutil.copytree(small[0].root, copy.root)
+    roots = [str(copy.root) for copy in copies]
+    command = [sys.executable, str(KILLER), mode, str(number), *roots]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return copies
+
+
+def gone_on_with(
+    copy: StudyPaths, protocol: Protocol, expected: pd.DataFrame
+) -> tuple[int, tuple[Event, ...], set[str]]:
+    """Go on with a session that was killed -> lines it had, its events, recordings."""
+    log = copy.log_file("R1", "test")
+    before = whole_lines(log)
+    go_on((copy, protocol))
+    assert whole_lines(log)[: len(before)] == before
+    events = read_log(log)
+    # every recording is in the log, also of a presentation that was not logged
+    named = {str(e.fields.get("recording")) for e in events} - {"None"}
+    assert named == {f"test_R1/{f.name}" for f in copy.sessions.glob("*/*.npz")}
+    assert not list(copy.sessions.glob("*/*.partial"))
+    assert ratings_of(copy, protocol).equals(expected)
+    return len(before), events, named
 
 
 @pytest.mark.slow
@@ -86,42 +110,21 @@ def killed_at(root: Path, line: int, n_bytes: int) -> None:
 def test_killed_at_each_line_and_gone_on_with_it_is_as_if_never_killed(
     new_study: Callable[..., Small], tmp_path: Path, n_bytes: int, faults: Faults
 ) -> None:
-    study, protocol = new_study(OCCASIONS)
-    # All runs go at once; each in a copy of the study.
-    copies = {}
-    for line in range(1, len(KINDS) + 1):
-        copies[line] = StudyPaths(tmp_path / f"killed_{line}")
-        shutil.copytree(study.root, copies[line].root)
-    go_on((study, protocol))
+    study, protocol = small = new_study(OCCASIONS)
+    copies = killed(small, tmp_path, "line", n_bytes, len(KINDS))
+    go_on(small)
     expected = ratings_of(study, protocol)
     whole = read_log(study.log_file("R1", "test"))
     assert [event.kind for event in whole] == KINDS
-    for line, copy in copies.items():
+    for line, copy in enumerate(copies, start=1):
         with faults("a session killed at each line of its log, and gone on with"):
-            killed_at(copy.root, line, n_bytes)
-            log = copy.log_file("R1", "test")
-            before = whole_lines(log)
-            assert len(before) == line - 1
-            go_on((copy, protocol))
-            after = whole_lines(log)
-            assert after[: len(before)] == before
-            events = read_log(log)
+            n_before, events, recordings = gone_on_with(copy, protocol, expected)
+            assert n_before == line - 1
             for kind in ("grade", "practice-grade", "answered", "break", "instructed"):
                 assert facts(events, kind) == facts(whole, kind)
             assert ("recovered" in {e.kind for e in events}) is (n_bytes > 0)
-            # every recording is in the log, also of a presentation that was not logged
-            named = {str(e.fields.get("recording")) for e in events} - {"None"}
-            there = {f"test_R1/{f.name}" for f in copy.sessions.glob("*/*.npz")}
-            assert there == named
-            assert not list(copy.sessions.glob("*/*.partial"))
-            is_cut = KINDS[line - 1] in (
-                "presented",
-                "practised",
-                "grade",
-                "practice-grade",
-            )
-            assert len(there) == 4 + is_cut
-            assert ratings_of(copy, protocol).equals(expected)
+            presented = ("presented", "practised", "grade", "practice-grade")
+            assert len(recordings) == 4 + (KINDS[line - 1] in presented)
             assert verify_study(copy).is_whole
 
 
@@ -162,12 +165,14 @@ def test_the_command_killed_from_outside_goes_on(small: Small) -> None:
     assert ratings_from_logs(study, protocol).table["grade"].notna().all()
 
 
-def n_sampled(study: StudyPaths) -> int:
-    # How many samples the presentation that is going on has left so far
+def n_kept(study: StudyPaths) -> dict[str, int]:
+    """Samples of presentations that go on, by the file that will have them."""
+    kept = {}
     for partial in study.sessions.glob("*/*.partial"):
         words = partial.read_bytes()[4096:4104]
-        return int(np.frombuffer(words)[0]) if len(words) == 8 else 0
-    return 0
+        if not partial.with_suffix(".npz").exists() and len(words) == 8:
+            kept[partial.stem] = int(np.frombuffer(words)[0])
+    return kept
 
 
 def test_killed_in_the_middle_of_a_presentation_its_recording_is_kept(
@@ -183,7 +188,7 @@ def test_killed_in_the_middle_of_a_presentation_its_recording_is_kept(
     log = study.log_file("R1", "test")
     with subprocess.Popen(command, stderr=subprocess.DEVNULL) as process:
         deadline = time.monotonic() + 60
-        while n_sampled(study) < 50 and time.monotonic() < deadline:
+        while sum(n_kept(study).values()) < 50 and time.monotonic() < deadline:
             time.sleep(0.01)
         process.kill()
     n_before = len(whole_lines(log))
@@ -201,17 +206,6 @@ def test_killed_in_the_middle_of_a_presentation_its_recording_is_kept(
 
 
 FREE = ("[schedule]", '[presentation]\nstretches = "free"\n\n[schedule]')
-MOMENTS = Path(__file__).with_name("kill_at_moments.py")
-
-
-def n_kept(study: StudyPaths) -> dict[str, int]:
-    # Samples of presentations that were going on, by the file that will have them
-    kept = {}
-    for partial in study.sessions.glob("*/*.partial"):
-        words = partial.read_bytes()[4096:4104]
-        if not partial.with_suffix(".npz").exists() and len(words) == 8:
-            kept[partial.stem] = int(np.frombuffer(words)[0])
-    return kept
 
 
 @pytest.mark.parametrize(
@@ -224,35 +218,20 @@ def n_kept(study: StudyPaths) -> dict[str, int]:
 def test_killed_at_any_moment_of_many_stretches_nothing_that_was_logged_is_lost(
     new_study: Callable[..., Small], tmp_path: Path, n_kills: int, faults: Faults
 ) -> None:
-    study, protocol = new_study(OCCASIONS, FREE)
-    whole = StudyPaths(tmp_path / "whole")
-    copies = [StudyPaths(tmp_path / f"killed_{n}") for n in range(n_kills)]
-    for copy in (whole, *copies):
-        shutil.copytree(study.root, copy.root)
-    roots = [str(copy.root) for copy in (whole, *copies)]
-    command = [sys.executable, str(MOMENTS), str(n_kills), *roots]
-    killed = subprocess.run(command, capture_output=True, text=True)
-    assert killed.returncode == 0, killed.stderr
+    _, protocol = small = new_study(OCCASIONS, FREE)
+    whole, *copies = killed(small, tmp_path, "moment", n_kills, n_kills + 1)
     expected = ratings_of(whole, protocol)
     assert expected["n_stretches"].max() > 1
     n_cut = 0
     for copy in copies:
         with faults("a session killed at a random moment, and gone on with"):
-            log = copy.log_file("R1", "test")
-            before, kept = whole_lines(log), n_kept(copy)
-            go_on((copy, protocol))
-            after = whole_lines(log)
-            assert after[: len(before)] == before
-            events = read_log(log)
+            kept = n_kept(copy)
+            _, events, _ = gone_on_with(copy, protocol, expected)
             graded = [e.fields["code"] for e in events if e.kind == "grade"]
             assert len(graded) == len(set(graded)) == 3
-            named = {str(e.fields.get("recording")) for e in events} - {"None"}
-            assert named == {f"test_R1/{f.name}" for f in copy.sessions.glob("*/*.npz")}
-            assert not list(copy.sessions.glob("*/*.partial"))
             for stem, n_samples in kept.items():
                 if n_samples > 0:  # else it had not begun
                     file = copy.sessions / "test_R1" / f"{stem}.npz"
                     assert read_recording(file).n_samples == n_samples
                     n_cut += 1
-            assert ratings_of(copy, protocol).equals(expected)
     assert n_cut > n_kills / 2

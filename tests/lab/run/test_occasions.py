@@ -1,7 +1,9 @@
 """Instructions, practice, breaks, order of sessions, coming back, questionnaires."""
 
+import contextlib
 import io
 from collections.abc import Callable
+from contextlib import nullcontext
 from datetime import UTC, datetime, timedelta
 
 import pytest
@@ -33,6 +35,7 @@ from masrel.lab.run import (
 from masrel.lab.schedule import read_schedule
 from masrel.lab.verification import verify_study
 from tests.lab.run.test_command import typed
+from tests.lab.run.test_session import console
 
 New = Callable[..., tuple[StudyPaths, Protocol]]
 
@@ -139,29 +142,19 @@ def test_a_session_has_instructions_practice_and_breaks(new_study: New) -> None:
     recording = read_recording(study.sessions / str(practised[0]["recording"]))
     assert recording.facts["practice"] is True
     assert verify_study(study).findings == ()
-
-
-def test_practice_is_no_rating(new_study: New) -> None:
-    study, protocol = new_study(("[schedule]", OCCASIONS))
-    run(study, protocol)
-    table = ratings_from_logs(study, protocol).table
-    assert len(table) == 3
+    table = ratings_from_logs(study, protocol).table  # practice is no rating
     assert sorted(table["grade"]) == ["1", "1+", "2"]
     assert "P1" not in study.schedule_file("R1", "test").read_text()
-
-
-def test_a_code_for_practice_is_no_model_of_the_study(new_study: New) -> None:
-    study, protocol = new_study(('"D1"', '"P1"'), ("[schedule]", OCCASIONS))
-    run(study, protocol)
-    codes = [e.fields["code"] for e in events_of(study) if e.kind == "practised"]
-    assert codes == ["P2", "P3"]
+    ids = [("[schedule]", OCCASIONS), ('"D1"', '"P1"')]
+    of_a_model, protocol = new_study(*ids, name="of a model")
+    run(of_a_model, protocol)
+    practised = [e for e in events_of(of_a_model) if e.kind == "practised"]
+    assert [e.fields["code"] for e in practised] == ["P2", "P3"]
 
 
 def test_the_console_says_what_is_practice_and_what_a_break(new_study: New) -> None:
     study, protocol = new_study(("[schedule]", OCCASIONS))
-    answers = io.StringIO("\n" + "\n2\n" * 4 + "what\n\n" + "\n2\n")
-    shown = io.StringIO()
-    grades = ConsoleGrades(scale_of(protocol), answers=answers, questions=shown)
+    grades, shown = console("\n" + "\n2\n" * 4 + "what\n\n" + "\n2\n")
     run(study, protocol, grades=grades)
     text = shown.getvalue()
     assert text.startswith("Hold the wrist.\nEnter to go on, stop to stop: PRACTICE, ")
@@ -178,15 +171,11 @@ def test_a_stopped_session_goes_on_before_what_was_not_over(
     study, protocol = new_study(("[schedule]", OCCASIONS))
     lines = ["", *["", "2"] * 4, "", *["", "2"]]
 
-    def console(texts: list[str]) -> ConsoleGrades:
-        answers = io.StringIO("".join(f"{text}\n" for text in texts))
-        return ConsoleGrades(
-            scale_of(protocol), answers=answers, questions=io.StringIO()
-        )
-
-    with pytest.raises(SessionStoppedError):
-        run(study, protocol, grades=console([*lines[:n_lines], "stop"]))
-    run(study, protocol, grades=console(lines[n_lines:]))
+    for texts in ([*lines[:n_lines], "stop"], lines[n_lines:]):
+        stops = pytest.raises(SessionStoppedError)
+        with stops if texts[-1] == "stop" else nullcontext():
+            typed = "".join(f"{text}\n" for text in texts)
+            run(study, protocol, grades=console(typed)[0])
     kinds = kinds_of(study)
     for kind, n in (("instructed", 1), ("break", 1), ("grade", 3), ("stopped", 1)):
         assert kinds.count(kind) == n, kind
@@ -200,49 +189,37 @@ AFTER = (
 )
 
 
+@pytest.mark.parametrize("policy", ["refuse", "warn"])
 @pytest.mark.parametrize(
     ("day", "problem"),
     [
         (None, "session test complete before it, got one that is not"),
         (6, "at least 7 days after session test, got 6"),
+        (7, ""),
+        (14, ""),
         (15, "at most 14 days after session test, got 15"),
     ],
 )
-def test_a_session_out_of_order_is_refused_and_leaves_no_log(
-    new_study: New, day: int | None, problem: str
+def test_a_session_out_of_order_is_refused_or_its_log_says_so(
+    new_study: New, day: int | None, problem: str, policy: str
 ) -> None:
-    study, protocol = new_study(AFTER)
+    old, new = AFTER
+    study, protocol = new_study((old, f'{new}\norder_policy = "{policy}"'))
     if day is not None:
         run(study, protocol, now=at(0))
-    with pytest.raises(
-        ParameterError, match=f"protocol.toml: sessions.retest: needed {problem}"
-    ):
+    match = f"protocol.toml: sessions.retest: needed {problem}"
+    with contextlib.ExitStack() as said:
+        if problem and policy == "refuse":
+            said.enter_context(pytest.raises(ParameterError, match=match))
+        elif problem:
+            said.enter_context(pytest.warns(MasrelWarning, match=match))
         run(study, protocol, session="retest", now=at(day or 0))
-    assert events_of(study, "retest") == ()
-
-
-@pytest.mark.parametrize("day", [7, 14])
-def test_the_log_has_the_days_between_sessions(new_study: New, day: int) -> None:
-    study, protocol = new_study(AFTER)
-    run(study, protocol, now=at(0))
-    run(study, protocol, session="retest", now=at(day))
-    (interval,) = [e.fields for e in events_of(study, "retest") if e.kind == "interval"]
-    assert interval == {
-        "after": "test",
-        "days": day,
-        "at_least_days": 7,
-        "at_most_days": 14,
-        "kept": True,
-    }
-
-
-def test_a_warned_session_begins_and_its_log_says_it(new_study: New) -> None:
-    old, new = AFTER
-    study, protocol = new_study((old, f'{new}\norder_policy = "warn"'))
-    with pytest.warns(MasrelWarning, match="needed session test complete before it"):
-        run(study, protocol, session="retest")
-    (interval,) = [e.fields for e in events_of(study, "retest") if e.kind == "interval"]
-    assert (interval["days"], interval["kept"]) == (None, False)
+    events = events_of(study, "retest")
+    assert (events == ()) is (problem != "" and policy == "refuse")
+    for interval in (e.fields for e in events if e.kind == "interval"):
+        days = {"days": day, "at_least_days": 7, "at_most_days": 14}
+        assert interval == {"after": "test", **days, "kept": not problem}
+    assert ("interval" in [e.kind for e in events]) is (events != ())
 
 
 class StopsAtTheSecond(ScriptGrades):
@@ -313,7 +290,13 @@ def test_a_rater_is_asked_whether_to_go_on(
 
 def test_every_kind_of_questionnaire_is_asked_when_it_is_due(new_study: New) -> None:
     study, protocol = new_study(("[schedule]", QUESTIONS))
-    run(study, protocol)
+    with pytest.raises(
+        ParameterError,
+        match=r"answer to realism\.score by R1 in session test: needed a whole number, "
+        "1 to 10, got 11",
+    ):
+        run(study, protocol, grades=script(realism_score=11))
+    run(study, protocol)  # it is asked for again
     answered = [e.fields for e in events_of(study) if e.kind == "answered"]
     codes = [e.fields["code"] for e in events_of(study) if e.kind == "grade"]
     assert [(f["question"], f["code"], f["answer"]) for f in answered] == [
@@ -329,28 +312,10 @@ def test_every_kind_of_questionnaire_is_asked_when_it_is_due(new_study: New) -> 
     assert verify_study(study).findings == ()
 
 
-def test_an_answer_off_its_range_is_refused_and_asked_for_again(
-    new_study: New,
-) -> None:
-    study, protocol = new_study(("[schedule]", QUESTIONS))
-    with pytest.raises(
-        ParameterError,
-        match=r"answer to realism\.score by R1 in session test: needed a whole number, "
-        "1 to 10, got 11",
-    ):
-        run(study, protocol, grades=script(realism_score=11))
-    run(study, protocol)
-    kinds = kinds_of(study)
-    assert kinds.count("grade") == 3
-    assert kinds.count("answered") == 5
-
-
 def test_the_console_asks_until_there_is_an_answer(new_study: New) -> None:
     study, protocol = new_study(("[schedule]", QUESTIONS))
     each = "\n1\n33.5\n"
-    answers = io.StringIO(each * 3 + "11\n\n7\n\n")
-    shown = io.StringIO()
-    grades = ConsoleGrades(scale_of(protocol), answers=answers, questions=shown)
+    grades, shown = console(each * 3 + "11\n\n7\n\n")
     run(study, protocol, grades=grades)
     text = shown.getvalue()
     question = "(a whole number, 1 to 10; 10: like a patient's; stop): "

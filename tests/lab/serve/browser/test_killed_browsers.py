@@ -1,14 +1,9 @@
 """A browser that dies at any moment takes no grade with it, and leaves none twice."""
 
-import contextlib
 import os
 import random
-import shutil
 import signal
-import subprocess
 import threading
-import time
-from pathlib import Path
 
 import pytest
 from playwright.sync_api import Error, Playwright
@@ -20,101 +15,20 @@ from tests.lab.serve.browser.visitors import Rater
 GRADES = ("0", "1", "1+", "2", "3", "4")
 
 
-class Mortal:
-    """A Chromium of its own, which can be killed with all its processes."""
-
-    def __init__(self, playwright: Playwright, folder: Path) -> None:
-        profile = (
-            "--headless",
-            "--remote-debugging-port=0",
-            f"--user-data-dir={folder}",
-        )
-        self._process = subprocess.Popen(
-            [str(CHROMIUM), *FLAGS, *profile],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
-        port = folder / "DevToolsActivePort"
-        while not port.exists() or "\n" not in port.read_text():
-            time.sleep(0.02)
-        number = port.read_text().split("\n")[0]
-        try:
-            self.browser = playwright.chromium.connect_over_cdp(
-                f"http://127.0.0.1:{number}"
-            )
-        except Error:
-            self.kill()
-            raise
-
-    def kill(self) -> None:
-        """Kill it as a tablet dies whose battery is empty."""
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(self._process.pid, signal.SIGKILL)
-        self._process.wait()
-
-
 def grade_of(code: str) -> str:
     """Return which grade a code is given, so that a mix-up is seen."""
     return GRADES[sum(code.encode()) % len(GRADES)]
 
 
-class Grading:
-    """A rater who grades until all is over; what the page said is saved is kept."""
-
-    def __init__(self) -> None:
-        self.saved: dict[str, str] = {}  # by code
-
-    def go_on(self, rater: Rater) -> None:
-        """Answer whatever is asked, until the session is over."""
-        while rater.wait_for("instructions", "ready", "grade", "over") != "over":
-            heading = rater.page.locator("h1").inner_text()
-            code = heading.split()[-1].strip(",")
-            if (shown := rater.screen) == "grade":
-                rater.grade = grade_of(code)
-            rater.answer()
-            if shown == "grade":
-                self.saved[code] = grade_of(code)
-
-
-def go_through(
-    playwright: Playwright, stage: Stage, folder: Path, *, kills: int, seed: int
-) -> int:
-    """Take sessions to their ends while browsers die -> how many sessions."""
-    moments, n_sessions, n_kills = random.Random(seed), 0, 0
-    while n_kills < kills:
-        n_sessions += 1
-        stage.enter(f"R{n_sessions}")
-        stage.coordinator.start(stage.rater)
-        grading = Grading()
-        while not is_over(stage):
-            shutil.rmtree(folder, ignore_errors=True)
-            folder.mkdir()
-            try:
-                mortal = Mortal(playwright, folder)
-            except Error:  # too busy a machine for it to come up
-                continue
-            context = mortal.browser.new_context(viewport=TABLET, has_touch=True)
-            rater = Rater(context, stage.server.new_address("rater"))
-            death = threading.Timer(moments.uniform(0.0, 2.5), mortal.kill)
-            if n_kills < kills:
-                death.start()
-            try:
-                grading.go_on(rater)
-            except Error:
-                n_kills += 1
-            finally:
-                death.cancel()
-                mortal.kill()
-        in_log = {
-            event.fields["code"]: event.fields["grade"]
-            for event in stage.log()
-            if event.kind == "grade"
-        }
-        assert stage.is_complete()  # each code graded once
-        assert in_log == {code: grade_of(code) for code in in_log}
-        assert grading.saved.items() <= in_log.items()
-    return n_sessions
+def grade_until_over(rater: Rater, saved: dict[str, str]) -> None:
+    """Answer whatever is asked; what the page said is saved is kept, by code."""
+    while rater.wait_for("instructions", "ready", "grade", "over") != "over":
+        heading = rater.page.locator("h1").inner_text()
+        code = heading.split()[-1].strip(",")
+        shown, rater.grade = rater.screen, grade_of(code)
+        rater.answer()
+        if shown == "grade":
+            saved[code] = grade_of(code)
 
 
 def is_over(stage: Stage) -> bool:
@@ -128,7 +42,35 @@ def is_over(stage: Stage) -> bool:
     [pytest.param(5, marks=pytest.mark.slow), pytest.param(50, marks=pytest.mark.long)],
 )
 def test_no_grade_is_lost_or_doubled_where_browsers_are_killed(
-    playwright: Playwright, make_stage: MakeStage, tmp_path: Path, kills: int
+    playwright: Playwright, make_stage: MakeStage, kills: int
 ) -> None:
-    stage = make_stage(n_raters=30, n_models=4)
-    go_through(playwright, stage, tmp_path / "profile", kills=kills, seed=20)
+    stage, moments = make_stage(n_raters=30, n_models=4), random.Random(20)
+    raters = iter(f"R{number}" for number in range(1, 31))
+    while kills:
+        stage.enter(next(raters))
+        stage.coordinator.start(stage.rater)
+        saved: dict[str, str] = {}
+        while not is_over(stage):
+            mortal = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+            told = mortal.new_browser_cdp_session().send("SystemInfo.getProcessInfo")
+            of_type = {each["type"]: each["id"] for each in told["processInfo"]}
+            context = mortal.new_context(viewport=TABLET, has_touch=True)
+            rater = Rater(context, stage.server.new_address("rater"))
+            # as a tablet dies whose battery is empty
+            death = threading.Timer(
+                moments.uniform(0.0, 2.5), os.kill, (of_type["browser"], signal.SIGKILL)
+            )
+            if kills:
+                death.start()
+            try:
+                grade_until_over(rater, saved)
+            except Error:
+                kills -= 1
+            finally:
+                death.cancel()
+                mortal.close()
+        graded = [event.fields for event in stage.log() if event.kind == "grade"]
+        in_log = {each["code"]: each["grade"] for each in graded}
+        assert stage.is_complete()  # each code graded once
+        assert in_log == {code: grade_of(code) for code in in_log}
+        assert saved.items() <= in_log.items()
