@@ -301,19 +301,21 @@ class Site:
         """Return a browser that was let in, with all that its page sends."""
         browser = self.browser(address)
         assert browser.get(self.access.new_address(role)).status_code == 200
-        state = browser.get(f"/{role}").json()
-        browser.headers["X-Masrel-CSRF"] = state["csrf"]
+        browser.headers["X-Masrel-CSRF"] = secret_in(browser.get(f"/{role}").text)
         browser.headers["Origin"] = self.origin
         return browser
 
 
-class Pages:
+class Pages(Site):
     """A study and its pages as they are, without a server and without limits."""
 
     def __init__(self, study: StudyPaths) -> None:
-        self.study = study
-        self.access = Access(study, origin=ORIGIN)
         self.manager = SessionManager(study, clock="simulated")
+        super().__init__(study.root)
+
+    def restart(self) -> None:
+        """Let another server take the place of the one that was there."""
+        self.access = Access(self.study, origin=ORIGIN)
         self.app = make_app(self.manager, self.access)
         self.app._with_cookie.allow = lambda _: True  # type: ignore[method-assign]
 
@@ -328,18 +330,9 @@ class Pages:
                     routes += [(method, path.replace("{action}", n)) for n in names]
         return routes
 
-    def browser(self, role: Role) -> Browser:
-        """Return a browser that was let in."""
-        browser = Browser(self.app)
-        browser.get(self.access.new_address(role))
-        browser.headers.update(
-            {"X-Masrel-CSRF": secret_in(browser.get(f"/{role}").text), "Origin": ORIGIN}
-        )
-        return browser
-
 
 def secret_in(page: str) -> str:
-    secret = re.search(r'name="csrf" content="(\w+)"', page)
+    secret = re.search(r'"csrf"(?: content=|:)"(\w+)"', page)
     assert secret is not None, page
     return secret[1]
 

@@ -1,4 +1,4 @@
-"""Who is let in, for how long, and what every answer says."""
+"""Who is let in, for how long, what each role can ask, and what every answer says."""
 
 import asyncio
 import contextlib
@@ -43,16 +43,6 @@ def restarted(site: Site, browser: Browser) -> Browser:
     return browser
 
 
-@pytest.mark.parametrize("role", ROLES)
-def test_an_address_leads_to_the_page_and_out_of_the_history(
-    site: Site, role: Any
-) -> None:
-    browser = site.browser()
-    answer = browser.get(site.access.new_address(role))
-    assert f'content="0; url=/{role}"' in answer.text
-    assert browser.get(f"/{role}").json()["role"] == role
-
-
 @pytest.mark.parametrize(
     ("origin", "name", "more"),
     [
@@ -73,7 +63,8 @@ def test_a_cookie_is_no_scripts_and_no_other_sites_and_stays_encrypted(
 
 def test_an_address_lets_in_once_and_the_browser_it_let_in_again(site: Site) -> None:
     address, browser = site.access.new_address("rater"), site.browser()
-    browser.get(address)
+    # and to the page, out of the history
+    assert 'content="0; url=/rater"' in browser.get(address).text
     tablet = browser.get("/rater").json()["tablet"]
     answer = site.browser().get(address)
     assert answer.status_code == 401
@@ -86,17 +77,14 @@ def test_an_address_lets_in_once_and_the_browser_it_let_in_again(site: Site) -> 
     assert "not one of this study now" in answer.text
 
 
-def test_the_oldest_of_many_addresses_lapses(site: Site) -> None:
+def test_the_oldest_of_many_addresses_lapses_and_no_other_token_lets_in(
+    site: Site,
+) -> None:
     addresses = [site.access.new_address("rater") for _ in range(9)]
     other = site.access.new_address("coordinator")
-    statuses = [status(site.browser(), each) for each in (*addresses, other)]
-    assert statuses == [401, *[200] * 9]
-
-
-@pytest.mark.parametrize("token", ["", "x", "é", "%00", "x" * 400])
-def test_no_other_token_lets_in(site: Site, token: str) -> None:
-    site.access.new_address("rater")
-    assert status(site.browser(), f"/rater?token={token}") == 401
+    wrong = [f"/rater?token={token}" for token in ("", "x", "é", "%00", "x" * 400)]
+    statuses = [status(site.browser(), each) for each in (*addresses, other, *wrong)]
+    assert statuses == [401, *[200] * 9, *[401] * 5]
 
 
 def test_every_token_is_compared(site: Site, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -227,22 +215,15 @@ def test_every_answer_has_the_headers_and_a_report_runs_no_script(
     assert answer.headers["referrer-policy"] == "same-origin"
 
 
-@pytest.mark.parametrize("method", ["PUT", "DELETE", "OPTIONS", "TRACE", "PATCH"])
-def test_other_methods_are_refused(site: Site, method: str) -> None:
-    assert site.let_in().all(method, ["/rater/state"])[0].status_code == 405
-
-
-@pytest.mark.parametrize(
-    "body", [b"", b"[]", b"3", b"{", b'{"a":NaN}', b'{"a":"\\ud800"}']
-)
-def test_what_is_no_object_is_refused_in_a_sentence(site: Site, body: bytes) -> None:
-    answer = site.let_in().post("/rater/answer", body)
-    assert answer.status_code == 400
-    assert answer.json() == {"why": "What is sent needs to be an object in JSON."}
-
-
-def test_a_person_reads_why_and_what_comes_from_outside_is_text(site: Site) -> None:
-    answer = site.browser().get("/rater")
+def test_other_methods_and_bodies_are_refused_in_a_sentence(site: Site) -> None:
+    browser = site.let_in()
+    for method in ("PUT", "DELETE", "OPTIONS", "TRACE", "PATCH"):
+        assert browser.all(method, ["/rater/state"])[0].status_code == 405
+    for body in (b"", b"[]", b"3", b"{", b'{"a":NaN}', b'{"a":"\\ud800"}'):
+        answer = browser.post("/rater/answer", body)
+        assert answer.status_code == 400
+        assert answer.json() == {"why": "What is sent needs to be an object in JSON."}
+    answer = site.browser().get("/rater")  # which a person reads
     assert answer.status_code == 401
     assert answer.headers["content-type"].startswith("text/html")
     assert "needs an address that lets this browser in" in answer.text
@@ -320,33 +301,28 @@ def pages(tmp_path: Path) -> Pages:
     return Pages(small_study(tmp_path / "study", OCCASIONS))
 
 
-def statuses(pages: Pages, browser: Browser, role: str) -> set[int]:
-    return {
+@pytest.mark.parametrize(
+    ("who", "role", "expected"),
+    [
+        *(("rater", role, 403) for role in ("coordinator", "report")),
+        ("coordinator", "rater", 403),
+        *((None, role, 401) for role in ACTIONS),
+    ],
+)
+def test_a_role_sees_and_does_nothing_of_the_other_and_a_stranger_nothing_at_all(
+    pages: Pages, who: Role | None, role: str, expected: int
+) -> None:
+    browser = pages.let_in(who) if who else pages.browser()
+    browser.headers["Origin"] = ORIGIN
+    assert {
         (browser.get(path) if method == "GET" else browser.post(path)).status_code
         for method, path in pages.routes(role, ACTIONS[role])
-    }
-
-
-@pytest.mark.parametrize(
-    ("who", "role"),
-    [("rater", "coordinator"), ("rater", "report"), ("coordinator", "rater")],
-)
-def test_a_role_sees_and_does_nothing_of_the_other(
-    pages: Pages, who: Role, role: str
-) -> None:
-    assert statuses(pages, pages.browser(who), role) == {403}
-
-
-@pytest.mark.parametrize("role", ACTIONS)
-def test_a_stranger_sees_nothing(pages: Pages, role: str) -> None:
-    browser = Browser(pages.app)
-    browser.headers["Origin"] = ORIGIN
-    assert statuses(pages, browser, role) == {401}
+    } == {expected}
 
 
 @pytest.mark.parametrize("role", ["rater", "coordinator"])
 def test_nothing_is_done_without_the_pages_secret(pages: Pages, role: Role) -> None:
-    browser = pages.browser(role)
+    browser = pages.let_in(role)
     del browser.headers["X-Masrel-CSRF"]
     for action in ACTIONS[role]:
         assert browser.post(f"/{role}/{action}").status_code == 403
@@ -364,7 +340,7 @@ def bodies(number: int) -> Iterator[dict[str, object]]:
 @pytest.mark.slow
 @pytest.mark.parametrize("role", ["rater", "coordinator"])
 def test_nothing_that_is_sent_makes_a_page_fail(pages: Pages, role: Role) -> None:
-    browser = pages.browser(role)
+    browser = pages.let_in(role)
 
     async def send() -> set[int]:
         transport, answers = httpx.ASGITransport(pages.app), set()
@@ -441,4 +417,4 @@ def test_no_answer_ends_a_session(pages: Pages) -> None:
     ],
 )
 def test_nothing_else_is_there(pages: Pages, path: str) -> None:
-    assert pages.browser("coordinator").get(path).status_code in (403, 404)
+    assert pages.let_in("coordinator").get(path).status_code in (403, 404)

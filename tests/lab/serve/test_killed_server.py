@@ -4,7 +4,6 @@ import random
 import sys
 import threading
 import time
-from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,9 +13,10 @@ import httpx
 import numpy as np
 import pytest
 
-from masrel.lab.protocol import StudyPaths, copy_template
+from masrel.lab.conduct import allot_schedules
+from masrel.lab.protocol import StudyPaths, copy_template, read_protocol
 from masrel.lab.recording import read_recording
-from masrel.lab.run import read_log
+from masrel.lab.run import SimulatedGrades, read_log, run_session
 from tests.benchmarks.bench_serve import Lateness, Stops, by_the_browser, long_study
 from tests.cli.process import Caller
 from tests.faults import Faults
@@ -247,81 +247,65 @@ def test_an_emergency_stop_comes_through_a_flood(tmp_path: Path) -> None:
     assert len(took_s) == 4
 
 
-FORMS = ("bids", "ro-crate")
-
-
-@pytest.fixture
-def masrel(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Caller:
-    return Caller(monkeypatch, capsys)
-
-
-def served(masrel: Caller, root: Path, *raters: str) -> StudyPaths:
-    """Make a site whose two raters have graded, and that was served."""
-    study = StudyPaths(root)
-    copy_template("small", root)
-    text = study.protocol.read_text()
-    for old, new in zip(("R1", "R2"), raters, strict=True):
-        text = text.replace(f'"{old}"', f'"{new}"')
-    study.protocol.write_text(text)
-    study.secret_file.parent.mkdir(mode=0o700)
-    study.secret_file.write_text(f"format: 1\nsecret: {'5a' * 16}\n")
-    session = ("--session", "test", "--grades", "simulated")
-    runs = (("run", root, "--rater", rater, *session) for rater in raters)
-    for call in (("schedule", root), *runs):
-        done = masrel(*call)
-        assert done.code == 0, done.err
-    serve(study, raters[0])
-    return study
-
-
-def serve(study: StudyPaths, rater: str) -> None:
-    """Let a tablet in."""
+def serve(study: StudyPaths, rater: str) -> list[bytes]:
+    """Let a tablet in -> what nobody else may know of it."""
     with alone(study):
         site = Site(study.root)
         site.browser().get(site.access.new_address("rater", rater=rater))
-
-
-def secrets(study: StudyPaths) -> list[bytes]:
-    """What nobody else may know."""
     key = study.serve_key_file.read_text().split("key: ")[1].strip()
     tablets = study.serve_key_file.with_name("tablets").read_text()
     (tablet,) = (word for word in tablets.split('"') if len(word) == 32)
     return [key.encode(), tablet.encode()]
 
 
-def holding(folder: Path, texts: list[bytes]) -> Iterator[str]:
-    """Names of files that hold one of these."""
-    for path in sorted(folder.rglob("*")):
-        if path.is_file() and any(text in path.read_bytes() for text in texts):
-            yield path.name
+def holding(folder: Path, texts: list[bytes]) -> list[str]:
+    """Names of files that hold one of these, or are the server's."""
+    return [
+        path.name
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+        and (
+            any(text in path.read_bytes() for text in texts)
+            or path.name.startswith("serve.")
+        )
+    ]
 
 
 @pytest.mark.slow
 def test_it_is_neither_merged_nor_exported_nor_reported(
-    masrel: Caller, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    north = served(masrel, tmp_path / "north", "R1", "R2")
-    south = served(masrel, tmp_path / "south", "R3", "R4")
-    merged, private = tmp_path / "merged", [*secrets(north), *secrets(south)]
-    assert list(holding(north.root, private)) == ["serve.txt", "tablets"]
-    done = masrel("merge", north.root, south.root, "-o", merged)
-    assert done.code == 0, done.err
-    assert list(holding(merged, private)) == []
-    assert not [*merged.rglob("serve.*")]
-    serve(StudyPaths(merged), "R1")
-    private += secrets(StudyPaths(merged))
-    calls = [
+    masrel, private, merged = Caller(monkeypatch, capsys), list[bytes](), "merged"
+    for site, raters in (("north", ("R1", "R2")), ("south", ("R3", "R4"))):
+        study = StudyPaths(tmp_path / site)
+        copy_template("small", study.root)
+        text = study.protocol.read_text()
+        for old, new in zip(("R1", "R2"), raters, strict=True):
+            text = text.replace(f'"{old}"', f'"{new}"')
+        study.protocol.write_text(text)
+        study.secret_file.parent.mkdir(mode=0o700)
+        study.secret_file.write_text(f"format: 1\nsecret: {'5a' * 16}\n")
+        allot_schedules(study, protocol := read_protocol(study.protocol))
+        grades = SimulatedGrades(protocol)
+        for rater in raters:
+            where = (study, protocol, rater, "test")
+            run_session(*where, grades=grades, clock="simulated")
+        private += serve(study, raters[0])
+        assert holding(study.root, private) == ["serve.lock", "serve.txt", "tablets"]
+    monkeypatch.chdir(tmp_path)
+    outputs = ("report", "bids", "ro-crate")
+    for call in (
+        ("merge", "north", "south", "-o", merged),
         ("ratings", merged),
-        ("report", merged, "-o", tmp_path / "report"),
-        *(("export", merged, "--as", form, "-o", tmp_path / form) for form in FORMS),
+        ("report", merged, "-o", "report"),
+        *(("export", merged, "--as", form, "-o", form) for form in outputs[1:]),
         ("verify", merged),
-    ]
-    for call in calls:
+    ):
         done = masrel(*call)
         assert done.code == 0, done.err
         assert "serve.txt" not in done.out + done.err
-    for name in ("report", *FORMS):
-        assert list(holding(tmp_path / name, private)) == []
-        assert not [*(tmp_path / name).rglob("serve.*")]
+        if call[0] == "merge":
+            assert holding(tmp_path / merged, private) == []
+            private += serve(StudyPaths(tmp_path / merged), "R1")
+    for name in outputs:
+        assert holding(tmp_path / name, private) == []

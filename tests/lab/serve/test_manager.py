@@ -19,7 +19,6 @@ from masrel.lab.run import ConsoleGrades, read_log, run_session
 from tests.lab.serve.pages import (
     EACH,
     OCCASIONS,
-    AnswerRefusedError,
     AskOverError,
     Page,
     SessionManager,
@@ -27,7 +26,6 @@ from tests.lab.serve.pages import (
     correction,
     kinds,
     logged,
-    n_sampled,
     small_study,
 )
 
@@ -38,28 +36,21 @@ def study(tmp_path: Path) -> StudyPaths:
     return small_study(tmp_path / "study", OCCASIONS)
 
 
-def test_the_same_answer_twice_is_entered_once_and_another_is_told(
+def test_what_is_sent_again_is_entered_once_and_another_answer_is_told(
     study: StudyPaths,
 ) -> None:
+    # by a page that never saw the answer, while the session runs and when it is over
     async def act(manager: SessionManager) -> None:
+        page = Page(manager)
         await manager.start("R1", "test")
-        ask = (await Page(manager).until("grade"))["ask"]
+        ask = (await page.until("grade"))["ask"]
         both = [manager.answer(ask, {"grade": "1"}) for _ in range(2)]
         other = manager.answer(ask, {"grade": "3"})
         results = await asyncio.gather(*both, other, return_exceptions=True)
         assert results[:2] == [None, None]
         assert isinstance(results[2], AskOverError)
         await manager.answer(ask, {"grade": "1"})  # of a tablet that was offline
-
-    at(study, act)
-    assert kinds(study).count("practice-grade") == 1
-
-
-def test_a_correction_sent_again_is_entered_once(study: StudyPaths) -> None:
-    # by a page that never saw the answer, while the session runs and when it is over
-    async def act(manager: SessionManager) -> None:
-        await manager.start("R1", "test")
-        await Page(manager).until("break")
+        await page.until("break")
         code = logged(study, "grade")[-1]["code"]
         for wrong, grade, match in (
             ("999", "2", "needed a code that was graded"),
@@ -67,53 +58,53 @@ def test_a_correction_sent_again_is_entered_once(study: StudyPaths) -> None:
         ):
             with pytest.raises(ParameterError, match=match):
                 await manager.correct("R1", "test", **correction(wrong, grade))
+        again = {**correction(code, "2"), "rehearsal": True}
         with pytest.raises(ParameterError, match="rehearsal"):
-            await manager.correct("R1", "test", **correction(code, "2"), rehearsal=True)
+            await manager.correct("R1", "test", **again)
         for grade in ("3", "3", "1", "3"):
             await manager.correct("R1", "test", **correction(code, grade))
         await manager.leave()
         await manager.correct("R1", "test", **correction(code, "3"))
 
     at(study, act)
+    assert kinds(study).count("practice-grade") == 1
     assert [each["grade"] for each in logged(study, "correction")] == ["3", "1", "3"]
 
 
-@pytest.mark.slow
-def test_a_session_that_is_left_goes_on_where_it_was(study: StudyPaths) -> None:
-    async def act(manager: SessionManager) -> None:
-        page = Page(manager)
-        for _ in range(3):
-            await manager.start("R1", "test")
-            state = await page.until("grade")
-            # what was tapped before the session is left counts
-            tap = asyncio.create_task(manager.answer(state["ask"], {"grade": "2"}))
-            await asyncio.sleep(0)
-            await manager.leave()
-            await tap
-            assert manager.state()["how"] == "stopped"
-        await manager.start("R1", "test")
-        await page.until("ready")
-        assert manager.state()["last"] is not None  # it can be corrected still
-        assert (await page.until("over"))["how"] == "complete"
-
-    at(study, act)
-    assert kinds(study).count("grade") == kinds(study).count("presented") == 4
-
-
-def test_an_answer_that_comes_after_the_session_is_left_is_not_taken(
+def test_a_session_that_is_left_or_stopped_between_presentations_goes_on_where_it_was(
     study: StudyPaths,
 ) -> None:
     async def act(manager: SessionManager) -> None:
+        page = Page(manager)
         await manager.start("R1", "test")
-        state = await Page(manager).until("grade")
+        state = await page.until("grade")
         left = asyncio.create_task(manager.leave())
         await asyncio.sleep(0)
         with pytest.raises(AskOverError, match="was stopped on request"):
             await manager.answer(state["ask"], {"grade": "2"})
         await left
+        assert "practice-grade" not in kinds(study)
+        await manager.start("R1", "test")
+        state = await page.until("grade")
+        # what was tapped before the session is left counts
+        tap = asyncio.create_task(manager.answer(state["ask"], {"grade": "2"}))
+        await asyncio.sleep(0)
+        await manager.leave()
+        await tap
+        assert manager.state()["how"] == "stopped"
+        assert kinds(study)[-2:] == ["practice-grade", "stopped"]
+        await manager.start("R1", "test")
+        await page.until("ready")
+        manager.stop("coordinator's page")
+        while (over := manager.state())["screen"] != "over":
+            await manager.changed(manager.version)
+        assert over["how"] == "stopped"
+        assert "by an emergency stop (coordinator's page)" in over["text"]
+        await manager.start("R1", "test")
+        assert (await page.until("over"))["how"] == "complete"
 
     at(study, act)
-    assert "practice-grade" not in kinds(study)
+    assert kinds(study).count("grade") == kinds(study).count("presented") == 4
 
 
 def test_one_session_runs_at_a_time_and_no_unknown_one(study: StudyPaths) -> None:
@@ -129,53 +120,6 @@ def test_one_session_runs_at_a_time_and_no_unknown_one(study: StudyPaths) -> Non
 
     at(study, act)
     assert not study.log_file("R2", "test").exists()
-
-
-@pytest.mark.slow
-def test_an_emergency_stop_is_a_fault_and_what_it_stopped_can_be_skipped(
-    tmp_path: Path,
-) -> None:
-    study = small_study(tmp_path / "study", quick=True)
-
-    async def act(manager: SessionManager) -> None:
-        page = Page(manager)
-        await manager.start("R1", "test")
-        assert (await page.until("presenting"))["ask"] is None
-        await n_sampled(manager, 20)
-        with pytest.raises(ParameterError, match="needed a presentation that is over"):
-            await manager.correct("R1", "test", **correction("999", "1"))
-        for _ in range(3):  # one press is meant
-            manager.stop("rater's page")
-        fault = await page.until("fault")
-        assert fault["why"] == "emergency stop: rater's page"
-        assert fault["may_skip"] is True
-        for wrong in ({"skip": " "}, {"again": "yes"}):
-            with pytest.raises(AnswerRefusedError, match="why not"):
-                await manager.answer(fault["ask"], wrong)
-        await manager.answer(fault["ask"], {"skip": "the arm slipped"})
-        await page.until("over")
-
-    at(study, act, clock="real")
-    assert kinds(study)[1:4] == ["presented", "fault", "skipped"]
-    (skipped,) = logged(study, "skipped")
-    assert (skipped["who"], skipped["why"]) == ("R1", "the arm slipped")
-    assert kinds(study).count("grade") == 3
-
-
-def test_an_emergency_stop_between_presentations_stops_the_session(
-    study: StudyPaths,
-) -> None:
-    async def act(manager: SessionManager) -> None:
-        await manager.start("R1", "test")
-        await Page(manager).until("ready")
-        manager.stop("coordinator's page")
-        while (over := manager.state())["screen"] != "over":
-            await manager.changed(manager.version)
-        assert over["how"] == "stopped"
-        assert "by an emergency stop (coordinator's page)" in over["text"]
-
-    at(study, act)
-    assert kinds(study)[-1] == "stopped"
 
 
 WHY = "wrong button"

@@ -10,7 +10,7 @@ from typing import Literal, get_args, get_type_hints
 import pytest
 
 import masrel.lab.serve
-from masrel.errors import MasrelError
+from masrel.errors import MasrelError, ParameterError
 from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.protocol.definition import Study
 from masrel.lab.schedule import read_schedule
@@ -19,8 +19,10 @@ from tests.lab.serve.pages import (
     OCCASIONS,
     SessionManager,
     Tablet,
+    correction,
     kinds,
     logged,
+    n_sampled,
     seen,
     small_study,
     with_tablets,
@@ -152,7 +154,9 @@ def test_a_stream_says_that_it_is_there(
     with_tablets(study, act, None)
 
 
-def test_two_tablets_one_acts_and_the_other_is_told(study: StudyPaths) -> None:
+def test_of_two_tablets_one_acts_what_it_says_is_on_disk_and_the_other_is_told(
+    study: StudyPaths,
+) -> None:
     async def act(manager: SessionManager, one: Tablet, two: Tablet) -> None:
         await manager.start("R1", "test")
         async with two.listening() as events:
@@ -171,20 +175,14 @@ def test_two_tablets_one_acts_and_the_other_is_told(study: StudyPaths) -> None:
             latest = events[-1][1]
             assert (latest["screen"], latest["ask"]) == (state["screen"], state["ask"])
 
+            for n in (2, 3):  # a grade is on disk when its answer comes
+                state = await one.until("grade")
+                await one.answer(state, grade="1+", stretch=None)
+                assert len(logged(study, "grade", "practice-grade")) == n
+                await one.answer(state, grade="1+", stretch=None)  # it was offline
+
     with_tablets(study, act, "R1", "R1")
     assert kinds(study).count("practice-grade") == 1
-
-
-def test_a_grade_is_on_disk_when_its_answer_comes(study: StudyPaths) -> None:
-    async def act(manager: SessionManager, tablet: Tablet) -> None:
-        await manager.start("R1", "test")
-        for n in range(3):
-            state = await tablet.until("grade")
-            await tablet.answer(state, grade="1+", stretch=None)
-            assert len(logged(study, "grade", "practice-grade")) == 1 + n
-            await tablet.answer(state, grade="1+", stretch=None)  # it was offline
-
-    with_tablets(study, act, "R1")
 
 
 @pytest.mark.slow
@@ -214,20 +212,32 @@ def test_done_ends_what_is_presented_and_nothing_that_comes_later(
 
 
 @pytest.mark.slow
-def test_the_emergency_stop_of_any_tablet_ends_a_presentation(tmp_path: Path) -> None:
+def test_the_emergency_stop_of_any_tablet_is_a_fault_of_what_is_presented(
+    tmp_path: Path,
+) -> None:
     study = small_study(tmp_path / "study", quick=True)
 
     async def act(manager: SessionManager, mine: Tablet, other: Tablet) -> None:
         await manager.start("R1", "test")
         await mine.answer(await mine.until("ready"), begin=True)
-        await mine.until("presenting")
+        await n_sampled(manager, 20)
+        with pytest.raises(ParameterError, match="needed a presentation that is over"):
+            await manager.correct("R1", "test", **correction("999", "1"))
         await other.done("stop")
-        state = await mine.until("fault")
-        assert state["why"].startswith("emergency stop")
-        status, _ = await mine.post("answer", ask=state["ask"], answer={"skip": " "})
-        assert status == 422
+        fault = await mine.until("fault")
+        assert fault["why"] == "emergency stop: rater's page"
+        assert fault["may_skip"] is True
+        for wrong in ({"skip": " "}, {"again": "yes"}):
+            status, _ = await mine.post("answer", ask=fault["ask"], answer=wrong)
+            assert status == 422
+        await mine.answer(fault, skip="the arm slipped")
+        await mine.until("over")
 
     with_tablets(study, act, "R1", "R2", clock="real")
+    assert kinds(study)[1:4] == ["presented", "fault", "skipped"]
+    (skipped,) = logged(study, "skipped")
+    assert (skipped["who"], skipped["why"]) == ("R1", "the arm slipped")
+    assert kinds(study).count("grade") == 3
 
 
 def words_in(language: str) -> dict[str, str]:

@@ -8,7 +8,7 @@ import signal
 import socket
 import ssl
 import sys
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import httpx
@@ -193,7 +193,7 @@ def test_what_is_no_certificate_with_its_key_is_said(
         encryption(DATA / certificate, DATA / key)
 
 
-@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root reads any")
+@pytest.mark.skipif(os.geteuid() == 0, reason="root reads any")
 def test_a_key_that_may_not_be_read_is_said(tmp_path: Path) -> None:
     key = tmp_path / "key.pem"
     key.touch(mode=0)
@@ -289,103 +289,64 @@ def study(tmp_path: Path) -> Path:
     return tmp_path / "study"
 
 
-INSTALL = "install it with: pip install 'masrel[serve]'"
-
-
-def test_a_protocol_that_cannot_be_read(masrel: Caller, study: Path) -> None:
-    (study / "protocol.toml").write_text("models = 3")
+def test_what_cannot_be_served_is_said(
+    masrel: Caller, study: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    protocol = study / "protocol.toml"
+    text = protocol.read_text()
+    protocol.write_text("models = 3")
     done = masrel("serve", study)
     assert (done.code, "protocol.toml" in done.err) == (2, True)
     assert not (study / ".key").exists()
-
-
-def test_windows_is_told_what_it_has_instead(
-    masrel: Caller, study: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    protocol.write_text(text)
+    with listen("127.0.0.1", 0) as other:
+        done = masrel("serve", study, "--port", other.getsockname()[1])
+    assert (done.code, done.err.count("\n")) == (2, 1)
+    assert "in use, perhaps by another masrel serve; --port 0 takes any" in done.err
+    if os.geteuid() != 0:  # root may open any
+        done = masrel("serve", study, "--port", 80)
+        assert done.code == 2
+        assert "--port: needed one that this user may open" in done.err
+    there: Callable[..., object] = importlib.util.find_spec
+    for library in ("starlette", "uvicorn", "segno"):
+        monkeypatch.setattr(
+            "importlib.util.find_spec",
+            lambda name, package=None, of=library: (
+                None if name == of else there(name, package)
+            ),
+        )
+        done = masrel("serve", study)
+        install = "install it with: pip install 'masrel[serve]'"
+        why = f"serve: needs {library}; {install}"
+        assert (done.code, done.out, done.err) == (2, "", f"masrel: {why}\n")
+    monkeypatch.undo()
     monkeypatch.setattr(sys, "platform", "win32")
     done = masrel("serve", study)
     why = "serve: needs Linux or macOS, got Windows; there is masrel run"
     assert (done.code, done.out, done.err) == (2, "", f"masrel: {why}\n")
 
 
-@pytest.mark.parametrize("library", ["starlette", "uvicorn", "segno"])
-def test_the_extra_is_not_installed(
-    masrel: Caller, study: Path, monkeypatch: pytest.MonkeyPatch, library: str
-) -> None:
-    there: Callable[..., object] = importlib.util.find_spec
-
-    def find(name: str, package: str | None = None) -> object:
-        return None if name == library else there(name, package)
-
-    monkeypatch.setattr("importlib.util.find_spec", find)
-    done = masrel("serve", study)
-    assert done.code == 2
-    assert done.err == f"masrel: serve: needs {library}; {INSTALL}\n"
-
-
-def test_a_port_in_use(masrel: Caller, study: Path) -> None:
-    with listen("127.0.0.1", 0) as other:
-        done = masrel("serve", study, "--port", other.getsockname()[1])
-    assert done.code == 2
-    assert "in use, perhaps by another masrel serve; --port 0 takes any" in done.err
-    assert done.err.count("\n") == 1
-
-
-@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may open any")
-def test_a_port_that_only_root_may_open(masrel: Caller, study: Path) -> None:
-    done = masrel("serve", study, "--port", 80)
-    assert done.code == 2
-    assert "--port: needed one that this user may open" in done.err
-
-
-@pytest.fixture
-def start(study: Path) -> Iterator[Callable[..., Server]]:
-    """Start it, as often as a test likes."""
-    started: list[Server] = []
-
-    def begin(*options: str, **settings: bool) -> Server:
-        started.append(Server(study, *options, **settings))
-        return started[-1]
-
-    yield begin
-    for each in started:
-        each.end(signal.SIGKILL)
-
-
 @pytest.mark.slow
-def test_two_addresses_each_with_a_qr_code_and_new_ones_at_enter(
-    start: Callable[..., Server],
+def test_the_command_serves_a_study_once_says_what_is_risked_and_ends_at_a_signal(
+    masrel: Caller, study: Path
 ) -> None:
-    server = start()
-    address = r"http://127\.0\.0\.1:\d+/{}\?token=[\w-]{{22}}"
-    for role in ("rater", "coordinator"):
-        assert len(re.findall(address.format(role), server.text)) == 1
-    assert server.text.count("\N{UPPER HALF BLOCK}") > 100
-    server.enter()
-    assert len(set(re.findall(r"token=([\w-]{22})", server.text))) == 4
-    assert server.end() == 0
-
-
-@pytest.mark.slow
-def test_a_study_is_served_once_and_the_port_says_nothing_else(
-    masrel: Caller, start: Callable[..., Server], study: Path
-) -> None:
-    server = start()
-    done = masrel("serve", study, "--port", server.port)
-    assert done.code == 2
-    assert "needed a study that nobody serves, got one that another" in done.err
-    assert server.end(signal.SIGTERM) == 0
-
-
-@pytest.mark.slow
-def test_an_open_connection_does_not_keep_it_and_what_is_risked_is_said_once(
-    start: Callable[..., Server],
-) -> None:
-    server = start(at_a_terminal=False)
-    assert "\N{UPPER HALF BLOCK}" not in server.text
-    with socket.create_connection(("127.0.0.1", server.port)) as connection:
-        connection.sendall(b"GET /rater HTTP/1.1\r\n")
-        assert server.end() == 0
-    again = start("--host=0.0.0.0", at_a_terminal=False)
-    assert again.text.count("--host 0.0.0.0 without --tls: whoever is in") == 1
-    assert again.end() == 0
+    server = Server(study)
+    try:
+        address = r"http://127\.0\.0\.1:\d+/{}\?token=[\w-]{{22}}"
+        for role in ("rater", "coordinator"):
+            assert len(re.findall(address.format(role), server.text)) == 1
+        assert server.text.count("\N{UPPER HALF BLOCK}") > 100
+        server.enter()
+        assert len(set(re.findall(r"token=([\w-]{22})", server.text))) == 4
+        done = masrel("serve", study, "--port", server.port)
+        assert done.code == 2
+        assert "needed a study that nobody serves, got one that another" in done.err
+        with socket.create_connection(("127.0.0.1", server.port)) as connection:
+            connection.sendall(b"GET /rater HTTP/1.1\r\n")  # and no more
+            assert server.end() == 0
+        server = Server(study, "--host=0.0.0.0", at_a_terminal=False)
+        assert "\N{UPPER HALF BLOCK}" not in server.text
+        assert server.text.count("--host 0.0.0.0 without --tls: whoever is in") == 1
+        assert server.end(signal.SIGTERM) == 0
+    finally:
+        server.end(signal.SIGKILL)
