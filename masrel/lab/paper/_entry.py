@@ -24,6 +24,7 @@ from masrel.lab.paper._form import (
 )
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
 from masrel.lab.run._around import interval_fields
+from masrel.lab.run._presenter import check_same
 from masrel.lab.run._state import (
     FORMAT,
     FROM_PAPER,
@@ -176,12 +177,8 @@ def _begin(
             "masrel_version": masrel.__version__,
         }
         log.append("session", {**same, **provenance})
-    for name in ("grades", *same) if state.header else ():  # which says most is first
-        if state.header.get(name) != same[name]:
-            raise SessionLogError(
-                f"{log.path}: begun with {name} = {state.header.get(name)}: needed "
-                f"{same[name]} to enter a sheet into it"
-            )
+        return
+    check_same(log.path, state.header, same)
 
 
 def _check(on: date | None, device: str, now: Callable[[], datetime]) -> None:

@@ -5,14 +5,15 @@ in words.
 """
 
 import hashlib
-import itertools
 import json
 import math
 import statistics
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
 
 from masrel.errors import ParameterError, ProtocolError
 from masrel.lab.protocol import (
@@ -165,6 +166,23 @@ class QuestionRequest:
     question: Question
     presentation: Presentation | None
     correct: Correct | None = None
+
+
+def checked_grade(
+    request: GradeRequest, grades: Sequence[str], grade: object, stretch: Any
+) -> StretchGrade:
+    """Return a grade of what was presented; ParameterError says what it cannot be."""
+    code, n_stretches = request.presentation.code, request.n_stretches
+    if not isinstance(grade, str) or grade not in grades:
+        raise ParameterError(
+            f"grade of {code}: needed one of {', '.join(grades)}, got {grade!r}"
+        )
+    is_number = type(stretch) is int and 1 <= stretch <= n_stretches  # true is none
+    if stretch is not None and not is_number:
+        raise ParameterError(
+            f"stretch of {code}: needed one of {n_stretches}, from 1, got {stretch!r}"
+        )
+    return StretchGrade(grade=grade, stretch=stretch)
 
 
 class GradeSource:
@@ -407,8 +425,9 @@ def severity(protocol: Protocol, model: Model) -> float:
         raise ProtocolError(
             "models: simulated raters need a model with an intended_grade, got none"
         )
-    anchors = sorted((height, statistics.fmean(of)) for height, of in ranks.items())
-    return _interpolated(height, anchors)
+    heights = sorted(ranks)
+    means = [statistics.fmean(ranks[each]) for each in heights]
+    return float(np.interp(height, heights, means))
 
 
 def intended_speeds(protocol: Protocol, key: _Key) -> list[float]:
@@ -443,16 +462,6 @@ def hand_seed(protocol: Protocol, rater: str) -> int:
     """Return the seed of what a rater's hand is like, in every presentation."""
     seed = protocol.simulated_raters.seed
     return int(2**52 * _uniform(seed, "hand", (rater, "", "", 0)))
-
-
-def _interpolated(height: float, anchors: list[tuple[float, float]]) -> float:
-    # anchors: (height, rank), by height
-    if height <= anchors[0][0]:
-        return anchors[0][1]
-    for (low, low_rank), (high, high_rank) in itertools.pairwise(anchors):
-        if height <= high:
-            return low_rank + (high_rank - low_rank) * (height - low) / (high - low)
-    return anchors[-1][1]
 
 
 def _uniform(seed: int, purpose: str, key: _Key, *further: int) -> float:

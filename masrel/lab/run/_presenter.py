@@ -1,19 +1,31 @@
 """Present one model until it is graded or skipped, and log each time at once.
 
-Sessions and trainings present so; their logs name what is presented by other fields.
+Sessions and trainings do; their logs name what is presented by other fields.
 """
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
-from masrel.errors import DeviceError, ParameterError, SessionStoppedError
+import masrel
+from masrel.errors import (
+    DeviceError,
+    SessionLogError,
+    SessionStoppedError,
+)
 from masrel.lab._event_log import SessionLog
 from masrel.lab.hess import Clock, EmergencyStop, RealClock, SimulatedClock
-from masrel.lab.protocol import Protocol
-from masrel.lab.recording import _Facts
-from masrel.lab.run._grade_sources import GradeRequest, GradeSource, Skip, StretchGrade
+from masrel.lab.protocol import Protocol, protocol_hash
+from masrel.lab.recording import _Fact, _Facts
+from masrel.lab.run._grade_sources import (
+    GradeRequest,
+    GradeSource,
+    Skip,
+    StretchGrade,
+    checked_grade,
+)
 from masrel.lab.run._present import (
     Outcome,
     present,
@@ -21,7 +33,10 @@ from masrel.lab.run._present import (
     recover,
     spool_of,
 )
+from masrel.lab.run._settings import moves_hardware
+from masrel.lab.run._state import may_go_on
 from masrel.lab.run.console import _at_terminal
+from masrel.lab.schedule import Presentation
 
 ClockName = Literal["real", "simulated"]
 
@@ -56,20 +71,36 @@ class Presenter:
         self._occasion = occasion  # what it is for, in messages
         self._named_by = named_by  # fields of a presentation in each of its events
         self._has_schedule = has_schedule  # that says which model it was
+        self._shown: Presentation | None = None  # what is asked about
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether grades or device are simulated."""
+        return self._grades.simulated or not moves_hardware(self._protocol.device)
+
+    def provenance(self) -> dict[str, _Fact]:
+        """Return what a log says of each time that it is begun or gone on with."""
+        return {
+            "protocol_sha256": protocol_hash(self._protocol),
+            "clock": self._clock,
+            "masrel_version": masrel.__version__,
+        }
+
+    @contextmanager
+    def stop_logged(self) -> Iterator[None]:
+        """Log where a stop came: at what was asked about last."""
+        try:
+            yield
+        except SessionStoppedError as error:
+            self._log.append("stopped", {**self._named(), "why": str(error)})
+            raise
 
     def rate(self, first: GradeRequest) -> StretchGrade | Skip:
         """Present until the grade comes, or nobody wants it any more.
 
-        `first` is the request for the first attempt; a stop is logged.
+        `first` is the request for the first attempt.
         """
-        try:
-            return self._until_graded(first)
-        except SessionStoppedError as error:
-            fields = {**self._named(first), "why": str(error)}
-            self._log.append("stopped", fields)
-            raise
-
-    def _until_graded(self, first: GradeRequest) -> StretchGrade | Skip:
+        self._shown = first.presentation
         attempt, n_faults = self._attempts_before(first), 0
         attempt += self._recovered(dataclasses.replace(first, attempt=attempt + 1))
         while True:
@@ -95,7 +126,7 @@ class Presenter:
 
     def _attempts_before(self, request: GradeRequest) -> int:
         # how often it was presented before this process
-        kind, named = _kind_of(request), self._named(request).items()
+        kind, named = _kind_of(request), self._named().items()
         before = [
             event
             for event in self._log.events
@@ -142,7 +173,7 @@ class Presenter:
     def _log_presented(
         self, request: GradeRequest, outcome: Outcome, file: Path
     ) -> None:
-        fields = self._named(request) | {"attempt": request.attempt}
+        fields = self._named() | {"attempt": request.attempt}
         shown = {"model": request.presentation.model}
         if self._has_schedule and not request.practice:
             shown.clear()
@@ -151,8 +182,8 @@ class Presenter:
             self._log.append("fault", {**fields, **outcome.fault})
         spool_of(file).unlink(missing_ok=True)  # only now is it of no use
 
-    def _named(self, request: GradeRequest) -> dict[str, _Facts]:
-        return {name: getattr(request.presentation, name) for name in self._named_by}
+    def _named(self) -> dict[str, _Facts]:
+        return {name: getattr(self._shown, name) for name in self._named_by}
 
     def _place(self, request: GradeRequest) -> str:
         return f"practice of {self._occasion}" if request.practice else self._occasion
@@ -170,26 +201,29 @@ class Presenter:
         return None
 
     def _checked(
-        self, request: GradeRequest, grade: str | StretchGrade | None
+        self, request: GradeRequest, answer: str | StretchGrade | None
     ) -> StretchGrade | None:
-        if grade is None:
+        if answer is None:
             return None
-        if isinstance(grade, str):
-            grade = StretchGrade(grade=grade)
-        grades, code = self._protocol.scale.grades, request.presentation.code
-        if grade.grade not in grades:
-            raise ParameterError(
-                f"grade of {code}: needed one of {', '.join(grades)}, "
-                f"got {grade.grade!r}"
-            )
-        stretch, n_stretches = grade.stretch, request.n_stretches
-        if stretch is not None and not 1 <= stretch <= n_stretches:
-            raise ParameterError(
-                f"stretch of {code}: needed one of {n_stretches}, from 1, got {stretch}"
-            )
-        return grade
+        if isinstance(answer, str):
+            answer = StretchGrade(grade=answer)
+        grades = self._protocol.scale.grades
+        return checked_grade(request, grades, answer.grade, answer.stretch)
 
 
 def _kind_of(request: GradeRequest) -> Literal["presented", "practised"]:
     # of the event that says what was presented
     return "practised" if request.practice else "presented"
+
+
+def check_same(
+    path: Path, begun: Mapping[str, _Facts], same: Mapping[str, _Facts]
+) -> None:
+    """Refuse to go on with a log that was begun with anything else."""
+    for name in ("grades", *same):  # which says most comes first
+        value, was = same[name], begun.get(name, False)  # there once were no rehearsals
+        if was != value and not (name == "grades" and may_go_on(was, value)):
+            raise SessionLogError(
+                f"{path}: begun with {name} = {was}: needed the same to go on, got "
+                f"{value}"
+            )

@@ -119,7 +119,7 @@ EVENTS: dict[str, tuple[str, ...]] = {
 }
 """Every kind of event with the fields it has."""
 
-_LATER: dict[str, tuple[set[str], ...]] = {
+LATER: dict[str, tuple[set[str], ...]] = {
     "presented": (
         {"grip_lost"},
         {
@@ -157,6 +157,8 @@ _TYPES: dict[str, object] = {
     **dict.fromkeys(("after", "answer", "value"), str | float | bool | None),
     "on": date,
     "row": int,
+    "position": int | None,
+    **dict.fromkeys(("model", "intended"), str),
     "mean_speed_deg_s": float | None,
     "stretches": list[_Stretch] | None,
 }
@@ -228,17 +230,18 @@ def read_session(log: Path) -> tuple[tuple[Event, ...], SessionState]:
 
 def replay(path: Path, events: Sequence[Event]) -> SessionState:
     """Return where a session stands after the events of its log."""
-    check_kinds(path, events, EVENTS, head="session", newest=FORMAT, later=_LATER)
+    check_kinds(path, events, EVENTS, head="session", newest=FORMAT, later=LATER)
     state = SessionState()
     for event in events:
-        problem = _of_another_type(event) or _contradiction(state, event)
+        problem = of_another_type(event) or _contradiction(state, event)
         if problem is not None:
             raise SessionLogError(f"{path}: line {event.line}: {event.kind}: {problem}")
         _apply(state, event)
     return state
 
 
-def _of_another_type(event: Event) -> str | None:
+def of_another_type(event: Event) -> str | None:
+    """Return which field of an event holds what it cannot hold, or None."""
     for name, value in event.fields.items():
         try:
             msgspec.convert(value, _TYPES.get(name, Any))

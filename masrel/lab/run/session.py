@@ -5,25 +5,22 @@ what was presented but not graded is presented again and logged as another attem
 """
 
 import hashlib
-from collections.abc import Callable, Container, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import masrel
 from masrel._files import check_inside
 from masrel.errors import (
     ParameterError,
     ProtocolError,
     SessionLogError,
-    SessionStoppedError,
 )
 from masrel.lab._event_log import Event, SessionLog, utc_now
 from masrel.lab.conduct._statements import refuse_withdrawn
 from masrel.lab.conduct._study_log import append_event, stated, study_answers
-from masrel.lab.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
+from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
 from masrel.lab.protocol._values import questions_of
 from masrel.lab.recording import _Fact, _Facts
 from masrel.lab.run._around import (
@@ -36,7 +33,7 @@ from masrel.lab.run._around import (
 )
 from masrel.lab.run._grade_sources import GradeRequest, GradeSource, Skip
 from masrel.lab.run._present import spool_of
-from masrel.lab.run._presenter import CLOCKS, ClockName, Presenter
+from masrel.lab.run._presenter import CLOCKS, ClockName, Presenter, check_same
 from masrel.lab.run._rehearsal import (
     RehearsalPaths,
     begin_rehearsal,
@@ -46,10 +43,9 @@ from masrel.lab.run._settings import (
     check_backend,
     check_button,
     has_simulated_hand,
-    moves_hardware,
     torque_problems,
 )
-from masrel.lab.run._state import FORMAT, SessionState, may_go_on, replay
+from masrel.lab.run._state import FORMAT, SessionState, replay
 from masrel.lab.schedule import Presentation, Schedule
 from masrel.lab.schedule.sheets import _drawn_schedule
 
@@ -181,8 +177,9 @@ def run_session(
     with SessionLog.open(log_file, now=now) as log:
         _check_recordings(codes, log_file, log.events)
         runner = _Runner(study, protocol, schedule, grades, clock, log, now)
-        runner.begin(checksum)
-        summary = runner.run(progress)
+        with runner.stop_logged():
+            runner.begin(checksum)
+            summary = runner.run(progress)
         if not rehearsal:
             runner.ask_about_study()
         return summary
@@ -227,7 +224,7 @@ def _check_device(clock: str, protocol: Protocol) -> None:
         raise ProtocolError(*problems)
 
 
-class _Runner:
+class _Runner(Presenter):
     """One run of one session; what it does is on disk before it goes on."""
 
     def __init__(
@@ -240,27 +237,14 @@ class _Runner:
         log: SessionLog,
         now: Callable[[], datetime],
     ) -> None:
-        self._study = study
-        self._protocol = protocol
-        self._schedule = schedule
-        self._grades = grades
-        self._clock = clock
-        self._log = log
-        self._now = now
+        occasion = f"session {schedule.session} of {schedule.rater}"
+        named_by = ("code", "position")
+        super().__init__(
+            protocol, grades, clock, log, occasion=occasion, named_by=named_by
+        )
+        self._study, self._schedule, self._now = study, schedule, now
         self._state: SessionState = replay(log.path, log.events)
         self._practice = practice_presentations(protocol)
-        self._presenter = Presenter(
-            protocol,
-            grades,
-            clock,
-            log,
-            occasion=f"session {schedule.session} of {schedule.rater}",
-            named_by=("code", "position"),
-        )
-
-    @property
-    def _is_simulated(self) -> bool:
-        return self._grades.simulated or not moves_hardware(self._protocol.device)
 
     @property
     def _is_rehearsal(self) -> bool:
@@ -276,36 +260,24 @@ class _Runner:
             "session": schedule.session,
             "presented_sha256": presented_hash(protocol),
             "schedule_sha256": schedule_sha256,
-            "simulated": self._is_simulated,
+            "simulated": self.is_simulated,
             "grades": self._grades.name,
             "device": protocol.device.backend,
             "rehearsal": self._is_rehearsal,
         }
-        provenance: dict[str, _Fact] = {
-            "protocol_sha256": protocol_hash(protocol),
-            "clock": self._clock,
-            "masrel_version": masrel.__version__,
-        }
         header = self._state.header
         if not header:
             interval = self._interval()  # before there is anything of the session
-            self._log.append("session", {**same, **provenance})
+            self._log.append("session", {**same, **self.provenance()})
             if interval is not None:
                 self._log.append("interval", interval)
             return
         same["format"] = header["format"]  # it is finished as it was begun
-        for name in ("grades", *same):  # which says most comes first
-            value = same[name]
-            begun = header.get(name, False)  # there once were no rehearsals
-            if begun != value and not (name == "grades" and may_go_on(begun, value)):
-                raise SessionLogError(
-                    f"{self._log.path}: begun with {name} = {begun}: needed "
-                    f"the same to go on, got {value}"
-                )
+        check_same(self._log.path, header, same)
         if not self._state.is_complete:
             kind = "restarted" if self._begins_anew() else "resumed"
-            provenance["n_graded"] = len(self._state.grades)
-            self._log.append(kind, {**provenance, "grades": self._grades.name})
+            fields = self.provenance() | {"n_graded": len(self._state.grades)}
+            self._log.append(kind, {**fields, "grades": self._grades.name})
             self._state = replay(self._log.path, self._log.events)
 
     def _interval(self) -> dict[str, _Fact] | None:
@@ -330,12 +302,10 @@ class _Runner:
         restart = policy == "restart"
         if policy == "ask":
             comes_next = next(
-                (p for p in self._shown if p.code not in self._state.settled),
-                self._shown[-1],
+                (p for p in self._scheduled if p.code not in self._state.settled),
+                self._scheduled[-1],
             )
-            with self._stop_logged(comes_next):
-                request = self._request(comes_next)
-                restart = self._grades.begins_anew(request, days)
+            restart = self._grades.begins_anew(self._request(comes_next), days)
         self._log.append(
             "aged",
             {
@@ -348,14 +318,14 @@ class _Runner:
         return restart
 
     @property
-    def _shown(self) -> tuple[Presentation, ...]:
+    def _scheduled(self) -> tuple[Presentation, ...]:
         return self._schedule.presentations
 
     def run(self, progress: Callable[[Presentation], object] | None) -> SessionSummary:
         """Present and ask until every presentation has its grade or is skipped."""
         if not self._state.is_complete:
             self._prepare()
-        for presentation in self._shown:
+        for presentation in self._scheduled:
             if presentation.code not in self._state.settled:
                 self._take_break(presentation)
                 self._rate(presentation)
@@ -365,15 +335,15 @@ class _Runner:
                 progress(presentation)
         if not self._state.is_complete:
             self._ask(None)
-            self._log.append("complete", {"n_presentations": len(self._shown)})
+            self._log.append("complete", {"n_presentations": len(self._scheduled)})
         state = replay(self._log.path, self._log.events)
         return SessionSummary(
             rater=self._schedule.rater,
             session=self._schedule.session,
-            n_presentations=len(self._shown),
+            n_presentations=len(self._scheduled),
             n_graded=len(state.grades),
             n_set_aside=state.n_set_aside,
-            simulated=self._is_simulated,
+            simulated=self.is_simulated,
             rehearsal=self._is_rehearsal,
             log_file=self._log.path,
         )
@@ -382,9 +352,8 @@ class _Runner:
         # instructions and practice, once
         text = self._protocol.occasions.instructions
         if text and not (self._state.is_instructed or self._state.presented):
-            first = (*self._practice, *self._shown)[0]
-            with self._stop_logged(first):
-                self._grades.instruct(self._request(first), text)
+            first = (*self._practice, *self._scheduled)[0]
+            self._grades.instruct(self._request(first), text)
             self._log.append("instructed", {"text": text})
         for presentation in self._practice:
             if presentation.code not in self._state.practice.settled:
@@ -397,9 +366,7 @@ class _Runner:
             return
         clock = CLOCKS[self._clock]()
         begun = clock.now_ns()
-        with self._stop_logged(presentation):
-            request = self._request(presentation)
-            self._grades.take_break(request, occasions.break_minutes)
+        self._grades.take_break(self._request(presentation), occasions.break_minutes)
         fields: dict[str, _Fact] = {
             "after": after,
             "minutes": occasions.break_minutes,
@@ -417,7 +384,7 @@ class _Runner:
             "code": presentation.code,
             "position": presentation.position,
         }
-        grade = self._presenter.rate(self._request(presentation))
+        grade = self.rate(self._request(presentation))
         if isinstance(grade, Skip):
             reasons = stated(who=grade.who, why=grade.why)
             self._log.append(f"{prefix}skipped", {**fields, **reasons})
@@ -433,20 +400,18 @@ class _Runner:
         code = None if presentation is None else presentation.code
         if code in self._state.settled and code not in self._state.first_grades:
             return
-        with self._stop_logged(presentation or self._shown[-1]):
-            ask_questions(
-                self._protocol,
-                "session" if presentation is None else "presentation",
-                self._grades,
-                rater=self._schedule.rater,
-                session=self._schedule.session,
-                presentation=presentation,
-                answered={key[:2] for key in self._state.answers if key[2] == code},
-                correct=self.correct,
-                log=lambda fields: self._log.append(
-                    "answered", {**fields, "code": code}
-                ),
-            )
+        self._shown = presentation or self._scheduled[-1]
+        ask_questions(
+            self._protocol,
+            "session" if presentation is None else "presentation",
+            self._grades,
+            rater=self._schedule.rater,
+            session=self._schedule.session,
+            presentation=presentation,
+            answered={key[:2] for key in self._state.answers if key[2] == code},
+            correct=self.correct,
+            log=lambda fields: self._log.append("answered", {**fields, "code": code}),
+        )
 
     def ask_about_study(self) -> None:
         """Ask once a rater has completed every session; the answers are the study's."""
@@ -472,21 +437,8 @@ class _Runner:
                 ),
             )
 
-    @contextmanager
-    def _stop_logged(self, presentation: Presentation) -> Iterator[None]:
-        try:
-            yield
-        except SessionStoppedError as error:
-            fields: dict[str, _Fact] = {
-                "code": presentation.code,
-                "position": presentation.position,
-                "why": str(error),
-            }
-            self._log.append("stopped", fields)
-            raise
-
     def _request(self, presentation: Presentation) -> GradeRequest:
-        is_practice = presentation in self._practice
+        is_practice, self._shown = presentation in self._practice, presentation
         return GradeRequest(
             rater=self._schedule.rater,
             session=self._schedule.session,

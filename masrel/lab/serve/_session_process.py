@@ -35,6 +35,7 @@ from masrel.lab.run import (
     StretchGrade,
     run_session,
 )
+from masrel.lab.run._grade_sources import checked_grade
 from masrel.lab.run.console import _stopped
 from masrel.scales import Scale, published_scale
 
@@ -166,15 +167,7 @@ class PageGrades(GradeSource):
         if message.get("again") is True:
             return None
         grade, stretch = message.get("grade"), message.get("stretch")
-        if not isinstance(grade, str) or grade not in self._scale.grades:
-            needed = ", ".join(self._scale.grades)
-            raise ParameterError(f"grade: needed one of {needed}, got {grade!r}")
-        numbers = range(1, request.n_stretches + 1)
-        if stretch is not None and (type(stretch) is not int or stretch not in numbers):
-            raise ParameterError(
-                f"stretch: needed one of {request.n_stretches}, from 1, got {stretch!r}"
-            )
-        return StretchGrade(grade=grade, stretch=stretch)
+        return checked_grade(request, self._scale.grades, grade, stretch)
 
     def present_again(self, request: GradeRequest, fault: str) -> bool | Skip:
         """Return whether to present it again after a fault, or that it is skipped."""

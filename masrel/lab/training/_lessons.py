@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import msgspec
 import numpy as np
 
 from masrel.errors import (
@@ -20,9 +21,10 @@ from masrel.errors import (
 )
 from masrel.estimates import Estimate
 from masrel.intervals import estimate
-from masrel.lab._bounded_files import format_problem
-from masrel.lab._event_log import Event, read_log
+from masrel.lab._event_log import Event, check_kinds, read_log
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
+from masrel.lab.run._state import EVENTS as SESSION_EVENTS
+from masrel.lab.run._state import LATER, of_another_type
 from masrel.lab.training._criterion import Criterion, training_criterion
 from masrel.lab.training._trainees import adaptive_weights
 
@@ -50,29 +52,27 @@ SETTINGS = (
 )
 """Keys of ``[training]`` that a training keeps to its end."""
 
+_PROVENANCE = ("protocol_sha256", "clock", "masrel_version")
+
+# As those of a session, without the codes that a training has not
 EVENTS: dict[str, tuple[str, ...]] = {
     "training": (
-        "format",
-        "study",
-        "rater",
-        "presented_sha256",
-        *SETTINGS,
-        "boundary",
-        "calibrated_false_fail",
-        "order_seed",
-        "simulated",
-        "grades",
-        "device",
+        *("format", "study", "rater", "presented_sha256", *SETTINGS),
+        *("boundary", "calibrated_false_fail", "order_seed", "is_weighted"),
+        *("simulated", "grades", "device", *_PROVENANCE),
     ),
-    "resumed": ("n_graded",),
-    "presented": ("position", "attempt", "model", "recording", "sha256", "fault"),
-    "fault": ("position", "attempt", "kind", "words"),
+    "resumed": ("n_graded", *_PROVENANCE),
+    **{
+        kind: tuple(name for name in SESSION_EVENTS[kind] if name != "code")
+        for kind in ("fault", "stopped", "recovered")
+    },
+    "presented": tuple(n for n in SESSION_EVENTS["practised"] if n != "code"),
     "grade": ("position", "model", "intended", "grade"),
-    "stopped": ("position", "why"),
-    "recovered": (),
     "complete": ("passed", "n_presentations"),
 }
-"""Every kind of event with the fields that are read."""
+"""Every kind of event with the fields it has."""
+
+_LATER = {"training": ({"is_weighted"},), "presented": LATER["presented"]}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -192,10 +192,10 @@ def read_training(study: StudyPaths, protocol: Protocol, rater: str) -> Training
 
 def check_events(path: Path, events: Sequence[Event]) -> None:
     """Refuse events that no training leaves in this order."""
-    graded = 0
-    presented: Counter[object] = Counter()
+    check_kinds(path, events, EVENTS, head="training", newest=FORMAT, later=_LATER)
+    graded, presented = 0, Counter[object]()
     for event in events:
-        fields, problem = event.fields, _problem(event)
+        fields, problem = event.fields, of_another_type(event)
         if problem is not None:
             pass
         elif (event.kind == "training") != (event is events[0]):
@@ -208,23 +208,6 @@ def check_events(path: Path, events: Sequence[Event]) -> None:
                 problem = f"needed the grade of presentation {graded}, after it"
         if problem is not None:
             raise SessionLogError(f"{path}: line {event.line}: {event.kind}: {problem}")
-
-
-def _problem(event: Event) -> str | None:
-    # why it is no event of any training, or None
-    if event.kind not in EVENTS:
-        return f"needed an event of {', '.join(EVENTS)}"
-    if event.kind == "training":  # first: another format has other fields
-        problem = format_problem(event.fields.get("format"), newest=FORMAT)
-        if problem is not None:
-            return problem
-    for name in EVENTS[event.kind]:
-        if name not in event.fields:
-            return f"needed the field {name}"
-    position = event.fields.get("position", 0)
-    if type(position) is not int:
-        return f"needed position as a number, got {position!r}"
-    return None
 
 
 def record_of(
@@ -247,7 +230,9 @@ def record_of(
         false_fail=float(str(header["calibrated_false_fail"])),
         order_seed=int(str(header["order_seed"])),
         is_weighted=bool(header.get("is_weighted", False)),
-        lessons=tuple(_lesson(e) for e in events if e.kind == "grade"),
+        lessons=tuple(
+            msgspec.convert(dict(e.fields), Lesson) for e in events if e.kind == "grade"
+        ),
         passed=bool(ended[-1]["passed"]) if ended else None,
         simulated=bool(header["simulated"]),
     )
@@ -262,16 +247,6 @@ def _criterion_of(header: Mapping[str, object], protocol: Protocol) -> Criterion
         window=int(str(header["window"])),
         max_presentations=int(str(header["max_presentations"])),
         order=str(header["order"]),
-    )
-
-
-def _lesson(event: Event) -> Lesson:
-    fields = event.fields
-    return Lesson(
-        position=int(str(fields["position"])),
-        model=str(fields["model"]),
-        intended=str(fields["intended"]),
-        grade=str(fields["grade"]),
     )
 
 

@@ -10,14 +10,12 @@ from dataclasses import asdict, replace
 from datetime import datetime
 from typing import ClassVar
 
-import masrel
 from masrel.errors import ParameterError, ProtocolError, SessionLogError
 from masrel.lab._event_log import SessionLog, utc_now
-from masrel.lab.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
+from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
 from masrel.lab.recording import _Fact
 from masrel.lab.run._grade_sources import GradeRequest, GradeSource, Skip
-from masrel.lab.run._presenter import ClockName, Presenter
-from masrel.lab.run._settings import moves_hardware
+from masrel.lab.run._presenter import ClockName, Presenter, check_same
 from masrel.lab.run.session import _check_device
 from masrel.lab.schedule import Presentation
 from masrel.lab.schedule._secret import Stream
@@ -113,7 +111,8 @@ def train_rater(
         check_events(path, log.events)
         trainer = _Trainer(study, protocol, rater, grades, clock, log)
         trainer.begin()
-        return trainer.run(feedback)
+        with trainer.stop_logged():
+            return trainer.run(feedback)
 
 
 def _check_models(study: StudyPaths, protocol: Protocol, rater: str) -> None:
@@ -134,7 +133,7 @@ def _check_models(study: StudyPaths, protocol: Protocol, rater: str) -> None:
         )
 
 
-class _Trainer:
+class _Trainer(Presenter):
     """One run of one training; what it does is on disk before it goes on."""
 
     def __init__(
@@ -146,13 +145,7 @@ class _Trainer:
         clock: ClockName,
         log: SessionLog,
     ) -> None:
-        self._study = study
-        self._protocol = protocol
-        self._rater = rater
-        self._grades = grades
-        self._clock = clock
-        self._log = log
-        self._presenter = Presenter(
+        super().__init__(
             protocol,
             grades,
             clock,
@@ -161,6 +154,7 @@ class _Trainer:
             named_by=("position",),
             has_schedule=False,
         )
+        self._study, self._rater = study, rater
         self._intended = {
             model.id: model.intended_grade
             for model in protocol.models
@@ -169,11 +163,6 @@ class _Trainer:
 
     def begin(self) -> None:
         """Log which training this is; check that it is the same when it goes on."""
-        provenance: dict[str, _Fact] = {
-            "protocol_sha256": protocol_hash(self._protocol),
-            "clock": self._clock,
-            "masrel_version": masrel.__version__,
-        }
         rules, device = self._protocol.training, self._protocol.device
         same: dict[str, _Fact] = {
             "format": FORMAT,
@@ -181,23 +170,19 @@ class _Trainer:
             "rater": self._rater,
             "presented_sha256": presented_hash(self._protocol),
             **{name: getattr(rules, name) for name in SETTINGS},
-            "simulated": self._grades.simulated or not moves_hardware(device),
+            "simulated": self.is_simulated,
             "grades": self._grades.name,
             "device": device.backend,
         }
         events = self._log.events
         if not events:
-            self._log.append("training", {**same, **self._calibrated(), **provenance})
+            fields = {**same, **self._calibrated(), **self.provenance()}
+            self._log.append("training", fields)
             return
-        for name, value in same.items():
-            if events[0].fields[name] != value:
-                raise SessionLogError(
-                    f"{self._log.path}: begun with {name} = {events[0].fields[name]}: "
-                    f"needed the same to go on, got {value}"
-                )
+        check_same(self._log.path, events[0].fields, same)
         if not any(event.kind == "complete" for event in events):
             n_graded = sum(event.kind == "grade" for event in events)
-            self._log.append("resumed", {"n_graded": n_graded, **provenance})
+            self._log.append("resumed", {"n_graded": n_graded, **self.provenance()})
 
     def _calibrated(self) -> dict[str, _Fact]:
         rules = self._protocol.training
@@ -245,7 +230,7 @@ class _Trainer:
             rater=self._rater,
         )
         position = len(record.lessons) + 1
-        grade = self._presenter.rate(self._request(position, model))
+        grade = self.rate(self._request(position, model))
         if isinstance(grade, Skip):  # no training can do without a grade
             raise ParameterError(
                 f"grade of presentation {position}: needed one, got that it is skipped"
