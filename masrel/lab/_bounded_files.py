@@ -7,10 +7,12 @@ ends in an error of the parser.
 import errno
 import io
 import json
+import math
 import os
 import re
 import stat
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from datetime import date, time
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +36,7 @@ _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""  # of a key
 _LONG_KEY = re.compile(
     rf"""(?<![\w"'.-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_MAX_DEPTH}}}"""
 )
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 # A spreadsheet fills a line up with separators
 _CSV_FORMAT = re.compile(r"# *format: *([^\s,;]{1,18})")
 _MAX_BITS = 1024  # of a whole number: what is longer cannot always be shown
@@ -120,3 +123,42 @@ def _parts(value: object) -> list[object]:
     if isinstance(value, Mapping):
         return list(value.values())
     return value if isinstance(value, list) else []
+
+
+def toml_lines(table: Mapping[str, Any], place: str = "") -> Iterator[str]:
+    """Give the lines of a TOML file; ValueError says what it cannot hold."""
+    # what is no table comes first, so that it does not belong to one
+    parts = {name: value for name, value in table.items() if _is_table(value)}
+    for name, value in table.items():
+        if name not in parts:
+            yield f"{_toml_key(name)} = {_toml_value(value)}"
+    for name, value in parts.items():
+        where = f"{place}.{_toml_key(name)}".lstrip(".")
+        if isinstance(value, Mapping):
+            yield from ("", f"[{where}]", *toml_lines(value, where))
+        else:
+            for entry in value:
+                yield from ("", f"[[{where}]]", *toml_lines(entry, where))
+
+
+def _is_table(value: object) -> bool:
+    entries = value if isinstance(value, list) and value else [value]
+    return all(isinstance(entry, Mapping) for entry in entries)
+
+
+def _toml_key(name: str) -> str:
+    return name if _BARE_KEY.fullmatch(name) else _toml_value(name)
+
+
+def _toml_value(value: object) -> str:
+    if isinstance(value, Mapping):
+        pairs = (f"{_toml_key(k)} = {_toml_value(v)}" for k, v in value.items())
+        return f"{{ {', '.join(pairs)} }}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_toml_value, value))}]"
+    if isinstance(value, date | time):  # a datetime too
+        return value.isoformat()
+    is_number = isinstance(value, int | float) and math.isfinite(value)
+    if not is_number and not isinstance(value, str):
+        raise ValueError(f"needs text, a finite number or a list, got {value!r}")
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")

@@ -6,9 +6,7 @@ verified before and after.
 """
 
 import json
-import re
 from collections.abc import Iterator, Mapping, Sequence
-from datetime import date, time
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -17,7 +15,13 @@ import msgspec
 
 from masrel._files import make_folder, write_files
 from masrel.errors import ParameterError, ProtocolError, ScheduleError
-from masrel.lab._bounded_files import MAX_RECORDING, MAX_SMALL, parse_toml, read_regular
+from masrel.lab._bounded_files import (
+    MAX_RECORDING,
+    MAX_SMALL,
+    parse_toml,
+    read_regular,
+    toml_lines,
+)
 from masrel.lab._durable_files import new_folder
 from masrel.lab._event_log import line_hashes
 from masrel.lab.conduct._study_log import append_event
@@ -36,8 +40,6 @@ from masrel.lab.verification import verify_study
 __all__ = ["merge_studies"]
 
 _ABSENT = object()
-
-_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def merge_studies(studies: Sequence[StudyPaths], destination: Path) -> StudyPaths:
@@ -355,39 +357,4 @@ def _merged_protocol(studies: Sequence[StudyPaths]) -> bytes:
         return contents[0]
     names = ", ".join(study.root.resolve().name for study in studies)
     head = f"# Merged from the protocols of {names}; their comments are in them."
-    return "\n".join([head, *_toml_lines(first)]).encode() + b"\n"
-
-
-def _toml_lines(table: Mapping[str, Any], place: str = "") -> Iterator[str]:
-    # what is no table comes first, so that it does not belong to one
-    parts = {name: value for name, value in table.items() if _is_table(value)}
-    for name, value in table.items():
-        if name not in parts:
-            yield f"{_toml_key(name)} = {_toml_value(value)}"
-    for name, value in parts.items():
-        where = f"{place}.{_toml_key(name)}".lstrip(".")
-        if isinstance(value, Mapping):
-            yield from ("", f"[{where}]", *_toml_lines(value, where))
-        else:
-            for entry in value:
-                yield from ("", f"[[{where}]]", *_toml_lines(entry, where))
-
-
-def _is_table(value: object) -> bool:
-    entries = value if isinstance(value, list) and value else [value]
-    return all(isinstance(entry, Mapping) for entry in entries)
-
-
-def _toml_key(name: str) -> str:
-    return name if _BARE_KEY.fullmatch(name) else _toml_value(name)
-
-
-def _toml_value(value: object) -> str:
-    if isinstance(value, Mapping):
-        pairs = (f"{_toml_key(k)} = {_toml_value(v)}" for k, v in value.items())
-        return f"{{ {', '.join(pairs)} }}"
-    if isinstance(value, list):
-        return f"[{', '.join(map(_toml_value, value))}]"
-    if isinstance(value, date | time):  # a datetime too
-        return value.isoformat()
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")
+    return "\n".join([head, *toml_lines(first)]).encode() + b"\n"

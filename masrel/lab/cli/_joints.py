@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from masrel._input import refuse
 from masrel.cli._options import (
     GroupedHelp,
     OutputOptions,
@@ -46,14 +47,16 @@ class JointOptions:
         """Return a joint with the changes, which only a spastic elbow can have."""
         from masrel.lab.elbow import ElbowParameters
 
-        changes: dict[str, Any] = {
+        asked = {
             "rest_angle": None if self.rest is None else math.radians(self.rest),
             "post_catch": self.post_catch,
             "residual_reading": self.reading,
             "catch_rise": self.rise,
             "inertia": self.inertia,
         }
-        changes = {name: value for name, value in changes.items() if value is not None}
+        changes: Any = {
+            name: value for name, value in asked.items() if value is not None
+        }
         if not changes:
             return joint
         if not isinstance(joint, ElbowParameters):
@@ -176,18 +179,21 @@ def _joint_of_file(model: str, study: Path | None) -> "JointModel":
         read_protocol,
     )
 
-    if study is not None and model.endswith(".toml"):
-        raise ParameterError(
+    is_file = model.endswith(".toml")
+    refuse(
+        (
+            study is not None and is_file,
             f"--model: needs a model of --study, got the file {model}; without "
-            "--study it is read with the usual constants"
-        )
+            "--study it is read with the usual constants",
+        ),
+        (
+            study is None and not is_file,
+            f"--model: needs one of {', '.join(STANDARD_MODELS)}, or a model file "
+            f"(.toml), or --study to name a study's own, got {model!r}",
+        ),
+    )
     if study is not None:
         return joint_model(read_protocol(StudyPaths(study).protocol), model)
-    if not model.endswith(".toml"):
-        raise ParameterError(
-            f"--model: needs one of {', '.join(STANDARD_MODELS)}, or a model file "
-            f"(.toml), or --study to name a study's own, got {model!r}"
-        )
     note_inputs(Path(model))
     return read_model_file(Path(model))
 
@@ -201,12 +207,13 @@ def _joint_of_kind(kind: str, settings: Sequence[str]) -> "JointModel":
         value_problems,
     )
 
-    if (problem := kind_problem(kind)) is not None:
-        raise ParameterError(f"--kind: {problem}")
-    if kind == DEFAULT_KIND:
-        raise ParameterError(
-            f"--kind: needs another kind than {kind}, whose models --model names"
-        )
+    refuse(
+        ((problem := kind_problem(kind)) is not None, f"--kind: {problem}"),
+        (
+            kind == DEFAULT_KIND,
+            f"--kind: needs another kind than {kind}, whose models --model names",
+        ),
+    )
     values: dict[str, float] = {}
     for setting in settings:
         key, _, text = setting.partition("=")

@@ -4,6 +4,7 @@ import csv
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,7 +48,13 @@ if TYPE_CHECKING:
     from masrel.lab.elbow import JointModel, Motion
     from masrel.lab.elbow.motions import Interpolation
 
-_KINDS = ("constant", "minimum-jerk", "trapezoid", "recording")
+# Class of each motion of a speed, and what it calls that
+_STRETCHES = {
+    "constant": ("ConstantSpeed", "speed"),
+    "minimum-jerk": ("MinimumJerk", "mean_speed"),
+    "trapezoid": ("Trapezoid", "speed"),
+}
+_KINDS = (*_STRETCHES, "recording")
 
 _COLUMNS = ("time_s", "angle_deg", "velocity_deg_s", "torque_nm", "phase")
 _MAX_SAMPLES = 5_000_000  # rows of a CSV file: at 1 kHz 83 minutes, and some 400 MB
@@ -205,12 +212,24 @@ def trace(
     Events and outputs are exact; the samples of --csv are what the controller commands
     at --rate-hz for that motion. Several models or speeds make one scene of each pair.
     """
-    if csv_file is not None or rate_hz is not None:
-        _check_samples(csv_file, rate_hz)
+    refuse(
+        (
+            rate_hz is not None and csv_file is None,
+            "--rate-hz: goes with --csv, whose samples it spaces",
+        ),
+        (
+            rate_hz is not None and not math.isfinite(rate_hz),
+            f"--rate-hz: needs a finite rate, got {rate_hz}",
+        ),
+        (csv_file == Path("-"), "--csv: needs the name of a file, got -"),
+        (
+            view is not None and output.figure is None,
+            "--view: goes with --figure, whose contents it chooses",
+        ),
+    )
     if speed_range is not None:
-        speeds = (*speeds, *_spaced(*speed_range))
-    if view is not None and output.figure is None:
-        raise ParameterError("--view: goes with --figure, whose contents it chooses")
+        low, high, n = speed_range
+        speeds += tuple(low + (high - low) * i / (n - 1) for i in range(n))
     scenes = _scenes(joints_of(joints), stretch, speeds)
     if output.figure is not None:
         check_view(scenes, view or SCENE_VIEWS[0])
@@ -228,10 +247,6 @@ def trace(
         figure=lambda: scenes_content(scenes, view or SCENE_VIEWS[0]),
         stamp=SCENE_STAMP,
     )
-
-
-def _spaced(low: float, high: float, n: int) -> tuple[float, ...]:
-    return tuple(low + (high - low) * i / (n - 1) for i in range(n))
 
 
 def _documents(
@@ -257,16 +272,14 @@ def _scenes(
     from masrel.lab.elbow import ElbowParameters
 
     scenes: list[Scene] = []
-    motions: dict[tuple[float | None, float], Motion] = {}  # by speed and end
+    motion_of = cache(partial(_motion_of, stretch))  # a recording is read once
     start = START_DEG if stretch.start is None else stretch.start
     for name, joint in joints.items():
         end = END_DEG if stretch.end is None else stretch.end
         if stretch.recording is None and not isinstance(joint, ElbowParameters):
             end = end_within(joint, stretch.end)
         for speed in dict.fromkeys(speeds or (None,)):
-            if (speed, end) not in motions:
-                motions[speed, end] = _motion_of(stretch, speed, start, end)
-            motion, ends = motions[speed, end], (start, end)
+            motion, ends = motion_of(speed, start, end), (start, end)
             if stretch.recording is not None:
                 ends = math.degrees(motion.start), math.degrees(motion.end)
             called = (
@@ -290,27 +303,21 @@ def _scenes(
 def _motion_of(
     stretch: _MotionOptions, speed_deg_s: float | None, start_deg: float, end_deg: float
 ) -> "Motion":
-    from masrel.lab.elbow import ConstantSpeed, MinimumJerk, Trapezoid
+    from masrel.lab import elbow
 
-    start, end = math.radians(start_deg), math.radians(end_deg)
-    speed = math.radians(speed_deg_s or 0.0)
-    motion: Motion
     if stretch.recording is not None:
-        motion = _recorded(stretch.recording, stretch.interpolation, speed_deg_s)
-    elif speed_deg_s is None:
+        once = _recorded(stretch.recording, stretch.interpolation, speed_deg_s)
+        return _stopped_and_repeated(stretch, once)
+    if speed_deg_s is None:
         raise ParameterError(
             f"--speed-deg-s: needs a speed for --motion {stretch.kind}"
         )
-    elif stretch.kind == "constant":
-        motion = ConstantSpeed(start=start, end=end, speed=speed)
-    elif stretch.acceleration is not None:
-        rate = math.radians(stretch.acceleration)
-        motion = Trapezoid(start=start, end=end, speed=speed, acceleration_rate=rate)
-    else:
-        motion = MinimumJerk(start=start, end=end, mean_speed=speed)
-    if stretch.stop is None and stretch.repeats == 1:
-        return motion
-    return _stopped_and_repeated(stretch, motion)
+    kind, speed = _STRETCHES[stretch.kind]
+    degrees = {"start": start_deg, "end": end_deg, speed: speed_deg_s}
+    if stretch.acceleration is not None:
+        degrees["acceleration_rate"] = stretch.acceleration
+    values = {name: math.radians(value) for name, value in degrees.items()}
+    return _stopped_and_repeated(stretch, getattr(elbow, kind)(**values))
 
 
 def _recorded(
@@ -348,15 +355,6 @@ def _stopped_and_repeated(stretch: _MotionOptions, once: "Motion") -> "Motion":
     for _ in range(stretch.repeats - 1):
         parts += [Reversed(motion=once), motion]
     return Joined(parts)
-
-
-def _check_samples(csv_file: Path | None, rate_hz: float | None) -> None:
-    if rate_hz is not None and csv_file is None:
-        raise ParameterError("--rate-hz: goes with --csv, whose samples it spaces")
-    if rate_hz is not None and not math.isfinite(rate_hz):
-        raise ParameterError(f"--rate-hz: needs a finite rate, got {rate_hz}")
-    if csv_file == Path("-"):
-        raise ParameterError("--csv: needs the name of a file, got -")
 
 
 def _write_samples(

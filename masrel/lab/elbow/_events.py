@@ -374,7 +374,7 @@ class Timeline:
         if some(leaves):
             top = value(angle, low) + fastest * (high - low)
             if some(leaves := leaves & (top > self.goal)):
-                low = self._leave_catch(leaves, start, angle, low, high, grows=False)
+                low = self._leave_catch(leaves, start, angle, low, high)
         ends = lasts & (self.phase == POST_CATCH)  # below ν_th, Fig. 7
         if some(ends):
             over, there = start + low, value(angle, low)
@@ -401,7 +401,7 @@ class Timeline:
             self.since = pick(self.phase == PRE_CATCH, later, nan)
         leaves = lasts & (self.phase == CATCH) & (end > self.goal)
         if some(leaves):
-            self._leave_catch(leaves, start, angle, at, length, grows=True)
+            self._leave_catch(leaves, start, angle, at, length)
 
     def _catch(
         self, ready: Flag, start: Number, angle: Polynomial, length: Number, end: Number
@@ -461,15 +461,11 @@ class Timeline:
             line = [pick(self.jumps, s, c) for s, c in zip(slow, line, strict=False)]
         place = first_above(line, 0.0, length, among=ready)
         if some(low := value(angle, place) < self.lowest):
-            begin = first_above(
-                angle, place, length, level=self.lowest, grows=True, among=low
-            )
+            begin = first_above(angle, place, length, level=self.lowest, among=low)
             place = pick(low, first_above(line, begin, length, among=low), place)
         top = ready & (end > self.highest)
         if some(top) and some(top := top & ~(value(angle, place) <= self.highest)):
-            late = first_above(
-                angle, 0.0, length, level=self.highest, grows=True, among=top
-            )
+            late = first_above(angle, 0.0, length, level=self.highest, among=top)
             place = pick(top, late, place)
         return pick(length - place <= TIE * length, nan, place)
 
@@ -480,11 +476,9 @@ class Timeline:
         angle: Polynomial,
         low: Number,
         high: Number,
-        *,
-        grows: bool,
     ) -> Number:
         # (4): the catch ends when the angle travelled exceeds D
-        place = first_above(angle, low, high, level=self.goal, grows=grows, among=which)
+        place = first_above(angle, low, high, level=self.goal, among=which)
         leaves = high - place > TIE * high
         if not some(leaves):
             return low

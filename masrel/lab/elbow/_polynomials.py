@@ -9,7 +9,7 @@ coefficients within `NOTHING` of the largest count as 0: floats tell no more.
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from math import comb, inf, isfinite, nan, sqrt
+from math import comb, inf, isfinite, nan
 from operator import ne
 from typing import Any
 
@@ -45,18 +45,12 @@ def known(number: Number, otherwise: Number) -> Number:
 
 def least(a: Number, b: Number) -> Number:
     """Return the smaller number; b if either is nan."""
-    is_first = a < b
-    if isinstance(is_first, np.ndarray):
-        return np.where(is_first, a, b)
-    return a if is_first else b
+    return pick(a < b, a, b)
 
 
 def greatest(a: Number, b: Number) -> Number:
     """Return the larger number; b if either is nan."""
-    is_first = a > b
-    if isinstance(is_first, np.ndarray):
-        return np.where(is_first, a, b)
-    return a if is_first else b
+    return pick(a > b, a, b)
 
 
 def chosen(columns: Sequence[Number], which: Any) -> list[Number]:
@@ -127,26 +121,21 @@ def first_above(
     high: Number,
     *,
     level: Number = 0.0,
-    grows: bool = False,
     among: Flag = True,
 ) -> Number:
     """Return where a polynomial is first above a level between two places.
 
-    A place nearer to high than a tie is none. A number that only grows is searched
-    faster. Of columns only rows `among` are looked at; the others are nan.
+    A place nearer to high than a tie is none. Of columns only rows `among` are looked
+    at; the others are nan.
     """
     p = [p[0] - level, *p[1:]]
     if isinstance(among, np.ndarray):
         return _first_above_in_rows(p, low, high, among)
-    width, end = high - low, value(p, high) if grows else inf
-    if not width > 0.0 or end <= 0.0:
+    width = high - low
+    if not width > 0.0:
         return nan
     if len(p) == 2 and p[1] > 0.0:
         x = max(-p[0] / p[1], low)
-    elif grows:
-        left = -value(p, low)
-        guess = low + left / (left + end) * width
-        x = _refined(p, low, high, guess=guess) if left > 0.0 else low
     else:
         b = bernstein(shifted(p, low), width)
         if (most := max(b)) <= 0.0:
@@ -239,8 +228,7 @@ def _sign_changes(
     signs = [c > 0.0 for c in b if not -nothing <= c <= nothing]
     n_changes = sum(map(ne, signs, signs[1:]))
     if n_changes == 1:
-        guess = _guess(b, low, high)
-        yield _refined(p, low, high, rises=signs[-1], guess=guess), signs[-1]
+        yield _refined(p, low, high, rises=signs[-1]), signs[-1]
     if n_changes < 2 or high - low <= tie:
         return  # touches 0, or passes it for less than a tie
     middle, (one, other) = 0.5 * (low + high), _halves(b)
@@ -280,64 +268,31 @@ def _largest_in_rows(p: Polynomial, length: Number, known: Number) -> Number:
         which, b = np.tile(which, 2), np.hstack([one, other])
 
 
-def _guess(b: list[float], low: float, high: float) -> float:
-    # where the control polygon first passes 0, but not at an end: that may be a root
-    share, is_above = 0.5, b[0] > 0.0
-    for i, c in enumerate(b):
-        if (c > 0.0) != is_above:
-            share = (i - c / (c - b[i - 1])) / (len(b) - 1)
-            break
-    return low + min(max(share, 0.02), 0.98) * (high - low)
-
-
-def _refined(
-    p: Polynomial, low: float, high: float, *, guess: float, rises: bool = True
-) -> float:
+def _refined(p: Polynomial, low: float, high: float, *, rises: bool) -> float:
     """Return the one place between two where a polynomial changes sign.
 
-    In closed form to degree 2; by Newton's rule above that, halved where it leaves the
-    bracket or is slow, until the next step would be below the last digit.
+    Of a line in closed form; else by Newton's rule, halved where it leaves the bracket.
     """
     if len(p) == 2:
         return float(min(max(-p[0] / p[1], low), high))
-    if len(p) == 3 and p[2]:
-        return min(max(_of_square(p, rises=rises), low), high)
-    x, before, is_newton = guess, high - low, False
-    digit, lead, others = 1e-16 * high, p[-1], p[-2::-1]
+    x, near, is_near = 0.5 * (low + high), 1e-7 * (high - low), False
+    lead, others = p[-1], p[-2::-1]
     for _ in range(200):
         height, slope = lead, 0.0
         for c in others:
             slope = slope * x + height
             height = height * x + c
-        if height == 0.0:
-            return x
         if (height > 0.0) == rises:
             high = x
         else:
             low = x
-        step = height / slope if slope else before
-        size = abs(step)
-        if size <= digit or not low < high:
-            return x
-        if 2.0 * size > before or not low <= x - step <= high:
-            x, before, is_newton = 0.5 * (low + high), high - low, False
-            continue
-        x -= step
-        # steps shrink as their squares do
-        if is_newton and size * size * size <= digit * before * before:
-            return x
-        before, is_newton = size, True
+        before, x = x, x - height / slope if slope else nan
+        if not low <= x <= high:
+            x = 0.5 * (low + high)
+        if is_near:  # a step doubles the digits
+            break
+        is_near = abs(x - before) <= near
     return x
-
-
-def _of_square(p: Polynomial, *, rises: bool) -> float:
-    # the root of a square at which it rises, or falls, without cancellation
-    c, b, a = map(float, p)
-    square = b * b - 4.0 * a * c
-    if square <= 0.0:
-        return -0.5 * b / a
-    root = sqrt(square) if rises else -sqrt(square)
-    return -2.0 * c / (b + root) if (b > 0.0) == rises else (root - b) / (2.0 * a)
 
 
 def _refined_in_rows(p: Polynomial, low: Number, high: Number) -> Number:

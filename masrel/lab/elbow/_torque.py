@@ -22,8 +22,6 @@ from masrel.lab.elbow._law import TorqueLaw
 from masrel.lab.elbow._polynomials import (
     Number,
     Polynomial,
-    bernstein,
-    chosen,
     derivative,
     first_above,
     greatest,
@@ -447,19 +445,9 @@ def _peak(line: Timeline, motion: Motion, laid: list[TorqueSegment]) -> Number:
             best = greatest(best, pick(ended > begun, law.level, -math.inf))
     moving = [segment for segment in laid if not segment.law.is_flat]
     for length, _, along in sections(line, motion, moving):
-        if isinstance(length, np.ndarray) and not isinstance(line.end, np.ndarray):
-            best = _largest_of_pieces(along, length, best)
-        else:
-            best = largest(along, length, best)
-    return best
-
-
-def _largest_of_pieces(along: Polynomial, length: Floats, best: float) -> float:
-    # one piece after another, of those whose bound is above what the ends have
-    best = max(best, float(np.max(greatest(along[0], value(along, length)))))
-    bounds = np.max(np.broadcast_arrays(*bernstein(along, length), length)[:-1], axis=0)
-    for i in np.flatnonzero(~(bounds <= best)).tolist():
-        best = largest(list(map(float, chosen(along, i))), float(length[i]), best)
+        best = largest(along, length, best)
+        if isinstance(best, np.ndarray) and not isinstance(line.end, np.ndarray):
+            best = best.max()  # of one scene, over its pieces
     return best
 
 

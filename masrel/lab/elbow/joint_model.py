@@ -48,11 +48,9 @@ class Stepper(Protocol):
         float
             Torque that resists extension, N·m.
         """
-        ...
 
     def release(self) -> None:
         """Give up at once what has been triggered, as when the grip is lost."""
-        ...
 
 
 class JointModel(Protocol):
@@ -77,17 +75,14 @@ class JointModel(Protocol):
         A joint with a delay, a trigger or a change in time is not passive in this
         sense, and is presented behind a guard only.
         """
-        ...
 
     @property
     def range_end(self) -> float:
         """End of the range of motion, rad."""
-        ...
 
     @property
     def speed_threshold(self) -> float:
         """Speed from which the arm counts as moving, rad/s."""
-        ...
 
     def stepper(self, start_angle: float) -> Stepper:
         """Return a joint that has not seen a sample yet.
@@ -102,7 +97,6 @@ class JointModel(Protocol):
         Stepper
             The state machine of one presentation.
         """
-        ...
 
     def largest_torque(self, *, start_angle: float, speed: float) -> float:
         """Return the largest torque of a stretch and the way back.
@@ -119,7 +113,6 @@ class JointModel(Protocol):
         float
             A bound of the torque's size, N·m, that no such motion passes.
         """
-        ...
 
     def largest_slope(self, *, speed: float) -> tuple[float, float]:
         """Return the largest slopes of the torque where it does not jump.
@@ -134,7 +127,6 @@ class JointModel(Protocol):
         tuple of two floats
             Over angle, N·m/rad, and over angular velocity, N·m·s/rad.
         """
-        ...
 
 
 Needs = Literal["positive", "not negative", "share", "angle", "frequency"]
@@ -197,14 +189,11 @@ class ToneEvent:
 class ToneStepper:
     """A law that sees one sample at a time; one with a memory adds it."""
 
+    is_given_up = False
+    phase = 0
+
     def __init__(self, model: Any, start_angle: float) -> None:
         self.model, self.rest = model, model.rest_from(start_angle)
-        self.is_given_up = False
-        self.phase = 0
-        self.begin()
-
-    def begin(self) -> None:
-        """Have seen nothing yet."""
 
     def release(self) -> None:
         """Give up at once what has been triggered; a law says until when."""

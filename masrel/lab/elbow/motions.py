@@ -9,7 +9,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from operator import attrgetter
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -68,12 +67,6 @@ class Piece(NamedTuple):
     fastest: float
 
 
-def piece_of(start: float, length: float, angle: Polynomial) -> Piece:
-    """Return a piece, its speed bounded by Bernstein coefficients."""
-    speeds = bernstein(derivative(angle), length)
-    return Piece(start, length, angle, min(speeds), max(speeds))
-
-
 class Rows(NamedTuple):
     """The same pieces as arrays."""
 
@@ -112,7 +105,10 @@ class Motion(ABC):
         def duration(self) -> float:
             """How long it takes, s."""
 
-    origin = property(attrgetter("start"), doc="Angle the pieces count from, rad.")
+    @property
+    def origin(self) -> float:
+        """Angle the pieces count from, rad."""
+        return self.start
 
     @abstractmethod
     def pieces(self) -> Sequence[Piece]:
@@ -245,8 +241,8 @@ class ConstantSpeed(_Stretch):
 
     def pieces(self) -> list[Piece]:
         """Return the one piece, a line."""
-        length = (self.end - self.start) / self.speed
-        return [Piece(0.0, length, (0.0, self.speed), self.speed, self.speed)]
+        speed = self.speed
+        return [Piece(0.0, self.duration, (0.0, speed), speed, speed)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -411,10 +407,11 @@ class Hold(Motion):
 class _Laid(Motion):
     """A movement whose pieces are laid out once."""
 
-    __slots__ = ("_pieces", "_rows", "duration", "end", "start")
+    __slots__ = ("_pieces", "_rows", "duration", "end", "origin", "start")
 
     start: float
     end: float
+    origin: float
     duration: float
     _pieces: list[Piece]
     _rows: Rows
@@ -481,53 +478,23 @@ class Recorded(_Laid):
             )
         times, angles = _checked(time, angle)
         self.interpolation = interpolation
-        self._knots, self._angles = times - times[0], angles
+        knots, low = times - times[0], angles - angles[0]
+        self._knots, self._angles = knots, angles
         self.start, self.end = float(angles[0]), float(angles[-1])
-        self.duration = float(self._knots[-1])
-        self._rows = Rows(self._knots[:-1], self._coefficients())
-        width = np.diff(self._knots)
-        speeds = bernstein(derivative(list(self._rows.angle)), width)
+        self.origin, self.duration = self.start, float(knots[-1])
+        width = np.diff(knots)
+        # θ - θ_0 over u, the time since sample i, constant first
+        coefficients = np.stack([low[:-1], np.diff(low) / width])
+        if interpolation == "pchip":
+            from scipy.interpolate import PchipInterpolator  # of recordings alone
+
+            coefficients = PchipInterpolator(knots, low).c[::-1]
+        self._rows = Rows(knots[:-1], coefficients)
+        speeds = bernstein(derivative(list(coefficients)), width)
         slowest, fastest = np.min(speeds, axis=0), np.max(speeds, axis=0)
-        columns = (self._rows.start, width, self._rows.angle.T, slowest, fastest)
+        columns = (self._rows.start, width, coefficients.T, slowest, fastest)
         rows = zip(*(column.tolist() for column in columns), strict=True)
         self._pieces = list(map(Piece._make, rows))
-
-    def _coefficients(self) -> Floats:
-        # θ_i + u (first + u (c₂ + u c₃)), u the time since sample i
-        width, rise = np.diff(self._knots), np.diff(self._angles)
-        low, chord = self._angles[:-1] - self._angles[0], rise / width
-        if self.interpolation == "linear":
-            return np.stack([low, chord])
-        slopes = _monotone_slopes(width, chord)
-        begin, finish = slopes[:-1] - chord, slopes[1:] - chord
-        square, cube = -(2.0 * begin + finish) / width, (begin + finish) / width / width
-        return np.stack([low, slopes[:-1], square, cube])
-
-
-def _monotone_slopes(width: Floats, chord: Floats) -> Floats:
-    # (n_samples,): cubics with these slopes are monotone where the samples are
-    if chord.size == 1:
-        return np.repeat(chord, 2)
-    slopes = np.zeros(width.size + 1)
-    before, after = chord[:-1], chord[1:]
-    wide, narrow = 2.0 * width[1:] + width[:-1], width[1:] + 2.0 * width[:-1]
-    same = np.sign(before) * np.sign(after) > 0.0
-    # weighted harmonic mean of the chords on both sides, 0 where they turn round
-    weighted = wide[same] / before[same] + narrow[same] / after[same]
-    slopes[1:-1][same] = (wide + narrow)[same] / weighted
-    slopes[0] = _end_slope(width[0], width[1], chord[0], chord[1])
-    slopes[-1] = _end_slope(width[-1], width[-2], chord[-1], chord[-2])
-    return slopes
-
-
-def _end_slope(near: float, far: float, chord: float, next_chord: float) -> float:
-    # of the parabola through three samples, kept from overshooting
-    slope = ((2 * near + far) * chord - near * next_chord) / (near + far)
-    if slope * chord <= 0:
-        return 0.0
-    if chord * next_chord <= 0 and abs(slope) > 3 * abs(chord):
-        return 3 * chord
-    return slope
 
 
 def _checked(time: ArrayLike, angle: ArrayLike) -> tuple[Floats, Floats]:
@@ -553,16 +520,20 @@ def _refuse(wrong: np.ndarray, needed: str, values: Floats) -> None:
         raise ParameterError(f"{needed}, got {values[row]:g} in sample {row + 1}")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Part(Motion):
+class Part(_Laid):
     """What a movement does from one time to another, a `Motion`.
 
-    Attributes
+    Parameters
     ----------
     motion : Motion
         The whole.
     begin, finish : float
         Times of the whole, s.
+
+    Attributes
+    ----------
+    motion, begin, finish
+        As given.
 
     Raises
     ------
@@ -579,57 +550,44 @@ class Part(Motion):
     1.5
     """
 
-    motion: Motion
-    begin: float
-    finish: float
+    __slots__ = ("begin", "finish", "motion")
 
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.begin < self.finish <= self.motion.duration:
+    def __init__(self, *, motion: Motion, begin: float, finish: float) -> None:
+        if not 0.0 <= begin < finish <= motion.duration:
             raise ParameterError(
-                "begin, finish: need 0 <= begin < finish <= "
-                f"{self.motion.duration:g} s, the duration, got {self.begin:g} and "
-                f"{self.finish:g} s"
+                f"begin, finish: need 0 <= begin < finish <= {motion.duration:g} s, "
+                f"the duration, got {begin:g} and {finish:g} s"
             )
-
-    origin = property(attrgetter("motion.origin"), doc=Motion.origin.__doc__)
-
-    @property
-    def start(self) -> float:
-        """Angle where it starts, rad."""
-        return float(self.motion.angle(self.begin))
-
-    @property
-    def end(self) -> float:
-        """Angle where it ends, rad."""
-        return float(self.motion.angle(self.finish))
-
-    @property
-    def duration(self) -> float:
-        """How long it takes, s."""
-        return self.finish - self.begin
-
-    def pieces(self) -> list[Piece]:
-        """Return the pieces of the whole between the times, the outer ones cut."""
-        cut = []
-        for piece in self.motion.pieces():
-            low = max(self.begin - piece.start, 0.0)
-            high = min(self.finish - piece.start, piece.length)
-            start = max(piece.start - self.begin, 0.0)
+        self.motion, self.begin, self.finish = motion, begin, finish
+        self.start, self.end = float(motion.angle(begin)), float(motion.angle(finish))
+        self.origin, self.duration = motion.origin, finish - begin
+        self._pieces = []
+        for piece in motion.pieces():  # those between the times, the outer ones cut
+            low = max(begin - piece.start, 0.0)
+            high = min(finish - piece.start, piece.length)
+            start = max(piece.start - begin, 0.0)
             if low == 0.0 and high == piece.length:
-                cut.append(piece._replace(start=start))
+                self._pieces.append(piece._replace(start=start))
             elif low < high:
-                cut.append(piece_of(start, high - low, shifted(piece.angle, low)))
-        return cut
+                angle = shifted(piece.angle, low)
+                speeds = bernstein(derivative(angle), high - low)
+                cut = Piece(start, high - low, angle, min(speeds), max(speeds))
+                self._pieces.append(cut)
+        self._rows = rows_of(self._pieces)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Reversed(Motion):
+class Reversed(_Laid):
     """A movement the other way, a `Motion`: from its end to its start.
+
+    Parameters
+    ----------
+    motion : Motion
+        The movement forwards.
 
     Attributes
     ----------
     motion : Motion
-        The movement forwards.
+        As given.
 
     Examples
     --------
@@ -641,35 +599,17 @@ class Reversed(Motion):
     (2.5, 2.0, -1.0)
     """
 
-    motion: Motion
+    __slots__ = ("motion",)
 
-    origin = property(attrgetter("motion.origin"), doc=Motion.origin.__doc__)
-
-    @property
-    def start(self) -> float:
-        """Angle where it starts, rad."""
-        return self.motion.end
-
-    @property
-    def end(self) -> float:
-        """Angle where it ends, rad."""
-        return self.motion.start
-
-    @property
-    def duration(self) -> float:
-        """How long it takes, s."""
-        return self.motion.duration
-
-    def pieces(self) -> list[Piece]:
-        """Return the pieces from the last to the first, each backwards."""
-        start, back = 0.0, []
-        for piece in reversed(self.motion.pieces()):
-            angle = reversed_from(piece.angle, piece.length)
-            back.append(
-                Piece(start, piece.length, angle, -piece.fastest, -piece.slowest)
-            )
-            start = max(self.motion.duration - piece.start, start)
-        return back
+    def __init__(self, *, motion: Motion) -> None:
+        self.motion, self.origin = motion, motion.origin
+        self.start, self.end, self.duration = motion.end, motion.start, motion.duration
+        start, self._pieces = 0.0, []
+        for begin, length, angle, slowest, fastest in reversed(motion.pieces()):
+            back = reversed_from(angle, length)
+            self._pieces.append(Piece(start, length, back, -fastest, -slowest))
+            start = max(motion.duration - begin, start)
+        self._rows = rows_of(self._pieces)
 
 
 class Joined(_Laid):
@@ -715,6 +655,7 @@ class Joined(_Laid):
                     f"{math.degrees(other.start):g} degrees"
                 )
         self.start, self.end = self.motions[0].start, self.motions[-1].end
+        self.origin = self.motions[0].origin
         self.duration, self._pieces = 0.0, []
         for motion in self.motions:
             offset = motion.origin - self.origin
@@ -727,11 +668,6 @@ class Joined(_Laid):
             ]
             self.duration += motion.duration
         self._rows = rows_of(self._pieces)
-
-    @property
-    def origin(self) -> float:
-        """Angle the pieces count from, rad."""
-        return float(self.motions[0].origin)
 
 
 def interrupted(motion: Motion, *, at: float, pause: float) -> Joined:

@@ -68,8 +68,7 @@ _BEYOND = math.radians(10.0)
 class _Rigid(ToneStepper):
     """Rigidity; nothing is ever triggered."""
 
-    def begin(self) -> None:
-        self._angle, self._bristle = math.nan, 0.0
+    _angle, _bristle = math.nan, 0.0
 
     def release(self) -> None:
         """Straighten the bristle."""
@@ -205,12 +204,10 @@ class LeadPipe(ToneModel):
 class _Cogwheel(_Rigid):
     """Cogwheel rigidity; nothing is ever triggered."""
 
-    def begin(self) -> None:
-        super().begin()
-        self._way = 0  # of the movement, 0 at rest
-        self._onset = 0.0  # s
-        self._ended = -math.inf  # when the movement before ended, s
-        self._last = 0.0  # how far its last gap was open
+    _way = 0  # of the movement, 0 at rest
+    _onset = 0.0  # s
+    _ended = -math.inf  # when the movement before ended, s
+    _last = 0.0  # how far its last gap was open
 
     def release(self) -> None:
         """Straighten the bristle, and begin anew."""
@@ -346,8 +343,7 @@ def _edge(since: float, length: float) -> float:
 class _ClaspKnife(ToneStepper):
     """A clasp-knife; a release gives it up until the arm is back beyond θ_arm."""
 
-    def begin(self) -> None:
-        self._fired = math.nan  # when the latch closed, s
+    _fired = math.nan  # when the latch closed, s
 
     def remember(
         self, time_s: float, angle: float, velocity: float
@@ -617,8 +613,7 @@ class Contracture(ToneModel):
 class _Dystonia(ToneStepper):
     """Dystonia; once released it stays at its resting activation."""
 
-    def begin(self) -> None:
-        self._begun = math.nan  # the first sample, s
+    _begun = math.nan  # the first sample, s
 
     def remember(
         self, time_s: float, _angle: float, _velocity: float
@@ -725,9 +720,8 @@ class Dystonia(ToneModel):
 class _Clonus(ToneStepper):
     """Clonus; a release stops the beats until the arm has been moved back."""
 
-    def begin(self) -> None:
-        self._begun = math.nan  # when the beats were set off, s
-        self._farthest = 0.0  # that the arm has been since, rad
+    _begun = math.nan  # when the beats were set off, s
+    _farthest = 0.0  # that the arm has been since, rad
 
     def remember(
         self, time_s: float, angle: float, velocity: float
@@ -881,9 +875,11 @@ class _ThresholdReflex(ToneStepper):
     first is old enough the arm is taken to have rested where it was then.
     """
 
-    def begin(self) -> None:
+    _late: tuple[float, float] | None = None  # rad, rad/s
+
+    def __init__(self, model: "ThresholdReflex", start_angle: float) -> None:
+        super().__init__(model, start_angle)
         self._samples: deque[tuple[float, float, float]] = deque()
-        self._late: tuple[float, float] | None = None  # rad, rad/s
 
     def remember(
         self, time_s: float, angle: float, velocity: float

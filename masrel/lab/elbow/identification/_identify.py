@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from masrel._input import refuse
 from masrel.errors import (
     MasrelError,
     ParameterError,
@@ -70,14 +71,12 @@ from masrel.lab.elbow.identification._reading import (
 )
 from masrel.lab.elbow.identification._steps import (
     SlowFit,
-    can_be_censored,
     detection_limit,
     fit_catch_line,
     fit_catches,
     fit_post_catch,
     fit_slow,
     on_the_line,
-    travels_seen,
 )
 from masrel.lab.elbow.parameters import STANDARD_MODELS, ElbowParameters
 
@@ -229,44 +228,41 @@ class FitOptions:
 
     def __post_init__(self) -> None:
         held, fits_inertia = self.constants, self.inertia == "fitted"
-        needs = [
+        refuse(
             (
-                0.5 < self.level < 1.0,
+                not 0.5 < self.level < 1.0,
                 f"level: needs more than 0.5 and less than 1, got {self.level}",
             ),
             (
-                held.residual_reading == "residual" and held.catch_rise == 0.0,
+                held.residual_reading != "residual" or held.catch_rise != 0.0,
                 "constants: a fit reads Q as section II does and takes the rise of a "
                 'catch from its option; needs residual_reading "residual" and '
                 f"catch_rise 0, got {held.residual_reading!r} and {held.catch_rise:g}",
             ),
             (
-                0.0 < self.slow_below < math.inf,
+                not 0.0 < self.slow_below < math.inf,
                 f"slow_below: needs more than 0, got {self.slow_below}",
             ),
             (
-                0.0 < self.window < math.inf,
+                not 0.0 < self.window < math.inf,
                 f"window: needs more than 0 s, got {self.window}",
             ),
             (
-                self.inertia in ("zero", "fitted"),
+                self.inertia not in ("zero", "fitted"),
                 f'inertia: needs "zero" or "fitted", got {self.inertia!r}',
             ),
             (
-                not (fits_inertia and held.post_catch == "additive"),
+                fits_inertia and held.post_catch == "additive",
                 'inertia: with post_catch "additive", m is in every phase but the '
                 "catch, and where one ends cannot be told from the jump of m·θ̈; needs "
                 '"zero", got "fitted"',
             ),
-            *(need for term in self.terms.items() for need in _of_term(*term, held)),
+            *(rule for term in self.terms.items() for rule in _of_term(*term, held)),
             (
-                math.isfinite(self.gravity_angle),
+                not math.isfinite(self.gravity_angle),
                 f"gravity_angle: needs a finite angle, got {self.gravity_angle}",
             ),
-        ]
-        for is_met, need in needs:
-            if not is_met:
-                raise ParameterError(need)
+        )
 
     @property
     def fitted(self) -> tuple[str, ...]:
@@ -295,19 +291,19 @@ def _number(term: Term) -> float:
 def _of_term(
     name: str, term: object, held: ElbowParameters
 ) -> Iterator[tuple[bool, str]]:
-    # what an option must be, in the order in which it is asked
+    # what an option must not be, in the order in which it is asked
     name = {"catch_rise": "rise"}.get(name, name)
     if isinstance(term, str) and term in ("off", "fitted"):
         return
     is_number = isinstance(term, int | float) and math.isfinite(term)
-    yield is_number, f'{name}: needs "off", "fitted" or a number, got {term!r}'
+    yield not is_number, f'{name}: needs "off", "fitted" or a number, got {term!r}'
     value = float(term) if isinstance(term, int | float) else 0.0
     if name in ("arm_inertia", "lag", "rise"):
-        yield value >= 0.0, f"{name}: needs 0 or more, got {value:g}"
+        yield value < 0.0, f"{name}: needs 0 or more, got {value:g}"
     if name == "rise":
         longest = f"{held.peak_duration:g} s"
         text = f"rise: needs 0 to ΔT_peak, {longest}, got {value:g} s"
-        yield value <= held.peak_duration, text
+        yield value > held.peak_duration, text
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -473,8 +469,9 @@ def _limits(
     # m, or where the pre-catch law goes on after a catch, the torque may climb or not
     # whatever k_post is: what could have been seen is not one angle.
     used = [t.catch for t in trials if t.catch is not None and t.name in read]
+    seen = {catch.travel for catch in used if catch.end is not None}
     climbs_alone = options.constants.post_catch == "continuous" and law.inertia == 0.0
-    if not climbs_alone or not can_be_censored(travels_seen(used)):
+    if not climbs_alone or len(seen) < 2:
         return [None] * len(trials)
     return [
         detection_limit(trial, stiffness, options.constants)

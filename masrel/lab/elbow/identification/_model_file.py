@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from masrel.errors import ParameterError
+from masrel.lab._bounded_files import toml_lines
 from masrel.lab.elbow.parameters import ElbowParameters
 
 if TYPE_CHECKING:
@@ -210,38 +211,10 @@ def as_toml(document: Mapping[str, object]) -> str:
     [model]
     residual_ratio = 0.3
     """
-    tables = {key: value for key, value in document.items() if _is_table(value)}
-    lines = _pairs({k: v for k, v in document.items() if k not in tables})
-    for key, value in tables.items():
-        if isinstance(value, Mapping):
-            lines += ["", f"[{key}]", *_pairs(value)]
-        elif isinstance(value, list):
-            lines += [x for row in value for x in ("", f"[[{key}]]", *_pairs(row))]
-    return "\n".join(lines) + "\n"
-
-
-def _is_table(value: object) -> bool:
-    entries = value if isinstance(value, list) else [value]
-    return bool(entries) and all(isinstance(entry, Mapping) for entry in entries)
-
-
-def _pairs(table: Mapping[str, object]) -> list[str]:
-    return [f"{key} = {_value(value)}" for key, value in table.items()]
-
-
-def _value(value: object) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, int | float) and math.isfinite(value):
-        return repr(float(value)) if isinstance(value, float) else str(value)
-    if isinstance(value, str):
-        # a basic string: quotes, backslashes and control characters are escaped
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-        letters = (x if x.isprintable() else f"\\U{ord(x):08X}" for x in escaped)
-        return f'"{"".join(letters)}"'
-    if isinstance(value, list):
-        return f"[{', '.join(_value(entry) for entry in value)}]"
-    raise ParameterError(f"value: needs text, a finite number or a list, got {value!r}")
+    try:
+        return "\n".join([*toml_lines(document), ""])
+    except ValueError as error:
+        raise ParameterError(f"value: {error}") from error
 
 
 def intermediate_models(

@@ -16,8 +16,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel._input import not_utf8
-from masrel.errors import ParameterError, RecordingError, RecordingWarning
+from masrel._input import not_utf8, refuse
+from masrel.errors import RecordingError, RecordingWarning
 from masrel.lab._bounded_files import MAX_RECORDING, read_regular
 from masrel.lab.recording import (
     _FIRST_COLUMNS,
@@ -209,7 +209,22 @@ def _find_columns(
     quantities: Iterable[str] = _UNITS,
 ) -> dict[str, _Column]:
     # the columns of time, angle, torque and, if there is one, velocity
-    _check_options(columns, units)
+    refuse(
+        *(
+            (
+                quantity not in _UNITS,
+                f"columns, units: need one of {', '.join(_UNITS)}, got {quantity!r}",
+            )
+            for quantity in (*columns, *units)
+        ),
+        *(
+            (
+                unit not in (known := _UNITS.get(quantity, {})),
+                f"units: {quantity} needs one of {', '.join(known)}, got {unit!r}",
+            )
+            for quantity, unit in units.items()
+        ),
+    )
     result = {}
     for quantity in quantities:
         forms = [f"{quantity}_{unit}" for unit in _UNITS[quantity]]
@@ -234,20 +249,6 @@ def _find_columns(
                 f"name given; got {', '.join(names) or 'no columns'}"
             )
     return result
-
-
-def _check_options(columns: Mapping[str, str], units: Mapping[str, str]) -> None:
-    for quantity in (*columns, *units):
-        if quantity not in _UNITS:
-            raise ParameterError(
-                f"columns, units: need one of {', '.join(_UNITS)}, got {quantity!r}"
-            )
-    for quantity, unit in units.items():
-        if unit not in _UNITS[quantity]:
-            raise ParameterError(
-                f"units: {quantity} needs one of {', '.join(_UNITS[quantity])}, "
-                f"got {unit!r}"
-            )
 
 
 def _with_unit(name: str, quantity: str, source: str, requested: str | None) -> _Column:

@@ -34,6 +34,8 @@ from masrel.lab.elbow.identification._equations import (
     DetectionLimit,
     Equations,
     Known,
+    fit_together,
+    joint_fit,
     line_row,
     mills,
 )
@@ -70,19 +72,14 @@ def fit_slow(trials: Sequence[Trial], known: Known, *, level: float) -> SlowFit:
     the offset is fixed.
     """
     equations = [Equations(trial, known) for trial in trials]
-    zeros = np.zeros(len(known.names))
-    starts = [np.zeros(len(e.local)) for e in equations]
-    tables = [e.table(zeros, x) for e, x in zip(equations, starts, strict=True)]
-    rows = [e.rows(zeros, table) for e, table in zip(equations, tables, strict=True)]
-    fit = solve(rows)
-    values, left, size = np.nan_to_num(fit.values), [], 0.0
-    for e, table in zip(equations, tables, strict=True):
-        n = len(e.local)
-        at = table[:, -1] + table[:, n:-1] @ values
-        own = np.linalg.lstsq(table[:, :n], -at, rcond=1e-12)[0]
-        left.append(e.part.torque + at + table[:, :n] @ own - e.part.measured)
-        size += float(np.abs(e.part.measured).sum())
-    away = np.concatenate(left)
+    solution = fit_together(equations, dict.fromkeys(known.names, 0.0), {})
+    joint = joint_fit(solution)
+    fit, parts = joint.fit, [e.part for e in equations]
+    left = [part.measured - law for part, law in zip(parts, solution.laws, strict=True)]
+    away, size = (
+        np.concatenate(left),
+        sum(np.abs(part.measured).sum() for part in parts),
+    )
     step = Step(
         name="slow trials: b, k of (1)",
         estimates=fitted(known.names, fit, level),
@@ -90,24 +87,25 @@ def fit_slow(trials: Sequence[Trial], known: Known, *, level: float) -> SlowFit:
     )
     errors = {e.name: e.standard_error for e in step.estimates}
     if len(trials) == 1 and not np.isnan(fit.values[:2]).any():
-        sds = _errors_of_samples(equations[0].part.time, rows[0], fit.values)
+        rows = equations[0].rows(solution.shared, joint.tables[0])
+        sds = _errors_of_samples(parts[0].time, rows)
         errors = dict(zip(errors, sds, strict=True))
     return SlowFit(
         trials=trials,
         step=step,
-        relative_error=float(np.abs(away).sum()) / size if size > 0.0 else math.nan,
+        relative_error=float(np.abs(away).sum() / size) if size > 0.0 else math.nan,
         errors=errors,
     )
 
 
-def _errors_of_samples(time: _Floats, rows: Rows, values: _Floats) -> list[float]:
+def _errors_of_samples(time: _Floats, rows: Rows) -> list[float]:
     # of one trial, of which the filter leaves one sample in so many independent
     period = float(np.median(np.diff(time))) if time.size > 1 else 1.0
     inverse = np.linalg.pinv(rows.design.T @ rows.design, hermitian=True)
-    left = rows.target - rows.design @ np.nan_to_num(values)
     n_alike = max(SLOW_WINDOW / period, 1.0)
-    df = max(time.size / n_alike - values.size - 1, 1.0)
-    return [math.sqrt(float(left @ left) / df * x) for x in np.diag(inverse)]
+    df = max(time.size / n_alike - len(inverse) - 1, 1.0)
+    squares = float(rows.target @ rows.target)
+    return [math.sqrt(squares / df * x) for x in np.diag(inverse)]
 
 
 def on_the_line(
@@ -177,7 +175,7 @@ def fit_catches(
 
     D is the angle travelled during the catch, ΔT_c·v̄_c: its mean if all catches end,
     otherwise where the likelihood of all travels is largest, those behind a limit
-    censored there.
+    censored there, for which two that are seen have to differ.
     """
     read = list(zip(catches, levels, strict=True))
     peaks = [(c.speed, at.peak) for c, at in read if not math.isnan(at.peak)]
@@ -194,8 +192,9 @@ def fit_catches(
             "no torque was recorded after a peak",
         ),
     ]
-    title, seen = "catch travel: D of (4)", travels_seen(catches)
-    if limits and can_be_censored(seen):
+    title = "catch travel: D of (4)"
+    seen = [catch.travel for catch in catches if catch.end is not None]
+    if limits:
         behind = np.array(limits)
         travels = Travels(np.array(seen), behind[:, 0], behind[:, 1])
         estimate, sd = fit_censored(travels, level=level)
@@ -206,16 +205,6 @@ def fit_catches(
         reason += f"; D is more than {math.degrees(longest):.4g} deg"
     rows = _rows([(1.0, travel) for travel in seen])
     return [*steps, _one(title, "catch_travel", rows, level, reason)]
-
-
-def travels_seen(catches: Sequence[Catch]) -> list[float]:
-    """Return the travels of catches that end."""
-    return [catch.travel for catch in catches if catch.end is not None]
-
-
-def can_be_censored(seen: Sequence[float]) -> bool:
-    """Return whether the travels that were seen tell how much travels differ."""
-    return len(set(seen)) > 1
 
 
 def fit_post_catch(levels: Sequence[CatchLevels], *, level: float) -> Step:
