@@ -206,10 +206,9 @@ def _checked_value(
     study: StudyPaths, fields: Mapping[str, RaterField], name: str, text: str
 ) -> FieldValue | None:
     if name not in fields:
-        known = listed(fields) if fields else "there is none"
         raise ParameterError(
-            f"field: needed one of [rater_fields] of {study.protocol} ({known}), got "
-            f"{name!r}"
+            f"field: needed one of [rater_fields] of {study.protocol} "
+            f"({listed(fields) or 'there is none'}), got {name!r}"
         )
     value = parsed_value(fields[name], text)
     if value is None and text.strip():

@@ -44,20 +44,21 @@ def _value_problems(value: object, annotation: object, where: str) -> Iterator[s
     if isinstance(value, list):
         annotation = _array_of(annotation)
     entry = _entry_type(annotation)
-    if _is_struct(annotation) and isinstance(value, Mapping):
-        yield from type_problems(value, annotation, where)
-    elif _is_struct(annotation):
-        yield f"{where}: needed a table, got {got(value)}"
-    elif entry is not None and isinstance(value, list):
-        yield from _array_problems(value, annotation, entry, where)
-    elif entry is not None:
-        yield f"{where}: needed {_form(annotation, where)}, got {got(value)}"
-    elif typing.get_origin(annotation) is dict and isinstance(value, Mapping):
-        of_value = typing.get_args(annotation)[1]
-        for name, item in value.items():
-            yield from _value_problems(item, of_value, f"{where}.{name}")
-    else:
-        yield from _leaf_problems(value, annotation, where)
+    match value:
+        case Mapping() if _is_struct(annotation):
+            yield from type_problems(value, annotation, where)
+        case Mapping() if typing.get_origin(annotation) is dict:
+            of_value = typing.get_args(annotation)[1]
+            for name, item in value.items():
+                yield from _value_problems(item, of_value, f"{where}.{name}")
+        case list() if entry is not None:
+            yield from _array_problems(value, annotation, entry, where)
+        case _ if _is_struct(annotation):
+            yield f"{where}: needed a table, got {got(value)}"
+        case _ if entry is not None:
+            yield f"{where}: needed {_form(annotation, where)}, got {got(value)}"
+        case _:
+            yield from _leaf_problems(value, annotation, where)
 
 
 def _array_problems(
@@ -142,26 +143,27 @@ def needed(annotation: object) -> str:
 
 
 def _phrase(info: inspect.Type) -> str:
-    if isinstance(info, inspect.UnionType):
-        kinds = [t for t in info.types if not isinstance(t, inspect.NoneType)]
-        return " or ".join(_phrase(kind) for kind in kinds)
-    if isinstance(info, inspect.BoolType):
-        return "true or false"
-    if isinstance(info, inspect.DictType):
-        return f"a table in which each value is {_phrase(info.value_type)}"
-    if isinstance(info, inspect.FloatType):
-        return "a number" + _range(info)
-    if isinstance(info, inspect.IntType):
-        return "a whole number" + _range(info)
-    if isinstance(info, inspect.LiteralType):
-        of = "one of " if len(info.values) > 1 else ""
-        return of + ", ".join(got(value) for value in info.values)
-    if isinstance(info, inspect.VarTupleType):
-        return "an array" + _entries(info)
-    if isinstance(info, inspect.StrType) and info.pattern is not None:
-        return _IDENTIFIER
-    if isinstance(info, inspect.StrType) and info.min_length:
-        return "text that is not empty (in quotes)"
+    match info:
+        case inspect.UnionType():
+            kinds = [t for t in info.types if not isinstance(t, inspect.NoneType)]
+            return " or ".join(_phrase(kind) for kind in kinds)
+        case inspect.BoolType():
+            return "true or false"
+        case inspect.DictType():
+            return f"a table in which each value is {_phrase(info.value_type)}"
+        case inspect.FloatType():
+            return "a number" + _range(info)
+        case inspect.IntType():
+            return "a whole number" + _range(info)
+        case inspect.LiteralType():
+            of = "one of " if len(info.values) > 1 else ""
+            return of + ", ".join(got(value) for value in info.values)
+        case inspect.VarTupleType():
+            return "an array" + _entries(info)
+        case inspect.StrType(pattern=str()):
+            return _IDENTIFIER
+        case inspect.StrType(min_length=int()):
+            return "text that is not empty (in quotes)"
     return "text (in quotes)"
 
 
@@ -182,27 +184,28 @@ def _range(info: inspect.FloatType | inspect.IntType) -> str:
 
 
 def _entries(info: inspect.VarTupleType) -> str:
+    low, high = info.min_length, info.max_length
     phrase = ""
-    if info.min_length and info.max_length:
-        phrase = f" of {info.min_length} to {info.max_length} entries"
-    elif info.min_length:
-        few = "entry" if info.min_length == 1 else "entries"
-        phrase = f" of at least {info.min_length} {few}"
-    if isinstance(info.item_type, inspect.LiteralType) and info.max_length:
+    if low and high:
+        phrase = f" of {low} to {high} entries"
+    elif low:
+        phrase = f" of at least {low} {'entry' if low == 1 else 'entries'}"
+    if isinstance(info.item_type, inspect.LiteralType) and high:
         phrase += f", each {_phrase(info.item_type)}"
     return phrase
 
 
 def got(value: object) -> str:
     """Show a decoded TOML value as its file would."""
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, Mapping):
-        return "a table"
-    if isinstance(value, list | tuple):
-        return f"an array of {len(value)}"
-    if isinstance(value, datetime.date | datetime.time):
-        return value.isoformat()
+    match value:
+        case str():
+            return json.dumps(value, ensure_ascii=False)
+        case bool():
+            return "true" if value else "false"
+        case Mapping():
+            return "a table"
+        case list() | tuple():
+            return f"an array of {len(value)}"
+        case datetime.date() | datetime.time():
+            return value.isoformat()
     return str(value)

@@ -94,14 +94,10 @@ def all_values(kind: str, values: Mapping[str, float]) -> dict[str, float | None
     for key, known in keys_of(kind).items():
         value = known.default
         if known.is_angle and value is not None:
-            value = _round_degrees(value)
+            # what was entered in degrees comes back: 115.00000000000001 is 115
+            value = float(f"{math.degrees(value):.12g}")
         every[key] = values.get(key, value)
     return every
-
-
-def _round_degrees(radians: float) -> float:
-    # what was entered in degrees comes back as it was: 115.00000000000001 is 115
-    return float(f"{math.degrees(radians):.12g}")
 
 
 def kind_problem(kind: str) -> str | None:

@@ -176,10 +176,10 @@ def _rater_fields(protocol: Protocol) -> Iterator[str]:
         for name, value in rater.fields.items():
             where = f"raters[{index}].fields.{name}"
             if name not in fields:
-                known = listed(fields) if fields else "there is none"
                 yield (
-                    f"{where}: needed a field of [rater_fields] ({known}), got "
-                    f"{got(name)}{_id(rater.id)}"
+                    f"{where}: needed a field of [rater_fields] "
+                    f"({listed(fields) or 'there is none'}), got {got(name)}"
+                    f"{_id(rater.id)}"
                 )
             elif field_value(fields[name], value) is None:
                 yield (
@@ -689,7 +689,7 @@ def _sample_sizes(protocol: Protocol) -> Iterator[str]:
     # each of a line of the plan, with shares of its grades
     lines = [line.id for line in protocol.analysis.estimates]
     names = [size.estimate for size in protocol.analysis.sample_sizes]
-    known = listed(lines) if lines else "there is none"
+    known = listed(lines) or "there is none"
     for index, size in enumerate(protocol.analysis.sample_sizes):
         where, name = f"analysis.sample_sizes[{index}]", size.estimate
         yield from _broken(

@@ -1,6 +1,7 @@
 """What answers a question, and what a field of a rater holds."""
 
 import math
+import re
 from datetime import date, datetime
 
 from masrel._input import listed
@@ -17,6 +18,7 @@ from masrel.lab.protocol.definition import (
 When = _When
 
 _LONGEST = 10_000  # letters of an answer
+_SURROGATE = re.compile("[\ud800-\udfff]")
 
 Answer = str | int | float | None
 """What can stand in a log as an answer; None for none."""
@@ -53,26 +55,21 @@ def checked_answer(question: Question, answer: Answer, *, where: str) -> Answer:
 def _value(question: Question, answer: str | float) -> str | int | float | None:
     # None where it does not answer the question
     if question.type == "text":
-        return answer if isinstance(answer, str) and _can_be_kept(answer) else None
+        # a lone surrogate, as a program may pass it, is in no file
+        can_be_kept = isinstance(answer, str) and len(answer) <= _LONGEST
+        return answer if can_be_kept and not _SURROGATE.search(str(answer)) else None
     if question.type == "choice":
         return answer if answer in question.choices else None
     try:
         number = float(answer)
     except (ValueError, OverflowError):  # a whole number beyond every float
         return None
-    if question.range is None or not math.isfinite(number):
-        return None
-    low, high = question.range
-    if not low <= number <= high:
+    low, high = question.range or (math.inf, -math.inf)
+    if not low <= number <= high:  # nor is nan
         return None
     if number.is_integer():
         return int(number)
     return None if question.type == "whole" else number
-
-
-def _can_be_kept(text: str) -> bool:
-    # a lone surrogate, as a program may pass it, is in no file
-    return len(text) <= _LONGEST and not any("\ud800" <= s <= "\udfff" for s in text)
 
 
 FieldValue = str | int | float
@@ -100,19 +97,22 @@ def needed_of(field: RaterField) -> str:
 
 def field_value(field: RaterField, value: object) -> FieldValue | None:
     """Return a value as its field holds it, or None if it is of another type."""
-    if isinstance(value, bool | datetime):
-        return None
-    if field.type == "date":
-        return _day(value)
-    if field.type == "whole":
-        return value if isinstance(value, int) and abs(value) < _LARGEST else None
-    if field.type == "number":  # not of nan
-        if isinstance(value, int | float) and abs(value) < _LARGEST:
+    match field.type, value:
+        case _, bool() | datetime():
+            return None
+        case "date", date():
+            return value.isoformat()
+        case "date", str() if _is_day(value):
             return value
-        return None
-    if not isinstance(value, str) or not value.strip():
-        return None
-    return value if field.type == "text" or value in field.choices else None
+        case "whole", int(number) if abs(number) < _LARGEST:
+            return number
+        case "number", int(number) | float(number) if abs(number) < _LARGEST:
+            return number  # not of nan
+        case "text", str() if value.strip():
+            return value
+        case "choice", str() if value.strip() and value in field.choices:
+            return value
+    return None
 
 
 def parsed_value(field: RaterField, text: str) -> FieldValue | None:
@@ -124,14 +124,11 @@ def parsed_value(field: RaterField, text: str) -> FieldValue | None:
         return None
 
 
-def _day(value: object) -> str | None:
-    if isinstance(value, date):
-        return value.isoformat()
+def _is_day(text: str) -> bool:
     try:
-        day = date.fromisoformat(str(value))
+        return text == date.fromisoformat(text).isoformat()
     except ValueError:
-        return None
-    return value if value == day.isoformat() else None
+        return False
 
 
 def field_heading(name: str, field: RaterField) -> str:

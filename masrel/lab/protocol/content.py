@@ -505,15 +505,17 @@ def parse_gate(
             f"estimate and a dot, got {name!r}"
         )
     if estimate not in estimates:
-        known = listed(estimates) if estimates else "there is none"
         raise ParameterError(
-            f"{where}: needed an estimate of the plan ({known}), got {estimate!r}"
+            f"{where}: needed an estimate of the plan "
+            f"({listed(estimates) or 'there is none'}), got {estimate!r}"
         )
+    if not _NUMBER.fullmatch(limit) or not math.isfinite(float(limit)):
+        raise ParameterError(f"{where}: needed a number as limit, got {limit!r}")
     return Gate(
         estimate=estimate,
         number=number,
         comparison=comparison,
-        limit=_limit(limit, where),
+        limit=float(limit),
         why=why,
         where=where,
     )
@@ -537,10 +539,3 @@ def gates_of(protocol: Protocol) -> tuple[Gate, ...]:
         parse_gate(gate.require, ids, where=f"report.gates[{index}]", why=gate.why)
         for index, gate in enumerate(protocol.report.gates)
     )
-
-
-def _limit(text: str, where: str) -> float:
-    limit = float(text) if _NUMBER.fullmatch(text) else math.nan
-    if not math.isfinite(limit):
-        raise ParameterError(f"{where}: needed a number as limit, got {text!r}")
-    return limit

@@ -195,29 +195,25 @@ def copy_template(name: str, destination: Path) -> None:
 
 def _check_new_folder(destination: Path, contents: Mapping[Path, bytes]) -> None:
     """Refuse a folder that holds anything beside what a killed copy has left."""
-    if destination.exists() and not destination.is_dir():
+    if not destination.exists():
+        return
+    if not destination.is_dir():
         raise ParameterError(f"{destination}: needed a new or empty folder, got a file")
-    if held := _foreign_names(destination, contents):
-        raise ParameterError(
-            f"{destination}: needed a new or empty folder, got one that holds {held[0]}"
-            + (f" and {len(held) - 1} more" if len(held) > 1 else "")
-        )
-
-
-def _foreign_names(folder: Path, contents: Mapping[Path, bytes]) -> list[str]:
-    """Return what a folder holds beside what a copy that was killed has left."""
-    if not folder.is_dir():
-        return []
-    begun = not StudyPaths(folder).protocol.exists()  # which a copy writes last
+    begun = not StudyPaths(destination).protocol.exists()  # which a copy writes last
     folders = {path.parent for path in contents if begun and path.parent.is_dir()}
-    return [
+    held = [
         path.name
-        for inside in sorted(folders | {folder})
+        for inside in sorted(folders | {destination})
         for path in sorted(inside.iterdir())
         if path not in folders
         and not is_part(path)
         and not (begun and path in contents and path.read_bytes() == contents[path])
     ]
+    if held:
+        raise ParameterError(
+            f"{destination}: needed a new or empty folder, got one that holds {held[0]}"
+            + (f" and {len(held) - 1} more" if len(held) > 1 else "")
+        )
 
 
 def _home() -> Path:
