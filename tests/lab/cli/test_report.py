@@ -65,15 +65,6 @@ def test_progress_is_on_a_terminal_unless_quiet(masrel: Caller, study: Path) -> 
     assert masrel.at_a_terminal("report", study, "--quiet").err == READ.format(study)
 
 
-def test_another_folder_gets_the_same_bytes(
-    masrel: Caller, study: Path, tmp_path: Path
-) -> None:
-    masrel("report", study, "--quiet")
-    elsewhere = tmp_path / "a" / "b"
-    assert masrel("report", study, "--quiet", "-o", elsewhere).code == 0
-    assert contents(elsewhere) == contents(study / "report")
-
-
 def test_ratings_can_be_named(masrel: Caller, study: Path) -> None:
     text = (study / "ratings/published.csv").read_text(encoding="utf-8")
     made = study / "simulated.csv"
@@ -84,29 +75,17 @@ def test_ratings_can_be_named(masrel: Caller, study: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("spoil", "said"),
-    [
-        ("protocol.toml", "protocol.toml"),
-        ("ratings/published.csv", "published.csv"),
-        ("ratings/in_person.csv", "in_person.csv"),
-    ],
+    "name", ["protocol.toml", "ratings/published.csv", "ratings/in_person.csv"]
 )
 def test_a_spoilt_file_is_named_and_nothing_is_written(
-    masrel: Caller, study: Path, spoil: str, said: str
+    masrel: Caller, study: Path, name: str
 ) -> None:
-    (study / spoil).write_text("spoilt\n", encoding="utf-8")
+    (study / name).write_text("spoilt\n", encoding="utf-8")
     done = masrel("report", study, "--quiet")
     assert (done.code, done.out) == (2, "")
-    assert said in done.err
     assert done.err.startswith("masrel: ")
-    assert "Traceback" not in done.err
+    assert Path(name).name in done.err
     assert not (study / "report").exists()
-
-
-def test_an_output_that_is_a_file_is_refused(masrel: Caller, study: Path) -> None:
-    done = masrel("report", study, "--quiet", "-o", study / "protocol.toml")
-    assert (done.code, done.out) == (2, "")
-    assert "protocol.toml" in done.err
 
 
 def test_a_figure_is_what_loads_matplotlib(study: Path) -> None:

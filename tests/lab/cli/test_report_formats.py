@@ -7,6 +7,7 @@ import stat
 import subprocess
 import sys
 import sysconfig
+from collections import Counter
 from pathlib import Path
 
 import docx
@@ -18,6 +19,7 @@ from masrel.lab.protocol import copy_template
 from tests.cli.process import Caller
 
 SETPRIV = shutil.which("setpriv")
+TITLE = "κ & 5 % of A_b #1 ± [x] {y} ~ ^"
 FORMATS = ("html", "markdown", "latex", "docx")
 
 
@@ -28,7 +30,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     copy_template("hess2012", root)
     protocol = root / "protocol.toml"
     text = protocol.read_text(encoding="utf-8")
-    title = "title = " + msgspec.json.encode("κ & 5 % of A_b #1 ± [x] {y} ~ ^").decode()
+    title = f"title = {msgspec.json.encode(TITLE).decode()}"
     head = text.partition("[[analysis.estimates]]")[0]
     report = f'sections = ["design", "grades", "methods"]\nformats = {list(FORMATS)}\n'
     protocol.write_text(f"{head}\n[report]\n{title}\n{report}", encoding="utf-8")
@@ -54,32 +56,23 @@ def test_every_format_has_the_same_tables_and_figures(folder: Path) -> None:
     latex = (folder / "report.tex").read_text(encoding="utf-8")
     word = docx.Document(str(folder / "report.docx"))
     n_tables = len(list((folder / "tables").iterdir()))
-    n_figures = len(list((folder / "figures").glob("*.png")))
+    figures = list((folder / "figures").glob("*.png"))
     assert n_tables > 2
-    assert n_figures > 0
-    assert latex.count("\\begin{longtable}") == n_tables
-    assert len(word.tables) == n_tables
+    assert figures
+    assert latex.count("\\begin{longtable}") == len(word.tables) == n_tables
+    n_figures = len(figures)
     assert latex.count("\\includegraphics") == len(word.inline_shapes) == n_figures
-    for name in (folder / "figures").glob("*.png"):
-        assert f"{{figures/{name.name}}}" in latex
-
-
-def test_a_word_document_has_headings_captions_and_texts_for_pictures(
-    folder: Path,
-) -> None:
-    word = docx.Document(str(folder / "report.docx"))
-    styles = [paragraph.style.name for paragraph in word.paragraphs]
-    assert styles.count("Heading 1") == 4
-    captions = [of for of in styles if of in ("Table Caption", "Image Caption")]
-    assert len(captions) == len(word.tables) + len(word.inline_shapes)
-    for shape in word.inline_shapes:
-        assert len(shape._inline.docPr.get("descr")) > 30
-    for table in word.tables:
-        assert "w:tblHeader" in table.rows[0]._tr.xml
-    assert word.paragraphs[0].text == "κ & 5 % of A_b #1 ± [x] {y} ~ ^"
-
-
-def test_the_manifest_says_which_pandoc_it_was(folder: Path) -> None:
+    assert all(f"{{figures/{file.name}}}" in latex for file in figures)
+    # headings, captions, heads of tables and texts for pictures
+    styles = Counter(paragraph.style.name for paragraph in word.paragraphs)
+    assert styles["Heading 1"] == 4
+    assert styles["Table Caption"] + styles["Image Caption"] == n_tables + n_figures
+    assert all(len(s._inline.docPr.get("descr")) > 30 for s in word.inline_shapes)
+    assert all("w:tblHeader" in table.rows[0]._tr.xml for table in word.tables)
+    # the title is escaped
+    assert word.paragraphs[0].text == TITLE
+    title = r"\(\kappa\) \& 5 \% of A\_b \#1 \(\pm\) "
+    assert title in " ".join(latex.split())
     manifest = msgspec.json.decode((folder / "manifest.json").read_bytes())
     assert re.fullmatch(r"[\d.]+", manifest["pandoc"])
 
@@ -147,12 +140,6 @@ def test_templates_of_the_user_change_no_document(
     assert same == (folder / "report.tex").read_bytes()
 
 
-def test_text_of_a_study_is_escaped_in_latex(folder: Path) -> None:
-    latex = (folder / "report.tex").read_text(encoding="utf-8")
-    title = r"\(\kappa\) \& 5 \% of A\_b \#1 \(\pm\) "
-    assert title in " ".join(latex.split())
-
-
 def test_tables_too_wide_for_paper_are_in_parts(tmp_path: Path) -> None:
     root = tmp_path / "study"
     copy_template("hess2012", root)
@@ -171,62 +158,44 @@ def test_tables_too_wide_for_paper_are_in_parts(tmp_path: Path) -> None:
     assert len(raters) == 8
 
 
-def compiled(folder: Path, engine: str) -> str:
-    """What an engine says of a report's LaTeX."""
-    if shutil.which(engine) is None:
-        pytest.skip(f"{engine} is not installed")
+@pytest.fixture(scope="module")
+def every_section(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("sections") / "study"
+    copy_template("hess2012", root)
+    protocol = root / "protocol.toml"
+    text = protocol.read_text(encoding="utf-8")
+    title = f"title = {msgspec.json.encode(TITLE).decode()}"
+    protocol.write_text(re.sub(r"(?m)^title = .*$", lambda _: title, text), "utf-8")
+    build(root, root / "report", {}, "--format", "latex")
+    return root / "report"
+
+
+ENGINES = [
+    pytest.param(
+        engine,
+        marks=pytest.mark.skipif(shutil.which(engine) is None, reason="not installed"),
+    )
+    for engine in ("pdflatex", "lualatex")
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES)
+def test_latex_of_every_section_fits_its_page(every_section: Path, engine: str) -> None:
     done = subprocess.run(
         [engine, "-halt-on-error", "-interaction=nonstopmode", "report.tex"],
-        cwd=folder, capture_output=True, check=False,
+        cwd=every_section, capture_output=True, check=False,
     )  # fmt: skip
     log = done.stdout.decode("utf-8", "replace")
     assert done.returncode == 0, log[-2000:]
-    return log
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ["pdflatex", "lualatex"])
-def test_latex_compiles(folder: Path, tmp_path: Path, engine: str) -> None:
-    log = compiled(shutil.copytree(folder, tmp_path / "copy"), engine)
     assert "Overfull" not in log
     assert "Missing character" not in log
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ["pdflatex", "lualatex"])
-def test_latex_of_every_section_fits_its_page(tmp_path: Path, engine: str) -> None:
-    root = tmp_path / "study"
-    copy_template("hess2012", root)
-    build(root, tmp_path / "report", {}, "--format", "latex")
-    log = compiled(tmp_path / "report", engine)
-    assert "Overfull" not in log
-    assert "Missing character" not in log
-
-
-@pytest.mark.slow
-def test_a_foreign_environment_gives_the_same_bytes(
-    study: Path, folder: Path, tmp_path: Path
-) -> None:
-    settings = tmp_path / "matplotlibrc"
-    settings.write_text("font.size: 30\nsavefig.dpi: 30\nsvg.fonttype: path\n")
-    variables = {
-        "LANG": "de_DE.UTF-8",
-        "LC_ALL": "C",
-        "TZ": "Asia/Seoul",
-        "HOME": str(tmp_path),
-        "MPLBACKEND": "module://matplotlib_inline.backend_inline",
-        "MATPLOTLIBRC": str(settings),
-        "PYTHONHASHSEED": "7",
-    }
-    build(study, tmp_path / "other", variables)
-    same_files(tmp_path / "other", folder)
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(SETPRIV is None, reason="nothing here takes root's privileges")
-@pytest.mark.parametrize("umask", ["000", "077"])
-def test_nothing_is_written_beside_the_packages_and_no_umask_changes_a_byte(
-    study: Path, folder: Path, tmp_path: Path, umask: str
+def test_a_foreign_environment_changes_no_byte_and_is_not_written_to(
+    study: Path, folder: Path, tmp_path: Path
 ) -> None:
     package = tmp_path / "site" / "masrel"
     shutil.copytree(
@@ -238,29 +207,33 @@ def test_nothing_is_written_beside_the_packages_and_no_umask_changes_a_byte(
     bare = [str(SETPRIV), "--bounding-set=-dac_override", "--inh-caps=-dac_override"]
     probe = subprocess.run([*bare, "touch", package / "written"], check=False)
     assert probe.returncode != 0
-    call = ["-P", "-m", "masrel", "report", str(study), "-o", str(tmp_path / "other")]
-    call += ["--cache", str(tmp_path / "cache")]
-    environment = {**os.environ, "PYTHONPATH": str(package.parent)}
+    settings = tmp_path / "matplotlibrc"
+    settings.write_text("font.size: 30\nsavefig.dpi: 30\nsvg.fonttype: path\n")
+    environment = os.environ | {
+        "LANG": "de_DE.UTF-8",
+        "LC_ALL": "C",
+        "TZ": "Asia/Seoul",
+        "HOME": str(tmp_path),
+        "MPLBACKEND": "module://matplotlib_inline.backend_inline",
+        "MATPLOTLIBRC": str(settings),
+        "PYTHONHASHSEED": "7",
+        "PYTHONPATH": str(package.parent),
+    }
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    other = tmp_path / "other"
+    call = ["-P", "-m", "masrel", "report", str(study), "-o", str(other)]
+    call += ["--cache", str(tmp_path / "cache")]
     subprocess.run(
-        [*bare, "sh", "-c", f'umask {umask}; exec "$@"', "sh", sys.executable, *call],
+        [*bare, "sh", "-c", 'umask 077; exec "$@"', "sh", sys.executable, *call],
         env=environment, check=True, capture_output=True,
     )  # fmt: skip
-    same_files(tmp_path / "other", folder)
-    page = (tmp_path / "other" / "report.html").stat()
-    assert stat.S_IMODE(page.st_mode) == 0o666 & ~int(umask, 8)
-
-
-def same_files(one: Path, other: Path) -> None:
-    """Check that two reports have the same bytes, file by file."""
-    names = [
-        sorted(path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
-        for folder in (one, other)
-    ]
-    assert names[0] == names[1]
-    assert len(names[0]) > 8
-    for name in names[0]:
-        assert (one / name).read_bytes() == (other / name).read_bytes()
+    made, expected = (
+        {f.relative_to(of): f.read_bytes() for f in of.rglob("*") if f.is_file()}
+        for of in (other, folder)
+    )
+    assert len(made) > 8
+    assert made == expected
+    assert stat.S_IMODE((other / "report.html").stat().st_mode) == 0o600
 
 
 def test_a_format_that_is_not_made_again_goes(
