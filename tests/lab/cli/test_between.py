@@ -6,11 +6,10 @@ from pathlib import Path
 import pytest
 
 from masrel.lab.elbow import STANDARD_MODELS, intermediate_models
-from masrel.lab.protocol import elbow_parameters, read_model_file, read_protocol
+from masrel.lab.protocol import read_model_file
 from tests.cli.process import Caller, Done
 
 STANDARDS = ("HM1", "HM2", "HM3", "HM4")
-PUBLISHED = Path(__file__).parents[3] / "studies" / "hess2012" / "protocol.toml"
 
 
 def refused(done: Done) -> str:
@@ -53,69 +52,23 @@ def test_files_hold_the_models_of_the_rule(masrel: Caller, tmp_path: Path) -> No
     assert str(folder) in done.err
 
 
-def test_a_study_can_name_them_and_has_the_published_dummies(
-    masrel: Caller, tmp_path: Path
-) -> None:
-    study = tmp_path / "study"
-    assert masrel("init", study, "--study", "hess2012").code == 0
-    assert (
-        masrel("joint", "between", *STANDARDS, "-n", 12, "-o", study / "models").code
-        == 0
-    )
-    protocol = study / "protocol.toml"
-    kept, in_dummy = [], False
-    for line in protocol.read_text(encoding="utf-8").splitlines():
-        key = line.split(" ")[0]
-        in_dummy = in_dummy and not line.startswith("[")
-        if line.startswith('id = "D'):
-            in_dummy = True
-            line = f'{line}\nfile = "models/{line[6:9]}.toml"'
-        elif in_dummy and key.startswith(("catch_", "residual_")):
-            continue
-        kept.append(line)
-    protocol.write_text("\n".join(kept) + "\n", encoding="utf-8")
-    (study / "published_secret.txt").unlink()
-    done = masrel("check", study)
-    assert done.code == 0
-    notes = done.err.splitlines()
-    assert all(note.startswith(f"note: {protocol}: device.") for note in notes)
-    written, named = read_protocol(PUBLISHED), read_protocol(protocol)
-    for number in range(1, 13):
-        name = f"D{number:02}"
-        one, two = elbow_parameters(written, name), elbow_parameters(named, name)
-        assert two.catch_travel == pytest.approx(one.catch_travel, rel=1e-14)
-        assert two.catch_torque_constant == pytest.approx(
-            one.catch_torque_constant, rel=1e-14
-        )
-
-
 def test_what_lies_next_to_simulated_is_simulated(
     masrel: Caller, tmp_path: Path
 ) -> None:
     file = simulated(tmp_path / "käte.toml")
     done = masrel("joint", "between", "HM1", "HM2", file, "-n", "2", "--json", "-")
     document = json.loads(done.out)
+    first = document["models"][0]
+    assert [first[key] for key in ("name", "from", "to", "way", "file")] == [
+        "D01", "HM1", "HM2", "1/2", None,
+    ]  # fmt: skip
+    assert first["model"]["catch_torque_nms_rad"] == 1.7  # (1.4 + 2.0)/2
     assert [model["simulated"] for model in document["models"]] == [False, True]
     assert document["simulated"] is True
     assert "käte" in document["models"][1]["made_from"]
     assert "sha256" in document["models"][1]["made_from"]
     shown = masrel("joint", "between", "HM1", "HM2", file, "-n", "2")
     assert shown.out.startswith("SIMULATED DATA")
-
-
-def test_json_is_one_document_and_nothing_else(masrel: Caller, tmp_path: Path) -> None:
-    done = masrel(
-        "joint", "between", "HM1", "HM2", "-n", "1", "-o", tmp_path, "--json", "-"
-    )
-    document = json.loads(done.out)
-    (model,) = document["models"]
-    assert (model["name"], model["from"], model["to"]) == ("D01", "HM1", "HM2")
-    assert model["way"] == "1/2"
-    assert model["file"] == str(tmp_path / "D01.toml")
-    assert model["model"]["catch_torque_nms_rad"] == 1.7  # (1.4 + 2.0)/2
-    file = tmp_path / "all.json"
-    assert masrel("joint", "between", "HM1", "HM2", "-n", "1", "--json", file).code == 0
-    assert json.loads(file.read_text("utf-8"))["models"][0]["file"] is None
 
 
 def test_nothing_is_overwritten_unless_asked(masrel: Caller, tmp_path: Path) -> None:

@@ -64,8 +64,8 @@ def test_a_fit_goes_into_a_protocol(
     assert joint.catch_slope == pytest.approx(0.35, rel=0.1)
 
 
-def test_json_on_stdout_is_one_document_and_nothing_else(
-    masrel: Caller, files: list[Path]
+def test_slow_trials_alone_are_shown_and_make_no_model_file(
+    masrel: Caller, files: list[Path], tmp_path: Path
 ) -> None:
     done = masrel("joint", "fit", *files[:3], "--json", "-")
     document = json.loads(done.out)
@@ -74,11 +74,6 @@ def test_json_on_stdout_is_one_document_and_nothing_else(
     assert "only slow stretches" in missing["reason"]
     assert [trial["pace"] for trial in document["trials"]] == ["slow"] * 3
     assert document["simulated"] is True
-
-
-def test_only_slow_trials_make_no_model_file(
-    masrel: Caller, files: list[Path], tmp_path: Path
-) -> None:
     done = masrel("joint", "fit", *files[:3], "-o", tmp_path / "s3.toml")
     assert done.code == 2
     assert "Parameters of the joint" in done.out  # what there is, is shown

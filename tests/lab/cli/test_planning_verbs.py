@@ -1,42 +1,36 @@
-"""init, check and schedule as a user calls them, wrong calls included."""
+"""init, check and schedule as a user calls them."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-
-def masrel(*arguments: str | Path, code: int = 0) -> tuple[str, str]:
-    """Run the command line in a process of its own; its output and its errors."""
-    done = subprocess.run(
-        [sys.executable, "-c", "from masrel.cli import main; main()", *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == code, done.stderr
-    assert "Traceback" not in done.stderr
-    return done.stdout, done.stderr
+from tests.cli.process import Caller
 
 
-@pytest.fixture
-def study(tmp_path: Path) -> Path:
-    folder = tmp_path / "study"
-    masrel("init", folder)
-    return folder
-
-
-def test_a_new_study_is_checked_drawn_and_checked_again(study: Path) -> None:
-    out, _ = masrel("check", study)
-    assert "no problems" in out
-    assert "0 of 2 schedules drawn" in out
-    out, _ = masrel("schedule", study)
-    assert "2 drawn, 0 kept" in out
-    out, _ = masrel("schedule", study)
-    assert "0 drawn, 2 kept" in out
-    out, _ = masrel("check", study)
-    assert "2 of 2 schedules drawn" in out
+def test_a_new_study_is_checked_drawn_and_checked_again(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    study = tmp_path / "study"
+    masrel("init", study)
+    assert "no problems" in masrel("check", study).out
+    assert "2 drawn, 0 kept" in masrel("schedule", study).out
+    assert "0 drawn, 2 kept" in masrel("schedule", study).out
+    assert "2 of 2 schedules drawn" in masrel("check", study).out
+    protocol = study / "protocol.toml"
+    text = protocol.read_text(encoding="utf-8").replace("seed = 20240", "seed = 1")
+    protocol.write_text(text, encoding="utf-8")
+    (study / "ratings").mkdir()
+    table = "session,rater,model,grade\ntest,R1,HM1,9\n"
+    (study / "ratings" / "ratings.csv").write_text(table, encoding="utf-8")
+    checked = masrel("check", study)
+    assert checked.code == 2
+    sentence = "schedule.seed was 20240 and is 1 since the draw: 2 of 2 schedules are"
+    assert f"{protocol}: {sentence} stale\n" in checked.err
+    assert "ratings.csv" in checked.err
+    published = tmp_path / "published"
+    masrel("init", published, "--study", "hess2012")
+    counts = "16 models, 8 raters, 2 sessions; 0 of 11 schedules drawn"
+    assert counts in masrel("check", published).out
 
 
 LIMIT = ("torque_limit_nm = 20.0", "torque_limit_nm = 19.9")
@@ -140,7 +134,11 @@ PULLING = ("beat_rate_hz = 5.0", "base_torque_nm = 2.1")
     ],
 )
 def test_check_says_what_the_device_or_the_plan_cannot_do(
-    template: str, edits: list[tuple[str, str]], said: str, tmp_path: Path
+    masrel: Caller,
+    template: str,
+    edits: list[tuple[str, str]],
+    said: str,
+    tmp_path: Path,
 ) -> None:
     masrel("init", tmp_path / "new", "--study", template)
     protocol = tmp_path / "new" / "protocol.toml"
@@ -150,76 +148,6 @@ def test_check_says_what_the_device_or_the_plan_cannot_do(
         text = text.replace(before, after, 1)
     protocol.write_text(text, encoding="utf-8")
     is_problem = bool(said) and "stops" not in said
-    _, err = masrel("check", tmp_path / "new", code=2 * is_problem)
-    assert said.replace(" P: ", f" {protocol}: ") in err
-    assert bool(err) == bool(said)
-
-
-def test_the_published_study_is_a_template(tmp_path: Path) -> None:
-    masrel("init", tmp_path / "new", "--study", "hess2012")
-    out, _ = masrel("check", tmp_path / "new")
-    assert "16 models, 8 raters, 2 sessions; 0 of 11 schedules drawn" in out
-
-
-def test_a_folder_in_use_and_an_unknown_study_are_refused(
-    study: Path, tmp_path: Path
-) -> None:
-    _, errors = masrel("init", study, code=2)
-    assert errors.startswith(f"masrel: {study}: needed a new or empty folder, got")
-    _, errors = masrel("init", tmp_path / "new", "--study", "x", code=2)
-    assert "needed one of hess2012, small" in errors
-
-
-def test_check_says_every_problem_on_a_line_of_its_own(study: Path) -> None:
-    protocol = study / "protocol.toml"
-    text = protocol.read_text(encoding="utf-8")
-    text = text.replace("catch_travel_deg = 60.0", "catch_travel_deg = 600.0")
-    text = text.replace("seed = 20240", "sed = 20240")
-    protocol.write_text(text, encoding="utf-8")
-    out, errors = masrel("check", study, code=2)
-    assert out == ""
-    lines = errors.splitlines()
-    assert [line.split(": ")[1] for line in lines[:-1]] == [
-        "models[0].catch_travel_deg",
-        "schedule.sed",
-        "schedule.seed",
-    ]
-    assert lines[-1] == f"masrel: {study}: 3 problems"
-
-
-def test_check_finds_stale_schedules_and_wrong_ratings_at_once(study: Path) -> None:
-    masrel("schedule", study)
-    protocol = study / "protocol.toml"
-    text = protocol.read_text(encoding="utf-8").replace("seed = 20240", "seed = 1")
-    protocol.write_text(text, encoding="utf-8")
-    (study / "ratings").mkdir()
-    (study / "ratings" / "ratings.csv").write_text(
-        "session,rater,model,grade\ntest,R1,HM1,9\n", encoding="utf-8"
-    )
-    _, errors = masrel("check", study, code=2)
-    sentence = "schedule.seed was 20240 and is 1 since the draw: 2 of 2 schedules are"
-    assert f"{protocol}: {sentence} stale\n" in errors
-    assert "ratings.csv" in errors
-
-
-def test_a_changed_protocol_is_refused_until_redrawn(study: Path) -> None:
-    masrel("schedule", study)
-    protocol = study / "protocol.toml"
-    text = protocol.read_text(encoding="utf-8").replace("seed = 20240", "seed = 1")
-    protocol.write_text(text, encoding="utf-8")
-    _, errors = masrel("schedule", study, code=2)
-    assert "--redraw draws those anew whose sessions have not begun" in errors
-    (study / "sessions").mkdir()
-    log = study / "sessions" / "test_R1.jsonl"
-    log.write_text("{}\n")
-    _, errors = masrel("schedule", study, "--redraw", code=2)
-    assert "the session has begun" in errors
-    log.unlink()
-    out, _ = masrel("schedule", study, "--redraw")
-    assert "2 drawn, 0 kept" in out
-
-
-@pytest.mark.parametrize("verb", ["check", "schedule"])
-def test_a_folder_without_a_protocol_is_refused(tmp_path: Path, verb: str) -> None:
-    _, errors = masrel(verb, tmp_path, code=2)
-    assert f"{tmp_path / 'protocol.toml'}: needed a protocol file" in errors
+    done = masrel("check", tmp_path / "new")
+    assert (done.code, bool(done.err)) == (2 * is_problem, bool(said))
+    assert said.replace(" P: ", f" {protocol}: ") in done.err

@@ -50,16 +50,6 @@ def test_every_kind_has_its_events_and_its_exact_torque(kind: str) -> None:
     assert scene["phases"][-1]["end_s"] == pytest.approx(stretch.duration)
 
 
-def test_a_clasp_knife_by_hand() -> None:
-    # Fires where 3.32 (θ - 56.27° + 0.25 s · 90°/s) = 3 N·m: at 85.543°, 0.61715 s.
-    scene = document("--kind", "clasp-knife", "--speed-deg-s", 90)
-    assert scene["catch_angle_deg"] == pytest.approx(85.5433, abs=1e-4)
-    times = {event["name"]: event["time_s"] for event in scene["events"]}
-    assert times["fire"] == pytest.approx(0.61715, abs=1e-5)
-    assert times["release"] == pytest.approx(0.66715, abs=1e-5)
-    assert scene["peak_torque_nm"] == pytest.approx(3.9419, abs=1e-4)
-
-
 def test_its_numbers_are_those_of_a_protocol() -> None:
     options = ("--kind", "contracture", "--parameter", "end_angle_deg=100")
     more = ("--parameter", "range_end_deg=110", "--at-deg", 105, "--speed-deg-s", 60)
