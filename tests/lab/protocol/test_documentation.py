@@ -82,17 +82,14 @@ def test_every_table_of_a_protocol_is_there() -> None:
 
 
 def test_the_default_sections_are_all_that_every_study_has() -> None:
-    hints = msgspec.inspect.type_info(definition.Report)
-    assert isinstance(hints, msgspec.inspect.StructType)
-    (union,) = (field.type for field in hints.fields if field.name == "sections")
-    assert isinstance(union, msgspec.inspect.UnionType)
-    info, _ = union.types
-    assert isinstance(info, msgspec.inspect.VarTupleType)
-    assert isinstance(info.item_type, msgspec.inspect.LiteralType)
+    (union,) = (
+        field.type
+        for field in msgspec.inspect.type_info(definition.Report).fields
+        if field.name == "sections"
+    )
     study = Path(__file__).parents[3] / "studies/hess2012"  # it has something for each
     protocol = read_protocol(study / "protocol.toml")
     report = msgspec.structs.replace(protocol.report, sections=None)
     default = report_sections(msgspec.structs.replace(protocol, report=report))
-    assert {*default, "in-person", "claims", "sample-size"} == set(
-        info.item_type.values
-    )
+    known = set(union.types[0].item_type.values)
+    assert {*default, "in-person", "claims", "sample-size"} == known

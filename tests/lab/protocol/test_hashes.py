@@ -35,6 +35,8 @@ def test_comments_layout_order_and_defaults_do_not_enter(tmp_path: Path) -> None
     before = hashes(VALID, tmp_path)
     other = dict(reversed(changed("schedule", "repeats", to=1).items()))
     other["models"][0]["catch_angle_constant_deg"] = 130.0
+    other |= {"occasions": {"practice": [], "resume": "always"}, "questionnaires": []}
+    other["sessions"][1]["order_policy"] = "refuse"
     path = write(other, tmp_path)
     path.write_text("# a comment\n\n" + path.read_text(encoding="utf-8"))
     protocol = read_protocol(path)
@@ -198,14 +200,6 @@ def test_the_bundled_studies_keep_their_hashes(study: str) -> None:
         report=msgspec.structs.replace(protocol.report, sections=sections),
     )
     assert (protocol_hash(protocol), presented_hash(protocol)) == HASHES[study]
-
-
-def test_occasions_at_their_defaults_are_no_change(tmp_path: Path) -> None:
-    before = hashes(VALID, tmp_path)
-    document = changed("occasions", to={"practice": [], "resume": "always"})
-    document["questionnaires"] = []
-    document["sessions"][1]["order_policy"] = "refuse"
-    assert hashes(document, tmp_path) == before
 
 
 def test_a_model_that_says_what_all_follow_is_no_change(tmp_path: Path) -> None:

@@ -72,14 +72,6 @@ def test_the_page_has_every_kind_with_its_keys_and_defaults(tmp_path: Path) -> N
         assert known[1].split(", ") == list(listed)
 
 
-def test_an_unknown_kind_names_those_there_are(tmp_path: Path) -> None:
-    assert problems_of(of_kind("lead-pipe-rigidty"), tmp_path) == [
-        "models[2].kind: needed one of spastic-elbow, "
-        + ", ".join(KINDS)
-        + ', got "lead-pipe-rigidty"; did you mean lead-pipe-rigidity? (id "K")'
-    ]
-
-
 def test_all_that_is_wrong_with_the_numbers_of_a_kind_comes_at_once(
     tmp_path: Path,
 ) -> None:
@@ -111,45 +103,48 @@ def test_all_that_is_wrong_with_the_numbers_of_a_kind_comes_at_once(
     ]
 
 
-def test_numbers_that_do_not_go_together_are_refused(tmp_path: Path) -> None:
-    (problem,) = problems_of(of_kind("clasp-knife", arming_angle_deg=80.0), tmp_path)
-    assert problem.startswith("models[2].parameters.arming_angle_deg: needed at most ")
-    (problem,) = problems_of(of_kind("cogwheel-rigidity", gap_share=0.0), tmp_path)
-    assert problem.startswith("models[2].parameters")
-    assert "gap_edge: needs at most half a gap" in problem
+ELBOWS = 'needed for kind "spastic-elbow" only, got it for "dystonia"; its numbers'
+WRONG: list[tuple[dict[str, Any], str]] = [
+    (
+        {"kind": "lead-pipe-rigidty"},
+        f"kind: needed one of spastic-elbow, {', '.join(KINDS)}, got "
+        '"lead-pipe-rigidty"; did you mean lead-pipe-rigidity?',
+    ),
+    (
+        {"kind": "clasp-knife", "parameters": {"arming_angle_deg": 80.0}},
+        "parameters.arming_angle_deg: needed at most ",
+    ),
+    (
+        {"kind": "cogwheel-rigidity", "parameters": {"gap_share": 0.0}},
+        "parameters: gap_edge: needs at most half a gap",
+    ),
+    (
+        {"kind": "dystonia", "catch_angle_constant_deg": 120.0},
+        f"catch_angle_constant_deg: {ELBOWS}",
+    ),
+    ({"kind": "dystonia", "residual_ratio": 0.0}, f"residual_ratio: {ELBOWS}"),
+    (
+        {"kind": "dystonia", "constants": {"stiffness_nm_rad": 1.0}},
+        f"constants.stiffness_nm_rad: {ELBOWS}",
+    ),
+    *(
+        (
+            {"kind": "clonus", "parameters": {"beat_rate_hz": value}},
+            "parameters.beat_rate_hz: needed a number, got ",
+        )
+        for value in ("1", True, [1.0], {"a": 1.0}, math.inf, math.nan)
+    ),
+]
 
 
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [
-        ("catch_angle_constant_deg", 120.0),
-        ("residual_ratio", 0.0),
-        ("file", "K.toml"),
-        ("constants", {"stiffness_nm_rad": 1.0}),
-    ],
-)
-def test_keys_of_a_spastic_elbow_are_not_those_of_another_kind(
-    tmp_path: Path, key: str, value: object
+@pytest.mark.parametrize(("model", "problem"), WRONG)
+def test_what_is_wrong_with_a_model_of_a_kind_is_said_once(
+    tmp_path: Path, model: dict[str, Any], problem: str
 ) -> None:
-    document = of_kind("dystonia")
-    document["models"][2][key] = value
-    problems = problems_of(document, tmp_path)
-    if key == "file":  # ... which is read first, and is not there
-        assert problems[0].startswith("models[2].file: needed a model file")
-        return
-    where = "constants.stiffness_nm_rad" if key == "constants" else key
-    assert problems == [
-        f'models[2].{where}: needed for kind "spastic-elbow" only, got it for '
-        '"dystonia"; its numbers stand in [models.parameters] (id "K")'
-    ]
-
-
-@pytest.mark.parametrize("value", ["1", True, [1.0], {"a": 1.0}, math.inf, math.nan])
-def test_what_is_no_number_is_refused(tmp_path: Path, value: object) -> None:
-    (problem,) = problems_of(of_kind("clonus", beat_rate_hz=value), tmp_path)
-    where, needed = "models[2].parameters.beat_rate_hz", "needed a number, got "
-    assert problem.startswith(f"{where}: {needed}")
-    assert problem.endswith('(id "K")')
+    document = changed("models", to=[*VALID["models"], {"id": "K", **model}])
+    (said,) = problems_of(document, tmp_path)
+    assert said.startswith(f"models[2].{problem}")
+    assert said.endswith('(id "K")')
 
 
 def test_the_elbow_of_a_model_of_another_kind_is_refused(tmp_path: Path) -> None:

@@ -1,12 +1,12 @@
 """A model file's numbers are in the protocol as if they stood there."""
 
 import copy
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from masrel.errors import ProtocolError
 from masrel.lab.elbow.identification import as_toml, model_document
 from masrel.lab.elbow.parameters import STANDARD_MODELS
 from masrel.lab.protocol import (
@@ -15,7 +15,7 @@ from masrel.lab.protocol import (
     protocol_hash,
     read_protocol,
 )
-from tests.lab.protocol.documents import VALID, write
+from tests.lab.protocol.documents import VALID, problems_of, write
 
 KEYS = (
     "catch_angle_constant_deg",
@@ -84,16 +84,7 @@ def test_a_file_says_whether_it_comes_from_simulated_recordings(tmp_path: Path) 
     put(tmp_path)
     protocol = read_protocol(write(named(), tmp_path))
     assert [model.simulated for model in protocol.models] == [True, False]
-    with pytest.raises(ProtocolError) as raised:
-        read_protocol(write(named(simulated=False), tmp_path))
-    (problem,) = raised.value.problems
-    assert problem.endswith(
-        "models[0].simulated: needed in s3.toml or here, got it in both"
-    )
-
-
-def test_of_a_file_that_does_not_say_it_the_protocol_may(tmp_path: Path) -> None:
-    path = put(tmp_path)
+    path = tmp_path / "s3.toml"  # of one that does not say it the protocol may
     text = path.read_text("utf-8").replace("simulated = true\n", "")
     path.write_text(text, "utf-8")
     for said in (False, True):
@@ -135,32 +126,49 @@ def test_a_file_that_is_no_model_file_is_one_problem(
 ) -> None:
     if content is not None:
         (tmp_path / "s3.toml").write_text(content, encoding="utf-8")
-    with pytest.raises(ProtocolError, match=said) as raised:
-        read_protocol(write(named(), tmp_path))
-    assert len(raised.value.problems) == 1
+    (problem,) = problems_of(named(), tmp_path)
+    assert re.match(said, problem)
 
 
-def test_a_number_in_both_places_is_refused(tmp_path: Path) -> None:
-    put(tmp_path)
-    document = named(residual_ratio=0.2, constants={"damping_nms_rad": 1.0})
-    with pytest.raises(ProtocolError) as raised:
-        read_protocol(write(document, tmp_path))
-    said = "\n".join(raised.value.problems)
-    assert "models[0].residual_ratio: needed in s3.toml or here" in said
-    assert "models[0].constants.damping_nms_rad: needed in s3.toml or here" in said
+IN_BOTH = "needed in s3.toml or here, got it in both"
 
 
-def test_a_number_out_of_range_is_named_by_its_key(tmp_path: Path) -> None:
-    put(tmp_path, model={"residual_ratio": 1.5}, constants={"catch_slope_s": -1.0})
-    with pytest.raises(ProtocolError) as raised:
-        read_protocol(write(named(), tmp_path))
-    said = "\n".join(raised.value.problems)
-    assert "models[0].residual_ratio: needed a number at least 0" in said
-    assert "models[0].constants.catch_slope_s: needed a number above 0" in said
-
-
-def test_the_rule_of_catch_angles_uses_the_models_own_slope(tmp_path: Path) -> None:
-    # L 115 deg - 1.0 s · 60 deg/s = 55 deg, below the smallest catch angle
-    put(tmp_path, constants={"catch_slope_s": 1.0})
-    with pytest.raises(ProtocolError, match=r"115 - 1 \* 60 = 55"):
-        read_protocol(write(named(), tmp_path))
+@pytest.mark.parametrize(
+    ("of_file", "of_protocol", "problems"),
+    [
+        (
+            {},
+            {"residual_ratio": 0.2, "constants": {"damping_nms_rad": 1.0}},
+            [f"residual_ratio: {IN_BOTH}", f"constants.damping_nms_rad: {IN_BOTH}"],
+        ),
+        ({}, {"simulated": False}, [f"simulated: {IN_BOTH}"]),
+        (
+            {"model": {"residual_ratio": 1.5}, "constants": {"catch_slope_s": -1.0}},
+            {},
+            [
+                "residual_ratio: needed a number at least 0 and below 1, got 1.5",
+                "constants.catch_slope_s: needed a number above 0, got -1.0",
+            ],
+        ),
+        (  # L 115 deg - 1.0 s · 60 deg/s = 55 deg, below the smallest catch angle
+            {"constants": {"catch_slope_s": 1.0}},
+            {},
+            [
+                "catch_angle_constant_deg: needed a catch angle at "
+                "elbow.slowest_mean_speed_deg_s of at least "
+                "elbow.smallest_catch_angle_deg (60), got 115 - 1 * 60 = 55"
+            ],
+        ),
+    ],
+)
+def test_what_is_wrong_with_the_numbers_of_a_file_is_named_by_its_key(
+    tmp_path: Path,
+    of_file: dict[str, dict[str, object]],
+    of_protocol: dict[str, object],
+    problems: list[str],
+) -> None:
+    put(tmp_path, **of_file)
+    said = problems_of(named(**of_protocol), tmp_path)
+    assert [text.removesuffix(' (id "HM1")') for text in said] == [
+        f"models[0].{problem}" for problem in problems
+    ]

@@ -52,9 +52,6 @@ def test_the_angles_of_a_scale_are_asked_after_each_presentation(
     assert (angles.id, angles.when) == ("tardieu", "presentation")
     asked = [(q.id, q.type, q.low, q.high, q.required) for q in angles.questions]
     assert asked == [("R1", "whole", 0, 180, False), ("R2", "whole", 0, 180, False)]
-
-
-def test_a_study_may_ask_for_the_angles_in_a_way_of_its_own(tmp_path: Path) -> None:
     own = (
         '[[questionnaires]]\nid = "tardieu"\ntitle = "X"\nwhen = "presentation"\n'
         '[[questionnaires.questions]]\nid = "X"\ntext = "X, deg"\n'

@@ -317,6 +317,12 @@ NUMBER = "a number above 0 and at most 180"
             'got "test" twice (id "again")',
         ),
         (
+            ("analysis", "estimates", 1, "sessions"),
+            ["test", "retest", "test"],
+            "analysis.estimates[1].sessions: needed an array of 1 to 2 entries, got an "
+            'array of 3 (id "again")',
+        ),
+        (
             ("analysis", "estimates", 0, "sessions"),
             ["tset"],
             "analysis.estimates[0].sessions[0]: needed a session of [[sessions]] "
@@ -383,15 +389,6 @@ def test_a_session_too_small_for_the_plan_is_refused_where_it_is_asked_for(
         'got one of 1 (id "kappa")',
         "analysis.estimates[1].sessions: needed two sessions that share a rater, "
         'got none in both (id "again")',
-    ]
-
-
-def test_three_sessions_in_a_line_of_the_plan_are_refused_once(tmp_path: Path) -> None:
-    names = ["test", "retest", "test"]
-    document = changed("analysis", "estimates", 1, "sessions", to=names)
-    assert problems_of(document, tmp_path) == [
-        "analysis.estimates[1].sessions: needed an array of 1 to 2 entries, "
-        'got an array of 3 (id "again")'
     ]
 
 

@@ -1,7 +1,6 @@
 """Which sections a report has: those that are named, or all there is something for."""
 
 import msgspec
-import pytest
 
 from masrel.lab.protocol import Protocol, protocol_hash, report_sections
 from tests.lab.analysis.studies import hess2012, plan
@@ -37,11 +36,8 @@ def with_sections(sections: tuple[str, ...] | None, **tables: object) -> Protoco
     return msgspec.structs.replace(protocol, report=report)
 
 
-def test_without_a_choice_a_report_tells_the_whole_story() -> None:
+def test_without_a_choice_a_report_tells_what_a_study_has_something_for() -> None:
     assert report_sections(with_sections(None)) == STORY
-
-
-def test_what_a_study_has_nothing_for_is_left_out() -> None:
     protocol = hess2012()
     models = tuple(
         msgspec.structs.replace(model, intended_grade=None) for model in protocol.models
@@ -50,13 +46,10 @@ def test_what_a_study_has_nothing_for_is_left_out() -> None:
     bare = with_sections(None, models=models, analysis=analysis, questionnaires=())
     gone = {"test-retest", "confusion", "questionnaires"}
     assert report_sections(bare) == tuple(name for name in STORY if name not in gone)
+    for names in (FORMER, ("methods", "design"), ()):
+        assert report_sections(with_sections(names)) == names
 
 
 def test_no_choice_hashes_as_the_sections_that_once_were_the_default() -> None:
     assert protocol_hash(with_sections(None)) == protocol_hash(with_sections(FORMER))
     assert protocol_hash(with_sections(())) != protocol_hash(with_sections(FORMER))
-
-
-@pytest.mark.parametrize("names", [FORMER, ("methods", "design"), ()])
-def test_sections_that_are_named_stay_as_named(names: tuple[str, ...]) -> None:
-    assert report_sections(with_sections(names)) == names

@@ -60,6 +60,10 @@ def test_a_folder_that_holds_anything_is_refused_and_left_alone(tmp_path: Path) 
     with pytest.raises(ParameterError, match=r"got one that holds \.hidden"):
         copy_template("small", tmp_path)
     assert contents(tmp_path) == {".hidden": b"mine"}
+    for name in ("huge", "", "../studies/small", "."):
+        with pytest.raises(ParameterError, match="needed one of hess2012, small"):
+            copy_template(name, tmp_path / "new")
+    assert not (tmp_path / "new").exists()
 
 
 def test_a_copy_that_was_killed_is_completed(tmp_path: Path) -> None:
@@ -74,12 +78,3 @@ def test_a_copy_that_was_killed_is_completed(tmp_path: Path) -> None:
     assert contents(half) == whole
     with pytest.raises(ParameterError, match=r"got one that holds README\.md and"):
         copy_template("hess2012", half)
-
-
-@pytest.mark.parametrize("name", ["huge", "", "../studies/small", "."])
-def test_an_unknown_study_is_refused_with_those_there_are(
-    tmp_path: Path, name: str
-) -> None:
-    with pytest.raises(ParameterError, match="needed one of hess2012, small"):
-        copy_template(name, tmp_path / "new")
-    assert not (tmp_path / "new").exists()
