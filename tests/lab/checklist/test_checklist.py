@@ -1,7 +1,6 @@
 """Checklists hold what the record says, and leave the rest to the authors."""
 
 import hashlib
-import io
 import json
 import re
 from collections import Counter
@@ -11,6 +10,7 @@ from pathlib import Path
 
 import docx
 import pytest
+from markupsafe import escape
 
 from masrel.errors import ParameterError
 from masrel.lab.checklist import (
@@ -103,7 +103,8 @@ def grras(study: StudyPaths) -> Checklist:
 def test_of_grras_seven_are_filled_four_in_part_and_four_the_authors(
     rated: Small,
 ) -> None:
-    checklist = grras(rated[0])
+    study, _ = rated
+    checklist = grras(study)
     states = {
         state: {item.number for item in checklist.items if item.state == state}
         for state in ("filled", "in part", "authors")
@@ -111,6 +112,19 @@ def test_of_grras_seven_are_filled_four_in_part_and_four_the_authors(
     assert states["filled"] == {"6", "8", "9", "10", "11", "13", "15"}
     assert states["in part"] == {"2", "4", "7", "12"}
     assert states["authors"] == {"1", "3", "5", "14"}
+    # days and corrections come from the logs
+    assert "from 2026-03-01 to 2026-03-10 (UTC)" in facts(checklist, "8")
+    assert "9 to 9, median 9" in facts(checklist, "8")
+    assert "1 correction of a grade" in facts(checklist, "9")
+    numbers = "Session test: 2 raters, 3 models, 6 ratings, 0 missing."
+    assert numbers in facts(checklist, "11")
+    # every file that is named has its hash
+    named = {file.as_posix() for item in checklist.items for file in item.sources}
+    assert {"protocol.toml", "sessions/retest_R1.jsonl"} < named
+    assert checklist.files == {
+        name: hashlib.sha256((study.root / name).read_bytes()).hexdigest()
+        for name in sorted(named)
+    }
 
 
 def test_what_nobody_knows_before_the_first_session_is_asked(small: Small) -> None:
@@ -118,16 +132,6 @@ def test_what_nobody_knows_before_the_first_session_is_asked(small: Small) -> No
     asked = {item.number for item in checklist.items if item.state == "authors"}
     assert asked == {"1", "3", "5", "11", "13", "14", "15"}
     assert checklist.notes == ("No session has begun: what follows is the plan.",)
-
-
-def test_days_and_corrections_come_from_the_logs(rated: Small) -> None:
-    checklist = grras(rated[0])
-    assert "from 2026-03-01 to 2026-03-10 (UTC)" in facts(checklist, "8")
-    assert "9 to 9, median 9" in facts(checklist, "8")
-    assert "1 correction of a grade" in facts(checklist, "9")
-    assert "Session test: 2 raters, 3 models, 6 ratings, 0 missing." in facts(
-        checklist, "11"
-    )
 
 
 def test_raters_who_left_are_said_and_not_by_whom(rated: Small) -> None:
@@ -167,23 +171,6 @@ def test_public_fields_of_raters_are_told(new_study: Callable[..., Small]) -> No
         assert "influenza" not in said
 
 
-def test_every_file_that_is_named_has_its_hash(rated: Small) -> None:
-    study, _ = rated
-    checklist = grras(study)
-    named = {file.as_posix() for item in checklist.items for file in item.sources}
-    assert (
-        named
-        == set(checklist.files)
-        >= {
-            "protocol.toml",
-            "sessions/test_R1.jsonl",
-            "sessions/retest_R1.jsonl",
-        }
-    )
-    for name, digest in checklist.files.items():
-        assert hashlib.sha256((study.root / name).read_bytes()).hexdigest() == digest
-
-
 def test_cosmin_has_its_six_standards_and_no_grade(rated: Small) -> None:
     study, protocol = rated
     checklist = fill_checklist(study, protocol, "cosmin")
@@ -194,29 +181,17 @@ def test_cosmin_has_its_six_standards_and_no_grade(rated: Small) -> None:
     assert "9 to 9, median 9" in facts(checklist, "2")
     assert "Device: simulated in all sessions." in facts(checklist, "3")
     assert "0 grades missing of 9." in facts(checklist, "6")
-
-
-def test_what_differs_between_sessions_is_said(
-    rated: Small,
-) -> None:
-    study, protocol = rated
+    # what differs is said: the log of another version, its chain forged anew
     log = study.log_file("R1", "retest")
-    head = log.read_text().splitlines()[0]
-    version = re.search(r'"masrel_version": "([^"]+)"', head)
-    assert version is not None
-    # the chain is forged anew from its first line on
+    head, *later = map(json.loads, log.read_text().splitlines())
+    version, head["fields"]["masrel_version"] = head["fields"]["masrel_version"], "9.9"
     lines, previous = [], "0" * 64
-    for line in log.read_text().splitlines():
-        document = json.loads(line)
-        if document["event"] == "session":
-            document["fields"]["masrel_version"] = "9.9"
-        document["previous"] = previous
-        lines.append(json.dumps(document, ensure_ascii=False))
+    for document in (head, *later):
+        lines.append(json.dumps(document | {"previous": previous}, ensure_ascii=False))
         previous = hashlib.sha256(lines[-1].encode()).hexdigest()
     log.write_text("\n".join(lines) + "\n")
-    checklist = fill_checklist(study, protocol, "cosmin")
-    needed = f"Version of masrel differs: {version[1]} in 2; 9.9 in 1."
-    assert needed in facts(checklist, "3")
+    needed = f"Version of masrel differs: {version} in 2; 9.9 in 1."
+    assert needed in facts(fill_checklist(study, protocol, "cosmin"), "3")
 
 
 def test_a_study_without_logs_does_not_say_how_it_was_run() -> None:
@@ -232,30 +207,22 @@ def test_a_study_without_logs_does_not_say_how_it_was_run() -> None:
 def test_each_form_has_every_fact(rated: Small, tmp_path: Path) -> None:
     checklist = grras(rated[0])
     assert "SIMULATED" in " ".join(checklist.notes)
-    texts = {}
-    for form in (".html", ".md", ".docx"):
-        path = tmp_path / f"checklist{form}"
+    paths = [tmp_path / f"checklist{form}" for form in (".html", ".md", ".docx")]
+    for path in paths:
         write_checklist(checklist, path)
         first = path.read_bytes()
         write_checklist(checklist, path)
         assert path.read_bytes() == first
-        texts[form] = first
-    document = docx.Document(io.BytesIO(texts[".docx"]))
-    said = [paragraph.text for paragraph in document.paragraphs]
-    page, markdown = texts[".html"].decode(), texts[".md"].decode()
+    page, markdown = (path.read_text(encoding="utf-8") for path in paths[:2])
     assert markdown == checklist_markdown(checklist)
     assert "http" not in page
+    document = docx.Document(str(paths[2]))
+    said = "\n".join(paragraph.text for paragraph in document.paragraphs)
+    assert said.startswith(f"{checklist.study}\n")
     for item in checklist.items:
         for text in (item.topic, *item.facts):
-            assert any(text in of for of in said)
-            assert _escaped(text) in page
-    assert document.paragraphs[0].text == checklist.study
-
-
-def _escaped(text: str) -> str:
-    from markupsafe import escape
-
-    return str(escape(text))
+            assert text in said
+            assert str(escape(text)) in page
 
 
 def test_what_is_wrong_is_said_in_one_sentence(tmp_path: Path, small: Small) -> None:

@@ -126,19 +126,6 @@ def check_junit(root: ElementTree.Element) -> None:
         assert int(root.get(name, "")) == len(root.findall(f"*/{tag}"))
 
 
-def test_a_reason_keeps_to_its_cell(
-    masrel: Caller, study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    summary = tmp_path / "summary.md"
-    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(summary))
-    with (study / "protocol.toml").open("a") as file:
-        file.write('\n[[report.gates]]\nrequire = "kappa.std.n >= 5"\n')
-        file.write('why = "a | b <i>"\n')
-    assert masrel("analyze", study).code == 1
-    (row,) = [line for line in summary.read_text().splitlines() if "fails" in line]
-    assert r"(a \| b \<i\>)" in row
-
-
 @pytest.mark.parametrize("why", [r"odd \u0001 sign", r"two\nlines"])
 def test_a_reason_is_one_line(masrel: Caller, study: Path, why: str) -> None:
     with (study / "protocol.toml").open("a") as file:
@@ -171,14 +158,17 @@ def test_junit_and_the_summary_of_a_job_have_every_estimate_and_gate(
     summary = tmp_path / "summary.md"
     summary.write_text("before\n")
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(summary))
+    with (study / "protocol.toml").open("a") as file:
+        file.write('\n[[report.gates]]\nrequire = "kappa.std.n >= 5"\n')
+        file.write('why = "a | b <i>"\n')
     gates = ("--require", "kappa.std.n>=4", "--require", "kappa.std.n>4")
     junit = tmp_path / "junit.xml"
     done = masrel("analyze", study, *gates, "--junit", junit)
     assert done.code == 1
     suite = ElementTree.parse(junit).getroot()
     assert {key: suite.get(key) for key in ("tests", "failures", "skipped")} == {
-        "tests": "4",
-        "failures": "1",
+        "tests": "5",
+        "failures": "2",
         "skipped": "1",
     }
     check_junit(suite)
@@ -188,9 +178,11 @@ def test_junit_and_the_summary_of_a_job_have_every_estimate_and_gate(
         "again": ["skipped"],
         "kappa.std.n >= 4": [],
         "kappa.std.n > 4": ["failure"],
+        "kappa.std.n >= 5": ["failure"],
     }
     text = summary.read_text()
     assert text.startswith("before\n")
+    assert r"(a \| b \<i\>)" in text
     assert "Fleiss' κ = .63" in text
     assert r"| **fails** | --require: kappa.std.n \> 4 fails: 4 |" in text
     first = junit.read_bytes()

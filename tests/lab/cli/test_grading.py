@@ -22,10 +22,10 @@ def test_json_is_one_document_with_every_digit(masrel: Caller, tmp_path: Path) -
     done = masrel(*asked, "-")
     assert (done.code, done.err) == (0, "")
     document = json.loads(done.out)
-    for effect, said in zip(found.effects, document["effects"], strict=True):
-        assert said["predictor"] == effect.predictor
-        assert said["odds_ratio"] == effect.odds_ratio
-        assert (said["low"], said["high"]) == (effect.low, effect.high)
+    names = ("predictor", "odds_ratio", "low", "high")
+    assert [[said[name] for name in names] for said in document["effects"]] == [
+        [getattr(effect, name) for name in names] for effect in found.effects
+    ]
     assert (document["level"], document["simulated"]) == (0.9, False)
     written = masrel(*asked, tmp_path / "grading.json")
     assert "90 % interval" in written.out

@@ -128,18 +128,6 @@ def test_a_pandoc_that_fails_is_said_in_a_sentence(study: Path, tmp_path: Path) 
     assert done.stderr.splitlines()[-1].endswith(f"3.0 or newer; {old} ended with: no")
 
 
-def test_templates_of_the_user_change_no_document(
-    study: Path, folder: Path, tmp_path: Path
-) -> None:
-    templates = tmp_path / "pandoc" / "templates"
-    templates.mkdir(parents=True)
-    (templates / "default.latex").write_text("mine")
-    variables = {"XDG_DATA_HOME": str(tmp_path)}
-    build(study, tmp_path / "other", variables, "--format", "latex")
-    same = (tmp_path / "other" / "report.tex").read_bytes()
-    assert same == (folder / "report.tex").read_bytes()
-
-
 def test_tables_too_wide_for_paper_are_in_parts(tmp_path: Path) -> None:
     root = tmp_path / "study"
     copy_template("hess2012", root)
@@ -208,12 +196,16 @@ def test_a_foreign_environment_changes_no_byte_and_is_not_written_to(
     probe = subprocess.run([*bare, "touch", package / "written"], check=False)
     assert probe.returncode != 0
     settings = tmp_path / "matplotlibrc"
+    templates = tmp_path / "pandoc" / "templates"
+    templates.mkdir(parents=True)
+    (templates / "default.latex").write_text("mine")
     settings.write_text("font.size: 30\nsavefig.dpi: 30\nsvg.fonttype: path\n")
     environment = os.environ | {
         "LANG": "de_DE.UTF-8",
         "LC_ALL": "C",
         "TZ": "Asia/Seoul",
         "HOME": str(tmp_path),
+        "XDG_DATA_HOME": str(tmp_path),
         "MPLBACKEND": "module://matplotlib_inline.backend_inline",
         "MATPLOTLIBRC": str(settings),
         "PYTHONHASHSEED": "7",
@@ -254,9 +246,3 @@ def test_a_format_that_is_not_made_again_goes(
     masrel("report", root, "--quiet")
     assert [page.exists() for page in pages] == [True, False]
     assert masrel("report", root, "--check", "--quiet").code == 0
-
-
-def test_what_is_no_format_is_refused(masrel: Caller, study: Path) -> None:
-    done = masrel("report", study, "--format", "pdf")
-    assert done.code == 2
-    assert "'pdf' is not one of 'html', 'markdown', 'latex', 'docx'" in done.err

