@@ -5,7 +5,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -14,7 +14,9 @@ from masrel.cli._paths import InputFile, note_inputs
 from masrel.errors import MasrelWarning
 
 if TYPE_CHECKING:
+    from masrel.lab.protocol import Protocol
     from masrel.lab.ratings import StudyData
+    from masrel.lab.run import GradeSource
 
 study_argument = click.argument("study", type=click.Path(path_type=Path))
 
@@ -57,6 +59,24 @@ grades_option = click.option(
     show_default=True,
     help="Who gives the grades.",
 )
+
+
+def grading(
+    protocol: "Protocol",
+    grades: str,
+    clock: 'Literal["real", "simulated"] | None',
+    simulated: "Callable[[Protocol], GradeSource]",
+) -> "dict[str, Any]":
+    """Return the source of grades, and the clock, that a command runs with."""
+    from masrel.lab.protocol import scale_of
+    from masrel.lab.run import ConsoleGrades
+
+    if grades == "console":
+        source: GradeSource = ConsoleGrades(scale_of(protocol))
+        return {"grades": source, "clock": clock or "real"}
+    return {"grades": simulated(protocol), "clock": clock or "simulated"}
+
+
 ratings_option = click.option(
     "--ratings",
     "ratings_file",

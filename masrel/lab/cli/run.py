@@ -9,15 +9,16 @@ from masrel.cli._options import OutputOptions, output_options
 from masrel.lab.cli._study_options import (
     clock_option,
     grades_option,
+    grading,
     id_option,
     of_study,
     session_option,
     warnings_as_notes,
 )
-from masrel.lab.protocol import Protocol, StudyPaths, scale_of
+from masrel.lab.protocol import Protocol, StudyPaths
 
 if TYPE_CHECKING:
-    from masrel.lab.run import GradeSource, SessionSummary
+    from masrel.lab.run import SessionSummary
 
 
 @click.command("run")
@@ -47,7 +48,7 @@ def run(
     The rater is shown blinded codes only. With --rehearse the order and the codes are
     other ones, and log and recordings are kept in STUDY/rehearsals.
     """
-    from masrel.lab.run import run_session
+    from masrel.lab.run import SimulatedGrades, run_session
 
     n_presentations = len(protocol.models) * protocol.schedule.repeats
     # A person's prompts count the presentations themselves.
@@ -63,8 +64,7 @@ def run(
             protocol,
             rater,
             session,
-            grades=_source(grades, protocol),
-            clock=clock or ("simulated" if grades == "simulated" else "real"),
+            **grading(protocol, grades, clock, SimulatedGrades),
             rehearsal=rehearse,
             progress=lambda _: bar.update(),
         )
@@ -87,13 +87,3 @@ def _completed(done: "SessionSummary", grades: Literal["console", "simulated"]) 
     if done.n_set_aside:
         text += f"; {done.n_set_aside} from before count no more"
     return text
-
-
-def _source(
-    grades: Literal["console", "simulated"], protocol: Protocol
-) -> "GradeSource":
-    from masrel.lab.run import ConsoleGrades, SimulatedGrades
-
-    if grades == "console":
-        return ConsoleGrades(scale_of(protocol))
-    return SimulatedGrades(protocol)

@@ -12,6 +12,7 @@ from masrel.cli._paths import OutputFile
 from masrel.lab.cli._study_options import (
     clock_option,
     grades_option,
+    grading,
     id_option,
     of_study,
     warnings_as_notes,
@@ -19,7 +20,6 @@ from masrel.lab.cli._study_options import (
 
 if TYPE_CHECKING:
     from masrel.lab.protocol import Protocol, StudyPaths
-    from masrel.lab.run import GradeSource
     from masrel.lab.training import Lesson
 
 _WIDTH = 88  # of notes below a table
@@ -55,15 +55,14 @@ def _train(
     ratings of the study.
     """
     from masrel.lab.report._training import NOT_RATINGS, outcome
-    from masrel.lab.training import train_rater
+    from masrel.lab.training import SimulatedTrainee, train_rater
 
     with warnings_as_notes():
         record = train_rater(
             paths,
             protocol,
             rater,
-            grades=_source(grades, protocol),
-            clock=clock or ("simulated" if grades == "simulated" else "real"),
+            **grading(protocol, grades, clock, SimulatedTrainee),
             feedback=_show_grade if grades == "console" else None,
         )
     if not output.quiet:
@@ -79,19 +78,6 @@ def _show_grade(lesson: "Lesson") -> None:
         click.echo(f"Right: {lesson.intended}.\n")
     else:
         click.echo(f"Not {lesson.grade}: it is {lesson.intended}.\n")
-
-
-def _source(
-    grades: Literal["console", "simulated"], protocol: "Protocol"
-) -> "GradeSource":
-    if grades == "console":
-        from masrel.lab.protocol import scale_of
-        from masrel.lab.run import ConsoleGrades
-
-        return ConsoleGrades(scale_of(protocol))
-    from masrel.lab.training import SimulatedTrainee
-
-    return SimulatedTrainee(protocol)
 
 
 @train.command("show")

@@ -2,13 +2,15 @@
 
 import os
 import pty
+import re
 import select
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing
 from pathlib import Path
+
+import pytest
 
 from masrel.lab.protocol import StudyPaths
 from masrel.lab.run import read_log
@@ -25,41 +27,43 @@ stretches = "free"
 """
 
 
+RUN = ("run", "--rater", "R1", "--session", "test", "--clock", "real")
+
+
 class Terminal:
     """A person at a terminal, who waits for what is shown and types."""
 
     def __init__(self, study: StudyPaths) -> None:
-        self.keyboard, screen = pty.openpty()
-        command = (sys.executable, "-m", "masrel", "run", str(study.root))
+        self._keyboard, screen = pty.openpty()
+        command = [sys.executable, "-m", "masrel", *RUN, str(study.root)]
+        self._study, null = study, subprocess.DEVNULL
         self.session = subprocess.Popen(
-            (*command, "--rater", "R1", "--session", "test", "--clock", "real"),
-            stdin=screen,
-            stdout=screen,
-            stderr=subprocess.DEVNULL,
+            command, stdin=screen, stdout=screen, stderr=null
         )
         os.close(screen)
 
     def read_until(self, words: str) -> str:
+        """Read until these words are shown -> all that was."""
         shown = b""
         while words.encode() not in shown:
-            ready, _, _ = select.select([self.keyboard], [], [], 60.0)
+            ready, _, _ = select.select([self._keyboard], [], [], 60.0)
             assert ready, shown
-            shown += os.read(self.keyboard, 4096)
+            shown += os.read(self._keyboard, 4096)
         return shown.decode()
 
     def type(self, keys: str) -> None:
-        os.write(self.keyboard, keys.encode())
+        """Type keys; a star waits until a model is presented and keys count."""
+        for part in re.split(r"(\*)", keys):
+            if part == "*":
+                wait_for_presentation(self._study)
+            else:
+                os.write(self._keyboard, part.encode())
 
-
-@contextmanager
-def at_a_terminal(study: StudyPaths) -> Iterator[Terminal]:
-    terminal = Terminal(study)
-    try:
-        yield terminal
-    finally:
-        terminal.session.kill()
-        terminal.session.wait()
-        os.close(terminal.keyboard)
+    def close(self) -> None:
+        """Go away."""
+        self.session.kill()
+        self.session.wait()
+        os.close(self._keyboard)
 
 
 def wait_for_presentation(study: StudyPaths) -> None:
@@ -70,71 +74,61 @@ def wait_for_presentation(study: StudyPaths) -> None:
     time.sleep(0.1)  # until keys count
 
 
-def test_enter_says_done_and_one_too_many_does_nothing(tmp_path: Path) -> None:
-    study, _ = small_study(tmp_path / "study", 30.0, device=FREE)
-    with at_a_terminal(study) as terminal:
-        asked = terminal.read_until("stop to stop")
-        assert "Stretch the arm as often as you want, then Enter says done" in asked
-        terminal.type("\n")
-        wait_for_presentation(study)
-        terminal.type("\n\n\n")  # two too many while it ends
-        terminal.read_until("Grade of")
-        terminal.type("\n\n")  # and two where the grade is asked for
-        terminal.type("2\n")
-        shown = terminal.read_until("is complete")
+ONE = FREE.partition("[presentation]")[0]
+ASKED = "Stretch the arm as often as you want, then Enter says done"
+
+
+@pytest.mark.parametrize(
+    ("device", "asked", "typed", "then", "answer", "end"),
+    [
+        # two Enters too many while it ends, and two where the grade is asked for
+        (FREE, ASKED, "\n*\n\n\n", "Grade of", "\n\n2\n", ("done", "2")),
+        (FREE, ASKED, "\n* ", "Present it again?", "no\n", "emergency stop: key"),
+        (ONE, "Enter to begin", "\n*\n", "Grade of", "2\n", ("arrived", "2")),
+    ],
+)
+def test_enter_says_done_and_every_other_key_is_an_emergency_stop(
+    tmp_path: Path,
+    device: str,
+    asked: str,
+    typed: str,
+    then: str,
+    answer: str,
+    end: tuple[str, str] | str,
+) -> None:
+    speed = 30.0 if device == FREE else 60.0  # deg/s
+    study, _ = small_study(tmp_path / "study", speed, device=device)
+    with closing(Terminal(study)) as terminal:
+        assert asked in terminal.read_until("stop to stop")
+        terminal.type(typed)
+        terminal.read_until(then)
+        terminal.type(answer)
+        shown = terminal.read_until("is complete") if end[0] != "e" else ""
         assert "is not a grade" not in shown
+        assert terminal.session.wait(60.0) == (end[0] == "e")
     log = read_log(study.log_file("R1", "test"))
-    assert [event.kind for event in log] == [
-        *("session", "presented", "grade", "complete")
-    ]
-    assert (log[1].fields["ended"], log[2].fields["grade"]) == ("done", "2")
-
-
-def test_every_other_key_is_an_emergency_stop(tmp_path: Path) -> None:
-    study, _ = small_study(tmp_path / "study", 30.0, device=FREE)
-    with at_a_terminal(study) as terminal:
-        terminal.read_until("stop to stop")
-        terminal.type("\n")
-        wait_for_presentation(study)
-        terminal.type(" ")
-        terminal.read_until("Present it again?")
-        terminal.type("no\n")
-        assert terminal.session.wait(60.0) == 1
-    log = read_log(study.log_file("R1", "test"))
-    assert [event.kind for event in log][:3] == ["session", "presented", "fault"]
-    assert log[2].fields["words"] == "emergency stop: key"
-
-
-def test_enter_does_not_stop_a_presentation_of_one_stretch(tmp_path: Path) -> None:
-    device = FREE.partition("[presentation]")[0]
-    study, _ = small_study(tmp_path / "study", 60.0, device=device)
-    with at_a_terminal(study) as terminal:
-        terminal.read_until("stop to stop")
-        terminal.type("\n")
-        wait_for_presentation(study)
-        terminal.type("\n")
-        terminal.read_until("Grade of")
-        terminal.type("2\n")
-        terminal.read_until("is complete")
-    log = read_log(study.log_file("R1", "test"))
-    assert (log[1].fields["ended"], log[1].fields["n_stretches"]) == ("arrived", 1)
+    kinds = [event.kind for event in log]
+    if isinstance(end, str):
+        assert kinds[:3] == ["session", "presented", "fault"]
+        assert log[2].fields["words"] == end
+    else:
+        assert kinds == ["session", "presented", "grade", "complete"]
+        assert (log[1].fields["ended"], log[2].fields["grade"]) == end
 
 
 def test_a_program_that_answers_says_done_with_an_empty_line(tmp_path: Path) -> None:
     study, _ = small_study(tmp_path / "study", 30.0, device=FREE)
-    command = (sys.executable, "-u", "-m", "masrel", "run", str(study.root))
     with subprocess.Popen(
-        (*command, "--rater", "R1", "--session", "test", "--clock", "real"),
+        [sys.executable, "-u", "-m", "masrel", *RUN, str(study.root)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
+        bufsize=0,
     ) as program:
         assert program.stdin is not None
         program.stdin.write(b"\n")
-        program.stdin.flush()
         wait_for_presentation(study)
         program.stdin.write(b"\n2\n")  # done, and a grade that comes early
-        program.stdin.flush()
         assert program.wait(60.0) == 0
     log = read_log(study.log_file("R1", "test"))
     assert (log[1].fields["ended"], log[2].fields["grade"]) == ("done", "2")

@@ -367,24 +367,24 @@ def presented(study: StudyPaths) -> list:
     return [event.fields for event in log if event.kind == "presented"]
 
 
+@pytest.mark.parametrize("by_person", [True, False])
 def test_a_session_on_an_emulated_puck_is_labelled_simulated(
-    new_study: NewStudy,
+    new_study: NewStudy, by_person: bool
 ) -> None:
-    study, _ = on_a_puck(new_study)
-    who = ["--rater", "R1", "--session", "test", "--grades", "simulated"]
-    done = CliRunner().invoke(
-        cli, ["run", str(study.root), *who], catch_exceptions=False
-    )
-    assert done.exit_code == 0, done.output
-    assert "3 grades (simulated) in" in done.output
+    class Person(SimulatedGrades):
+        name = "console"
+        simulated = False
+
+    study, protocol = on_a_puck(new_study)
+    grades = Person(protocol) if by_person else SimulatedGrades(protocol)
+    done = run_session(study, protocol, "R1", "test", grades=grades, clock="simulated")
+    assert done.simulated
     header = read_log(study.log_file("R1", "test"))[0].fields
     assert (header["device"], header["simulated"]) == ("puck", True)
-    shown = presented(study)
-    assert [one["fault"] for one in shown] == [None] * 3
-    for one in shown:
+    for one in presented(study):
         facts = read_recording(study.sessions / str(one["recording"])).facts
         assert (facts["device"], facts["simulated"]) == ("puck", True)
-        assert facts["ended"] == "arrived"
+        assert (one["fault"], facts["ended"]) == (None, "arrived")
         assert one["simulated"] is True
 
 
@@ -408,18 +408,3 @@ def test_a_puck_outside_this_process_needs_a_real_clock(new_study: NewStudy) -> 
     with pytest.raises(ParameterError, match=r"needed the real one for device 'puck'"):
         run_session(study, protocol, "R1", "test", grades=grades, clock="simulated")
     assert not study.log_file("R1", "test").exists()
-
-
-def test_grades_of_a_person_on_an_emulated_puck_are_simulated_too(
-    new_study: NewStudy,
-) -> None:
-    class Person(SimulatedGrades):
-        name = "console"
-        simulated = False
-
-    study, protocol = on_a_puck(new_study)
-    done = run_session(
-        study, protocol, "R1", "test", grades=Person(protocol), clock="simulated"
-    )
-    assert done.simulated
-    assert read_log(study.log_file("R1", "test"))[0].fields["simulated"] is True

@@ -42,7 +42,7 @@ from masrel.lab.run import (
     record_correction,
     run_session,
 )
-from masrel.lab.schedule import Presentation, read_schedule
+from masrel.lab.schedule import read_schedule
 from masrel.scales import MODIFIED_ASHWORTH
 
 Small = tuple[StudyPaths, Protocol]
@@ -369,17 +369,6 @@ def test_a_sensor_is_recorded_with_noise_of_its_own_each_time(
         measured.append(recording.columns[MEASURED_TORQUE.column][:20].tolist())
     assert len(measured) == 3
     assert all(one != other for one, other in pairwise(measured))
-
-
-def test_a_script_by_code_and_by_position() -> None:
-    shown = Presentation(position=2, code="K7", model="HM1", repeat=1)
-    request = GradeRequest(
-        rater="R1", session="test", presentation=shown, n_presentations=3, attempt=1
-    )
-    assert ScriptGrades({"K7": "1+"}).grade(request) == "1+"
-    assert ScriptGrades(["1", "2"]).grade(request) == "2"
-    with pytest.raises(ParameterError, match="position 2, code K7"):
-        ScriptGrades({"A": "1"}).grade(request)
 
 
 _CALL = re.compile(r"(?:\d+ +)?(fsync|write)\((\d+)<([^>]*)>(.*)")

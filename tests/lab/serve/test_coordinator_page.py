@@ -82,6 +82,11 @@ def test_what_cannot_be_is_one_sentence(study: StudyPaths) -> None:
     assert not study.conduct_file.exists()
 
 
+def screens(events: list[tuple[str, Any]]) -> set[str]:
+    """Which of a session the page was told."""
+    return {data["screen"] for kind, data in events if kind == "desk"}
+
+
 @pytest.mark.slow
 def test_a_session_is_followed_and_no_model_is_named_before_unblinding(
     study: StudyPaths,
@@ -92,7 +97,10 @@ def test_a_session_is_followed_and_no_model_is_named_before_unblinding(
         pages.append(page)
         async with page.listening() as events:
             await page.done("start", **R1)
-            await tablet.until("ready")
+            for screen in ("instructions", "ready", "grade"):
+                await tablet.until(screen)
+                while screen not in screens(events):
+                    await asyncio.sleep(0.01)
             await page.done("leave")
             await page.done("start", **R1)
             await tablet.until("break")
@@ -100,12 +108,12 @@ def test_a_session_is_followed_and_no_model_is_named_before_unblinding(
             await page.done("correct", **R1, code=code, grade="3", **BY)
             await tablet.until("over")
             await page.done("correct", **R1, code=code, grade="NA", **BY)
+            while "over" not in screens(events):
+                await asyncio.sleep(0.01)
         state = await page.state()
         assert state["overview"]["sessions"][0]["stage"] == "complete"
         kinds = {kind for kind, _ in events}
         assert {"desk", "overview", "log"} <= kinds
-        screens = {data["screen"] for kind, data in events if kind == "desk"}
-        assert {"instructions", "ready", "grade", "over"} <= screens
         page.sent.append("unblinded")
         shown = await page.done("unblind", code=code, rater="R1", **BY)
         schedule = read_schedule(study.schedule_file("R1", "test"))

@@ -170,7 +170,7 @@ def check_grades(study: StudyPaths, tablet: Tablet) -> None:
 @pytest.mark.parametrize(
     "n_kills",
     [
-        pytest.param(20, marks=pytest.mark.slow),
+        pytest.param(12, marks=pytest.mark.slow),
         pytest.param(200, marks=[pytest.mark.long, pytest.mark.faults]),
     ],
 )
@@ -214,7 +214,7 @@ PER_S = 1000.0
 @pytest.mark.parametrize(
     "lasts_s",
     [
-        pytest.param(6.0, marks=pytest.mark.slow),
+        pytest.param(4.0, marks=pytest.mark.slow),
         pytest.param(60.0, marks=pytest.mark.long),
     ],
 )

@@ -295,7 +295,10 @@ def test_a_training_begun_without_weights_ends_without(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("order", "n"), [("blocked", 1_000), ("adaptive", 4_000)])
+@pytest.mark.parametrize(
+    ("order", "n"),
+    [("blocked", 1_000), pytest.param("adaptive", 4_000, marks=pytest.mark.long)],
+)
 def test_it_needs_30_percent_fewer_presentations_at_equal_errors(
     order: str, n: int
 ) -> None:

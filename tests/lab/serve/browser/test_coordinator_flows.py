@@ -54,13 +54,26 @@ def start(stage: Stage) -> Rater:
     return stage.tablet()
 
 
-def test_a_page_loaded_again_shows_the_session_that_runs(stage: Stage) -> None:
-    coordinator, rater = stage.coordinator, start(stage)
+def test_two_coordinators_see_the_same_loaded_again_too_and_nothing_is_done_twice(
+    stage: Stage,
+) -> None:
+    coordinator, second = stage.coordinator, stage.second_coordinator()
+    second.tolerated = re.compile("status of 422")
+    sees(second, "No session runs")
+    rater = start(stage)
     rater.wait_for("instructions")
-    sees(coordinator, "reads the instructions")
+    for each in (coordinator, second):
+        sees(each, "reads the instructions")
+    status, body = second.post(
+        "/coordinator/start", rater="R60", session="test", rehearsal=False
+    )
+    assert (status, "needed none that runs" in body["why"]) == (422, True)
+    said = form(second.page, NOTE, text="Seen by two", who="AB")
+    expect(said).to_contain_text("Recorded")
+    sees(coordinator, "Seen by two", "#events")
     rater.go_until("grade")
     sees(coordinator, f"{stage.rater} grades practice")
-    press(coordinator.page, "Stop the session")
+    press(second.page, "Stop the session")
     rater.wait_for("over")
     sees(coordinator, "No session runs")
     sees(coordinator, "begun", "#sessions")
@@ -111,14 +124,15 @@ def test_what_was_refused_is_tried_again_and_what_is_done_is_told(
     sees(stage.coordinator, "is started", "#controls .outcome")
 
 
-def test_a_grade_is_corrected_and_a_code_unblinded(stage: Stage) -> None:
-    rater = start(stage)
+def test_a_grade_is_corrected_a_code_unblinded_and_what_happens_recorded(
+    stage: Stage,
+) -> None:
+    rater, page = start(stage), stage.coordinator.page
     for _ in range(2):
         rater.go_until("grade")
         rater.answer()
     rater.wait_for("ready")
     code = stage.log()[-1].fields["code"]
-    page = stage.coordinator.page
     which = {"rater": stage.rater, "session": "test", "code": code}
     said = form(page, "Correct a grade", **which, grade="3", **SIGNED)
     expect(said).to_contain_text(f"{code} is corrected")
@@ -129,21 +143,18 @@ def test_a_grade_is_corrected_and_a_code_unblinded(stage: Stage) -> None:
     said = form(page, "Unblind a code", **which, **SIGNED)
     expect(said).to_contain_text(f"{code} of {stage.rater}, session test, is HM")
     assert not any(model in rater.page.content() for model in models)
-
-
-def test_an_adverse_event_is_recorded_and_a_rater_who_has_left_begins_no_session(
-    stage: Stage,
-) -> None:
-    page, text = stage.coordinator.page, f"Bruised thumb of {stage.rater}"
-    event = {"kind": "adverse-event", "severity": "mild", "rater": stage.rater}
+    text, of = f"Bruised thumb of {stage.rater}", {"rater": stage.rater}
+    event = {"kind": "adverse-event", "severity": "mild", **of}
     said = form(page, NOTE, text=text, who="MK", **event)
     expect(said).to_have_text("Recorded: adverse-event.")
     sees(stage.coordinator, text, "#events")
     fields = read_log(stage.study.conduct_file)[-1].fields
     assert (fields["kind"], fields["severity"]) == ("adverse-event", "mild")
-    said = form(page, "A rater has left", rater=stage.rater, **SIGNED)
+    said = form(page, "A rater has left", **of, **SIGNED)
     expect(said).to_contain_text(f"{stage.rater} is withdrawn")
-    start(stage)
+    press(page, "Stop the session")
+    sees(stage.coordinator, "No session runs")
+    start(stage)  # which nobody who has left begins
     sees(stage.coordinator, "withdrawn")
 
 
@@ -166,23 +177,6 @@ def test_a_tablet_is_of_its_address_or_of_whose_session_it_shows_first(
     start(stage)
     for each in (rater, first):
         each.wait_for("instructions")
-
-
-def test_two_coordinators_see_the_same_and_nothing_is_done_twice(stage: Stage) -> None:
-    first, second = stage.coordinator, stage.second_coordinator()
-    second.tolerated = re.compile("status of 422")
-    sees(second, "No session runs")
-    start(stage).wait_for("instructions")
-    sees(second, "reads the instructions")
-    status, body = second.post(
-        "/coordinator/start", rater="R60", session="test", rehearsal=False
-    )
-    assert (status, "needed none that runs" in body["why"]) == (422, True)
-    said = form(second.page, NOTE, text="Seen by two", who="AB")
-    expect(said).to_contain_text("Recorded")
-    sees(first, "Seen by two", "#events")
-    press(second.page, "Stop the session")
-    sees(first, "No session runs")
 
 
 def test_a_coordinator_without_network_is_told_and_nothing_is_lost(
