@@ -15,6 +15,7 @@ from masrel.agreement import (
     light_kappa,
     percent_agreement,
     pooled_kappa,
+    robinson_a,
     stratified_kappa,
 )
 from masrel.errors import ParameterError, UndefinedStatisticWarning
@@ -59,19 +60,18 @@ def test_cohen_1960_style_table_by_hand() -> None:
     assert (found.n_items, found.n_raters, found.n_categories) == (50, 2, 2)
 
 
+def test_spss_prints_an_error_over_n() -> None:
+    # https://stats.oarc.ucla.edu/spss/faq/ on unequal ranges of scores: 12 films
+    # prints Kappa .500, Asymp. Std. Error .156
+    films = cohen_kappa(count_table([[4, 0, 0], [0, 4, 0], [0, 4, 0]]))
+    assert films.value == 0.5
+    assert films.standard_error == pytest.approx(0.163, abs=5e-4)
+    assert films.standard_error * math.sqrt(11 / 12) == pytest.approx(0.156, abs=5e-4)
+
+
 def test_pairs_with_a_missing_rating_are_left_out_of_the_margins() -> None:
     complete = [["a", "a"], ["a", "b"], ["b", "b"], ["b", "b"]]
     assert cohen_kappa([*complete, ["a", None], [None, "b"]]) == cohen_kappa(complete)
-
-
-@pytest.mark.parametrize("function", [fleiss_kappa, cohen_kappa])
-def test_one_category_is_undefined_and_says_so(function) -> None:  # type: ignore[no-untyped-def]
-    with pytest.warns(UndefinedStatisticWarning, match="0/0"):
-        found = function([["a", "a"], ["a", "a"]], categories=["a", "b"])
-    assert math.isnan(found.value)
-    assert math.isnan(found.standard_error)
-    assert "one category" in found.reason
-    assert found.observed == found.chance == 1.0
 
 
 @pytest.mark.parametrize("n", [10, 49, 100_008])  # n · (1/n) is not 1 for each
@@ -232,3 +232,14 @@ def test_the_disagreement_on_each_item_by_hand() -> None:
     linear = item_disagreement([[1, 2], [1, 3], [2, 2]], weights="linear")
     assert linear.tolist() == [0.5, 1.0, 0.0]
     assert item_disagreement(count_items([[3, 0], [2, 1]])).tolist() == [0.0, 2 / 3]
+
+
+def test_robinsons_a_of_two_raters_by_hand() -> None:
+    # Levels 2 and 3 set aside: deviations -1, 0, 1 and -1, 1, 0. Items' means -1, 1/2,
+    # 1/2: SS = 2 (1 + 1/4 + 1/4) = 3; of all squares, 2 + 2 = 4.
+    found = robinson_a([[1, 2], [2, 4], [3, 3]])
+    assert found.value == 0.75
+    assert (found.n_items, found.n_raters, found.n_categories) == (3, 2, 4)
+    assert math.isnan(found.standard_error)
+    assert math.isnan(found.observed)
+    assert math.isnan(found.chance)

@@ -15,7 +15,7 @@ from masrel.agreement import (
     icc_f_test,
     variance_components,
 )
-from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
+from masrel.errors import ParameterError, RatingsError
 
 FORMS = get_args(IccForm)
 
@@ -74,25 +74,6 @@ def test_text_counts_by_rank_and_numbers_by_value() -> None:
     assert uneven.value == icc(np.array([[1, 2], [4, 4], [2, 1]])).value
     with pytest.raises(RatingsError, match=r"declared scale in order.*text"):
         icc(text)
-
-
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize(
-    ("table", "why"),
-    [
-        ([[1, 2]], "fewer than two items"),
-        ([[1], [2]], "fewer than two raters"),
-        ([[3, 3], [3, 3]], "0/0: neither items nor ratings"),
-    ],
-)
-def test_undefined_with_a_reason(
-    form: IccForm, table: list[list[int]], why: str
-) -> None:
-    for function in (icc, icc_f_test):
-        with pytest.warns(UndefinedStatisticWarning, match=why):
-            found = function(table, form=form)  # type: ignore[operator]
-        assert why in found.reason
-    assert math.isnan(found.p_value)
 
 
 def test_wrong_options_are_one_sentence() -> None:

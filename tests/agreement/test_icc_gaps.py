@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy import optimize, stats
 
 from masrel.agreement import IccForm, icc, variance_components
-from masrel.errors import UndefinedStatisticWarning
 
 Floats = NDArray[np.float64]
 
@@ -165,25 +164,3 @@ def test_neither_origin_unit_nor_order_matters(form: IccForm) -> None:
         ratings[:, [3, 0, 5, 1, 4, 2]],
     ):
         assert icc(moved, form=form).value == pytest.approx(value, rel=1e-10)
-
-
-@pytest.mark.parametrize(
-    ("ratings", "why"),
-    [
-        ([[1, None], [None, 2]], "no item has two ratings"),
-        ([[1, 2], [3, None]], "too few ratings to tell raters from the residual"),
-        ([[1, None, 2], [None, 3, None]], "too few ratings to tell raters"),
-        ([[2, 2, 2], [2, 2, None]], "0/0: neither items nor ratings of an item"),
-        (
-            [[1, 2, None, None], [3, 4, None, None], [None, None, 5, 7]],
-            "no residual, and raters whom no item links",
-        ),
-    ],
-)
-def test_undefined_with_a_reason(ratings: list[list[int | None]], why: str) -> None:
-    with pytest.warns(UndefinedStatisticWarning, match=why):
-        result = icc(ratings)
-    assert math.isnan(result.value)
-    assert result.reason is not None
-    assert why in result.reason
-    assert result.interval is None

@@ -1,20 +1,15 @@
 """Kendall's W: ranks by hand, a published table, plain fractions, Friedman's test."""
 
 import math
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import stats
 
 from masrel.agreement import kendall_w, kendall_w_test
-from tests.agreement.undefined import assert_undefined
 
-Rows = list[list[int]]
 Array = NDArray[Any]
 
 # Siegel (1956), Nonparametric Statistics, ch. 9: three sets of ranks of ten things,
@@ -33,41 +28,6 @@ SIEGEL = [
 ]
 
 
-def plain_w(rows: Rows, *, ties: bool) -> Fraction | None:
-    # Σ_i (R_i - R)² over its largest value, which is m times the squares of all ranks
-    # about their mean; without ties those of a rater are (n³ - n)/12.
-    n, m = len(rows), len(rows[0])
-    ranks = [
-        [
-            1
-            + sum(y < x for y in column)
-            + Fraction(sum(y == x for y in column) - 1, 2)
-            for x in column
-        ]
-        for column in zip(*rows, strict=True)
-    ]
-    sums = [sum(of_item) for of_item in zip(*ranks, strict=True)]
-    above = sum((s - Fraction(m * (n + 1), 2)) ** 2 for s in sums)
-    if ties:
-        mean = Fraction(n + 1, 2)
-        below = m * sum((r - mean) ** 2 for of_rater in ranks for r in of_rater)
-    else:
-        below = m * m * Fraction(n**3 - n, 12)
-    return None if below == 0 else Fraction(above / below)
-
-
-def rows(
-    n_items: tuple[int, int], n_raters: tuple[int, int]
-) -> st.SearchStrategy[Rows]:
-    return st.integers(*n_raters).flatmap(
-        lambda m: st.lists(
-            st.lists(st.integers(0, 5), min_size=m, max_size=m),
-            min_size=n_items[0],
-            max_size=n_items[1],
-        )
-    )
-
-
 def test_published_ranks_with_ties() -> None:
     # There: s = 591, W = .828, and .796 without the correction. ΣT = 6 + 6, 6 + 6 + 6,
     # 60 + 24 = 114; 12 · 591 / (9 · 990 - 3 · 114) = 7092/8568.
@@ -80,16 +40,6 @@ def test_published_ranks_with_ties() -> None:
     assert test.statistic == pytest.approx(27 * 7092 / 8568, rel=1e-15)
     assert (test.df, test.n_items) == ((9.0,), 10)
     assert 0.001 < test.p_value < 0.01
-
-
-@given(rows((2, 9), (2, 5)), st.booleans())
-def test_is_the_quotient_of_plain_sums(table: Rows, ties: bool) -> None:
-    expected = plain_w(table, ties=ties)
-    if expected is None:
-        assert_undefined(lambda: kendall_w(table, ties=ties))
-        return
-    assert kendall_w(table, ties=ties).value == float(expected)
-    assert 0 <= expected <= 1
 
 
 def weighted_w(ratings: list[list[int]], shares: Array, *, ties: bool) -> Any:

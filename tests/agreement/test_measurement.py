@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from masrel.agreement import ErrorKind, limits_of_agreement, lin_ccc, mdc, sem
-from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.estimates import Estimate
 
 KINDS: tuple[ErrorKind, ...] = ("agreement", "consistency")
@@ -72,19 +71,6 @@ def test_consistency_of_complete_tables_has_the_interval_of_chi_squared(
     assert ends(result) == pytest.approx(expected, rel=1e-8)
 
 
-def test_undefined_with_a_reason() -> None:
-    for ratings, why in (
-        ([[1, 2]], "fewer than two items"),
-        ([[1], [2]], "fewer than two raters"),
-        ([[1, 2], [3, None]], "too few ratings to tell raters"),
-    ):
-        with pytest.warns(UndefinedStatisticWarning, match=why):
-            result = mdc(ratings)
-        assert math.isnan(result.value)
-        assert result.reason is not None
-        assert result.interval is None
-
-
 FILE = Path(__file__).parents[1] / "oracles" / "measurement.json"
 EVERY: list[dict[str, Any]] = json.loads(FILE.read_text("utf-8"))["settings"]
 LIMITS = {s["id"]: s for s in EVERY if s["kind"] == "bland_altman"}
@@ -132,18 +118,6 @@ def test_published_factors_of_ten_items() -> None:
     assert one.upper_interval.high == pytest.approx(2.911, abs=5e-4)
 
 
-def test_limits_that_are_none() -> None:
-    with pytest.warns(UndefinedStatisticWarning, match="fewer than two items"):
-        limits = limits_of_agreement([[1, 2], [None, 3]])
-    assert math.isnan(limits.lower)
-    assert limits.lower_interval.reason == limits.reason
-    with pytest.raises(RatingsError, match=r"need the ratings of two raters, got 3"):
-        limits_of_agreement([[1, 2, 3], [3, 4, 4]])
-    for name in ("share", "level"):
-        with pytest.raises(ParameterError, match=rf"{name}: needs \(0, 1\), got 95"):
-            limits_of_agreement([[1, 2], [2, 2]], **{name: 95})
-
-
 (SETTING,) = (
     setting
     for setting in json.loads(
@@ -174,22 +148,3 @@ def test_interval_of_three_raters_leaves_out_each_item() -> None:
     ends = np.tanh(math.atanh(result.value) + width * np.array([-1.0, 1.0]))
     assert (result.interval.low, result.interval.high) == pytest.approx(ends, rel=1e-10)
     assert result.interval.method == "item jackknife, t(4) on Fisher's z"
-
-
-def test_a_concordance_that_is_none() -> None:
-    for ratings, why in (
-        ([[1, 2], [3, None]], "fewer than two items are rated by every rater"),
-        ([[1], [2]], "fewer than two raters"),
-        ([[2, 2], [2, 2]], "0/0: all ratings are the same"),
-    ):
-        with pytest.warns(UndefinedStatisticWarning, match=why):
-            result = lin_ccc(ratings)
-        assert math.isnan(result.value)
-        assert result.interval is None
-    # fewer than three items; a rater without variance; no item moves the value
-    no_error = [[1, 2], [3, 4]], [[1, 2], [1, 4], [1, 1]], [[1, 1, 1], [1, 1, 2]] * 2
-    for rows in no_error:
-        result = lin_ccc(rows)
-        assert result.interval is not None
-        assert math.isnan(result.interval.low)
-        assert result.interval.reason is not None

@@ -25,7 +25,7 @@ from masrel.agreement import (
 )
 from masrel.errors import UndefinedStatisticWarning
 from tests.agreement.oracles import Dataset, by_dataset, datasets, estimate, values
-from tests.agreement.undefined import assert_undefined
+from tests.agreement.test_undefined import assert_undefined
 
 EXACT = (
     "percent_agreement",

@@ -26,7 +26,7 @@ from masrel.agreement import (
 )
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate
-from tests.agreement.undefined import assert_undefined
+from tests.agreement.test_undefined import assert_undefined
 
 
 def estimate(value: float, error: float, n_items: int = 20) -> Estimate:

@@ -1,13 +1,11 @@
 """Tests and indices of two raters, kappa of one category: by hand, against others."""
 
-import math
 from fractions import Fraction
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy import stats
 from statsmodels.stats import contingency_tables as peer
 
@@ -32,9 +30,8 @@ from masrel.errors import (
     CountsError,
     ParameterError,
     RatingsError,
-    UndefinedStatisticWarning,
 )
-from tests.agreement.undefined import assert_undefined
+from tests.agreement.test_undefined import assert_undefined
 from tests.strategies import LABELS, Table, tables
 
 TESTS = [bowker, stuart_maxwell, bhapkar]
@@ -59,35 +56,6 @@ def test_published_vision_table() -> None:
     assert bowker(VISION).statistic == pytest.approx(19.107, abs=0.0005)
     assert bowker(VISION).df == (6.0,)
     assert stuart.n_items == 7477
-
-
-def full_tables(sides: tuple[int, int] = (2, 6)) -> st.SearchStrategy[NDArray]:  # type: ignore[type-arg]
-    """Tables in which every two categories are connected by changes."""
-    return st.integers(*sides).flatmap(
-        lambda q: st.lists(
-            st.lists(st.integers(1, 30), min_size=q, max_size=q), min_size=q, max_size=q
-        ).map(np.array)
-    )
-
-
-@given(full_tables())
-def test_bowker_against_statsmodels(table: NDArray[np.int64]) -> None:
-    other = peer.SquareTable(table, shift_zeros=False).symmetry()
-    found = bowker(table)
-    assert found.statistic == pytest.approx(other.statistic, rel=1e-12, abs=1e-12)
-    assert found.p_value == pytest.approx(other.pvalue, rel=1e-9)
-    assert found.df == (other.df,)
-
-
-@given(full_tables())
-def test_equal_margins_against_statsmodels(table: NDArray[np.int64]) -> None:
-    square = peer.SquareTable(table, shift_zeros=False)
-    for test, method in ((stuart_maxwell, "stuart_maxwell"), (bhapkar, "bhapkar")):
-        other = square.homogeneity(method=method)
-        found = test(table)
-        assert found.statistic == pytest.approx(other.statistic, rel=1e-8, abs=1e-9)
-        assert found.p_value == pytest.approx(other.pvalue, rel=1e-7)
-        assert found.df == (other.df,)
 
 
 @given(
@@ -138,16 +106,6 @@ def test_groups_that_no_change_connects_are_tested_each() -> None:
     assert bowker(table).statistic == pytest.approx(16 / 6 + 36 / 8, rel=1e-14)
 
 
-@pytest.mark.parametrize("test", TESTS)
-@pytest.mark.parametrize("table", [[[3, 0], [0, 4]], [[5]], [[0, 0], [0, 0]]])
-def test_without_a_change_there_is_nothing_to_test(test, table) -> None:  # type: ignore[no-untyped-def]
-    with pytest.warns(UndefinedStatisticWarning, match="0/0: no item changed"):
-        found = test(table)
-    assert math.isnan(found.p_value)
-    assert found.df == (0.0,)
-    assert str(found) == f"{test.__name__}: undefined (0/0: no item changed)"
-
-
 def test_exact_mcnemar_of_many_changes_goes_on_where_integers_end() -> None:
     for b, c in ((480, 520), (480, 521), (700, 900), (1, 1200)):
         found = mcnemar([[0, b], [c, 0]]).p_value
@@ -160,13 +118,6 @@ def test_mcnemar_takes_two_categories_and_three_kinds() -> None:
         mcnemar(np.eye(3, dtype=int))
     with pytest.raises(ParameterError, match="kind: needs one of exact, uncorrected"):
         mcnemar([[1, 2], [3, 4]], kind="yates")  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("test", [*TESTS, mcnemar])
-@pytest.mark.parametrize("table", [[[1, 2, 3], [4, 5, 6]], [[1, -1], [0, 2]], [1, 2]])
-def test_what_is_no_square_table_of_counts_is_refused(test, table) -> None:  # type: ignore[no-untyped-def]
-    with pytest.raises(CountsError):
-        test(table)
 
 
 def test_a_contingency_table_keeps_the_declared_order_and_drops_missing_pairs() -> None:
@@ -241,12 +192,6 @@ def test_no_kappa_is_above_the_largest(cells: Cells) -> None:
 
 
 @pytest.mark.parametrize("function", [prevalence_index, bias_index, kappa_max])
-def test_without_an_item_there_is_nothing(function) -> None:  # type: ignore[no-untyped-def]
-    with pytest.warns(UndefinedStatisticWarning, match="no item has ratings of two"):
-        assert math.isnan(function([[0, 0], [0, 0]]))
-
-
-@pytest.mark.parametrize("function", [prevalence_index, bias_index, kappa_max])
 @pytest.mark.parametrize(
     ("table", "said"),
     [
@@ -309,19 +254,3 @@ def test_items_with_a_missing_rating_are_not_tested() -> None:
     holed: Table = [*whole, ["a", "a", None], [None, None, None]]
     assert fleiss_null(holed) == fleiss_null(whole)
     assert fleiss_null(holed, category="a") == fleiss_null(whole, category="a")
-
-
-@pytest.mark.parametrize(
-    ("ratings", "why"),
-    [
-        ([["a", "a"], ["a", "a"]], "0/0: all ratings are in one category"),
-        ([["a"], ["b"]], "fewer than two raters"),
-        ([["a", None], [None, "b"]], "no item is rated by every rater"),
-    ],
-)
-def test_nothing_to_test_is_said(ratings: Table, why: str) -> None:
-    with pytest.warns(UndefinedStatisticWarning, match=why):
-        found = fleiss_null(ratings, categories=["a", "b"])
-    assert math.isnan(found.statistic)
-    assert math.isnan(found.p_value)
-    assert why in (found.reason or "")

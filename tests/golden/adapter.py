@@ -71,20 +71,6 @@ def _call(method: str, coefficient: str, table: Table, seed: int = 0) -> Any:
     return entry.call(coefficient, table, **shared | options)
 
 
-def drawn_values(method: str, coefficient: str, table: Table) -> list[float] | None:
-    """The values that ends were read off, ascending, where the package has them."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        interval = _call(method, coefficient, table)
-        if interval.distribution is None:
-            return None
-        values = interval.distribution.values.tolist()
-        if METHODS[method].options["kind"] != "basic":
-            return values
-        value = result_of("value", coefficient, table)["value"]
-    return [2.0 * value - x for x in reversed(values)]
-
-
 def plain_result(result: Any) -> dict[str, Any]:
     """The result's numbers and texts by the names that they are stored under."""
     if hasattr(result, "equality"):

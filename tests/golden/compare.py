@@ -3,16 +3,19 @@
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
-__all__ = ["Change", "changes"]
+__all__ = ["MOST_ERRORS", "Change", "beyond", "changes"]
 
 Kind = Literal[
     "value", "standard_error", "interval end", "event", "torque", "other", "text"
 ]
 
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w.]*\w)")
+
+TABLES = "numbers"
+"""The group of 2 000 tables, whose keys are short and whose ends may be drawn."""
 
 COEFFICIENTS = (
     "agreement", "intervals", "agree", "analyze", "demo", "transcripts",
@@ -21,6 +24,31 @@ COEFFICIENTS = (
 
 SAMPLED = ("latent",)
 """Groups of Markov chains, which one last bit sends elsewhere."""
+
+KINDS: dict[str, Kind] = {
+    **dict.fromkeys(("value", "observed", "chance"), "value"),
+    **dict.fromkeys(("low", "high"), "interval end"),
+    **dict.fromkeys(("start_s", "end_s"), "event"),
+    "standard_error": "standard_error",
+}
+"""What a number is by its key; of `TABLES`, all else is read off a distribution."""
+
+KINDS_OF_TABLES: dict[str, Kind] = {
+    **dict.fromkeys(("value", "values"), "value"),
+    **dict.fromkeys(("error", "errors"), "standard_error"),
+}
+
+MEASUREMENTS = re.compile("icc_|sem|mdc|lin_ccc|kendall_w|robinson_a")
+"""Made of sums of squares, which are rounded; with gaps, of a likelihood."""
+
+MOST_ERRORS, NEVER_ERRORS, ONE_OF = 4.0, 6.0, 1000
+"""Joint Monte Carlo errors that one in so many drawn ends may be off, and none."""
+
+OF_DRAWS = ("cut at the end", "standard error of 0", "one value", "and left out")
+"""Words of notes that come and go with what is drawn."""
+
+DRAWN_KEYS = ("low", "high", "median", "mce", "n_resamples", "n_undefined", "method")
+"""What is drawn, and the method, which says how many were or that all were taken."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +60,7 @@ class Change:
     stored: object
     new: object
     within: bool = False  # the bar of its kind
+    errors: float | None = None  # by how many joint errors a drawn end is off
 
     def __str__(self) -> str:
         return f"{self.where} ({self.kind}): {self.stored!r} stored, {self.new!r} now"
@@ -52,10 +81,31 @@ class Change:
         return self.absolute / most if most else 0.0
 
 
-def changes(group: str, stored: object, new: object) -> list[Change]:
-    """Every difference, of the bits; `within` says whether its bar holds still."""
+def changes(
+    group: str,
+    stored: object,
+    new: object,
+    *,
+    where: str = "",
+    has_gaps: bool = False,
+    draws_differ: bool = False,
+) -> list[Change]:
+    """Every difference, of the bits; `within` says whether its bar holds still.
+
+    Where draws differ, the same seed draws other numbers: ends of tables are within
+    their Monte Carlo errors.
+    """
     peak = max((abs(x) for x in _torques(stored)), default=0.0)
-    return list(_walk(_Place(group, "", {}, peak), stored, new))
+    place = _Place(group, where, {}, peak, has_gaps, draws_differ)
+    return list(_walk(place, stored, new))
+
+
+def beyond(changes: list[Change], n_drawn: int) -> list[Change]:
+    """Those that are too many: all not within, and drawn ends but one in a thousand."""
+    wrong = [c for c in changes if not c.within and c.errors is None]
+    far = [c for c in changes if not c.within and c.errors is not None]
+    never = [c for c in far if c.errors > NEVER_ERRORS]  # type: ignore[operator]
+    return wrong + (far if len(far) > max(1, n_drawn // ONE_OF) else never)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,33 +114,35 @@ class _Place:
     path: str
     around: dict  # the stored dictionary that the number is in
     peak: float
+    has_gaps: bool
+    draws_differ: bool
 
     def at(self, key: object, around: dict | None = None) -> "_Place":
         path = f"{self.path}/{key}"
-        return _Place(self.group, path, around or self.around, self.peak)
+        return replace(self, path=path, around=around or self.around)
 
     @property
     def kind(self) -> Kind:
         key = next(k for k in reversed(self.path.split("/")) if not k.isdigit())
-        if key == "standard_error":
-            return "standard_error"
-        if key in ("low", "high"):
-            return "interval end"
+        if self.group == TABLES:
+            return KINDS_OF_TABLES.get(key, "interval end")
         if "torque" in key and "nms" not in key:
             return "torque"
-        if key in ("start_s", "end_s"):
-            return "event"
-        if key in ("value", "observed", "chance"):
-            return "value" if self.group in COEFFICIENTS else "other"
-        return "other"
+        kind = KINDS.get(key, "other")
+        return "other" if kind == "value" and self.group not in COEFFICIENTS else kind
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether it is of an answer whose ends are drawn, and not as they were."""
+        return self.draws_differ and "mce" in self.around
 
 
 def _walk(place: _Place, stored: object, new: object) -> Iterator[Change]:
     if isinstance(stored, dict) and isinstance(new, dict):
-        yield from _keys(place, list(stored), list(new))
-        for key in [key for key in stored if key in new]:
-            yield from _walk(place.at(key, stored), stored[key], new[key])
+        yield from _parts(place, stored, new)
     elif isinstance(stored, list) and isinstance(new, list):
+        if place.is_drawn and place.path.endswith("/notes"):
+            stored, new = (sorted(filter(_says_more, of)) for of in (stored, new))
         if len(stored) != len(new):
             yield Change(place.path + "/length", "text", len(stored), len(new))
         for k, parts in enumerate(zip(stored, new, strict=False)):
@@ -103,14 +155,43 @@ def _walk(place: _Place, stored: object, new: object) -> Iterator[Change]:
         yield Change(place.path, place.kind, stored, new, _within(place, stored, new))
 
 
-def _keys(place: _Place, stored: list[str], new: list[str]) -> Iterator[Change]:
-    # those of one alone; or all, where only their order differs
-    gone = [key for key in stored if key not in new]
-    come = [key for key in new if key not in stored]
+def _says_more(note: str) -> bool:
+    return not any(words in note for words in OF_DRAWS)
+
+
+def _parts(place: _Place, stored: dict, new: dict) -> Iterator[Change]:
+    # keys of one alone; or all, where only their order differs
+    ignored = ("steps", "near_1") if place.group == TABLES else ()
+    if place.draws_differ and "mce" in stored:
+        yield from _drawn_ends(place, stored, new)
+        ignored += DRAWN_KEYS
+        stored, new = ({"notes": [], **of} for of in (stored, new))
+    keys, others = ([key for key in of if key not in ignored] for of in (stored, new))
+    gone = [key for key in keys if key not in others]
+    come = [key for key in others if key not in keys]
     if gone or come:
         yield Change(place.path + "/keys", "text", gone, come)
-    elif stored != new:
-        yield Change(place.path + "/keys", "text", stored, new)
+    elif keys != others:
+        yield Change(place.path + "/keys", "text", keys, others)
+    for key in [key for key in keys if key in new]:
+        yield from _walk(place.at(key, stored), stored[key], new[key])
+
+
+def _drawn_ends(place: _Place, stored: dict, new: dict) -> Iterator[Change]:
+    """Ends that are farther than their joint Monte Carlo error lets them be."""
+    for k, key in enumerate(("low", "high")):
+        one, other = stored.get(key, math.nan), new.get(key, math.nan)
+        where = f"{place.path}/{key}"
+        if math.isnan(one) or math.isnan(other):
+            if math.isnan(one) != math.isnan(other):
+                yield Change(where, "interval end", one, other)
+            continue
+        off = abs(one - other)
+        joint = math.hypot(*(of.get("mce", (0.0, 0.0))[k] for of in (stored, new)))
+        step = stored.get("steps", (0.0, 0.0))[k]
+        if off > max(step, 1e-8 * (1.0 + abs(one))):
+            n = off / joint if joint > 0.0 else math.inf
+            yield Change(where, "interval end", one, other, n <= MOST_ERRORS, n)
 
 
 def _texts(place: _Place, stored: str, new: str) -> Iterator[Change]:
@@ -135,6 +216,13 @@ def _reads_alike(place: _Place, stored: str, new: str) -> bool:
     pairs = zip(NUMBER.findall(stored), NUMBER.findall(new), strict=True)
     if place.group in SAMPLED:
         return True
+    if place.group == TABLES:
+        # three decimals: the last one of what was rounded, or all of what was drawn
+        return all(
+            a == b
+            or ("." in a and (place.is_drawn or abs(float(a) - float(b)) < 1.1e-3))
+            for a, b in pairs
+        )
     return all(math.isclose(float(a), float(b), rel_tol=1e-9) for a, b in pairs)
 
 
@@ -150,19 +238,37 @@ def _within(place: _Place, stored: object, new: object) -> bool:
 
 
 def _bar(place: _Place, size: float) -> float:
-    # how far a number of this size may be off
+    """How far a number of this size may be off."""
+    if place.kind == "event":
+        return 1e-11
+    if place.kind == "torque":
+        return 1e-12 * place.peak
+    if place.group == TABLES:
+        least = 1e-3 if place.kind == "standard_error" else 1.0
+        return _share_of_tables(place) * (size + least)
     if place.kind == "value":
-        # of grades that are measurements there are sums of squares, which are rounded
         return 1e-12 * size if "/icc_" in place.path else 1e-14 * (1.0 + size)
     if place.kind == "standard_error":
         chance = place.around.get("chance")
         near_one = isinstance(chance, float) and 1.0 - chance < 1e-6
         return (1e-9 if near_one else 1e-12) * size
-    if place.kind == "event":
-        return 1e-11
-    if place.kind == "torque":
-        return 1e-12 * place.peak
     return 1e-9 * (max(size, 1e-3) if place.kind == "interval end" else size)
+
+
+def _share_of_tables(place: _Place) -> float:
+    _, _, method, coefficient, *_ = place.path.split("/")
+    is_measured = MEASUREMENTS.match(coefficient) is not None
+    if place.kind == "interval end" and method == "differences max_t":
+        return 1e-7  # its quantile is summed over a lattice, which rounding turns
+    if is_measured and place.has_gaps:
+        return 1e-8  # a likelihood is flat at its top, and Newton stops below it
+    if place.kind == "interval end":
+        return 1e-8 if "mce" in place.around else 1e-9  # of draws nine digits are kept
+    if "near_1" in place.around:
+        return 1e-8  # 1 - p_e < 1e-6, by which both are divided
+    if place.kind == "standard_error" or is_measured:
+        return 1e-12
+    return 1e-14  # κ is 1 less a ratio, and has the rounding of both
 
 
 def _torques(stored: object, path: str = "") -> Iterator[float]:

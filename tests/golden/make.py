@@ -9,9 +9,8 @@ import sys
 from collections import defaultdict
 
 from tests.golden import numbers
-from tests.golden.cases import GROUPS
 from tests.golden.compare import Change, changes
-from tests.golden.store import load, save
+from tests.golden.store import GROUPS, load, save
 
 MOST_TEXTS = 40
 

@@ -4,22 +4,22 @@ The file says by name what was computed of every table: a coefficient that is ad
 later is in none of them, and shifts none.
 """
 
-import math
 import zlib
-from bisect import bisect
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from itertools import accumulate
 from multiprocessing import get_context
+from typing import Any
 
-from tests.golden.adapter import Table, drawn_values, result_of
+from tests.golden.adapter import Table, result_of
 from tests.golden.call import Stream
-from tests.golden.compare import Change
+from tests.golden.compare import Change, changes
 from tests.golden.drawn import pick, shares_of
-from tests.golden.may_differ import MOST_ERRORS, Question, differences
 from tests.golden.store import load, save
 
 N_TABLES = 2000
+
+Replay = tuple[list[Change], int]
 
 GROUP = "numbers"
 
@@ -32,9 +32,6 @@ NAMED = (
 )  # fmt: skip
 
 LEVELS = [0.8, 0.8, 0.9, 0.9, 0.95, 0.95, 0.95, 0.99]
-
-OTHER_SEEDS = tuple(range(1_000_001, 1_000_005))
-"""By which it is seen how far drawn ends may jump, where nothing else says it."""
 
 DIGITS = 9
 """Significant ones of what was drawn; anything else has all of them."""
@@ -146,52 +143,16 @@ def _digits(x: float) -> float:
     return float(f"{x:.{DIGITS}g}")
 
 
-def frozen(seed: int, plan: dict[str, Collection[str]]) -> dict:
+def frozen(seed: int, stored: dict) -> dict:
     """A table as the file has it: a check of how it was drawn, and the answers."""
     of, made = table(seed), {}
-    for method, name in ((m, name) for m, names in plan.items() for name in names):
-        try:
+    for method, answers in stored["answers"].items():
+        for name, before in answers.items():
             answer = rounded(result_of(method, name, of))
-            if "mce" in answer and method.startswith("bootstrap"):
-                answer |= _steps(method, name, of, answer)
-        except Exception as error:  # noqa: BLE001 - a fault is no golden result
-            print(f"left out: table {seed}, {method}, {name}: {error!r}")
-            continue
-        made.setdefault(method, {})[name] = answer
+            # how far drawn ends may jump, which depends on the ratings alone
+            answer |= {key: before[key] for key in ("steps",) if key in before}
+            made.setdefault(method, {})[name] = answer
     return {"crc": checksum(of), "answers": made}
-
-
-def _steps(method: str, name: str, of: Table, answer: dict) -> dict[str, list[float]]:
-    """How far apart the values next to drawn ends are, where errors do not cover it.
-
-    Few values are possible there, so that the error of a quantile is 0 or says little.
-    """
-    ends = answer["low"], answer["high"]
-    drawn = drawn_values(method, name, of)
-    if drawn is None:  # of ratios, which are none of the coefficient's values
-        others = [result_of(method, name, of, seed) for seed in OTHER_SEEDS]
-        steps = [
-            2.0 * max(abs(other.get(key, end) - end) for other in others)
-            for key, end in zip(("low", "high"), ends, strict=True)
-        ]
-    else:
-        steps = [_step(drawn, end) for end in ends]
-    covered = MOST_ERRORS * math.sqrt(2.0)  # as both ends have an error
-    pairs = zip(steps, answer["mce"], strict=True)
-    if not any(step > covered * error for step, error in pairs):
-        return {}
-    return {"steps": [float(f"{1.001 * step:.4g}") for step in steps]}
-
-
-def _step(values: list[float], end: float) -> float:
-    """How far an end moves with two errors of its rank, and at least to a neighbour."""
-    n, rounding = len(values), 1e-8 * (1.0 + abs(end))
-    lower, upper = bisect(values, end - rounding), bisect(values, end + rounding)
-    reach = 3 + round(2.0 * math.sqrt(lower * (n - lower) / n))
-    first = min(lower - 1, (lower + upper) // 2 - reach)
-    last = max(upper, (lower + upper) // 2 + reach)
-    near = values[max(first, 0)], values[min(last, n - 1)]
-    return max(abs(end - value) for value in near)
 
 
 def checksum(of: Table) -> int:
@@ -215,42 +176,38 @@ def save_tables(made: dict[str, dict]) -> int:
     return save(f"{GROUP}-tenth", tenth) + save(f"{GROUP}-rest", rest)
 
 
-def freeze(stored: dict[str, dict]) -> dict[str, dict]:
-    """Every table anew on two processes: the same coefficients by the same methods."""
-    plans = [of["answers"] for of in stored.values()]
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        made = pool.map(frozen, range(N_TABLES), plans, chunksize=20)
-        return {f"{seed:04}": of for seed, of in enumerate(made)}
-
-
-def replayed(stored: dict[str, dict]) -> Iterator[tuple[Question, dict, dict]]:
-    """Every stored answer of some tables, with the result of today."""
+def replayed(stored: dict[str, dict], *, draws_differ: bool = False) -> Replay:
+    """What differs of some tables, and how many of their ends were drawn."""
+    found, n_drawn = [], 0
     for seed, frozen_table in stored.items():
         of = table(int(seed))
         if checksum(of) != frozen_table["crc"]:
             raise ValueError(f"table {seed} is drawn otherwise than the stored one")
         for method, answers in frozen_table["answers"].items():
             for name, answer in answers.items():
-                question = Question(
-                    f"{seed}/{method}/{name}", method, name, of.has_gaps
+                found += changes(
+                    *(GROUP, answer, rounded(result_of(method, name, of))),
+                    where=f"/{seed}/{method}/{name}",
+                    has_gaps=of.has_gaps,
+                    draws_differ=draws_differ,
                 )
-                yield question, answer, rounded(result_of(method, name, of))
+                n_drawn += len(answer.get("mce", ()))
+    return found, n_drawn
 
 
-def compared(
-    stored: dict[str, dict], *, draws_differ: bool = False
-) -> tuple[list[Change], int]:
-    """What differs of some tables, and how many of their ends were drawn."""
-    changes, n_drawn = [], 0
-    for question, answer, new in replayed(stored):
-        changes += differences(question, answer, new, draws_differ=draws_differ)
-        n_drawn += len(answer.get("mce", ()))
-    return changes, n_drawn
-
-
-def compared_by_two(stored: dict[str, dict]) -> tuple[list[Change], int]:
-    """The same of all tables, on two processes."""
-    parts = [{seed: of} for seed, of in stored.items()]
+def by_two(work: Callable[..., Any], *arguments: Iterable[Any]) -> list[Any]:
+    """What a function makes of every table, on two processes."""
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        made = list(pool.map(compared, parts, chunksize=20))
+        return list(pool.map(work, *arguments, chunksize=20))
+
+
+def compared_by_two(stored: dict[str, dict]) -> Replay:
+    """Replay all tables, on two processes."""
+    made = by_two(replayed, [{seed: of} for seed, of in stored.items()])
     return [change for part, _ in made for change in part], sum(n for _, n in made)
+
+
+def freeze(stored: dict[str, dict]) -> dict[str, dict]:
+    """Every table anew: the same coefficients by the same methods."""
+    made = by_two(frozen, map(int, stored), stored.values())
+    return dict(zip(stored, made, strict=True))

@@ -1,4 +1,4 @@
-"""Where golden results are kept, and in which environment they were made."""
+"""Every golden case by group, where results are kept, and how they were made."""
 
 import gzip
 import importlib.metadata
@@ -8,7 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-__all__ = ["differing", "environment", "load", "save"]
+from tests.golden import scenes, studies, tables
+from tests.golden.call import Case
+
+__all__ = ["GROUPS", "differing", "environment", "load", "save"]
+
+GROUPS: dict[str, list[Case]] = {}
+for _case in [*tables.cases(), *studies.cases(), *scenes.cases()]:
+    GROUPS.setdefault(_case.group, []).append(_case)
 
 DATA = Path(__file__).parent / "data"
 

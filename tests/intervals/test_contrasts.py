@@ -27,7 +27,6 @@ from masrel.intervals import (
     donner_test,
     equality_test,
     estimate,
-    jackknife,
 )
 from tests.intervals.data import dirichlet_multinomial
 
@@ -120,11 +119,6 @@ SETTINGS = json.loads(FILE.read_text(encoding="utf-8"))["settings"]
 CLUSTERED = SETTINGS["dependent_kappas_clustered-01"]["data"]
 
 
-def columns(*places: int) -> list[NDArray[np.int64]]:
-    ratings = np.array(CLUSTERED["ratings"])
-    return [ratings[:, [k, k + 1]] for k in places]
-
-
 def agrees(
     name: str, sets: list[Any], reference: dict[str, Any], **options: Any
 ) -> None:
@@ -153,48 +147,34 @@ def agrees(
     assert found.n_units == reference["n_clusters"]
 
 
-@pytest.mark.parametrize("place", ["01", "02", "03"])
-def test_weighted_kappas_of_clusters_are_those_of_multiagree(place: str) -> None:
-    setting = SETTINGS[f"dependent_kappas_clustered-{place}"]
-    agrees(
-        "cohen_kappa",
-        columns(0, 2, 4),
-        setting["reference"],
-        clusters=CLUSTERED["cluster"],
-        categories=[1, 2, 3],
-        weights=setting["weights"],
-    )
-
-
-def test_fleiss_kappas_of_clusters_are_those_of_multiagree() -> None:
-    setting = SETTINGS["dependent_fleiss_clustered-01"]
-    counts = np.array(setting["data"]["counts"])
-    raters = [
-        np.array([np.repeat([0, 1, 2], row) for row in part])
-        for part in (counts[:, :3], counts[:, 3:])
-    ]
-    agrees(
-        "fleiss_kappa",
-        raters,
-        setting["reference"],
-        clusters=setting["data"]["cluster"],
-        categories=[0, 1, 2],
-    )
-
-
-def test_conger_kappas_of_clusters_are_those_of_multiagree_group_by_group() -> None:
-    setting = SETTINGS["dependent_conger_clustered-01"]
-    data = setting["data"]
+def of_multiagree(setting: str) -> tuple[str, list[Any], dict[str, Any]]:
+    """Coefficient, sets of ratings and options of one of its results."""
+    data = SETTINGS[setting]["data"]
+    if isinstance(data, str):
+        data = CLUSTERED
+    options: dict[str, Any] = {"clusters": data["cluster"]}
+    if "fleiss" in setting:
+        counts = np.array(data["counts"])
+        sets = [
+            np.array([np.repeat([0, 1, 2], row) for row in part])
+            for part in (counts[:, :3], counts[:, 3:])
+        ]
+        return "fleiss_kappa", sets, options | {"categories": [0, 1, 2]}
+    if "conger" in setting:
+        cut = np.cumsum(data["raters_per_group"])[:-1]
+        sets = np.split(np.array(data["ratings"]), cut, axis=1)
+        return "conger_kappa", sets, options | {"categories": [0, 1]}
+    options |= {"categories": [1, 2, 3], "weights": SETTINGS[setting]["weights"]}
     ratings = np.array(data["ratings"])
-    sizes = data.get("raters_per_group") or data["raters_of_group"]
-    cut = np.cumsum(sizes)[:-1]
-    agrees(
-        "conger_kappa",
-        np.split(ratings, cut, axis=1),
-        setting["reference"],
-        clusters=data["cluster"],
-        categories=[0, 1],
-    )
+    return "cohen_kappa", [ratings[:, [k, k + 1]] for k in (0, 2, 4)], options
+
+
+@pytest.mark.parametrize(
+    "setting", [name for name in SETTINGS if name.startswith("dependent_")]
+)
+def test_several_of_clusters_are_those_of_multiagree(setting: str) -> None:
+    name, of_sets, options = of_multiagree(setting)
+    agrees(name, of_sets, SETTINGS[setting]["reference"], **options)
 
 
 def sets(seed: int, n: int, g: int) -> list[NDArray[np.int64]]:
@@ -283,13 +263,6 @@ def test_independent_kappas_are_compared_as_by_donner_and_by_fleiss(
         assert found.n_items == int(np.sum(tables))
 
 
-OF_SUMS = [
-    name
-    for name, e in COEFFICIENTS.items()
-    if e.formula and e.shape == "ratings" and not e.has_interval
-]
-
-
 def clustered(
     n_clusters: int, seed: int, r: int = 2, strength: float = 1.0
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -304,93 +277,30 @@ def clustered(
     return ratings.astype(float), clusters
 
 
-@pytest.mark.parametrize("place", ["01", "02", "03"])
-def test_one_kappa_has_the_interval_of_multiagree(place: str) -> None:
-    setting = SETTINGS[f"dependent_kappas_clustered-{place}"]
-    data = SETTINGS["dependent_kappas_clustered-01"]["data"]
-    ratings = np.array(data["ratings"])[:, :2]
-    options: dict[str, Any] = {
-        "target": "items",
-        "clusters": data["cluster"],
-        "weights": setting["weights"],
-        "categories": [1, 2, 3],
-    }
-    normal = analytic("cohen_kappa", ratings, distribution="normal", **options)
-    assert (normal.low, normal.high) == pytest.approx(
-        setting["one_kappa_interval95"], rel=1e-8
-    )
-    found = estimate("cohen_kappa", ratings, method="analytic", **options)
-    error = setting["reference"]["se"][0]
-    assert found.standard_error == pytest.approx(error, rel=1e-8)
-    assert found.interval is not None
-    half = stats.t.ppf(0.975, setting["reference"]["n_clusters"] - 1) * error
-    assert found.interval.high == pytest.approx(found.value + half, rel=1e-8)
-    assert found.interval.unit == "clusters"
-
-
-@pytest.mark.parametrize("name", OF_SUMS)
-def test_the_jackknife_leaves_out_every_cluster_once(name: str) -> None:
-    ratings, clusters = clustered(15, 3)
-    ratings[[2, 9], 0] = np.nan
-    found = jackknife(
-        name, ratings, target="items", clusters=clusters, categories=[0, 1, 2]
-    )
-    without = [
-        COEFFICIENTS[name](ratings[clusters != c], categories=[0, 1, 2]).value
-        for c in range(15)
-    ]
-    variance = 14 / 15 * float(((without - np.mean(without)) ** 2).sum())
-    value = COEFFICIENTS[name](ratings, categories=[0, 1, 2]).value
-    half = stats.t.ppf(0.975, 14) * math.sqrt(variance)
-    assert found.low == pytest.approx(value - half, rel=1e-9)
-    assert found.high == pytest.approx(min(value + half, 1.0), rel=1e-9)
-    assert found.method == "cluster jackknife, t(14)"
-
-
 def test_independent_clusters_add_their_variances() -> None:
     (first, of_first), (second, of_second) = clustered(12, 11), clustered(16, 13)
     labels = [f"a{c}" for c in of_first], [f"b{c}" for c in of_second]
-    found = difference(
-        "fleiss_kappa",
-        first,
-        second,
-        design="independent",
-        categories=[0, 1, 2],
-        clusters=labels,
-    )
+    kappa = COEFFICIENTS["fleiss_kappa"]
+    options: dict[str, Any] = {"design": "independent", "categories": [0, 1, 2]}
+    asked = ("fleiss_kappa", first, second)
+    found = difference(*asked, clusters=labels, **options)
     variance, df = 0.0, 0.0
     for ratings, codes in ((first, of_first), (second, of_second)):
         n = int(codes.max()) + 1
         without = [
-            COEFFICIENTS["fleiss_kappa"](
-                ratings[codes != c], categories=[0, 1, 2]
-            ).value
-            for c in range(n)
+            kappa(ratings[codes != c], categories=[0, 1, 2]).value for c in range(n)
         ]
         part = (n - 1) / n * float(((without - np.mean(without)) ** 2).sum())
         variance, df = variance + part, df + part**2 / (n - 1)
     assert found.standard_error == pytest.approx(math.sqrt(variance), rel=1e-9)
-    test = difference_test(
-        "fleiss_kappa",
-        first,
-        second,
-        design="independent",
-        categories=[0, 1, 2],
-        clusters=labels,
-    )
+    test = difference_test(*asked, clusters=labels, **options)
     assert test.df[0] == pytest.approx(variance**2 / df, rel=1e-9)
-    with pytest.raises(ParameterError, match="need other clusters, got 'a1' in both"):
-        difference(
-            "fleiss_kappa",
-            first,
-            second,
-            design="independent",
-            clusters=(labels[0], ["a1", *labels[1][1:]]),
-        )
-    with pytest.raises(ParameterError, match="a pair of sequences"):
-        difference(
-            "fleiss_kappa", first, second, design="independent", clusters=labels[0]
-        )
+    for wrong, why in (
+        ((labels[0], ["a1", *labels[1][1:]]), "other clusters, got 'a1' in both"),
+        (labels[0], "a pair of sequences"),
+    ):
+        with pytest.raises(ParameterError, match=why):
+            difference(*asked, clusters=wrong, **options)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("n_outside", "is_rare"), [(4, True), (30, False)])

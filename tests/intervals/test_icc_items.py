@@ -10,7 +10,6 @@ from masrel.agreement import COEFFICIENTS, IccForm, icc
 from masrel.errors import (
     ParameterError,
 )
-from masrel.estimates import Interval
 from masrel.intervals import analytic, difference, estimate, jackknife
 
 FORMS: dict[str, IccForm] = {
@@ -26,36 +25,21 @@ GAP[3][1] = None
 PATIENTS = [f"p{i // 2}" for i in range(24)]
 
 
-def half(interval: Interval | None) -> float:
-    assert interval is not None
-    return (interval.high - interval.low) / 2.0
-
-
 @pytest.mark.parametrize(("name", "form"), FORMS.items())
-@pytest.mark.parametrize("clusters", [None, PATIENTS])
-def test_the_jackknife_is_of_the_coefficient_without_each(
-    name: str, form: IccForm, clusters: list[str] | None
+def test_the_interval_of_clusters_is_symmetric_on_fishers_z(
+    name: str, form: IccForm
 ) -> None:
-    units = np.array(clusters or range(24))
+    units = np.array(PATIENTS)
     without = np.array([
         icc(RATINGS[units != unit], form=form).value for unit in np.unique(units)
     ])  # fmt: skip
-    n = len(without)
-    error = np.sqrt((n - 1) / n * ((without - without.mean()) ** 2).sum())
-    found = jackknife(name, RATINGS, target="items", clusters=clusters)
-    t = stats.t.ppf(0.975, n - 1)
-    assert found.high == pytest.approx(
-        min(icc(RATINGS, form=form).value + t * error, 1)
-    )
-    assert found.target == "items"
-    if clusters is not None:
-        chosen = estimate(name, RATINGS, target="items", clusters=clusters)
-        # symmetric on Fisher's z
-        assert chosen.interval is not None
-        low, high = np.arctanh([chosen.interval.low, chosen.interval.high])
-        value = chosen.value
-        assert np.tanh((low + high) / 2.0) == pytest.approx(value, rel=1e-9)
-        assert (high - low) / 2.0 == pytest.approx(t * error / (1 - value**2), rel=1e-9)
+    error = np.sqrt(11 / 12 * ((without - without.mean()) ** 2).sum())
+    chosen = estimate(name, RATINGS, target="items", clusters=PATIENTS)
+    assert chosen.interval is not None
+    low, high = np.arctanh([chosen.interval.low, chosen.interval.high])
+    value, t = chosen.value, stats.t.ppf(0.975, 11)
+    assert np.tanh((low + high) / 2.0) == pytest.approx(value, rel=1e-9)
+    assert (high - low) / 2.0 == pytest.approx(t * error / (1 - value**2), rel=1e-9)
 
 
 def test_clustered_intervals_cover() -> None:

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,10 +10,9 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from masrel.agreement import (
+    COEFFICIENTS,
     Metric,
-    fleiss_kappa,
     krippendorff_alpha,
-    stratified_kappa,
 )
 from masrel.errors import (
     UndefinedStatisticWarning,
@@ -20,8 +20,9 @@ from masrel.errors import (
 from masrel.intervals import bootstrap, jackknife
 from tests.intervals.data import SCALE, TABLE_V, dirichlet_multinomial
 
-T7 = 2.364624251592784  # t(7; .975) of any table of Student's t
-few = pytest.mark.filterwarnings("ignore::masrel.errors.SmallSampleWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::masrel.errors.MasrelWarning")
+
+METRICS: list[Metric] = ["nominal", "ordinal", "interval", "ratio"]
 
 
 def variance(replicates: list[float]) -> float:
@@ -30,76 +31,91 @@ def variance(replicates: list[float]) -> float:
     return (n - 1) / n * math.fsum((r - mean) ** 2 for r in replicates)
 
 
-def without_rater(table: list[list[str]], r: int) -> list[list[str]]:
-    return [row[:r] + row[r + 1 :] for row in table]
+def made(n_items: int, n_raters: int, seed: int) -> NDArray[Any]:
+    rng = np.random.default_rng(seed)
+    return np.array(dirichlet_multinomial(rng, n_items, n_raters, 0.5), dtype=float)
 
 
-def without_item(table: list[list[str]], i: int) -> list[list[str]]:
-    return table[:i] + table[i + 1 :]
+GRADES = np.array([
+    [1, 1, 2], [2, 2, 3], [4, 3, 4], [5, 5, 5], [1, 2, 1], [3, 3, np.nan],
+    [5, 4, 5], [2, 1, 2], [np.nan, 4, 4], [1, 1, 1], [3, 5, 3],
+])  # fmt: skip
+PAIRS, HOLED, GAPS = made(24, 2, 3), made(24, 2, 3), made(9, 4, 5)
+HOLED[[2, 9], 0] = GAPS[[1, 4, 4], [0, 2, 3]] = np.nan
+MEASURED = made(24, 1, 4) + 0.6 * np.random.default_rng(4).normal(size=(24, 3))
+RETEST = np.array([
+    [["1", "1"], ["2", "2"], ["1", "2"], ["3", "3"]],
+    [["1", "1"], ["2", "1"], ["1", "1"], ["3", "3"]],
+])  # fmt: skip
+PATIENTS = np.arange(24) // 2
+CATEGORIES = {"categories": [0, 1, 2]}
+
+# coefficient, ratings, target, options, clusters of items
+CASES: dict[str, tuple[str, NDArray[Any], str, dict[str, Any], Any]] = {
+    "raters": (
+        "fleiss_kappa",
+        np.array(TABLE_V),
+        "raters",
+        {"categories": SCALE},
+        None,
+    ),
+    "both": ("fleiss_kappa", made(12, 6, 8), "both", CATEGORIES, None),
+    "gaps": ("conger_kappa", GAPS, "items", CATEGORIES, None),
+    "items of a retest": ("stratified_kappa", RETEST, "items", {}, None),
+    "raters of a retest": ("stratified_kappa", RETEST, "raters", {}, None),
+    **{
+        f"{metric} metric": (
+            *("krippendorff_alpha", GRADES, "items"),
+            *({"metric": metric, "categories": range(1, 6)}, None),
+        )
+        for metric in METRICS
+    },
+    **{
+        f"{name}, {of}": (name, ratings, "items", CATEGORIES, clusters)
+        for name, e in COEFFICIENTS.items()
+        if e.formula and e.shape == "ratings" and not e.has_interval
+        for of, ratings, clusters in (
+            ("items", PAIRS, None),
+            ("clusters with gaps", HOLED, PATIENTS),
+        )
+    },
+    **{
+        f"{name}, {of}": (name, MEASURED, "items", {}, clusters)
+        for name, e in COEFFICIENTS.items()
+        if e.formula and e.has_interval
+        for of, clusters in (("items", None), ("clusters", PATIENTS))
+    },
+}
 
 
-def test_leaving_out_raters_is_the_loop_over_them() -> None:
-    values = [fleiss_kappa(without_rater(TABLE_V, r)).value for r in range(8)]
-    half = T7 * math.sqrt(variance(values))
-    centre = fleiss_kappa(TABLE_V).value
+@pytest.mark.parametrize("case", CASES)
+def test_it_is_the_loop_that_leaves_out_one_after_the_other(case: str) -> None:
+    name, ratings, target, options, clusters = CASES[case]
+    entry = COEFFICIENTS[name]
+    value = entry.function(ratings, **options).value
+    parts, dfs = [], []
+    for unit in ("items", "raters") if target == "both" else (target,):
+        axis = int((unit == "raters") != (entry.shape == "pairs"))
+        units = np.arange(ratings.shape[axis]) if clusters is None else clusters
+        without = [
+            entry.function(np.compress(units != u, ratings, axis), **options).value
+            for u in np.unique(units)
+        ]
+        parts.append(variance(without))
+        dfs.append(len(without) - 1)
+    half = stats.t.ppf(0.975, min(dfs)) * math.sqrt(sum(parts))
+    found = jackknife(name, ratings, target=target, clusters=clusters, **options)  # type: ignore[arg-type]
+    assert found.low == pytest.approx(max(value - half, entry.lowest), rel=1e-9)
+    assert found.high == pytest.approx(min(value + half, entry.highest), rel=1e-9)
+    what = {"items": "item", "raters": "rater", "both": "two-way"}[target]
+    what = what if clusters is None else "cluster"
+    assert found.method == f"{what} jackknife, t({min(dfs)})"
+    assert (found.target, found.n_resamples) == (target, None)
+
+
+def test_another_program_found_the_same_for_table_v() -> None:
     found = jackknife("fleiss_kappa", TABLE_V, target="raters", categories=SCALE)
-    assert found.low == pytest.approx(centre - half, rel=1e-12)
-    assert found.high == pytest.approx(centre + half, rel=1e-12)
-    # as another program found for Table V
     assert (found.low, found.high) == pytest.approx((0.320, 0.933), abs=5e-4)
-    assert (found.unit, found.target, found.method) == (
-        "raters",
-        "raters",
-        "rater jackknife, t(7)",
-    )
-    assert found.n_resamples is None
-
-
-@few
-def test_leaving_out_items_is_the_loop_over_them() -> None:
-    rng = np.random.default_rng(5)
-    table = [
-        [str(g) if rng.random() > 0.1 else None for g in row]
-        for row in dirichlet_multinomial(rng, 8, 4, 0.4)
-    ]
-    values = [fleiss_kappa(without_item(table, i)).value for i in range(8)]
-    half = T7 * math.sqrt(variance(values))
-    found = jackknife("fleiss_kappa", table, target="items")
-    centre = fleiss_kappa(table).value
-    assert found.low == pytest.approx(centre - half, rel=1e-9)
-    assert found.high == pytest.approx(min(centre + half, 1.0), rel=1e-9)
-
-
-@few
-def test_for_both_the_variances_add_and_degrees_are_the_fewer() -> None:
-    table = dirichlet_multinomial(np.random.default_rng(8), 12, 6, 0.5)
-    rows = variance([fleiss_kappa(without_item(table, i)).value for i in range(12)])
-    columns = variance([fleiss_kappa(without_rater(table, r)).value for r in range(6)])
-    found = jackknife("fleiss_kappa", table, target="both")
-    half = (found.high - found.low) / 2
-    t5 = 2.570581835636314  # of 11 and 5 degrees
-    assert half == pytest.approx(t5 * math.sqrt(rows + columns), rel=1e-12)
-    assert found.method == "two-way jackknife, t(5)"
-
-
-@few
-def test_a_retest_item_leaves_with_all_its_raters() -> None:
-    pairs = [
-        [["1", "1"], ["2", "2"], ["1", "2"], ["3", "3"]],
-        [["1", "1"], ["2", "1"], ["1", "1"], ["3", "3"]],
-    ]
-    values = [
-        stratified_kappa([without_item(rater, i) for rater in pairs]).value
-        for i in range(4)
-    ]
-    half = 3.18244630528371 * math.sqrt(variance(values))
-    found = jackknife("stratified_kappa", pairs, target="items")
-    centre = stratified_kappa(pairs).value
-    assert found.low == pytest.approx(centre - half, rel=1e-10)
-    raters = [stratified_kappa([rater]).value for rater in pairs[::-1]]
-    half = math.tan(0.475 * math.pi) * math.sqrt(variance(raters))  # t(1), Cauchy's
-    wide = jackknife("stratified_kappa", pairs, target="raters")
-    assert wide.low == pytest.approx(max(centre - half, -1.0), rel=1e-10)
 
 
 @pytest.mark.parametrize(
@@ -123,7 +139,6 @@ def test_a_retest_item_leaves_with_all_its_raters() -> None:
         ([["a", "b", "a"]], "items", "left out the estimate is undefined"),
     ],
 )
-@few
 def test_where_it_cannot_say_it_says_why(
     table: list[list[str]], target: str, reason: str
 ) -> None:
@@ -132,37 +147,6 @@ def test_where_it_cannot_say_it_says_why(
     assert math.isnan(found.low)
     assert math.isnan(found.high)
     assert reason in (found.reason or "")
-
-
-pytestmark = pytest.mark.filterwarnings(
-    "ignore::masrel.errors.SmallSampleWarning",
-    "ignore::masrel.errors.UndefinedStatisticWarning",
-)
-
-METRICS: list[Metric] = ["nominal", "ordinal", "interval", "ratio"]
-
-GRADES = [
-    [1, 1, 2], [2, 2, 3], [4, 3, 4], [5, 5, 5], [1, 2, 1], [3, 3, None],
-    [5, 4, 5], [2, 1, 2], [None, 4, 4], [1, 1, 1], [3, 5, 3],
-]  # fmt: skip
-
-
-@pytest.mark.parametrize("metric", METRICS)
-def test_the_jackknife_leaves_items_out_of_the_metric_too(metric: Metric) -> None:
-    n = len(GRADES)
-    without = [
-        krippendorff_alpha(
-            GRADES[:i] + GRADES[i + 1 :], categories=range(1, 6), metric=metric
-        ).value
-        for i in range(n)
-    ]
-    half = stats.t.ppf(0.975, n - 1) * math.sqrt(
-        (n - 1) ** 2 / n * np.var(without, ddof=1)
-    )
-    result = jackknife("krippendorff_alpha", GRADES, target="items", metric=metric)
-    value = krippendorff_alpha(GRADES, metric=metric).value
-    assert result.low == pytest.approx(value - half, rel=1e-9)
-    assert result.high == pytest.approx(min(value + half, 1.0), rel=1e-9)
 
 
 @pytest.mark.parametrize("metric", METRICS)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.special import betainc, betaincinv, roots_jacobi
+from scipy.special import betaincinv
 
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Interval
@@ -77,47 +77,6 @@ def test_agreement_is_a_beta() -> None:
         assert (result.n_resamples, result.seed, result.monte_carlo_error) == (
             None,
         ) * 3
-
-
-def jacobi(a: float, b: float) -> tuple[Floats, Floats]:
-    """Gauss-Jacobi nodes and weights of a Beta(a, b)."""
-    nodes, weights = roots_jacobi(80, b - 1.0, a - 1.0)
-    return 0.5 * (nodes + 1.0), weights / weights.sum()
-
-
-def cohen_probability(prior: Floats, value: float) -> float:
-    """By another way round: given the first rater's margin p and the second's share w
-    of category 1 on the first's category 2, κ <= value is linear in its share u on
-    the first's category 1: 2 p (1 - p) (u - w) <= value (p + q - 2 p q), with
-    q = p u + (1 - p) w.
-    """
-    p, of_p = jacobi(prior[0].sum(), prior[1].sum())
-    w, of_w = jacobi(prior[1, 0], prior[1, 1])
-    p, w = p[:, None], w[None, :]
-    slope = p * (2.0 * (1.0 - p) - value * (1.0 - 2.0 * p))
-    least = value * p + (1.0 - p) * w * (2.0 * p + value * (1.0 - 2.0 * p))
-    below = betainc(prior[0, 0], prior[0, 1], (least / slope).clip(0.0, 1.0))
-    given_both = np.where(slope > 0.0, below, 1.0 - below)
-    return float(of_p @ given_both @ of_w)
-
-
-@pytest.mark.parametrize(
-    "table",
-    [
-        [[20, 5], [10, 15]],
-        [[200, 50], [100, 150]],
-        [[6, 5], [7, 9]],
-        [[4, 12], [13, 6]],
-        [[90, 4], [5, 12]],
-    ],
-)
-def test_two_categories_by_another_integral(table: list[list[int]]) -> None:
-    prior = np.array(table) + 2.0
-    result = table_posterior("cohen_kappa", table, concentration=2.0)
-    again = [cohen_probability(prior, end) for end in ends(result)]
-    # the other integral has kinks where a share reaches 0 or 1
-    assert again == pytest.approx(TAILS, abs=1e-8)
-    assert result.n_resamples is None
 
 
 def drawn_values(coefficient: str, prior: Floats, v: Floats, n: int = 60_000) -> Floats:
