@@ -2,8 +2,6 @@
 
 import json
 import pickle
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -331,16 +329,3 @@ def test_what_is_read_of_a_table_can_be_pickled() -> None:
     file = masrel.agree(FRAME).file
     assert pickle.loads(pickle.dumps(file)) == file
     assert file.sha256() == ""  # there are no bytes of a file
-
-
-def test_it_loads_no_figures_and_no_other_frames() -> None:
-    code = (
-        "import sys, masrel; import pandas as pd; "
-        "masrel.agree(pd.DataFrame({'item': [1, 2], 'K': [1, 2], 'L': [1, 1]})); "
-        "print([m for m in ('matplotlib', 'narwhals', 'polars', 'duckdb', 'emcee', "
-        "'masrel.intervals', 'masrel.lab') if m in sys.modules])"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.strip() == "[]"

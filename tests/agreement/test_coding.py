@@ -32,7 +32,6 @@ from masrel.agreement import (
     robinson_a,
     scott_pi,
 )
-from masrel.agreement._codes import Repeated
 from masrel.errors import MasrelError, ParameterError, RatingsError, RatingsWarning
 
 GRADES = ["0", "1", "1+", "2", "3", "4"]
@@ -107,7 +106,7 @@ def test_a_repeated_rating_is_refused_by_name() -> None:
 
 
 @pytest.mark.parametrize(("policy", "kept"), [("first", 0), ("last", 3)])
-def test_a_named_policy_keeps_one_of_them(policy: Repeated, kept: int) -> None:
+def test_a_named_policy_keeps_one_of_them(policy: Any, kept: int) -> None:
     coded = code_long(TWICE, categories=SCALE, repeated=policy)
     assert coded.codes.tolist() == [[kept, 2], [2, -1]]
 

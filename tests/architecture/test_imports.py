@@ -1,80 +1,95 @@
-"""What is loaded, seen by looking at the loaded modules of a fresh interpreter."""
+"""What is loaded, seen by looking at the loaded modules of fresh interpreters."""
 
 import json
 import subprocess
 import sys
 
-import pytest
-
 HEAVY = {"pandas", "scipy", "statsmodels", "matplotlib", "emcee", "arviz_stats"}
+PAGES = {"starlette", "uvicorn", "segno", "anyio", "jinja2"}
+
+# Each code in a child of its own of one interpreter, which has loaded nothing but this.
+SCRIPT = """
+import contextlib, io, json, os, sys
+for code in json.loads(sys.argv[1]):
+    child = os.fork()
+    if child == 0:
+        with contextlib.redirect_stdout(io.StringIO()):
+            try:
+                exec(code, {})
+            except SystemExit:
+                pass
+        print(json.dumps(sorted(sys.modules)), flush=True)
+        os._exit(0)
+    os.waitpid(child, 0)
+"""
+
+
+def loaded_after_each(*codes: str) -> list[set[str]]:
+    """Names of the modules a fresh interpreter holds after each of these codes."""
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT, json.dumps(codes)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return [set(json.loads(line)) for line in done.stdout.splitlines()]
 
 
 def loaded_after(code: str) -> set[str]:
-    """Top-level names of the modules a fresh interpreter holds after `code`."""
-    script = (
-        "import sys, json, io, contextlib\n"
-        "with contextlib.redirect_stdout(io.StringIO()):\n"
-        "    try:\n"
-        + "".join(f"        {line}\n" for line in code.splitlines())
-        + "    except SystemExit:\n        pass\n"
-        "print(json.dumps(sorted({name.split('.')[0] for name in sys.modules})))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=True
-    )
-    return set(json.loads(done.stdout))
+    """Names of the modules a fresh interpreter holds after a code."""
+    (loaded,) = loaded_after_each(code)
+    return loaded
 
 
-@pytest.mark.parametrize(
-    "code",
-    [
-        "import masrel",
-        "from masrel.cli import cli\ncli(['--help'])",
-        "from masrel.cli import cli\ncli(['--version'])",
-    ],
-)
-def test_the_package_and_its_help_load_nothing_heavy(code: str) -> None:
-    assert loaded_after(code) & (HEAVY | {"numpy"}) == set()
+OF_GROUPS = ("joint", "record", "paper", "schedule", "status", "train")
+# code, and what it loads none of
+LOADS_NO: dict[str, set[str]] = {
+    **{
+        code: HEAVY | {"numpy"}
+        for code in (
+            "import masrel",
+            "from masrel.cli import cli\ncli(['--help'])",
+            "from masrel.cli import cli\ncli(['--version'])",
+        )
+    },
+    **{
+        f"import masrel.{name}": HEAVY
+        for name in (
+            *("agreement", "intervals", "lab.elbow", "lab.hess"),
+            *("lab.protocol", "lab.schedule", "lab.run"),  # before the ratings
+        )
+    },
+    **{
+        f"import numpy\nfrom masrel.agreement import {name}\n"
+        f"{name}(numpy.array([[1, 1], [1, 2], [2, 2]]), weights='quadratic')": (
+            HEAVY | {"click", "msgspec", "masrel.intervals"}
+        )
+        for name in ("fleiss_kappa", "gwet_ac", "cohen_kappa")
+    },
+    **{
+        f"from masrel.cli import cli\ncli([{group!r}, '--help'])": HEAVY
+        for group in OF_GROUPS
+    },
+    "import masrel.lab.analysis, masrel.ratings": {"matplotlib", "emcee"},
+    "import masrel, pandas as pd\n"
+    "masrel.agree(pd.DataFrame({'item': [1, 2], 'K': [1, 2], 'L': [1, 1]}))": {
+        *("matplotlib", "narwhals", "polars", "duckdb", "emcee"),
+        *("masrel.intervals", "masrel.lab"),
+    },
+    # the pages load their server only when they are served
+    "from masrel.lab.cli import serve\nserve.serve(['--help'])": PAGES | HEAVY,
+    # beside the loop of a session nothing else runs
+    "import masrel.lab.serve._session_process": PAGES,
+    # a backend is imported when it is chosen
+    "import masrel.lab.hess": {"masrel.lab.hess.puck"},
+}
 
 
-@pytest.mark.parametrize("package", ["agreement", "intervals", "lab.elbow", "lab.hess"])
-def test_a_library_loads_numpy_at_most(package: str) -> None:
-    assert loaded_after(f"import masrel.{package}") & HEAVY == set()
-
-
-@pytest.mark.parametrize("stage", ["protocol", "schedule", "run"])
-def test_a_stage_before_the_ratings_loads_no_pandas(stage: str) -> None:
-    assert loaded_after(f"import masrel.lab.{stage}") & HEAVY == set()
-
-
-def test_one_kappa_loads_numpy_alone() -> None:
-    code = (
-        "from masrel.agreement import fleiss_kappa\n"
-        "fleiss_kappa([['1', '1'], ['1', '2']], categories=['1', '2'])"
-    )
-    assert loaded_after(code) & HEAVY == set()
-
-
-def test_an_analysis_loads_no_matplotlib() -> None:
-    loaded = loaded_after("import masrel.lab.analysis, masrel.ratings")
-    assert loaded & {"matplotlib", "emcee", "statsmodels"} == set()
+def test_nothing_is_loaded_that_is_not_needed() -> None:
+    loaded = dict(zip(LOADS_NO, loaded_after_each(*LOADS_NO), strict=True))
+    too_much = {code: loaded[code] & LOADS_NO[code] for code in LOADS_NO}
+    assert {code: names for code, names in too_much.items() if names} == {}
 
 
 def test_sub_packages_come_on_first_use() -> None:
     assert "numpy" in loaded_after("import masrel\nmasrel.lab.elbow.STANDARD_MODELS")
-
-
-@pytest.mark.parametrize(
-    "group", ["joint", "record", "paper", "schedule", "status", "train"]
-)
-def test_a_group_lists_its_commands_without_numpy(group: str) -> None:
-    code = f"from masrel.cli import cli\ncli([{group!r}, '--help'])"
-    assert loaded_after(code) & HEAVY == set()
-
-
-def test_the_pages_load_their_server_only_when_they_are_served() -> None:
-    libraries = {"starlette", "uvicorn", "segno", "anyio", "jinja2"}
-    code = "from masrel.lab.cli import serve\nserve.serve(['--help'])"
-    assert loaded_after(code) & (libraries | HEAVY) == set()
-    # nor does the process of a session, beside whose loop nothing else runs
-    assert loaded_after("import masrel.lab.serve._session_process") & libraries == set()

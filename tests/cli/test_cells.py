@@ -6,33 +6,29 @@ from pathlib import Path
 
 import pytest
 
-from masrel._files import from_safe_cell, safe_cell
 from masrel.lab.ratings import ratings_from_rows, read_study_ratings, write_ratings
 from masrel.scales import Scale
 from tests.cli.process import Caller
 
 RUN = ['=HYPERLINK("http://x")', "+cmd|' /C calc'!A0", "-2+3", "@SUM(A1)", "'=1", "=1"]
-SAFE = ["1+", "-1", "+2.5", "-1e-3", "'tis", "A=1", "R-1", ""]
+SAFE = ["1+", "-1", "+2.5", "-1e-3", "'tis", "A=1", "R-1"]
 
 
-def test_every_text_comes_back() -> None:
-    for text in (*RUN, *SAFE, *(f"'{text}" for text in RUN)):
-        assert from_safe_cell(safe_cell(text)) == text
-    assert [safe_cell(text) for text in SAFE] == SAFE
-    assert all(safe_cell(text) == f"'{text}" for text in RUN)
-
-
-def test_a_study_reads_the_grades_that_it_wrote(tmp_path: Path) -> None:
-    scale = Scale(name="odd", grades=("=0", "-", "1+", "-1"))
+def test_every_text_comes_back(tmp_path: Path) -> None:
+    grades = [*RUN, *SAFE, *(f"'{text}" for text in RUN if text[0] != "'")]
+    scale = Scale(name="odd", grades=tuple(dict.fromkeys(grades)))
     rows = [
         {"session": "test", "rater": "R1", "model": f"M{i}", "grade": grade}
         for i, grade in enumerate(scale.grades)
     ]
-    write_ratings(ratings_from_rows(rows, scale), tmp_path / "ratings.csv")
-    text = (tmp_path / "ratings.csv").read_text()
-    assert ",'=0," in text
-    assert ",1+," in text
-    read = read_study_ratings(tmp_path / "ratings.csv", scale)
+    file = tmp_path / "ratings.csv"
+    write_ratings(ratings_from_rows(rows, scale), file)
+    lines = [line for line in file.read_text().splitlines() if line[0] != "#"]
+    written = {row["model"]: row["grade"] for row in csv.DictReader(lines)}
+    assert [written[f"M{i}"] for i, grade in enumerate(scale.grades)] == [
+        grade if grade in SAFE else f"'{grade}" for grade in scale.grades
+    ]
+    read = read_study_ratings(file, scale)
     assert read.table["grade"].tolist() == list(scale.grades)
 
 

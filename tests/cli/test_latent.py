@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from masrel.plots._style import STYLE
 from tests.cli.process import Caller
 
 SAMPLER = "masrel.intervals.latent._sampler"
@@ -65,9 +64,8 @@ def test_json_and_csv_keep_every_digit_and_repeat(masrel: Caller, wide: Path) ->
 
 
 def test_the_figure_shows_items_thresholds_and_raters(
-    masrel: Caller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    masrel: Caller, tmp_path: Path
 ) -> None:
-    monkeypatch.setitem(STYLE, "svg.fonttype", "none")  # text stays text
     file, figure = tmp_path / "study.csv", tmp_path / "scale.svg"
     file.write_text(SESSIONS, encoding="utf-8")
     asked = ("latent", file, "--items", "fixed", "--only", "second", "--one-prior")
@@ -75,7 +73,7 @@ def test_the_figure_shows_items_thresholds_and_raters(
     assert done.code == 0
     assert done.err == f"figure: {figure}\n"
     assert done.out.startswith("SIMULATED DATA. ")
-    drawn = figure.read_text("utf-8")
+    drawn = figure.read_text("utf-8")  # in which a comment says what is drawn
     for words in ("SIMULATED DATA", "severity", "2 | 3", "bias of raters"):
         assert words in drawn
 

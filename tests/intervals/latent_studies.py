@@ -1,21 +1,9 @@
 """Made studies: ratings drawn from the latent-trait model, and the truth they hide."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.intervals.latent._model import Traits
-
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Study:
-    """Codes with the unknowns they were drawn from, each of one position."""
-
-    codes: NDArray[np.int64]
-    truth: Traits
 
 
 def drawn(
@@ -27,8 +15,11 @@ def drawn(
     share: float,
     fraction: float,
     spread: float,
-) -> Study:
-    """Draw items and raters, and let every rater grade every item, one by one."""
+) -> tuple[NDArray[np.int64], dict[str, Floats]]:
+    """Draw items and raters, and let every rater grade every item, one by one.
+
+    Returns the codes, and the unknowns that made them, each of one position.
+    """
     rest = 1.0 - share
     theta = rng.normal(scale=np.sqrt(share), size=n_items)
     bias = rng.normal(scale=np.sqrt(rest * (1.0 - fraction)), size=n_raters)
@@ -44,16 +35,13 @@ def drawn(
             for i in range(n_items)
         ]
     )
-    return Study(
-        codes=codes,
-        truth=Traits(
-            severity=theta[None],
-            bias=bias[None],
-            noise=noise[None],
-            thresholds=np.array([thresholds]),
-            item_share=np.array([share]),
-            noise_spread=np.array([spread]),
-            bias_variance=np.array([rest * (1.0 - fraction)]),
-            noise_variance=np.array([rest * fraction]),
-        ),
-    )
+    return codes, {
+        "severity": theta[None],
+        "bias": bias[None],
+        "noise": noise[None],
+        "thresholds": np.array([thresholds]),
+        "item_share": np.array([share]),
+        "noise_spread": np.array([spread]),
+        "bias_variance": np.array([rest * (1.0 - fraction)]),
+        "noise_variance": np.array([rest * fraction]),
+    }

@@ -43,7 +43,7 @@ def fitted(ratings: object = SMALL, **options: object) -> LatentTrait:
 
 @pytest.fixture(scope="module")
 def result(brief: None) -> LatentTrait:  # noqa: ARG001 - it has to come first
-    return fitted(keep_chains=True, compare=True)
+    return fitted(keep_chains=True)
 
 
 def test_everything_has_a_name_and_an_interval(result: LatentTrait) -> None:
@@ -64,7 +64,7 @@ def test_everything_has_a_name_and_an_interval(result: LatentTrait) -> None:
 
 
 def test_a_seed_repeats_every_byte(result: LatentTrait) -> None:
-    again = fitted(keep_chains=True, compare=True)
+    again = fitted(keep_chains=True)
     assert again == result
     assert again.chains is not None
     assert result.chains is not None
@@ -151,10 +151,9 @@ def extreme(result: LatentTrait) -> dict[str, float]:
 
 def test_the_predictive_check_sees_a_rater_who_turns_the_scale_round() -> None:
     rng = np.random.default_rng(2)
-    study = drawn(
+    codes, _ = drawn(
         rng, 14, 6, [-1.2, -0.4, 0.4, 1.2], share=0.95, fraction=0.7, spread=0.1
     )
-    codes = study.codes.copy()
     codes[:, 4] = 4 - codes[:, 4]
     tight = LatentPrior(noise_spread=0.1)  # raters who are alike
     result = fitted(codes, categories=[0, 1, 2, 3, 4], prior=tight)

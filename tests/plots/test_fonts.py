@@ -2,12 +2,12 @@
 
 import warnings
 
+import pandas as pd
 import pytest
 
+import masrel
 from masrel.errors import MissingLettersWarning
-from masrel.plots import draw, forest
-from masrel.plots._drawn_values import Drawn
-from masrel.tables._estimate_words import forest_row
+from masrel.plots import forest
 from tests.plots.made import blank, estimate
 
 
@@ -22,11 +22,15 @@ def test_letters_without_a_font_are_said_in_one_sentence_with_the_way_out() -> N
     assert warning.filename == __file__
 
 
-@pytest.mark.parametrize(("form", "is_said"), [("png", True), ("inline", False)])
-def test_a_page_has_the_letters_of_its_reader(form: str, is_said: bool) -> None:
-    rows = (forest_row("경미", estimate()),)
-    shown = Drawn("masrel.plots._forest:forest_picture", (rows, "agreement"))
+@pytest.mark.parametrize("is_page", [True, False])
+def test_a_page_has_the_letters_of_its_reader(is_page: bool) -> None:
+    named = pd.DataFrame([[1, 1], [2, 1], [1, 2]], columns=["경미", "경"])
+    result = masrel.agree(named, reading=masrel.Reading(no_item=True))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        draw(shown, stamp="", forms=(form,))
-    assert [of.category for of in caught] == [MissingLettersWarning] * is_said
+        if is_page:
+            assert "경미" in result.to_html()
+        else:
+            result.plot("grades")
+    is_said = any(of.category is MissingLettersWarning for of in caught)
+    assert is_said is not is_page

@@ -13,7 +13,6 @@ from matplotlib.colors import to_rgb
 from masrel.errors import ParameterError
 from masrel.intervals import diagnose
 from masrel.plots import categories, confusion, grades, items
-from masrel.plots._cells import letters_on
 from tests.plots.made import LONG, blank, diagnosis, overlaps, texts_of
 
 # Kim gives a to the first two items and b to the others; Ann has no last item.
@@ -130,12 +129,14 @@ def test_items_come_by_disagreement_and_missing_ratings_are_blank() -> None:
 
 @pytest.mark.parametrize("ordered", [True, False])
 def test_letters_can_be_read_on_every_cell(ordered: bool) -> None:
-    axes = grades(drawn(40, 3, 8, words=False), ordered=ordered, ax=blank())
-    for colour in legend_of(axes).values():
-        light, dark = sorted(
-            (luminance(colour), luminance(letters_on(colour))), reverse=True
+    axes = items(drawn(40, 3, 8, words=False), ordered=ordered, ax=blank())
+    cells = np.asarray(axes.images[0].get_array())
+    for (column, row), letters in {of.get_position(): of for of in axes.texts}.items():
+        pair = (
+            luminance(cells[int(row), int(column)][:3]),
+            luminance(letters.get_color()),
         )
-        assert (light + 0.05) / (dark + 0.05) > 4.0
+        assert (max(pair) + 0.05) / (min(pair) + 0.05) > 4.0
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 
 from masrel.agreement import coefficient
 from masrel.errors import ParameterError, RatingsError
-from masrel.ratings import RatingsFile, Reading, _large, read_ratings
+from masrel.ratings import RatingsFile, Reading, read_ratings
 
 pyarrow = pytest.importorskip("pyarrow")
 parquet = pytest.importorskip("pyarrow.parquet")
@@ -159,10 +159,12 @@ def test_names_of_items_are_looked_through(
     streamed, whole = both(path)
     assert_same(streamed, whole)
     assert [finding.code for finding in streamed.warnings] == codes
-    monkeypatch.setattr(_large, "_MAX_NAMES", 2)  # too many of them, or rows
+    monkeypatch.setattr(
+        "masrel.ratings._large._MAX_NAMES", 2
+    )  # too many of them, or rows
     streamed, _ = both(path)
     assert [finding.code for finding in streamed.warnings] == ["stream"] * len(codes)
-    monkeypatch.setattr(_large, "_MAX_NAMED", 2)
+    monkeypatch.setattr("masrel.ratings._large._MAX_NAMED", 2)
     streamed, _ = both(path)
     assert [finding.code for finding in streamed.warnings] == ["stream"]
 
@@ -232,7 +234,7 @@ HEAD = "id,A,B\n" + "".join(f"p{k},{k % 3},{k // 2 % 3}\n" for k in range(500))
 def test_a_wrong_line_of_a_text_is_refused_where_it_stands(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line: str, words: str, end: str
 ) -> None:
-    monkeypatch.setattr(_large, "_HEAD_BYTES", 1000)
+    monkeypatch.setattr("masrel.ratings._large._HEAD_BYTES", 1000)
     path = tmp_path / "wide.csv"
     path.write_bytes(f"{HEAD}{line}\nq,1,2\n".replace("\n", end).encode("latin-1"))
     for stream in (True, False):
@@ -271,17 +273,17 @@ class TestSize:
         path = written(tmp_path / "wide.parquet", columns)
         with pytest.raises(RatingsError, match=r"more than 120 .*--no-stream"):
             read_ratings(path, Reading(stream=True))
-        monkeypatch.setattr(_large, "_LARGE_TABLE", 1000)
+        monkeypatch.setattr("masrel.ratings._large._LARGE_TABLE", 1000)
         assert not is_streamed(read_ratings(path))
 
     def test_without_duckdb_it_is_read_as_a_whole(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(_large, "find_spec", lambda _: None)
+        monkeypatch.setattr("masrel.ratings._large.find_spec", lambda _: None)
         monkeypatch.setitem(sys.modules, "duckdb", None)
         columns = long_columns(ORDER, [f"p{k}" for k in range(400)])
         path = written(tmp_path / "long.parquet", columns)
         with pytest.raises(RatingsError, match=r"masrel\[big\]"):
             read_ratings(path, Reading(stream=True))
-        monkeypatch.setattr(_large, "_LARGE_TABLE", 1000)
+        monkeypatch.setattr("masrel.ratings._large._LARGE_TABLE", 1000)
         assert not is_streamed(read_ratings(path))

@@ -20,9 +20,9 @@ from typing import Any
 
 import pytest
 
-from masrel.lab.report._report_folder import NOTES
 from masrel.lab.run import read_log
 
+NOTES = ".masrel_cache"  # of a report, beside it
 CHANGING = ("open", "write", "fsync", "replace", "unlink", "mkdir", "chmod")
 
 # Calls of the system that change a file or a folder, and those that need space

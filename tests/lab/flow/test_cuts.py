@@ -189,7 +189,7 @@ def test_a_full_disk_at_any_call_is_said_with_the_file(
         assert masrel(*call).code == 0
     after = contents(root)
     places = range(1, len(calls) + 1)
-    for place in Random(7).sample(places, min(20, len(places))):
+    for place in Random(7).sample(places, min(10, len(places))):
         shutil.rmtree(root)
         shutil.copytree(kept, root)
         with full_disk_at(place):
