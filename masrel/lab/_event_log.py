@@ -18,14 +18,14 @@ from typing import TYPE_CHECKING, Self
 
 from masrel._files import make_folder, naming, sync_folder
 from masrel.errors import SessionLogError, SessionLogInUseError
-from masrel.lab._bounded_files import (
+from masrel.lab._study_files import (
     MAX_TABLE,
     format_problem,
+    no_follow,
+    once,
     parse_json,
     read_regular,
 )
-from masrel.lab._durable_files import no_follow
-from masrel.lab._once import once
 
 if TYPE_CHECKING:
     from masrel.lab.recording import _Fact, _Facts  # loads numpy

@@ -15,15 +15,15 @@ import msgspec
 
 from masrel._files import make_folder, write_files
 from masrel.errors import ParameterError, ProtocolError, ScheduleError
-from masrel.lab._bounded_files import (
+from masrel.lab._event_log import line_hashes
+from masrel.lab._study_files import (
     MAX_RECORDING,
     MAX_SMALL,
+    new_folder,
     parse_toml,
     read_regular,
     toml_lines,
 )
-from masrel.lab._durable_files import new_folder
-from masrel.lab._event_log import line_hashes
 from masrel.lab.conduct._study_log import append_event
 from masrel.lab.paper._printing import has_answers
 from masrel.lab.protocol import (

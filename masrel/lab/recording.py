@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from masrel._files import write_files
 from masrel.errors import ParameterError, RecordingError
-from masrel.lab._bounded_files import (
+from masrel.lab._study_files import (
     MAX_RECORDING,
     MAX_SMALL,
     format_problem,

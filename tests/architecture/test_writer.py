@@ -10,7 +10,7 @@ PACKAGE = Path(masrel.__file__).parent
 
 WRITERS = {
     "_files.py",
-    "lab/_durable_files.py",  # bit by bit
+    "lab/_study_files.py",  # bit by bit
     "lab/_event_log.py",  # lines are added to a log
     "lab/cli/_gating.py",  # a summary that a CI system gives is added to
     "lab/hess/_recorder.py",  # samples while they are taken

@@ -12,7 +12,7 @@ import pytest
 
 from masrel._files import make_folder, write_file, write_files
 from masrel.errors import ParameterError
-from masrel.lab._durable_files import new_file, no_follow
+from masrel.lab._study_files import new_file, no_follow
 
 
 def study(root: Path) -> Path:

@@ -15,7 +15,7 @@ from typing import Any
 from masrel.agreement import COEFFICIENTS, p_value
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate
-from masrel.lab._bounded_files import MAX_TABLE, parse_json, read_regular
+from masrel.lab._study_files import MAX_TABLE, parse_json, read_regular
 from masrel.lab.analysis._results import ANALYSIS_FORMAT, Analysis, PlannedEstimate
 from masrel.lab.protocol import Gate
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Literal
 import masrel
 from masrel._files import write_file
 from masrel.errors import ParameterError
-from masrel.lab._bounded_files import MAX_TABLE, read_regular
+from masrel.lab._study_files import MAX_TABLE, read_regular
 from masrel.lab.checklist._facts import StudyFacts, gather_facts, words_of
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.report._pages import converted

@@ -15,8 +15,7 @@ from masrel._files import write_file
 from masrel.cli._options import Decorator, grouped
 from masrel.cli._paths import OutputFile
 from masrel.errors import ParameterError
-from masrel.lab._bounded_files import read_regular
-from masrel.lab._durable_files import no_follow
+from masrel.lab._study_files import no_follow, read_regular
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from masrel.errors import MasrelError, ParameterError, ProtocolError, RatingsError
-from masrel.lab._once import read_once
+from masrel.lab._study_files import read_once
 from masrel.lab.cli._study_options import echo_remarks, study_argument
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol, scale_of
 from masrel.lab.ratings import study_remarks

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from masrel.cli._paths import OutputFile
-from masrel.lab._once import read_once
+from masrel.lab._study_files import read_once
 from masrel.lab.cli._study_options import of_study, warnings_as_notes
 from masrel.lab.protocol import Protocol, StudyPaths
 

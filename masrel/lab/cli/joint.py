@@ -14,7 +14,7 @@ from masrel.cli._commands import ListedCommands
 from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.cli._paths import InputFile, refuse_inputs
 from masrel.errors import ParameterError
-from masrel.lab._bounded_files import MAX_SMALL, parse_toml, read_regular
+from masrel.lab._study_files import MAX_SMALL, parse_toml, read_regular
 
 if TYPE_CHECKING:
     from masrel.lab.elbow import ElbowParameters

@@ -6,7 +6,7 @@ import click
 
 from masrel._files import write_file
 from masrel.cli._paths import OutputFile, note_inputs
-from masrel.lab._once import read_once
+from masrel.lab._study_files import read_once
 from masrel.lab.cli._study_options import echo_remarks, of_study
 from masrel.lab.protocol import Protocol, StudyPaths
 

@@ -21,8 +21,7 @@ from masrel.cli._options import (
     write_json,
 )
 from masrel.errors import ParameterError
-from masrel.lab._bounded_files import MAX_TABLE, parse_json, read_regular
-from masrel.lab._once import read_once
+from masrel.lab._study_files import MAX_TABLE, parse_json, read_once, read_regular
 from masrel.lab.cli._gating import GateOptions, Verdict, gate_options, verdict_of
 from masrel.lab.cli._study_options import ratings_option, read_study, warnings_as_notes
 from masrel.lab.report._report_folder import (

@@ -9,7 +9,7 @@ import click
 from masrel.cli._commands import STUDY, Commands
 from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.errors import SessionLogError
-from masrel.lab._once import read_once
+from masrel.lab._study_files import read_once
 from masrel.lab.cli._study_options import of_study
 
 if TYPE_CHECKING:

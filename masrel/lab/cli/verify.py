@@ -10,7 +10,7 @@ import click
 
 from masrel.cli._options import STDOUT, OutputOptions, output_options, write_json
 from masrel.errors import ParameterError
-from masrel.lab._once import read_once
+from masrel.lab._study_files import read_once
 from masrel.lab.cli._study_options import warnings_as_notes
 from masrel.lab.protocol import StudyPaths
 

@@ -16,7 +16,7 @@ from typing import Any
 
 from masrel._input import listed
 from masrel.errors import ParameterError
-from masrel.lab._bounded_files import MAX_SMALL, parse_json, read_regular
+from masrel.lab._study_files import MAX_SMALL, parse_json, read_regular
 from masrel.lab.progress import rater_progress, raters_csv, session_progress
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.ratings import Ratings, answers_csv, ratings_csv, read_study_data

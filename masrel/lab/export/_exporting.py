@@ -13,8 +13,7 @@ from urllib.parse import quote
 import masrel
 from masrel._files import write_files
 from masrel.errors import ParameterError
-from masrel.lab._bounded_files import MAX_RECORDING, read_regular
-from masrel.lab._durable_files import new_folder
+from masrel.lab._study_files import MAX_RECORDING, new_folder, read_regular
 from masrel.lab.export._bids import bids_files
 from masrel.lab.export._dataset import Dataset, gather_dataset, json_bytes
 from masrel.lab.protocol import Protocol, StudyPaths

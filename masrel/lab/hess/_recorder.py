@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from masrel._files import make_folder
 from masrel.errors import ParameterError, RecordingError
-from masrel.lab._bounded_files import MAX_RECORDING, parse_json, read_regular
-from masrel.lab._durable_files import no_follow
+from masrel.lab._study_files import MAX_RECORDING, no_follow, parse_json, read_regular
 from masrel.lab.recording import (
     MEASURED_TORQUE,
     RAMPS,

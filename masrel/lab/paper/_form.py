@@ -11,7 +11,7 @@ from itertools import takewhile
 from pathlib import Path
 
 from masrel.errors import ParameterError, RatingsError
-from masrel.lab._bounded_files import (
+from masrel.lab._study_files import (
     MAX_SMALL,
     csv_format,
     format_problem,

@@ -9,7 +9,7 @@ import msgspec
 
 from masrel._input import not_utf8
 from masrel.errors import ProtocolError
-from masrel.lab._bounded_files import (
+from masrel.lab._study_files import (
     MAX_SMALL,
     format_problem,
     parse_toml,

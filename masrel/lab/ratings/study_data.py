@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from masrel.errors import RatingsError
-from masrel.lab._bounded_files import (
+from masrel.lab._event_log import Event
+from masrel.lab._study_files import (
     MAX_RECORDING,
     MAX_SMALL,
     MAX_TABLE,
@@ -18,7 +19,6 @@ from masrel.lab._bounded_files import (
     format_problem,
     read_regular,
 )
-from masrel.lab._event_log import Event
 from masrel.lab.conduct import excluded_raters
 from masrel.lab.protocol import Protocol, StudyPaths, scale_of
 from masrel.lab.ratings.answers import GivenAnswer, answers_of

@@ -11,7 +11,7 @@ from typing import Any
 from masrel._files import from_safe_cell
 from masrel._input import listed, not_utf8
 from masrel.errors import RatingsError
-from masrel.lab._bounded_files import (
+from masrel.lab._study_files import (
     MAX_TABLE,
     csv_format,
     format_problem,

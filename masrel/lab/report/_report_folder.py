@@ -29,7 +29,7 @@ from masrel._files import (
     write_files,
 )
 from masrel.errors import ParameterError
-from masrel.lab._bounded_files import MAX_TABLE, read_regular, regular
+from masrel.lab._study_files import MAX_TABLE, read_regular, regular
 
 if sys.platform != "win32":
     import fcntl

@@ -11,7 +11,7 @@ import msgspec
 
 from masrel.errors import SessionLogError
 from masrel.lab._event_log import Event, check_kinds, read_log
-from masrel.lab._once import once
+from masrel.lab._study_files import once
 
 if TYPE_CHECKING:
     from masrel.lab.protocol._values import Answer

@@ -18,7 +18,7 @@ from numpy.random import PCG64
 
 from masrel._files import make_folder, write_files
 from masrel.errors import ScheduleError
-from masrel.lab._bounded_files import MAX_SMALL, read_regular
+from masrel.lab._study_files import MAX_SMALL, read_regular
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.protocol.study import _check_new_folder
 

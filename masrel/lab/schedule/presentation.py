@@ -10,13 +10,13 @@ from typing import Any
 import masrel
 from masrel._input import not_utf8
 from masrel.errors import ScheduleError
-from masrel.lab._bounded_files import (
+from masrel.lab._study_files import (
     MAX_SMALL,
     csv_format,
     format_problem,
+    once,
     read_regular,
 )
-from masrel.lab._once import once
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
 from masrel.lab.schedule._orders import WITH_ROWS, draw_order
 from masrel.lab.schedule._secret import Stream, StudySecret, site_of

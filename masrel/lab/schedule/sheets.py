@@ -12,7 +12,7 @@ from typing import Any
 from masrel._files import make_folder, write_files
 from masrel._input import listed
 from masrel.errors import ScheduleError
-from masrel.lab._bounded_files import MAX_SMALL, read_regular
+from masrel.lab._study_files import MAX_SMALL, read_regular
 from masrel.lab.protocol import (
     Protocol,
     StudyPaths,

@@ -17,7 +17,7 @@ import segno
 
 from masrel._files import make_folder, write_files
 from masrel.errors import MasrelError, ParameterError
-from masrel.lab._bounded_files import MAX_SMALL, parse_json, read_regular
+from masrel.lab._study_files import MAX_SMALL, parse_json, read_regular
 from masrel.lab.protocol import StudyPaths
 
 Role = Literal["rater", "coordinator"]

@@ -23,7 +23,7 @@ from starlette.responses import FileResponse, JSONResponse, Response
 
 from masrel.errors import MasrelError, ParameterError
 from masrel.lab._event_log import read_log
-from masrel.lab._once import read_once
+from masrel.lab._study_files import read_once
 from masrel.lab.conduct import (
     allot_schedules,
     read_conduct,

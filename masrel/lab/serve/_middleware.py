@@ -14,7 +14,7 @@ from starlette.requests import ClientDisconnect, Request, cookie_parser
 from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from masrel.lab._bounded_files import parse_json
+from masrel.lab._study_files import parse_json
 from masrel.lab.serve._access import ROLES, Access, AccessError, Role, Visitor
 
 if TYPE_CHECKING:

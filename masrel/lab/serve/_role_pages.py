@@ -26,7 +26,7 @@ from starlette.responses import (
 )
 
 from masrel.errors import MasrelError
-from masrel.lab._bounded_files import parse_json
+from masrel.lab._study_files import parse_json
 from masrel.lab.hess._recorder import _HEADER, _WORD
 from masrel.lab.protocol import read_protocol
 from masrel.lab.recording import PHASES, RECORDING_COLUMNS

@@ -14,7 +14,8 @@ from typing import Literal, TypeVar
 
 from masrel._files import write_file
 from masrel.errors import ParameterError, SessionLogError
-from masrel.lab._bounded_files import (
+from masrel.lab._event_log import Event, line_hashes, read_log
+from masrel.lab._study_files import (
     MAX_RECORDING,
     MAX_SMALL,
     MAX_TABLE,
@@ -23,7 +24,6 @@ from masrel.lab._bounded_files import (
     parse_json,
     read_regular,
 )
-from masrel.lab._event_log import Event, line_hashes, read_log
 from masrel.lab.protocol import StudyPaths
 from masrel.lab.recording import _FORMAT as _RECORDING_FORMAT
 from masrel.lab.schedule import Presentation

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from masrel.errors import ParameterError, ScheduleError
-from masrel.lab._bounded_files import MAX_SMALL, read_regular
 from masrel.lab._event_log import Event, read_log
+from masrel.lab._study_files import MAX_SMALL, read_regular
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
 from masrel.lab.protocol._values import checked_answer
 from masrel.lab.run._rehearsal import (

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 
 import masrel
 from masrel.errors import MasrelError, MasrelWarning, ProtocolError, SessionLogError
-from masrel.lab._bounded_files import (
+from masrel.lab._study_files import (
     MAX_RECORDING,
     MAX_TABLE,
     format_problem,
     parse_json,
+    read_once,
     read_regular,
 )
-from masrel.lab._once import read_once
 from masrel.lab.conduct import excluded_raters
 from masrel.lab.conduct._study_log import (
     allotment_problems,

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from masrel.errors import ParameterError
-from masrel.lab._bounded_files import toml_lines
+from masrel.lab._study_files import toml_lines
 from masrel.lab.elbow.parameters import ElbowParameters
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from masrel._input import not_utf8, refuse
 from masrel.errors import RecordingError, RecordingWarning
-from masrel.lab._bounded_files import MAX_RECORDING, read_regular
+from masrel.lab._study_files import MAX_RECORDING, read_regular
 from masrel.lab.recording import (
     _FIRST_COLUMNS,
     MEASURED_TORQUE,

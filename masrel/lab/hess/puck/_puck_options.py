@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Literal, Self, get_args
 
 from masrel.errors import DeviceError, ParameterError
-from masrel.lab._bounded_files import MAX_SMALL, parse_toml, read_regular
+from masrel.lab._study_files import MAX_SMALL, parse_toml, read_regular
 from masrel.lab.hess.device import BackendOptions
 from masrel.lab.hess.limits import _check_not_negative, _check_positive
 

@@ -1,20 +1,39 @@
-"""Files of a study as they are read: regular, of a bounded size and depth.
+"""Files of a study: read within limits and once, written bit by bit, added to.
 
-No pipe or device holds a command up, no file fills the memory, and no nesting or number
-ends in an error of the parser.
+What is read is regular, of a bounded size and depth: no pipe or device holds a command
+up, no file fills the memory, and no nesting or number ends in an error of the parser.
 """
 
 import errno
+import functools
 import io
 import json
 import math
 import os
 import re
+import shutil
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from datetime import date, time
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO, TypeVar
+
+from masrel._files import (
+    BINARY,
+    NO_FOLLOW,
+    PART_BEGINS,
+    PART_ENDS,
+    make_folder,
+    naming,
+    new_part,
+    on_disk,
+    refuse_record,
+    remove_left_over,
+    sync_folder,
+)
+from masrel.errors import ParameterError
 
 # The most bytes of a protocol, a model file, a schedule, a sheet, facts of a recording
 MAX_SMALL = 1_000_000
@@ -26,9 +45,8 @@ MAX_RECORDING = 128_000_000
 # of a file that grows while it is read
 _PIECE = 65_536
 
-# Each missing on some systems
+# missing on some systems
 _NO_WAIT = getattr(os, "O_NONBLOCK", 0)
-_BINARY = getattr(os, "O_BINARY", 0)
 
 # Tables and arrays inside each other; a protocol has four
 _MAX_DEPTH = 32
@@ -45,7 +63,7 @@ _MAX_BITS = 1024  # of a whole number: what is longer cannot always be shown
 def read_regular(path: Path, *, most: int) -> bytes:
     """Return the bytes of a regular file of at most so many."""
     # A pipe without a writer would keep it waiting, and a device never ends.
-    descriptor = os.open(path, os.O_RDONLY | _NO_WAIT | _BINARY)
+    descriptor = os.open(path, os.O_RDONLY | _NO_WAIT | BINARY)
     regular(descriptor, path)
     try:
         # room for what is there, not for the most that there may be
@@ -162,3 +180,90 @@ def _toml_value(value: object) -> str:
     if not is_number and not isinstance(value, str):
         raise ValueError(f"needs text, a finite number or a list, got {value!r}")
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")
+
+
+@contextmanager
+def new_file(path: Path) -> Iterator[TextIO]:
+    """Give a text to write an output into bit by bit; at the end it gets its name."""
+    refuse_record(path)
+    part, descriptor = new_part(path)
+    try:
+        with on_disk(path, descriptor) as out:
+            text = io.TextIOWrapper(out, encoding="utf-8", newline="")
+            yield text
+            text.detach()  # with all of it, and not closed before it is on disk
+        with naming(path):
+            os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+    remove_left_over(path.parent)
+    sync_folder(path.parent)
+
+
+@contextmanager
+def new_folder(folder: Path) -> Iterator[Path]:
+    """Give a folder to write into; at the end it gets its name, at a stop it goes."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise ParameterError(f"{folder}: needed a new or empty folder, got another")
+    make_folder(folder.parent)
+    part = folder.with_name(f"{PART_BEGINS}{os.urandom(8).hex()}{PART_ENDS}")
+    try:
+        part.mkdir()
+        yield part
+        os.replace(part, folder)
+    except OSError as error:
+        place = Path(str(error.filename))
+        if place.is_relative_to(part):  # nobody knows it
+            error.filename = str(folder / place.relative_to(part))
+            error.filename2 = None
+        raise
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+    sync_folder(folder.parent)
+
+
+def no_follow(path: str, flags: int, mode: int = 0o600) -> int:
+    """Open a file that is added to, an `opener` for ``open``; refuse a link or pipe."""
+    try:
+        descriptor = os.open(path, flags | NO_FOLLOW | _NO_WAIT | BINARY, mode)
+    except OSError as error:
+        if error.errno == errno.ELOOP:
+            raise OSError(
+                errno.ELOOP, "is a link, which is not followed", path
+            ) from None
+        raise
+    return regular(descriptor, Path(path))
+
+
+_About = TypeVar("_About")
+_Answer = TypeVar("_Answer")
+
+_memory: ContextVar[dict[Any, Any] | None] = ContextVar("_memory", default=None)
+
+
+@contextmanager
+def read_once() -> Iterator[None]:
+    """Within it, what a file said when it was first read is what it says."""
+    memory = _memory.get()  # one within another remembers with it
+    token = _memory.set({} if memory is None else memory)
+    try:
+        yield
+    finally:
+        _memory.reset(token)
+
+
+def once(answer: Callable[[_About], _Answer]) -> Callable[[_About], _Answer]:
+    """Remember within `read_once` what a function said of a path, or of an object."""
+
+    @functools.wraps(answer)
+    def remembered(about: _About) -> _Answer:
+        memory = _memory.get()
+        if memory is None:
+            return answer(about)
+        key = answer, str(about) if isinstance(about, Path) else id(about)
+        if key not in memory:
+            memory[key] = about, answer(about)  # nothing else gets its id meanwhile
+        result: _Answer = memory[key][1]
+        return result
+
+    return remembered
