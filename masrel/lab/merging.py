@@ -14,6 +14,7 @@ from typing import Any
 import msgspec
 
 from masrel._files import make_folder, write_files
+from masrel._input import refuse
 from masrel.errors import ParameterError, ProtocolError, ScheduleError
 from masrel.lab._event_log import line_hashes
 from masrel.lab._study_files import (
@@ -38,8 +39,6 @@ from masrel.lab.schedule._secret import find_secret
 from masrel.lab.verification import verify_study
 
 __all__ = ["merge_studies"]
-
-_ABSENT = object()
 
 
 def merge_studies(studies: Sequence[StudyPaths], destination: Path) -> StudyPaths:
@@ -100,21 +99,30 @@ def merge_studies(studies: Sequence[StudyPaths], destination: Path) -> StudyPath
 
 
 def _check_destination(studies: Sequence[StudyPaths], destination: Path) -> None:
-    if len(studies) < 2:
-        raise ParameterError(f"studies: needed two or more, got {len(studies)}")
-    if len({study.root.resolve() for study in studies}) < len(studies):
-        raise ParameterError("studies: needed different folders, got one twice")
-    if destination.exists() and (
-        not destination.is_dir() or any(destination.iterdir())
-    ):
-        raise ParameterError(f"{destination}: needed a new or empty folder")
-    if not destination.resolve().parent.is_dir():
-        raise ParameterError(f"{destination}: needed a folder to make it in, got none")
-    for study in studies:
-        if destination.resolve().is_relative_to(study.root.resolve()):
-            raise ParameterError(
-                f"{destination}: needed a folder outside {study.root}, which is merged"
+    place = destination.resolve()
+    refuse(
+        (len(studies) < 2, f"studies: needed two or more, got {len(studies)}"),
+        (
+            len({study.root.resolve() for study in studies}) < len(studies),
+            "studies: needed different folders, got one twice",
+        ),
+        (
+            destination.exists()
+            and not (destination.is_dir() and not any(destination.iterdir())),
+            f"{destination}: needed a new or empty folder",
+        ),
+        (
+            not place.parent.is_dir(),
+            f"{destination}: needed a folder to make it in, got none",
+        ),
+        *(
+            (
+                place.is_relative_to(study.root.resolve()),
+                f"{destination}: needed a folder outside {study.root}, which is merged",
             )
+            for study in studies
+        ),
+    )
 
 
 def _check_protocols(
@@ -128,15 +136,11 @@ def _check_protocols(
             for each in (protocols[0], protocol)
         )
         for key in sorted({**first, **other}):
-            values = first.get(key, _ABSENT), other.get(key, _ABSENT)
+            values = first.get(key, "none"), other.get(key, "none")
             if values[0] != values[1]:
-                shown = [
-                    "none" if v is _ABSENT else json.dumps(v, ensure_ascii=False)
-                    for v in values
-                ]
                 raise ProtocolError(
-                    f"{key}: needed the same in all protocols, got {shown[0]} in "
-                    f"{studies[0].protocol} and {shown[1]} in {study.protocol}"
+                    f"{key}: needed the same in all protocols, got {values[0]} in "
+                    f"{studies[0].protocol} and {values[1]} in {study.protocol}"
                 )
         if presented_hash(protocol) != presented_hash(protocols[0]):
             raise ProtocolError(
@@ -158,12 +162,13 @@ def _comparable(protocol: Protocol, raters: set[str]) -> dict[str, Any]:
     return content
 
 
-def _leaves(content: object, place: str = "") -> Iterator[tuple[str, object]]:
+def _leaves(content: object, place: str = "") -> Iterator[tuple[str, str]]:
+    # the places of a document, and the JSON of what stands there
     if isinstance(content, Mapping) and content:
         for key, value in content.items():
             yield from _leaves(value, f"{place}.{key}".lstrip("."))
     else:
-        yield place, content
+        yield place, json.dumps(content, ensure_ascii=False)
 
 
 def _check_secrets(studies: Sequence[StudyPaths]) -> None:
@@ -190,17 +195,16 @@ def _owners(
     # the study that has sessions of a rater, who has them in no other
     first: dict[str, tuple[StudyPaths, Path]] = {}
     for study, protocol in zip(studies, protocols, strict=True):
-        for session in protocol.sessions:
-            for rater in session.raters:
-                log = study.log_file(rater, session.id)
-                if not log.exists():
-                    continue
-                owner, other = first.setdefault(rater, (study, log))
-                if owner != study:
-                    raise ParameterError(
-                        f"rater {rater}: needed sessions in one of the studies, got "
-                        f"{other} and {log}"
-                    )
+        for rater, session in protocol.rater_sessions:
+            log = study.log_file(rater, session)
+            if not log.exists():
+                continue
+            owner, other = first.setdefault(rater, (study, log))
+            if owner != study:
+                raise ParameterError(
+                    f"rater {rater}: needed sessions in one of the studies, got "
+                    f"{other} and {log}"
+                )
     return {rater: owner for rater, (owner, _) in first.items()}
 
 
@@ -235,13 +239,12 @@ def _files(
         # a schedule that another site drew too is that of the site that followed it
         others = {
             file
-            for session in protocol.sessions
-            for rater in session.raters
+            for rater, session in protocol.rater_sessions
             if owners.get(rater, study) != study
             for file in (
-                study.schedule_file(rater, session.id),
-                study.sheet_file(rater, session.id),
-                study.typed_file(rater, session.id),
+                study.schedule_file(rater, session),
+                study.sheet_file(rater, session),
+                study.typed_file(rater, session),
             )
         }
         sources = (
@@ -341,19 +344,13 @@ def _merged_protocol(studies: Sequence[StudyPaths]) -> bytes:
     # the file of a protocol with the raters of all sites
     contents = [read_regular(study.protocol, most=MAX_SMALL) for study in studies]
     first, *others = (parse_toml(content) for content in contents)
-    is_new = False
     for other in others:
         ids = [rater["id"] for rater in first["raters"]]
-        raters = [rater for rater in other["raters"] if rater["id"] not in ids]
-        first["raters"] += raters
-        is_new |= bool(raters)
+        first["raters"] += [r for r in other["raters"] if r["id"] not in ids]
         for session, more in zip(first["sessions"], other["sessions"], strict=True):
-            in_session = [
-                rater for rater in more["raters"] if rater not in session["raters"]
-            ]
-            session["raters"] += in_session
-            is_new |= bool(in_session)
-    if not is_new:
+            there = session["raters"]
+            session["raters"] = [*there, *(r for r in more["raters"] if r not in there)]
+    if first == parse_toml(contents[0]):
         return contents[0]
     names = ", ".join(study.root.resolve().name for study in studies)
     head = f"# Merged from the protocols of {names}; their comments are in them."

@@ -4,30 +4,27 @@ In: a protocol, its ratings and grades given in person. Out: an `Analysis`, writ
 as JSON in full precision; or a regression of the grades, or estimates as a frame.
 """
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from masrel.lab.analysis._comparison import GateResult, check_gates
-    from masrel.lab.analysis._grading import Effect, GradeRegression, grade_regression
-    from masrel.lab.analysis._plan import analyze
-    from masrel.lab.analysis._results import (
-        Analysis,
-        AnswerCount,
-        InPersonAgreement,
-        InPersonPair,
-        IntendedAgreement,
-        ModelAgreement,
-        PlannedEstimate,
-        Presentations,
-        QuestionSummary,
-        RaterEstimate,
-        Speed,
-        Speeds,
-        SpeedSummary,
-        as_analysis_document,
-        to_frame,
-        write_analysis,
-    )
+from masrel.lab.analysis._comparison import GateResult, check_gates
+from masrel.lab.analysis._grading import Effect, GradeRegression, grade_regression
+from masrel.lab.analysis._plan import analyze
+from masrel.lab.analysis._results import (
+    Analysis,
+    AnswerCount,
+    InPersonAgreement,
+    InPersonPair,
+    IntendedAgreement,
+    ModelAgreement,
+    PlannedEstimate,
+    Presentations,
+    QuestionSummary,
+    RaterEstimate,
+    Speed,
+    Speeds,
+    SpeedSummary,
+    as_analysis_document,
+    to_frame,
+    write_analysis,
+)
 
 __all__ = [
     "Analysis",
@@ -53,24 +50,3 @@ __all__ = [
     "to_frame",
     "write_analysis",
 ]
-
-_HOMES = {
-    "Effect": "_grading",
-    "GateResult": "_comparison",
-    "GradeRegression": "_grading",
-    "analyze": "_plan",
-    "check_gates": "_comparison",
-    "grade_regression": "_grading",
-}
-"""Name to its module; all others are of `_results`."""
-
-
-def __getattr__(name: str) -> object:
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    import importlib
-
-    home = importlib.import_module(
-        f"masrel.lab.analysis.{_HOMES.get(name, '_results')}"
-    )
-    return getattr(home, name)

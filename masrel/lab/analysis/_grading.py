@@ -9,17 +9,17 @@ import sys
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
-from scipy.optimize import linprog
-from scipy.special import stdtrit
 
 from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
 from masrel.lab.protocol import Protocol, elbow_parameters
 from masrel.lab.ratings import Ratings
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 PREDICTORS: dict[str, tuple[str, str]] = {
     "L": ("catch_angle_constant_deg", "deg"),
@@ -172,11 +172,15 @@ def grade_regression(
        estimates in logistic regression models. Biometrika, 71(1), 1-10.
        https://doi.org/10.1093/biomet/71.1.1
     """
+    # Imported here, as below: no other analysis needs them.
+    from pandas import factorize
+    from scipy.special import stdtrit
+
     _check_options(protocol, predictors, session, level)
     ratings = ratings.without(excluded)
     table, n_missing = _predictor_table(protocol, ratings, predictors, models, session)
     grades = tuple(g for g in ratings.scale.grades if (table["grade"] == g).any())
-    raters, names = pd.factorize(table["rater"])
+    raters, names = factorize(table["rater"])
     if len(grades) < 2 or len(names) < 2:
         raise RatingsError(
             "a regression of grades needs two grades and two raters or more, got "
@@ -237,7 +241,7 @@ def _predictor_table(
     predictors: Sequence[str],
     models: str,
     session: str | None,
-) -> tuple[pd.DataFrame, int]:
+) -> "tuple[DataFrame, int]":
     # every grade with its predictors beside it, and how many ratings lack some
     selected = {m.id: m for m in protocol.models if models in ("all", m.role)}
     table = ratings.table[ratings.table["model"].isin(selected)].copy()
@@ -262,7 +266,7 @@ def _predictor_table(
 
 
 def _independent(
-    table: pd.DataFrame, predictors: Sequence[str]
+    table: "DataFrame", predictors: Sequence[str]
 ) -> tuple[list[str], list[tuple[str, str]]]:
     # the predictors that are no combination of earlier ones, and why others are out
     names: list[str] = []
@@ -312,6 +316,8 @@ def _is_separated(values: _Floats, codes: NDArray[np.int64]) -> bool:
     # [1] Albert, A., Anderson, J. A. (1984). On the existence of maximum likelihood
     # estimates in logistic regression models. Biometrika, 71(1), 1-10.
     # https://doi.org/10.1093/biomet/71.1.1
+    from scipy.optimize import linprog
+
     # A direction (β, τ) in which no rating's interval τ_(g-1) < x·β < τ_g shrinks at
     # either end, and some end moves away: then the likelihood grows for ever.
     n, p = values.shape

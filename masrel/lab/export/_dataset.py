@@ -10,13 +10,17 @@ import tomllib
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from masrel._input import listed
 from masrel.errors import ParameterError
-from masrel.lab._study_files import MAX_SMALL, parse_json, read_regular
+from masrel.lab._study_files import (
+    MAX_SMALL,
+    parse_json,
+    read_regular,
+    toml_lines,
+)
 from masrel.lab.progress import rater_progress, raters_csv, session_progress
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.ratings import Ratings, answers_csv, ratings_csv, read_study_data
@@ -193,14 +197,7 @@ def _protocol_text(
         left_out.append(f"notes on {n_notes} raters in the protocol (notes)")
     if not n_notes and not n_values:
         return text, left_out
-    try:
-        tomli_w = import_module("tomli_w")
-    except ModuleNotFoundError as error:
-        raise ParameterError(
-            "export: leaving what is private out of a protocol needs tomli-w; install "
-            "it with: pip install 'masrel[export]', or keep it by --include"
-        ) from error
-    return tomli_w.dumps(document).encode(), left_out
+    return "\n".join((*toml_lines(document), "")).encode(), left_out
 
 
 _OF_RATINGS = {
@@ -296,17 +293,13 @@ _OF_ANSWERS = {
 
 def _recordings(paths: StudyPaths, protocol: Protocol) -> Iterator[RecordingFile]:
     # those that a log names, in its order
-    for session in protocol.sessions:
-        for rater in session.raters:
-            log = paths.log_file(rater, session.id)
-            if not log.is_file():
-                continue
-            for event in read_log(log):
-                if event.kind != "presented":
-                    continue
+    for rater, session in protocol.rater_sessions:
+        log = paths.log_file(rater, session)
+        for event in read_log(log) if log.is_file() else ():
+            if event.kind == "presented":
                 path = paths.sessions / str(event.fields["recording"])
                 if path.is_file():
-                    yield RecordingFile(rater=rater, session=session.id, path=path)
+                    yield RecordingFile(rater=rater, session=session, path=path)
 
 
 def _description(protocol: Protocol, ratings: Ratings) -> str:

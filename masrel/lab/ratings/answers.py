@@ -12,7 +12,12 @@ from masrel.errors import ParameterError
 from masrel.lab.conduct._study_log import study_answers
 from masrel.lab.protocol import Protocol, Question, StudyPaths
 from masrel.lab.protocol._values import Answer, checked_answer, questions_of
-from masrel.lab.ratings.study_file import _Problem, _read_rows, _refusal
+from masrel.lab.ratings.study_file import (
+    _check_columns,
+    _Problem,
+    _read_rows,
+    _refuse,
+)
 from masrel.lab.run._state import FROM_PERSONS, SessionState, read_session
 from masrel.lab.schedule import read_schedule
 
@@ -86,10 +91,9 @@ def answers_from_logs(study: StudyPaths, protocol: Protocol) -> tuple[GivenAnswe
     if not protocol.questionnaires:
         return ()
     begun = {
-        (session.id, rater): state
-        for session in protocol.sessions
-        for rater in session.raters
-        if (state := _state_of(study, rater, session.id)).header
+        (session, rater): state
+        for rater, session in protocol.rater_sessions
+        if (state := _state_of(study, rater, session)).header
     }
     of_sessions = [
         answer
@@ -264,9 +268,7 @@ def read_answers(path: Path, protocol: Protocol) -> tuple[GivenAnswer, ...]:
         answer that it cannot have. The message lists up to 20 problems.
     """
     rows = _read_rows(path)
-    if not set(_COLUMNS) <= set(rows.header):
-        message = f"needed the columns {listed(_COLUMNS)}, got {listed(rows.header)}"
-        raise _refusal(path, [(rows.header_line, None, message)])
+    _check_columns(rows, _COLUMNS)
     questions = {
         (questionnaire.id, question.id): question
         for questionnaire in protocol.questionnaires
@@ -279,8 +281,7 @@ def read_answers(path: Path, protocol: Protocol) -> tuple[GivenAnswer, ...]:
             answers.append(_of_row(cells, questions))
         except ParameterError as error:
             problems.append((line, None, str(error)))
-    if problems:
-        raise _refusal(path, problems)
+    _refuse(path, problems)
     return tuple(answers)
 
 

@@ -68,10 +68,9 @@ def corrections_of(study: StudyPaths, protocol: Protocol) -> tuple[Correction, .
     """
     return tuple(
         correction
-        for session in protocol.sessions
-        for rater in session.raters
-        if study.log_file(rater, session.id).exists()
-        for correction in _corrections(study, rater, session.id)
+        for rater, session in protocol.rater_sessions
+        if study.log_file(rater, session).exists()
+        for correction in _corrections(study, rater, session)
     )
 
 
@@ -215,11 +214,7 @@ def _n_graded(study: StudyPaths, rater: str) -> int:
 def _of_sessions(
     study: StudyPaths, protocol: Protocol, include: Collection[str]
 ) -> Iterator[str]:
-    expected = {
-        study.log_file(rater, session.id)
-        for session in protocol.sessions
-        for rater in session.raters
-    }
+    expected = {study.log_file(*each) for each in protocol.rater_sessions}
     there = sorted(study.sessions.glob("*.jsonl"))
     of_study = study_answers(study)
     for log in there:

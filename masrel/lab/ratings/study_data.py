@@ -240,11 +240,10 @@ def _of_logs(
 ) -> Ratings:
     rows = [
         row
-        for session in protocol.sessions
-        for rater in session.raters
-        if study.log_file(rater, session.id).exists()
+        for rater, session in protocol.rater_sessions
+        if study.log_file(rater, session).exists()
         for row in _rows(
-            study, protocol, rater, session.id, check_recordings=check_recordings
+            study, protocol, rater, session, check_recordings=check_recordings
         )
     ]
     if not rows:

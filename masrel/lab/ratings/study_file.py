@@ -95,19 +95,21 @@ def read_study_ratings(path: Path | str, scale: Scale) -> Ratings:
     """
     rows = _read_rows(Path(path))
     names = {name: name for name in RATING_COLUMNS if name in rows.header}
+    problems: list[_Problem] = []
     for role in _NAMES:
         columns = [name for name in rows.header if name.casefold() in _NAMES[role]]
         if len(columns) > 1:
             message = f"needed one column for the {role}, got {' and '.join(columns)}"
-            raise _error(rows, message)
-        if columns:
+            problems.append((rows.header_line, None, message))
+        elif columns:
             names[role] = columns[0]
         elif role != "session":
-            raise _error(
-                rows,
+            message = (
                 f"needed a column for the {role} named {' or '.join(_NAMES[role])}, "
-                f"got {listed(rows.header)}; masrel agree reads other tables",
+                f"got {listed(rows.header)}; masrel agree reads other tables"
             )
+            problems.append((rows.header_line, None, message))
+    _refuse(rows.path, problems[:1])
     values = [
         (line, _DEFAULTS | _values({name: cells[names[name]] for name in names}))
         for line, cells in rows.rows
@@ -116,28 +118,13 @@ def read_study_ratings(path: Path | str, scale: Scale) -> Ratings:
         (line, names.get(column, column), message)
         for line, column, message in _problems(values, scale, "line")
     ]
-    if problems:
-        raise _refusal(rows.path, problems)
+    _refuse(rows.path, problems)
     return _assemble((row for _, row in values), scale, rows.path)
 
 
 def _values(texts: Mapping[str, str]) -> dict[str, Any]:
     # what the cells of one row mean; a cell that cannot be read stays text
-    values: dict[str, Any] = {}
-    for name, text in texts.items():
-        never_missing = name in ("session", "repeat")
-        if name in _FLOATS:
-            values[name] = math.nan if text in _MISSING else _speed(text)
-        elif not text or (text in _MISSING and not never_missing):
-            values[name] = None
-        elif name in _WHOLE:
-            # more digits than any count has
-            is_whole = text.isascii() and text.isdigit() and len(text) < 19
-            values[name] = int(text) if is_whole else text
-        elif name == "grip_lost" and text in _YES_NO:
-            values[name] = text == _YES_NO[True]
-        else:
-            values[name] = text
+    values: dict[str, Any] = {n: _value(n, text) for n, text in texts.items()}
     speeds, n_stretches = texts.get("speeds_deg_s", "NA"), values.get("n_stretches")
     if speeds in _MISSING and n_stretches != 1:
         values["speeds_deg_s"] = () if n_stretches == 0 else None
@@ -147,6 +134,19 @@ def _values(texts: Mapping[str, str]) -> dict[str, Any]:
             None if cell in _MISSING else _speed(cell) for cell in cells
         )
     return values
+
+
+def _value(name: str, text: str) -> str | float | None:
+    if name in _FLOATS:
+        return math.nan if text in _MISSING else _speed(text)
+    if not text or (text in _MISSING and name not in ("session", "repeat")):
+        return None
+    # more digits than any count has
+    if name in _WHOLE and text.isascii() and text.isdigit() and len(text) < 19:
+        return int(text)
+    if name == "grip_lost" and text in _YES_NO:
+        return text == _YES_NO[True]
+    return text
 
 
 def _speed(text: str) -> float | str:
@@ -234,17 +234,17 @@ def read_in_person(path: Path | str) -> InPerson:
         or is there twice. The message lists up to 20 problems.
     """
     rows = _read_rows(Path(path))
-    if not set(_IN_PERSON_COLUMNS) <= set(rows.header):
-        needed = ", ".join(_IN_PERSON_COLUMNS)
-        raise _error(rows, f"needed the columns {needed}, got {', '.join(rows.header)}")
+    _check_columns(rows, _IN_PERSON_COLUMNS)
     problems: list[_Problem] = []
     seen: dict[tuple[str, str, str], int] = {}
     graded = []
     for line, cell in rows.rows:
-        for name in ("source_table", "rater", "subject", "model"):
-            if cell[name] in _MISSING:
-                problems.append((line, name, "needed text, got none"))
         table, rater, subject = cell["source_table"], cell["rater"], cell["subject"]
+        problems += [
+            (line, name, "needed text, got none")
+            for name in ("source_table", "rater", "subject", "model")
+            if cell[name] in _MISSING
+        ]
         first = seen.setdefault((table, rater, subject), line)
         if first != line:
             message = (
@@ -256,9 +256,14 @@ def read_in_person(path: Path | str) -> InPerson:
         for name in ("in_person_grade", "haptic_grade"):
             values[name] = None if cell[name] in _MISSING else cell[name]
         graded.append(InPersonRow(line=line, **values))
-    if problems:
-        raise _refusal(rows.path, problems)
+    _refuse(rows.path, problems)
     return InPerson(rows=tuple(graded), source_path=rows.path)
+
+
+def _check_columns(rows: _CsvRows, needed: Sequence[str]) -> None:
+    message = f"needed the columns {listed(needed)}, got {listed(rows.header)}"
+    is_lacking = not {*needed} <= {*rows.header}
+    _refuse(rows.path, [(rows.header_line, None, message)] * is_lacking)
 
 
 def _read_rows(path: Path) -> _CsvRows:
@@ -284,23 +289,20 @@ def _read_rows(path: Path) -> _CsvRows:
     records = _records(path, text)
     if not records:
         raise RatingsError(f"{path}: needed a header and rows, the file has none")
-    header_line, header = records[0]
+    (header_line, header), *others = records
     _check_header(path, header_line, header)
-    problems: list[_Problem] = []
-    for line, cells in records[1:]:
-        if len(cells) != len(header):
-            problems.append(
-                (line, None, f"needed {len(header)} cells, got {len(cells)}: {cells}")
-            )
-    if problems:
-        raise _refusal(path, problems)
+    n = len(header)
+    problems: list[_Problem] = [
+        (line, None, f"needed {n} cells, got {len(cells)}: {cells}")
+        for line, cells in others
+        if len(cells) != n
+    ]
+    _refuse(path, problems)
     return _CsvRows(
         path=path,
         header=header,
         header_line=header_line,
-        rows=[
-            (line, dict(zip(header, cells, strict=True))) for line, cells in records[1:]
-        ],
+        rows=[(line, dict(zip(header, cells, strict=True))) for line, cells in others],
     )
 
 
@@ -331,31 +333,21 @@ def _records(path: Path, text: str) -> list[tuple[int, tuple[str, ...]]]:
 
 
 def _check_header(path: Path, line: int, header: tuple[str, ...]) -> None:
-    if len(header) == 1:
-        raise RatingsError(
-            f"{path}: line {line}: needed columns separated by commas, got one, "
-            f"{header[0]!r}"
-        )
     problems: list[_Problem] = []
-    seen: set[str] = set()
-    for position, name in enumerate(header, start=1):
+    if len(header) == 1:
+        message = f"needed columns separated by commas, got one, {header[0]!r}"
+        problems.append((line, None, message))
+    for place, name in enumerate(header):
         if not name:
-            problems.append((line, None, f"column {position} needs a name, got none"))
-        elif name in seen:
-            problems.append(
-                (line, name, "needed different names, this one is there twice")
-            )
-        seen.add(name)
-    if problems:
-        raise _refusal(path, problems)
+            problems.append((line, None, f"column {place + 1} needs a name, got none"))
+        elif name in header[:place]:
+            message = "needed different names, this one is there twice"
+            problems.append((line, name, message))
+    _refuse(path, problems)
 
 
-def _error(rows: _CsvRows, message: str) -> RatingsError:
-    return RatingsError(f"{rows.path}: line {rows.header_line}: {message}")
-
-
-def _refusal(path: Path, problems: Sequence[_Problem]) -> RatingsError:
-    # the error with the problems of a file by line, the first 20 of them
+def _refuse(path: Path, problems: Sequence[_Problem]) -> None:
+    # what is wrong with a file by line, if anything is, the first 20 of it
     texts = []
     for line, column, message in sorted(problems, key=lambda problem: problem[0]):
         where = f"line {line}" + ("" if column is None else f", column {column!r}")
@@ -363,4 +355,5 @@ def _refusal(path: Path, problems: Sequence[_Problem]) -> RatingsError:
     more = len(texts) - _MAX_PROBLEMS
     if more > 0:
         texts = [*texts[:_MAX_PROBLEMS], f"{path}: and {more} more"]
-    return RatingsError("\n".join(texts))
+    if texts:
+        raise RatingsError("\n".join(texts))

@@ -54,7 +54,7 @@ from masrel.lab.report._paragraphs import methods_section, result_text
 from masrel.lab.report._report_folder import (
     MANIFEST,
     NUMBERS,
-    Assets,
+    asset_name,
     replace_report,
     report_files,
 )
@@ -273,7 +273,7 @@ def make_report(
     protocol, analysis = material.protocol, material.analysis
     names = [n for n in section_names(protocol) if not only or n in only]
     sections = [made_section(name, material) for name in names]
-    assets, inputs = Assets(), dict(analysis.inputs)
+    assets, inputs = dict[str, bytes](), dict(analysis.inputs)
     document = Document(
         title=protocol.report.title or protocol.study.title,
         tag=tag_of(material.data),
@@ -334,7 +334,7 @@ def _chapters(
 
 
 def _block(
-    assets: Assets,
+    assets: dict[str, bytes],
     progress: Progress | None,
     raw_csv: bool,
     number: int,
@@ -342,15 +342,17 @@ def _block(
 ) -> Block:
     # as it is shown; files of tables and figures go to the assets
     if isinstance(content, Table):
-        assets.add("tables", content.name, "csv", as_csv(content, raw=raw_csv).encode())
+        data = as_csv(content, raw=raw_csv).encode()
+        assets[asset_name("tables", content.name, "csv", data)] = data
     if not isinstance(content, Drawing):
         return Block(number=number, content=content)
     drawn = draw(content.content, stamp=content.stamp)
-    pictures = {str(form): picture for form, picture in drawn.items()}
     if progress is not None:
         progress(content.name)
+    pictures = {str(form): picture for form, picture in drawn.items()}
     files = {
-        form: assets.add("figures", content.name, form, picture)
+        form: asset_name("figures", content.name, form, picture)
         for form, picture in pictures.items()
     }
+    assets.update({files[form]: picture for form, picture in pictures.items()})
     return Block(number=number, content=content, pictures=pictures, files=files)

@@ -17,7 +17,7 @@ import re
 import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -42,21 +42,13 @@ _ASSET_FOLDERS = ("tables", "figures")
 _ASSET = re.compile(r"(?:tables|figures)/[\w.-]+-([0-9a-f]{16})\.(?:csv|png|svg)")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Assets:
-    """The tables and figures of a report, each under the name that a link has."""
-
-    contents: dict[str, bytes] = field(default_factory=dict)
-
-    def add(self, folder: str, name: str, form: str, data: bytes) -> str:
-        """Take one in and return its name, from the report's folder."""
-        place = f"{folder}/{name}-{_hash(data)[:_N_HEX]}.{form}"
-        self.contents[place] = data
-        return place
+def asset_name(folder: str, name: str, form: str, data: bytes) -> str:
+    """Return the name of a table or a figure, from the report's folder."""
+    return f"{folder}/{name}-{_hash(data)[:_N_HEX]}.{form}"
 
 
 def report_files(
-    assets: Assets,
+    assets: Mapping[str, bytes],
     pages: Mapping[str, bytes],
     inputs: Mapping[str, str],
     *,
@@ -67,7 +59,7 @@ def report_files(
     # Imported here: whether a report is current is known without it.
     from masrel.lab.verification.record import _REPORT_FORMAT
 
-    written = {**assets.contents, **pages}
+    written = {**assets, **pages}
     document = {
         "format": _REPORT_FORMAT,
         "inputs": dict(inputs),
@@ -126,35 +118,30 @@ def _hash(data: bytes) -> str:
 
 
 def _is_there(path: Path, data: bytes) -> bool:
-    if path.is_symlink():
-        return False
-    try:
-        return read_regular(path, most=len(data)) == data
-    except OSError:
-        return False
+    return not path.is_symlink() and file_hash(str(path)) == _hash(data)
 
 
 def stale_pages(folder: Path, named: Collection[str]) -> Iterator[Path]:
     """Yield pages of the last report in a folder that this one does not have."""
     # Only if nobody has written in them since: the manifest has their hashes.
-    path = folder / MANIFEST
+    hashes = _hashes_in(folder)
     for name in ("report.html", "report.md", "report.tex", "report.docx"):
         page = folder / name
-        if name in named or page.is_symlink() or not page.is_file():
+        if name in named or name not in hashes or page.is_symlink():
             continue
-        if _hash_in(path, name) == file_hash(str(page)):
+        if hashes[name] == file_hash(str(page)):
             yield page
 
 
-def _hash_in(manifest: Path, name: str) -> str | None:
-    # what a manifest says of a file; None if it says nothing
+def _hashes_in(folder: Path) -> dict[str, str]:
+    # what its manifest says of the files of a report; nothing if there is none
     try:
-        document = json.loads(read_regular(manifest, most=MAX_TABLE))
+        document = json.loads(read_regular(folder / MANIFEST, most=MAX_TABLE))
     except (OSError, ValueError):
-        return None
+        return {}
     files = document.get("files") if isinstance(document, dict) else None
-    digest = files.get(name) if isinstance(files, dict) else None
-    return digest if isinstance(digest, str) else None
+    pairs = files.items() if isinstance(files, dict) else ()
+    return {name: digest for name, digest in pairs if isinstance(digest, str)}
 
 
 def stale_assets(folder: Path, named: Collection[str]) -> Iterator[Path]:
@@ -176,18 +163,13 @@ def stale_assets(folder: Path, named: Collection[str]) -> Iterator[Path]:
 
 def file_hash(path: str) -> str | None:
     """Return the SHA-256 of a file; None where there is none that can be read."""
-    digest = hashlib.sha256()
     try:
         # a pipe without a writer keeps nobody waiting
         descriptor = regular(os.open(path, _FLAGS), Path(path))
-        try:
-            while data := os.read(descriptor, 1 << 20):
-                digest.update(data)
-        finally:
-            os.close(descriptor)
+        with open(descriptor, "rb", buffering=0) as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError:
         return None
-    return digest.hexdigest()
 
 
 _FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
@@ -228,9 +210,8 @@ class Build:
 
     def last(self, made_from: str) -> dict[str, Any] | None:
         """Return what the last build has shown if a new one would change nothing."""
-        note = self._note()
         with contextlib.suppress(OSError, ValueError):
-            seal, _, text = read_regular(note, most=MAX_TABLE).partition(b"\n")
+            seal, _, text = read_regular(self._note(), most=MAX_TABLE).partition(b"\n")
             if seal == self._seal(made_from, text):
                 shown: dict[str, Any] = json.loads(text)
                 return shown if _is_whole(self.folder, shown["manifest"]) else None
@@ -297,11 +278,10 @@ def _libraries() -> list[str]:
 
 def _is_whole(folder: Path, manifest: str) -> bool:
     # Whether a report is there as it was written, and nothing that a build would remove
-    path = folder / MANIFEST
-    if file_hash(str(path)) != manifest:
+    if file_hash(str(folder / MANIFEST)) != manifest:
         return False
-    files = json.loads(read_regular(path, most=MAX_TABLE))["files"]
+    hashes = _hashes_in(folder)
     return not any(
         os.path.islink(folder / name) or file_hash(str(folder / name)) != digest
-        for name, digest in files.items()
-    ) and not any(stale_assets(folder, files))
+        for name, digest in hashes.items()
+    ) and not any(stale_assets(folder, hashes))

@@ -144,9 +144,8 @@ def verify_sessions(study: StudyPaths, protocol: Protocol) -> Verification:
         If a file that is there cannot be read.
     """
     checked = [
-        check_session(study, protocol, session.id, rater)
-        for session in protocol.sessions
-        for rater in session.raters
+        check_session(study, protocol, session, rater)
+        for rater, session in protocol.rater_sessions
     ]
     training_logs = [study.training_log_file(rater.id) for rater in protocol.raters]
     trained = [
