@@ -5,7 +5,7 @@ What was given first stays in the log; a correction is one event more, with who 
 
 import warnings
 from collections.abc import Callable, Container, Iterable, Sequence
-from datetime import date, datetime
+from datetime import datetime
 from pathlib import Path
 
 from masrel.errors import MasrelWarning, ParameterError, SessionLogError
@@ -78,11 +78,8 @@ _NOT_THE_RATERS = ("recovered", "correction", "answer-correction", "stopped")
 
 def days_since(time_utc: str, now: Callable[[], datetime]) -> int:
     """Return the calendar days, where the computer is, since a time of a log."""
-    return (now().astimezone().date() - _day(time_utc)).days
-
-
-def _day(time_utc: str) -> date:
-    return datetime.fromisoformat(time_utc).astimezone().date()
+    day = datetime.fromisoformat(time_utc).astimezone().date()
+    return (now().astimezone().date() - day).days
 
 
 def last_time(events: Sequence[Event]) -> str:
@@ -90,13 +87,8 @@ def last_time(events: Sequence[Event]) -> str:
     return [e.time_utc for e in events if e.kind not in _NOT_THE_RATERS][-1]
 
 
-def is_complete(study: StudyPaths, rater: str, session: str) -> bool:
-    """Return whether a session came to its end."""
-    return _completed(study, rater, session) is not None
-
-
-def _completed(study: StudyPaths, rater: str, session: str) -> str | None:
-    # when a session came to its end
+def completed_at(study: StudyPaths, rater: str, session: str) -> str | None:
+    """Return when a session came to its end, or None."""
     log = study.log_file(rater, session)
     events = read_log(log) if log.exists() else ()
     completed = next((e.time_utc for e in events if e.kind == "complete"), None)
@@ -120,7 +112,7 @@ def interval_fields(
     before = next((each for each in protocol.sessions if each.id == rules.after), None)
     if before is None or rater not in before.raters:
         return None
-    completed = _completed(study, rater, before.id)
+    completed = completed_at(study, rater, before.id)
     days = None if completed is None else days_since(completed, now)
     problem = _problem(rules, days)
     if problem is not None:

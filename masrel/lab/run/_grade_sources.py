@@ -72,8 +72,7 @@ class GradeRequest:
         came to the catch that the model has at that speed. None before, and after a
         fault.
     grip_lost : bool or None
-        Whether the arm came loose and the model let it go. None before, and after a
-        fault.
+        Whether the arm came loose and the model let it go. None before.
     ended : str or None
         What ended the presentation, as in its recording: ``"time-limit"``, say. None
         before.

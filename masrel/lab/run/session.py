@@ -25,10 +25,10 @@ from masrel.lab.protocol._values import questions_of
 from masrel.lab.recording import _Fact, _Facts
 from masrel.lab.run._around import (
     ask_questions,
+    completed_at,
     correct_in_session,
     days_since,
     interval_fields,
-    is_complete,
     last_time,
 )
 from masrel.lab.run._grade_sources import GradeRequest, GradeSource, Skip
@@ -243,12 +243,10 @@ class _Runner(Presenter):
             protocol, grades, clock, log, occasion=occasion, named_by=named_by
         )
         self._study, self._schedule, self._now = study, schedule, now
+        self._scheduled = schedule.presentations
+        self._is_rehearsal = isinstance(study, RehearsalPaths)
         self._state: SessionState = replay(log.path, log.events)
         self._practice = practice_presentations(protocol)
-
-    @property
-    def _is_rehearsal(self) -> bool:
-        return isinstance(self._study, RehearsalPaths)
 
     def begin(self, schedule_sha256: str) -> None:
         """Log which session this is; check that it is the same when it is resumed."""
@@ -267,7 +265,10 @@ class _Runner(Presenter):
         }
         header = self._state.header
         if not header:
-            interval = self._interval()  # before there is anything of the session
+            interval = None
+            if not self._is_rehearsal:  # before there is anything of the session
+                where = (self._study, protocol, schedule.rater, schedule.session)
+                interval = interval_fields(*where, self._now)
             self._log.append("session", {**same, **self.provenance()})
             if interval is not None:
                 self._log.append("interval", interval)
@@ -279,12 +280,6 @@ class _Runner(Presenter):
             fields = self.provenance() | {"n_graded": len(self._state.grades)}
             self._log.append(kind, {**fields, "grades": self._grades.name})
             self._state = replay(self._log.path, self._log.events)
-
-    def _interval(self) -> dict[str, _Fact] | None:
-        if self._is_rehearsal:
-            return None
-        rater, session = self._schedule.rater, self._schedule.session
-        return interval_fields(self._study, self._protocol, rater, session, self._now)
 
     def _begins_anew(self) -> bool:
         # by the protocol's policy, once a model was presented
@@ -316,10 +311,6 @@ class _Runner(Presenter):
             },
         )
         return restart
-
-    @property
-    def _scheduled(self) -> tuple[Presentation, ...]:
-        return self._schedule.presentations
 
     def run(self, progress: Callable[[Presentation], object] | None) -> SessionSummary:
         """Present and ask until every presentation has its grade or is skipped."""
@@ -357,7 +348,7 @@ class _Runner(Presenter):
             self._log.append("instructed", {"text": text})
         for presentation in self._practice:
             if presentation.code not in self._state.practice.settled:
-                self._rate_by(presentation, "practice-")
+                self._rate(presentation)
 
     def _take_break(self, presentation: Presentation) -> None:
         occasions, after = self._protocol.occasions, presentation.position - 1
@@ -375,25 +366,17 @@ class _Runner(Presenter):
         self._log.append("break", fields)
 
     def _rate(self, presentation: Presentation) -> None:
-        if self._rate_by(presentation, ""):
-            self._ask(presentation)
-
-    def _rate_by(self, presentation: Presentation, prefix: str) -> bool:
-        # whether it was graded, not skipped
-        fields: dict[str, _Fact] = {
-            "code": presentation.code,
-            "position": presentation.position,
-        }
+        is_practice = presentation in self._practice
+        prefix = "practice-" if is_practice else ""
         grade = self.rate(self._request(presentation))
         if isinstance(grade, Skip):
             reasons = stated(who=grade.who, why=grade.why)
-            self._log.append(f"{prefix}skipped", {**fields, **reasons})
-            return False
-        self._log.append(
-            f"{prefix}grade",
-            {**fields, "grade": grade.grade, "stretch": grade.stretch},
-        )
-        return True
+            self._log.append(f"{prefix}skipped", {**self._named(), **reasons})
+            return
+        fields = {**self._named(), "grade": grade.grade, "stretch": grade.stretch}
+        self._log.append(f"{prefix}grade", fields)
+        if not is_practice:
+            self._ask(presentation)
 
     def _ask(self, presentation: Presentation | None) -> None:
         # the questions about a presentation that was graded here, or the session
@@ -419,7 +402,7 @@ class _Runner(Presenter):
         sessions = [each.id for each in protocol.sessions if rater in each.raters]
         if not questions_of(protocol, "study"):
             return
-        if all(is_complete(study, rater, each) for each in sessions):
+        if all(completed_at(study, rater, each) for each in sessions):
             ask_questions(
                 protocol,
                 "study",

@@ -209,7 +209,9 @@ class _Trainer(Presenter):
         """Teach until the criterion is met or there were enough presentations."""
         record = record_of(self._log.path, self._log.events, self._protocol)
         while record.passed is None:
-            passed = _has_passed(record)
+            # Looked at once a set is whole; a training that went on before could not
+            # have ended.
+            passed = bool((record.evidence() >= record.boundary).any())
             n_presentations = len(record.lessons)
             if passed or n_presentations >= record.criterion.max_presentations:
                 facts = {"passed": passed, "n_presentations": n_presentations}
@@ -255,12 +257,6 @@ class _Trainer(Presenter):
             attempt=1,
             rules=self._protocol.presentation,
         )
-
-
-def _has_passed(record: TrainingRecord) -> bool:
-    # looked at once a set is whole; a training that went on before could not have ended
-    evidence = record.evidence()
-    return bool(evidence.size and (evidence >= record.boundary).any())
 
 
 def next_model(

@@ -1,14 +1,13 @@
 """What a coordinator does at the page, in Chromium."""
 
 import re
-from collections.abc import Iterator
 
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from masrel.lab.protocol import read_protocol
 from masrel.lab.run import ScriptGrades, read_log, run_session
-from tests.lab.serve.browser.conftest import N_RATERS, MakeStage, at_work
+from tests.lab.serve.browser.conftest import MakeStage, at_work
 from tests.lab.serve.browser.stages import Stage
 from tests.lab.serve.browser.test_rater_flows import broken, tab_to
 from tests.lab.serve.browser.visitors import LOST, Coordinator, Rater
@@ -231,18 +230,10 @@ def test_the_page_fits_on_a_screen_and_needs_no_mouse(stage: Stage) -> None:
     sees(coordinator, f"Session test: {stage.rater} ")
 
 
-@pytest.fixture
-def slow_asking(make_stage: MakeStage) -> Iterator[Stage]:
-    """A study long enough to press something."""
-    speed = {"mean_speed_deg_s": 45.0}
-    stage = make_stage(n_raters=N_RATERS, n_models=2, simulated_raters=speed)
-    yield from at_work(stage, "R1")
-
-
 def test_a_model_is_left_without_a_grade_after_a_fault_by_either(
-    slow_asking: Stage,
+    slow_stage: Stage,
 ) -> None:
-    stage, page = slow_asking, slow_asking.coordinator.page
+    stage, page = slow_stage, slow_stage.coordinator.page
     rater = stage.session()
     rater.begin()
     rater.page.locator("#stop").tap()
