@@ -2,19 +2,11 @@
 
 import itertools
 from collections import Counter
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from docs.make import training as page
-from docs.make.training import (
-    SEED,
-    calibrated,
-    fixed_errors,
-    sequential,
-)
 from masrel.agreement import cohen_kappa
 from masrel.lab.protocol import copy_template, presented_hash, read_protocol
 from masrel.lab.run import Event
@@ -292,27 +284,3 @@ def test_a_training_begun_without_weights_ends_without(tmp_path: Path) -> None:
 
     assert evidence() == evidence(is_weighted=False)
     assert evidence() != evidence(is_weighted=True)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("order", "n"),
-    [("blocked", 1_000), pytest.param("adaptive", 4_000, marks=pytest.mark.long)],
-)
-def test_it_needs_30_percent_fewer_presentations_at_equal_errors(
-    order: str, n: int
-) -> None:
-    rule, rng = page.criterion(order=order), np.random.default_rng(SEED)
-    boundary = calibrated(rule).boundary
-    bad = sequential(rule, boundary, rule.insufficient, n, rng)
-    good = sequential(rule, boundary, rule.sufficient, n, rng)
-    false_pass = max(share for share, _ in bad.values())
-    false_fail = max(1.0 - share for share, _ in good.values())
-    # other trainees than those of the calibration; four standard errors
-    assert false_pass <= 0.05 + 4.0 * (0.05 * 0.95 / n) ** 0.5
-    assert false_fail <= 0.1
-    mean = max(length for _, length in good.values())
-    as_many = int(mean / 0.7 / rule.n_models) * rule.n_models
-    fails, _ = fixed_errors(replace(rule, order="blocked"), as_many, false_pass, n)
-    # a fixed number that is 30 % larger fails more
-    assert fails > false_fail + 4.0 * (2.0 * false_fail / n) ** 0.5
