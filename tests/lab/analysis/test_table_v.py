@@ -12,17 +12,14 @@ import math
 from collections import Counter
 from fractions import Fraction
 
-import msgspec
 import pytest
 from scipy import stats
 
 from masrel.lab.analysis import Analysis, analyze
 from tests.lab.analysis.studies import (
-    hess2012,
     in_person,
     plan,
     protocol_with,
-    ratings,
     table_v,
 )
 
@@ -112,17 +109,6 @@ def test_the_intended_grade_was_given_as_the_paper_says() -> None:
     assert (found.session, found.reason) == ("test", None)
 
 
-def test_in_person_and_haptic_grades_are_equal_in_all_eleven_pairs() -> None:
-    # Table IV: four subjects, three raters, one of them absent once: 12 - 1 pairs.
-    found = published(sections=("in-person",)).in_person
-    assert found is not None
-    assert (found.n_pairs, found.n_equal, found.n_unpaired) == (11, 11, 1)
-    assert ("R3", "HM2") not in {(pair.rater, pair.model) for pair in found.pairs}
-    # R2 found subject 4 a 2, and so the model, which was built as a 3.
-    (r2,) = [p for p in found.pairs if (p.rater, p.model) == ("R2", "HM4")]
-    assert (r2.in_person, r2.haptic) == ("2", "2")
-
-
 def test_the_speeds_are_table_vs() -> None:
     # HM4: 68, 65, 64, 72, 60, 65, 61, 60: sum 515, mean 64.375; squares of the
     # deviations sum to 33275 - 515**2 / 8 = 121.875, over 7 the variance.
@@ -136,29 +122,3 @@ def test_the_speeds_are_table_vs() -> None:
     (r1,) = [summary for summary in found.by_rater if summary.name == "R1"]
     assert (r1.n, r1.mean) == (4, 105.5)
     assert found.n_missing == 0
-
-
-def test_what_is_not_printed_in_the_paper_is_said_to_be_absent() -> None:
-    lines = hess2012().analysis.estimates
-    found = published(*(msgspec.structs.replace(a, interval="none") for a in lines))
-    reasons = {entry.line.id: entry.reason for entry in found.estimates}
-    assert reasons == {
-        "kappa-standard": None,
-        "kappa-standard-items": None,
-        "percent-standard": None,
-        "kappa-dummies": "no dummy model has ratings in session test",
-        "retest-standard": "there are no ratings of session retest",
-        "retest-dummies": "there are no ratings of session retest",
-    }
-    assert found.simulated is False
-
-
-def test_parts_no_section_asks_for_are_not_computed() -> None:
-    found = published(plan())
-    assert (found.intended, found.in_person, found.speeds) == (None, None, None)
-    assert published(sections=("traces",)).speeds is not None
-
-
-def test_simulated_ratings_are_said_to_be() -> None:
-    simulated = ratings(("test", "R1", "HM1", "1"), source="simulated")
-    assert analyze(protocol_with(), simulated).simulated is True

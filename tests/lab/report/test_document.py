@@ -15,7 +15,6 @@ from tests.lab.report.pages import (
     name_of,
     page_of,
     published_report,
-    simulated_report,
 )
 
 TITLES = {
@@ -48,18 +47,6 @@ def contents(folder: Path) -> dict[str, bytes]:
 def csv_rows(path: Path) -> list[list[str]]:
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.reader(file))
-
-
-@pytest.mark.slow
-def test_the_same_inputs_give_the_same_bytes(
-    tmp_path: Path, published: ReportFiles, simulated: ReportFiles
-) -> None:
-    published_report(tmp_path / "published")
-    simulated_report(tmp_path / "simulated")
-    for first in (published, simulated):
-        name = "published" if first is published else "simulated"
-        assert len(contents(first.html.parent)) > 10
-        assert contents(tmp_path / name) == contents(first.html.parent)
 
 
 @pytest.mark.parametrize("report", ["published", "simulated"])
@@ -222,14 +209,12 @@ def test_every_section_can_be_asked_for(published: ReportFiles) -> None:
     assert sections == [*(TITLES[name] for name in ALL), "Provenance"]
 
 
-def test_the_inputs_are_named_on_the_page(published: ReportFiles) -> None:
+def test_the_inputs_are_named_and_symbols_have_their_index_set_low(
+    published: ReportFiles,
+) -> None:
     for path in (published.html, published.markdown):
         text = path.read_text(encoding="utf-8")
         for name in ("protocol", "ratings", "grades given in person"):
             assert re.search(rf"SHA-256 of the {name}\W+.*[0-9a-f]{{64}}", text)
-
-
-def test_symbols_have_their_index_set_low(published: ReportFiles) -> None:
     text = published.html.read_text(encoding="utf-8")
-    assert "ν<sub>L</sub>" in text
-    assert "ν_L" not in text
+    assert ("ν<sub>L</sub>" in text, "ν_L" in text) == (True, False)

@@ -13,7 +13,7 @@ import pytest
 
 import masrel.lab.report
 from masrel.estimates import Estimate, Interval
-from masrel.lab.analysis import PlannedEstimate, analyze, as_analysis_document
+from masrel.lab.analysis import PlannedEstimate, analyze
 from masrel.lab.ratings import Ratings, ratings_from_rows
 from masrel.lab.report import ReportFiles, write_report
 from masrel.scales import MODIFIED_ASHWORTH
@@ -54,17 +54,6 @@ def of_the_file(text: str) -> bool:
     return re.fullmatch(f"(?:(?:{'|'.join(patterns)}) ?)+", text) is not None
 
 
-def numbers(content: object) -> set[str]:
-    """Every number of an analysis, as a paragraph may show it."""
-    if isinstance(content, dict):
-        return set().union(*map(numbers, content.values()))
-    if isinstance(content, list):
-        return {str(len(content))}.union(*map(numbers, content))
-    if isinstance(content, float):
-        return {f"{content:.3f}", f"{content:.1f}", f"{100 * content:g}"}
-    return {str(content)} if isinstance(content, int) else set()
-
-
 def test_the_published_result_is_told_in_sentences_of_the_file(tmp_path: Path) -> None:
     lines = (
         plan(id="kappa", interval="jackknife"),
@@ -83,10 +72,6 @@ def test_the_published_result_is_told_in_sentences_of_the_file(tmp_path: Path) -
     )
     assert of_the_file(text)
     assert not of_the_file(text.replace("graded", "scored"))
-    protocol = protocol_with(*lines, sections=("intended",))
-    document = as_analysis_document(analyze(protocol, table_v()))
-    known = numbers(msgspec.json.decode(msgspec.json.encode(document)))
-    assert set(re.findall(r"\d+(?:\.\d+)?", text.replace("32 grades", ""))) <= known
 
 
 ONE = ratings(*of_session("test", R1=("1",), R2=("1",)))

@@ -105,26 +105,3 @@ def test_the_law_of_the_catch_angle_is_the_joints(found: ElbowFit) -> None:
     expected = [joint.catch_angle(speed) for speed in speeds.tolist()]
     law = figures._catch_angle_law(found, speeds)
     np.testing.assert_allclose(law, expected, rtol=1e-14)
-
-
-def test_residuals_are_those_of_every_sample(found: ElbowFit) -> None:
-    angle, slow = figures._slow_residuals(found)
-    since, fast = figures._fast_residuals(found)
-    n_samples = sum(law.size for law in found.fitted_torque)
-    assert angle.size + since.size == slow.size + fast.size == n_samples
-    together = np.concatenate([slow, fast])
-    assert np.abs(together).mean() < 0.1  # N·m: the noise that was put in
-    assert since.min() < 0.0 < since.max()  # around the catch
-
-
-def test_a_bin_of_few_samples_has_no_mean() -> None:
-    x = np.concatenate([np.linspace(0.0, 1.0, 800, endpoint=False), [40.0] * 19])
-    _, means = figures._binned_means(x, 2.0 * x)
-    np.testing.assert_allclose(means[0], 2.0 * x[:800].mean())
-    assert np.isnan(means[1:]).all()
-
-
-def test_every_catch_has_a_peak_above_its_residual(found: ElbowFit) -> None:
-    readings = figures._catch_readings(found)
-    assert [catch for catch, _ in readings] == figures._catches(found)
-    assert all(levels.peak > levels.residual > 0.0 for _, levels in readings)

@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from docs.make.tone import FIGURES, SCENES, view
-from docs.make.tone_figures import draw
+from docs.make.tone import FIGURES, SCENES
 from masrel.lab.elbow import MODELS
 from masrel.lab.elbow.tone import ToneModel
 
@@ -17,9 +16,3 @@ def test_every_law_has_a_figure_in_its_page() -> None:
     for name in SCENES:
         assert (FIGURES / f"{name}.png").is_file()
         assert f"](../figures/{name}.png)" in pages
-
-
-def test_a_figure_is_drawn_twice_in_the_same_bytes() -> None:
-    one, other = (draw(view(SCENES["tone_contracture"])) for _ in "ab")
-    assert one.startswith(b"\x89PNG")
-    assert one == other
