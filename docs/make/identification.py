@@ -14,16 +14,14 @@ import time
 from collections import Counter
 from pathlib import Path
 
-import numpy as np
 from tqdm import tqdm
 
 from masrel.lab.elbow import STANDARD_MODELS, fit, fit_friction
 from masrel.lab.elbow.identification._model_file import QUANTITIES
 from masrel.lab.report._fits import fit_figures
-from tests.lab.elbow.identification.synthesis import Scatter, recording, study
+from tests.lab.elbow.identification.synthesis import NAMES, SCATTER, Scatter, study
 from tests.lab.elbow.identification.test_friction import backdriven
 from tests.lab.elbow.identification.test_lack_of_fit import (
-    NAMES,
     RIGHT,
     TERMS,
     WRONG,
@@ -33,9 +31,6 @@ from tests.lab.elbow.identification.test_lack_of_fit import (
 )
 
 FIGURES = Path(__file__).parents[1] / "figures"
-SCATTER = Scatter(
-    catch_angle=math.radians(2.0), catch_torque=0.1, catch_travel=math.radians(2.0)
-)
 HALF = Scatter(
     catch_angle=math.radians(1.0), catch_torque=0.05, catch_travel=math.radians(1.0)
 )
@@ -100,23 +95,18 @@ def right(n_studies: int) -> None:
 
 
 def seconds() -> None:
-    """Print the processor time that 24 trials of 2 s take."""
-    rng = np.random.default_rng(1)
-    joint, movements = STANDARD_MODELS["HM3"], []
-    for i in range(24):
-        slow = i < 8
-        start = math.radians(rng.uniform(30.0, 90.0) if slow else 30.0)
-        end = start + math.radians(16.0) if slow else joint.range_end
-        mean = math.radians(9.0 if slow else rng.uniform(75.0, 120.0))
-        options = {"rng": rng, "duration": 2.0, "rest": 0.15, "name": f"trial {i}"}
-        made = recording(joint, start=start, end=end, mean_speed=mean, **options)
-        movements.append(made)
+    """Print the processor time that 24 trials take."""
+    movements = study(STANDARD_MODELS["HM3"], seed=1)
+    recorded = sum(movement.time[-1] for movement in movements)
     taken = []
     for _ in range(7):
         begun = time.process_time()
         fit(movements)
         taken.append(time.process_time() - begun)
-    print(f"24 trials of 2 s at 1 kHz: {statistics.median(taken):.2f} s of processor")
+    print(
+        f"{len(movements)} trials, {recorded:.0f} s at 1 kHz: "
+        f"{statistics.median(taken):.2f} s of processor"
+    )
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ import numpy as np
 from mpmath import mp
 from tqdm import tqdm
 
+from docs.make.benchmarks.elbow_ode import Ode
 from docs.make.benchmarks.elbow_stepped import places, step_together
 from masrel.lab.elbow import (
     STANDARD_MODELS,
@@ -33,7 +34,6 @@ from masrel.lab.elbow import (
 )
 from masrel.lab.elbow._scenes import EVENTS
 from tests.benchmarks.sidebyside import Timing, side_by_side
-from tests.lab.elbow.ode import Ode
 from tests.lab.elbow.reference import solved
 
 N_SCENES = 10_000

@@ -1,14 +1,12 @@
-"""Motions: by hand, against SciPy, pieces against samples, refusals."""
+"""Motions: by hand, pieces against samples, refusals."""
 
-import math
-from math import inf, nan, pi
+from math import inf, nan
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
-from scipy.interpolate import PchipInterpolator
 
 from masrel.errors import ParameterError
 from masrel.lab.elbow import (
@@ -34,28 +32,37 @@ LINE = ConstantSpeed(start=0.5, end=2.5, speed=1.0)
 RAMPS = Trapezoid(start=0.5, end=2.5, speed=1.0, acceleration_rate=2.0)
 
 
+# Dyadic fractions, of which no operation rounds.
 @pytest.mark.parametrize(
-    ("time", "angle", "velocity", "acceleration"),
+    ("motion", "time", "angle", "velocity", "acceleration"),
     [
         # p(s) = 10 s³ - 15 s⁴ + 6 s⁵, p' = 30 s² (1-s)², p'' = 60 s (1-s)(1-2s) with
         # s = t/2: θ = 0.5 + 2 p, ω = 2/2 p' = p', α = 2/4 p'' = p''/2.
-        (0.0, 0.5, 0.0, 0.0),
+        (REACH, 0.0, 0.5, 0.0, 0.0),
         # s = 1/4: p = 10/64 - 15/256 + 6/1024 = (160 - 60 + 6)/1024 = 106/1024;
         # p' = 30 · 1/16 · 9/16 = 270/256; p'' = 60 · 1/4 · 3/4 · 1/2 = 5.625.
-        (0.5, 0.5 + 212 / 1024, 270 / 256, 2.8125),
+        (REACH, 0.5, 0.5 + 212 / 1024, 270 / 256, 2.8125),
         # s = 1/2: p = 1/2, half the way; p' = 30/16 = 1.875; p'' = 0.
-        (1.0, 1.5, 1.875, 0.0),
-        (1.5, 2.5 - 212 / 1024, 270 / 256, -2.8125),  # mirrored
-        (2.0, 2.5, 0.0, 0.0),
+        (REACH, 1.0, 1.5, 1.875, 0.0),
+        (REACH, 1.5, 2.5 - 212 / 1024, 270 / 256, -2.8125),  # mirrored
+        (REACH, 2.0, 2.5, 0.0, 0.0),
+        (Reversed(motion=REACH), 0.5, 2.5 - 212 / 1024, -270 / 256, -2.8125),
+        (RAMPS, 0.0, 0.5, 0.0, 2.0),
+        (RAMPS, 0.25, 0.5625, 0.5, 2.0),  # ½ · 2 · ¼²
+        (RAMPS, 0.5, 0.75, 1.0, 0.0),
+        (RAMPS, 1.0, 1.25, 1.0, 0.0),
+        (RAMPS, 2.25, 2.4375, 0.5, -2.0),
+        (RAMPS, 2.5, 2.5, 0.0, -2.0),
+        (Part(motion=RAMPS, begin=0.25, finish=2.25), 0.0, 0.5625, 0.5, 2.0),
+        (Part(motion=RAMPS, begin=0.25, finish=2.25), 2.0, 2.4375, 0.5, -2.0),
     ],
 )
-def test_minimum_jerk_has_the_values_of_the_quintic(
-    time: float, angle: float, velocity: float, acceleration: float
+def test_motions_by_hand(
+    motion: Motion, time: float, angle: float, velocity: float, acceleration: float
 ) -> None:
-    # These are dyadic fractions: no operation rounds.
-    assert float(REACH.angle(time)) == angle
-    assert float(REACH.velocity(time)) == velocity
-    assert float(REACH.acceleration(time)) == acceleration
+    assert float(motion.angle(time)) == angle
+    assert float(motion.velocity(time)) == velocity
+    assert float(motion.acceleration(time)) == acceleration
 
 
 @given(motion=motions(), share=st.floats(0.001, 0.999))
@@ -64,37 +71,6 @@ def test_times_at_undoes_angle(motion: Motion, share: float) -> None:
     found = float(times_at(motion, [angle])[0])
     assert 0.0 <= found <= motion.duration
     assert float(motion.angle(found)) == pytest.approx(angle, abs=4e-15)
-
-
-@pytest.mark.parametrize("kind", [constant, minimum_jerk])
-@pytest.mark.parametrize(
-    ("start", "end"),
-    [(50.0, 50.0), (60.0, 50.0), (-1.0, 50.0), (10.0, 181.0), (nan, 50.0), (10.0, nan)],
-)
-def test_angles_out_of_order_or_range_are_refused(kind, start, end) -> None:
-    said = (
-        r"start, end: need 0 <= start < end <= 180 degrees, "
-        rf"got {start:g} and {end:g} degrees"
-    )
-    with pytest.raises(ParameterError, match=said):
-        kind(90.0, start_deg=start, end_deg=end)
-
-
-@pytest.mark.parametrize(
-    ("kind", "name"), [(constant, "speed"), (minimum_jerk, "mean_speed")]
-)
-@pytest.mark.parametrize("speed", [0.0, -90.0, nan, math.inf])
-def test_speeds_that_do_not_move_are_refused(kind, name: str, speed: float) -> None:
-    said = rf"^{name}: needs more than 0 and finite, got {speed:g} deg/s"
-    with pytest.raises(ParameterError, match=said):
-        kind(speed)
-
-
-@pytest.mark.parametrize("goal", [2.6, 0.4, float("nan"), float("inf")])
-def test_an_angle_that_is_not_reached_has_no_time(goal: float) -> None:
-    stretch = ConstantSpeed(start=0.5, end=2.5, speed=1.0)
-    with pytest.raises(ParameterError, match="angles: need ones that the motion reach"):
-        times_at(stretch, [goal])
 
 
 def any_motion(seed: int, kind: str) -> Motion:
@@ -126,28 +102,6 @@ def test_samples_are_those_of_the_pieces(kind: str, seed: int) -> None:
     assert float(motion.angle(motion.duration)) == pytest.approx(motion.end, abs=1e-14)
 
 
-# Trapezoid
-
-
-@pytest.mark.parametrize(
-    ("time", "angle", "velocity", "acceleration"),
-    [
-        (0.0, 0.5, 0.0, 2.0),
-        (0.25, 0.5625, 0.5, 2.0),  # ½ · 2 · ¼²
-        (0.5, 0.75, 1.0, 0.0),
-        (1.0, 1.25, 1.0, 0.0),
-        (2.25, 2.4375, 0.5, -2.0),
-        (2.5, 2.5, 0.0, -2.0),
-    ],
-)
-def test_a_trapezoid_by_hand(
-    time: float, angle: float, velocity: float, acceleration: float
-) -> None:
-    assert float(RAMPS.angle(time)) == angle
-    assert float(RAMPS.velocity(time)) == velocity
-    assert float(RAMPS.acceleration(time)) == acceleration
-
-
 def test_a_trapezoid_may_be_a_triangle_and_no_less() -> None:
     # 1 rad/s on 2 rad needs 1²/2 = 0.5 rad/s² at least: then there is no level
     triangle = Trapezoid(start=0.5, end=2.5, speed=1.0, acceleration_rate=0.5)
@@ -159,23 +113,6 @@ def test_a_trapezoid_may_be_a_triangle_and_no_less() -> None:
 
 
 # Recorded
-
-
-@given(
-    rises=st.lists(st.floats(-0.3, 0.3), min_size=2, max_size=12),
-    widths=st.lists(st.floats(0.01, 1.0), min_size=12, max_size=12),
-)
-def test_cubics_between_samples_are_those_of_scipy(
-    rises: list[float], widths: list[float]
-) -> None:
-    angle = np.clip(1.5 + np.cumsum([0.0, *rises]), 0.0, pi)
-    time = np.cumsum([0.0, *widths[: len(rises)]])
-    motion = Recorded(time=time, angle=angle)
-    peer = PchipInterpolator(time, angle)
-    at = np.linspace(0.0, time[-1], 101)
-    steepest = float(np.abs(np.diff(angle) / np.diff(time)).max()) + 1.0
-    assert motion.angle(at) == pytest.approx(peer(at), abs=1e-13)
-    assert motion.velocity(at) == pytest.approx(peer(at, 1), abs=1e-10 * steepest)
 
 
 @pytest.mark.parametrize(
@@ -199,25 +136,42 @@ def test_wrong_samples_are_refused_with_their_place(time, angle, said: str) -> N
 # Composed
 
 
-def test_backwards_by_hand() -> None:
-    back = Reversed(motion=REACH)
-    assert (back.start, back.end, back.duration) == (2.5, 0.5, 2.0)
-    # the quintic above, at 0.5 s before its end
-    assert float(back.angle(0.5)) == 2.5 - 212 / 1024
-    assert float(back.velocity(0.5)) == -270 / 256
-    assert float(back.acceleration(0.5)) == -2.8125
-
-
-def test_a_part_is_the_whole_between_two_times() -> None:
-    part = Part(motion=RAMPS, begin=0.25, finish=2.25)
-    assert (part.start, part.end, part.duration) == (0.5625, 2.4375, 2.0)
-    assert float(part.velocity(0.0)) == 0.5
-    assert [piece.length for piece in part.pieces()] == [0.25, 1.5, 0.25]
-
-
 @pytest.mark.parametrize(
     ("make", "said"),
     [
+        *(
+            (
+                lambda kind=kind, ends=ends: kind(
+                    90.0, start_deg=ends[0], end_deg=ends[1]
+                ),
+                "start, end: need 0 <= start < end <= 180 degrees, "
+                f"got {ends[0]:g} and {ends[1]:g} degrees",
+            )
+            for kind in (constant, minimum_jerk)
+            for ends in (
+                (50.0, 50.0),
+                (60.0, 50.0),
+                (-1.0, 50.0),
+                (10.0, 181.0),
+                (nan, 50.0),
+                (10.0, nan),
+            )
+        ),
+        *(
+            (
+                lambda kind=kind, speed=speed: kind(speed),
+                f"^{name}: needs more than 0 and finite, got {speed:g} deg/s",
+            )
+            for kind, name in ((constant, "speed"), (minimum_jerk, "mean_speed"))
+            for speed in (0.0, -90.0, nan, inf)
+        ),
+        *(
+            (
+                lambda goal=goal: times_at(LINE, [goal]),
+                "angles: need ones that the motion reach",
+            )
+            for goal in (2.6, 0.4, nan, inf)
+        ),
         (lambda: Joined([]), "motions: needs one or more, got none"),
         (
             lambda: Joined([LINE, LINE]),

@@ -1,6 +1,6 @@
 """Parameters: Table III in SI, the clamps of the catch angle, refusals."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from math import inf, nan, pi
 
 import pytest
@@ -26,31 +26,37 @@ PLAIN = ElbowParameters(
 )
 
 
+COMMON = {
+    "inertia": 0.0,
+    "damping": 1.26,
+    "stiffness": 3.15,
+    "catch_slope": 0.35,
+    "peak_duration": 0.1,
+    "post_catch_stiffness": 5.8,
+    "speed_threshold": 20 * DEG,
+    "slowest_mean_speed": 60 * DEG,
+    "smallest_catch_angle": 60 * DEG,
+    "range_end": 146 * DEG,
+    "catch_rise": 0.0,
+}
+WORDS = {"rest_angle": None, "post_catch": "continuous", "residual_reading": "residual"}
+
+
 @pytest.mark.parametrize("model", TABLE_III)
-def test_standard_models_are_table_iii(model: str) -> None:
+def test_standard_models_are_table_iii_and_the_text(model: str) -> None:
     length, torque, ratio, travel = TABLE_III[model]
-    joint = STANDARD_MODELS[model]
-    assert joint.catch_angle_constant == pytest.approx(length * DEG, rel=1e-15)
-    assert joint.catch_torque_constant == torque
-    assert joint.residual_ratio == ratio
-    assert joint.catch_travel == pytest.approx(travel * DEG, rel=1e-15)
-
-
-@pytest.mark.parametrize("model", TABLE_III)
-def test_the_common_constants_are_table_iii_and_the_text(model: str) -> None:
-    joint = STANDARD_MODELS[model]
-    assert joint.inertia == 0.0
-    assert joint.damping == 1.26
-    assert joint.stiffness == 3.15
-    assert joint.catch_slope == 0.35
-    assert joint.peak_duration == 0.1
-    assert joint.post_catch_stiffness == 5.8
-    assert joint.speed_threshold == pytest.approx(20 * DEG, rel=1e-15)
-    assert joint.slowest_mean_speed == pytest.approx(60 * DEG, rel=1e-15)
-    assert joint.smallest_catch_angle == pytest.approx(60 * DEG, rel=1e-15)
-    assert joint.range_end == pytest.approx(146 * DEG, rel=1e-15)
-    assert joint.rest_angle is None
-    assert joint.post_catch == "continuous"
+    values = asdict(STANDARD_MODELS[model])
+    assert {name: values.pop(name) for name in WORDS} == WORDS
+    assert values == pytest.approx(
+        {
+            "catch_angle_constant": length * DEG,
+            "catch_torque_constant": torque,
+            "residual_ratio": ratio,
+            "catch_travel": travel * DEG,
+            **COMMON,
+        },
+        rel=1e-15,
+    )
 
 
 @pytest.mark.parametrize(

@@ -13,24 +13,31 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from masrel.lab.elbow.identification import Movement
-from masrel.lab.elbow.parameters import ElbowParameters
+from masrel.lab.elbow.parameters import STANDARD_MODELS, ElbowParameters
 
 Floats = NDArray[np.float64]
+
+HM2, HM3, HM4 = (STANDARD_MODELS[name] for name in ("HM2", "HM3", "HM4"))
+
+# What is fitted of them, but for m
+NAMES = (
+    "damping",
+    "stiffness",
+    "catch_angle_constant",
+    "catch_slope",
+    "catch_torque_constant",
+    "residual_ratio",
+    "catch_travel",
+    "post_catch_stiffness",
+)
 
 STEP = 2.5e-4  # s
 ENCODER = math.radians(0.09)
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Hand:
-    """How a hand moves a joint: a bell-shaped speed that is never twice the same.
-
-    `wobble` is the size of slow irregularities relative to the speed; `yielding` how
-    much of the speed is lost after a catch, with a time constant of 0.12 s.
-    """
-
-    wobble: float = 0.08
-    yielding: float = 0.3
+# A hand's speed is a bell that is never twice the same: the size of its slow
+# irregularities relative to it, and how much is lost after a catch, in 0.12 s
+WOBBLE, YIELDING = 0.08, 0.3
+REST = 0.2  # before and after a stretch, s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,6 +47,11 @@ class Scatter:
     catch_angle: float = 0.0  # rad
     catch_torque: float = 0.0  # relative
     catch_travel: float = 0.0  # rad
+
+
+SCATTER = Scatter(
+    catch_angle=math.radians(2.0), catch_torque=0.1, catch_travel=math.radians(2.0)
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,21 +74,16 @@ def recording(
     end: float,
     mean_speed: float,
     rng: np.random.Generator,
-    hand: Hand | None = None,
     scatter: Scatter | None = None,
     noise: float = 0.1,
-    encoder: float = ENCODER,
     rate: float = 1000.0,
-    rest: float = 0.2,
-    duration: float | None = None,
-    offset: float = 0.0,
     arm: Arm | None = None,
     name: str = "simulated",
 ) -> Movement:
-    """One stretch with `rest` seconds of rest before and after it."""
-    hand, scatter, arm = hand or Hand(), scatter or Scatter(), arm or Arm()
+    """One stretch with a rest before and after it."""
+    scatter, arm = scatter or Scatter(), arm or Arm()
     joint = replace(joint, catch_rise=arm.rise)
-    speed = _speed(end - start, mean_speed, hand, rng)
+    speed = _speed(end - start, mean_speed, rng)
     joint = replace(
         joint,
         catch_torque_constant=joint.catch_torque_constant
@@ -89,22 +96,19 @@ def recording(
     catch = _catch(joint, time, angle, speed, shift)
     free = np.gradient(speed, STEP)  # before the hand yields to a catch
     if catch is not None:
-        speed = _yield(speed, time, catch, hand)
+        speed = _yield(speed, time, catch)
         angle = start + _integral(speed)
-    length = time[-1] + 2 * rest if duration is None else duration
-    at = np.arange(round(length * rate)) / rate
-    inside = np.clip(at - rest, 0.0, time[-1])
-    sampled = np.interp(inside, time, angle)
+    at = np.arange(round((time[-1] + 2 * REST) * rate)) / rate
+    inside = np.clip(at - REST, 0.0, time[-1])
+    sampled = np.round(np.interp(inside, time, angle) / ENCODER) * ENCODER
     motion = time, angle, speed
     torque = _torque(joint, *motion, catch, inside, free)
     if arm != Arm():
-        fine = np.arange(at[0], at[-1] + STEP, STEP) - rest
+        fine = np.arange(at[0], at[-1] + STEP, STEP) - REST
         within = np.clip(fine, 0.0, time[-1])
         law = _torque(joint, *motion, catch, within, free)
-        torque = np.interp(at - rest, fine, _sensed(arm, law, *motion, fine))
-    felt = torque + offset + noise * _noise(rng, at.size, arm.noise_time * rate)
-    if encoder:
-        sampled = np.round(sampled / encoder) * encoder
+        torque = np.interp(at - REST, fine, _sensed(arm, law, *motion, fine))
+    felt = torque + noise * _noise(rng, at.size, arm.noise_time * rate)
     return Movement(name=name, time=at, angle=sampled, torque=felt, simulated=True)
 
 
@@ -122,44 +126,29 @@ def study(
 ) -> list[Movement]:
     """Slow stretches of part of the range and fast ones of all of it."""
     rng = np.random.default_rng(seed)
-    made = []
-    sensors = {"noise": noise, "rate": rate}
-    for i in range(n_slow):
-        start = math.radians(rng.uniform(25.0, 105.0))
-        mean = math.radians(rng.uniform(5.0, 8.5))
+    made, arm = [], arm or Arm()
+    for place in range(n_slow + n_fast):
+        is_slow = place < n_slow
+        i = place if is_slow else place - n_slow
+        start = math.radians(rng.uniform(*((25.0, 105.0) if is_slow else (27.0, 33.0))))
+        drift = arm.drift + (-1) ** i * arm.own_drift
         made.append(
             recording(
                 joint,
                 start=start,
-                end=start + math.radians(18.0),
-                mean_speed=mean,
+                end=start + math.radians(18.0) if is_slow else joint.range_end,
+                mean_speed=math.radians(
+                    rng.uniform(*((5.0, 8.5) if is_slow else fast))
+                ),
                 rng=rng,
-                name=f"slow {i}",
-                arm=_drifting(arm, i),
-                **sensors,
-            )
-        )
-    for i in range(n_fast):
-        made.append(
-            recording(
-                joint,
-                start=math.radians(rng.uniform(27.0, 33.0)),
-                end=joint.range_end,
-                mean_speed=math.radians(rng.uniform(*fast)),
-                rng=rng,
-                scatter=scatter,
-                name=f"fast {i}",
-                arm=_drifting(arm, i),
-                **sensors,
+                scatter=None if is_slow else scatter,
+                noise=noise,
+                rate=rate,
+                name=f"{'slow' if is_slow else 'fast'} {i}",
+                arm=replace(arm, drift=drift, own_drift=0.0),
             )
         )
     return made
-
-
-def _drifting(arm: Arm | None, place: int) -> Arm | None:
-    if arm is None:
-        return None
-    return replace(arm, drift=arm.drift + (-1) ** place * arm.own_drift, own_drift=0.0)
 
 
 def _sensed(
@@ -186,7 +175,7 @@ def _noise(rng: np.random.Generator, size: int, time: float) -> Floats:
     return np.asarray(lfilter([1.0], [1.0, -keep], grown, zi=[keep * white[0]])[0])
 
 
-def _speed(travel: float, mean: float, hand: Hand, rng: np.random.Generator) -> Floats:
+def _speed(travel: float, mean: float, rng: np.random.Generator) -> Floats:
     duration = travel / mean
     s = np.arange(0.0, duration + STEP, STEP) / duration
     s = s[s <= 1.0]
@@ -195,9 +184,7 @@ def _speed(travel: float, mean: float, hand: Hand, rng: np.random.Generator) -> 
     for cycles in (1.0, 2.0, 3.0):
         phase = rng.uniform(0.0, 2.0 * math.pi)
         ripple += (
-            hand.wobble
-            * rng.standard_normal()
-            * np.sin(2.0 * math.pi * cycles * s + phase)
+            WOBBLE * rng.standard_normal() * np.sin(2.0 * math.pi * cycles * s + phase)
         )
     shaped = bell * np.maximum(ripple, 0.2)
     return np.asarray(shaped * (travel / _integral(shaped)[-1]))
@@ -230,9 +217,9 @@ def _catch(
     return float(time[later][first - 1] + part * STEP)
 
 
-def _yield(speed: Floats, time: Floats, catch: float, hand: Hand) -> Floats:
+def _yield(speed: Floats, time: Floats, catch: float) -> Floats:
     since = np.maximum(time - catch, 0.0)
-    return speed * (1.0 - hand.yielding * (1.0 - np.exp(-since / 0.12)))
+    return speed * (1.0 - YIELDING * (1.0 - np.exp(-since / 0.12)))
 
 
 def _torque(

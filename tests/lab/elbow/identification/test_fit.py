@@ -16,18 +16,14 @@ from masrel.errors import (
 )
 from masrel.lab.elbow import STANDARD_MODELS, ConstantSpeed, fit, trace
 from masrel.lab.elbow.identification import ElbowFit, Movement
-from tests.lab.elbow.identification.oracles import HM2, HM3, HM4, SCATTER
-from tests.lab.elbow.identification.synthesis import recording, study
-
-NAMES = (
-    "damping",
-    "stiffness",
-    "catch_angle_constant",
-    "catch_slope",
-    "catch_torque_constant",
-    "residual_ratio",
-    "catch_travel",
-    "post_catch_stiffness",
+from tests.lab.elbow.identification.synthesis import (
+    HM2,
+    HM3,
+    HM4,
+    NAMES,
+    SCATTER,
+    recording,
+    study,
 )
 
 

@@ -14,29 +14,21 @@ import pytest
 
 from masrel.errors import RecordingError, RecordingWarning
 from masrel.lab.elbow import (
-    STANDARD_MODELS,
     ConstantSpeed,
     MinimumJerk,
     Trapezoid,
     trace,
 )
 from masrel.lab.elbow.identification import ElbowFit, Movement, compare_fits, fit
-from tests.lab.elbow.identification.synthesis import Arm, Scatter, study
+from tests.lab.elbow.identification.synthesis import (
+    HM3,
+    NAMES,
+    SCATTER,
+    Arm,
+    Scatter,
+    study,
+)
 
-HM3 = STANDARD_MODELS["HM3"]
-SCATTERED = Scatter(
-    catch_angle=math.radians(2.0), catch_torque=0.1, catch_travel=math.radians(2.0)
-)
-NAMES = (
-    "damping",
-    "stiffness",
-    "catch_angle_constant",
-    "catch_slope",
-    "catch_torque_constant",
-    "residual_ratio",
-    "catch_travel",
-    "post_catch_stiffness",
-)
 WRONG = {
     "gravity": Arm(gravity=0.5),
     "arm_inertia": Arm(inertia=0.05),
@@ -48,9 +40,9 @@ WRONG = {
 TERMS = {wrong: {"own drifts": "drift"}.get(wrong, wrong) for wrong in WRONG}
 RIGHT = {
     "white": {},
-    "scattered": {"scatter": SCATTERED},
+    "scattered": {"scatter": SCATTER},
     "coloured": {"arm": Arm(noise_time=0.02)},
-    "coloured, scattered": {"arm": Arm(noise_time=0.02), "scatter": SCATTERED},
+    "coloured, scattered": {"arm": Arm(noise_time=0.02), "scatter": SCATTER},
     "200 Hz": {"rate": 200.0},
     "gaps": {},
 }
@@ -292,7 +284,7 @@ def test_all_that_an_arm_has_is_fitted_at_once() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("scatter", [None, SCATTERED], ids=["exact", "scattered"])
+@pytest.mark.parametrize("scatter", [None, SCATTER], ids=["exact", "scattered"])
 @pytest.mark.parametrize("wrong", WRONG)
 def test_without_it_every_parameter_is_covered_or_the_fit_says_so(
     wrong: str, scatter: Scatter | None
