@@ -103,7 +103,7 @@ def _correct(
 @_of_session(_code)
 def _skip(
     study: "StudyPaths",
-    _: "Protocol",
+    protocol: "Protocol",
     rater: str,
     session: str,
     code: str,
@@ -112,7 +112,7 @@ def _skip(
     """Leave a presentation of STUDY, after a fault, without a grade."""
     from masrel.lab.run import record_skip
 
-    record_skip(study, rater, session, code=code, **reasons)
+    record_skip(study, protocol, rater, session, code=code, **reasons)
     log = study.log_file(rater, session)
     click.echo(
         f"{code} of {rater}, session {session}, is skipped, as is said in {log}. "

@@ -316,6 +316,7 @@ def record_answer(
 
 def record_skip(
     study: StudyPaths,
+    protocol: Protocol,  # noqa: ARG001 - as all that is recorded takes it
     rater: str,
     session: str,
     *,
@@ -330,6 +331,8 @@ def record_skip(
     ----------
     study : StudyPaths
         Where the study is.
+    protocol : Protocol
+        The study's protocol.
     rater, session : str
         Whose session.
     code : str

@@ -73,22 +73,8 @@ class _Action:
 
     record: Callable[..., object]
     needed: tuple[str, ...]
-    optional: tuple[str, ...]
+    optional: Mapping[str, str | None]  # with what each is unless it is sent
     done: str  # with what it took, and what it returned as {result}
-
-
-def _draw(study: StudyPaths, protocol: Any) -> int:
-    return len(allot_schedules(study, protocol))
-
-
-def _note(*where: Any, kind: str | None, **fields: Any) -> str:
-    of_kind: Any = kind or "note"
-    record_note(*where, kind=of_kind, **fields)
-    return str(of_kind)
-
-
-def _skip(study: StudyPaths, _: Any, rater: str, session: str, **fields: Any) -> None:
-    record_skip(study, rater, session, **fields)
 
 
 def _unblind(*where: Any, **fields: Any) -> str:
@@ -101,32 +87,42 @@ def _unblind(*where: Any, **fields: Any) -> str:
 _SIGNED = ("who", "why")
 _SESSION = ("rater", "session")
 ACTIONS = {
-    "draw": _Action(_draw, (), (), "All {result} schedules are drawn."),
+    "draw": _Action(
+        lambda *where: len(allot_schedules(*where)),
+        (),
+        {},
+        "All {result} schedules are drawn.",
+    ),
     "note": _Action(
-        _note,
+        record_note,
         ("text", "who"),
-        ("kind", *_SESSION, "severity", "action", "outcome"),
-        "Recorded: {result}.",
+        {
+            "kind": "note",
+            **dict.fromkeys((*_SESSION, "severity", "action", "outcome")),
+        },
+        "Recorded: {kind}.",
     ),
     "answer": _Action(
         record_answer,
         (*_SESSION, "question", *_SIGNED),
-        ("answer", "code"),
+        dict.fromkeys(("answer", "code")),
         "The answer to {question} is corrected; what it was stays in the log.",
     ),
     "skip": _Action(
-        _skip,
+        record_skip,
         (*_SESSION, "code", *_SIGNED),
-        (),
+        {},
         "{code} of {rater}, session {session}, is left without a grade.",
     ),
     "withdraw": _Action(
         partial(record_standing, standing="withdrawn"),
         ("rater", *_SIGNED),
-        (),
+        {},
         "{rater} is withdrawn; the grades given before are kept.",
     ),
-    "unblind": _Action(_unblind, ("code", *_SIGNED), _SESSION, "Recorded. {result}."),
+    "unblind": _Action(
+        _unblind, ("code", *_SIGNED), dict.fromkeys(_SESSION), "Recorded. {result}."
+    ),
 }
 """What is recorded of a study, by name."""
 
@@ -244,7 +240,9 @@ class CoordinatorPages(Pages):
 
     def _record(self, action: _Action, fields: Fields) -> str:
         texts = needed(fields, *action.needed)
-        texts |= {name: text(fields, name) for name in action.optional}
+        texts |= {
+            name: text(fields, name) or usual for name, usual in action.optional.items()
+        }
         protocol = read_protocol(self._study.protocol)
         result = action.record(self._study, protocol, **texts)
         return action.done.format(**texts, result=result)

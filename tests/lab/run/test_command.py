@@ -174,7 +174,7 @@ def test_a_fault_is_skipped_later_and_its_grade_given_later_still(
     said, _ = typed("record", "skip", study.root, *R1, "--code", first, *KIM)
     assert f"{first} of R1, session test, is skipped" in said
     with pytest.raises(SessionLogError, match=r"and is not skipped yet \(none\)"):
-        record_skip(study, "R1", "test", code=first, **BY)
+        record_skip(*faulty, "R1", "test", code=first, **BY)
     with pytest.raises(SessionLogError, match=r"was presented \(.*\), got"):
         record_correction(*faulty, "R1", "test", code=second, grade="1", **BY)
     assert "Presentation 1 of 3" not in by_console(faulty, "\nskip a\n\nskip b\n")
@@ -196,7 +196,7 @@ def test_a_grade_is_corrected_to_missing_and_back_and_not_skipped(small: Small) 
     with pytest.raises(SessionLogError, match="needed a code that has a grade"):
         record_correction(*small, "R1", "test", code=first, grade=None, **BY)
     with pytest.raises(SessionLogError, match="needed a code that a fault stopped"):
-        record_skip(small[0], "R1", "test", code=first, **BY)
+        record_skip(*small, "R1", "test", code=first, **BY)
     assert not verify_study(study).findings
     for _ in range(2):
         said, _ = typed(*correct, "--grade", "4")
