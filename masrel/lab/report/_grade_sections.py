@@ -345,7 +345,7 @@ _CONFUSION = "Grades given for each intended grade"
 
 
 def confusion_section(material: Material, result: _GivenGrades) -> Iterator[Content]:
-    """Show which grades models of each intended grade were result."""
+    """Show which grades models of each intended grade were given."""
     grades, level = material.ratings.scale.grades, material.analysis.level
     caption = f"{_CONFUSION}, session {result.session}"
     framed = np.array([[grade == aim for grade in grades] for aim in result.intended])
@@ -404,7 +404,7 @@ def confusion_section(material: Material, result: _GivenGrades) -> Iterator[Cont
 
 _RECONSTRUCTED = (
     "Reconstructed answers are one set that fits the published mean and standard "
-    "deviation, not the answers that were result."
+    "deviation, not the answers that were given."
 )
 
 _WITHHELD = (
