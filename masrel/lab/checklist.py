@@ -1,92 +1,213 @@
-"""Checklists of guidelines: what is asked for, what the record says, and their forms.
+"""Checklists of reporting guidelines, filled from the record of a study.
+
+In: a study. Out: the items of a guideline, each with what masrel knows of it and the
+files that say so; what only the authors know is left to them.
 
 Kottner et al. (2011), GRRAS: 15 items. Mokkink et al. (2020), COSMIN: six design
 standards of studies on reliability, which the author grades and masrel does not.
-Topics are in our words; ``templates/facts.txt`` has what the record says to each.
+Topics are in our words; what the record says is in ``report/templates/facts.txt``.
 """
 
 import hashlib
+import statistics
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import date
 from importlib.resources import files
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import masrel
 from masrel._files import write_file
+from masrel._input import listed
 from masrel.errors import ParameterError
 from masrel.lab._study_files import MAX_TABLE, read_regular
-from masrel.lab.checklist._facts import StudyFacts, gather_facts, words_of
+from masrel.lab.analysis import Analysis, analyze
+from masrel.lab.progress import RaterProgress, rater_progress, session_progress
 from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.ratings import Ratings, corrections_of, read_study_data, study_remarks
+from masrel.lab.report._design import (
+    beside_presentations,
+    size_sentence,
+    stretches_asked_for,
+)
+from masrel.lab.report._material import TARGETS, coefficient_name
 from masrel.lab.report._pages import converted
+from masrel.lab.run._state import read_session
+from masrel.lab.schedule._orders import orders_in_words
+from masrel.lab.schedule.presentation import _read_drawn
+from masrel.tables._estimate_words import sentence
+from masrel.tables._tables import counted, number, percent
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-State = Literal["filled", "in part", "authors"]
+__all__ = ["checklist_markdown", "fill_checklist", "write_checklist"]
+
+_CONDITIONS = {
+    "device": "Device",
+    "grades": "Grades from",
+    "clock": "Clock of the device",
+    "masrel_version": "Version of masrel",
+    "presented_sha256": "SHA-256 of what is presented",
+}
+"""What must be the same for like conditions: fields of a log's head, and their names"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _SessionFacts:
+    """One session of one rater that has begun."""
+
+    rater: str
+    day: date  # on which it began, UTC
+    header: Mapping[str, str]  # by the keys of `_CONDITIONS`
+    is_complete: bool
+    n_faults: int
+    log: Path
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _StudyFacts:
+    """What the record of a study says."""
+
+    # None before there are ratings
+    ratings: Ratings | None
+    analysis: Analysis | None
+    sessions: tuple[_SessionFacts, ...]
+    days_between: Sequence[int]  # of a rater's session and the one before, sorted
+    n_corrections: int
+    remarks: tuple[str, ...]
+    raters: tuple[RaterProgress, ...]
+    n_schedules: int  # drawn
+    n_concealed: int  # of these, those drawn from a secret that is not published
+    files: Mapping[str, Sequence[Path]]  # by what they are, from the study's folder
+
+
+def _gather_facts(paths: StudyPaths, protocol: Protocol) -> _StudyFacts:
+    """Read everything of a study that a guideline asks for."""
+    ratings = analysis = None
+    tables = [f for f in (paths.ratings_file, paths.published_file) if f.is_file()]
+    if paths.logs() or tables:
+        data = read_study_data(paths, protocol)
+        ratings = data.ratings
+        analysis = analyze(
+            protocol, ratings, in_person=data.in_person, excluded=data.excluded
+        )
+    pairs = protocol.rater_sessions
+    drawn = [schedule for _, schedule in _read_drawn(paths, pairs)]
+    is_published = paths.published_secret_file.is_file()
+    begun = (_session(rater, paths.log_file(rater, each)) for rater, each in pairs)
+    sessions = tuple(session for session in begun if session is not None)
+    days: dict[str, list[date]] = {}
+    for session in sessions:
+        days.setdefault(session.rater, []).append(session.day)
+    named = {
+        "protocol": [paths.protocol],
+        "logs": [session.log for session in sessions],
+        "ratings": tables[:1],
+    }
+    return _StudyFacts(
+        ratings=ratings,
+        analysis=analysis,
+        sessions=sessions,
+        days_between=sorted(
+            (after - before).days
+            for of_rater in days.values()
+            for before, after in pairwise(sorted(of_rater))
+        ),
+        n_corrections=len(corrections_of(paths, protocol)),
+        remarks=study_remarks(paths, protocol, include=()),
+        raters=rater_progress(paths, protocol, session_progress(paths, protocol)),
+        n_schedules=len(drawn),
+        n_concealed=sum(s.commitment is not None for s in drawn) * (not is_published),
+        files={
+            key: [file.relative_to(paths.root) for file in files]
+            for key, files in named.items()
+        },
+    )
+
+
+def _session(rater: str, log: Path) -> _SessionFacts | None:
+    events, state = read_session(log) if log.is_file() else ((), None)
+    if state is None or not state.header:
+        return None
+    shown = (event for events in state.presented.values() for event in events)
+    return _SessionFacts(
+        rater=rater,
+        day=date.fromisoformat(events[0].time_utc[:10]),
+        header={name: str(state.header.get(name)) for name in _CONDITIONS},
+        is_complete=state.is_complete,
+        n_faults=sum(event.fields["fault"] is not None for event in shown),
+        log=log,
+    )
+
+
+def _words_of(facts: _StudyFacts, protocol: Protocol) -> dict[str, object]:
+    """Return what a template says facts with."""
+    orders = "an order of their own, all orders equally likely"
+    if protocol.schedule.scheme != "random-order":
+        orders = orders_in_words(protocol.schedule)
+    fields = protocol.rater_fields.items()
+    return {
+        "facts": facts,
+        "protocol": protocol,
+        "orders": orders,
+        "not_public": listed(f.title or name for name, f in fields if not f.public),
+        "names_of_conditions": _CONDITIONS,
+        "targets": TARGETS,
+        "tally": _tally,
+        "range_of": _range_of,
+        "counted": counted,
+        "percent": percent,
+        "sentence": sentence,
+        "size_sentence": size_sentence,
+        "coefficient_name": coefficient_name,
+        "stretches_asked_for": stretches_asked_for,
+        "beside_presentations": beside_presentations,
+    }
+
+
+def _tally(values: Iterable[object], form: str) -> list[str]:
+    """Return each value with how often it comes, in the order of first coming."""
+    return [form.format(value, n) for value, n in Counter(map(str, values)).items()]
+
+
+def _range_of(values: Sequence[float], unit: str) -> str:
+    if not values:
+        return "not known"
+    ends = f"{number(min(values), None)} to {number(max(values), None)} {unit}"
+    return f"{ends.strip()}, median {number(statistics.median(values), None)}"
+
+
+_State = Literal["filled", "in part", "authors"]
 """Who fills an item: the record, both, or the authors alone."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ChecklistItem:
-    """One item of a guideline.
+class _ChecklistItem:
+    """One item of a guideline."""
 
-    Attributes
-    ----------
-    number : str
-        Its number in the guideline.
-    topic : str
-        What it asks for, in our words.
-    state : {"filled", "in part", "authors"}
-        Whether the record of the study answers it.
-    facts : tuple of str
-        What the record says, one sentence or more each.
-    to_add : str
-        What the authors have to add; empty where nothing.
-    sources : tuple of Path
-        The files that say so, from the study's folder.
-    """
-
-    number: str
-    topic: str
-    state: State
-    facts: tuple[str, ...] = ()
-    to_add: str = ""
-    sources: tuple[Path, ...] = ()
+    number: str  # in the guideline
+    topic: str  # what it asks for, in our words
+    state: _State
+    facts: tuple[str, ...] = ()  # what the record says, one sentence or more each
+    to_add: str = ""  # what the authors have to add
+    sources: tuple[Path, ...] = ()  # that say so, from the study's folder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Checklist:
-    """A guideline with what the record of a study says to each of its items.
-
-    Attributes
-    ----------
-    guideline : str
-        Its short name, of `GUIDELINES`.
-    title : str
-        Its name.
-    reference : str
-        Where it is published.
-    study : str
-        The title of the study.
-    items : tuple of ChecklistItem
-        In the guideline's order.
-    notes : tuple of str
-        What a reader must know before the items.
-    files : mapping of str to str
-        SHA-256 of each file that an item names.
-    masrel_version : str
-        The version that filled it.
-    """
+class _Checklist:
+    """A guideline with what the record of a study says to each of its items."""
 
     guideline: str
     title: str
-    reference: str
-    study: str
-    items: tuple[ChecklistItem, ...]
-    notes: tuple[str, ...]
-    files: Mapping[str, str] = field(hash=False)
+    reference: str  # where it is published
+    study: str  # its title
+    items: tuple[_ChecklistItem, ...]
+    notes: tuple[str, ...]  # what a reader must know before the items
+    files: Mapping[str, str] = field(hash=False)  # SHA-256 of each that an item names
     masrel_version: str
 
 
@@ -190,62 +311,27 @@ _GUIDELINES: dict[str, tuple[str, str, tuple[_Entry, ...]]] = {
     ),
 }
 
-GUIDELINES = tuple(_GUIDELINES)
-"""Names of the guidelines."""
 
-
-def fill_checklist(study: StudyPaths, protocol: Protocol, guideline: str) -> Checklist:
+def fill_checklist(study: StudyPaths, protocol: Protocol, guideline: str) -> _Checklist:
     """Fill the checklist of a reporting guideline from the record of a study.
 
-    Parameters
-    ----------
-    study : StudyPaths
-        Where the study is; it may have no ratings yet.
-    protocol : Protocol
-        The study's protocol.
-    guideline : {"grras", "cosmin"}
-        Kottner et al. (2011), 15 items; or the design standards of Mokkink et al.
-        (2020), 6 items, to which no grade is given.
-
-    Returns
-    -------
-    Checklist
-        Every item with what the record says of it.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such guideline.
-    RatingsError
-        If the ratings are damaged, or not what the session logs say.
-    SessionLogError
-        If a log is damaged.
-    ScheduleError
-        If a schedule is damaged, or that of a log is missing or stale.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from masrel.lab.protocol import StudyPaths, read_protocol
-    >>> study = StudyPaths(Path("studies/hess2012"))
-    >>> filled = fill_checklist(study, read_protocol(study.protocol), "grras")
-    >>> [item.number for item in filled.items if item.state == "filled"]
-    ['6', '10', '11', '13', '15']
+    Before there are ratings what is known of the plan is said. A damaged record is
+    refused.
     """
     if guideline not in _GUIDELINES:
         raise ParameterError(
             f"guideline: needed one of {', '.join(_GUIDELINES)}, got {guideline!r}"
         )
     title, reference, entries = _GUIDELINES[guideline]
-    facts = gather_facts(study, protocol)
+    facts = _gather_facts(study, protocol)
     say = _environment().overlay(finalize=_in_one_line).get_template("facts.txt")
-    macros = say.make_module(words_of(facts, protocol))
+    macros = say.make_module(_words_of(facts, protocol))
     items = tuple(
         _item(facts, str(number), entry, lambda name: str(getattr(macros, name)()))
         for number, entry in enumerate(entries, start=1)
     )
     named = sorted({file for item in items for file in item.sources})
-    return Checklist(
+    return _Checklist(
         guideline=guideline,
         title=title,
         reference=reference,
@@ -263,8 +349,8 @@ def fill_checklist(study: StudyPaths, protocol: Protocol, guideline: str) -> Che
 
 
 def _item(
-    facts: StudyFacts, number: str, entry: _Entry, say: Callable[[str], str]
-) -> ChecklistItem:
+    facts: _StudyFacts, number: str, entry: _Entry, say: Callable[[str], str]
+) -> _ChecklistItem:
     to_add, names = entry.to_add, entry.facts
     if "ratings" in entry.sources and facts.ratings is None:
         to_add, names = "There are no ratings yet.", ()
@@ -273,11 +359,11 @@ def _item(
     elif "logs" in entry.sources and not (facts.sessions or to_add):
         to_add = "What no log of a session says."
     if not names:
-        return ChecklistItem(
+        return _ChecklistItem(
             number=number, topic=entry.topic, state="authors", to_add=to_add
         )
     lines = (line.strip() for name in names for line in say(name).split("\n"))
-    return ChecklistItem(
+    return _ChecklistItem(
         number=number,
         topic=entry.topic,
         state="in part" if to_add else "filled",
@@ -292,7 +378,7 @@ def _in_one_line(value: object) -> object:
     return " ".join(value.splitlines()) if isinstance(value, str) else value
 
 
-def _notes(facts: StudyFacts) -> tuple[str, ...]:
+def _notes(facts: _StudyFacts) -> tuple[str, ...]:
     if facts.ratings is None:
         return ("No session has begun: what follows is the plan.",)
     if not facts.ratings.simulated:
@@ -304,32 +390,15 @@ def _notes(facts: StudyFacts) -> tuple[str, ...]:
 
 _HEADINGS = ("Item", "Asks for", "State", "What the record says", "Files")
 
-_STATES: dict[State, str] = {
+_STATES: dict[_State, str] = {
     "filled": "filled from the record",
     "in part": "filled in part",
     "authors": "for the authors alone",
 }
 
 
-def write_checklist(checklist: Checklist, path: Path) -> None:
-    """Write a checklist as a file whose form its ending says.
-
-    Parameters
-    ----------
-    checklist : Checklist
-        What `fill_checklist` returned.
-    path : Path
-        A file that ends in ``.html``, ``.md`` or ``.docx``. The same checklist gives
-        the same bytes.
-
-    Raises
-    ------
-    ParameterError
-        If the ending is another, the file is a study's primary record, or pandoc
-        is needed and is not installed.
-    OSError
-        If the file cannot be written.
-    """
+def write_checklist(checklist: _Checklist, path: Path) -> None:
+    """Write a checklist as .html, .md or .docx; the same one gives the same bytes."""
     if path.suffix not in _FORMS:
         raise ParameterError(
             f"output: needed a file that ends in {', '.join(_FORMS)}, got {path}"
@@ -337,19 +406,8 @@ def write_checklist(checklist: Checklist, path: Path) -> None:
     write_file(path, _FORMS[path.suffix](checklist))
 
 
-def checklist_markdown(checklist: Checklist) -> str:
-    """Return a checklist as Markdown.
-
-    Parameters
-    ----------
-    checklist : Checklist
-        What `fill_checklist` returned.
-
-    Returns
-    -------
-    str
-        A section for each item, then the files with their hashes.
-    """
+def checklist_markdown(checklist: _Checklist) -> str:
+    """Return a checklist as Markdown: a section an item, then files with hashes."""
     lines = [f"# {_plain(checklist.study)}", ""]
     lines += [f"{_plain(text)}\n" for text in _introduction(checklist)]
     for item in checklist.items:
@@ -374,26 +432,26 @@ def _plain(text: str) -> str:
     return " ".join(text.translate(_ESCAPES).split())
 
 
-def _introduction(checklist: Checklist) -> tuple[str, ...]:
+def _introduction(checklist: _Checklist) -> tuple[str, ...]:
     head = f"{checklist.title}: {checklist.reference}. Topics are in our words."
     return (head, *checklist.notes, _summary(checklist))
 
 
-def _summary(checklist: Checklist) -> str:
+def _summary(checklist: _Checklist) -> str:
     counts = Counter(item.state for item in checklist.items)
     parts = [f"{counts[state]} {text}" for state, text in _STATES.items()]
     return f"Of {len(checklist.items)} items {', '.join(parts)}."
 
 
-def _numbers(checklist: Checklist, item: ChecklistItem) -> str:
+def _numbers(checklist: _Checklist, item: _ChecklistItem) -> str:
     # of the files an item names, such as "1, 3-24" where they follow each other
     places = list(checklist.files)
     ranges: list[list[int]] = []
-    for number in sorted(places.index(file.as_posix()) + 1 for file in item.sources):
-        if ranges and number == ranges[-1][-1] + 1:
-            ranges[-1].append(number)
+    for place in sorted(places.index(file.as_posix()) + 1 for file in item.sources):
+        if ranges and place == ranges[-1][-1] + 1:
+            ranges[-1].append(place)
         else:
-            ranges.append([number])
+            ranges.append([place])
     return ", ".join(
         f"{each[0]}–{each[-1]}" if len(each) > 2 else ", ".join(map(str, each))
         for each in ranges
@@ -410,14 +468,14 @@ def _environment() -> "Environment":
     )
 
     return Environment(
-        loader=PackageLoader("masrel.lab.checklist"),
+        loader=PackageLoader("masrel.lab.report"),
         autoescape=select_autoescape(["html"]),
         undefined=StrictUndefined,
         keep_trailing_newline=True,
     )
 
 
-def _html(checklist: Checklist) -> str:
+def _html(checklist: _Checklist) -> str:
     style = files("masrel.pages").joinpath("templates/page.css")
     return (
         _environment()
@@ -432,7 +490,7 @@ def _html(checklist: Checklist) -> str:
     )
 
 
-_FORMS: dict[str, Callable[[Checklist], str | bytes]] = {
+_FORMS: dict[str, Callable[[_Checklist], str | bytes]] = {
     ".html": _html,
     ".md": checklist_markdown,
     ".docx": lambda made: converted(checklist_markdown(made), "docx", pictures={}),
