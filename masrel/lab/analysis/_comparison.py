@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from masrel._input import refuse
 from masrel.agreement import COEFFICIENTS, p_value
 from masrel.errors import ParameterError, UndefinedStatisticWarning
 from masrel.estimates import Estimate
@@ -146,19 +147,21 @@ def read_old_analysis(place: Path, study: str, *, option: str) -> dict[str, Any]
         document = parse_json(read_regular(file, most=MAX_TABLE))
     except ValueError as error:
         raise ParameterError(f"{option}: {file}: is no analysis: {error}") from error
-    if not isinstance(document, dict) or not isinstance(document.get("study"), str):
-        raise ParameterError(f"{option}: {file}: is no analysis of a study")
-    if document.get("format", 1) != ANALYSIS_FORMAT:
-        raise ParameterError(
-            f"{option}: {file}: needs format {ANALYSIS_FORMAT}, got "
-            f"{document['format']!r}"
-        )
-    if document["study"] != study:
-        raise ParameterError(
-            f"{option}: needs an analysis of the study {study!r}, {file} is of "
-            f"{document['study']!r}"
-        )
-    return document
+    is_analysis = isinstance(document, dict) and isinstance(document.get("study"), str)
+    head: dict[str, Any] = document if is_analysis else {}
+    version, of = head.get("format", 1), head.get("study")
+    refuse(
+        (not is_analysis, f"{option}: {file}: is no analysis of a study"),
+        (
+            version != ANALYSIS_FORMAT,
+            f"{option}: {file}: needs format {ANALYSIS_FORMAT}, got {version!r}",
+        ),
+        (
+            of != study,
+            f"{option}: needs an analysis of the study {study!r}, {file} is of {of!r}",
+        ),
+    )
+    return head
 
 
 def changes_between(

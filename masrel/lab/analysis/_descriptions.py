@@ -2,6 +2,7 @@
 
 import math
 import statistics
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from operator import attrgetter
@@ -37,39 +38,38 @@ def intended_agreement(
     # [1] Park, H.-S., Kim, J., Damiano, D. L. (2012). Development of a Haptic Elbow
     # Spasticity Simulator (HESS). IEEE TNSRE, 20(3), 361-370, section IV.B.
     # https://doi.org/10.1109/TNSRE.2012.2195330
-    rows = [row for row in ratings.rows if row.session == session]
-    models = []
-    for model in protocol.models if session is not None else ():
-        if model.role != "standard" or model.intended_grade is None:
-            continue
-        of_model = [row.grade for row in rows if row.model == model.id]
-        grades = [grade for grade in of_model if grade is not None]
-        n_agree = grades.count(model.intended_grade)
-        models.append(
-            ModelAgreement(
-                model=model.id,
-                intended_grade=model.intended_grade,
-                n_ratings=len(grades),
-                n_agree=n_agree,
-                percent=100.0 * n_agree / len(grades) if grades else math.nan,
-            )
+    graded = Counter(
+        (row.model, row.grade)
+        for row in ratings.rows
+        if row.session == session and row.grade is not None
+    )
+    n_ratings = Counter(model for model, _ in graded.elements())
+    models = [
+        ModelAgreement(
+            model=model.id,
+            intended_grade=aim,
+            n_ratings=n_ratings[model.id],
+            n_agree=graded[model.id, aim],
+            percent=100.0 * graded[model.id, aim] / n_ratings[model.id]
+            if n_ratings[model.id]
+            else math.nan,
         )
+        for model in (protocol.models if session is not None else ())
+        if model.role == "standard" and (aim := model.intended_grade) is not None
+    ]
     percents = [row.percent for row in models if row.n_ratings]
-    reason = None
-    if session is None:
-        reason = "no session of the protocol has ratings"
-    elif not models:
-        reason = "no standard model has an intended grade"
-    elif not percents:
-        reason = "no standard model has a rating"
-    elif len(percents) == 1:
-        reason = "one model has no standard deviation over models"
+    reasons = (
+        (session is None, "no session of the protocol has ratings"),
+        (not models, "no standard model has an intended grade"),
+        (not percents, "no standard model has a rating"),
+        (len(percents) == 1, "one model has no standard deviation over models"),
+    )
     return IntendedAgreement(
         session=session if models else None,
         models=tuple(models),
         mean=statistics.fmean(percents) if percents else math.nan,
         sd=statistics.stdev(percents) if len(percents) > 1 else math.nan,
-        reason=reason,
+        reason=next((reason for is_so, reason in reasons if is_so), None),
     )
 
 

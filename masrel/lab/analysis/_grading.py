@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.errors import ParameterError, RatingsError, UndefinedStatisticWarning
+from masrel._input import refuse
+from masrel.errors import RatingsError, UndefinedStatisticWarning
 from masrel.lab.protocol import Protocol, elbow_parameters
 from masrel.lab.ratings import Ratings
 
@@ -221,18 +222,23 @@ def grade_regression(
 def _check_options(
     protocol: Protocol, predictors: Sequence[str], session: str | None, level: float
 ) -> None:
-    unknown = [name for name in predictors if name not in PREDICTORS]
-    if unknown or not predictors or len(set(predictors)) < len(predictors):
-        raise ParameterError(
-            f"predictors: need some of {', '.join(PREDICTORS)}, each once, got "
-            f"{', '.join(predictors) or 'none'}"
-        )
-    if not 0.5 < level < 1.0:
-        raise ParameterError(f"level: needs more than 0.5 and less than 1, got {level}")
+    known = {*PREDICTORS} >= {*predictors}
     sessions = [declared.id for declared in protocol.sessions]
-    if session is not None and session not in sessions:
-        known = ", ".join(sessions)
-        raise ParameterError(f"session: needs one of {known}, got {session!r}")
+    refuse(
+        (
+            not (known and predictors) or len({*predictors}) < len(predictors),
+            f"predictors: need some of {', '.join(PREDICTORS)}, each once, got "
+            f"{', '.join(predictors) or 'none'}",
+        ),
+        (
+            not 0.5 < level < 1.0,
+            f"level: needs more than 0.5 and less than 1, got {level}",
+        ),
+        (
+            session is not None and session not in sessions,
+            f"session: needs one of {', '.join(sessions)}, got {session!r}",
+        ),
+    )
 
 
 def _predictor_table(

@@ -99,14 +99,19 @@ def _document(
     return {**document, "anchors": [dataclasses.asdict(anchor) for anchor in anchors]}
 
 
-def _stage_of(record: "SessionRecord") -> str:
-    if record.stage in ("not begun", "unreadable"):
-        return record.stage
-    counts = f"{record.n_graded} of {record.n_presentations} graded"
-    skipped = f", {record.n_skipped} skipped" if record.n_skipped else ""
-    corrected = f", {record.n_corrections} corrected" if record.n_corrections else ""
-    counts += skipped + corrected
-    return f"{record.stage}, {counts}, {record.n_recordings} recordings"
+def _line_of(record: "SessionRecord") -> str:
+    # how far a session, a rehearsal or a training came
+    which = f"{record.session} {record.rater}"
+    if record.rehearsal is not None:
+        which = f"rehearsal {record.rehearsal} of {which}"
+    if record.stage in ("not begun", "unreadable") and record.session != "training":
+        return f"{which}: {record.stage}"
+    is_training = record.session == "training"
+    of = "" if is_training else f" of {record.n_presentations}"
+    parts = [f"{which}: {record.stage}", f"{record.n_graded}{of} graded"]
+    parts += [f"{record.n_skipped} skipped"] * bool(record.n_skipped)
+    parts += [f"{record.n_corrections} corrected"] * bool(record.n_corrections)
+    return ", ".join([*parts, f"{record.n_recordings} recordings"])
 
 
 def _show(
@@ -115,15 +120,9 @@ def _show(
     anchors: "tuple[Anchor, ...]",
     n_broken: int,
 ) -> None:
-    for record in (*verification.sessions, *verification.rehearsals):
-        number = record.rehearsal
-        which = "" if number is None else f"rehearsal {number} of "
-        click.echo(f"{which}{record.session} {record.rater}: {_stage_of(record)}")
-    for training in verification.trainings:
-        click.echo(
-            f"training {training.rater}: {training.stage}, {training.n_graded} graded, "
-            f"{training.n_recordings} recordings"
-        )
+    sessions = (*verification.sessions, *verification.rehearsals)
+    for record in (*sessions, *verification.trainings):
+        click.echo(_line_of(record))
     for anchor in anchors:
         click.echo(f"anchor: {anchor}")
     for finding in verification.findings:

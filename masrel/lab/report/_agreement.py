@@ -100,14 +100,7 @@ def estimates_section(
         return
     every = estimate_rows(planned)
     rows = _few_of_many(every)
-    table = estimate_table(rows, name=name, caption=caption, data=material.data)
-    if len(rows) < len(every):
-        full = estimate_table(every, name=name, caption=caption, data=material.data)
-        note = "Of many raters, five by their value; the file has all."
-        table = dataclasses.replace(
-            table, rows=full.rows, page_rows=table.rows, notes=(*table.notes, note)
-        )
-    yield table
+    yield _estimate_table(every, rows, name=name, caption=caption, data=material.data)
     intervals = [row.interval for row in rows if row.interval is not None]
     for text in dict.fromkeys(meaning(interval) for interval in intervals):
         yield Paragraph(text=text)
@@ -175,10 +168,15 @@ def _few_of_many(rows: Sequence[EstimateRow]) -> list[EstimateRow]:
     return shown
 
 
-def estimate_table(
-    rows: Sequence[EstimateRow], *, name: str, caption: str, data: str
+def _estimate_table(
+    every: Sequence[EstimateRow],
+    rows: Sequence[EstimateRow],
+    *,
+    name: str,
+    caption: str,
+    data: str,
 ) -> Table:
-    """Return a table of estimates."""
+    # rows: those of a page; the file has every one
     # On a page an interval is one column, marked with a letter; a note below says what
     # each letter means: level, method, and what the interval generalises to.
     marks: dict[str, str] = {}
@@ -211,11 +209,14 @@ def estimate_table(
     strengths = [column.key for column in _COLUMNS].index("strength")
     if any(row[strengths] is not None for row in cells):
         notes.append(_LANDIS_KOCH)
+    if len(rows) < len(every):
+        notes.append("Of many raters, five by their value; the file has all.")
     return Table(
         name=name,
         caption=caption,
         columns=_COLUMNS,
-        rows=tuple(cells),
+        rows=tuple(_cells(row, "") for row in every),
+        page_rows=tuple(cells),
         notes=tuple(notes),
         data=data,
     )

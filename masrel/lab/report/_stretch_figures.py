@@ -101,8 +101,7 @@ def _small_panels(panels: Sequence[TracePanel]) -> tuple[Figure, NDArray[Any]]:
         axes.grid(axis="y")
         is_first, is_lowest = place % n_columns == 0, place + n_columns >= len(panels)
         axes.tick_params(labelleft=is_first, labelbottom=is_lowest)
-        axes.set_xlabel("time (s)" if is_lowest else "")
-        axes.set_ylabel("torque (N·m)" if is_first else "")
+        axes.set(xlabel="time (s)" * is_lowest, ylabel="torque (N·m)" * is_first)
     for axes in others:
         axes.set_visible(False)
     return figure, grid
@@ -193,15 +192,13 @@ def catch_figure(curves: Sequence[Catches]) -> Figure:
                     at, height, "o", markersize=6.5, markerfacecolor="none",
                     markeredgecolor=colour, markeredgewidth=0.8,
                 )  # fmt: skip
-    angle.set_xlabel("mean speed before\nthe catch (deg/s)")
-    angle.set_ylabel("catch angle (deg)")
+    angle.set(xlabel="mean speed before\nthe catch (deg/s)", ylabel="catch angle (deg)")
     for axes, text in (
         (duration, "catch duration (s)"),
         (travel, "duration × speed (deg)"),
     ):
-        axes.set_xlabel("mean speed during\nthe catch (deg/s)")
+        axes.set(xlabel="mean speed during\nthe catch (deg/s)", ylabel=text)
         axes.set_ylim(bottom=0.0)
-        axes.set_ylabel(text)
     ring: dict[str, Any] = {"marker": "o", "markerfacecolor": "none", "ls": "none"}
     handles = [*travel.get_lines(), Line2D([], [], color=GREY, **ring)]
     labels = [*(curve[0] for curve in curves), "ν$_L$ and ν$_H$ of (6)"]
@@ -261,7 +258,6 @@ def schematic_figure(
         x, y = 0.5 * (one[0] + other[0]), 0.5 * (one[1] + other[1]) + up
         axes.text(x, y, text, fontsize=9, parse_math=True, **how)  # type: ignore[arg-type]
     axes.set_xlim(line.time[0], line.time[-1])
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel("torque (N·m)")
+    axes.set(xlabel="time (s)", ylabel="torque (N·m)")
     axes.set_title(title, loc="left")
     return figure

@@ -298,8 +298,7 @@ def _draw_differences(axes: Axes, differences: Any) -> None:
                 markersize=4.5, color=colour, label=label,
             )  # fmt: skip
     axes.axhline(0.0, color=GREY, linewidth=0.7, zorder=1.0)
-    axes.set_xlabel("presentation")
-    axes.set_ylabel("grades too high")
+    axes.set(xlabel="presentation", ylabel="grades too high")
     axes.set_xlim(0.0, len(differences) + 1.0)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=5))

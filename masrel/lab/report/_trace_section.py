@@ -7,6 +7,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Literal
 
@@ -440,15 +441,14 @@ def _first_of_each_model(material: Material, folder: Path) -> list[Recording]:
     # by model, in the protocol's order; of the first session and rater that have one
     models = [model.id for model in material.protocol.models]
     first: dict[str, Recording] = {}
-    for session in material.sessions:
-        for rater in material.raters:
-            for path in sorted((folder / f"{session}_{rater}").glob("*.npz")):
-                recording = read_recording(path)
-                has_torque = MEASURED_TORQUE in recording.channels
-                if has_torque and recording.facts["fault"] is None:
-                    first.setdefault(str(recording.facts["model"]), recording)
-            if first.keys() >= set(models):
-                break
+    for session, rater in product(material.sessions, material.raters):
+        if first.keys() >= {*models}:
+            break
+        for path in sorted((folder / f"{session}_{rater}").glob("*.npz")):
+            recording = read_recording(path)
+            has_torque = MEASURED_TORQUE in recording.channels
+            if has_torque and recording.facts["fault"] is None:
+                first.setdefault(str(recording.facts["model"]), recording)
     return [first[model] for model in models if model in first]
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING, Any, Literal
 
+from masrel._input import refuse
 from masrel.errors import ParameterError
 from masrel.lab.recording import PHASES
 from masrel.plots._drawn_values import Drawn
@@ -291,37 +292,39 @@ def check_view(scenes: Sequence[Scene], view: str) -> None:
     """Refuse a figure that cannot be drawn, before anything is computed for it."""
     models = _by_model(scenes)
     max_speeds = max(map(len, models.values()))
-    if len(models) > 5 or (view != "catch" and (len(models) > 4 or max_speeds > 5)):
-        raise ParameterError(
+    is_large = len(models) > 4 or max_speeds > 5
+    refuse(
+        (
+            len(models) > 5 or (view != "catch" and is_large),
             "--figure: shows 4 models at 5 speeds at most, or with --view catch 5 "
-            f"models, got {len(models)} and {max_speeds}"
-        )
-    if view in ("catch", "schematic") and len(_elbows(scenes)) < len(scenes):
-        raise ParameterError(
-            f"--view {view}: shows the catch of a spastic elbow, got other kinds too"
-        )
-    if view == "catch":
-        _check_catches(models)
-    if view == "schematic":
-        if len(scenes) != 1:
-            raise ParameterError(
-                f"--view schematic: shows one scene, got {len(scenes)}"
-            )
-        if not _n_caught(scenes):
-            raise ParameterError("--view schematic: needs a stretch that catches")
-
-
-def _check_catches(models: dict[str, list[Scene]]) -> None:
-    for name, scenes in models.items():
-        if len(scenes) < 2:
-            raise ParameterError(
-                f"--view catch: needs two or more speeds, got {len(scenes)}"
-            )
-        if (n_caught := _n_caught(scenes)) < 2:
-            raise ParameterError(
+            f"models, got {len(models)} and {max_speeds}",
+        ),
+        (
+            view in ("catch", "schematic") and len(_elbows(scenes)) < len(scenes),
+            f"--view {view}: shows the catch of a spastic elbow, got other kinds too",
+        ),
+        (
+            view == "schematic" and len(scenes) != 1,
+            f"--view schematic: shows one scene, got {len(scenes)}",
+        ),
+    )
+    for name, of_model in models.items() if view in ("catch", "schematic") else ():
+        n_caught, n = _n_caught(of_model), len(of_model)
+        refuse(
+            (
+                view == "schematic" and not n_caught,
+                "--view schematic: needs a stretch that catches",
+            ),
+            (
+                view == "catch" and n < 2,
+                f"--view catch: needs two or more speeds, got {n}",
+            ),
+            (
+                view == "catch" and n_caught < 2,
                 f"--view catch: needs two or more speeds at which {name} catches, got "
-                f"{n_caught} of {len(scenes)}"
-            )
+                f"{n_caught} of {n}",
+            ),
+        )
 
 
 def _elbows(scenes: Sequence[Scene]) -> list["ElbowParameters"]:
