@@ -17,7 +17,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from masrel.lab.elbow import STANDARD_MODELS, fit, fit_friction
-from masrel.lab.elbow.identification._model_file import QUANTITIES
+from masrel.lab.elbow._model_file import QUANTITIES
 from masrel.lab.report._fits import fit_figures
 from tests.lab.elbow.identification.synthesis import NAMES, SCATTER, Scatter, study
 from tests.lab.elbow.identification.test_friction import backdriven

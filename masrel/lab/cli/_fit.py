@@ -282,7 +282,7 @@ def _write(
 
 def _write_model(fitted: "ElbowFit", path: Path) -> None:
     import masrel
-    from masrel.lab.elbow.identification import as_toml, model_document
+    from masrel.lab.elbow._model_file import as_toml, model_document
 
     document = model_document(
         fitted.joint(),

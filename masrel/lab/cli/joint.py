@@ -148,7 +148,7 @@ def _read_source(model: str) -> _Source:
 def _rows(sources: Sequence[_Source], n_models: int) -> list[dict[str, Any]]:
     # for every new model its name, its neighbours, and the content of its file
     from masrel.lab.elbow import intermediate_models
-    from masrel.lab.elbow.identification import model_document
+    from masrel.lab.elbow._model_file import model_document
 
     joints = {source.name: source.joint for source in sources}
     if len(joints) < len(sources):
@@ -177,7 +177,7 @@ def _rows(sources: Sequence[_Source], n_models: int) -> list[dict[str, Any]]:
 
 
 def _write(rows: list[dict[str, Any]], folder: Path, *, overwrite: bool) -> None:
-    from masrel.lab.elbow.identification import as_toml
+    from masrel.lab.elbow._model_file import as_toml
 
     files = [folder / f"{row['name']}.toml" for row in rows]
     refuse_inputs(*files)
@@ -196,7 +196,7 @@ def _write(rows: list[dict[str, Any]], folder: Path, *, overwrite: bool) -> None
 
 
 def _table(rows: list[dict[str, Any]]) -> "Table":
-    from masrel.lab.elbow.identification._model_file import MODEL_KEYS, QUANTITIES
+    from masrel.lab.elbow._model_file import MODEL_KEYS, QUANTITIES
     from masrel.tables._tables import Column, Table
 
     quantities = [q for q in QUANTITIES.values() if q.key in MODEL_KEYS]

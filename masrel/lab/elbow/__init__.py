@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from masrel.lab.elbow._events import Events, PhaseSpan, StretchEvents, events
 from masrel.lab.elbow._law import SampledJoint
+from masrel.lab.elbow._model_file import intermediate_models
 from masrel.lab.elbow._scenes import Columns, SceneTable, evaluate
 from masrel.lab.elbow._torque import (
     Outline,
@@ -39,12 +40,7 @@ from masrel.lab.elbow.motions import (
 from masrel.lab.elbow.parameters import STANDARD_MODELS, ElbowParameters
 
 if TYPE_CHECKING:
-    from masrel.lab.elbow.identification import (
-        fit,
-        fit_friction,
-        intermediate_models,
-        read_movement,
-    )
+    from masrel.lab.elbow.identification import fit, fit_friction, read_movement
 
 __all__ = [
     "MODELS",
@@ -89,7 +85,7 @@ __all__ = [
     "work",
 ]
 
-_IDENTIFIED = ("fit", "fit_friction", "intermediate_models", "read_movement")
+_IDENTIFIED = ("fit", "fit_friction", "read_movement")
 
 
 def __getattr__(name: str) -> object:

@@ -5,11 +5,9 @@ https://doi.org/10.1109/TNSRE.2012.2195330, equations (1)-(6) and Table III.
 """
 
 import math
-import struct
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from masrel.errors import ParameterError
 from masrel.lab.elbow import _law
@@ -58,17 +56,8 @@ READINGS = {
 }
 
 
-class _Packed:
-    """Fields as bytes too, of which `evaluate` reads thousands fast."""
-
-    __slots__ = ("_packed",)  # no field: it is of no account to ==, hash and repr
-
-    def __reduce__(self) -> tuple[Any, ...]:  # a copy is made anew, and packed
-        return partial(type(self), **{k: getattr(self, k) for k in self.__slots__}), ()
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ElbowParameters(_Packed):
+class ElbowParameters:
     """Parameters of the joint model, in SI units (angles in rad).
 
     Angle 0 is full flexion and grows with extension.
@@ -142,7 +131,6 @@ class ElbowParameters(_Packed):
     catch_rise: float = 0.0
 
     def __post_init__(self) -> None:
-        numbers: list[float] = []  # nan for no rest angle, the place of a reading
         for name in self.__slots__:
             value = getattr(self, name)
             if name in READINGS:
@@ -150,10 +138,8 @@ class ElbowParameters(_Packed):
                     raise ParameterError(
                         f'{name}: needs "{two[0]}" or "{two[1]}", got {value!r}'
                     )
-                value = two.index(value)
             elif isinstance(value, int | float) and not math.isfinite(value):
                 raise ParameterError(f"{name}: needs a finite number, got {value}")
-            numbers.append(math.nan if value is None else value)
         for needed, is_met, names in _RANGES:
             for name in names:
                 value = getattr(self, name)
@@ -164,8 +150,6 @@ class ElbowParameters(_Packed):
                 f"catch_rise: needs 0 to peak_duration, {self.peak_duration:g} s, "
                 f"got {self.catch_rise:g} s"
             )
-        packed = struct.pack(f"{len(numbers)}d", *numbers)
-        object.__setattr__(self, "_packed", packed)
 
     @property
     def fastest_mean_speed(self) -> float:

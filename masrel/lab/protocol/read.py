@@ -15,7 +15,7 @@ from masrel.lab._study_files import (
     parse_toml,
     read_regular,
 )
-from masrel.lab.elbow.identification._model_file import (
+from masrel.lab.elbow._model_file import (
     CONSTANT_KEYS,
     FORMAT,
     MODEL_KEYS,

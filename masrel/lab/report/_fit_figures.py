@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from masrel.lab.elbow._model_file import QUANTITIES, Quantity
 from masrel.lab.elbow.identification import ElbowFit, FittedParameter, FrictionFit
 from masrel.lab.elbow.identification._catches import (
     Catch,
@@ -20,7 +21,6 @@ from masrel.lab.elbow.identification._catches import (
     Law,
     catch_levels,
 )
-from masrel.lab.elbow.identification._model_file import QUANTITIES, Quantity
 from masrel.lab.report._fits import FRICTION
 from masrel.plots._style import BLACK, BLUE, GREY, ORANGE
 from masrel.tables._tables import interval_text, number

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+from masrel.lab.elbow._model_file import ALL_QUANTITIES, Quantity
 from masrel.lab.elbow.identification import (
     ComparedFit,
     ElbowFit,
@@ -11,7 +12,6 @@ from masrel.lab.elbow.identification import (
     LackOfFit,
 )
 from masrel.lab.elbow.identification._catches import Trial
-from masrel.lab.elbow.identification._model_file import ALL_QUANTITIES, Quantity
 from masrel.plots._drawn_values import Drawn, Form
 from masrel.tables._tables import (
     ABSENT,

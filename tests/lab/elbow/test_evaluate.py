@@ -1,8 +1,5 @@
 """Many scenes at once: what one scene gives, only what is asked, bounded memory."""
 
-import copy
-import pickle
-from collections.abc import Callable
 from dataclasses import replace
 from math import isnan
 
@@ -112,29 +109,6 @@ def test_one_joint_for_many_motions_and_one_motion_for_many_joints() -> None:
     expected = [97.8, 87.8, 82.8, 77.8]  # L - 0.35 · 92
     assert np.degrees(table.column("catch_angle")) == pytest.approx(expected)
     assert evaluate(HM3, constant(92.0)).values.shape == (1, 2)
-
-
-@pytest.mark.parametrize(
-    "copied",
-    [
-        copy.copy,
-        copy.deepcopy,
-        replace,
-        lambda joint: pickle.loads(pickle.dumps(joint)),
-    ],
-)
-def test_copies_of_a_joint_give_what_it_gives(
-    copied: Callable[[ElbowParameters], ElbowParameters],
-) -> None:
-    joint = replace(
-        HM3, rest_angle=0.4, post_catch="additive", residual_reading="decrease"
-    )
-    again = copied(joint)
-    assert again == joint
-    assert hash(again) == hash(joint)
-    of_each = evaluate([joint, again, HM3], constant(92.0), LOADS).values
-    np.testing.assert_array_equal(of_each[0], of_each[1])
-    assert (of_each[0] != of_each[2]).all()
 
 
 # Columns

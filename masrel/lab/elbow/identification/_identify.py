@@ -28,6 +28,11 @@ from masrel.errors import (
     RecordingWarning,
     SmallSampleWarning,
 )
+from masrel.lab.elbow._model_file import (
+    ALL_QUANTITIES,
+    ARM_QUANTITIES,
+    QUANTITIES,
+)
 from masrel.lab.elbow.identification._catches import (
     Law,
     Stretch,
@@ -58,11 +63,6 @@ from masrel.lab.elbow.identification._lack_of_fit import (
     lack_of_fit,
     own_drifts,
     p_text,
-)
-from masrel.lab.elbow.identification._model_file import (
-    ALL_QUANTITIES,
-    ARM_QUANTITIES,
-    QUANTITIES,
 )
 from masrel.lab.elbow.identification._reading import (
     Movement,
