@@ -200,7 +200,7 @@ def _counted_blocks(material: Material, grid: _Grid) -> Iterator[Content]:
 
 
 def intended_needs(material: Material) -> IntendedAgreement | Lacking:
-    """Return how often the intended grade was result."""
+    """Return how often the intended grade was given."""
     result = material.analysis.intended
     if result is not None and result.models:
         return result

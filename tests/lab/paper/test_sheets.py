@@ -97,38 +97,28 @@ def test_a_schedule_whose_sheet_was_printed_is_not_drawn_anew(small: Small) -> N
     )
 
 
-def test_breaks_instructions_and_the_meanings_of_grades_are_printed(
-    new_study: New,
-) -> None:
-    study, protocol = new_study(
-        (
-            "[schedule]",
-            '[occasions]\ninstructions = """Sit.\n\nMove the arm."""\nbreak_after = 2\n'
-            "break_minutes = 7.5\n\n[schedule]",
-        )
-    )
-    page = write_sheets(study, protocol).html.read_text(encoding="utf-8")
-    assert "<p>Sit.</p><p>Move the arm.</p>" in page
-    assert page.count("Break of 7.5 min") == 3  # one a sheet, none after the last
-    assert "Modified Ashworth Scale" in page
-    assert "<dt>1+</dt><dd>tone slightly up" in page
-
-
-def test_practice_comes_first_and_how_to_stretch_is_said(new_study: New) -> None:
+def test_all_that_a_rater_must_know_is_printed(new_study: New) -> None:
     rules = (
-        '[occasions]\npractice = ["HM3", "D1"]\n\n[presentation]\n'
+        '[occasions]\ninstructions = """Sit.\n\nMove the arm."""\nbreak_after = 2\n'
+        'break_minutes = 7.5\npractice = ["HM3", "D1"]\n\n[presentation]\n'
         'stretches = ["slow", "fast"]\n\n[schedule]'
     )
     study, protocol = new_study(("[schedule]", rules))
     made = write_sheets(study, protocol, raters=["R1"], sessions=["test"])
     page = made.html.read_text(encoding="utf-8")
+    for words in (
+        "<p>Sit.</p><p>Move the arm.</p>",
+        "Modified Ashworth Scale",
+        "<dt>1+</dt><dd>tone slightly up",
+        "Stretch 1: slow, at most 10 deg/s (V1). Stretch 2: fast",
+    ):
+        assert words in page
+    assert page.count("Break of 7.5 min") == 1  # none after the last
+    assert not [words for words in ("HM3", "says done") if words in page]
+    # practice comes first, no rating comes of it, and none is typed
     places = [page.index(code) for code in (">P1<", ">P2<", f">{codes(study)[0]}<")]
     assert places == sorted(places)
     assert page.count('class="box none"') == 2 + 3
-    assert "HM3" not in page
-    assert "Stretch 1: slow, at most 10 deg/s (V1). Stretch 2: fast" in page
-    assert "says done" not in page
-    # no rating comes of practice, and none is typed
     (typed,) = made.typed
     assert "P1" not in typed.read_text(encoding="utf-8")
 
