@@ -36,7 +36,7 @@ HEAD = b"GET /rater HTTP/1.1\r\nHost: 127.0.0.1\r\n"
 BODY = HEAD.replace(b"GET", b"POST") + b"Content-Length: 100\r\n\r\n"
 
 
-async def is_cut(reader: asyncio.StreamReader, s: float = 0.4) -> bool:
+async def is_cut(reader: asyncio.StreamReader, s: float = 1.0) -> bool:
     """Whether a connection ends within so many seconds."""
     try:
         await asyncio.wait_for(reader.read(), s)
