@@ -6,6 +6,7 @@ from dataclasses import fields, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from masrel._input import refuse
 from masrel.errors import ParameterError
 from masrel.lab._study_files import toml_lines
 from masrel.lab.elbow.parameters import ElbowParameters
@@ -251,13 +252,14 @@ def intermediate_models(
     (12, 1.52)
     """
     gaps = len(models) - 1
-    if gaps < 1:
-        raise ParameterError(f"models: need two or more, got {len(models)}")
-    if n_models < gaps or n_models % gaps:
-        raise ParameterError(
+    refuse(
+        (gaps < 1, f"models: need two or more, got {len(models)}"),
+        (
+            n_models < gaps or n_models % max(gaps, 1),
             f"number of models: needs a multiple of {gaps}, one or more in each gap, "
-            f"got {n_models}"
-        )
+            f"got {n_models}",
+        ),
+    )
     each = n_models // gaps
     made = [
         _between(pair, models[pair[0]], models[pair[1]], i, each + 1)

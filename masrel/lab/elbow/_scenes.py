@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from masrel._input import refuse
 from masrel.errors import ParameterError
 from masrel.lab.elbow._events import Timeline, check_starts
 from masrel.lab.elbow._polynomials import Number
@@ -248,21 +249,22 @@ def evaluate(
     """
     names = tuple(outputs)
     unknown = [name for name in names if name not in _OUTPUTS]
-    if unknown or not names:
-        raise ParameterError(
-            f"outputs: needs some of {', '.join(_OUTPUTS)}, "
-            f"got {', '.join(map(repr, unknown)) or 'none'}"
-        )
-    if chunk < 1:
-        raise ParameterError(f"chunk: needs 1 or more, got {chunk}")
     joints = _listed(parameters, ElbowParameters)
     moves = _listed(motions, Motion)
     n = max(len(joints), len(moves)) if len(joints) and len(moves) else 0
-    if len(joints) not in (1, n) or len(moves) not in (1, n) or n == 0:
-        raise ParameterError(
+    refuse(
+        (
+            unknown or not names,
+            f"outputs: needs some of {', '.join(_OUTPUTS)}, "
+            f"got {', '.join(map(repr, unknown)) or 'none'}",
+        ),
+        (chunk < 1, f"chunk: needs 1 or more, got {chunk}"),
+        (
+            len(joints) not in (1, n) or len(moves) not in (1, n) or n == 0,
             "parameters, motions: need as many joints as motions, or one of either, "
-            f"got {len(joints)} and {len(moves)}"
-        )
+            f"got {len(joints)} and {len(moves)}",
+        ),
+    )
     if n > 1000:  # once so much has been given back, the allocator keeps its pages
         np.empty(128 * min(n, chunk))
     values, n_alone = np.empty((len(names), n)).T, 0

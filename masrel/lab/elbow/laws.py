@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+from masrel._input import refuse
 from masrel.errors import ParameterError
 from masrel.lab.elbow._events import events
 from masrel.lab.elbow.joint_model import JointModel, ToneModel
@@ -100,16 +101,18 @@ def tardieu(
     (77.5, 68.5)
     """
     slow, falling, fast = speeds
-    if not 0.0 < slow < falling < fast < math.inf:
-        raise ParameterError(
+    refuse(
+        (
+            not 0.0 < slow < falling < fast < math.inf,
             "speeds: need three above 0 deg/s, each faster than the one before, got "
-            + ", ".join(f"{math.degrees(speed):g}" for speed in speeds)
-        )
-    if not 0.0 <= start_angle < model.range_end:
-        raise ParameterError(
+            + ", ".join(f"{math.degrees(speed):g}" for speed in speeds),
+        ),
+        (
+            not 0.0 <= start_angle < model.range_end,
             f"start_angle: needs 0 to less than {math.degrees(model.range_end):g} "
-            f"degrees, the end of range, got {math.degrees(start_angle):g} degrees"
-        )
+            f"degrees, the end of range, got {math.degrees(start_angle):g} degrees",
+        ),
+    )
     first, second, third = (_caught(model, start_angle, speed) for speed in speeds)
     return Tardieu(
         speeds=speeds,

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from masrel._input import refuse
 from masrel.errors import ParameterError
 from masrel.lab.elbow._polynomials import (
     Number,
@@ -288,7 +289,7 @@ class MinimumJerk(_Stretch):
         with x = s - 1/2, which keeps its digits to the end.
         """
         way, fastest = self.end - self.start, 1.875 * self.mean_speed
-        length = way / self.mean_speed
+        length = self.duration
         third = way / length / length / length
         fifth, half = third / length / length, 0.5 * length
         first = (0.0, 0.0, 0.0, 10.0 * third, -15.0 * third / length, 6.0 * fifth)
@@ -385,14 +386,16 @@ class Hold(Motion):
     duration: float
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.start <= math.pi:
-            raise ParameterError(
-                f"start: needs 0 to 180 degrees, got {math.degrees(self.start):g}"
-            )
-        if not 0.0 < self.duration < math.inf:
-            raise ParameterError(
-                f"duration: needs more than 0 s and finite, got {self.duration:g}"
-            )
+        refuse(
+            (
+                not 0.0 <= self.start <= math.pi,
+                f"start: needs 0 to 180 degrees, got {math.degrees(self.start):g}",
+            ),
+            (
+                not 0.0 < self.duration < math.inf,
+                f"duration: needs more than 0 s and finite, got {self.duration:g}",
+            ),
+        )
 
     @property
     def end(self) -> float:

@@ -154,65 +154,25 @@ def _joined(motion, number):
 
 
 def _recorded(motion, number):
-    times, angles = (column.tolist() for column in (motion._knots, motion._angles))
-    t, y = [number(x) for x in times], [number(x) for x in angles]
-    h = [b - a for a, b in itertools.pairwise(t)]
-    d = [(b - a) / w for a, b, w in zip(y, y[1:], h, strict=False)]
-    if motion.interpolation == "linear":
-        yield from (_line(y[i], d[i], h[i]) for i in range(len(h)))
-        return
-    slopes = _slopes(h, d)
-    for i, width in enumerate(h):
-        yield _hermite(width, y[i], y[i + 1], slopes[i], slopes[i + 1])
+    # cubics of SciPy, or lines, whose coefficients are taken as they are
+    for _, length, (first, *others), _, _ in motion.pieces():
+        p = Polynomial([number(motion.start) + number(first), *map(number, others)])
+        yield Segment(number(length), p, p.deriv(), p.deriv(2))
 
 
-def _slopes(h: list[Number], d: list[Number]) -> list[Number]:
-    # as SciPy's manual describes PchipInterpolator
-    if len(h) == 1:
-        return [d[0], d[0]]
+class Polynomial(tuple):
+    """Coefficients of any kind of number, constant first."""
 
-    def outer(h0, h1, d0, d1):
-        slope = ((2 * h0 + h1) * d0 - h0 * d1) / (h0 + h1)
-        if slope * d0 <= 0:
-            return 0 * slope
-        return 3 * d0 if d0 * d1 < 0 and abs(slope) > abs(3 * d0) else slope
+    def __call__(self, u: Number) -> Number:
+        total = 0 * u
+        for c in reversed(self):
+            total = total * u + c
+        return total
 
-    inner = []
-    for k in range(1, len(h)):
-        w1, w2 = 2 * h[k] + h[k - 1], h[k] + 2 * h[k - 1]
-        flat = d[k - 1] * d[k] <= 0
-        inner.append(0 * w1 if flat else (w1 + w2) / (w1 / d[k - 1] + w2 / d[k]))
-    return [outer(h[0], h[1], d[0], d[1]), *inner, outer(h[-1], h[-2], d[-1], d[-2])]
-
-
-def _hermite(h: Number, y0: Number, y1: Number, s0: Number, s1: Number) -> Segment:
-    # in the four basis functions of cubic Hermite interpolation and their derivatives
-    def angle(u):
-        x = u / h
-        return (
-            y0 * (1 + 2 * x) * (1 - x) ** 2
-            + h * s0 * x * (1 - x) ** 2
-            + y1 * x**2 * (3 - 2 * x)
-            + h * s1 * x**2 * (x - 1)
-        )
-
-    def velocity(u):
-        x = u / h
-        return (
-            (y1 - y0) / h * 6 * x * (1 - x)
-            + s0 * (3 * x**2 - 4 * x + 1)
-            + s1 * (3 * x**2 - 2 * x)
-        )
-
-    def acceleration(u):
-        x = u / h
-        return (
-            6 * (y1 - y0) / h**2 * (1 - 2 * x)
-            + s0 / h * (6 * x - 4)
-            + s1 / h * (6 * x - 2)
-        )
-
-    return Segment(h, angle, velocity, acceleration)
+    def deriv(self, times: int = 1) -> "Polynomial":
+        """The derivative, or one of it."""
+        found = Polynomial([i * c for i, c in enumerate(self)][1:])
+        return found if times == 1 else found.deriv(times - 1)
 
 
 def first_above(exact: Law, rough: Law, low: mpf, high: mpf) -> mpf | None:

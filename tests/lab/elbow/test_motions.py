@@ -4,8 +4,6 @@ from math import inf, nan
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 
 from masrel.errors import ParameterError
@@ -23,7 +21,7 @@ from masrel.lab.elbow import (
     times_at,
 )
 from tests.lab.elbow.scenes import KINDS, random_scene
-from tests.lab.elbow.stretches import constant, minimum_jerk, motions
+from tests.lab.elbow.stretches import constant, minimum_jerk
 
 # From 0.5 to 2.5 rad at a mean of 1 rad/s: 2 rad in 2 s.
 REACH = MinimumJerk(start=0.5, end=2.5, mean_speed=1.0)
@@ -65,12 +63,23 @@ def test_motions_by_hand(
     assert float(motion.acceleration(time)) == acceleration
 
 
-@given(motion=motions(), share=st.floats(0.001, 0.999))
-def test_times_at_undoes_angle(motion: Motion, share: float) -> None:
-    angle = motion.start + share * (motion.end - motion.start)
-    found = float(times_at(motion, [angle])[0])
-    assert 0.0 <= found <= motion.duration
-    assert float(motion.angle(found)) == pytest.approx(angle, abs=4e-15)
+@pytest.mark.parametrize("kind", KINDS[:3])
+@pytest.mark.parametrize("seed", range(20))
+def test_times_at_undoes_angle(kind: str, seed: int) -> None:
+    motion = any_motion(seed, kind)
+    angles = np.linspace(motion.start, motion.end, 20)[1:-1]
+    found = times_at(motion, angles)
+    assert 0.0 <= found.min() <= found.max() <= motion.duration
+    assert motion.angle(found) == pytest.approx(angles, abs=4e-15)
+
+
+def test_a_recording_is_at_its_samples_and_does_not_pass_them() -> None:
+    time, angle = np.array([0.0, 0.5, 2.0, 2.25]), np.array([0.5, 1.0, 1.0, 0.75])
+    for interpolation in ("pchip", "linear"):
+        motion = Recorded(time=time, angle=angle, interpolation=interpolation)
+        assert motion.angle(time) == pytest.approx(angle, abs=1e-15)
+        assert motion.angle(np.linspace(0.0, 2.25, 99)).max() <= 1.0 + 1e-15
+    assert float(motion.angle(0.25)) == 0.75
 
 
 def any_motion(seed: int, kind: str) -> Motion:

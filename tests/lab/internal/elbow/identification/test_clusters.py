@@ -1,4 +1,4 @@
-"""Clustered least squares against closed forms, a dense form, and statsmodels."""
+"""Clustered least squares against closed forms and a dense form."""
 
 import math
 from collections.abc import Sequence
@@ -6,7 +6,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-import statsmodels.api as sm
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -71,17 +70,6 @@ def test_reduced_and_whole_matrices_agree(seed: int, sizes: list[int]) -> None:
     np.testing.assert_allclose(fit.values, values, rtol=1e-9)
     np.testing.assert_allclose(fit.covariance, covariance, rtol=1e-6, atol=1e-12)
     np.testing.assert_allclose(fit.df, freedom, rtol=1e-6)
-
-
-def test_with_one_row_a_trial_it_is_hc2_of_statsmodels() -> None:
-    rows = trials(3, [1] * 12)
-    x = np.concatenate([r.design for r in rows])
-    y = np.concatenate([r.target for r in rows])
-    peer = sm.OLS(y, x).fit(cov_type="HC2")
-    fit = solve(rows)
-    np.testing.assert_allclose(fit.values, peer.params, rtol=1e-12)
-    np.testing.assert_allclose(fit.covariance, peer.cov_params(), rtol=1e-9)
-    assert fit.residual_sd == pytest.approx(math.sqrt(peer.mse_resid), rel=1e-12)
 
 
 def test_what_leaving_a_trial_out_does_is_what_a_fit_without_it_says() -> None:
