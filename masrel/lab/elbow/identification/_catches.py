@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
+from scipy.signal import detrend, savgol_filter
 
 from masrel.errors import RecordingError
 from masrel.lab.elbow.identification._clusters import Rows
@@ -230,11 +230,8 @@ def _rest_noise(samples: Samples, velocity: _Floats) -> float:
     squares, df = 0.0, 0
     for start, stop in _spans(still):
         if (stop - start) * samples.period >= _MIN_REST:
-            torque = samples.torque[start:stop]
-            since = np.arange(torque.size) - 0.5 * (torque.size - 1)
-            left = torque - torque.mean()
-            left = left - since * (float(since @ left) / float(since @ since))
-            squares, df = squares + float(left @ left), df + torque.size - 2
+            left = detrend(samples.torque[start:stop])
+            squares, df = squares + float(left @ left), df + left.size - 2
     return math.sqrt(squares / df) if df > 0 else math.nan
 
 
@@ -524,15 +521,15 @@ def _jump(time: _Floats, angle: _Floats, near: float) -> float:
     # and a parabola from an instant on, by least squares
     window = np.abs(time - near) <= 3.0 * _JUMP
     time, angle = time[window], angle[window]
-    best, squares = near, math.inf
-    for instant in time[(time > near - _JUMP) & (time < near + 2.0 * _JUMP)].tolist():
+
+    def squares(instant: float) -> float:
         since = np.maximum(time - instant, 0.0)
         design = np.stack([np.ones_like(since), since, since**2], axis=1)
         values = np.linalg.lstsq(design, angle, rcond=None)[0]
-        left = float(((angle - design @ values) ** 2).sum())
-        if left < squares:
-            best, squares = instant, left
-    return best
+        return float(((angle - design @ values) ** 2).sum())
+
+    tried = time[(time > near - _JUMP) & (time < near + 2.0 * _JUMP)].tolist()
+    return float(min(tried, key=squares, default=near))
 
 
 def _after(
