@@ -214,7 +214,7 @@ PER_S = 1000.0
 @pytest.mark.parametrize(
     "lasts_s",
     [
-        pytest.param(4.0, marks=pytest.mark.slow),
+        pytest.param(6.0, marks=pytest.mark.slow),
         pytest.param(60.0, marks=pytest.mark.long),
     ],
 )
