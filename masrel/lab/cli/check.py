@@ -115,6 +115,7 @@ def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
     if not files:
         return
     from masrel.lab.ratings import read_study_ratings  # loads pandas
+    from masrel.lab.ratings.study_data import _of_logs, _refuse_other_table
 
     for path in files:
         try:
@@ -123,18 +124,12 @@ def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
             yield str(error)
             return
     if study.ratings_file.exists() and study.logs():
-        yield from _table_problems(protocol, study)
-
-
-def _table_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
-    from masrel.lab.ratings.study_data import _of_logs, _refuse_other_table
-
-    with contextlib.suppress(MasrelError):  # another checker has said what of the logs
-        ratings = _of_logs(study, protocol, check_recordings=False)
-        try:
-            _refuse_other_table(study.ratings_file, ratings)
-        except RatingsError as error:
-            yield str(error)
+        with contextlib.suppress(MasrelError):  # what of the logs, another has said
+            ratings = _of_logs(study, protocol, check_recordings=False)
+            try:
+                _refuse_other_table(study.ratings_file, ratings)
+            except RatingsError as error:
+                yield str(error)
 
 
 _CHECKERS: tuple[Callable[[Protocol, StudyPaths], Iterable[str]], ...] = (

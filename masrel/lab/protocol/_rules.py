@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import chain
 from operator import attrgetter
 
@@ -58,6 +58,12 @@ def _id(name: str) -> str:
     return f" (id {got(name)})"
 
 
+def _again(names: Sequence[str], where: str, needs: str) -> Iterator[str]:
+    for index, name in enumerate(names):
+        if name in names[:index]:
+            yield f"{where}[{index}]: needed {needs}, got {got(name)} again"
+
+
 def _chosen(table: msgspec.Struct, *keys: str) -> list[str]:
     # those of the keys that are not at their defaults
     defaults = {info.name: info.default for info in msgspec.structs.fields(table)}
@@ -67,13 +73,10 @@ def _chosen(table: msgspec.Struct, *keys: str) -> list[str]:
 def _scale(protocol: Protocol) -> Iterator[str]:
     # grades that a file of ratings can hold, each once
     grades = protocol.scale.grades
+    yield from _again(grades, "scale.grades", "grades that differ")
     for index, grade in enumerate(grades):
         where = f"scale.grades[{index}]"
         yield from _broken(
-            (
-                grade in grades[:index],
-                f"{where}: needed grades that differ, got {got(grade)} again",
-            ),
             (
                 _is_padded(grade),
                 f"{where}: needed a grade without spaces around it or control "
@@ -502,19 +505,14 @@ def _choices(question: Question) -> Iterator[str]:
             f"choices: needed at least 2 texts, got {got(choices)}",
         ),
     )
-    for place, choice in enumerate(choices if kind == "choice" else ()):
-        yield from _broken(
-            (
-                choice in choices[:place],
-                f"choices[{place}]: needed choices that differ, got {got(choice)} "
-                "again",
-            ),
-            (
-                _is_padded(choice),
-                f"choices[{place}]: needed a choice without spaces around it or "
-                f"control characters, got {got(choice)}",
-            ),
-        )
+    if kind == "choice":
+        yield from _again(choices, "choices", "choices that differ")
+        for place, choice in enumerate(choices):
+            if _is_padded(choice):
+                yield (
+                    f"choices[{place}]: needed a choice without spaces around it or "
+                    f"control characters, got {got(choice)}"
+                )
 
 
 def _models(protocol: Protocol) -> Iterator[str]:
@@ -635,14 +633,9 @@ def _plan(protocol: Protocol) -> Iterator[str]:
     for index, line in enumerate(protocol.analysis.estimates):
         for problem in _plan_line(line, protocol):
             yield f"analysis.estimates[{index}].{problem}{_id(line.id)}"
-    for key in ("sections", "formats"):
-        names = getattr(protocol.report, key) or ()
-        for index, name in enumerate(names):
-            if name in names[:index]:
-                yield (
-                    f"report.{key}[{index}]: needed each {key[:-1]} once, "
-                    f"got {got(name)} again"
-                )
+    report = protocol.report
+    yield from _again(report.sections or (), "report.sections", "each section once")
+    yield from _again(report.formats, "report.formats", "each format once")
 
 
 def _plan_line(line: EstimatePlan, protocol: Protocol) -> Iterator[str]:

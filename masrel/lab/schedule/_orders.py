@@ -130,13 +130,7 @@ def _design_order(
     replicate, place = divmod(row - 1, n_lines)
     purpose = ("design", session, site or "", str(replicate + 1))
     stream = Stream(rules.seed, *purpose, secret=secret)
-    return _replicate(protocol, stream)[place]
-
-
-def _replicate(protocol: Protocol, stream: Stream) -> list[list[str]]:
-    # every row of a replicate, whose repeats have squares of their own
-    rules = protocol.schedule
-    rows = _lines(protocol, stream)
+    rows = _lines(protocol, stream)  # every row of the replicate
     for _ in range(1, rules.repeats):
         lines = _lines(protocol, stream)
         # Drawn until no row goes on with the model that it ended with. Of k rows that
@@ -148,7 +142,7 @@ def _replicate(protocol: Protocol, stream: Stream) -> list[list[str]]:
         ):
             stream.shuffle(lines)
         rows = [row + line for row, line in zip(rows, lines, strict=True)]
-    return rows
+    return rows[place]
 
 
 def _lines(protocol: Protocol, stream: Stream) -> list[list[str]]:
