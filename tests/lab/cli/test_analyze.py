@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from masrel.lab.protocol import copy_template
 from tests.architecture.test_imports import loaded_after
 from tests.cli.process import Caller
+from tests.files import published_study
 
 # One estimate with an interval and one the published data do not hold: the rest of
 # the published plan only costs time here.
@@ -39,13 +39,7 @@ sections = ["design", "agreement", "test-retest", "intended", "in-person"]
 @pytest.fixture
 def study(tmp_path: Path) -> Path:
     """The published study with a shorter plan."""
-    root = tmp_path / "study"
-    copy_template("hess2012", root)  # nothing that somebody left in the clone
-    protocol = root / "protocol.toml"
-    text = protocol.read_text(encoding="utf-8")
-    head = text.partition("[[analysis.estimates]]")[0]
-    protocol.write_text(head + PLAN, encoding="utf-8")
-    return root
+    return published_study(tmp_path / "study", PLAN)
 
 
 def test_the_tables_are_printed_and_the_analysis_written(

@@ -8,6 +8,7 @@ import pytest
 from masrel.lab.elbow import STANDARD_MODELS, intermediate_models
 from masrel.lab.protocol import read_model_file
 from tests.cli.process import Caller, Done
+from tests.files import edit
 
 STANDARDS = ("HM1", "HM2", "HM3", "HM4")
 
@@ -91,8 +92,7 @@ def test_a_file_that_hides_whether_it_is_simulated_is_refused(
     path = simulated(tmp_path / "a.toml", is_it='"no"')
     said = refused(masrel("joint", "between", "HM1", path, "-n", "1"))
     assert "a.toml: simulated must be true or false" in said
-    kept = path.read_text(encoding="utf-8").replace('simulated = "no"\n', "")
-    path.write_text(kept, encoding="utf-8")
+    edit(path, 'simulated = "no"\n', "")
     assert "got nothing" in refused(masrel("joint", "between", "HM1", path, "-n", "1"))
 
 

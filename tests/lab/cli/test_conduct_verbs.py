@@ -9,6 +9,7 @@ from click.testing import CliRunner
 
 from masrel.cli import cli
 from masrel.lab.protocol import StudyPaths, copy_template
+from tests.files import edit
 
 FIELDS = """
 [rater_fields.years]
@@ -23,9 +24,7 @@ unit = "years"
 def study(tmp_path: Path) -> StudyPaths:
     paths = StudyPaths(tmp_path / "study")
     copy_template("small", paths.root)
-    text = paths.protocol.read_text(encoding="utf-8")
-    text = text.replace("\n[[sessions]]", FIELDS, 1)
-    paths.protocol.write_text(text, encoding="utf-8")
+    edit(paths.protocol, "\n[[sessions]]", FIELDS, 1)
     return paths
 
 

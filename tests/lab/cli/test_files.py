@@ -7,6 +7,7 @@ import pytest
 
 from masrel.lab.protocol import copy_template
 from tests.cli.process import Caller
+from tests.files import contents, edit
 
 
 @pytest.fixture
@@ -17,10 +18,6 @@ def study(tmp_path: Path) -> Path:
     (root / "sessions").mkdir()
     (root / "sessions" / "test_R1.jsonl").write_text("a log")
     return root
-
-
-def contents(root: Path) -> dict[Path, bytes]:
-    return {path: path.read_bytes() for path in root.rglob("*") if path.is_file()}
 
 
 @pytest.mark.parametrize(
@@ -87,10 +84,8 @@ def test_a_model_file_of_the_protocol_is_an_input(study: Path, masrel: Caller) -
         masrel("joint", "between", "HM1", "HM2", "-n", "1", "-o", study / "models").code
         == 0
     )
-    protocol = study / "protocol.toml"
-    text = protocol.read_text(encoding="utf-8")
     entry = '[[models]]\nid = "E01"\nrole = "dummy"\nfile = "models/D01.toml"\n\n'
-    protocol.write_text(text.replace("[[raters]]", f"{entry}[[raters]]", 1))
+    edit(study / "protocol.toml", "[[raters]]", f"{entry}[[raters]]", 1)
     done = masrel("analyze", study, "--json", study / "models" / "D01.toml")
     assert done.code == 2
     assert "this one is read" in done.err

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.process import Caller
+from tests.files import edit
 
 
 def test_a_new_study_is_checked_drawn_and_checked_again(
@@ -17,8 +18,7 @@ def test_a_new_study_is_checked_drawn_and_checked_again(
     assert "0 drawn, 2 kept" in masrel("schedule", study).out
     assert "2 of 2 schedules drawn" in masrel("check", study).out
     protocol = study / "protocol.toml"
-    text = protocol.read_text(encoding="utf-8").replace("seed = 20240", "seed = 1")
-    protocol.write_text(text, encoding="utf-8")
+    edit(protocol, "seed = 20240", "seed = 1")
     (study / "ratings").mkdir()
     table = "session,rater,model,grade\ntest,R1,HM1,9\n"
     (study / "ratings" / "ratings.csv").write_text(table, encoding="utf-8")

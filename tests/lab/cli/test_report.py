@@ -5,33 +5,19 @@ from pathlib import Path
 
 import pytest
 
-from masrel.lab.protocol import copy_template
 from tests.architecture.test_imports import loaded_after
 from tests.cli.process import Caller
+from tests.files import contents, edit, published_study
 
 
 @pytest.fixture
 def study(tmp_path: Path) -> Path:
     """The published study: no estimates, one section with a figure and one without."""
-    root = tmp_path / "study"
-    copy_template("hess2012", root)  # nothing that somebody left in the clone
-    protocol = root / "protocol.toml"
-    text = protocol.read_text(encoding="utf-8")
-    head = text.partition("[[analysis.estimates]]")[0]
-    sections = '\n[report]\nsections = ["intended", "grades"]\n'
-    protocol.write_text(head + sections, encoding="utf-8")
-    return root
+    plan = '[report]\nsections = ["intended", "grades"]\n'
+    return published_study(tmp_path / "study", plan)
 
 
 READ = "read: 32 ratings from {}/ratings/published.csv\n"
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-    }
 
 
 def without_hash(name: str) -> str:
@@ -92,8 +78,7 @@ def test_a_figure_is_what_loads_matplotlib(study: Path) -> None:
     call = f"from masrel.cli import cli\ncli(['report', {str(study)!r}, '--quiet'])"
     assert "matplotlib" in loaded_after(call)
     protocol = study / "protocol.toml"
-    text = protocol.read_text(encoding="utf-8")
-    protocol.write_text(text.replace(', "grades"]', "]"), encoding="utf-8")
+    edit(protocol, ', "grades"]', "]")
     assert "matplotlib" not in loaded_after(call)
 
 

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from masrel.cli import cli
-from masrel.lab.protocol import copy_template
 from tests.cli.process import Caller
+from tests.files import edit, published_study, replan
 
 LINE = """
 [[analysis.estimates]]
@@ -28,8 +28,7 @@ REPORT = '[report]\nsections = ["agreement", "intended"]\n'
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The published study with one estimate, and its report."""
     root = tmp_path_factory.mktemp("made") / "study"
-    copy_template("hess2012", root)
-    plan(root, LINE.format(name="percent") + REPORT)
+    published_study(root, LINE.format(name="percent") + REPORT)
     cli(["report", str(root), "--quiet"], standalone_mode=False)
     return root
 
@@ -40,17 +39,8 @@ def study(made: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(made, tmp_path / "study"))
 
 
-def plan(root: Path, lines: str) -> None:
-    protocol = root / "protocol.toml"
-    head = protocol.read_text(encoding="utf-8").partition("[[analysis.estimates]]")[0]
-    protocol.write_text(head + lines, encoding="utf-8")
-
-
 def change_a_grade(root: Path) -> None:
-    table = root / "ratings" / "published.csv"
-    text = table.read_text(encoding="utf-8")
-    assert "test,R8,HM2,1," in text
-    table.write_text(text.replace("test,R8,HM2,1,", "test,R8,HM2,1+,"))
+    edit(root / "ratings/published.csv", "test,R8,HM2,1,", "test,R8,HM2,1+,")
 
 
 def compared(masrel: Caller, root: Path, *more: object) -> dict[str, Any]:
@@ -66,8 +56,7 @@ def test_another_input_of_the_same_numbers_is_no_change(
     assert done.code == 0
     assert f"no number has changed since {study / 'report'}" in done.out
     protocol = study / "protocol.toml"
-    text = protocol.read_text(encoding="utf-8")
-    protocol.write_text(text.replace('title = "', 'title = "New: ', 1), "utf-8")
+    edit(protocol, 'title = "', 'title = "New: ', 1)
     document = compared(masrel, study, *against)
     assert document["changes"] == []
     (line,) = document["inputs"]
@@ -106,7 +95,7 @@ def test_a_change_fails_if_asked_to(
 def test_an_estimate_that_is_new_or_gone_is_a_change(
     masrel: Caller, study: Path
 ) -> None:
-    plan(study, LINE.format(name="other") + REPORT)
+    replan(study, LINE.format(name="other") + REPORT)
     document = compared(masrel, study, "--against", study / "report")
     values = {each["of"]: each for each in document["changes"] if each["field"] == "id"}
     assert values["other"]["old"] is None

@@ -12,10 +12,10 @@ import pytest
 import masrel
 from masrel.cli import cli
 from masrel.lab.cli import report as verb
-from masrel.lab.protocol import copy_template
 from masrel.lab.report import _report_folder
 from tests.architecture.test_imports import HEAVY, loaded_after
 from tests.cli.process import Caller
+from tests.files import contents, edit, published_study
 
 LINES = """
 [[analysis.estimates]]
@@ -45,10 +45,7 @@ sections = ["agreement", "grades"]
 def reported(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The published study with two estimates, and what its report leaves in a cache."""
     root = tmp_path_factory.mktemp("reported") / "study"
-    copy_template("hess2012", root)
-    protocol = root / "protocol.toml"
-    head = protocol.read_text(encoding="utf-8").partition("[[analysis.estimates]]")[0]
-    protocol.write_text(head + LINES, encoding="utf-8")
+    published_study(root, LINES)
     cli(["report", str(root), "--quiet"], standalone_mode=False)
     shutil.rmtree(root / "report")
     return root
@@ -60,22 +57,8 @@ def study(reported: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(reported, tmp_path / "study"))
 
 
-Contents = dict[str, bytes]
-
-
-def contents(folder: Path) -> Contents:
-    files = (path for path in sorted(folder.rglob("*")) if path.is_file())
-    return {str(path.relative_to(folder)): path.read_bytes() for path in files}
-
-
 def times(folder: Path) -> dict[Path, int]:
     return {path: path.lstat().st_mtime_ns for path in folder.rglob("*")}
-
-
-def edit(file: Path, old: str, new: str) -> None:
-    text = file.read_text(encoding="utf-8")
-    assert old in text
-    file.write_text(text.replace(old, new, 1), encoding="utf-8")
 
 
 def test_nothing_changed_touches_nothing_and_says_the_same(
@@ -108,8 +91,7 @@ def test_letters_without_a_font_are_said_in_one_note_until_there_is_one(
     masrel: Caller, study: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for file in (study / "protocol.toml", *study.glob("ratings/*.csv")):
-        text = file.read_text(encoding="utf-8").replace("1+", "경")
-        file.write_text(text, encoding="utf-8")
+        file.write_bytes(file.read_bytes().replace(b"1+", "경".encode()))
     first = masrel("report", study)
     (note, read, *_) = first.err.splitlines()
     assert note.startswith("note: no font here has 경: such letters are drawn as boxes")
@@ -182,7 +164,7 @@ def test_an_edit_of_the_code_is_seen(study: Path, tmp_path: Path) -> None:
     before = page()
     template = tmp_path / "code/masrel/lab/report/templates/report.md"
     status = template.stat()
-    edit(template, "# ", "% ")  # as long as it was
+    edit(template, "# ", "% ", 1)  # as long as it was
     os.utime(template, ns=(status.st_atime_ns, status.st_mtime_ns))
     assert page() == before.replace("# ", "% ", 1)
 
@@ -270,7 +252,7 @@ def test_a_report_that_another_build_has_replaced_is_made_again(
     shutil.rmtree(study / "report")
     write = verb.replace_report
 
-    def with_another(folder: Path, files: Contents) -> None:
+    def with_another(folder: Path, files: dict[str, bytes]) -> None:
         write(folder, files)
         write(folder, grades)  # in the moment after
 

@@ -17,6 +17,7 @@ import pytest
 import masrel
 from masrel.lab.protocol import copy_template
 from tests.cli.process import Caller
+from tests.files import edit, published_study
 
 SETPRIV = shutil.which("setpriv")
 TITLE = "κ & 5 % of A_b #1 ± [x] {y} ~ ^"
@@ -26,15 +27,10 @@ FORMATS = ("html", "markdown", "latex", "docx")
 @pytest.fixture(scope="module")
 def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The published study with a hostile title, asking for all formats."""
-    root = tmp_path_factory.mktemp("formats") / "study"
-    copy_template("hess2012", root)
-    protocol = root / "protocol.toml"
-    text = protocol.read_text(encoding="utf-8")
     title = f"title = {msgspec.json.encode(TITLE).decode()}"
-    head = text.partition("[[analysis.estimates]]")[0]
-    report = f'sections = ["design", "grades", "methods"]\nformats = {list(FORMATS)}\n'
-    protocol.write_text(f"{head}\n[report]\n{title}\n{report}", encoding="utf-8")
-    return root
+    sections = f'sections = ["design", "grades", "methods"]\nformats = {list(FORMATS)}'
+    root = tmp_path_factory.mktemp("formats") / "study"
+    return published_study(root, f"\n[report]\n{title}\n{sections}\n")
 
 
 @pytest.fixture(scope="module")
@@ -233,10 +229,7 @@ def test_a_format_that_is_not_made_again_goes(
 ) -> None:
     root = tmp_path / "study"
     shutil.copytree(study, root)
-    protocol = root / "protocol.toml"
-    text = protocol.read_text(encoding="utf-8")
-    text = text.replace(f"formats = {list(FORMATS)}", 'formats = ["html"]')
-    protocol.write_text(text, encoding="utf-8")
+    edit(root / "protocol.toml", f"formats = {list(FORMATS)}", 'formats = ["html"]')
     done = masrel("report", root, "--format", "latex", "--quiet")
     assert done.code == 0, done.err
     pages = [root / "report" / name for name in ("report.html", "report.tex")]

@@ -9,6 +9,7 @@ import pytest
 from masrel.lab.protocol import StudyPaths
 from masrel.lab.schedule import read_schedule
 from tests.cli.process import Caller
+from tests.files import edit
 from tests.lab.protocol.documents import VALID, changed, write
 
 
@@ -87,8 +88,7 @@ def test_runs_of_models_grades_and_standards_are_counted(
 def test_a_row_that_was_forged_is_broken(masrel: Caller, study: StudyPaths) -> None:
     masrel("schedule", study.root)
     file = study.schedule_file("R1", "test")
-    text = file.read_text(encoding="utf-8")
-    file.write_text(text.replace("# row: 1", "# row: 4"), encoding="utf-8")
+    edit(file, "# row: 1", "# row: 4")
     verified = masrel("verify", study.root)
     assert verified.code == 2
     assert f"broken: {file}: needed row 1, by {study.conduct_file}, got row 4" in (

@@ -20,6 +20,7 @@ from masrel.lab.training import (
     train_rater,
 )
 from tests.cli.process import Caller
+from tests.files import edit
 
 # A test that few presentations decide
 RULES = """
@@ -65,13 +66,6 @@ def train_simulated(root: Path) -> TrainingRecord:
     return train_rater(
         StudyPaths(root), protocol, "R1", grades=trainee, clock="simulated"
     )
-
-
-def changed(root: Path, old: str, new: str) -> None:
-    file = root / "protocol.toml"
-    text = file.read_text(encoding="utf-8")
-    assert old in text
-    file.write_text(text.replace(old, new), encoding="utf-8")
 
 
 def answers(monkeypatch: pytest.MonkeyPatch, *lines: str) -> None:
@@ -211,10 +205,10 @@ def test_a_training_goes_on_with_what_it_was_begun_with(
     trained: Path, masrel: Caller
 ) -> None:
     call = ["train", trained, "--rater", "R1", "--grades", "simulated"]
-    log = trained / "training" / "R1.jsonl"
-    changed(trained, "false_pass = 0.2", "false_pass = 0.1")
+    log, protocol = trained / "training" / "R1.jsonl", trained / "protocol.toml"
+    edit(protocol, "false_pass = 0.2", "false_pass = 0.1")
     assert "begun with false_pass = 0.2: needed the same" in masrel(*call).err
-    changed(trained, "false_pass = 0.1", "false_pass = 0.2")
+    edit(protocol, "false_pass = 0.1", "false_pass = 0.2")
     text = log.read_text(encoding="utf-8")
     log.write_text(text.replace('"grade": "1"', '"grade": "3"', 1), encoding="utf-8")
     assert "a line before was changed" in masrel(*call).err
@@ -222,8 +216,8 @@ def test_a_training_goes_on_with_what_it_was_begun_with(
     gone = masrel(*call)
     assert gone.code == 2
     assert "is gone, and there are recordings" in gone.err
-    changed(
-        trained, "catch_angle_constant_deg = 130.0", "catch_angle_constant_deg = 129.0"
+    edit(
+        protocol, "catch_angle_constant_deg = 130.0", "catch_angle_constant_deg = 129.0"
     )
     log.write_text(text, encoding="utf-8")
     changed_models = masrel("train", "show", trained, "--rater", "R1")

@@ -18,6 +18,7 @@ from masrel.lab.schedule import (
     schedule_problems,
 )
 from masrel.lab.verification import verify_sessions
+from tests.files import edit
 from tests.lab.schedule.studies import SECRET, protocol_of, with_secret
 
 SITES = {"R1": "north", "R2": "south", "R3": "north", "R4": "south"}
@@ -214,8 +215,7 @@ def test_a_schedule_whose_row_no_event_has_is_found(study: StudyPaths) -> None:
 
 def test_a_changed_line_of_the_log_stops_the_draw(study: StudyPaths) -> None:
     allot_schedules(study, williams())
-    text = study.conduct_file.read_text(encoding="utf-8")
-    study.conduct_file.write_text(text.replace('"row": 1', '"row": 3'), "utf-8")
+    edit(study.conduct_file, '"row": 1', '"row": 3')
     with pytest.raises(SessionLogError, match="line 3: needed previous"):
         allot_schedules(study, williams(raters=("R1", "R2", "R3")))
 

@@ -10,6 +10,7 @@ from masrel.lab.conduct import read_conduct, record_standing, record_unblinding
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.run import ScriptGrades, record_correction, run_session
 from masrel.lab.schedule import read_schedule
+from tests.files import edit
 
 Small = tuple[StudyPaths, Protocol]
 BY = {"who": " MK ", "why": "moved away"}
@@ -47,8 +48,7 @@ def test_a_changed_line_is_found(small: Small) -> None:
     study, protocol = small
     record_standing(study, protocol, "R2", "withdrawn", **BY)
     record_unblinding(study, protocol, None, who="A", why="b")
-    text = study.conduct_file.read_text(encoding="utf-8")
-    study.conduct_file.write_text(text.replace('"R2"', '"R1"'), encoding="utf-8")
+    edit(study.conduct_file, '"R2"', '"R1"')
     with pytest.raises(SessionLogError, match="line 3: needed previous"):
         read_conduct(study)
     with pytest.raises(SessionLogError, match="line 3: needed previous"):
@@ -104,8 +104,7 @@ def test_a_code_on_two_sheets_needs_its_rater(small: Small) -> None:
     study, protocol = small
     file = study.schedule_file("R2", "test")
     first, other = codes(study, "R1")[0], codes(study, "R2")[0]
-    text = file.read_text(encoding="utf-8").replace(other, first)
-    file.write_text(text, encoding="utf-8")
+    edit(file, other, first)
     with pytest.raises(ScheduleError, match=r"R1 in session test and R2 in .*--rater"):
         record_unblinding(study, protocol, first, **BY)
     assert not study.conduct_file.exists()

@@ -16,6 +16,7 @@ from masrel.lab.conduct import (
     record_standing,
 )
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
+from tests.files import edit
 
 Small = tuple[StudyPaths, Protocol]
 NewStudy = Callable[..., Small]
@@ -51,8 +52,7 @@ def test_what_is_recorded_last_goes_before_the_protocol(fielded: Small) -> None:
 def test_a_value_that_the_protocol_no_longer_has_is_refused(fielded: Small) -> None:
     study, protocol = fielded
     record_rater_values(study, protocol, "R2", {"job": "PT"}, who="MK")
-    text = study.protocol.read_text(encoding="utf-8").replace('"PT"', '"OT"')
-    study.protocol.write_text(text, encoding="utf-8")
+    edit(study.protocol, '"PT"', '"OT"')
     with pytest.raises(SessionLogError, match='job of R2: needed one of "OT", "MD"'):
         rater_values(study, read_protocol(study.protocol))
 
@@ -110,7 +110,7 @@ def test_a_changed_line_of_a_merged_log_is_found(small: Small) -> None:
     record_note(study, protocol, "b", who="MK")
     study.merged_conduct.mkdir()
     moved = study.conduct_file.rename(study.merged_conduct / "north.jsonl")
-    moved.write_text(moved.read_text().replace('"a"', '"c"'))
+    edit(moved, '"a"', '"c"')
     with pytest.raises(SessionLogError, match=r"north.jsonl: line 3: needed previous"):
         read_conduct(study)
     assert json.loads(moved.read_text().splitlines()[1])["fields"]["text"] == "c"

@@ -22,6 +22,7 @@ from masrel.lab.ratings import ratings_from_logs
 from masrel.lab.run import ScriptGrades, SimulatedGrades, run_session
 from masrel.lab.training import SimulatedTrainee, train_rater
 from masrel.lab.verification import anchors_of, verify_study
+from tests.files import contents, edit
 from tests.lab.cli.test_train import RULES
 
 NewStudy = Callable[..., tuple[StudyPaths, Protocol]]
@@ -66,14 +67,6 @@ def sites(new_study: NewStudy) -> Sites:
     return north, south
 
 
-def contents(folder: Path) -> dict[str, bytes]:
-    return {
-        path.relative_to(folder).as_posix(): path.read_bytes()
-        for path in folder.rglob("*")
-        if path.is_file()
-    }
-
-
 def test_all_raters_logs_and_recordings_come_over(sites: Sites, tmp_path: Path) -> None:
     before = [contents(study.root) for study in sites]
     unused = {"schedules/test_R2.csv"}  # of another draw than R2 followed
@@ -108,8 +101,7 @@ def test_what_is_no_rating_comes_over_too(sites: Sites, tmp_path: Path) -> None:
     trainee = SimulatedTrainee(protocol)
     train_rater(study, protocol, rater, grades=trainee, clock="simulated")
     filled_in = sites[0].typed_file("R1", "test")
-    text = filled_in.read_text(encoding="utf-8")
-    filled_in.write_text(text.replace(",\n", ",2\n"), encoding="utf-8")
+    edit(filled_in, ",\n", ",2\n")
     study.published_answers_file.parent.mkdir()
     study.published_answers_file.write_text("as it was", encoding="utf-8")
     before = [contents(study.root) for study in sites]

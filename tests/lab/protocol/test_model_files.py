@@ -15,6 +15,7 @@ from masrel.lab.protocol import (
     protocol_hash,
     read_protocol,
 )
+from tests.files import edit
 from tests.lab.protocol.documents import VALID, problems_of, write
 
 KEYS = (
@@ -85,8 +86,7 @@ def test_a_file_says_whether_it_comes_from_simulated_recordings(tmp_path: Path) 
     protocol = read_protocol(write(named(), tmp_path))
     assert [model.simulated for model in protocol.models] == [True, False]
     path = tmp_path / "s3.toml"  # of one that does not say it the protocol may
-    text = path.read_text("utf-8").replace("simulated = true\n", "")
-    path.write_text(text, "utf-8")
+    edit(path, "simulated = true\n", "")
     for said in (False, True):
         protocol = read_protocol(write(named(simulated=said), tmp_path))
         assert protocol.models[0].simulated is said

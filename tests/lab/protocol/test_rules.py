@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from masrel.lab.protocol import protocol_hash, read_protocol
+from tests.files import edit
 from tests.lab.protocol.documents import VALID, changed, problems_of, write
 
 OCCASIONS = [
@@ -253,5 +254,5 @@ def test_sessions_that_come_after_each_other_are_all_refused(tmp_path: Path) -> 
 def test_a_date_stands_with_or_without_quotes(tmp_path: Path) -> None:
     path = write(with_values({"since": "2001-02-03"}), tmp_path)
     quoted = read_protocol(path)
-    path.write_text(path.read_text().replace('"2001-02-03"', "2001-02-03"))
+    edit(path, '"2001-02-03"', "2001-02-03")
     assert protocol_hash(read_protocol(path)) == protocol_hash(quoted)

@@ -7,16 +7,9 @@ import pytest
 import masrel
 from masrel.errors import ParameterError
 from masrel.lab.protocol import copy_template, read_protocol, template_names
+from tests.files import contents
 
 STUDIES = Path(__file__).parents[3] / "studies"
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    return {
-        path.relative_to(folder).as_posix(): path.read_bytes()
-        for path in folder.rglob("*")
-        if path.is_file()
-    }
 
 
 def test_the_published_study_brings_its_ratings(tmp_path: Path) -> None:
