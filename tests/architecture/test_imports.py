@@ -3,7 +3,9 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
+TABLE_V = Path(__file__).parents[2] / "studies/hess2012/ratings/published.csv"
 HEAVY = {"pandas", "scipy", "statsmodels", "matplotlib", "emcee", "arviz_stats"}
 PAGES = {"starlette", "uvicorn", "segno", "anyio", "jinja2"}
 
@@ -75,6 +77,10 @@ LOADS_NO: dict[str, set[str]] = {
     "masrel.agree(pd.DataFrame({'item': [1, 2], 'K': [1, 2], 'L': [1, 1]}))": {
         *("matplotlib", "narwhals", "polars", "duckdb", "emcee"),
         *("masrel.intervals", "masrel.lab"),
+    },
+    f"from masrel.cli import cli\ncli(['agree', {str(TABLE_V)!r}])": {
+        *("scipy", "emcee", "matplotlib", "statsmodels", "masrel.intervals"),
+        *("masrel.lab.hess",),
     },
     # the pages load their server only when they are served
     "from masrel.lab.cli import serve\nserve.serve(['--help'])": PAGES | HEAVY,

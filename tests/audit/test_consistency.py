@@ -113,48 +113,6 @@ def check_count(
         assert any(fits(of_table(example, *weights), by) for by in RULES)
 
 
-def random_claim(
-    rng: np.random.Generator, rule: str, max_items: tuple[int, int] = (120, 45)
-) -> dict[str, object]:
-    """What would be printed of a table of 2 or 3 categories that is drawn."""
-    while True:
-        q = int(rng.integers(2, 4))
-        n_items = int(rng.integers(5, max_items[q - 2] + 1))
-        shape = rng.dirichlet(np.full(q * q, 0.5) + 3.0 * np.eye(q).ravel())
-        table = rng.multinomial(n_items, shape).reshape(q, q).tolist()
-        names = [str(name) for name in rng.choice(WEIGHTS, 2)]
-        percent, kappa = of_two_raters(table, *names)
-        if kappa is not None:
-            break
-    decimals = [int(rng.integers(0, 3)), int(rng.integers(1, 4))]
-    return {
-        "n_items": n_items,
-        "n_categories": q,
-        "agreement": shown(rounded(percent, decimals[0], rule), decimals[0]),
-        "kappa": shown(rounded(kappa, decimals[1], rule), decimals[1]),
-        "agreement_weights": names[0],
-        "kappa_weights": names[1],
-    }
-
-
-N_TRUE = [
-    pytest.param(range(40), id="some"),
-    pytest.param(range(40, 1040), id="tenth", marks=pytest.mark.slow),
-    pytest.param(range(10_000), id="all", marks=pytest.mark.long),
-]
-
-
-@pytest.mark.parametrize("seeds", N_TRUE)
-def test_no_true_table_raises_an_alarm(seeds: range) -> None:
-    for seed in seeds:
-        rng = np.random.default_rng(seed)
-        rule = RULES[seed % 2]
-        claim = random_claim(rng, rule)
-        for rounding in (rule, "either"):
-            result = consistent_tables(**claim, rounding=rounding)
-            assert result.is_possible, (seed, claim)
-
-
 @pytest.mark.parametrize(
     ("claim", "n_visited"),
     [

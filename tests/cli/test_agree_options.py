@@ -3,33 +3,29 @@
 import csv
 import io
 import json
+import re
+import shlex
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import pytest
-from scipy import stats
 
 from masrel.agreement import (
-    COEFFICIENTS,
-    Metric,
-    WeightName,
     fleiss_kappa,
-    krippendorff_alpha,
 )
-from masrel.intervals import analytic
 from tests.cli.process import Caller, Done
 
 # Four patients by three raters, one gap.
 WIDE = "patient,Kim,Lee,Ann\nA,1,1+,1\nB,2,NA,2\nC,1,1,2\nD,3,3,3\n"
 SCALE = ("1", "1+", "2", "3")
+TABLE_V = Path(__file__).parents[2] / "studies/hess2012/ratings/published.csv"
+JSON = ("--json", "-")
 ROWS = [["1", "1+", "1"], ["2", None, "2"], ["1", "1", "2"], ["3", "3", "3"]]
 
 
 @pytest.fixture
 def wide(tmp_path: Path) -> Path:
-    path = tmp_path / "wide.csv"
-    path.write_text(WIDE, encoding="utf-8")
-    return path
+    return written(tmp_path, WIDE, "wide.csv")
 
 
 def estimates(done: Done) -> list[dict[str, Any]]:
@@ -43,34 +39,6 @@ def estimates(done: Done) -> list[dict[str, Any]]:
         "estimates"
     ]
     return found
-
-
-def refused(done: Done) -> str:
-    """Check that a call was refused in words, and return them."""
-    assert done.code == 2
-    assert done.out == ""
-    assert "Traceback" not in done.err
-    return done.err
-
-
-# What is estimated.
-
-
-@pytest.mark.parametrize("weights", get_args(WeightName))
-def test_weights_are_those_of_the_declared_scale(
-    masrel: Caller, wide: Path, weights: WeightName
-) -> None:
-    names = ("fleiss_kappa", "gwet_ac", "krippendorff_alpha")
-    call = ("--categories", ",".join(SCALE), "--weights", weights, "--json", "-")
-    found = estimates(masrel("agree", wide, "--coefficients", ",".join(names), *call))
-    for name, document in zip(names, found, strict=True):
-        ours = COEFFICIENTS[name](ROWS, categories=SCALE, weights=weights)
-        assert document["value"] == ours.value
-        assert document["standard_error"] == ours.standard_error
-        assert document["weights"] == weights
-
-
-# How it is shown.
 
 
 @pytest.mark.parametrize("more", [(), ("--target", "items"), ("--target", "raters")])
@@ -106,56 +74,6 @@ def test_json_in_a_file_leaves_the_table_on_stdout(
 
 
 @pytest.mark.parametrize(
-    ("convention", "law"), [("irrcac", "t"), ("spss", "normal"), ("over_n", "normal")]
-)
-def test_a_convention_has_the_error_and_the_interval_of_its_program(
-    masrel: Caller, tmp_path: Path, convention: Any, law: Any
-) -> None:
-    pairs = [("a", "a")] * 10 + [("b", "b")] * 4 + [("a", "b")] * 6
-    path = tmp_path / "pairs.csv"
-    rows = "".join(f"{k},{a},{b}\n" for k, (a, b) in enumerate(pairs))
-    path.write_text(f"item,Kim,Lee\n{rows}", encoding="utf-8")
-    names = ("--coefficients", "cohen_kappa,fleiss_kappa", "--level", "0.8")
-    done = masrel("agree", path, *names, "--convention", convention, "--json", "-")
-    for row in estimates(done):
-        expected = analytic(
-            row["coefficient"],
-            pairs,
-            target="items",
-            level=0.8,
-            convention=convention,
-            distribution=law,
-        )
-        half = 0.5 * (expected.high - expected.low)
-        assert row["interval"]["low"] == expected.low
-        quantile = stats.t.ppf(0.9, 19 if law == "t" else 1e12)
-        assert row["standard_error"] == pytest.approx(half / quantile, rel=1e-9)
-        assert row["interval"]["method"] == expected.method
-    assert json.loads(done.out)["options"]["convention"] == convention
-
-
-# Metrics of alpha.
-
-
-def test_a_metric_is_of_alpha(masrel: Caller, tmp_path: Path) -> None:
-    path = tmp_path / "two.csv"
-    path.write_text("item,A,B\nx,1,1\ny,2,1\nz,4,4\nu,2,3\n", encoding="utf-8")
-    rows = [[1, 1], [2, 1], [4, 4], [2, 3]]
-    metrics: list[Metric] = ["nominal", "ordinal", "interval", "ratio"]
-    for metric in metrics:
-        call = ("agree", path, "--metric", metric, "--json", "-")
-        done = masrel(*call)
-        (of_alpha,) = estimates(done)
-        alpha = krippendorff_alpha(rows, metric=metric)
-        assert (of_alpha["value"], of_alpha["weights"]) == (alpha.value, alpha.weights)
-        assert json.loads(done.out)["options"]["metric"] == metric
-    done = masrel("agree", path, "--metric", "interval", "--target", "items")
-    assert "Krippendorff's α, interval metric" in done.out
-    said = refused(masrel(*call[:4], "--coefficients", "fleiss_kappa,gwet_ac"))
-    assert "--metric ratio: is of krippendorff_alpha, which is not among" in said
-
-
-@pytest.mark.parametrize(
     "text",
     [
         "1,.75,.25,0\n.75,1,.5,0\n.25,.5,1,.5\n0,0,.5,1\n",
@@ -182,3 +100,79 @@ def test_weights_of_a_file_are_those_of_a_matrix(
     assert of_kappa["standard_error"] == pytest.approx(kappa.standard_error, abs=1e-14)
     assert of_kappa["weights"] == "w.csv"
     assert json.loads(done.out)["options"]["weight_matrix"] == matrix
+
+
+SESSIONS = "session,item,rater,grade,source\n" + "".join(
+    f"{session},{item},{rater},{(item * rater) % 3},simulated\n"
+    for session in ("first", "second")
+    for item in range(4)
+    for rater in range(3)
+)
+
+
+def written(folder: Path, text: str, name: str = "ratings.csv") -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def table(done: Done) -> list[dict[str, str]]:
+    assert done.code == 0, done.err
+    return list(csv.DictReader(io.StringIO(done.out)))
+
+
+def test_warnings_are_lines_on_stderr_alone(masrel: Caller, tmp_path: Path) -> None:
+    rows = [f"{k},{20 + 1.37 * k:.2f},{20.5 + 1.31 * k:.2f}\n" for k in range(30)]
+    path = written(tmp_path, "item,Kim,Lee\n" + "".join(rows), "r.csv")
+    (warned,) = json.loads(masrel("agree", path, "--json", "-").out)["notes"]
+    assert warned.startswith("warning: ")
+    for form in ((), ("--csv",), ("--latex",), ("--sentence",), ("--json", "-")):
+        done = masrel("agree", path, *form)
+        assert done.err.splitlines().count(warned) == 1
+        assert "warning: " not in done.out or form == ("--json", "-")
+    assert warned in masrel("diagnose", path).err.splitlines()
+
+
+def test_the_command_that_is_offered_gives_an_interval(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    path = written(tmp_path, SESSIONS, "Ann's ratings.csv")
+    call = ("agree", str(path), "--by", "session", "--categories", "0, 1,2", "--csv")
+    words, command = masrel(*call).err.splitlines()[-1].split(": masrel ")
+    assert words == "no interval; for other items like these"
+    assert shlex.split(command) == [*call, "--target", "items"]
+    done = masrel(*shlex.split(command))
+    assert all(row["low"] for row in table(done))
+    assert "no interval" not in done.err
+
+
+def test_verbs_and_options_are_guessed(masrel: Caller, wide: Path) -> None:
+    assert "Did you mean 'agree'?" in masrel("agre", wide).err
+    said = masrel("agree", wide, "--weigths", "x").err
+    assert re.search(r"Did you mean .*--weights", said)
+    done = masrel("qqq")
+    assert (done.code, done.out) == (2, "")
+    assert "No such command 'qqq'." in done.err
+
+
+def test_table_v_gives_its_kappa_to_the_last_digit(masrel: Caller) -> None:
+    fleiss, percent = "fleiss_kappa", "percent_agreement"
+    found = {e["coefficient"]: e for e in estimates(masrel("agree", TABLE_V, *JSON))}
+    assert found[fleiss]["value"] == pytest.approx(0.626083678854127, abs=1e-15)
+    # 81 of 112 pairs of raters agree: 21 + 16 + 28 + 16, of 28 pairs a model
+    assert found[percent]["value"] == 81 / 112
+    assert found[fleiss]["interval"] is None
+
+
+def test_estimates_in_small_units_keep_their_digits(
+    masrel: Caller, tmp_path: Path
+) -> None:
+    # differences of 0, 2 and 1 tenths of a millimetre, in metres: SD 0.0001, and
+    # SEM = 0.0001 / √2
+    file = written(tmp_path, "item,Kim,Lee\na,1,1\nb,2,2.0002\nc,3,3.0001\n")
+    call = ("agree", file, "--coefficients", "lin_ccc,sem_consistency")
+    out = masrel(*call).out
+    row = next(line for line in out.splitlines() if "SEM" in line)
+    assert " 7.071e−05 " in row
+    assert " 1.000 " in next(line for line in out.splitlines() if "Lin's" in line)
+    assert "SEM, consistency = 7.071e−05" in masrel(*call, "--sentence").out

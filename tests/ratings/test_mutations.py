@@ -1,13 +1,12 @@
 """Files with faults that programs, people and disks make: an answer or one sentence.
 
 Seeded mutations of the corpus and of files of other shapes never end in a traceback or
-a silent guess; what keeps the meaning keeps the numbers; and a plain table with other
-cells gives what a few lines of exact arithmetic give.
+a silent guess.
 """
 
 import json
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,6 @@ from typing import Any
 import pytest
 
 from tests.cli.process import Caller, Done
-from tests.ratings.by_hand import agreement
 
 DOOR = Path(__file__).parent / "door"
 TEXT = (".csv", ".txt", ".dat", ".jsonl")
@@ -178,8 +176,6 @@ MUTATIONS: list[Mutate] = [
     *(separated, with_cell, with_cell, with_column),
 ]
 
-# ---- what keeps its meaning ----
-
 
 def call(masrel: Caller, folder: Path, base: Base, *more: str) -> Done:
     path = folder / base.name
@@ -230,47 +226,3 @@ def test_a_mutation_is_answered_or_refused(
     check_ended(done)
     if done.code == 0 and "--stream" in more:
         assert numbers(call(masrel, tmp_path, mutated)) == numbers(done)
-
-
-# ---- plain tables ----
-
-SAME = {"1": ["1.0", "01", " 1 ", '"1"', "1e0"], "mild": [" mild", '"mild"', "mild\t"]}
-# What may be no grade, or one of two; and columns that are no raters.
-DOUBTFUL = ["?", "n/a", "-", "#N/A", '"1\n2"']
-NO_RATERS = "gold majority_vote Kim_conf agree Freq total mean consensus notes".split()
-
-
-@pytest.mark.parametrize("seed", range(20))
-@pytest.mark.parametrize("grades", ["123", ("mild", "severe", "absent")])
-def test_cells_of_a_plain_table(
-    grades: Sequence[str], seed: int, tmp_path: Path, masrel: Caller
-) -> None:
-    rng = random.Random(seed)
-    names, n_items = ["item", "Kim", "Lee", "Ann"], rng.randrange(9, 16)
-    known: list[list[str | None]] = [rng.choices(grades, k=3) for _ in range(n_items)]
-    known[0] = [*grades]
-    written = [[f"p{k}", *map(str, row)] for k, row in enumerate(known)]
-
-    for _ in range(rng.randrange(1, 5)):
-        row, rater = rng.randrange(1, n_items), rng.randrange(3)
-        ways = [("", None), ("NA", None), ("4", "4")]
-        ways += [(text, grades[0]) for text in (*SAME[grades[0]], grades[0])]
-        written[row][1 + rater], known[row][rater] = rng.choice(ways)
-
-    def answer() -> Done:
-        text = "".join(",".join(row) + "\n" for row in (names, *written))
-        return call(masrel, tmp_path, made("r.csv", text))
-
-    found = {name: value for name, _, value in numbers(answer())}
-    for name, value in agreement(known).items():
-        assert value is not None
-        assert found[name] == pytest.approx(float(value), abs=1e-12)
-    row, rater = rng.randrange(1, n_items), rng.randrange(1, 4)
-    text, written[row][rater] = written[row][rater], rng.choice(DOUBTFUL)
-    assert answer().code == 2
-    written[row][rater] = text
-    names.append(rng.choice(NO_RATERS))
-    for row_of_it in written:
-        row_of_it.append(rng.choice([*grades, "1", "2"]))
-    done = answer()
-    assert (done.code, names[-1] in done.err) == (2, True), done
