@@ -14,13 +14,12 @@ from masrel.agreement import ErrorKind, limits_of_agreement, lin_ccc, mdc, sem
 from masrel.estimates import Estimate
 
 KINDS: tuple[ErrorKind, ...] = ("agreement", "consistency")
-SETTINGS: dict[str, Any] = {
-    setting["id"]: setting
-    for setting in json.loads(
-        (Path(__file__).parents[1] / "oracles" / "measurement.json").read_text("utf-8")
-    )["settings"]
-    if setting["kind"] == "icc_missing"
-}
+FILE = Path(__file__).parents[1] / "oracles" / "measurement.json"
+EVERY: list[dict[str, Any]] = json.loads(FILE.read_text("utf-8"))["settings"]
+SETTINGS = {s["id"]: s for s in EVERY if s["kind"] == "icc_missing"}
+LIMITS = {s["id"]: s for s in EVERY if s["kind"] == "bland_altman"}
+(CONCORDANCE,) = (s for s in EVERY if s["kind"] == "lin_ccc")
+PAIRS = np.column_stack([CONCORDANCE["data"]["x"], CONCORDANCE["data"]["y"]])
 
 
 def ends(result: Estimate) -> tuple[float, float]:
@@ -71,17 +70,11 @@ def test_consistency_of_complete_tables_has_the_interval_of_chi_squared(
     assert ends(result) == pytest.approx(expected, rel=1e-8)
 
 
-FILE = Path(__file__).parents[1] / "oracles" / "measurement.json"
-EVERY: list[dict[str, Any]] = json.loads(FILE.read_text("utf-8"))["settings"]
-LIMITS = {s["id"]: s for s in EVERY if s["kind"] == "bland_altman"}
-(LIN,) = (s["data"] for s in EVERY if s["kind"] == "lin_ccc")
-
-
 def ratings_of(name: str) -> NDArray[np.float64]:
     """Pairs whose differences have the mean and spread of a setting."""
     data = LIMITS[name]["data"]
     if isinstance(data, str):  # those of the concordance
-        return np.column_stack([LIN["x"], LIN["y"]])
+        return PAIRS
     z = np.arange(float(data["n"]))
     z = (z - z.mean()) / z.std(ddof=1) * data["sd"] + data["mean"]
     return np.column_stack([50.0 + z, np.full(len(z), 50.0)])
@@ -118,18 +111,8 @@ def test_published_factors_of_ten_items() -> None:
     assert one.upper_interval.high == pytest.approx(2.911, abs=5e-4)
 
 
-(SETTING,) = (
-    setting
-    for setting in json.loads(
-        (Path(__file__).parents[1] / "oracles" / "measurement.json").read_text("utf-8")
-    )["settings"]
-    if setting["kind"] == "lin_ccc"
-)
-PAIRS = np.column_stack([SETTING["data"]["x"], SETTING["data"]["y"]])
-
-
 def test_value_error_and_interval_are_those_of_epir() -> None:
-    expected = SETTING["reference"]
+    expected = CONCORDANCE["reference"]
     result = lin_ccc(PAIRS)
     assert result.value == pytest.approx(expected["ccc_divisor_n"], rel=1e-8)
     assert result.standard_error == pytest.approx(expected["se"], rel=1e-8)

@@ -46,22 +46,11 @@ def estimate(value: float, error: float, n_items: int = 20) -> Estimate:
 
 
 def both_tails(t: float, df: int) -> float:
-    # P(|T| ≥ t) by the finite sums of Abramowitz and Stegun (1964), 26.7.3 and 26.7.4,
-    # with tan θ = t/√df: 1 - sin θ (1 + 1/2 cos²θ + 1·3/(2·4) cos⁴θ + ...) for even df,
-    # 1 - 2/π (θ + sin θ (cos θ + 2/3 cos³θ + 2·4/(3·5) cos⁵θ + ...)) for odd. Digits
-    # enough that the difference from 1 keeps some.
+    # P(|T| ≥ t) = I(df/2, 1/2) at df/(df + t²), with digits enough for far tails
     with mpmath.workdps(450):
-        square = mpmath.mpf(df) / (df + mpmath.mpf(t) ** 2)
-        sine, odd = mpmath.sqrt(1 - square), df % 2
-        term = mpmath.sqrt(square) if odd else mpmath.mpf(1)
-        total = mpmath.mpf(0)
-        for k in range(2 + odd, df + 1, 2):
-            total += term
-            term *= square * (k - 1) / k
-        if odd:
-            angle = mpmath.atan(mpmath.mpf(t) / mpmath.sqrt(df))
-            return float(1 - 2 / mpmath.pi * (angle + sine * total))
-        return float(1 - sine * total)
+        x = mpmath.mpf(df) / (df + mpmath.mpf(t) ** 2)
+        half = mpmath.mpf(1) / 2
+        return float(mpmath.betainc(df * half, half, 0, x, regularized=True))
 
 
 @pytest.mark.parametrize("df", [1, 2, 3, 4, 7, 29, 100, 1000, 20_000])

@@ -1,11 +1,9 @@
 """The forest: every estimate, its interval, and how it is distributed, are in it."""
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.patches import StepPatch
@@ -22,12 +20,6 @@ DENSITY = np.exp(-50.0 * (BELL - 0.6) ** 2)
 
 def one(interval: Interval) -> Axes:
     return forest(estimate(interval), ax=blank())
-
-
-@pytest.fixture(autouse=True)
-def _closed() -> Iterator[None]:
-    yield
-    plt.close("all")
 
 
 def lines(axes: Axes) -> list[tuple[str, list[list[float]]]]:

@@ -1,6 +1,6 @@
 """Ratings by grade: each is counted, coloured and named as it was given."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -25,12 +25,6 @@ THREE = pd.DataFrame(
     index=["P1", "P2", "P3", "P4", "P5"],
 )
 TWO = THREE[["Kim", "Lee"]]
-
-
-@pytest.fixture(autouse=True)
-def _closed() -> Iterator[None]:
-    yield
-    plt.close("all")
 
 
 def drawn(n_items: int, n_raters: int, q: int, *, words: bool) -> list[list[Any]]:

@@ -1,19 +1,10 @@
 """Agreement of pairs: every pair has its cell, every rater his or her change."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
-from matplotlib import pyplot as plt
 
 from masrel.plots import pairs
 from tests.plots.made import LONG, blank, diagnosis, overlaps, texts_of
-
-
-@pytest.fixture(autouse=True)
-def _closed() -> Iterator[None]:
-    yield
-    plt.close("all")
 
 
 def test_values_stand_in_their_cells_on_colours_from_0_to_1() -> None:

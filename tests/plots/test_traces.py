@@ -1,23 +1,15 @@
 """Traces: all of every stretch is drawn, its phases told apart, and named."""
 
-from collections.abc import Iterator
 from math import radians
 
 import numpy as np
 import pytest
-from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 
 from masrel.errors import ParameterError
 from masrel.lab.elbow import STANDARD_MODELS, ConstantSpeed, Trace, trace
 from masrel.plots import traces
 from tests.plots.made import blank, overlaps, texts_of
-
-
-@pytest.fixture(autouse=True)
-def _closed() -> Iterator[None]:
-    yield
-    plt.close("all")
 
 
 def stretch(speed: float, model: str = "HM3") -> Trace:

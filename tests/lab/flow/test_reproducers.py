@@ -3,7 +3,6 @@
 import json
 import re
 import shutil
-import subprocess
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
@@ -81,29 +80,6 @@ def outputs_over_records(bench: Bench) -> None:
     bench("ratings", "-o", bench.study / protocol, code=2)
     bench("report", "-o", bench.study / "sessions", code=2)
     assert contents(bench.study) == before
-
-
-def a_presentation_that_always_faults(bench: Bench) -> None:
-    bench.edit("protocol.toml", "torque_limit_nm = 20.0", "torque_limit_nm = 19.1")
-    assert "HM4" in bench("check", code=2).err
-
-
-def a_protocol_named_as_the_study(bench: Bench) -> None:
-    done = bench.masrel("check", bench.study / "protocol.toml")
-    assert done.code == 2
-    assert "folder" in done.err
-
-
-def a_session_without_a_terminal(bench: Bench) -> None:
-    # a stream that ends and a stop leave the session whole
-    for file in bench.study.glob("sessions/test_R2*"):
-        shutil.rmtree(file) if file.is_dir() else file.unlink()
-    where = ("--rater", "R2", "--session", "test", "--clock", "simulated")
-    command = masrel_command("run", bench.study, *where)
-    done = subprocess.run(command, input="\n1\n", capture_output=True, text=True)
-    assert done.returncode in (1, 2), done.stderr
-    assert "Traceback" not in done.stderr
-    assert "1 of 4 graded" in bench.masrel("verify", bench.study).out
 
 
 def a_file_system_without_locks(bench: Bench) -> None:
