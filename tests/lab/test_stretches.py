@@ -39,64 +39,49 @@ def single(recording: Recording) -> Stretch:
     return stretch
 
 
-def test_the_mean_speed_goes_from_the_onset_to_the_catch() -> None:
-    # ν_th is reached at 32 deg, 0.1 s, the catch is at 58 deg, 0.4 s: 26 / 0.3.
-    found = single(
-        recorded(
-            [0, 20, 90, 90, 90, 10],
-            angle_deg=[30, 32, 40, 49, 58, 60],
-            phase=[0, 0, 0, 0, 1, 0],
-        )
-    )
-    assert found.mean_speed_deg_s == pytest.approx(26.0 / 0.3)
-    assert found.catch_angle_deg == 58.0
-    assert found.catch_time_s == pytest.approx(0.4)
-    assert found.phases == ("pre-catch", "catch", "pre-catch")
-
-
-def test_an_arm_that_hesitated_has_begun_anew() -> None:
-    # As for the joint: 45 to 58 deg from 0.3 to 0.4 s, without the rest before.
-    found = recorded(
-        [50, 50, 10, 90, 90],
-        angle_deg=[30, 35, 36, 45, 58],
-        phase=[0, 0, 0, 0, 1],
-    )
-    assert single(found).mean_speed_deg_s == pytest.approx(130.0)
-
-
-def test_without_a_catch_it_goes_to_the_last_fast_sample() -> None:
-    found = recorded([0, 30, 30, 30, 0], angle_deg=[30, 31, 34, 37, 38], phase=[0] * 5)
-    assert single(found).mean_speed_deg_s == pytest.approx(30.0)
-    assert single(found).catch_angle_deg is None
-    assert single(found).residual_torque_nm is None
+FAULT = {**THRESHOLD, "fault": "speed: too much"}
 
 
 @pytest.mark.parametrize(
-    ("velocity", "is_fast"),
-    [([0, 19, 19, 0], False), ([0, 25, 0, 0], True), ([0, -60, -60, 0], False)],
+    ("velocity", "angle", "phase", "facts", "mean_speed", "catch_angle"),
+    [
+        # ν_th is reached at 32 deg, 0.1 s, the catch is at 58 deg, 0.4 s: 26 / 0.3
+        (
+            *([0, 20, 90, 90, 90, 10], [30, 32, 40, 49, 58, 60], [0, 0, 0, 0, 1, 0]),
+            *(THRESHOLD, 26.0 / 0.3, 58.0),
+        ),
+        # an arm that hesitated has begun anew, as for the joint: 45 to 58 deg in 0.1 s
+        (
+            *([50, 50, 10, 90, 90], [30, 35, 36, 45, 58], [0, 0, 0, 0, 1]),
+            *(THRESHOLD, 130.0, 58.0),
+        ),
+        # without a catch it goes to the last fast sample
+        ([0, 30, 30, 30, 0], [30, 31, 34, 37, 38], [0] * 5, THRESHOLD, 30.0, None),
+        # without an extension there is none
+        ([0, 19, 19, 0], [30, 31, 32, 33], [0] * 4, THRESHOLD, None, None),
+        ([0, 25, 0, 0], [30, 31, 32, 33], [0] * 4, THRESHOLD, None, None),
+        ([0, -60, -60, 0], [30, 31, 32, 33], [0] * 4, THRESHOLD, None, None),
+        # a fault before the catch leaves none, and one after it does
+        ([0, 30, 30, 999], [30, 33, 36, 136], [0] * 4, FAULT, None, None),
+        ([0, 30, 30, 999], [30, 33, 36, 136], [0, 0, 1, 1], FAULT, 30.0, 36.0),
+    ],
 )
-def test_without_an_extension_there_is_none(
-    velocity: list[float], is_fast: bool
+def test_the_mean_speed_goes_from_the_onset_to_the_catch(
+    velocity: list[float],
+    angle: list[float],
+    phase: list[int],
+    facts: dict[str, str | float],
+    mean_speed: float | None,
+    catch_angle: float | None,
 ) -> None:
-    found = single(recorded(velocity, angle_deg=[30, 31, 32, 33], phase=[0] * 4))
-    assert found.mean_speed_deg_s is None
-    assert found.reached_threshold is is_fast
-
-
-def test_a_fault_before_the_catch_leaves_no_mean_speed() -> None:
-    scene = {"angle_deg": [30, 33, 36, 136], "phase": [0] * 4}
-    assert single(recorded([0, 30, 30, 999], **scene)).mean_speed_deg_s is not None
-    facts = {**THRESHOLD, "fault": "speed: too much"}
-    stopped = recorded([0, 30, 30, 999], **scene, facts=facts)
-    assert single(stopped).mean_speed_deg_s is None
-
-
-def test_a_fault_after_the_catch_leaves_it() -> None:
-    facts = {**THRESHOLD, "fault": "speed: too much"}
-    found = recorded(
-        [0, 30, 30, 999], angle_deg=[30, 33, 36, 136], phase=[0, 0, 1, 1], facts=facts
-    )
-    assert single(found).mean_speed_deg_s == pytest.approx(30.0)
+    found = single(recorded(velocity, angle_deg=angle, phase=phase, facts=facts))
+    assert found.mean_speed_deg_s == (mean_speed and pytest.approx(mean_speed))
+    assert found.catch_angle_deg == catch_angle
+    assert found.reached_threshold is (max(velocity) >= 20)
+    if catch_angle is None:
+        assert found.residual_torque_nm is None
+    else:
+        assert found.catch_time_s == pytest.approx(0.1 * phase.index(1))
 
 
 def test_a_fault_takes_nothing_from_a_stretch_that_was_over() -> None:
@@ -108,6 +93,8 @@ def test_a_fault_takes_nothing_from_a_stretch_that_was_over() -> None:
         facts={**THRESHOLD, "fault": "speed: too much"},
     )
     assert [s.mean_speed_deg_s is None for s in stretches(found)] == [False, True]
+    without = recorded([0, 30, 30, 999], angle_deg=[30, 33, 36, 136], phase=[0] * 4)
+    assert single(without).mean_speed_deg_s is not None
 
 
 def test_each_stretch_has_its_own_facts() -> None:

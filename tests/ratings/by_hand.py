@@ -1,8 +1,30 @@
-"""Agreement by a few lines of exact arithmetic, to compare with."""
+"""Texts read as files, what was read by names, and agreement by exact arithmetic."""
 
 from collections import Counter
 from collections.abc import Sequence
 from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from masrel.ratings import RatingsFile, Reading, read_ratings
+
+
+def read(folder: Path, text: str, ending: str = ".csv", **options: Any) -> RatingsFile:
+    """Read a text as a file of this ending."""
+    path = folder / f"r{ending}"
+    path.write_text(text, encoding="utf-8")
+    return read_ratings(path, Reading(**options))
+
+
+def grades(file: RatingsFile) -> dict[tuple[str, str], str | None]:
+    """Return the grade of each item and rater, None where it is missing."""
+    (part,) = file.parts
+    names = (*file.scale.grades, None)
+    return {
+        (item, rater): names[code]
+        for item, row in zip(part.items, part.ratings.codes.tolist(), strict=True)
+        for rater, code in zip(part.raters, row, strict=True)
+    }
 
 
 def agreement(items: Sequence[Sequence[str | None]]) -> dict[str, Fraction | None]:

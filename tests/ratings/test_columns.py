@@ -7,14 +7,7 @@ import pytest
 
 from masrel.agreement import count_ratings
 from masrel.errors import ParameterError, RatingsError
-from masrel.ratings import RatingsFile, Reading, read_ratings
-
-
-def read(folder: Path, text: str, **options: Any) -> RatingsFile:
-    path = folder / "r.csv"
-    path.write_text(text, encoding="utf-8")
-    return read_ratings(path, Reading(**options))
-
+from tests.ratings.by_hand import read
 
 # ---- rows that stand for several items ----
 

@@ -11,7 +11,7 @@ import pytest
 
 from masrel.errors import MasrelError
 from masrel.ratings import Reading, read_ratings
-from tests.ratings.by_name import grades
+from tests.ratings.by_hand import grades
 
 
 def lines(*rows: dict[str, Any]) -> str:

@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 from masrel.errors import ParameterError, RatingsError
-from masrel.ratings import RatingsFile, Reading, read_ratings
+from masrel.ratings import RatingsFile, Reading
+from tests.ratings.by_hand import read as read_text
 
 
 def read(
@@ -16,9 +17,8 @@ def read(
     texts = cells.split("|")
     rows = [["item", "Kim", "Lee"]]
     rows += [[f"i{k}", *texts[k : k + 2]] for k in range(0, len(texts), 2)]
-    path = folder / "r.tsv"
-    path.write_text("\n".join(map(between.join, rows)) + "\n", encoding="utf-8")
-    return read_ratings(path, Reading(**options))
+    text = "\n".join(map(between.join, rows)) + "\n"
+    return read_text(folder, text, ".tsv", **options)
 
 
 # cells, options, grades of the scale, what was taken off
@@ -169,14 +169,12 @@ def test_a_few_codes_alone_are_suggested_as_missing(
 def test_numbers_of_items_with_thousands(
     text: str, options: dict[str, Any], n_items: int | str, tmp_path: Path
 ) -> None:
-    path = tmp_path / "table.csv"
-    path.write_text(text, encoding="utf-8")
     if isinstance(n_items, int):
-        file = read_ratings(path, Reading(table=True, **options))
+        file = read_text(tmp_path, text, table=True, **options)
         assert file.read["n_items"] == n_items
     else:
         with pytest.raises(RatingsError, match=n_items):
-            read_ratings(path, Reading(table=True, **options))
+            read_text(tmp_path, text, table=True, **options)
 
 
 @pytest.mark.parametrize(

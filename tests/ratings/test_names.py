@@ -9,7 +9,7 @@ import pytest
 from masrel.errors import ParameterError, RatingsError
 from masrel.ratings import RatingsFile, Reading, read_ratings
 from tests.cli.process import Caller
-from tests.ratings.by_name import grades
+from tests.ratings.by_hand import grades
 
 TABLE = "patient,Ines,Omar,Yun\nP1,1,2,3\nP2,0,3,0\nP3,1,,1\n"
 GRADES = {

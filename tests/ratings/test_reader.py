@@ -16,18 +16,13 @@ from masrel.errors import ParameterError, RatingsError
 from masrel.ratings import RatingsFile, Reading, read_ratings
 from masrel.scales import MODIFIED_ASHWORTH
 from tests.cli.process import Caller
+from tests.ratings.by_hand import read
 
 WIDE = "patient,Kim,Lee,Ann\nA,1,1,2\nB,2,2,NA\nC,3,,3\n"
 LONG = (
     "item,rater,grade\nA,Kim,1\nA,Lee,1\nA,Ann,2\nB,Kim,2\nB,Lee,2\nC,Kim,3\nC,Ann,3\n"
 )
 TABLE = [["1", "1", "2"], ["2", "2", None], ["3", None, "3"]]
-
-
-def read(folder: Path, text: str, **options: Any) -> RatingsFile:
-    path = folder / "r.csv"
-    path.write_text(text, encoding="utf-8")
-    return read_ratings(path, Reading(**options))
 
 
 def grades_of(file: RatingsFile) -> list[list[list[str | None]]]:

@@ -18,7 +18,7 @@ import pytest
 
 from masrel.errors import ParameterError, RatingsError
 from masrel.ratings import Reading, read_ratings
-from tests.ratings.by_name import grades
+from tests.ratings.by_hand import grades
 
 LONG = {
     "item": ["A", "A", "B", "B"],
