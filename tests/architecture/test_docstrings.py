@@ -1,15 +1,19 @@
-"""Docstrings of what is exported are whole numpydoc; the rest has a line."""
+"""Docstrings of what is exported are whole numpydoc, and it is on the page of names."""
 
 import dataclasses
 import importlib
 import inspect
+import pkgutil
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
 from numpydoc.validate import validate
 
+import masrel
+from docs.make import api
 from docs.make.api import MODULES
 
 # No examples or cross-references are forced on a class of data (EX01, SA01), a summary
@@ -63,3 +67,26 @@ def faults(name: str) -> list[str]:
 @pytest.mark.parametrize("module", MODULES)
 def test_an_exported_name_is_documented_whole(module: str) -> None:
     assert {n: why for n in exported(module) if (why := faults(n))} == {}
+
+
+page = cache(api.page)
+
+
+def test_the_page_is_what_the_packages_export() -> None:
+    """If it is not: ``python -m docs.make.api``."""
+    assert api.PAGE.read_text(encoding="utf-8") == page()
+
+
+def test_every_name_has_a_line_that_says_what_it_is() -> None:
+    empty = [line for line in page().splitlines() if line.endswith("|  |")]
+    assert empty == []
+
+
+def test_no_package_that_exports_is_left_out() -> None:
+    packages = [
+        info.name
+        for info in pkgutil.walk_packages(masrel.__path__, "masrel.")
+        if info.ispkg and info.name.count(".") == 1
+    ]
+    exporting = {p for p in packages if hasattr(importlib.import_module(p), "__all__")}
+    assert exporting - {"masrel.cli"} <= set(api.MODULES)

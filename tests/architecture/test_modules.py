@@ -1,4 +1,4 @@
-"""How modules import each other: never in a circle, and no more than they need."""
+"""How modules import each other, never in a circle, and which of them write files."""
 
 import ast
 from collections.abc import Iterable, Iterator
@@ -18,6 +18,9 @@ def _name(file: Path) -> str:
 FILES = {_name(file).removesuffix(".__init__"): file for file in ROOT.rglob("*.py")}
 
 
+TREES = {name: ast.parse(file.read_text("utf-8")) for name, file in FILES.items()}
+
+
 def _nodes(tree: ast.AST, types: bool) -> Iterator[ast.AST]:
     """Every node, without what is imported for type checkers alone unless asked for."""
     for node in ast.iter_child_nodes(tree):
@@ -35,9 +38,8 @@ def imported(module: str, *, lazy: bool) -> frozenset[str]:
     With `lazy` also those that a package loads when a name is first used: its
     ``__init__`` imports them for type checkers.
     """
-    file, found = FILES[module], set()
-    is_package = file.name == "__init__.py"
-    for node in _nodes(ast.parse(file.read_text("utf-8")), lazy and is_package):
+    is_package, found = FILES[module].name == "__init__.py", set()
+    for node in _nodes(TREES[module], lazy and is_package):
         if isinstance(node, ast.ImportFrom) and node.module:
             names = {f"{node.module}.{alias.name}" for alias in node.names}
             found |= (names & FILES.keys()) or {node.module}
@@ -76,3 +78,43 @@ def test_no_module_imports_in_a_circle() -> None:
 def test_a_command_reaches_few_modules(commands: tuple[str, ...], at_most: int) -> None:
     reached = closure(f"masrel.cli.{command}" for command in commands)
     assert len(reached) <= at_most
+
+
+WRITERS = {
+    "_files.py",
+    "lab/_study_files.py",  # bit by bit
+    "lab/_event_log.py",  # lines are added to a log
+    "lab/cli/_gating.py",  # a summary that a CI system gives is added to
+    "lab/hess/_recorder.py",  # samples while they are taken
+    "ratings/_exports.py",  # a temporary file for a library that reads no bytes
+}
+
+CALLS = {
+    "write_text",
+    "write_bytes",
+    "savefig",
+    "savez",
+    "to_csv",
+    "copyfile",
+    "rename",
+}
+
+
+def writes(tree: ast.AST) -> Iterator[int]:
+    # Lines of a module that open a file to write into it, or write one
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Call):
+            continue
+        name = getattr(node.func, "attr", getattr(node.func, "id", ""))
+        constants = [a.value for a in node.args if isinstance(a, ast.Constant)]
+        modes = [c for c in constants if isinstance(c, str) and len(c) <= 3]
+        if name in CALLS or (
+            name == "open" and any(set(m) & set("wax+") for m in modes)
+        ):
+            yield node.lineno
+
+
+def test_no_other_module_writes_files() -> None:
+    places = {name: str(file.relative_to(ROOT)) for name, file in FILES.items()}
+    lines = {places[name]: list(writes(tree)) for name, tree in TREES.items()}
+    assert {of: at for of, at in lines.items() if at and of not in WRITERS} == {}

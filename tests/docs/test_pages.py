@@ -123,6 +123,13 @@ def test_a_piece_of_a_protocol_has_keys_and_values_that_it_may(block: Block) -> 
             msgspec.convert(rest | entry, kind)
 
 
+def test_the_readme_begins_with_the_two_commands_that_ci_takes_from_it() -> None:
+    of_shell = (b for b in BLOCKS if b.page == "README.md" and b.language == "sh")
+    (main_job,), (tests,), *_ = [block.lines for block in of_shell]
+    assert main_job.endswith("masrel demo out")
+    assert tests.endswith("python -m pytest -n auto")
+
+
 # The reader sees what it has to see
 
 
