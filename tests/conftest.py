@@ -1,4 +1,4 @@
-"""Settings of property tests and of signals: the same in every run, no time limit."""
+"""Settings of property tests and of signals, and what all tests may ask for."""
 
 import signal
 from collections.abc import Callable, Iterator
@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 import pytest
 from hypothesis import settings
 
+from tests.cli.process import Caller
 from tests.faults import Faults
 
 # derandomize: a failure repeats; 30 examples a property; a slow machine is no failure.
@@ -15,6 +16,14 @@ settings.load_profile("masrel")
 # What a shell starts in the background ignores Ctrl-C, which tests send.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture
+def masrel(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Caller:
+    """The command line in this process: verb and arguments to how the call ended."""
+    return Caller(monkeypatch, capsys)
 
 
 @pytest.fixture

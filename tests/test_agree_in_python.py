@@ -17,8 +17,8 @@ import masrel
 from masrel.agreement import declared_weights, fleiss_kappa
 from masrel.errors import MasrelError
 from masrel.ratings import read_ratings
-from tests.cli.conftest import masrel as command
 from tests.cli.process import Caller
+from tests.conftest import masrel as command
 
 __all__ = ["command"]
 

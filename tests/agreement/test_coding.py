@@ -10,8 +10,6 @@ import pandas as pd
 import polars as pl
 import pyarrow as pa
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 import masrel
 from masrel.agreement import (
@@ -27,8 +25,6 @@ from masrel.agreement import (
     icc_f_test,
     kendall_w,
     krippendorff_alpha,
-    limits_of_agreement,
-    lin_ccc,
     robinson_a,
     scott_pi,
 )
@@ -81,22 +77,6 @@ def test_a_rating_that_is_not_there_or_empty_is_missing() -> None:
     assert (coded.n_items, coded.n_raters) == (2, 2)
 
 
-@given(st.data())
-def test_a_long_table_gives_what_the_wide_one_gives(data: st.DataObject) -> None:
-    grade = st.sampled_from([*SCALE, None])
-    wide = data.draw(
-        st.lists(st.lists(grade, min_size=3, max_size=3), min_size=2, max_size=6)
-    )
-    cells = [(i, j, g) for i, row in enumerate(wide) for j, g in enumerate(row)]
-    shuffled = data.draw(st.permutations(cells[3:]))
-    # the first item's rows stay first, so that raters keep their order
-    coded = code_long(long(*cells[:3], *shuffled), categories=SCALE)
-    position = {g: k for k, g in enumerate(SCALE)} | {None: -1}
-    expected = sorted([position[g] for g in row] for row in wide[1:])
-    assert coded.codes[0].tolist() == [position[g] for g in wide[0]]
-    assert sorted(coded.codes[1:].tolist()) == expected
-
-
 TWICE = long(("x", "A", "1"), ("x", "B", "2"), ("x", "A", "3"), ("y", "A", "2"))
 
 
@@ -132,13 +112,6 @@ def test_two_sequences_are_the_raters_of_a_table(form: Callable[..., Any]) -> No
     assert scott_pi(form(KIM), form(LEE)) == scott_pi(rows)
     table = contingency_table(form(KIM), form(LEE))
     assert table.tolist() == contingency_table(rows).tolist()
-
-
-def test_two_sequences_of_measurements() -> None:
-    first, second = [1.0, 3.0, 5.0, 6.5], [2.0, 3.5, 7.0, 6.0]
-    rows = np.column_stack([first, second])
-    assert lin_ccc(first, second) == lin_ccc(rows)
-    assert limits_of_agreement(first, second).upper == limits_of_agreement(rows).upper
 
 
 @pytest.mark.parametrize(

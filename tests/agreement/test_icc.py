@@ -5,14 +5,10 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from scipy import stats
 
 from masrel.agreement import (
     IccForm,
     icc,
-    icc_f_test,
     variance_components,
 )
 from masrel.errors import ParameterError, RatingsError
@@ -45,25 +41,6 @@ def test_a_variance_below_0_is_0_and_named() -> None:
     assert (result.items, result.raters) == (0.0, 0.0)
     assert result.residual == pytest.approx(2 / 3)
     assert result.negative == ("items", "raters")
-
-
-tables = st.integers(2, 4).flatmap(
-    lambda k: st.lists(
-        st.lists(st.integers(0, 9), min_size=k, max_size=k), min_size=3, max_size=7
-    ).map(np.array)
-)
-
-
-@given(tables.filter(lambda table: table.var(axis=1).sum() > 0))
-def test_one_way_f_against_scipy(table: "np.ndarray[tuple[int, int]]") -> None:  # type: ignore[type-var]
-    if (table.mean(axis=1) == table.mean()).all():
-        table = table + np.arange(len(table))[:, None]
-    other = stats.f_oneway(*table)
-    found = icc_f_test(table, form="ICC(1)")
-    assert found.statistic == pytest.approx(other.statistic, rel=1e-9)
-    assert found.p_value == pytest.approx(other.pvalue, rel=1e-8)
-    n, k = table.shape
-    assert found.df == (n - 1, n * (k - 1))
 
 
 def test_text_counts_by_rank_and_numbers_by_value() -> None:

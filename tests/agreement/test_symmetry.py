@@ -7,10 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
-from statsmodels.stats import contingency_tables as peer
 
 from masrel.agreement import (
-    McnemarKind,
     bhapkar,
     bias_index,
     bowker,
@@ -32,7 +30,7 @@ from masrel.errors import (
     RatingsError,
 )
 from tests.agreement.test_undefined import assert_undefined
-from tests.strategies import LABELS, Table, tables
+from tests.strategies import Table
 
 TESTS = [bowker, stuart_maxwell, bhapkar]
 
@@ -56,28 +54,6 @@ def test_published_vision_table() -> None:
     assert bowker(VISION).statistic == pytest.approx(19.107, abs=0.0005)
     assert bowker(VISION).df == (6.0,)
     assert stuart.n_items == 7477
-
-
-@given(
-    st.tuples(*[st.integers(0, 40)] * 4).filter(lambda cells: cells[1] + cells[2] > 0)
-)
-def test_mcnemar_against_statsmodels(cells: tuple[int, ...]) -> None:
-    table = [list(cells[:2]), list(cells[2:])]
-    exact = peer.mcnemar(table, exact=True)
-    found = mcnemar(table)
-    assert found.p_value == pytest.approx(exact.pvalue, rel=1e-12)
-    assert found.statistic == exact.statistic
-    kinds: tuple[tuple[McnemarKind, bool], ...] = (
-        ("uncorrected", False),
-        ("corrected", True),
-    )
-    for kind, correction in kinds:
-        if correction and cells[1] == cells[2]:
-            continue  # (|b - c| - 1)² would be 1 where nothing speaks for a change
-        other = peer.mcnemar(table, exact=False, correction=correction)
-        ours = mcnemar(table, kind=kind)
-        assert ours.statistic == pytest.approx(other.statistic, rel=1e-13)
-        assert ours.p_value == pytest.approx(other.pvalue, rel=1e-12)
 
 
 def test_equal_margins_of_a_sparse_table_by_hand() -> None:
@@ -229,24 +205,6 @@ def test_published_kappa_of_each_diagnosis() -> None:
         assert (found.coefficient, found.weights) == ("category_kappa", diagnosis)
         assert (found.n_items, found.n_raters, found.n_categories) == (30, 6, 2)
     assert fleiss_kappa(RATINGS).value == pytest.approx(0.430, abs=5e-4)
-
-
-@pytest.mark.filterwarnings("ignore::masrel.errors.UndefinedStatisticWarning")
-@given(tables(missing=False))
-def test_fleiss_kappa_is_their_mean_weighed_by_p_times_q(table: Table) -> None:
-    grades = [grade for row in table for grade in row]
-    if len(set(grades)) < 2:
-        assert_undefined(lambda: fleiss_kappa(table, categories=LABELS))
-        return
-    shares = {g: grades.count(g) / len(grades) for g in set(grades)}
-    weights = {g: p * (1 - p) for g, p in shares.items()}
-    mean = sum(
-        w * category_kappa(table, g, categories=LABELS).value
-        for g, w in weights.items()
-        if g is not None
-    ) / sum(weights.values())
-    found = fleiss_kappa(table, categories=LABELS).value
-    assert found == pytest.approx(mean, rel=1e-12, abs=1e-14)
 
 
 def test_items_with_a_missing_rating_are_not_tested() -> None:

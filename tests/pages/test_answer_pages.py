@@ -14,6 +14,9 @@ import masrel
 from masrel import Estimating, Reading
 from masrel.errors import ParameterError
 from tests.cli.process import Caller
+from tests.conftest import masrel as masrel_command
+
+__all__ = ["masrel_command"]
 
 
 def ratings(n_raters: int = 4, n_items: int = 12) -> pd.DataFrame:
@@ -178,14 +181,6 @@ def test_methods_say_and_cite_what_was_computed(
     brackets = " ".join(re.findall(r"\(([^()]*, \d{4}[^()]*)\)", methods))
     listed = re.findall(r" \((\d{4})\)\. ", methods)
     assert {*re.findall(r"\d{4}", brackets)} == {*listed}
-
-
-@pytest.fixture
-def masrel_command(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Caller:
-    """The command line in this process."""
-    return Caller(monkeypatch, capsys)
 
 
 def test_the_page_of_a_command_has_its_call_and_the_hash(

@@ -10,7 +10,6 @@ from masrel.cli import cli
 from masrel.lab.conduct import record_standing
 from masrel.lab.protocol import StudyPaths, read_protocol
 from masrel.lab.run import SimulatedGrades, run_session
-from tests.cli.process import Caller
 from tests.lab.cli.test_train import new_study, train_simulated
 
 
@@ -21,14 +20,6 @@ def run(*arguments: str, code: int = 0) -> str:
         raise result.exception
     assert result.exit_code == code, result.output
     return result.output
-
-
-@pytest.fixture
-def masrel(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Caller:
-    """The command line in this process, with the sentences it ends with."""
-    return Caller(monkeypatch, capsys)
 
 
 @pytest.fixture(scope="session")
