@@ -102,6 +102,14 @@ def test_inertia_adds_to_pre_catch_by_hand() -> None:
     assert one(joint, motion, 0.5) == pytest.approx(expected, rel=1e-15)
 
 
+def test_the_torque_jumps_by_h_times_the_speed_at_the_catch() -> None:
+    # (3), with v_c the speed there, 1.63 times the mean speed until then
+    motion = minimum_jerk(92.0)
+    at = events(HM3, motion).catch
+    jump = one(HM3, motion, at) - one(HM3, motion, nextafter(at, 0.0))
+    assert jump == pytest.approx(2.8 * float(motion.velocity(at)), rel=1e-12)
+
+
 # What section III.C says of the four traces, at one speed
 
 
