@@ -29,7 +29,6 @@ from masrel.lab.run import read_log
 from masrel.lab.serve._access import LIFE_S, ROLES, Access, Role
 from masrel.lab.serve._coordinator import ACTIONS
 from masrel.lab.serve._manager import (
-    AnswerRefusedError,
     AskOverError,
     SessionManager,
 )
@@ -48,7 +47,6 @@ __all__ = [
     "ACTIONS",
     "LIFE_S",
     "ROLES",
-    "AnswerRefusedError",
     "AskOverError",
     "Role",
     "SampleTail",
