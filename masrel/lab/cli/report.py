@@ -276,7 +276,7 @@ def _made(
     from masrel.lab.report import study_conduct
     from masrel.lab.report._document import make_report, section_names
     from masrel.lab.report._material import gather
-    from masrel.lab.report._pages import pandoc_version
+    from masrel.lab.report._pages import CONVERTED, pandoc_version
     from masrel.lab.verification import anchors_of
 
     # most of what libraries and figures make stays in use
@@ -289,7 +289,7 @@ def _made(
                     f"--only: needed a section of this report, {', '.join(known)}, got "
                     f"{name!r}"
                 )
-        if {"latex", "docx"} & {*data.protocol.report.formats, *formats}:
+        if CONVERTED & {*data.protocol.report.formats, *formats}:
             pandoc_version()
         gates = gating.gates(data.protocol)
         conduct = study_conduct(

@@ -49,7 +49,7 @@ from masrel.lab.report._grade_sections import (
 )
 from masrel.lab.report._material import Lacking, Material, gather
 from masrel.lab.report._order_tables import order_needs, order_section
-from masrel.lab.report._pages import WRITERS, pandoc_version
+from masrel.lab.report._pages import CONVERTED, WRITERS, pandoc_version
 from masrel.lab.report._paragraphs import methods_section, result_text
 from masrel.lab.report._report_folder import (
     MANIFEST,
@@ -247,8 +247,8 @@ def write_report(
     files = make_report(material, anchors=anchors, progress=progress, raw_csv=raw_csv)
     replace_report(destination, files)
     pages = {
-        name: destination / writer.file if writer.file in files else None
-        for name, writer in WRITERS.items()
+        name: destination / file if file in files else None
+        for name, (file, _) in WRITERS.items()
     }
     return ReportFiles(
         **pages,
@@ -291,19 +291,15 @@ def make_report(
         ),
         version=analysis.masrel_version,
     )
-    writers = [
-        writer
-        for name, writer in WRITERS.items()
-        if name in protocol.report.formats or name in formats
-    ]
-    pages = {writer.file: writer.write(document) for writer in writers}
+    every = {*protocol.report.formats, *formats}
+    writers = [writer for name, writer in WRITERS.items() if name in every]
+    pages = {file: write(document) for file, write in writers}
     pages[NUMBERS] = analysis_text(analysis).encode()
     if progress is not None:
         progress("pages")
     if material.conduct is not None:
         inputs |= material.conduct.inputs
-    is_converted = any(writer.is_converted for writer in writers)
-    pandoc = pandoc_version() if is_converted else None
+    pandoc = pandoc_version() if CONVERTED & every else None
     return report_files(assets, pages, inputs, pandoc=pandoc)
 
 
@@ -323,11 +319,11 @@ def _chapters(
         warnings.simplefilter("always")
         made = chapters(sections, block)
     lacking: set[str] = set()
-    for warning in caught:
-        if isinstance(warning.message, MissingLettersWarning):
-            lacking |= warning.message.letters
+    for message in (warning.message for warning in caught):
+        if isinstance(message, MissingLettersWarning):
+            lacking |= message.letters
         else:
-            warnings.warn(warning.message, stacklevel=3)
+            warnings.warn(message, stacklevel=3)
     if lacking:
         warnings.warn(MissingLettersWarning(lacking), stacklevel=3)
     return made

@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Literal
@@ -19,15 +19,6 @@ from masrel.errors import ParameterError
 from masrel.pages._sections import Document, html_page, narrow
 from masrel.tables._latex import in_math
 from masrel.tables._tables import Column, Table, page_cells
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Writer:
-    """A format of pages."""
-
-    file: str  # name of the page, in the report's folder
-    write: Callable[[Document], bytes]
-    is_converted: bool = False  # whether pandoc makes it
 
 
 def _markdown(document: Document, form: Literal["latex", "docx"] | None) -> str:
@@ -77,17 +68,17 @@ def _as_document(form: Literal["latex", "docx"], document: Document) -> bytes:
     return converted(_markdown(document, form), form, pictures=pictures)
 
 
-WRITERS: dict[str, Writer] = {
-    "html": Writer(file="report.html", write=lambda of: html_page(of).encode()),
-    "markdown": Writer(file="report.md", write=lambda of: _markdown(of, None).encode()),
-    "latex": Writer(
-        file="report.tex", write=partial(_as_document, "latex"), is_converted=True
-    ),
-    "docx": Writer(
-        file="report.docx", write=partial(_as_document, "docx"), is_converted=True
-    ),
+WRITERS: dict[str, tuple[str, Callable[[Document], bytes]]] = {
+    "html": ("report.html", lambda of: html_page(of).encode()),
+    "markdown": ("report.md", lambda of: _markdown(of, None).encode()),
+    "latex": ("report.tex", partial(_as_document, "latex")),
+    "docx": ("report.docx", partial(_as_document, "docx")),
 }
-"""The formats of pages by name, in the order in which they are written."""
+"""The formats of pages by name, in the order in which they are written: a file's name
+in the report's folder, and what writes it."""
+
+CONVERTED = frozenset(("latex", "docx"))
+"""Formats that pandoc makes."""
 
 
 def _rule(columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> str:

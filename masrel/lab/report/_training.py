@@ -16,7 +16,14 @@ from masrel.lab.training._lessons import (
     TrainingRecord,
     learning_curve,
 )
-from masrel.pages._sections import Block, Chapter, Document, Drawing, Paragraph
+from masrel.pages._sections import (
+    Block,
+    Chapter,
+    Document,
+    Drawing,
+    Paragraph,
+    html_page,
+)
 from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import (
     SIMULATED,
@@ -188,7 +195,6 @@ def learning_content(record: TrainingRecord, *, level: float) -> Drawn:
 def training_page(record: TrainingRecord, protocol: Protocol, *, level: float) -> bytes:
     """Return the page of a training; takes the level of its intervals."""
     # Imported here: the tables alone load nothing that draws.
-    from masrel.lab.report._pages import WRITERS
     from masrel.plots import draw
 
     curve, confusion = training_tables(record, level=level)
@@ -217,4 +223,4 @@ def training_page(record: TrainingRecord, protocol: Protocol, *, level: float) -
         inputs=(("SHA-256 of the protocol", protocol_hash(protocol)),),
         version=__version__,
     )
-    return WRITERS["html"].write(document)
+    return html_page(document).encode()
