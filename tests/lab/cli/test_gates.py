@@ -126,15 +126,6 @@ def check_junit(root: ElementTree.Element) -> None:
         assert int(root.get(name, "")) == len(root.findall(f"*/{tag}"))
 
 
-@pytest.mark.parametrize("why", [r"odd \u0001 sign", r"two\nlines"])
-def test_a_reason_is_one_line(masrel: Caller, study: Path, why: str) -> None:
-    with (study / "protocol.toml").open("a") as file:
-        file.write(f'\n[[report.gates]]\nrequire = "kappa.std.n >= 5"\nwhy = "{why}"\n')
-    done = masrel("check", study)
-    assert done.code == 2
-    assert "report.gates[0].why: needed one line without control" in done.err
-
-
 @pytest.mark.parametrize("place", ["none/summary.md", "."])
 def test_a_summary_that_cannot_be_written_hides_no_gate(
     masrel: Caller,

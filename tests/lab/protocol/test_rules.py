@@ -228,6 +228,13 @@ def cases() -> list[tuple[dict[str, Any], str]]:
         )
         for sizes, problem in SIZES
     ]
+    every += [
+        (
+            changed("report", "gates", to=[{"require": "kappa.n >= 5", "why": why}]),
+            "report.gates[0].why: needed one line without control",
+        )
+        for why in ("odd \u0001 sign", "two\nlines")
+    ]
     return every
 
 

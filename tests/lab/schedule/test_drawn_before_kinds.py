@@ -12,7 +12,12 @@ from pathlib import Path
 import pytest
 
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
-from masrel.lab.schedule import draw_schedule, schedule_problems, write_schedules
+from masrel.lab.schedule import (
+    concealment_notes,
+    draw_schedule,
+    schedule_problems,
+    write_schedules,
+)
 
 BEFORE = Path(__file__).parent / "drawn_before_kinds"
 DRAWN = json.loads((BEFORE / "sha256.json").read_text(encoding="utf-8"))
@@ -61,6 +66,8 @@ def test_they_are_kept_and_a_rater_who_comes_later_has_a_concealed_order(
     assert write_schedules(protocol, paths) == ()
     assert schedule_problems(protocol, paths) == ()
     assert not paths.secret_file.exists()  # nothing was drawn, nothing needed it
+    note, *_ = concealment_notes(protocol, paths)
+    assert "2 of 2 schedules were drawn from the protocol's seed alone" in note
     text = paths.protocol.read_text(encoding="utf-8")
     later = '\n[[raters]]\nid = "R3"\n\n[[sessions]]\n'
     text = text.replace("\n[[sessions]]\n", later)
