@@ -12,7 +12,8 @@ MOST_SAID = 15
 def _parts() -> list[object]:
     """Tables in parts: a tenth in each run, few of it quick; all in the long tests."""
     parts: list[tuple[range, tuple[pytest.MarkDecorator, ...]]] = [
-        *((numbers.TENTH[k::8], (pytest.mark.slow,) if k else ()) for k in range(8)),
+        (numbers.TENTH[::20], ()),
+        *((numbers.TENTH[k::8], (pytest.mark.slow,)) for k in range(8)),
         *((range(k, numbers.N_TABLES, 20), (pytest.mark.long,)) for k in range(20)),
     ]
     return [

@@ -53,9 +53,10 @@ def shaped(entry: Coefficient, table: Table) -> object:
 def for_entry(entry: Coefficient) -> st.SearchStrategy[Table]:
     if entry.shape == "pairs":
         return st.integers(1, 3).flatmap(lambda r: tables(n_raters=(2 * r, 2 * r)))
-    few = entry.has_interval and entry.name != "kendall_w"  # with gaps it is fitted
+    few = entry.has_interval and entry.name != "kendall_w"
     n_raters = entry.n_raters[0], entry.n_raters[1] or (3 if few else 6)
-    return tables(n_raters=n_raters, max_items=5 if few else 12)
+    is_icc = entry.name.startswith("icc")  # which are fitted where there are gaps
+    return tables(n_raters=n_raters, max_items=5 if few else 12, missing=not is_icc)
 
 
 def weights_for(entry: Coefficient) -> st.SearchStrategy[WeightName]:
