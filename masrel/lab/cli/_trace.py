@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -366,21 +366,6 @@ def _write_samples(
     quiet: bool,
 ) -> None:
     # columns name the scene where there are several
-    n_rows = _n_samples(documents, rate_hz)
-    several = len(scenes) > 1
-    with (
-        new_file(csv_file) as out,
-        tqdm(total=n_rows, desc="samples", delay=1.0, disable=quiet or None) as bar,
-    ):
-        out.write("# simulated: true\n")
-        writer = csv.writer(out, lineterminator="\n")
-        writer.writerow((*(("model", "speed_deg_s") if several else ()), *_COLUMNS))
-        for scene in scenes:
-            names = (safe_cell(scene.model), scene.speed_deg_s) if several else ()
-            _write_rows(writer, names, scene, rate_hz, bar)
-
-
-def _n_samples(documents: Sequence[dict[str, Any]], rate_hz: float) -> int:
     durations = [document["phases"][-1]["end_s"] for document in documents]
     n_samples = sum(durations) * rate_hz + len(durations)
     if not n_samples <= _MAX_SAMPLES:
@@ -388,16 +373,25 @@ def _n_samples(documents: Sequence[dict[str, Any]], rate_hz: float) -> int:
             f"--csv: needs at most {_MAX_SAMPLES} samples, got {n_samples:.4g}: "
             f"{sum(durations):.4g} s at {rate_hz:g} Hz; --rate-hz makes them fewer"
         )
-    return int(n_samples)
+    several = len(scenes) > 1
+    with (
+        new_file(csv_file) as out,
+        tqdm(
+            total=int(n_samples), desc="samples", delay=1.0, disable=quiet or None
+        ) as bar,
+    ):
+        out.write("# simulated: true\n")
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow((*(("model", "speed_deg_s") if several else ()), *_COLUMNS))
+        for scene in scenes:
+            names = (safe_cell(scene.model), scene.speed_deg_s) if several else ()
+            for rows in _blocks_of_rows(scene, rate_hz):
+                writer.writerows((*names, *row) for row in rows)
+                bar.update(len(rows))
 
 
-def _write_rows(
-    writer: Any,  # csv.writer, whose type has no name
-    names: tuple[object, ...],
-    scene: Scene,
-    rate_hz: float,
-    bar: "tqdm[Any]",
-) -> None:
+def _blocks_of_rows(scene: Scene, rate_hz: float) -> Iterator[list[tuple[Any, ...]]]:
+    # as many samples at once as are written between two signs of progress
     import numpy as np
 
     from masrel.lab import elbow
@@ -413,6 +407,4 @@ def _write_rows(
     for start in range(0, samples.time.size, _N_AT_ONCE):
         block = slice(start, start + _N_AT_ONCE)
         phases = [PHASES[code] for code in samples.phase[block].tolist()]
-        rows = zip(*(c[block].tolist() for c in columns), phases, strict=True)
-        writer.writerows((*names, *row) for row in rows)
-        bar.update(len(phases))
+        yield list(zip(*(c[block].tolist() for c in columns), phases, strict=True))
