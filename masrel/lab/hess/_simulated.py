@@ -420,16 +420,6 @@ class SimulatedDevice(Device):
         self._sensing = None if sensor is None else _Sensing(sensor)
         self.channels = () if sensor is None else (MEASURED_TORQUE,)
 
-    @property
-    def hand_torque(self) -> float:
-        """Torque of the hand on the arm now, as a sensor between them reads, N·m."""
-        return self._plant.hand_torque if self._started else 0.0
-
-    @property
-    def motor_torque(self) -> float:
-        """Torque of the motor at the elbow now, N·m; positive resists extension."""
-        return self._plant.motor_torque
-
     def _start(self) -> None:
         """Nothing to take hold of."""
 

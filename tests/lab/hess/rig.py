@@ -7,11 +7,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from masrel.errors import DeviceTimeoutError
+from masrel.errors import DeviceError, DeviceTimeoutError
 from masrel.lab.elbow import STANDARD_MODELS, JointModel
 from masrel.lab.elbow._torque import _stepped
 from masrel.lab.hess import (
     BackendOptions,
+    Clock,
     Controller,
     Device,
     DeviceLimits,
@@ -79,22 +80,25 @@ class ScriptedDevice(Device):
     name: ClassVar[str] = "scripted"
     simulated: ClassVar[bool] = True
 
-    def __init__(self, clock: SimulatedClock, angle=lambda _time_s: START) -> None:
-        self.clock = clock
+    def __init__(
+        self, clock: Clock | None = None, angle=lambda _time_s: START, **traits: Any
+    ) -> None:
+        self.clock = clock or SimulatedClock()
         self.angle = angle
         self.values = lambda _time_s: ()
         self.commands: list[tuple[int, float]] = []
         self.n_reads = 0
         self.late_ns = 0  # how old a reading is
-        self.silent_after = math.inf
+        self.is_lost = lambda _n: False  # whether a reading gets no answer
         self.deaf_after = math.inf
+        vars(self).update(traits)
 
     def _start(self) -> None:
         self.start_ns = self.clock.now_ns()
 
     def _read(self) -> Reading:
         self.n_reads += 1
-        if self.n_reads > self.silent_after:
+        if self.is_lost(self.n_reads - 1):
             raise DeviceTimeoutError("scripted: no answer")
         now_ns = self.clock.now_ns()
         time_s = (now_ns - self.start_ns) * 1e-9
@@ -109,20 +113,6 @@ class ScriptedDevice(Device):
         self.stopped = True
 
 
-class Losing(ScriptedDevice):
-    """No answer to some of its questions, by number."""
-
-    def __init__(self, is_lost: Callable[[int], bool], **options) -> None:
-        super().__init__(SimulatedClock(), **options)
-        self.is_lost = is_lost
-
-    def _read(self) -> Reading:
-        reading = super()._read()
-        if self.is_lost(self.n_reads - 1):
-            raise DeviceTimeoutError("scripted: no answer")
-        return reading
-
-
 def scripted(
     angle: Callable[[float], float] = lambda _time_s: START,
     model: str | JointModel | Controller = "HM3",
@@ -132,7 +122,7 @@ def scripted(
     **options: Any,
 ) -> tuple[ScriptedDevice, Presented]:
     """Present on a scripted device; `options` are those of the loop."""
-    device = device or ScriptedDevice(clock or SimulatedClock(), angle)
+    device = device or ScriptedDevice(clock, angle)
     if not isinstance(model, Controller):
         model = controls(model, rate_hz=options.get("rate_hz", 1000))
     options = {"limits": LIMITS, "max_duration_s": 0.02, **options}
@@ -151,6 +141,22 @@ def path(points_deg: Sequence[tuple[float, float]]) -> Callable[[float], float]:
         return radians(np.interp(time_s, times, angles) + tremor)
 
     return angle
+
+
+class Heard:
+    """What a watchdog hears, ms; from a time on it has ended."""
+
+    def __init__(self, ends_ms: float = math.inf) -> None:
+        self.clock, self.said, self.ends_ms = SimulatedClock(), [], ends_ms
+
+    def beat(self) -> None:
+        self.said.append(self.clock.now_ns() * 1e-6)
+        if self.said[-1] >= self.ends_ms:
+            raise DeviceError("watchdog: has ended")
+
+    def rest(self) -> None:
+        self.beat()
+        self.said[-1] = "rest"
 
 
 class Joint:
@@ -201,7 +207,9 @@ def missing(gaps: dict[float, float]) -> dict[float, Callable[[ActingClock], Non
     return {at: lambda clock, gap=gap: clock.miss(gap) for at, gap in gaps.items()}
 
 
-def law_of(model: JointModel, recording: Recording) -> np.ndarray:
+def law_of(
+    model: JointModel, recording: Recording, velocity: np.ndarray | None = None
+) -> np.ndarray:
     """What a model asks for, N·m, where it is fed what was read (n_samples,)."""
     columns = recording.columns
     return _stepped(
@@ -209,7 +217,7 @@ def law_of(model: JointModel, recording: Recording) -> np.ndarray:
         START,
         columns["time_s"],
         np.rint(columns["angle_deg"] / 0.005) * radians(0.005),  # as it was read
-        np.radians(columns["velocity_deg_s"]),
+        np.radians(columns["velocity_deg_s"]) if velocity is None else velocity,
     )[0]
 
 

@@ -27,7 +27,7 @@ from .rig import (
     POST_CATCH,
     PRE_CATCH,
     START,
-    Losing,
+    ScriptedDevice,
     controls,
     present,
     scripted,
@@ -119,7 +119,9 @@ def test_the_speed_is_that_of_a_first_order_low_pass_and_missed_ticks_do_not_bia
     lost = set(rng.choice(np.arange(5, 200), 15, replace=False).tolist())
     limits = DeviceLimits(missed_replies=9, missed_replies_per_100=99, drift_speed=1e-3)
 
-    device = Losing(lost.__contains__, angle=lambda time_s: START + 1.5 * time_s)
+    device = ScriptedDevice(
+        angle=lambda time_s: START + 1.5 * time_s, is_lost=lost.__contains__
+    )
     made = scripted(device=device, limits=limits, max_duration_s=0.2)[1].recording
     time_s = made.columns["time_s"][: made.n_presented]
     speed = np.radians(made.columns["velocity_deg_s"][: made.n_presented])

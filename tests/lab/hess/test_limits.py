@@ -15,7 +15,6 @@ from masrel.lab.elbow import STANDARD_MODELS, MinimumJerk
 from masrel.lab.hess import (
     DeviceLimits,
     Reading,
-    SimulatedClock,
     StretchRules,
     render,
 )
@@ -28,7 +27,6 @@ from .rig import (
     START,
     ActingClock,
     Joint,
-    Losing,
     ScriptedDevice,
     controls,
     missing,
@@ -328,8 +326,10 @@ def test_what_lies_on_a_limit_passes_and_what_lies_beyond_is_named(row: str) -> 
 def test_a_gap_widens_what_may_follow(moved_deg: float, is_a_jump: bool) -> None:
     speed_deg_s = 30.0 if moved_deg == 0.6 else 0.0
     before = ticks((2, speed_deg_s), (1, 0.0))
-    device = Losing(lambda tick: 3 <= tick < 22)
-    device.angle = lambda t: before(t) + radians(moved_deg) * (t > 2.5 * MS)
+    device = ScriptedDevice(
+        angle=lambda t: before(t) + radians(moved_deg) * (t > 2.5 * MS),
+        is_lost=lambda tick: 3 <= tick < 22,
+    )
     limits = DeviceLimits(missed_replies=99, missed_replies_per_100=100)
     fault = scripted(device=device, limits=limits, max_duration_s=0.3)[1].fault
     assert (fault is not None) is is_a_jump
@@ -344,8 +344,7 @@ def test_a_gap_widens_what_may_follow(moved_deg: float, is_a_jump: bool) -> None
 def test_a_reading_that_is_too_old_or_from_the_future_is_named(
     late_ms: float, is_stale: bool
 ) -> None:
-    device = ScriptedDevice(SimulatedClock())
-    device.late_ns = round(late_ms * 1e6)
+    device = ScriptedDevice(late_ns=round(late_ms * 1e6))
     _, presented = scripted(device=device)
     if not is_stale:
         assert presented.fault is None
@@ -371,7 +370,8 @@ def test_a_reading_that_is_too_old_or_from_the_future_is_named(
 def test_two_readings_in_a_row_may_be_lost_and_ten_of_a_hundred(
     is_lost: Callable[[int], bool], tick: int | None, words: str
 ) -> None:
-    _, presented = scripted(device=Losing(is_lost), max_duration_s=1.0)
+    device = ScriptedDevice(is_lost=is_lost)
+    _, presented = scripted(device=device, max_duration_s=1.0)
     fault = presented.fault
     if tick is None:
         assert fault is None
@@ -398,7 +398,7 @@ def test_the_share_is_that_of_any_hundred_ticks(
         missed_replies=1000, missed_replies_per_100=limit, watchdog_time=9.0
     )
     _, presented = scripted(
-        device=Losing(lost.__contains__),
+        device=ScriptedDevice(is_lost=lost.__contains__),
         limits=limits,
         rate_hz=rate_hz,
         max_duration_s=401 / rate_hz,

@@ -28,6 +28,7 @@ from .rig import (
     LIMITS,
     START,
     ActingClock,
+    Heard,
     ScriptedDevice,
     controls,
     missing,
@@ -172,22 +173,6 @@ def test_a_fault_brings_the_torque_to_zero_in_a_straight_line(
     assert columns["time_s"][-1] <= fault.time_s + ramp_time + 1e-9
 
 
-class Heard:
-    """What a watchdog hears, ms; from a time on it has ended."""
-
-    def __init__(self, ends_ms: float = math.inf) -> None:
-        self.clock, self.said, self.ends_ms = SimulatedClock(), [], ends_ms
-
-    def beat(self) -> None:
-        self.said.append(self.clock.now_ns() / PERIOD_NS)
-        if self.said[-1] >= self.ends_ms:
-            raise DeviceError("watchdog: has ended")
-
-    def rest(self) -> None:
-        self.beat()
-        self.said[-1] = "rest"
-
-
 def test_a_watchdog_that_ends_does_not_make_the_torque_fall_at_once() -> None:
     heard = Heard(ends_ms=200.0)
     device, presented = scripted(
@@ -229,12 +214,6 @@ def test_at_a_fault_zero_is_the_last_torque_and_the_device_is_let_go() -> None:
     assert len(device.commands) == 12  # ticks 0 to 9, and zero twice
 
 
-def failing(**after: float) -> ScriptedDevice:
-    device = ScriptedDevice(SimulatedClock(), lambda time_s: START + 2.0 * time_s)
-    vars(device).update(after)
-    return device
-
-
 SILENT = (
     "missed replies: needs a new reading after at most 2 ticks without, got 3 in a row "
     "(scripted: no answer)"
@@ -242,11 +221,16 @@ SILENT = (
 DEAF = "scripted: does not listen"
 
 
+def even(time_s: float) -> float:
+    return START + 2.0 * time_s
+
+
 # Two ticks without a reading are let pass, a command that is not taken is not.
 @pytest.mark.parametrize(
     ("after", "kind", "message", "last_s"),
     [
-        ({"silent_after": 6}, "missed-replies", SILENT, 58e-3),  # and the ramp
+        # and the ramp
+        ({"is_lost": lambda n: n >= 6}, "missed-replies", SILENT, 58e-3),
         (
             {"deaf_after": 6},
             "no-answer",
@@ -254,18 +238,18 @@ DEAF = "scripted: does not listen"
             7e-3,
         ),
         (
-            {"silent_after": 6, "deaf_after": 6},
+            {"is_lost": lambda n: n >= 6, "deaf_after": 6},
             "missed-replies",
             f"{SILENT}; ramping down: {DEAF}; closing it: {DEAF}",
             9e-3,
         ),
-        ({"silent_after": 0}, "missed-replies", SILENT, None),
+        ({"is_lost": lambda _n: True}, "missed-replies", SILENT, None),
     ],
 )
 def test_a_device_that_fails_is_a_fault_with_its_own_words(
     after: dict[str, int], kind: str, message: str, last_s: float | None, tmp_path
 ) -> None:
-    device, presented = scripted(device=failing(**after))
+    device, presented = scripted(device=ScriptedDevice(angle=even, **after))
     assert presented.fault is not None
     assert (presented.fault.kind, presented.fault.message) == (kind, message)
     assert not device.is_open
@@ -334,7 +318,7 @@ def test_the_device_is_asked_for_its_state_every_50_ms() -> None:
     [
         (7, {}, 8),
         (7, {"deaf_after": 7}, 7),
-        (21, {"silent_after": 10, "deaf_after": 18}, 18),
+        (21, {"is_lost": lambda n: n >= 10, "deaf_after": 18}, 18),
     ],
 )
 def test_an_exception_leaves_zero_torque_and_a_closed_device(
@@ -343,8 +327,8 @@ def test_an_exception_leaves_zero_torque_and_a_closed_device(
     def interrupt(_clock: SimulatedClock) -> None:
         raise interruption
 
-    device = failing(**after)
-    device.clock = ActingClock({at_ms * 1e-3: interrupt})
+    clock = ActingClock({at_ms * 1e-3: interrupt})
+    device = ScriptedDevice(clock, even, **after)
     with pytest.raises(interruption) as caught:
         scripted(device=device, max_duration_s=1.0)
     assert len(device.commands) == n_sent

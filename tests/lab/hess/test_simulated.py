@@ -7,8 +7,6 @@ import pytest
 
 from masrel.errors import ParameterError
 from masrel.lab.hess import (
-    HandTraits,
-    HumanHand,
     RealClock,
     SimulatedClock,
     SimulatedHand,
@@ -18,55 +16,31 @@ from masrel.lab.hess import (
 STEP = radians(0.005)  # of the encoder
 
 
-class Bench:
-    """An open device and its clock; nobody holds the arm unless told otherwise."""
-
-    def __init__(self, slip_time: float | None = 0.0) -> None:
-        self.clock = SimulatedClock()
-        hand = SimulatedHand(start=1.0, end=2.5, mean_speed=1.5, slip_time=slip_time)
-        self.device = open_device("simulated", clock=self.clock, hand=hand)
-        self.device.read()
-
-    def run(self, until_s: float) -> list[float]:
-        angles = []
-        while self.clock.now_ns() < round(until_s * 1e9):
-            self.clock.sleep_until_ns(self.clock.now_ns() + 1_000_000)
-            angles.append(self.device.read().angle)
-        return angles
+def angles_of(torque_nm: float, slip_time: float | None = None) -> list[float]:
+    """What the encoder reads each ms for 3 s, rad; the last second is under torque."""
+    clock = SimulatedClock()
+    hand = SimulatedHand(start=1.0, end=2.5, mean_speed=1.5, slip_time=slip_time)
+    angles = []
+    with open_device("simulated", clock=clock, hand=hand) as device:
+        for tick in range(3000):
+            clock.sleep_until_ns(tick * 1_000_000)
+            angles.append(device.read().angle)
+            assert device.read().angle == angles[-1]  # the same twice
+            if tick == 2000:
+                device.command(torque_nm)
+    return angles
 
 
-@pytest.fixture
-def bench(request: pytest.FixtureRequest):
-    made = Bench(*getattr(request, "param", ()))
-    yield made
-    made.device.close()
-
-
-held = pytest.mark.parametrize("bench", [(None,)], indirect=True)
-
-
-@held
-def test_the_end_stop_holds_the_arm_within_a_fifth_of_a_degree(bench: Bench) -> None:
-    assert max(bench.run(2.0)) <= radians(146.2)
-    bench.device.command(-20.0)
-    assert max(bench.run(3.0)) <= radians(146.2)
-
-
-def test_the_stop_at_full_flexion_holds_too(bench: Bench) -> None:
-    bench.device.command(20.0)
-    assert min(bench.run(2.0)) >= radians(-1.5)
-    assert bench.run(3.0)[-1] == pytest.approx(0.0, abs=radians(0.1))
-
-
-@held
-def test_the_encoder_reads_multiples_of_its_step_and_the_same_twice(bench) -> None:
-    for angle in bench.run(1.0):
+def test_the_end_stops_hold_the_arm_and_the_encoder_reads_multiples_of_its_step() -> (
+    None
+):
+    pushed = angles_of(-20.0)
+    assert radians(145.0) < max(pushed[:2000]) <= max(pushed) <= radians(146.2)
+    flexed = angles_of(20.0, slip_time=0.0)
+    assert min(flexed) >= radians(-1.5)
+    assert flexed[-1] == pytest.approx(0.0, abs=radians(0.1))
+    for angle in pushed + flexed:
         assert angle / STEP == pytest.approx(round(angle / STEP), abs=1e-6)
-    assert bench.device.read() == bench.device.read()
-    once = Bench(None)  # a gap in the readings does not change where the arm is
-    with once.device:
-        once.clock.sleep_until_ns(1_000_000_000)
-        assert once.device.read().angle == angle
 
 
 @pytest.mark.parametrize("range_end", [0.9, 3.2])
@@ -75,26 +49,6 @@ def test_an_arm_that_cannot_be_is_refused(range_end: float) -> None:
     assert not 1.0 < range_end <= pi
     with pytest.raises(ParameterError, match="range_end"):
         open_device("simulated", clock=SimulatedClock(), hand=hand, range_end=range_end)
-
-
-def test_a_sensor_reads_what_a_heavy_hand_gives_the_arm() -> None:
-    # What moves the arm's own 0.0597 kg·m² is the hand less motor and friction
-    clock = SimulatedClock()
-    traits = HandTraits(stiffness=60.0, damping=3.0, inertia=0.1)
-    hand = HumanHand(traits, start=1.0, end=2.5, mean_speed=1.5)
-    given, last = 0.0, 1.0
-    with open_device("simulated", clock=clock, hand=hand) as device:
-        for tick in range(400):
-            angle = device.read().angle
-            if tick:
-                viscous, coulomb = 0.168 * (angle - last), 0.189e-3 * (angle > last)
-                given -= viscous + coulomb + device.motor_torque * 1e-3
-            given += device.hand_torque * 1e-3
-            speed, last = (angle - last) / 1e-3, angle
-            device.command(3.0 if tick > 200 else 0.0)
-            clock.sleep_until_ns(clock.now_ns() + 1_000_000)
-    # a step of the encoder is 0.0052 N·m·s of 0.0597 kg·m²
-    assert given == pytest.approx(0.0597 * speed, abs=0.009)
 
 
 # Clocks

@@ -29,7 +29,7 @@ from masrel.lab.hess.puck import (
 )
 from tests.lab.hess.faults import FaultyDevice, dropped, repeated
 from tests.lab.hess.puck.rig import END, fault, loose, opened, puck_options
-from tests.lab.hess.rig import ActingClock, ScriptedDevice, stretching
+from tests.lab.hess.rig import ActingClock, Heard, ScriptedDevice, stretching
 
 # What a check finds
 
@@ -159,16 +159,6 @@ def test_a_free_arm_says_its_friction_from_wherever_it_starts(
     assert estimate.coulomb == pytest.approx(0.189, rel=0.03)
 
 
-class Heard:
-    n_beats = n_rests = 0
-
-    def beat(self) -> None:
-        self.n_beats += 1
-
-    def rest(self) -> None:
-        self.n_rests += 1
-
-
 def simulated(clock: SimulatedClock, **faults) -> FaultyDevice:
     """The simulated device with a free arm at 60 deg, and what is wrong."""
     inner = open_device("simulated", clock=clock, hand=loose(60.0))
@@ -180,13 +170,14 @@ def simulated(clock: SimulatedClock, **faults) -> FaultyDevice:
 def test_it_runs_on_the_simulated_device_too_and_the_watchdog_hears_every_tick() -> (
     None
 ):
-    clock, heard = SimulatedClock(), Heard()
+    heard = Heard()
+    clock = heard.clock
     with simulated(clock) as device:
         estimate = fit_friction(steady_runs(device, clock, watchdog=heard))
     assert estimate.viscous == pytest.approx(0.168, rel=0.015)
     assert estimate.coulomb == pytest.approx(0.189, rel=0.015)
-    assert heard.n_beats == clock.now_ns() // 1_000_000 + 1
-    assert heard.n_rests == 1
+    assert len(heard.said) == clock.now_ns() // 1_000_000 + 2
+    assert heard.said[-1] == "rest"
 
 
 @pytest.mark.parametrize(

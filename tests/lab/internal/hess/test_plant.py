@@ -232,7 +232,7 @@ def felt(share: float) -> list[float]:
             clock.sleep_until_ns(tick * 1_000_000)
             velocity = estimate.update(tick * 1e-3, device.read().angle)
             device.command(-compensation.torque(velocity))
-            torques.append(device.hand_torque)
+            torques.append(device._plant.hand_torque)
     return torques
 
 
