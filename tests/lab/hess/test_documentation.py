@@ -1,13 +1,13 @@
 """What docs/driver.md says is what the driver does."""
 
 import re
-from math import degrees, radians
+from math import radians
 from pathlib import Path
 
 import pytest
 
 from masrel.lab.elbow import STANDARD_MODELS, MinimumJerk, trace
-from masrel.lab.hess import DeviceLimits, Friction, device_names
+from masrel.lab.hess import Friction, device_names
 from masrel.lab.protocol import DeviceSettings
 
 from .rig import END, START
@@ -29,23 +29,6 @@ def test_the_devices_are_those_that_the_page_names() -> None:
     assert "It has not been tested on physical hardware" in PAGE
     first = (DOCS / "hardware.md").read_text(encoding="utf-8").split("\n\n")[1]
     assert first.startswith("**Nothing on this page has been tested on physical hard")
-
-
-def test_the_limits_are_the_defaults_of_a_protocol() -> None:
-    settings = DeviceSettings()
-    assert row("torque")[3] == f"{settings.torque_limit_nm:g}"
-    assert row("speed")[3] == f"{settings.speed_limit_deg_s:g} deg/s"
-    assert row("missed ticks")[3] == f"{settings.missed_ticks_limit}"
-    limits = DeviceLimits(torque=1.0, speed=1.0, missed_ticks=0)
-    low, high = degrees(limits.lowest_angle), degrees(limits.highest_angle)
-    assert row("range")[3] == f"{low:.0f} and {high:.0f} deg".replace("-", "−")
-
-
-def test_every_key_of_a_limit_is_on_the_page() -> None:
-    no_limits = ("backend", "rate_hz", "friction", "dead_zone", "full_speed", "slip")
-    for key in DeviceSettings.__struct_fields__:
-        if not key.startswith((*no_limits, "puck")):
-            assert f"`{key}`" in PAGE
 
 
 def shown(value: object) -> str:

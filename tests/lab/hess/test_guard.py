@@ -325,46 +325,6 @@ def test_with_the_default_limits_it_is_rendered_there_and_back(kind: str) -> Non
         assert rendering.energy_taken > 1.0
 
 
-@pytest.mark.parametrize("kind", GUARDED)
-def test_a_tank_too_small_is_a_fault_with_the_ramp(kind: str) -> None:
-    # Begun in the middle and flexed, each of them pushes the arm the way it goes.
-    flexed = Reversed(
-        motion=MinimumJerk(start=START, end=radians(85.0), mean_speed=radians(30.0))
-    )
-    limits = DeviceLimits(active_energy=0.002)
-    presented = render(GUARDED[kind], flexed, limits=limits).presented
-    assert_straight_ramp(presented, "energy")
-    assert assert_within(presented, limits) > 0.001
-
-
-@pytest.mark.parametrize("kind", GUARDED)
-def test_a_torque_above_that_of_active_models_is_a_fault_with_the_ramp(
-    kind: str,
-) -> None:
-    peak = render(GUARDED[kind], FULL).peak_torque
-    limits = DeviceLimits(active_torque=0.8 * peak)
-    presented = render(GUARDED[kind], FULL, limits=limits).presented
-    assert_straight_ramp(presented, "active-torque")
-    assert_within(presented, limits)
-
-
-@pytest.mark.parametrize("kind", GUARDED)
-def test_an_arm_that_slips_where_it_resists_most_is_a_fault_with_the_ramp(
-    kind: str,
-) -> None:
-    clean = render(GUARDED[kind], FULL).presented.recording.columns
-    top = int(np.argmax(clean["model_torque_nm"]))
-    slip = float(clean["time_s"][top]) - 0.002
-    presented = present(
-        controls(GUARDED[kind], slip_speed_drop=radians(20.0)),
-        hand=MotionHand(FULL, slip_time=slip),
-        max_duration_s=FULL.duration,
-        end_angle=4.0,
-    )
-    assert_straight_ramp(presented, "slip")
-    assert slip < presented.fault.time_s < slip + 0.03
-
-
 @pytest.mark.parametrize("slip_s", [0.2, 0.5, 0.8, 1.1, 1.5, 2.0, 2.5])
 @pytest.mark.parametrize("kind", GUARDED)
 def test_an_arm_that_is_let_go_anywhere_stays_slow_or_is_stopped(

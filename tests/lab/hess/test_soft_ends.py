@@ -25,7 +25,6 @@ from . import faults as f
 from .rig import (
     LIMITS,
     MODELS,
-    START,
     ActingClock,
     controls,
     law_of,
@@ -129,21 +128,6 @@ def test_while_no_ramp_is_active_it_is_the_law_to_the_last_bit(model: str) -> No
     is_plain = columns["ramp"] == 0.0  # degrees in the recording cost the last bits
     off = np.abs(plain - columns["command_torque_nm"])[is_plain]
     assert off.max() <= 1e-9
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_two_controllers_differ_under_the_ramp_alone(model: str) -> None:
-    soft, hard = (controls(model, post_catch_ramp=ramp) for ramp in (0.1, 0.0))
-    n_easing = 0
-    for tick in range(6000):  # three times there and back
-        time_s = tick * 1e-3
-        angle = START + radians(58.0) * (1.0 - math.cos(math.pi * time_s))
-        speed = radians(58.0) * math.pi * math.sin(math.pi * time_s)
-        command, plain = (c.step(time_s, angle, speed) for c in (soft, hard))
-        n_easing += soft.is_easing
-        assert soft.model_torque == hard.model_torque
-        assert command == plain or soft.is_easing
-    assert n_easing == 3 * 99
 
 
 def test_a_grip_that_is_lost_under_the_ramp_ends_it_at_once() -> None:

@@ -20,8 +20,6 @@ from masrel.errors import (
 from masrel.lab.hess import BackendOptions, RealClock, SimulatedClock, open_device
 from masrel.lab.hess.puck import (
     EmulatorOptions,
-    Frame,
-    Link,
     PropertyTable,
     PuckOptions,
     property_table,
@@ -31,6 +29,7 @@ from masrel.lab.hess.puck import (
 from tests.lab.hess.puck.rig import (
     PUCK,
     PuckDevice,
+    PuckNode,
     bench,
     fault,
     loose,
@@ -181,38 +180,29 @@ def test_a_bus_or_an_adapter_that_is_not_there_is_said(
 # Waking, configuring, zeroing: what is refused of a puck that answers oddly
 
 
-class Altered(Link):
-    """A bus on which some properties, and maybe the position, read otherwise."""
-
-    values: dict[int, list[int]]  # what comes in turn, the last one for ever
-    counts: int | None
-
-    def receive(self, deadline_ns: int) -> Frame | None:
-        frame = super().receive(deadline_ns)
-        if frame is None:
-            return None
-        if frame.identifier == 0x423 and self.counts is not None:
-            return frame._replace(data=self.counts.to_bytes(3, "big"))
-        said = self.values.get(frame.data[0] & 0x7F)
-        if frame.identifier != 0x426 or not said:
-            return frame
-        value = said.pop(0) if len(said) > 1 else said[0]
-        data = frame.data[:2] + value.to_bytes(4, "little", signed=True)
-        return frame._replace(data=data)
-
-
 def zeroed(
+    monkeypatch: pytest.MonkeyPatch,
     values: dict[int, list[int]] | None = None,
     counts: int | None = None,
     angle_deg: float = 90.0,
 ) -> int:
+    """Zero a puck of which some properties, and maybe the position, read otherwise."""
+    get, position = PuckNode.get, PuckNode.position
+
+    def said(node: PuckNode, number: int, **options: float) -> int:
+        value = get(node, number, **options)
+        others = (values or {}).get(number, [value])  # in turn, the last one for ever
+        return others.pop(0) if len(others) > 1 else others[0]
+
+    def at(node: PuckNode, number: int, **options: float) -> tuple[int, int]:
+        time_ns, count = position(node, number, **options)
+        return time_ns, count if counts is None else counts
+
+    monkeypatch.setattr(PuckNode, "get", said)
+    monkeypatch.setattr(PuckNode, "position", at)
     one = bench()
-    link = Altered(one.link._bus, one.clock, peer=one.emulator)
-    link.values, link.counts = values or {}, counts
-    try:
-        return zero(link, one.clock, PuckOptions(), angle=radians(angle_deg))
-    finally:
-        one.close()
+    with one.link:
+        return zero(one.link, one.clock, PuckOptions(), angle=radians(angle_deg))
 
 
 @pytest.mark.parametrize(
@@ -229,11 +219,14 @@ def zeroed(
     ],
 )
 def test_answers_that_make_no_sense_are_refused(
-    values: dict[int, list[int]], counts: int | None, words: str
+    values: dict[int, list[int]], counts: int | None, words: str, monkeypatch
 ) -> None:
     with pytest.raises(DeviceError, match=words):
-        zeroed(values, counts)
-    assert zeroed(counts=19251 + 2) == 19253
+        zeroed(monkeypatch, values, counts)
+
+
+def test_a_count_or_two_beside_the_angle_is_there(monkeypatch) -> None:
+    assert zeroed(monkeypatch, counts=19251 + 2) == 19253
 
 
 # Options
@@ -273,9 +266,9 @@ def test_options_out_of_range_are_refused(changes: dict, words: str) -> None:
 
 
 @pytest.mark.parametrize("angle_deg", [-0.1, 180.1, float("nan")])
-def test_no_arm_is_beyond_its_ends(angle_deg: float) -> None:
+def test_no_arm_is_beyond_its_ends(angle_deg: float, monkeypatch) -> None:
     with pytest.raises(ParameterError, match="angle: needs 0 to 180 degrees"):
-        zeroed(angle_deg=angle_deg)
+        zeroed(monkeypatch, angle_deg=angle_deg)
 
 
 @pytest.mark.parametrize(
