@@ -5,9 +5,9 @@ import functools
 import math
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 from tqdm import tqdm
@@ -16,11 +16,29 @@ from masrel.cli._commands import Commands
 from masrel.cli._options import STDOUT, OutputOptions, output_options, write_output
 from masrel.cli._paths import InputFile
 from masrel.lab.cli._study_options import several
-from masrel.lab.hess import Clock, RealClock, SimulatedClock, SimulatedHand
-from masrel.lab.hess.puck import PuckOptions, read_property_table
-
-if TYPE_CHECKING:
-    from masrel.lab.hess.puck import FrictionEstimate, Link, NodeReport
+from masrel.lab.hess import (
+    Clock,
+    EmergencyStop,
+    RealClock,
+    SimulatedClock,
+    SimulatedHand,
+    open_device,
+)
+from masrel.lab.hess._stop import stop_on_key, stop_on_signals, watched
+from masrel.lab.hess.puck import (
+    FrictionEstimate,
+    Link,
+    NodeReport,
+    PuckOptions,
+    check,
+    connected,
+    fit_friction,
+    probe,
+    read_property_table,
+    steady_runs,
+    zero,
+)
+from masrel.lab.hess.puck._commissioning import LIMITS, SPEEDS
 
 _N_NODES = 31
 _RANGE_END = math.radians(146.0)  # where an emulated arm meets its end stop
@@ -66,10 +84,8 @@ class _Session:
     hand: SimulatedHand | None
     output: OutputOptions  # where its results go
 
-    def link(self, *, all_nodes: bool = False) -> "AbstractContextManager[Link]":
-        """Join the bus for a while."""
-        from masrel.lab.hess.puck import connected
-
+    def link(self, *, all_nodes: bool = False) -> Link:
+        """Join the bus, for a ``with`` block."""
         return connected(
             self.options,
             clock=self.clock,
@@ -152,8 +168,6 @@ def device() -> None:
 @_puck_command
 def _probe(session: _Session) -> None:
     """Ask every node who it is; nothing is set and nobody is woken."""
-    from masrel.lab.hess.puck import probe
-
     with session.link(all_nodes=True) as link, session.progress(_N_NODES) as progress:
         reports = probe(
             link,
@@ -177,8 +191,6 @@ def _check(session: _Session) -> None:
     It is told its groups and torque limit, goes into torque mode for some
     milliseconds with no more than 0.007 N·m, and is idle afterwards.
     """
-    from masrel.lab.hess.puck import check
-
     with session.link() as link:
         checks = check(link, session.clock, session.options)
     holds = all(one.holds for one in checks)
@@ -209,8 +221,6 @@ def _check(session: _Session) -> None:
 @_puck_command
 def _zero(session: _Session, angle_deg: float) -> None:
     """Tell a puck where the arm is; it forgets when its supply is switched off."""
-    from masrel.lab.hess.puck import zero
-
     with session.link() as link:
         counts = zero(
             link, session.clock, session.options, angle=math.radians(angle_deg)
@@ -234,11 +244,6 @@ def _friction(session: _Session, arm_is_free: bool) -> None:
     The arm moves by itself, between 40 and 115 deg, at up to 80 deg/s, with at most
     2 N·m, for about 20 s.
     """
-    from masrel.lab.hess import EmergencyStop, open_device
-    from masrel.lab.hess._stop import stop_on_key, stop_on_signals, watched
-    from masrel.lab.hess.puck import fit_friction, steady_runs
-    from masrel.lab.hess.puck._commissioning import LIMITS, SPEEDS
-
     if not arm_is_free:
         raise click.UsageError(
             "the arm will move by itself; when it is free, say --arm-is-free"
@@ -269,7 +274,7 @@ def _friction(session: _Session, arm_is_free: bool) -> None:
     session.write_output(_friction_lines(estimate), dataclasses.asdict(estimate))
 
 
-def _report_line(report: "NodeReport") -> str:
+def _report_line(report: NodeReport) -> str:
     if report.firmware is None:
         return f"puck {report.puck}: {report.kind}"
     state = "awake" if report.is_awake else "asleep"
@@ -281,7 +286,7 @@ def _report_line(report: "NodeReport") -> str:
     )
 
 
-def _friction_lines(estimate: "FrictionEstimate") -> list[str]:
+def _friction_lines(estimate: FrictionEstimate) -> list[str]:
     runs = [
         f"{math.degrees(run.speed):7.1f} deg/s {run.torque:8.4f} N·m"
         for run in estimate.runs

@@ -254,7 +254,7 @@ def assert_within(presented: Presented, limits: DeviceLimits) -> float:
     return float(given_up_to[-1]) if given_up_to.size else 0.0
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     st.lists(st.floats(-12.0, 12.0), min_size=1, max_size=12),
     st.floats(0.0, 3.0),

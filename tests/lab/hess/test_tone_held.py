@@ -219,7 +219,13 @@ def assert_held(outcomes: list[Outcome]) -> None:
     assert max((o.slip_s or 0.0) for o in outcomes) <= NOTICE_S
 
 
-@pytest.mark.parametrize("kind", KINDS)
+QUICK = ("contracture", "clonus", "threshold reflex")
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [*QUICK, *(pytest.param(kind, marks=pytest.mark.slow) for kind in KINDS)],
+)
 def test_a_kind_is_stretched_held_and_brought_back(kind: str) -> None:
     # an ordinary hand, which does not press against the joint's end
     (rater,) = raters(kind, [5])

@@ -11,12 +11,12 @@ from masrel.lab.hess.puck._commissioning import (
     NodeReport,
     SteadyRun,
     check,
-    connected,
     fit_friction,
     probe,
     steady_runs,
     zero,
 )
+from masrel.lab.hess.puck._emulator import connected
 from masrel.lab.hess.puck._puck_options import (
     EmulatorOptions,
     InjectedFault,

@@ -174,6 +174,11 @@ class Link:
     peer : InProcessPeer or None, optional
         An emulator in the same thread, which is served whenever this end sends or
         waits, so that a bus works on a simulated clock too, and closed with it.
+
+    Attributes
+    ----------
+    peer : InProcessPeer or None
+        That emulator.
     """
 
     def __init__(
@@ -182,7 +187,7 @@ class Link:
         self._can = _python_can()
         self._bus = bus
         self._clock = clock
-        self._peer = peer
+        self.peer = peer
 
     def __enter__(self) -> Self:
         return self
@@ -228,8 +233,8 @@ class Link:
             self._bus.send(message)
         except (self._can.CanError, OSError) as error:
             raise BusError(f"puck: the bus takes no frame ({error})") from error
-        if self._peer is not None:
-            self._peer.serve()
+        if self.peer is not None:
+            self.peer.serve()
         return now_ns
 
     def receive(self, deadline_ns: int) -> Frame | None:
@@ -250,18 +255,18 @@ class Link:
         BusError
             If the bus cannot be read.
         """
-        if self._peer is None:
+        if self.peer is None:
             left_ns = deadline_ns - self._clock.now_ns()
             return self._next_frame(max(0.0, left_ns * 1e-9))
         while True:
-            self._peer.serve()
+            self.peer.serve()
             frame = self._next_frame(0.0)
             if frame is not None:
                 return frame
-            due_ns = self._peer.next_due_ns()
+            due_ns = self.peer.next_due_ns()
             if due_ns is None or due_ns > deadline_ns:
                 self._clock.sleep_until_ns(deadline_ns)
-                self._peer.serve()
+                self.peer.serve()
                 return None
             self._clock.sleep_until_ns(due_ns)
 
@@ -278,8 +283,8 @@ class Link:
         except (self._can.CanError, OSError) as error:
             raise BusError(f"puck: the bus cannot be left ({error})") from error
         finally:
-            if self._peer is not None:
-                self._peer.close()
+            if self.peer is not None:
+                self.peer.close()
 
     def _next_frame(self, timeout_s: float) -> Frame | None:
         # A timeout of 0 does not wait.

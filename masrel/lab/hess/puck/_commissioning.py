@@ -19,10 +19,8 @@ from masrel.lab.hess._guard import Guard
 from masrel.lab.hess._signals import VelocityEstimate
 from masrel.lab.hess._stop import EmergencyStop, NoWatchdog, Watching
 from masrel.lab.hess.device import Device
-from masrel.lab.hess.hand import Hand
 from masrel.lab.hess.limits import DeviceLimits
 from masrel.lab.hess.puck._bus import MAX_NODE, Link
-from masrel.lab.hess.puck._emulator import join
 from masrel.lab.hess.puck._puck_device import AwakePuck, PuckNode, identify
 from masrel.lab.hess.puck._puck_options import (
     ASLEEP,
@@ -78,45 +76,6 @@ _INTEGRAL_GAIN = 20.0  # N·m/rad: 18 rad/s with that inertia, damped by a half
 _PROBE_TORQUE, _PROBE_S = 0.5, 0.3
 _PROBE_TRAVEL = math.radians(1.0)
 _PERIOD_NS = 1_000_000
-
-
-def connected(
-    options: PuckOptions,
-    *,
-    clock: Clock,
-    hand: Hand | None = None,
-    range_end: float = math.radians(146.0),
-    all_nodes: bool = False,
-) -> Link:
-    """Join a bus for a while, with an emulated puck on it where there is a hand.
-
-    Parameters
-    ----------
-    options : PuckOptions
-        Which bus, and which puck on it.
-    clock : Clock
-        The clock of deadlines.
-    hand : Hand or None, optional
-        What moves the arm of an emulated puck.
-    range_end : float, optional
-        Where that arm meets its end stop, rad.
-    all_nodes : bool, optional
-        Whether to receive the frames of all nodes rather than of one puck.
-
-    Returns
-    -------
-    Link
-        This end of the bus, for a ``with`` block.
-
-    Raises
-    ------
-    DeviceError
-        If the bus cannot be opened.
-    """
-    link, _ = join(
-        options, clock=clock, hand=hand, range_end=range_end, all_nodes=all_nodes
-    )
-    return link
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

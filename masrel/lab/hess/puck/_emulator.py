@@ -413,15 +413,39 @@ class PuckEmulator:
             self.link.send(frame)
 
 
-def join(
+def connected(
     options: PuckOptions,
     *,
     clock: Clock,
-    hand: Hand | None,
-    range_end: float,
+    hand: Hand | None = None,
+    range_end: float = math.radians(146.0),
     all_nodes: bool = False,
-) -> tuple[Link, PuckEmulator | None]:
-    """Join a bus, with an emulated puck on it where there is a hand."""
+) -> Link:
+    """Join a bus for a while, with an emulated puck on it where there is a hand.
+
+    Parameters
+    ----------
+    options : PuckOptions
+        Which bus, and which puck on it.
+    clock : Clock
+        The clock of deadlines.
+    hand : Hand or None, optional
+        What moves the arm of an emulated puck.
+    range_end : float, optional
+        Where that arm meets its end stop, rad.
+    all_nodes : bool, optional
+        Whether to receive the frames of all nodes rather than of one puck.
+
+    Returns
+    -------
+    Link
+        This end of the bus, for a ``with`` block; its `peer` is the emulated puck.
+
+    Raises
+    ------
+    DeviceError
+        If the bus cannot be opened.
+    """
     emulator = None
     if hand is not None:
         emulator = PuckEmulator(
@@ -432,11 +456,10 @@ def join(
             options=options.emulator or EmulatorOptions(),
             puck=options.puck,
         )
-    link = open_link(
+    return open_link(
         options.interface,
         options.channel,
         clock=clock,
         accepted=None if all_nodes else reply_identifiers(options.puck),
         peer=emulator,
     )
-    return link, emulator

@@ -37,7 +37,7 @@ from masrel.lab.hess.puck._bus import (
     open_link,
     reply_identifiers,
 )
-from masrel.lab.hess.puck._emulator import join
+from masrel.lab.hess.puck._emulator import connected
 from masrel.lab.hess.puck._puck_options import (
     ASLEEP,
     ID,
@@ -442,9 +442,10 @@ class PuckDevice(Device):
 
     def _start(self) -> None:
         setup, options = self._setup, self._options
-        self._link, self.emulator = join(
+        self._link = connected(
             options, clock=setup.clock, hand=setup.hand, range_end=setup.range_end
         )
+        self.emulator = self._link.peer
         try:
             self._bring_up()
         except BaseException:

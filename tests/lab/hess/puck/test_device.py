@@ -365,13 +365,6 @@ def test_a_table_that_is_none_or_contradicts_itself_is_refused(
 # In torque mode
 
 
-def test_it_says_when_the_encoder_was_sampled() -> None:
-    clock = SimulatedClock()
-    with opened(clock, loose()) as device:
-        asked_ns = clock.now_ns()
-        assert device.read().time_ns == asked_ns + 75_000
-
-
 def test_it_refuses_a_torque_above_its_own_limit() -> None:
     with opened(SimulatedClock(), loose(), largest_torque=10.0) as device:
         for torque in (9.99, -9.99):

@@ -95,27 +95,6 @@ def test_an_answer_takes_150_microseconds_and_the_encoder_is_read_after_75(on) -
 
 
 @pytest.mark.parametrize(
-    ("traits", "number", "data"),
-    [
-        ({}, IPNM, "d600 8c0a0000"),  # 2700
-        ({"counts_per_turn": 40960}, CTS, "c400 00a00000"),
-        ({}, P, "004b33"),
-    ],
-)
-def test_what_it_answers(on, traits: dict, number: int, data: str) -> None:
-    one = on(awake=True, **traits)
-    (frame,) = answers(one, 1, bytes((number,)))
-    sender = 0x423 if number == P else 0x426
-    assert frame == Frame(sender, bytes.fromhex(data))
-
-
-@pytest.mark.parametrize("counts", [2**21 - 1, 2**21, -5])
-def test_positions_wrap_at_22_bits(on, counts: int) -> None:
-    one = told(on(awake=True), (P, counts))
-    assert position(one) == (counts + 2**21) % 2**22 - 2**21
-
-
-@pytest.mark.parametrize(
     ("identifier", "data", "n"),
     [
         (1, b"\x30", 1),
