@@ -240,19 +240,6 @@ def stretched(
 # Recorded
 
 
-def test_the_sensor_reads_the_torque_that_the_model_asked_for() -> None:
-    # Nine tenths of the friction are compensated: at 92 deg/s 0.05 N·m are left
-    columns = present(backend=sensing()).recording.columns
-    off = columns[MEASURED] - columns["model_torque_nm"]
-    even = (columns["time_s"] > 0.15) & (columns["angle_deg"] < 143.0)
-    for jump in np.flatnonzero(np.abs(np.diff(columns["model_torque_nm"])) > 0.5):
-        even[jump : jump + 15] = False  # motor and sensor follow within 15 ms
-    assert even.sum() > 1000
-    tenth = 0.1 * (0.168 * radians(92.0) + 0.189)
-    assert np.mean(off[even]) == pytest.approx(tenth, abs=0.015)
-    assert np.abs(off[even]).max() < 0.2
-
-
 def test_a_sensor_changes_no_torque_and_its_noise_is_that_of_the_seed() -> None:
     sensed, bare = present(backend=sensing()).recording, present().recording
     assert (sensed.channels, bare.channels) == ((MEASURED_TORQUE,), ())

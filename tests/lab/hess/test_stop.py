@@ -7,7 +7,6 @@ prints how long its torque stood.
 import os
 import pty
 import resource
-import select
 import signal
 import statistics
 import subprocess
@@ -31,9 +30,7 @@ from masrel.lab.hess._stop import (
     watch,
     watched,
 )
-from masrel.lab.run import read_log
 
-from .injected import small_study
 from .rig import ActingClock, ScriptedDevice, present, scripted
 from .shared import SharedDevice, SharedFile, made
 
@@ -140,41 +137,6 @@ def test_what_is_no_terminal_is_not_read(tmp_path) -> None:
         assert answers.readline() == "1+\n"
     with stop_on_key(stop, None):  # a standard input that was closed
         assert stop.reason is None
-
-
-def test_a_key_stops_the_presentation_of_a_session(tmp_path: Path) -> None:
-    # As a person has it: a terminal, the real clock, and a device that is at work
-    patient = "[device]\nmissed_ticks_limit = 10000\nwatchdog_ms = 100\n"
-    study, _ = small_study(tmp_path / "study", 60.0, device=patient)
-    keyboard, screen = pty.openpty()
-    command = (sys.executable, "-m", "masrel", "run", str(study.root), "--rater", "R1")
-    session = subprocess.Popen(
-        (*command, "--session", "test", "--clock", "real", "--quiet"),
-        stdin=screen,
-        stdout=screen,
-        stderr=subprocess.DEVNULL,
-    )
-    os.close(screen)
-
-    def read_until(words: bytes) -> None:
-        shown = b""
-        while words not in shown:
-            ready, _, _ = select.select([keyboard], [], [], 30.0)
-            assert ready, shown
-            shown += os.read(keyboard, 4096)
-
-    with session:
-        read_until(b"Enter to begin")
-        os.write(keyboard, b"\n")
-        wait_for(lambda: list(study.sessions.rglob("*.partial")))
-        os.write(keyboard, b"x")
-        read_until(b"Present it again?")
-        os.write(keyboard, b"no\n")
-        assert session.wait(30.0) == 1
-    os.close(keyboard)
-    log = read_log(study.log_file("R1", "test"))
-    assert [event.kind for event in log][:3] == ["session", "presented", "fault"]
-    assert log[2].fields["words"] == "emergency stop: key"
 
 
 # The watchdog: when the loop falls silent, another process idles the device
