@@ -19,7 +19,6 @@ from masrel.errors import (
 )
 from masrel.lab.hess import BackendOptions, RealClock, SimulatedClock, open_device
 from masrel.lab.hess.puck import (
-    EmulatorOptions,
     PropertyTable,
     PuckOptions,
     property_table,
@@ -245,24 +244,6 @@ def test_a_count_or_two_beside_the_angle_is_there(monkeypatch) -> None:
 def test_a_setup_that_contradicts_itself_is_refused(setup: dict, words: str) -> None:
     with pytest.raises(DeviceError, match=words):
         open_device("puck", clock=SimulatedClock(), **setup)
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"puck": 8}, "puck: needs a motor's node, 1 to 7, got 8"),
-        ({"gear_ratio": 0.0}, "gear_ratio: needs more than 0"),
-        ({"patience_s": -1.0}, "patience_s: needs more than 0"),
-        ({"largest_torque": float("nan")}, "largest_torque: needs more than 0"),
-        ({"direction": 0}, "direction: needs 1 or -1, got 0"),
-        ({"poll_ticks": 0}, "poll_ticks: needs 1 or more, got 0"),
-        ({"angle_after_reset": 4.0}, "angle_after_reset: needs 0 to 180 degrees"),
-        ({"emulator": EmulatorOptions()}, "interface: needs 'virtual'"),
-    ],
-)
-def test_options_out_of_range_are_refused(changes: dict, words: str) -> None:
-    with pytest.raises(ParameterError, match=words):
-        PuckOptions(**changes)
 
 
 @pytest.mark.parametrize("angle_deg", [-0.1, 180.1, float("nan")])
