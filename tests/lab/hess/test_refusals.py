@@ -21,7 +21,6 @@ from masrel.lab.hess.puck import EmulatorOptions, InjectedFault, PuckOptions
 from .puck.rig import PUCK
 from .rig import controls
 
-
 transmitted = partial(replace, PUCK)  # what lies between elbow and bus
 
 
