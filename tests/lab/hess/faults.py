@@ -64,7 +64,6 @@ class FaultyDevice(Device):
     def _check(self) -> None:
         if self.check_fault is not None:
             self.check_fault(self.time_s)
-        self.inner.check()
 
     def _stop(self) -> None:
         if self.time_s >= self.cut_s - 1e-9:
