@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from masrel.errors import OverrunWarning
 from masrel.lab.hess import Device, open_device
 from masrel.lab.hess.puck import InjectedFault
+from tests.lab.hess.faults import FaultyDevice
 from tests.lab.hess.injected import N_STRETCHES, Injection, cell, later_s
 from tests.lab.hess.injected import Outcome as SessionOutcome
 from tests.lab.hess.injected import outcome as session_outcome
@@ -201,6 +202,13 @@ def test_a_fault_of_the_bus(
         assert made.zero_ms <= 205.0
 
 
+class Asked(FaultyDevice):
+    """One without faults of its own, which passes on who asks for the puck's state."""
+
+    def _check(self) -> None:
+        self.inner.check()
+
+
 def session(injected: InjectedFault, folder: Path) -> SessionOutcome:
     """Run a session on emulated pucks, the first of which has a fault."""
     faults = [(injected,)]
@@ -211,7 +219,8 @@ def session(injected: InjectedFault, folder: Path) -> SessionOutcome:
         return open_device("puck", hand=hand, options=made, **others)
 
     # the loop begins some ms after the torque mode, from which the faults are timed
-    first = Injection(name="", at_s=round(injected.start_s - 0.01, 3), expected=None)
+    at_s = round(injected.start_s - 0.01, 3)
+    first = Injection(name="", at_s=at_s, expected=None, wrap=Asked)
     return session_outcome(first, folder, opener)
 
 
