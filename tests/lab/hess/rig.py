@@ -9,7 +9,6 @@ import numpy as np
 
 from masrel.errors import DeviceError, DeviceTimeoutError
 from masrel.lab.elbow import STANDARD_MODELS, JointModel
-from masrel.lab.elbow._torque import _stepped
 from masrel.lab.hess import (
     BackendOptions,
     Clock,
@@ -212,13 +211,13 @@ def law_of(
 ) -> np.ndarray:
     """What a model asks for, N·m, where it is fed what was read (n_samples,)."""
     columns = recording.columns
-    return _stepped(
-        model,
-        START,
-        columns["time_s"],
-        np.rint(columns["angle_deg"] / 0.005) * radians(0.005),  # as it was read
-        np.radians(columns["velocity_deg_s"]) if velocity is None else velocity,
-    )[0]
+    angle = np.rint(columns["angle_deg"] / 0.005) * radians(0.005)  # as it was read
+    if velocity is None:
+        velocity = np.radians(columns["velocity_deg_s"])
+    step = model.stepper(START).step
+    return np.array(
+        [step(*now) for now in zip(columns["time_s"], angle, velocity, strict=True)]
+    )
 
 
 def same_columns(one: Recording, other: Recording, n: int | None = None) -> bool:
