@@ -12,11 +12,11 @@ import pytest
 import masrel
 from masrel.cli import cli
 from masrel.lab.cli import report as verb
-from masrel.lab.report import _report_folder
 from tests.architecture.test_imports import HEAVY, loaded_after
 from tests.cli.process import Caller
 from tests.files import contents, edit, published_study
 
+NOTES = ".masrel_cache"  # the folder of notes in a study
 LINES = """
 [[analysis.estimates]]
 id = "kappa"
@@ -200,7 +200,7 @@ def test_a_spoilt_cache_is_of_no_consequence(masrel: Caller, study: Path) -> Non
     before = contents(study / "report")
     for spoilt in SPOILT:
         # the study is a copy of one that was reported: it has the note of that, too
-        for file in (study / _report_folder.NOTES).glob("*.json"):
+        for file in (study / NOTES).glob("*.json"):
             data = file.read_bytes()
             file.write_bytes(spoilt(data))
             assert file.read_bytes() != data
@@ -212,12 +212,12 @@ def test_a_spoilt_cache_is_of_no_consequence(masrel: Caller, study: Path) -> Non
 def test_a_cache_that_is_no_folder_is_of_no_consequence(
     masrel: Caller, study: Path
 ) -> None:
-    shutil.rmtree(study / _report_folder.NOTES)
-    (study / _report_folder.NOTES).write_text("a file")
+    shutil.rmtree(study / NOTES)
+    (study / NOTES).write_text("a file")
     first = masrel("report", study, "--only", "agreement")
     assert first.code == 0
     assert masrel("report", study, "--only", "agreement") == first
-    done = masrel("report", study, "--cache", study / _report_folder.NOTES)
+    done = masrel("report", study, "--cache", study / NOTES)
     assert (done.code, "is a file" in done.err) == (2, True)
 
 
@@ -228,8 +228,8 @@ def test_a_full_disk_leaves_a_report(
     def full(path: Path, _: object) -> None:
         raise OSError(28, "No space left on device", str(path))
 
-    shutil.rmtree(study / _report_folder.NOTES)
-    monkeypatch.setattr(_report_folder, "write_file", full)
+    shutil.rmtree(study / NOTES)
+    monkeypatch.setattr("masrel.lab.report._report_folder.write_file", full)
     assert masrel("report", study).code == 0
     assert (study / "report/report.html").is_file()
 
@@ -271,7 +271,7 @@ def test_check_names_what_would_change_and_writes_nothing(
     assert done.code == 1
     assert f"{study}/report/report.html: would be new\n" in done.out
     masrel("report", study)
-    shutil.rmtree(study / _report_folder.NOTES)  # as in a clone
+    shutil.rmtree(study / NOTES)  # as in a clone
     before = times(study)
     done = masrel("report", study, "--check")
     assert (done.code, done.out) == (0, "")
