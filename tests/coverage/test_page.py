@@ -33,7 +33,7 @@ def test_every_cell_has_a_row() -> None:
 @pytest.mark.parametrize(
     ("every", "size"),
     [
-        pytest.param(14, 40, marks=pytest.mark.slow),
+        pytest.param(28, 40, marks=pytest.mark.slow),
         pytest.param(3, 300, marks=pytest.mark.long),
     ],
 )

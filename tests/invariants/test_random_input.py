@@ -292,7 +292,6 @@ def check(result: Any) -> None:
     ("seed", "n_calls"),
     [
         pytest.param(1, 2_500, marks=pytest.mark.slow),
-        pytest.param(2, 2_500, marks=pytest.mark.slow),
         pytest.param(3, 100_000, marks=pytest.mark.long),
     ],
 )
