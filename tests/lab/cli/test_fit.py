@@ -12,7 +12,7 @@ from masrel.lab.elbow import STANDARD_MODELS
 from masrel.lab.elbow.identification import Movement
 from masrel.lab.protocol import elbow_parameters, read_protocol
 from tests.cli.process import Caller
-from tests.lab.elbow.identification.synthesis import Arm, study
+from tests.lab.elbow.identification.synthesis import study
 from tests.lab.elbow.identification.test_friction import backdriven
 from tests.lab.protocol.documents import VALID, write
 
@@ -132,17 +132,3 @@ def test_only_fast_stretches_are_refused_with_the_option(
     assert done.code == 2
     assert done.err.startswith("masrel: recordings: b and k need a slow stretch")
     assert done.err.endswith(" deg/s. --slow-below raises the limit\n")
-
-
-def test_an_inertia_below_0_is_refused(masrel: Caller, tmp_path: Path) -> None:
-    arm = Arm(inertia=-0.05)
-    made = study(STANDARD_MODELS["HM3"], seed=21, n_slow=3, n_fast=6, arm=arm)
-    done = masrel(
-        "joint",
-        "fit",
-        *(put(each, tmp_path) for each in made),
-        "--arm-inertia",
-        "fitted",
-    )
-    assert (done.code, done.out) == (2, "")
-    assert "this is not the law: J of all trials is -0.0" in done.err
