@@ -114,8 +114,8 @@ def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
     files = [f for f in (study.ratings_file, study.published_file) if f.exists()]
     if not files:
         return
-    from masrel.lab.ratings import read_study_ratings  # loads pandas
-    from masrel.lab.ratings.study_data import _of_logs, _refuse_other_table
+    from masrel.lab.ratings import ratings_from_logs, read_study_ratings
+    from masrel.lab.ratings.study_data import _refuse_other_table
 
     for path in files:
         try:
@@ -125,7 +125,7 @@ def _ratings_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
             return
     if study.ratings_file.exists() and study.logs():
         with contextlib.suppress(MasrelError):  # what of the logs, another has said
-            ratings = _of_logs(study, protocol, check_recordings=False)
+            ratings = ratings_from_logs(study, protocol, check_recordings=False)
             try:
                 _refuse_other_table(study.ratings_file, ratings)
             except RatingsError as error:

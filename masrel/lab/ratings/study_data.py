@@ -202,7 +202,9 @@ def _names(text: str) -> list[str]:
     return line.split(",")
 
 
-def ratings_from_logs(study: StudyPaths, protocol: Protocol) -> Ratings:
+def ratings_from_logs(
+    study: StudyPaths, protocol: Protocol, *, check_recordings: bool = True
+) -> Ratings:
     """Collect the ratings of a study from its session logs.
 
     Parameters
@@ -211,6 +213,8 @@ def ratings_from_logs(study: StudyPaths, protocol: Protocol) -> Ratings:
         Where the study is.
     protocol : Protocol
         The study's protocol.
+    check_recordings : bool, optional
+        Whether recordings are held against the checksums of the logs.
 
     Returns
     -------
@@ -232,12 +236,6 @@ def ratings_from_logs(study: StudyPaths, protocol: Protocol) -> Ratings:
     ScheduleError
         If a schedule is missing, damaged or stale.
     """
-    return _of_logs(study, protocol, check_recordings=True)
-
-
-def _of_logs(
-    study: StudyPaths, protocol: Protocol, *, check_recordings: bool
-) -> Ratings:
     rows = [
         row
         for rater, session in protocol.rater_sessions

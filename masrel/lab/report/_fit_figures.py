@@ -150,13 +150,13 @@ def _fast_trial(column: Sequence[Axes], fit: ElbowFit, place: int) -> None:
     bottom.plot(time, speed, **_THIN)
     begin = catch.time - trial.start
     end = last if catch.end is None else catch.end - trial.start
-    shade: dict[str, Any] = {"linewidth": 0.0}
+    line: dict[str, Any] = {"color": GREY, "linewidth": 0.7}
     for axes in column:
-        axes.axvspan(begin, end, color=ORANGE, alpha=0.35, label="catch", **shade)
+        axes.axvspan(begin, end, color=ORANGE, alpha=0.35, lw=0.0, label="catch")
         if catch.end is not None:
-            axes.axvspan(end, last, color=BLUE, alpha=0.15, label="post-catch", **shade)
-            axes.axvline(end, color=GREY, linewidth=0.7)
-        axes.axvline(begin, color=GREY, linewidth=0.7)
+            axes.axvspan(end, last, color=BLUE, alpha=0.15, lw=0.0, label="post-catch")
+            axes.axvline(end, **line)
+        axes.axvline(begin, **line)
     top.set_title(f"mean speed {number(math.degrees(catch.mean_speed), 0)} deg/s")
 
 
@@ -224,12 +224,12 @@ def _catch_angles(axes: Axes, fit: ElbowFit, catches: Sequence[Catch]) -> None:
 
 
 def _catch_travels(axes: Axes, fit: ElbowFit, catches: Sequence[Catch]) -> None:
-    longest, both = max(math.degrees(catch.travel) for catch in catches), [*catches]
+    longest = max(math.degrees(catch.travel) for catch in catches)
     for ended, look, label in (
         (True, _DOT, "catch ended"),
         (False, _OPEN, "stretch ended first"),
     ):
-        shown = [catch for catch in both if (catch.end is not None) == ended]
+        shown = [catch for catch in catches if (catch.end is not None) == ended]
         if shown:
             speeds = np.degrees([catch.mean_catch_speed for catch in shown])
             travels = np.degrees([catch.travel for catch in shown])

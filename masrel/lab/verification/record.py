@@ -235,13 +235,17 @@ def _output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]
     if not files:
         return  # nothing is loaded for it
     from masrel.lab.analysis import analyze
-    from masrel.lab.ratings import answers_of, in_person_of, read_study_data
-    from masrel.lab.ratings.study_data import _of_logs
+    from masrel.lab.ratings import (
+        answers_of,
+        in_person_of,
+        ratings_from_logs,
+        read_study_data,
+    )
 
     try:
         if study.logs():
             # recordings have been held against the logs before
-            ratings = _of_logs(study, protocol, check_recordings=False)
+            ratings = ratings_from_logs(study, protocol, check_recordings=False)
             yield from _table_findings(study, protocol, ratings)
         else:
             ratings = read_study_data(study, protocol).ratings
