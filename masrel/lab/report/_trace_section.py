@@ -78,7 +78,7 @@ def speeds_section(material: Material, speeds: Speeds) -> Iterator[Content]:
             "reached ν_th."
         )
     yield Paragraph(text=text)
-    digits = whole_or_tenths([speed.mean_speed_deg_s for speed in speeds.values])
+    digits = _whole_or_tenths([speed.mean_speed_deg_s for speed in speeds.values])
     yield _speeds_table(material, speeds.by_model, "model", digits)
     texts = "; ".join(
         f"{s.name} in {s.session}: mean {number(s.mean, 0)}, "
@@ -155,8 +155,8 @@ def _has_many(speeds: Sequence[Speed]) -> bool:
     return any(speed.stretch is not None and speed.stretch > 1 for speed in speeds)
 
 
-def whole_or_tenths(values: Sequence[float]) -> int:
-    """Return the decimals a column of measurements needs: 0 if all are whole."""
+def _whole_or_tenths(values: Sequence[float]) -> int:
+    # the decimals a column of measurements needs: 0 if all are whole
     known = [value for value in values if math.isfinite(value)]
     return 0 if all(float(value).is_integer() for value in known) else 1
 
@@ -267,7 +267,7 @@ def _traced(
         peaks = outputs.column("peak_torque").tolist()
     else:
         peaks = [float(line.torque.max()) for line in lines(known)]
-    digits = whole_or_tenths(known)
+    digits = _whole_or_tenths(known)
     grade = ""
     if model.intended_grade is not None:
         grade = f" ({protocol.scale.name} {model.intended_grade})"

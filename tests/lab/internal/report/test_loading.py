@@ -20,14 +20,3 @@ for name in SECTIONS:
 
 def test_tables_load_nothing_that_draws() -> None:
     assert loaded_after(TABLES.strip()) & {"matplotlib", "jinja2"} == set()
-
-
-def test_a_report_without_figures_draws_nothing() -> None:
-    code = (
-        "import pathlib, tempfile\n"
-        "from tests.lab.report.pages import published_report\n"
-        "published_report(pathlib.Path(tempfile.mkdtemp()), 'design', 'intended')"
-    )
-    loaded = loaded_after(code)
-    assert "jinja2" in loaded
-    assert "matplotlib" not in loaded

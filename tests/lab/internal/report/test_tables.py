@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from masrel.lab.report._trace_section import whole_or_tenths
 from masrel.tables._tables import (
     Column,
     Table,
@@ -46,7 +45,6 @@ TOLD: list[tuple[Any, object]] = [
     ),
     (fixed_or_significant(12345678.9, 3), "1.235e+07"),
     ((significant(92.0), significant(0.123456, 3)), ("92", "0.123")),
-    ((whole_or_tenths([122.0, 68.0]), whole_or_tenths([68.5, math.nan])), (0, 1)),
     (aligned([["θ̇", "1"], ["N", "22"]], ["left", "right"]), ["θ̇   1", "N  22"]),
 ]
 
