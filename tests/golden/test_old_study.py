@@ -11,6 +11,7 @@ import json
 import math
 import shutil
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -101,12 +102,14 @@ def table(text: str, delimiter: str = ",") -> dict[str, Any]:
 
 
 def content(file: Path) -> Any:
-    """A file as `lacking` compares it: JSON and tables may have grown."""
+    """A file as `lacking` compares it: JSON, TOML and tables may have grown."""
     data = file.read_bytes()
     if file.suffix == ".gz":
         return gzip.decompress(data)
     if file.suffix == ".json":
         return json.loads(data)
+    if file.suffix == ".toml":
+        return tomllib.loads(data.decode())
     if file.suffix == ".jsonl":
         events = [json.loads(line) for line in data.splitlines()]
         return [{key: e[key] for key in ("event", "fields")} for e in events]
