@@ -105,3 +105,31 @@ def test_the_law_of_the_catch_angle_is_the_joints(found: ElbowFit) -> None:
     expected = [joint.catch_angle(speed) for speed in speeds.tolist()]
     law = figures._catch_angle_law(found, speeds)
     np.testing.assert_allclose(law, expected, rtol=1e-14)
+
+
+def test_residuals_are_those_of_every_sample(found: ElbowFit) -> None:
+    slow, fast = figures._slow_residuals(found), figures._fast_residuals(found)
+    assert slow[0].size == slow[1].size
+    assert fast[0].size == fast[1].size
+    n_samples = sum(law.size for law in found.fitted_torque)
+    assert slow[0].size + fast[0].size == n_samples
+    together = np.concatenate([slow[1], fast[1]])
+    assert np.abs(together).mean() < 0.1  # N·m: the noise that was put in
+    assert fast[0].min() < 0.0 < fast[0].max()  # around the catch
+
+
+def test_a_bin_of_few_samples_has_no_mean() -> None:
+    low, high = np.linspace(0.0, 0.01, figures._MIN_IN_BIN), np.array([1.0])
+    middles, means = figures._binned_means(
+        np.concatenate([low, high]), np.append(3.0 + low, 10.0)
+    )
+    width = 1.0 / figures._BINS
+    np.testing.assert_allclose(middles[[0, -1]], [width / 2, 1.0 - width / 2])
+    np.testing.assert_allclose(means[0], 3.005)
+    assert np.isnan(means[1:]).all()
+
+
+def test_every_catch_has_a_peak_above_its_residual(found: ElbowFit) -> None:
+    readings = figures._catch_readings(found)
+    assert [catch for catch, _ in readings] == figures._catches(found)
+    assert all(levels.peak > levels.residual > 0.0 for _, levels in readings)
