@@ -47,7 +47,7 @@ class JointOptions:
         """Return a joint with the changes, which only a spastic elbow can have."""
         from masrel.lab.elbow import ElbowParameters
 
-        asked = {
+        options = {
             "rest_angle": None if self.rest is None else math.radians(self.rest),
             "post_catch": self.post_catch,
             "residual_reading": self.reading,
@@ -55,7 +55,7 @@ class JointOptions:
             "inertia": self.inertia,
         }
         changes: Any = {
-            name: value for name, value in asked.items() if value is not None
+            name: value for name, value in options.items() if value is not None
         }
         if not changes:
             return joint
