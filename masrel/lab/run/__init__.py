@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from masrel.lab._event_log import Event, SessionLog, read_log
-    from masrel.lab.run._around import (
+    from masrel.lab.run._corrections import (
         record_answer,
         record_correction,
         record_skip,
@@ -48,7 +48,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    "masrel.lab.run._around": (
+    "masrel.lab.run._corrections": (
         "record_answer",
         "record_correction",
         "record_skip",

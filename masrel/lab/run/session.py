@@ -26,11 +26,11 @@ from masrel.lab.recording import _Fact, _Facts
 from masrel.lab.run._around import (
     ask_questions,
     completed_at,
-    correct_in_session,
     days_since,
     interval_fields,
     last_time,
 )
+from masrel.lab.run._corrections import correct_in_session
 from masrel.lab.run._grade_sources import GradeRequest, GradeSource, Skip
 from masrel.lab.run._present import spool_of
 from masrel.lab.run._presenter import CLOCKS, ClockName, Presenter, check_same
