@@ -19,11 +19,11 @@ if TYPE_CHECKING:
         GradeSource,
         QuestionRequest,
         ScriptGrades,
-        SimulatedGrades,
         Skip,
         StretchGrade,
     )
     from masrel.lab.run._settings import model_controller
+    from masrel.lab.run._simulated_raters import SimulatedGrades
     from masrel.lab.run.console import ConsoleGrades
     from masrel.lab.run.session import SessionSummary, run_session
 
@@ -58,12 +58,12 @@ _HOMES = {
         "GradeSource",
         "QuestionRequest",
         "ScriptGrades",
-        "SimulatedGrades",
         "Skip",
         "StretchGrade",
     ),
     "masrel.lab._event_log": ("Event", "SessionLog", "read_log"),
     "masrel.lab.run._settings": ("model_controller",),
+    "masrel.lab.run._simulated_raters": ("SimulatedGrades",),
     "masrel.lab.run.console": ("ConsoleGrades",),
     "masrel.lab.run.session": ("SessionSummary", "run_session"),
 }

@@ -40,18 +40,18 @@ from masrel.lab.recording import (
     stretches,
     write_recording,
 )
-from masrel.lab.run._grade_sources import (
-    GradeRequest,
-    hand_seed,
-    intended_speeds,
-    key_of,
-    sensor_seed,
-)
+from masrel.lab.run._grade_sources import GradeRequest
 from masrel.lab.run._settings import (
     backend_options,
     device_limits,
     has_simulated_hand,
     model_controller,
+)
+from masrel.lab.run._simulated_raters import (
+    hand_seed,
+    intended_speeds,
+    key_of,
+    sensor_seed,
 )
 from masrel.lab.run._state import Felt
 

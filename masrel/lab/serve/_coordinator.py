@@ -38,8 +38,9 @@ from masrel.lab.run import record_answer, record_skip
 from masrel.lab.run._rehearsal import last_rehearsal
 from masrel.lab.run._settings import torque_problems
 from masrel.lab.serve._access import Access, qr_svg
+from masrel.lab.serve._live import SampleTail
 from masrel.lab.serve._manager import SessionManager
-from masrel.lab.serve._role_pages import Pages, SampleTail
+from masrel.lab.serve._role_pages import Pages
 
 Fields = Mapping[str, Any]
 """What a page sends; texts, but for what is either so or not."""

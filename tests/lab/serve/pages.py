@@ -28,12 +28,12 @@ from masrel.lab.protocol import StudyPaths, copy_template, read_protocol
 from masrel.lab.run import read_log
 from masrel.lab.serve._access import LIFE_S, ROLES, Access, Role
 from masrel.lab.serve._coordinator import ACTIONS
+from masrel.lab.serve._live import SampleTail
 from masrel.lab.serve._manager import (
     AskOverError,
     SessionManager,
 )
 from masrel.lab.serve._middleware import Middleware
-from masrel.lab.serve._role_pages import SampleTail
 from masrel.lab.serve._server import (
     alone,
     encryption,

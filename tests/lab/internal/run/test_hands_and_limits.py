@@ -36,7 +36,6 @@ from masrel.lab.protocol import (
 )
 from masrel.lab.recording import RECORDING_COLUMNS, Recording, stretches
 from masrel.lab.run import GradeRequest, SimulatedGrades
-from masrel.lab.run._grade_sources import intended_speeds, severity
 from masrel.lab.run._present import StatusOfHand, _felt
 from masrel.lab.run._settings import (
     _largest_torque,
@@ -47,6 +46,7 @@ from masrel.lab.run._settings import (
     model_controller,
     moves_hardware,
 )
+from masrel.lab.run._simulated_raters import intended_speeds, severity
 from masrel.lab.run.console import _cues_shown
 from masrel.lab.schedule import Presentation
 
