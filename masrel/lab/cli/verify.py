@@ -99,14 +99,13 @@ def _document(
     return {**document, "anchors": [dataclasses.asdict(anchor) for anchor in anchors]}
 
 
-def _line_of(record: "SessionRecord") -> str:
-    # how far a session, a rehearsal or a training came
+def _line_of(record: "SessionRecord", *, is_training: bool) -> str:
+    # how far a session, a rehearsal or a training came, which has no schedule
     which = f"{record.session} {record.rater}"
     if record.rehearsal is not None:
         which = f"rehearsal {record.rehearsal} of {which}"
-    if record.stage in ("not begun", "unreadable") and record.session != "training":
+    if record.stage in ("not begun", "unreadable") and not is_training:
         return f"{which}: {record.stage}"
-    is_training = record.session == "training"
     of = "" if is_training else f" of {record.n_presentations}"
     parts = [f"{which}: {record.stage}", f"{record.n_graded}{of} graded"]
     parts += [f"{record.n_skipped} skipped"] * bool(record.n_skipped)
@@ -120,9 +119,10 @@ def _show(
     anchors: "tuple[Anchor, ...]",
     n_broken: int,
 ) -> None:
-    sessions = (*verification.sessions, *verification.rehearsals)
-    for record in (*sessions, *verification.trainings):
-        click.echo(_line_of(record))
+    for record in (*verification.sessions, *verification.rehearsals):
+        click.echo(_line_of(record, is_training=False))
+    for record in verification.trainings:
+        click.echo(_line_of(record, is_training=True))
     for anchor in anchors:
         click.echo(f"anchor: {anchor}")
     for finding in verification.findings:

@@ -233,6 +233,17 @@ def test_a_study_that_nobody_touched_is_whole(study: StudyPaths) -> None:
         assert [record["rater"] for record in document[of]] == ["R1"]
 
 
+def test_a_session_that_is_called_training_is_no_training(tmp_path: Path) -> None:
+    root = str(tmp_path / "study")
+    run("init", root)
+    protocol = tmp_path / "study" / "protocol.toml"
+    protocol.write_text(protocol.read_text().replace('"test"', '"training"'))
+    run("schedule", root)
+    place = ("--rater", "R1", "--session", "training")
+    run("run", root, *place, "--grades", "simulated", "--quiet")
+    assert "training R1: complete, 4 of 4 graded" in run("verify", root)
+
+
 def named(forgeries: list[tuple[str, Forgery]]) -> pytest.MarkDecorator:
     ids = [
         f"{file} {forge.__qualname__.partition('.')[0]}" for file, forge in forgeries
