@@ -8,9 +8,10 @@ import shutil
 from collections.abc import Callable, Iterator
 
 import pytest
-from playwright.sync_api import Browser, Playwright, sync_playwright
+from playwright.sync_api import Browser, Playwright, expect, sync_playwright
 
 from tests.lab.serve.browser.stages import OCCASIONS, REALISM, Stage, make_study
+from tests.lab.serve.browser.visitors import WITHIN_MS
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 CHROMIUM = next(filter(None, map(shutil.which, NAMES)), None)
@@ -28,6 +29,7 @@ MakeStage = Callable[..., Stage]
 def playwright() -> Iterator[Playwright]:
     if CHROMIUM is None:
         pytest.skip("needs Chromium: apt-get install chromium")
+    expect.set_options(timeout=WITHIN_MS)
     with sync_playwright() as started:
         yield started
 

@@ -184,8 +184,7 @@ def test_a_coordinator_without_network_is_told_and_nothing_is_lost(
     coordinator, page = stage.coordinator, stage.coordinator.page
     coordinator.tolerated = LOST
     page.locator("#which").wait_for()
-    coordinator.context.set_offline(True)
-    sees(coordinator, "No connection", "#banner")
+    coordinator.go_offline("#banner")
     said = form(page, NOTE, text=f"In the dark, {stage.rater}", who="MK")
     page.wait_for_timeout(500)
     assert said.inner_text() == ""

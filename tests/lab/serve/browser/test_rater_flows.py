@@ -251,8 +251,7 @@ def test_a_tablet_without_network_says_so_and_goes_on_by_itself(
             rater.go_until(*set(ALL) - {*seen, "presenting"})
             continue
         seen.append(shown)
-        rater.context.set_offline(True)
-        rater.page.get_by_text(NO_CONNECTION).wait_for()
+        rater.go_offline("#lost")
         with rater.shown_anew():
             heading = rater.page.query_selector("#screen h1")
             if shown != "presenting":

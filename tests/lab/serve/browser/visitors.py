@@ -29,6 +29,14 @@ POST = """async ([path, fields]) => {
     return [answer.status, await answer.json()];
 }"""
 
+# Whether an element has said anything since, for however short a time
+LISTEN = """selector => {
+    const element = document.querySelector(selector);
+    window.hasSpoken = false;
+    const look = () => { window.hasSpoken ||= element.textContent !== ""; };
+    new MutationObserver(look).observe(element, {childList: true, subtree: true});
+}"""
+
 
 class Visitor:
     """A browser with cookies of its own, at one page; what goes wrong in it is noted.
@@ -64,6 +72,16 @@ class Visitor:
         is_tolerated = self.tolerated is not None and self.tolerated.search(text)
         if message.type in ("error", "warning") and not is_tolerated:
             self.problems.append(text)
+
+    def go_offline(self, banner: str) -> None:
+        """Cut the network, and return when this banner has said so.
+
+        Of a stream that is open Chromium lets a page still hear, and whatever is heard
+        takes the words away again.
+        """
+        self.page.evaluate(LISTEN, banner)
+        self.context.set_offline(True)
+        self.page.wait_for_function("window.hasSpoken")
 
     def post(self, path: str, **fields: Any) -> tuple[int, dict[str, Any]]:
         """Send something as the page would -> its status and body."""
