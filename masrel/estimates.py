@@ -34,8 +34,8 @@ IntervalMethod = Literal[
 ]
 """Kinds of intervals; "auto" is the newest of the rules that choose one."""
 
+# Whose standard error an interval is made of, where it is not our own
 _Convention = Literal["irrcac", "spss", "over_n"]
-"""Whose standard error an interval is made of, where it is not our own."""
 
 Unit = Literal["items", "raters", "both", "clusters"]
 """What is resampled or left out."""

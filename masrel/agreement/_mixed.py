@@ -19,11 +19,11 @@ from masrel.estimates import _LongNote
 
 _Numbers = NDArray[Any]  # real, or complex for slopes
 
+# Imaginary step of which the square is nothing: slopes then have no rounding
 _TINY = 1e-30
-"""Imaginary step of which the square is nothing: slopes then have no rounding."""
 
+# √ratio of a variance that no ratings tell from 0: to 1e-8 it makes no difference
 _NONE = 5e-5
-"""√ratio of a variance that no ratings tell from 0: to 1e-8 it makes no difference."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -34,11 +34,12 @@ from masrel.estimates import Estimate, Interval, Significance, Target
 IccForm = Literal["ICC(1)", "ICC(1,k)", "ICC(C,1)", "ICC(C,k)", "ICC(A,1)", "ICC(A,k)"]
 """One-way; consistency and absolute agreement; of one rating and of the mean of k."""
 
+# How the interval is made: by the newest rule, by an older, or from F always
 _Method = Literal["auto", "auto-2026.1", "auto-2026.2", "F"]
-"""How the interval is made: by the newest rule, by an older, or from F always."""
 
 _BY_F = ("F", "auto-2026.1")
 
+# Form, as McGraw and Wong call it, to its name in the register
 _ICC_NAMES: dict[IccForm, str] = {
     "ICC(1)": "icc_1",
     "ICC(1,k)": "icc_1k",
@@ -47,8 +48,8 @@ _ICC_NAMES: dict[IccForm, str] = {
     "ICC(A,1)": "icc_a1",
     "ICC(A,k)": "icc_ak",
 }
-"""Form, as McGraw and Wong call it, to its name in the register."""
 
+# Form to what Shrout and Fleiss call it, and psych
 _ICC_ALIASES: dict[IccForm, tuple[str, ...]] = {
     "ICC(1)": ("ICC(1,1)", "ICC1"),
     "ICC(1,k)": ("ICC(k)", "ICC1k"),
@@ -57,10 +58,8 @@ _ICC_ALIASES: dict[IccForm, tuple[str, ...]] = {
     "ICC(A,1)": ("ICC(2,1)", "ICC2"),
     "ICC(A,k)": ("ICC(2,k)", "ICC2k"),
 }
-"""Form to what Shrout and Fleiss call it, and psych."""
 
-_ROUNDING = 1e-13
-"""Share of the sum of all squares that is none."""
+_ROUNDING = 1e-13  # share of the sum of all squares that is none
 
 _ALL_ALIKE = "0/0: neither items nor ratings of an item differ"
 
@@ -69,8 +68,8 @@ _OUTSIDE = (
     "and its interval is drawn out to the value"
 )
 
+# Value, interval and why there is none
 _Answer = tuple[float, Interval | None, str | None]
-"""Value, interval and why there is none."""
 
 
 def _bare_form(name: object) -> str:
@@ -639,6 +638,7 @@ def _disagreements(
     return d_o, d_e, _Anova.of_sums(steps).value(form).imag * 1e30
 
 
+# The coefficients of complete tables as functions of sums over items
 _ICC_FORMULAS = {
     form: Formula(
         name=name,
@@ -648,7 +648,6 @@ _ICC_FORMULAS = {
     )
     for form, name in _ICC_NAMES.items()
 }
-"""The coefficients of complete tables as functions of sums over items."""
 
 
 def _too_few(values: NDArray[np.float64]) -> str | None:

@@ -45,8 +45,8 @@ from masrel.estimates import Estimate, Significance
 _MAX_PAIRS = 1 << 20  # of ratings whose disagreement is looked up at once
 _MANY_RATERS = 1000
 
+# From p (..., q) and v to D_e (..., 1) and its gradient (..., q)
 _Chance = Callable[[Floats, Any], tuple[Floats, Floats]]
-"""From p (..., q) and v to D_e (..., 1) and its gradient (..., q)."""
 
 
 def _no_chance(p: Floats, _v: Any) -> tuple[Floats, Floats]:

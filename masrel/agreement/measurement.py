@@ -33,14 +33,12 @@ _Parts = list[tuple[float, float]]  # of a variance, each with its degrees of fr
 ErrorKind = Literal["agreement", "consistency"]
 """Whether what raters differ by on average is error, or not."""
 
+# From the error of one rating to the change of two that chance exceeds in 5 %
 _CHANGE = 1.96 * math.sqrt(2.0)
-"""From the error of one rating to the change of two that chance exceeds in 5 %."""
 
-_FEW = 3
-"""Items from which on Lin's concordance has an error."""
+_FEW = 3  # items from which on Lin's concordance has an error
 
-_ROUNDING = 1e-13
-"""Share of the variance of all ratings that is none."""
+_ROUNDING = 1e-13  # share of the variance of all ratings that is none
 
 _NODES, _FARTHEST = 96, 8.5
 """Of Gauss and Legendre's rule over what the mean can be: nodes, and standard errors

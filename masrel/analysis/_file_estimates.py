@@ -276,6 +276,7 @@ class Explanation(str):
     __slots__ = ()
 
 
+# Notes that stand below a table at once
 _TEXTS = {
     "left_out": "{group}Left out: {names}.",
     "pair": "Difference: {pair}.",
@@ -290,8 +291,8 @@ _TEXTS = {
     "different items.",
     "without": "Left out: {titles}: there is no such interval.",
 }
-"""Notes that stand below a table at once."""
 
+# Notes on how numbers were made
 _EXPLANATIONS = {
     # test and retest
     "sessions": "{group}Each rater's grades of {first} and of {second}.",
@@ -342,7 +343,6 @@ _EXPLANATIONS = {
     "Hotelling's T² as F": "Hotelling's T² as F: groups of the same items, by their "
     "names, or of the same clusters, by the delta method.",
 }
-"""Notes on how numbers were made."""
 
 
 def note(kind: str, **values: object) -> str:

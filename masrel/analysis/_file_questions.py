@@ -595,6 +595,7 @@ def _diagnosis_notes(
     return {**ends, "raters": of_raters, "confusion": confusion}
 
 
+# Options and commands to what answers them, in the order in which it is shown
 _QUESTIONS = {
     "retest": _retest,
     "each_category": _categories,
@@ -604,4 +605,3 @@ _QUESTIONS = {
     "limits": _limits,
     "compare": comparisons,
 }
-"""Options and commands to what answers them, in the order in which it is shown."""

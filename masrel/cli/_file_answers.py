@@ -61,6 +61,7 @@ def _list_register(
     context.exit()
 
 
+# How estimates are made, by names of options
 _ESTIMATING = {
     "coefficients": click.option(
         "--coefficients",
@@ -126,7 +127,6 @@ _ESTIMATING = {
         help="Name the best band that the true value reaches with 95 % probability.",
     ),
 }
-"""How estimates are made, by names of options."""
 
 by_option = click.option(
     "--by", metavar="COL", help="Estimate each group of this column."

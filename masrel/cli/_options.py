@@ -30,6 +30,7 @@ STDOUT = Path("-")
 _FORMS: dict[str, "Form"] = {".png": "png", ".svg": "svg", ".pdf": "pdf"}
 
 
+# Groups of options by the name of their argument, as --help heads them
 _HEADINGS = {
     "reading": "Reading FILE",
     "questions": "Estimating",
@@ -41,7 +42,6 @@ _HEADINGS = {
     "comparing": "Comparison",
     "output": "Output",
 }
-"""Groups of options by the name of their argument, as --help heads them."""
 
 
 class GroupedHelp(click.Command):

@@ -142,9 +142,9 @@ def _claim(texts: _Texts) -> "Claim":
     return claim_of(values)
 
 
+# Options that say nothing without another
 _BESIDE = {
     "level": "interval",
     "agreement_weights": "agreement",
     "kappa_weights": "kappa",
 }
-"""Options that say nothing without another."""

@@ -28,8 +28,7 @@ from masrel.intervals.bootstrap import _distinct_features, _Resamples
 OF_PATTERNS = "Dirichlet posterior of the patterns of ratings"
 """Of all intervals of patterns."""
 
-_WORTH = 1.5
-"""Items that the prior is worth, as that of a table of two raters."""
+_WORTH = 1.5  # items that the prior is worth, as that of a table of two raters
 
 _PRIOR = f"a Dirichlet worth {_WORTH:g} items, half of it on raters who all agree"
 _MAX_CATEGORIES = 100  # of which a prior makes pairs

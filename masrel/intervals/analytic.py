@@ -24,8 +24,8 @@ from masrel.intervals._question import (
     warn_small,
 )
 
+# What an interval is taken from, and on which scale
 _Distribution = Literal["t", "normal", "logit", "fisher"]
-"""What an interval is taken from, and on which scale."""
 
 _METHODS: dict[_Distribution, str] = {
     "t": "t(n-1)",
@@ -40,12 +40,12 @@ _NAMES: dict[_Convention, str] = {
     "over_n": "delta method over n",
 }
 
+# What intervals are taken from that are printed with these errors
 _PRINTED: dict[_Convention, _Distribution] = {
     "irrcac": "t",
     "spss": "normal",
     "over_n": "normal",
 }
-"""What intervals are taken from that are printed with these errors."""
 
 
 def analytic(

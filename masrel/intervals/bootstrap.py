@@ -27,11 +27,11 @@ from masrel.intervals._question import (
     warn_small,
 )
 
+# How the ends of an interval come from resamples
 _Kind = Literal["percentile", "basic", "bca", "studentized"]
-"""How the ends of an interval come from resamples."""
 
+# Whether all resamples are taken: always, never, or if there are few enough
 _Exact = Literal["auto"] | bool
-"""Whether all resamples are taken: always, never, or if there are few enough."""
 
 _NO_SPREAD = 1e-9  # of the standard error of the estimate: rounding, not spread
 _MAX_ALL = 300_000  # distinct resamples that are all taken rather than drawn

@@ -68,8 +68,8 @@ if TYPE_CHECKING:
     from masrel.agreement import Metric, WeightsLike
 
 
+# Raters alike, what `posterior` takes unless told, or each rater as he or she is
 _Model = Literal["alike", "usual", "patterns"]
-"""Raters alike, what `posterior` takes unless told, or each rater as he or she is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,11 +90,11 @@ class _Rule:
         return ("patterns",) if n >= _SEVERAL else ("alike", "patterns")
 
 
+# Rules by name, the newest last
 _RULES = {
     "auto-2026.1": _Rule("auto-2026.1", math.inf),
     "auto-2026.2": _Rule("auto-2026.2", 4),
 }
-"""Rules by name, the newest last."""
 
 _NEWEST = list(_RULES.values())[-1]
 

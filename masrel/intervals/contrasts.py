@@ -34,14 +34,13 @@ from masrel.intervals._question import (
 )
 from masrel.intervals.jackknife import _variance_of
 
+# Whether both sets of ratings are of the same items, row by row
 _Design = Literal["dependent", "independent"]
-"""Whether both sets of ratings are of the same items, row by row."""
 
+# How several intervals hold at once
 _Simultaneous = Literal["max_t", "bonferroni", "scheffe"]
-"""How several intervals hold at once."""
 
-_Units = Literal["items", "clusters"]
-"""What the sample is of."""
+_Units = Literal["items", "clusters"]  # what the sample is of
 
 _METHODS: dict[_Simultaneous, str] = {
     "max_t": "the largest of correlated t",

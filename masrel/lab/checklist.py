@@ -46,6 +46,7 @@ if TYPE_CHECKING:
 
 __all__ = ["checklist_markdown", "fill_checklist", "write_checklist"]
 
+# What must be the same for like conditions: fields of a log's head, and their names
 _CONDITIONS = {
     "device": "Device",
     "grades": "Grades from",
@@ -53,7 +54,6 @@ _CONDITIONS = {
     "masrel_version": "Version of masrel",
     "presented_sha256": "SHA-256 of what is presented",
 }
-"""What must be the same for like conditions: fields of a log's head, and their names"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -181,8 +181,8 @@ def _range_of(values: Sequence[float], unit: str) -> str:
     return f"{ends.strip()}, median {number(statistics.median(values), None)}"
 
 
+# Who fills an item: the record, both, or the authors alone
 _State = Literal["filled", "in part", "authors"]
-"""Who fills an item: the record, both, or the authors alone."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -35,8 +35,8 @@ __all__ = [
     "session_progress",
 ]
 
+# How far a session came
 _SessionStage = Literal["not drawn", "drawn", "begun", "complete", "unreadable"]
-"""How far a session came."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -166,8 +166,8 @@ def _events(log: Path) -> tuple[tuple[Event, ...], SessionState, str | None]:
         return (), SessionState(), problem
 
 
+# What became of a rater; of two that hold the later one
 _RaterStatus = Literal["planned", "begun", "complete", "withdrawn", "excluded"]
-"""What became of a rater; of two that hold the later one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -64,8 +64,7 @@ RECORDING_COLUMNS = (
     "ramp",  # position in RAMPS
     "stretch",  # which one goes on: 1, 2, ...; 0 before, between and after
 )
-_FORMAT = 1
-"""Version of the files of a recording; facts without one are of version 1."""
+_FORMAT = 1  # version of the files of a recording; facts without one are of version 1
 
 _FIRST_COLUMNS = frozenset(RECORDING_COLUMNS[:6])  # those of every recording
 

@@ -58,20 +58,20 @@ if TYPE_CHECKING:
 _MOST_PARTS = 4  # whose pictures are all shown
 _MOST_LISTED = 12  # items
 _MOST_NAMED = 8  # raters whose grades stand one after the other
+# Commands to what their page is called; it begins with their own tables
 _TITLES = {
     "compare": "Agreement of groups in",
     "diagnose": "Raters, pairs and grades in",
     "limits": "Limits of agreement of the raters in",
 }
-"""Commands to what their page is called; it begins with their own tables."""
 
+# Sections of pictures in the order of a page
 _PICTURED = {
     "raters": "Raters",
     "grades": "Grades",
     "items": "Items to discuss",
     "variance": "Where the variance lies",
 }
-"""Sections of pictures in the order of a page."""
 
 _NO_INTERVAL = (
     'No interval was asked for. --target items (in Python target="items") gives one '

@@ -95,6 +95,7 @@ _SPECIFIC = (
         is_of_ends=True,
     ),
 )
+# Answers and pictures by name to how they were made
 _TEXTS: dict[str, tuple[_Text, ...]] = {
     "symmetry": (
         _Text(
@@ -130,7 +131,6 @@ _TEXTS: dict[str, tuple[_Text, ...]] = {
         ),
     ),
 }
-"""Answers and pictures by name to how they were made."""
 
 _TESTS = {
     "McNemar, exact": "mcnemar1947",

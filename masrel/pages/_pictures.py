@@ -397,6 +397,7 @@ def picture_of(
     return drawing.content
 
 
+# What the ratings of each picture must have
 _NEEDS = {
     "forest": "it shows coefficients of agreement",
     "pairs": "it needs three raters or more",
@@ -407,4 +408,3 @@ _NEEDS = {
     "items": "it needs items that raters disagree on",
     "components": "it needs coefficients with an ICC, and to know who rated what",
 }
-"""What the ratings of each picture must have."""

@@ -11,13 +11,13 @@ from masrel.scales import PublishedScale
 
 _FILE = Path(__file__).with_name("templates") / "references.bib"
 
+# Words in the method of an interval to what it rests on
 _METHODS = {
     "jackknife": "efron1981",
     "bootstrap": "efron1993",
     "Dirichlet-multinomial": "mosimann1962",
     "delta method": "gwet2014",
 }
-"""Words in the method of an interval to what it rests on."""
 
 _SCALES = {
     "modified-ashworth": ("bohannon1987",),

@@ -29,8 +29,8 @@ Quantity = Literal["torque", "angle"]
 
 Against = Quantity | Literal["torque over angle"]
 """What is drawn against time, or against the angle."""
+# How far up and across, in points; the point that is named, and its name
 _NamePlace = tuple[float, float, tuple[float, float], str]
-"""How far up and across, in points; the point that is named, and its name."""
 
 _LABELS: dict[Quantity, str] = {"torque": "torque (N·m)", "angle": "angle (deg)"}
 _CATCH = 1  # position in _PHASES

@@ -14,13 +14,13 @@ from masrel.tables._tables import Table, counted, number, p_text, percent, signi
 
 _SHOWN = 12  # raters that are named
 
+# Scales to what is said of them where nobody declared them
 _SCALES = {
     "MAS": "Scale: the Modified Ashworth Scale, {}, told by its grade 1+; --categories "
     "declares another.",
     "observed": "Scale: the grades met (AC and Brennan-Prediger depend on it; "
     "--categories declares another).",
 }
-"""Scales to what is said of them where nobody declared them."""
 
 
 def first_screen(
@@ -147,6 +147,7 @@ def reading_warnings(ratings: RatingsFile, first: Answer) -> tuple[Finding, ...]
 
 # ---- what the tables come to, in one sentence ----
 
+# Answers to a number that must be there, and what is said of its row
 _RESULTS = {
     "differences": (
         "low",
@@ -169,7 +170,6 @@ _RESULTS = {
         "differences are expected between {lower} and {upper}{unit}.",
     ),
 }
-"""Answers to a number that must be there, and what is said of its row."""
 
 
 def result_sentence(answered: Sequence[Answer], items: str) -> tuple[int, str]:

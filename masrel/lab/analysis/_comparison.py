@@ -22,12 +22,12 @@ from masrel.lab.protocol import Gate
 
 # inputs are compared by themselves; notes say in words what numbers beside them say
 _LEFT_OUT = ("format", "inputs", "masrel_version", "notes")
+# Fields that tell the elements of a list apart
 _NAMES = ("id", "questionnaire", "question", "session", "model", "rater", "name",
           "label", "stretch")  # fmt: skip
-"""Fields that tell the elements of a list apart."""
 
+# Parts of a place that say nothing beside the name of a line of the plan
 _WITHIN = ("estimates", "estimate", "interval")
-"""Parts of a place that say nothing beside the name of a line of the plan."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

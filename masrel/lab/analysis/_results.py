@@ -373,8 +373,8 @@ ANALYSIS_FORMAT = 1
 """Version of the file of an analysis; one that names none is of version 1."""
 
 
+# Fields that analyses once had not, and have not in a file where they are empty
 _LATER = ("excluded", "questionnaires")
-"""Fields that analyses once had not, and have not in a file where they are empty."""
 
 
 def as_analysis_document(analysis: Analysis) -> dict[str, object]:

@@ -78,6 +78,7 @@ def _study(paths: "StudyPaths", protocol: "Protocol", output: OutputOptions) -> 
     )
 
 
+# Columns that are there when any session has something in them
 _COUNTS = {
     "n_practised": "Practised",
     "n_breaks": "Breaks",
@@ -86,7 +87,6 @@ _COUNTS = {
     "n_faults": "Faults",
     "n_corrections": "Corrections",
 }
-"""Columns that are there when any session has something in them."""
 
 
 def _sessions_table(

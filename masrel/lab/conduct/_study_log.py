@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 
 _FORMAT = 1
 
+# Every kind of event with the fields it has
 _EVENTS = {
     "conduct": ("format", "study", "masrel_version"),
     "withdrawn": ("rater", "who", "why"),
@@ -69,7 +70,6 @@ _EVENTS = {
     "allotted": ("rater", "session", "site", "scheme", "row"),
     "recovered": ("line", "n_bytes", "sha256", "kept", "moved_to"),
 }
-"""Every kind of event with the fields it has."""
 
 _SHOWN = (
     "withdrawn",

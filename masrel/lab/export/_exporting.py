@@ -119,8 +119,7 @@ _TITLES = {
     "stretch": "Stretch that goes on, 0 before, between and after",
 }
 _UNITS = {"_deg_s": "deg/s", "_deg": "deg", "_nm": "N*m", "_mv": "mV", "_s": "s"}
-_WHOLE = ("phase", "ramp", "stretch")
-"""Columns of a recording that hold whole numbers."""
+_WHOLE = ("phase", "ramp", "stretch")  # columns of a recording that hold whole numbers
 
 
 def _bids_files(dataset: Dataset) -> Iterator[tuple[str, bytes]]:

@@ -269,13 +269,13 @@ class DeviceSetup:
     options: BackendOptions | None = None
 
 
+# Name to the module whose `build` makes a device of a `DeviceSetup`, not yet open, or
+# raises `DeviceError` when it does not fit; imported when it is chosen
 _BACKENDS = {
     "puck": "masrel.lab.hess.puck._puck_device",
     "replay": "masrel.lab.hess._replay",
     "simulated": "masrel.lab.hess._simulated",
 }
-"""Name to the module whose `build` makes a device of a `DeviceSetup`, not yet open, or
-raises `DeviceError` when it does not fit; imported when it is chosen."""
 
 
 def device_names() -> tuple[str, ...]:

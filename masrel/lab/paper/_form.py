@@ -102,8 +102,8 @@ _SEPARATORS = (",", ";", "\t")
 
 _LONGEST_CELL = 10_000  # letters of an answer
 
+# Byte order marks of what spreadsheets call Unicode text
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
-"""Byte order marks of what spreadsheets call Unicode text."""
 
 _WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 

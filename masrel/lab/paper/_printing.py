@@ -16,8 +16,7 @@ from masrel.lab.run.console import _instruction
 from masrel.lab.schedule.sheets import _drawn_schedule
 from masrel.scales import published_scale
 
-_MOST_BOXES = 12
-"""Answers of a question that are boxes; for more there is a blank."""
+_MOST_BOXES = 12  # answers of a question that are boxes; for more there is a blank
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,6 +19,7 @@ from masrel.lab.protocol._decode import closest, got
 DEFAULT_KIND = ElbowParameters.kind
 """The paper's own law, whose numbers have keys of their own."""
 
+# Unit of a parameter in Python to the end of its key; angles are degrees there
 _SUFFIXES = {
     "": "",
     "rad": "_deg",
@@ -33,7 +34,6 @@ _SUFFIXES = {
     "kg": "_kg",
     "kg·m²": "_kg_m2",
 }
-"""Unit of a parameter in Python to the end of its key; angles are degrees there."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -24,23 +24,23 @@ from masrel.lab.protocol.definition import (
     SampleSize,
 )
 
+# Presentations of one session; blinded codes are drawn from 1800
 _MAX_PRESENTATIONS = 500
-"""Presentations of one session; blinded codes are drawn from 1800."""
 
+# Names that Windows keeps for devices, whatever stands behind a dot
 _DEVICES = {
     *("CON", "PRN", "AUX", "NUL"),
     *(f"{port}{number}" for port in ("COM", "LPT") for number in range(1, 10)),
 }
-"""Names that Windows keeps for devices, whatever stands behind a dot."""
 
+# Marks of a missing rating in a ratings file; no grade may be called that
 _MISSING_MARKS = ("NA",)
-"""Marks of a missing rating in a ratings file; no grade may be called that."""
 
+# Kind of an estimate to the number of sessions it is made from
 _SESSIONS_NEEDED = {
     "inter-rater": (1, "one session"),
     "test-retest": (2, "two sessions"),
 }
-"""Kind of an estimate to the number of sessions it is made from."""
 
 
 def broken_rules(protocol: Protocol) -> Iterator[str]:
@@ -217,12 +217,12 @@ def _schedules(protocol: Protocol) -> Iterator[str]:
         )
 
 
+# Keys that say something of one scheme only
 _BELONGS_TO = {
     "blocks_by": "blocks",
     "standards_apart": "restricted",
     "max_same_grade": "restricted",
 }
-"""Keys that say something of one scheme only."""
 
 
 def _orders(protocol: Protocol) -> Iterator[str]:
@@ -307,6 +307,7 @@ def _sites(protocol: Protocol) -> Iterator[str]:
         )
 
 
+# Keys, and how each compares with another
 _COMPARISONS = (
     ("stretch.start_deg", "less than", "stretch.end_deg"),
     ("stretch.end_deg", "at most", "elbow.range_end_deg"),
@@ -317,7 +318,6 @@ _COMPARISONS = (
     ("elbow.smallest_catch_angle_deg", "less than", "elbow.range_end_deg"),
     ("elbow.catch_rise_s", "at most", "elbow.peak_duration_s"),
 )
-"""Keys, and how each compares with another."""
 
 
 def _comparisons(protocol: Protocol) -> Iterator[str]:

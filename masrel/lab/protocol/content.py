@@ -124,6 +124,7 @@ def report_sections(protocol: Protocol) -> tuple[str, ...]:
     return tuple(name for name in _STORY if has_something.get(name, True))
 
 
+# Sections in the order in which a paper tells them
 _STORY = (
     "design",
     "sample-size",
@@ -139,7 +140,6 @@ _STORY = (
     "questionnaires",
     "methods",
 )
-"""Sections in the order in which a paper tells them."""
 
 
 def _model_of(protocol: Protocol, model_id: str) -> Model:
@@ -182,6 +182,7 @@ def _joint_of(model: Model, shared: ElbowConstants) -> ElbowParameters:
     )
 
 
+# The tables that decide what a rater meets, besides the study's id
 _PRESENTED = (
     "scale",
     "elbow",
@@ -192,8 +193,10 @@ _PRESENTED = (
     "occasions",
     "device",
 )
-"""The tables that decide what a rater meets, besides the study's id."""
 
+# What protocols once had not, with the defaults it then had: it does not enter where it
+# says nothing, so that no schedule drawn before turns stale. A list has what is so of
+# every entry.
 _LATER: dict[str, Any] = {
     "models": [
         {
@@ -275,11 +278,9 @@ _LATER: dict[str, Any] = {
         "seed": 0,
     },
 }
-"""What protocols once had not, with the defaults it then had: it does not enter where
-it says nothing, so that no schedule drawn before turns stale. A list has what is so of
-every entry."""
 
 
+# The default of ``report.sections`` when it entered: it still does, for no choice
 _FORMER_SECTIONS = (
     "design",
     "grades",
@@ -289,7 +290,6 @@ _FORMER_SECTIONS = (
     "speeds",
     "traces",
 )
-"""The default of ``report.sections`` when it entered: it still does, for no choice."""
 
 
 @once
@@ -397,8 +397,8 @@ def _drop_defaults(model: dict[str, Any], elbow: dict[str, Any]) -> None:
             model[key] = values
 
 
+# Numbers of an estimate that a gate can be about
 _GATE_NUMBERS = ("value", "low", "high", "width", "n", "n_missing", "p")
-"""Numbers of an estimate that a gate can be about."""
 
 _COMPARISONS: dict[str, Callable[[float, float], bool]] = {
     ">=": operator.ge,

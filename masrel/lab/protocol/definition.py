@@ -111,8 +111,8 @@ class Rater(_Table, frozen=True, kw_only=True):
     fields: dict[str, object] = {}
 
 
+# What a field of raters may be called: a column of a table of raters
 _FIELD_NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
-"""What a field of raters may be called: a column of a table of raters."""
 
 
 class RaterField(_Table, frozen=True, kw_only=True):
@@ -164,8 +164,8 @@ class Stretch(_Table, frozen=True, kw_only=True):
     largest_speed_deg_s: Annotated[float, Meta(gt=0, le=600)] = 131.0
 
 
+# What a rater is asked for: V1 or V3 of the Tardieu scale
 _Cue = Literal["slow", "fast"]
-"""What a rater is asked for: V1 or V3 of the Tardieu scale."""
 
 
 class PresentationRules(_Table, frozen=True, kw_only=True):
@@ -193,13 +193,12 @@ class Occasions(_Table, frozen=True, kw_only=True):
     resume: Literal["always", "same-day", "restart", "ask"] = "always"
 
 
+# What questions are about, and so when they are asked
 _When = Literal["presentation", "session", "study"]
-"""What questions are about, and so when they are asked."""
 
 _Whole = Annotated[int, Meta(ge=-1_000_000, le=1_000_000)]
 
-_ANALOGUE_RANGE = (0, 100)
-"""The ends of a visual analogue scale."""
+_ANALOGUE_RANGE = (0, 100)  # the ends of a visual analogue scale
 
 
 class Question(_Table, frozen=True, kw_only=True):

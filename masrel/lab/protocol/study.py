@@ -137,6 +137,7 @@ class StudyPaths:
         return self.training / f"{rater}.jsonl"
 
 
+# What a bundled study may hold; nothing drawn, run or computed in it is copied
 _BUNDLED = (
     "README.md",
     "ratings/published.csv",
@@ -145,7 +146,6 @@ _BUNDLED = (
     "published_secret.txt",
     "protocol.toml",  # last: a folder that has one is a study
 )
-"""What a bundled study may hold; nothing drawn, run or computed in it is copied."""
 
 
 def template_names() -> tuple[str, ...]:

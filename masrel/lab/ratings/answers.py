@@ -58,8 +58,7 @@ class GivenAnswer:
     grades_from: str
 
 
-_FORMAT = 1
-"""Version of a table of answers."""
+_FORMAT = 1  # version of a table of answers
 
 _COLUMNS = tuple(field.name for field in fields(GivenAnswer))
 

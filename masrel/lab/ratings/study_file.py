@@ -30,22 +30,21 @@ from masrel.lab.ratings.table import (
 )
 from masrel.scales import Scale
 
-_MISSING = ("", "NA")
-"""Cells that stand for a missing value; nothing else does."""
+_MISSING = ("", "NA")  # cells that stand for a missing value; nothing else does
 
 _MAX_PROBLEMS = 20
 
+# Names of columns that are recognized, letter case aside
 _NAMES = {
     "model": ("model", "item", "subject"),
     "rater": ("rater",),
     "grade": ("grade", "rating", "score"),
     "session": ("session",),
 }
-"""Names of columns that are recognized, letter case aside."""
 
 
+# What is wrong with a file: its line, its column if it is of one, and a message
 _Problem = tuple[int, str | None, str]
-"""What is wrong with a file: its line, its column if it is of one, and a message."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -92,25 +92,22 @@ class Rating(NamedTuple):
 RATING_COLUMNS = Rating._fields
 """Columns of a table of ratings."""
 
-_N_ALWAYS = 7
-"""Columns that every table has."""
+_N_ALWAYS = 7  # columns that every table has
 
-_FORMAT = 2
-"""Version of the file of a study's ratings."""
+_FORMAT = 2  # version of the file of a study's ratings
 
+# Columns of a table that does not know of any grip whether it was lost
 _N_WITHOUT_GRIP = 20
-"""Columns of a table that does not know of any grip whether it was lost."""
 
-_N_FORMERLY = 15
-"""Columns of a table of format 1, which does not name its format."""
+_N_FORMERLY = 15  # columns of a table of format 1, which does not name its format
 
-_YES_NO = ("no", "yes")
-"""Cells of False and True."""
+_YES_NO = ("no", "yes")  # cells of False and True
 
 SOURCES = ("published", "recorded", "simulated", "foreign")
 """Where a rating comes from; "foreign" is a file that does not say."""
 
 _FLOATS = ("mean_speed_deg_s", "min_speed_deg_s", "max_speed_deg_s")
+# Columns of whole numbers, and the least that each may hold
 _WHOLE = {
     "repeat": 1,
     "n_stretches": 0,
@@ -118,10 +115,9 @@ _WHOLE = {
     "position": 1,
     "n_attempts": 0,
 }
-"""Columns of whole numbers, and the least that each may hold."""
 
+# Of columns that are no objects
 _TYPES = {"repeat": "int64", **dict.fromkeys(_FLOATS, "float64")}
-"""Of columns that are no objects."""
 
 DEFAULT_SESSION = "test"
 """Session of ratings that do not name one."""

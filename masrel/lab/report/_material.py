@@ -32,12 +32,12 @@ SIMULATED_GRADES = (
     "The grades and speeds in this report are simulated. They show that the study "
     "runs; they say nothing about people or about the models.",
 )
+# Banner and sentence of a report, by who gave the grades
 _SIMULATED_IN_PART = (
     "SIMULATED DATA – no person gave some of these grades",
     "Some of the grades in this report are simulated; the table of sessions says of "
     "which. Together they say nothing about people or about the models.",
 )
-"""Banner and sentence of a report, by who gave the grades."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -21,11 +21,11 @@ from masrel.lab.schedule._balance import OrderBalance
 from masrel.pages._sections import Content, Paragraph
 from masrel.tables._tables import Column, Table, Value, percent
 
+# By rating, the step of its grade, or how far that is from others'
 _Steps = Mapping[Rating, float]
-"""By rating, the step of its grade, or how far that is from others'."""
 
+# By rater, the values whose means are compared: the first less the second
 _Pairs = Mapping[str, tuple[list[float], list[float]]]
-"""By rater, the values whose means are compared: the first less the second."""
 
 
 def place_rows(protocol: Protocol, ratings: Ratings) -> list[tuple[Value, ...]]:

@@ -68,8 +68,8 @@ def _name_within(line: EstimatePlan) -> str:
     return name if line.weights == "identity" else f"{name} with {line.weights} weights"
 
 
+# Coefficients that are not called by anybody's name
 _COMMON = ("percent_agreement", "pooled_kappa", "stratified_kappa")
-"""Coefficients that are not called by anybody's name."""
 
 
 def _between(analysis: Analysis) -> Iterator[str]:

@@ -66,8 +66,8 @@ def question_named(protocol: Protocol, name: str) -> tuple[Questionnaire, Questi
     return known[name]
 
 
+# Events that do not say when a rater was there last
 _NOT_THE_RATERS = ("recovered", "correction", "answer-correction", "stopped")
-"""Events that do not say when a rater was there last."""
 
 
 def days_since(time_utc: str, now: Callable[[], datetime]) -> int:

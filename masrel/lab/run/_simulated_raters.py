@@ -19,8 +19,7 @@ from masrel.lab.run._grade_sources import GradeRequest, GradeSource, QuestionReq
 _MOST_STRETCHES = 3  # of a simulated rater who may stretch as often as wanted
 
 
-_Key = tuple[str, str, str, int]
-"""Rater, session, model and repeat."""
+_Key = tuple[str, str, str, int]  # rater, session, model and repeat
 
 
 def key_of(request: GradeRequest) -> _Key:

@@ -151,6 +151,7 @@ class _Stretch(msgspec.Struct):
     mean_speed_deg_s: float | None
 
 
+# What a field that is read by its type holds, whatever the event
 _TYPES: dict[str, object] = {
     **dict.fromkeys(("code", "grade", "grades", "who", "why", "file"), str | None),
     **dict.fromkeys(("questionnaire", "question", "column"), str | None),
@@ -162,7 +163,6 @@ _TYPES: dict[str, object] = {
     "mean_speed_deg_s": float | None,
     "stretches": list[_Stretch] | None,
 }
-"""What a field that is read by its type holds, whatever the event."""
 
 _AFTER_COMPLETE = ("correction", "answer-correction", "reentered")
 

@@ -96,11 +96,9 @@ Cell = tuple[int | None, bool]
 
 _Sizes = tuple[int, int]  # dummies, standards
 
+# Presentations that are left of each cell, the last cell, and its run of a grade. Cells
+# are counted grade by grade, those without one last; of each dummies, standards.
 _Remainder = tuple[tuple[int, ...], int, int]
-"""Presentations that are left of each cell, the last cell, and its run of a grade.
-
-Cells are counted grade by grade, those without one last; of each dummies, standards.
-"""
 
 _NOTHING = -2  # in the place of the last cell: of no grade, and no standard
 

@@ -95,6 +95,7 @@ def orders_in_words(rules: ScheduleScheme) -> str:
     return _IN_WORDS[rules.scheme, by]
 
 
+# Schemes without limits, and what is blocked, to words for them
 _IN_WORDS = {
     ("random-order", None): "a random order",
     ("williams", None): "an order of a Williams design, which balances places and what "
@@ -104,7 +105,6 @@ _IN_WORDS = {
     ("blocks", "repeat"): "a random order in which each comes once before any comes "
     "again",
 }
-"""Schemes without limits, and what is blocked, to words for them."""
 
 
 def _check_row(scheme: str, row: int | None) -> None:

@@ -259,9 +259,10 @@ def _require_place(protocol: Protocol, rater: str, session: str) -> None:
         )
 
 
+# Version of the files of schedules and sheets; a file without one is of version 1
 _FORMAT = 1
-"""Version of the files of schedules and sheets; a file without one is of version 1."""
 
+# Keys of the ``# key: value`` lines, in order, and what their values look like
 _HEAD = {
     "study": r"\S+",
     "rater": r"\S+",
@@ -275,13 +276,11 @@ _HEAD = {
     "site": r"\S+",
     "row": r"[1-9][0-9]{0,8}",
 }
-"""Keys of the ``# key: value`` lines, in order, and what their values look like."""
 
-_WHOLE = ("seed", "row")
-"""Those whose values are whole numbers."""
+_WHOLE = ("seed", "row")  # those whose values are whole numbers
 
+# Those that a schedule without a secret, without strata, or without rows has not
 _OPTIONAL = ("commitment", "site", "row")
-"""Those that a schedule without a secret, without strata, or without rows has not."""
 
 _COLUMNS = ["position", "code", "model", "repeat"]
 _SHEET_COLUMNS = ["position", "code", "grade"]

@@ -66,8 +66,7 @@ def _require_its_own(schedule: Schedule, file: Path, rater: str, session: str) -
         )
 
 
-_RaterSession = tuple[str, str]
-"""A rater and a session."""
+_RaterSession = tuple[str, str]  # a rater and a session
 
 
 def write_schedules(

@@ -32,8 +32,7 @@ from masrel.lab.serve._manager import (
 )
 from masrel.lab.serve._middleware import page
 
-_BEAT_S = 5.0
-"""A page takes a stream for lost that says nothing for three times this."""
+_BEAT_S = 5.0  # a page takes a stream for lost that says nothing for three times this
 
 _FRAME_S = 0.04  # between two looks at the samples
 _PRESENTED = ("code", "position", "practice", "again")  # which presentation it is

@@ -40,8 +40,7 @@ if TYPE_CHECKING:
     from masrel.lab.analysis import Analysis
     from masrel.lab.ratings import Ratings
 
-_REPORT_FORMAT = "masrel report 1"
-"""What the manifest of a report says its format is."""
+_REPORT_FORMAT = "masrel report 1"  # what the manifest of a report says its format is
 
 _SHOWN = 20  # differences of the table that are listed
 

@@ -54,8 +54,8 @@ from masrel.lab.hess.puck._puck_options import (
     property_table,
 )
 
+# From a request to the sample of the encoder, as one of the public drivers has it
 _SAMPLING_NS = 75_000
-"""From a request to the sample of the encoder, as one of the public drivers has it."""
 
 # What every puck answers; requested for the order of the answers, not for the values
 _MARKERS = (VERSION, ROLE, SERIAL_NUMBER, ID, STATUS)
