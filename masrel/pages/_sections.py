@@ -54,12 +54,6 @@ class Section:
     blocks: tuple[Content, ...]  # in order
 
 
-def absent_section(name: str, title: str, reason: str | None) -> Section:
-    """Return a section whose data are not there, and why."""
-    text = f"Not in these data: {reason or 'this was not computed'}."
-    return Section(name=name, title=title, blocks=(Paragraph(text=text, absent=True),))
-
-
 _KINDS = {
     Paragraph: "paragraph",
     Table: "table",

@@ -23,11 +23,11 @@ from masrel.lab.report._material import (
     MANY_RATERS,
     NOT_THERE,
     TARGETS,
-    Lacking,
     Material,
     at_ranks,
     coefficient_name,
     interval_name,
+    lacking,
     main_estimate,
     meaning,
 )
@@ -78,18 +78,17 @@ _COLUMNS = (
 _LETTERS = "ᵃᵇᶜᵈᵉᶠᵍʰⁱʲᵏˡᵐⁿᵒᵖʳˢᵗᵘᵛʷˣʸᶻ"  # they stand high without any markup
 
 
-_Planned = Sequence[PlannedEstimate]
+_OF_KIND = {
+    "inter-rater": ("agreement", "Agreement between raters"),
+    "test-retest": ("test_retest", "Agreement of raters with themselves"),
+}
+"""Kind of a line of the plan to the name of its table and figure, and their caption."""
 
 
-def planned_of_kind(material: Material, kind: str) -> _Planned:
-    """Return the plan's estimates of a kind: between raters, or test-retest."""
-    return [p for p in material.analysis.estimates if p.line.kind == kind]
-
-
-def estimates_section(
-    material: Material, planned: _Planned, *, name: str, caption: str
-) -> Iterator[Content]:
-    """Show estimates with their intervals, or say why there are none."""
+def estimates_section(material: Material, *, kind: str) -> Iterator[Content]:
+    """Show the plan's estimates of a kind with their intervals, or why not."""
+    planned = [p for p in material.analysis.estimates if p.line.kind == kind]
+    name, caption = _OF_KIND[kind]
     if not planned:
         yield Paragraph(text="The plan asks for no such estimate.", absent=True)
         return
@@ -302,16 +301,13 @@ _CATEGORIES = "Agreement on each grade"
 _FEW = 10  # models, below which the intervals of a grade say next to nothing
 
 
-def categories_needs(material: Material) -> PlannedEstimate | Lacking:
-    """Return the main estimate, whose ratings agreement on each grade is of."""
-    entry = main_estimate(material.analysis)
-    if entry is None:
-        return Lacking("the plan asks for no estimate of agreement between raters")
-    return Lacking(entry.reason) if entry.estimate is None else entry
-
-
-def categories_section(material: Material, entry: PlannedEstimate) -> Iterator[Content]:
+def categories_section(material: Material) -> Iterator[Content]:
     """Show how well raters agree on each grade, by the ratings of the main estimate."""
+    entry = main_estimate(material.analysis)
+    if entry is None or entry.estimate is None:
+        reason = "the plan asks for no estimate of agreement between raters"
+        yield lacking(reason if entry is None else entry.reason)
+        return
     level, n_models = material.analysis.level, len(entry.models)
     ratings = material.ratings.without(material.analysis.excluded)
     notes = [

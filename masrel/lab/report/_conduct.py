@@ -129,23 +129,18 @@ CONDUCT_SECTIONS = ("flow", "conduct")
 """Sections that no protocol names: they are there where there is anything to say."""
 
 
-def run_of(material: Material) -> StudyConduct | None:
-    """Return how the study was run, if that is to be said."""
-    return material.conduct
-
-
-def flow_section(material: Material, conduct: StudyConduct | None) -> Iterator[Content]:
+def flow_section(material: Material) -> Iterator[Content]:
     """Say what became of the raters, once one has begun."""
+    conduct = material.conduct
     if conduct and any(session.last_event is not None for session in conduct.sessions):
         yield _flow_table(material, conduct)
         yield _flow_figure(material, conduct)
         yield from _characteristics(material, conduct)
 
 
-def conduct_section(
-    material: Material, conduct: StudyConduct | None
-) -> Iterator[Content]:
+def conduct_section(material: Material) -> Iterator[Content]:
     """Say what happened, as far as it is known."""
+    conduct = material.conduct
     if conduct is None:
         return
     if conduct.events:

@@ -9,7 +9,7 @@ from masrel.lab.analysis import PlannedEstimate
 from masrel.lab.protocol import Occasions, PresentationRules, Protocol, SampleSize
 from masrel.lab.protocol._kinds import DEFAULT_KIND, all_values
 from masrel.lab.ratings import Rating
-from masrel.lab.report._material import MANY_RATERS, Lacking, Material, sentence
+from masrel.lab.report._material import MANY_RATERS, Material, lacking, sentence
 from masrel.lab.schedule._orders import orders_in_words
 from masrel.pages._sections import Content, Paragraph
 from masrel.tables._tables import Column, Table, Value, as_entered, counted, number
@@ -65,7 +65,7 @@ _CONSTANT_COLUMNS = (
 _MODEL = Column(key="model", heading="Model", align="left")
 
 
-def design_section(material: Material, _: None) -> Iterator[Content]:
+def design_section(material: Material) -> Iterator[Content]:
     """Describe the study: models with parameters, raters and sessions."""
     protocol = material.protocol
     study, settings = protocol.study, protocol.simulated_raters
@@ -320,22 +320,16 @@ _SIZES = (
 )
 
 
-_Sizes = Sequence[tuple[PlannedEstimate, SampleSize]]
-
-
-def planned_sizes(material: Material) -> _Sizes | Lacking:
-    """Return each size of the plan with the estimate that it is of."""
+def sample_size_section(material: Material) -> Iterator[Content]:
+    """Show how the size was chosen, as the protocol says it, and what came of it."""
     sizes = material.protocol.analysis.sample_sizes
     if not sizes:
-        return Lacking(sentence("sample-size", "nothing"))
+        yield lacking(sentence("sample-size", "nothing"))
+        return
     of_line = {planned.line.id: planned for planned in material.analysis.estimates}
-    return [(of_line[size.estimate], size) for size in sizes]
-
-
-def sample_size_section(material: Material, sizes: _Sizes) -> Iterator[Content]:
-    """Show how the size was chosen, as the protocol says it, and what came of it."""
     rows: list[tuple[Value, ...]] = []
-    for result, size in sizes:
+    for size in sizes:
+        result = of_line[size.estimate]
         planned = size_sentence(material.protocol, size)
         yield Paragraph(text=f"{result.line.id}: {planned} {_outcome(result, size)}")
         rows += _size_rows(result, size)

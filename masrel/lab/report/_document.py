@@ -18,37 +18,23 @@ from masrel.lab.analysis import Analysis
 from masrel.lab.analysis._results import analysis_text
 from masrel.lab.protocol import Protocol, report_sections
 from masrel.lab.ratings import InPerson, Ratings
-from masrel.lab.report._agreement import (
-    categories_needs,
-    categories_section,
-    estimates_section,
-    planned_of_kind,
-)
+from masrel.lab.report._agreement import categories_section, estimates_section
 from masrel.lab.report._conduct import (
     CONDUCT_SECTIONS,
     StudyConduct,
     conduct_section,
     flow_section,
-    run_of,
 )
-from masrel.lab.report._design import (
-    design_section,
-    planned_sizes,
-    sample_size_section,
-)
+from masrel.lab.report._design import design_section, sample_size_section
 from masrel.lab.report._grade_sections import (
-    confusion_needs,
     confusion_section,
     grades_section,
-    in_person_needs,
     in_person_section,
-    intended_needs,
     intended_section,
-    questionnaires_needs,
     questionnaires_section,
 )
-from masrel.lab.report._material import Lacking, Material, gather
-from masrel.lab.report._order_tables import order_needs, order_section
+from masrel.lab.report._material import Material, gather, lacking
+from masrel.lab.report._order_tables import order_section
 from masrel.lab.report._pages import CONVERTED, WRITERS, pandoc_version
 from masrel.lab.report._paragraphs import methods_section, result_text
 from masrel.lab.report._report_folder import (
@@ -58,19 +44,13 @@ from masrel.lab.report._report_folder import (
     replace_report,
     report_files,
 )
-from masrel.lab.report._trace_section import (
-    speeds_needs,
-    speeds_section,
-    traces_needs,
-    traces_section,
-)
+from masrel.lab.report._trace_section import speeds_section, traces_section
 from masrel.lab.verification import Anchor
 from masrel.pages._sections import (
     Block,
     Content,
     Document,
     Drawing,
-    Paragraph,
     Section,
     chapters,
 )
@@ -81,64 +61,40 @@ Progress = Callable[[str], object]
 """Called with the name of each figure, and of the pages, once it is made."""
 
 
-def _nothing(_: Material) -> None:
-    """Return what a section needs that is made of the material alone."""
-
-
-@dataclass(frozen=True, slots=True)
-class SectionRow:
-    """A section: its heading, what it says, and of what."""
-
-    title: str
-    contents: Callable[[Material, Any], Iterable[Content]]
-    # computed when the section is asked for; `Lacking` says why it is not there
-    needs: Callable[[Material], object] = _nothing
-
-
-_AGREEMENT = "Agreement between raters"
-_AGAIN = "Agreement of raters with themselves"
-SECTIONS = {
-    "design": SectionRow("Design", design_section),
-    "flow": SectionRow("Flow of the raters", flow_section, run_of),
-    "conduct": SectionRow("Conduct", conduct_section, run_of),
-    "sample-size": SectionRow("Sample size", sample_size_section, planned_sizes),
-    "grades": SectionRow("Grades", grades_section),
-    "agreement": SectionRow(
-        _AGREEMENT,
-        partial(estimates_section, name="agreement", caption=_AGREEMENT),
-        partial(planned_of_kind, kind="inter-rater"),
+SECTIONS: dict[str, tuple[str, Callable[[Material], Iterable[Content]]]] = {
+    "design": ("Design", design_section),
+    "flow": ("Flow of the raters", flow_section),
+    "conduct": ("Conduct", conduct_section),
+    "sample-size": ("Sample size", sample_size_section),
+    "grades": ("Grades", grades_section),
+    "agreement": (
+        "Agreement between raters",
+        partial(estimates_section, kind="inter-rater"),
     ),
-    "test-retest": SectionRow(
+    "test-retest": (
         "Test-retest agreement",
-        partial(estimates_section, name="test_retest", caption=_AGAIN),
-        partial(planned_of_kind, kind="test-retest"),
+        partial(estimates_section, kind="test-retest"),
     ),
-    "categories": SectionRow(
-        "Agreement on each grade", categories_section, categories_needs
-    ),
-    "intended": SectionRow(
-        "Agreement with the intended grade", intended_section, intended_needs
-    ),
-    "confusion": SectionRow(
-        "Grades given for each intended grade", confusion_section, confusion_needs
-    ),
-    "in-person": SectionRow(
-        "In-person and haptic grades", in_person_section, in_person_needs
-    ),
-    "order": SectionRow("Effects of order", order_section, order_needs),
-    "speeds": SectionRow("Stretching speeds", speeds_section, speeds_needs),
-    "traces": SectionRow("Torque traces", traces_section, traces_needs),
-    "questionnaires": SectionRow(
-        "Questionnaires", questionnaires_section, questionnaires_needs
-    ),
-    "claims": SectionRow(
+    "categories": ("Agreement on each grade", categories_section),
+    "intended": ("Agreement with the intended grade", intended_section),
+    "confusion": ("Grades given for each intended grade", confusion_section),
+    "in-person": ("In-person and haptic grades", in_person_section),
+    "order": ("Effects of order", order_section),
+    "speeds": ("Stretching speeds", speeds_section),
+    "traces": ("Torque traces", traces_section),
+    "questionnaires": ("Questionnaires", questionnaires_section),
+    "claims": (
         "Published numbers",
-        lambda *_: (),
-        lambda _: Lacking("masrel audit holds ratings/claims.csv against every table"),
+        lambda _: [
+            lacking("masrel audit holds ratings/claims.csv against every table")
+        ],
     ),
-    "methods": SectionRow("Methods", methods_section),
+    "methods": ("Methods", methods_section),
 }
-"""By their names in ``report.sections``; those of the conduct are nowhere named."""
+"""The heading of each section and what it says, by its name in ``report.sections``.
+
+Those of the conduct are nowhere named.
+"""
 
 _INPUTS = {
     "protocol_sha256": "protocol",
@@ -150,14 +106,8 @@ _INPUTS = {
 
 def made_section(name: str, material: Material) -> Section:
     """Return a section by its name, or what says why its data are not there."""
-    row = SECTIONS[name]
-    needed = row.needs(material)
-    if isinstance(needed, Lacking):
-        text = f"Not in these data: {needed.reason or 'this was not computed'}."
-        contents: Iterable[Content] = [Paragraph(text=text, absent=True)]
-    else:
-        contents = row.contents(material, needed)
-    return Section(name=name, title=row.title, blocks=tuple(contents))
+    title, contents = SECTIONS[name]
+    return Section(name=name, title=title, blocks=tuple(contents(material)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

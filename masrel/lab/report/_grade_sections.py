@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.intervals.diagnosis import _share_interval
-from masrel.lab.analysis import InPersonAgreement, IntendedAgreement, QuestionSummary
+from masrel.lab.analysis import QuestionSummary
 from masrel.lab.analysis._descriptions import FEWEST_RATERS
 from masrel.lab.protocol import report_sections
-from masrel.lab.report._material import FIGURES, MANY_RATERS, Lacking, Material
+from masrel.lab.report._material import FIGURES, MANY_RATERS, Material, lacking
 from masrel.pages._sections import Content, Drawing, Paragraph
 from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import Column, Table, Value, counted, number, percent
@@ -22,7 +22,7 @@ from masrel.tables._tables import Column, Table, Value, counted, number, percent
 _MODEL = Column(key="model", heading="Model", align="left")
 
 
-def grades_section(material: Material, _: None) -> Iterator[Content]:
+def grades_section(material: Material) -> Iterator[Content]:
     """Show every grade of every session, as a grid of models by raters."""
     felt = felt_sentences(material)
     if not material.sessions:
@@ -199,18 +199,12 @@ def _counted_blocks(material: Material, grid: _Grid) -> Iterator[Content]:
     )
 
 
-def intended_needs(material: Material) -> IntendedAgreement | Lacking:
-    """Return how often the intended grade was given."""
-    result = material.analysis.intended
-    if result is not None and result.models:
-        return result
-    return Lacking(None if result is None else result.reason)
-
-
-def intended_section(
-    material: Material, result: IntendedAgreement
-) -> Iterator[Content]:
+def intended_section(material: Material) -> Iterator[Content]:
     """Show how many raters gave each standard model its intended grade."""
+    result = material.analysis.intended
+    if result is None or not result.models:
+        yield lacking(None if result is None else result.reason)
+        return
     yield Table(
         name="intended",
         caption=f"Raters who gave the intended grade, session {result.session}",
@@ -235,18 +229,12 @@ def intended_section(
     )
 
 
-def in_person_needs(material: Material) -> InPersonAgreement | Lacking:
-    """Return the pairs of grades of patients and of their models."""
-    result = material.analysis.in_person
-    if result is not None and result.n_pairs:
-        return result
-    return Lacking(None if result is None else result.reason)
-
-
-def in_person_section(
-    material: Material, result: InPersonAgreement
-) -> Iterator[Content]:
+def in_person_section(material: Material) -> Iterator[Content]:
     """Show grades given to patients beside those given to their models."""
+    result = material.analysis.in_person
+    if result is None or not result.n_pairs:
+        yield lacking(None if result is None else result.reason)
+        return
     percents = number(100 * result.n_equal / result.n_pairs, 1)
     text = f"{result.n_equal} of {result.n_pairs} pairs are equal ({percents} %)."
     if result.n_unpaired:
@@ -293,7 +281,7 @@ class _GivenGrades:
     shares: NDArray[np.float64]  # (3, n_intended)
 
 
-def confusion_needs(material: Material) -> _GivenGrades | Lacking:
+def given_grades(material: Material) -> _GivenGrades | None:
     """Return what models of each intended grade were given in the first session."""
     analysis, grades = material.analysis, material.ratings.scale.grades
     aims = {model.id: model.intended_grade for model in material.protocol.models}
@@ -307,7 +295,7 @@ def confusion_needs(material: Material) -> _GivenGrades | Lacking:
     aimed = [r for r in graded if r.session == session and aims[r.model] is not None]
     intended = [grade for grade in grades if grade in {aims[r.model] for r in aimed}]
     if not intended:
-        return Lacking("no model with an intended grade has ratings")
+        return None
     raters = sorted({row.rater for row in aimed})
     counts = np.zeros((len(intended), len(raters), len(grades)), dtype=np.int64)
     for row in aimed:
@@ -344,8 +332,12 @@ def _shares(
 _CONFUSION = "Grades given for each intended grade"
 
 
-def confusion_section(material: Material, result: _GivenGrades) -> Iterator[Content]:
+def confusion_section(material: Material) -> Iterator[Content]:
     """Show which grades models of each intended grade were given."""
+    result = given_grades(material)
+    if result is None:
+        yield lacking("no model with an intended grade has ratings")
+        return
     grades, level = material.ratings.scale.grades, material.analysis.level
     caption = f"{_CONFUSION}, session {result.session}"
     framed = np.array([[grade == aim for grade in grades] for aim in result.intended])
@@ -428,19 +420,12 @@ _QUESTIONS = (
 )
 
 
-_Summaries = Sequence[QuestionSummary]
-
-
-def questionnaires_needs(material: Material) -> _Summaries | Lacking:
-    """Return how questions were answered, if any was."""
-    summaries = material.analysis.questionnaires
-    return summaries if any(s.n for s in summaries) else Lacking("there are no answers")
-
-
-def questionnaires_section(
-    material: Material, summaries: _Summaries
-) -> Iterator[Content]:
+def questionnaires_section(material: Material) -> Iterator[Content]:
     """Show how each question was answered, over all raters."""
+    summaries = material.analysis.questionnaires
+    if not any(summary.n for summary in summaries):
+        yield lacking("there are no answers")
+        return
     made_up = [_RECONSTRUCTED] * any(each.is_reconstructed for each in summaries)
     questions = [
         (q, each) for q in material.protocol.questionnaires for each in q.questions

@@ -13,6 +13,7 @@ from masrel.estimates import Interval
 from masrel.lab.analysis import Analysis, PlannedEstimate
 from masrel.lab.protocol import Protocol
 from masrel.lab.ratings import InPerson, Ratings
+from masrel.pages._sections import Paragraph
 from masrel.tables._estimate_words import Noun, origin, promise
 from masrel.tables._tables import SIMULATED, SIMULATED_DEVICE, percent
 
@@ -60,13 +61,6 @@ class Material:
     raters: tuple[str, ...]
     recordings: Path | None  # the folder of the sessions' recordings, if known
     conduct: "StudyConduct | None"  # how the study was run, if that is to be said
-
-
-@dataclass(frozen=True, slots=True)
-class Lacking:
-    """Why that is not there which a section needs."""
-
-    reason: str | None  # None where nobody has computed it
 
 
 def gather(
@@ -133,6 +127,12 @@ def main_estimate(analysis: Analysis) -> PlannedEstimate | None:
     """Return the first line between raters that the data hold, or else the first."""
     planned = [p for p in analysis.estimates if p.line.kind == "inter-rater"]
     return next((p for p in planned if p.estimate), planned[0] if planned else None)
+
+
+def lacking(reason: str | None) -> Paragraph:
+    """Return what says why a section is not there."""
+    text = f"Not in these data: {reason or 'this was not computed'}."
+    return Paragraph(text=text, absent=True)
 
 
 _FILE = Path(__file__).with_name("templates") / "sentences.toml"

@@ -16,7 +16,7 @@ import numpy as np
 
 from masrel.lab.protocol import Protocol
 from masrel.lab.ratings import Rating, Ratings
-from masrel.lab.report._material import Lacking, Material, sentence
+from masrel.lab.report._material import Material, lacking, sentence
 from masrel.lab.schedule._balance import OrderBalance
 from masrel.pages._sections import Content, Paragraph
 from masrel.tables._tables import Column, Table, Value, percent
@@ -64,13 +64,6 @@ def effect_rows(
     A row has the question, the numbers of raters and of pairs of grades, how many of
     these are equal, and the mean difference with the ends of its interval, in steps.
     """
-    return [_effect_row(*each, level) for each in _compared(protocol, ratings)]
-
-
-def _compared(
-    protocol: Protocol, ratings: Ratings
-) -> list[tuple[str, list[str], _Pairs]]:
-    # what can be compared: the kind of effect, its sessions and its values
     steps = _steps(protocol, ratings)
     deviations = _deviations(steps)
     by_session: dict[str, list[Rating]] = defaultdict(list)
@@ -80,7 +73,7 @@ def _compared(
     first, second = ([r for r in steps if r.repeat == n] for n in (1, 2))
     again = _paired(steps, first, second, ("session", "rater", "model"))
     shared = "rater", "model", "repeat"
-    every = [
+    compared = [  # the kind of effect, its sessions and its values
         ("place", sessions, _halves(deviations)),
         ("neighbour", sessions, _neighbours(steps, deviations)),
         ("again", sessions, again),
@@ -89,7 +82,11 @@ def _compared(
             for a, b in pairwise(sessions)
         ),
     ]
-    return [each for each in every if each[2]]
+    return [
+        _effect_row(kind, of_sessions, pairs, level)
+        for kind, of_sessions, pairs in compared
+        if pairs
+    ]
 
 
 def _steps(protocol: Protocol, ratings: Ratings) -> dict[Rating, float]:
@@ -194,17 +191,14 @@ def _effect_row(
     return (question, n, n_pairs, n_equal, mean, low, high), reason
 
 
-def order_needs(material: Material) -> Ratings | Lacking:
-    """Return the ratings that are analysed, if they can show any effect of order."""
-    ratings = material.ratings.without(material.analysis.excluded)
-    lacks = Lacking(sentence("order", "nothing"))
-    return ratings if _compared(material.protocol, ratings) else lacks
-
-
-def order_section(material: Material, ratings: Ratings) -> Iterator[Content]:
+def order_section(material: Material) -> Iterator[Content]:
     """Show grades by place, after other models, and when a model came again."""
     protocol, level = material.protocol, material.analysis.level
+    ratings = material.ratings.without(material.analysis.excluded)
     effects = effect_rows(protocol, ratings, level)
+    if not effects:
+        yield lacking(sentence("order", "nothing"))
+        return
     yield Paragraph(text=sentence("order", "steps"))
     if places := place_rows(protocol, ratings):
         yield Table(

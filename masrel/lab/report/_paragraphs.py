@@ -12,15 +12,14 @@ from masrel.lab.analysis import Analysis, PlannedEstimate
 from masrel.lab.protocol import EstimatePlan, report_sections, scale_of
 from masrel.lab.protocol._kinds import DEFAULT_KIND
 from masrel.lab.report._design import beside_presentations, stretches_asked_for
-from masrel.lab.report._grade_sections import confusion_needs
+from masrel.lab.report._grade_sections import given_grades
 from masrel.lab.report._material import (
-    Lacking,
     Material,
     coefficient_name,
     main_estimate,
     sentence,
 )
-from masrel.lab.report._order_tables import order_needs
+from masrel.lab.report._order_tables import effect_rows
 from masrel.lab.schedule._orders import orders_in_words
 from masrel.pages._references import (
     bibtex,
@@ -156,7 +155,7 @@ def _ends(interval: Interval, name: str) -> str:
     )
 
 
-def methods_section(material: Material, _: None) -> Iterator[Content]:
+def methods_section(material: Material) -> Iterator[Content]:
     """Say how the study was made and its numbers computed, with references."""
     used: list[str] = []  # keys of all that is cited
     for sentences in (_study(material, used), _statistics(material, used)):
@@ -247,9 +246,12 @@ def _of_sections(material: Material, used: list[str]) -> Iterator[str]:
             interval_reference=_cite(["korn1998"], used),
             kappa_reference=_cite(["fleiss1971"], used),
         )
-    if "confusion" in sections and not isinstance(confusion_needs(material), Lacking):
+    if "confusion" in sections and given_grades(material) is not None:
         yield sentence("methods", "confusion", reference=_cite(["korn1998"], used))
-    if "order" in sections and not isinstance(order_needs(material), Lacking):
+    ratings = material.ratings.without(material.analysis.excluded)
+    if "order" in sections and effect_rows(
+        material.protocol, ratings, material.analysis.level
+    ):
         yield sentence("methods", "order")
 
 

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel.lab.analysis import Speed, Speeds, SpeedSummary
+from masrel.lab.analysis import Speed, SpeedSummary
 from masrel.lab.elbow import (
     ConstantSpeed,
     ElbowParameters,
@@ -32,9 +32,9 @@ from masrel.lab.report._material import (
     MANY_MODELS,
     MANY_RATERS,
     MANY_STRETCHES,
-    Lacking,
     Material,
     at_ranks,
+    lacking,
 )
 from masrel.pages._sections import Content, Drawing, Paragraph
 from masrel.plots._drawn_values import Drawn
@@ -56,16 +56,12 @@ _Floats = NDArray[np.float64]
 _Line = Outline | Trace  # of the exact law, or samples of another kind
 
 
-def speeds_needs(material: Material) -> Speeds | Lacking:
-    """Return the speeds, if any is known."""
-    speeds = material.analysis.speeds
-    if speeds is not None and speeds.values:
-        return speeds
-    return Lacking(None if speeds is None else speeds.reason)
-
-
-def speeds_section(material: Material, speeds: Speeds) -> Iterator[Content]:
+def speeds_section(material: Material) -> Iterator[Content]:
     """Show the mean speeds per model and per rater."""
+    speeds = material.analysis.speeds
+    if speeds is None or not speeds.values:
+        yield lacking(None if speeds is None else speeds.reason)
+        return
     text = (
         "Mean speed of the phase before the catch, which sets the catch angle by "
         "equation (2); below ν_L the catch angle no longer changes."
@@ -177,22 +173,16 @@ class TracedModel:
     band: Mapping[str, _Floats] | None
 
 
-def traces_needs(material: Material) -> Speeds | Lacking:
-    """Return the speeds, if any is fast enough to be drawn."""
-    speeds = speeds_needs(material)
-    if isinstance(speeds, Lacking) or any(map(_is_drawn, speeds.values)):
-        return speeds
-    return Lacking(f"every speed is {_TOO_SLOW}")
-
-
-def _is_drawn(speed: Speed) -> bool:
-    return speed.mean_speed_deg_s >= _SLOWEST_DRAWN_DEG_S
-
-
-def traces_section(material: Material, speeds: Speeds) -> Iterator[Content]:
+def traces_section(material: Material) -> Iterator[Content]:
     """Show the torque each model makes at each rater's mean speed."""
-    protocol = material.protocol
-    moved = [speed for speed in speeds.values if _is_drawn(speed)]
+    protocol, speeds = material.protocol, material.analysis.speeds
+    if speeds is None:
+        yield lacking(None)
+        return
+    moved = [s for s in speeds.values if s.mean_speed_deg_s >= _SLOWEST_DRAWN_DEG_S]
+    if not moved:
+        yield lacking(speeds.reason or f"every speed is {_TOO_SLOW}")
+        return
     session = next(s for s in material.sessions if s in {v.session for v in moved})
     values = [value for value in moved if value.session == session]
     end_deg = min(protocol.stretch.end_deg, protocol.elbow.range_end_deg)
