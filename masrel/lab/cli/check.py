@@ -70,15 +70,10 @@ def _plan_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
 
 
 def _device_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
-    from masrel.lab.run._settings import (  # loads numpy
-        check_backend,
-        check_button,
-        torque_problems,
-    )
+    from masrel.lab.run._settings import check_backend, torque_problems  # loads numpy
 
     try:
-        check_backend(protocol.device)
-        check_button(protocol)
+        check_backend(protocol)
     except ParameterError as error:
         yield f"{study.protocol}: {error}"
     for problem in torque_problems(protocol):

@@ -14,7 +14,7 @@ from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.protocol._values import checked_answer
 from masrel.lab.recording import _Fact
 from masrel.lab.run._around import question_named
-from masrel.lab.run._state import replay
+from masrel.lab.run._state import SessionState, replay
 
 
 def record_correction(
@@ -64,10 +64,7 @@ def record_correction(
     correction = _checked_correction(protocol, code, grade, who, why)
     with _begun_log(study, rater, session, now) as log:
         state = replay(log.path, log.events)
-        known = state.presented if grade is not None else state.grades
-        what = "was presented" if grade is not None else "has a grade"
-        _check_code(log.path, code, known, what)
-        _append_once(log, correction)
+        _append_correction(log, state, correction, state.presented, "was presented")
 
 
 def correct_in_session(
@@ -77,18 +74,25 @@ def correct_in_session(
     correction = _checked_correction(protocol, code, grade, **by)
     state = replay(log.path, log.events)
     # what is asked about now gets a grade of its own
-    known = state.settled if grade is not None else state.grades
-    what = "was graded" if grade is not None else "has a grade"
-    _check_code(log.path, code, sorted(known), what)
-    _append_once(log, correction)
+    _append_correction(log, state, correction, sorted(state.settled), "was graded")
 
 
-def _append_once(log: SessionLog, fields: dict[str, _Fact]) -> None:
+def _append_correction(
+    log: SessionLog,
+    state: SessionState,
+    fields: dict[str, _Fact],
+    known: Iterable[str],
+    what: str,
+) -> None:
+    code = str(fields["code"])
+    if fields["grade"] is None:
+        known, what = state.grades, "has a grade"
+    _check_code(log.path, code, known, what)
     # one that is sent again, as after a lost line, is in the log already
     corrected = (
         event.fields
         for event in reversed(log.events)
-        if event.kind == "correction" and event.fields["code"] == fields["code"]
+        if event.kind == "correction" and event.fields["code"] == code
     )
     if next(corrected, None) != fields:
         log.append("correction", fields)

@@ -1,5 +1,6 @@
 """What the protocol's ``[device]`` means to the driver."""
 
+import bisect
 import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -31,8 +32,9 @@ _WATCHED_S = 10.0  # for how long Tardieu's scale watches clonus
 _WITH_BUTTON = ("simulated",)  # which the simulated hand presses
 
 
-def check_backend(settings: DeviceSettings) -> None:
+def check_backend(protocol: Protocol) -> None:
     """Do nothing if a session can be run on the device of a protocol."""
+    settings = protocol.device
     names = [name for name in device_names() if name != "replay"]  # that has no hand
     if settings.backend not in names:
         raise ParameterError(
@@ -46,15 +48,11 @@ def check_backend(settings: DeviceSettings) -> None:
         )
     device_limits(settings)
     backend_options(settings)
-
-
-def check_button(protocol: Protocol) -> None:
-    """Do nothing if the device has the button that a protocol asks for."""
-    backend = protocol.device.backend
-    if protocol.presentation.done_with == "button" and backend not in _WITH_BUTTON:
+    is_asked_for = protocol.presentation.done_with == "button"
+    if is_asked_for and settings.backend not in _WITH_BUTTON:
         raise ParameterError(
             f"device.backend: needed one with a button ({', '.join(_WITH_BUTTON)}), "
-            f"as presentation.done_with asks for, got {backend!r}"
+            f"as presentation.done_with asks for, got {settings.backend!r}"
         )
 
 
@@ -126,15 +124,14 @@ def torque_notes(protocol: Protocol) -> Iterator[str]:
 
 
 def _speed_of_torque(protocol: Protocol, model: Model, torque: float) -> float:
-    # the speed up to which a model never asks for more, deg/s, by bisection
-    low, high = 0.0, protocol.device.speed_limit_deg_s
-    if _largest_torque(protocol, model, high) <= torque:
-        return high
-    while high - low > _SPEED_DEG_S:
-        middle = 0.5 * (low + high)
-        is_within = _largest_torque(protocol, model, middle) <= torque
-        low, high = (middle, high) if is_within else (low, middle)
-    return low
+    # the speed up to which a model never asks for more, deg/s
+    n_steps = math.ceil(protocol.device.speed_limit_deg_s / _SPEED_DEG_S)
+    n_within = bisect.bisect_right(
+        range(1, n_steps + 1),
+        torque,
+        key=lambda step: _largest_torque(protocol, model, step * _SPEED_DEG_S),
+    )
+    return n_within * _SPEED_DEG_S
 
 
 def _largest_torque(protocol: Protocol, model: Model, speed_deg_s: float) -> float:

@@ -19,7 +19,12 @@ from masrel.errors import (
 )
 from masrel.lab._event_log import Event, SessionLog, utc_now
 from masrel.lab.conduct._statements import refuse_withdrawn
-from masrel.lab.conduct._study_log import append_event, stated, study_answers
+from masrel.lab.conduct._study_log import (
+    append_event,
+    check_choice,
+    stated,
+    study_answers,
+)
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
 from masrel.lab.protocol._values import questions_of
 from masrel.lab.recording import _Fact, _Facts
@@ -41,7 +46,6 @@ from masrel.lab.run._rehearsal import (
 )
 from masrel.lab.run._settings import (
     check_backend,
-    check_button,
     has_simulated_hand,
     torque_problems,
 )
@@ -210,17 +214,14 @@ def _check_recordings(
 
 
 def _check_device(clock: str, protocol: Protocol) -> None:
-    if clock not in CLOCKS:
-        raise ParameterError(f"clock: needed one of {', '.join(CLOCKS)}, got {clock!r}")
+    check_choice("clock", clock, CLOCKS)
+    check_backend(protocol)
     device = protocol.device
-    check_backend(device)
-    check_button(protocol)
     if clock == "simulated" and not has_simulated_hand(device):
         raise ParameterError(
             f"clock: needed the real one for device {device.backend!r}, got 'simulated'"
         )
-    problems = tuple(torque_problems(protocol))
-    if problems:
+    if problems := tuple(torque_problems(protocol)):
         raise ProtocolError(*problems)
 
 

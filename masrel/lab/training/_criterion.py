@@ -15,6 +15,7 @@ was before the run says nothing about the rater as he or she is now.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -157,30 +158,6 @@ class Criterion:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TraineeErrors:
-    """What becomes of one kind of simulated trainees.
-
-    Attributes
-    ----------
-    skill : str
-        How they err; ``docs/training.md`` describes each kind.
-    false_pass : float or None
-        Share that passes although kappa stays at the insufficient one; None where no
-        trainee of the kind is so bad.
-    false_fail : float or None
-        Share that does not pass although kappa is at the sufficient one from the
-        first presentation on; None where no trainee of the kind is so good.
-    mean_presentations : float or None
-        Mean length of the training of the latter.
-    """
-
-    skill: Skill
-    false_pass: float | None
-    false_fail: float | None
-    mean_presentations: float | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Calibration:
     """The boundary of a criterion, with the errors that it makes.
 
@@ -188,18 +165,23 @@ class Calibration:
     ----------
     boundary : float
         The evidence that passes a training.
-    errors : tuple of TraineeErrors
-        By kind of trainee.
+    false_passes : mapping of str to float
+        By kind of trainee, the share that passes although kappa stays at the
+        insufficient one; ``docs/training.md`` describes each kind. A kind is lacking
+        where none of it is so bad.
+    false_fails : mapping of str to float
+        The same of those that do not pass although kappa is at the sufficient one from
+        the first presentation on.
     """
 
     boundary: float
-    errors: tuple[TraineeErrors, ...] = field(repr=False)
+    false_passes: Mapping[Skill, float] = field(repr=False)
+    false_fails: Mapping[Skill, float] = field(repr=False)
 
     @property
     def false_fail(self) -> float:
         """The largest share of any kind that fails wrongly; 1 if no kind can pass."""
-        shares = [e.false_fail for e in self.errors if e.false_fail is not None]
-        return max(shares, default=1.0)
+        return max(self.false_fails.values(), default=1.0)
 
 
 def training_criterion(protocol: Protocol) -> Criterion:
@@ -269,44 +251,37 @@ def calibrate(
     True
     """
     generator = np.random.default_rng(rng)
-    n_looks = criterion.max_presentations // criterion.n_models
-    at: dict[str, dict[Skill, _Floats | None]] = {}
-    for name, kappa in (
-        ("insufficient", criterion.insufficient),
-        ("sufficient", criterion.sufficient),
-    ):
-        at[name] = {
-            skill: _simulated_evidence(criterion, skill, kappa, n_simulated, generator)
-            for skill in SKILLS
-        }
-    bad, good = at["insufficient"], at["sufficient"]
-    largest = [run.max(axis=1) for run in bad.values() if run is not None]
-    boundary = max((_boundary(e, false_pass) for e in largest), default=0.0)
+    bad, good = (
+        _simulated_evidence(criterion, kappa, n_simulated, generator)
+        for kappa in (criterion.insufficient, criterion.sufficient)
+    )
+    boundary = max((_boundary(e, false_pass) for e in bad.values()), default=0.0)
     return Calibration(
         boundary=boundary,
-        errors=tuple(
-            _errors(skill, bad[skill], good[skill], boundary, n_looks, criterion)
-            for skill in SKILLS
-        ),
+        false_passes={kind: float((e >= boundary).mean()) for kind, e in bad.items()},
+        false_fails={
+            kind: float(1.0 - (e >= boundary).mean()) for kind, e in good.items()
+        },
     )
 
 
 def _simulated_evidence(
-    criterion: Criterion,
-    skill: Skill,
-    kappa: float,
-    n_simulated: int,
-    rng: np.random.Generator,
-) -> _Floats | None:
-    # (n_simulated, n_looks); None where the kind has no trainee with such a kappa
-    confusion = confusion_with_kappa(
-        skill, kappa, criterion.kappa, len(criterion.grades), criterion.intended
-    )
-    if confusion is None:
-        return None
+    criterion: Criterion, kappa: float, n_simulated: int, rng: np.random.Generator
+) -> dict[Skill, _Floats]:
+    # By kind the largest evidence of each trainee with this kappa, (n_simulated,); not
+    # of a kind that has none
+    largest = {}
     shape = n_simulated, criterion.max_presentations
-    drawn = draw_training(confusion, criterion.intended, criterion.order, shape, rng)
-    return criterion.evidence(*drawn)
+    for skill in SKILLS:
+        confusion = confusion_with_kappa(
+            skill, kappa, criterion.kappa, len(criterion.grades), criterion.intended
+        )
+        if confusion is not None:
+            drawn = draw_training(
+                confusion, criterion.intended, criterion.order, shape, rng
+            )
+            largest[skill] = criterion.evidence(*drawn).max(axis=1)
+    return largest
 
 
 def _boundary(largest: _Floats, share: float) -> float:
@@ -315,28 +290,3 @@ def _boundary(largest: _Floats, share: float) -> float:
     values, n = np.sort(largest)[::-1], largest.size
     n_passing = share * n - 2.0 * math.sqrt(share * (1.0 - share) * n)
     return float(np.nextafter(values[max(0, int(n_passing))], np.inf))
-
-
-def _errors(
-    skill: Skill,
-    bad: _Floats | None,
-    good: _Floats | None,
-    boundary: float,
-    n_looks: int,
-    criterion: Criterion,
-) -> TraineeErrors:
-    false_pass = false_fail = mean = None
-    if bad is not None:
-        false_pass = float((bad.max(axis=1) >= boundary).mean())
-    if good is not None:
-        passes = good >= boundary
-        has_passed = passes.any(axis=1)
-        looks = np.where(has_passed, passes.argmax(axis=1) + 1, n_looks)
-        false_fail = float(1.0 - has_passed.mean())
-        mean = float(looks.mean() * criterion.n_models)
-    return TraineeErrors(
-        skill=skill,
-        false_pass=false_pass,
-        false_fail=false_fail,
-        mean_presentations=mean,
-    )

@@ -164,16 +164,11 @@ def draw_blocks(
     size = BLOCK_SETS * n_models
     n_blocks = -(-shape[1] // size)
     models = rng.integers(0, n_models, (shape[0] * n_blocks, size))
-    while (lacking := ~_have_all(models, n_models)).any():
+    every = np.arange(n_models)
+    # a model that stands in no place of a block is lacking there
+    while (lacking := (models[..., None] != every).all(axis=1).any(axis=1)).any():
         models[lacking] = rng.integers(0, n_models, (int(lacking.sum()), size))
     return models.reshape(shape[0], -1)[:, : shape[1]]
-
-
-def _have_all(blocks: _Integers, n_models: int) -> NDArray[np.bool_]:
-    # (n_blocks, size) -> (n_blocks,)
-    met = np.zeros((len(blocks), n_models), dtype=bool)
-    np.put_along_axis(met, blocks, True, axis=1)
-    return np.asarray(met.all(axis=1))
 
 
 def draw_grades(probabilities: _Floats, rng: np.random.Generator) -> _Integers:

@@ -12,6 +12,7 @@ from typing import ClassVar
 
 from masrel.errors import ParameterError, ProtocolError, SessionLogError
 from masrel.lab._event_log import SessionLog, utc_now
+from masrel.lab.conduct._study_log import check_rater
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
 from masrel.lab.recording import _Fact
 from masrel.lab.run._grade_sources import GradeRequest, GradeSource, Skip
@@ -116,9 +117,7 @@ def train_rater(
 
 
 def _check_models(study: StudyPaths, protocol: Protocol, rater: str) -> None:
-    raters = [each.id for each in protocol.raters]
-    if rater not in raters:
-        raise ParameterError(f"rater: needed one of {', '.join(raters)}, got {rater!r}")
+    check_rater(protocol, rater)
     criterion = training_criterion(protocol)
     if len(set(criterion.intended)) < 2:
         raise ProtocolError(

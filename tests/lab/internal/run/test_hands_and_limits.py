@@ -81,6 +81,8 @@ FIELDS = {
     "arrival_ms": ("arrival_time", 1e-3),
 }
 
+Small = tuple[StudyPaths, Protocol]
+
 
 def test_each_limit_has_a_key_that_sets_it_and_no_other() -> None:
     usual = DeviceSettings()
@@ -96,14 +98,15 @@ def test_each_limit_has_a_key_that_sets_it_and_no_other() -> None:
         assert dataclasses.replace(made, **{field: getattr(before, field)}) == before
 
 
-def test_a_torque_sensor_is_the_simulated_device_s_alone() -> None:
+def test_a_torque_sensor_is_the_simulated_device_s_alone(small: Small) -> None:
     sensing = DeviceSettings(torque_sensor=True)
     assert backend_options(sensing, seed=7) == SimulatedOptions(
         torque_sensor=TorqueSensor(seed=7)
     )
+    puck = msgspec.structs.replace(sensing, backend="puck")
     words = r"device\.torque_sensor: needed false, .* 'puck' has no torque sensor"
     with pytest.raises(ParameterError, match=words):
-        check_backend(msgspec.structs.replace(sensing, backend="puck"))
+        check_backend(msgspec.structs.replace(small[1], device=puck))
 
 
 PUCK = {
@@ -282,7 +285,6 @@ def test_what_was_felt_follows_from_speed_and_catch(
 
 
 Made = Callable[..., tuple[StudyPaths, Protocol]]
-Small = tuple[StudyPaths, Protocol]
 
 
 def test_severity_is_interpolated_in_the_height_of_the_catch(

@@ -123,28 +123,20 @@ def test_the_errors_are_those_of_all_courses_a_training_can_take() -> None:
     result = calibrate(rule, false_pass=0.1, rng=5, n_simulated=4_000)
     orders = itertools.product([0, 1], repeat=6)
     courses = np.array([order for order in orders if len(set(order)) == 2])
-    for errors in result.errors:
-        for kappa, share in (
-            (0.2, errors.false_pass),
-            (0.7, None if errors.false_fail is None else 1.0 - errors.false_fail),
-        ):
-            exact = 0.0
+    passing = {kind: 1.0 - fails for kind, fails in result.false_fails.items()}
+    assert {"noise", "pair"} <= {*passing} & {*result.false_passes}
+    for kappa, shares in ((0.2, result.false_passes), (0.7, passing)):
+        exact, chance = 0.0, 0.5 * (1.0 - kappa)
+        for wrong in itertools.product([0, 1], repeat=6):
+            evidence = rule.evidence(courses, courses ^ np.array(wrong))
+            passes = (evidence >= result.boundary).any(axis=1)
+            n_wrong = sum(wrong)
+            exact += chance**n_wrong * (1.0 - chance) ** (6 - n_wrong) * passes.mean()
+        # four standard errors of a share of 4 000
+        error = (exact * (1.0 - exact) / 4_000) ** 0.5
+        for kind, share in shares.items():
             # κ = 1 - 2 e with errors alike, which "shift" has not
-            if errors.skill == "shift" or share is None:
-                continue
-            chance = 0.5 * (1.0 - kappa)
-            for wrong in itertools.product([0, 1], repeat=6):
-                passes = (
-                    rule.evidence(courses, courses ^ np.array(wrong)) >= result.boundary
-                ).any(axis=1)
-                n_wrong = sum(wrong)
-                exact += (
-                    chance**n_wrong * (1.0 - chance) ** (6 - n_wrong) * passes.mean()
-                )
-            # four standard errors of a share of 4 000
-            assert share == pytest.approx(
-                exact, abs=4.0 * (exact * (1.0 - exact) / 4_000) ** 0.5
-            )
+            assert kind == "shift" or share == pytest.approx(exact, abs=4.0 * error)
 
 
 def test_no_kind_of_trainee_passes_too_often_and_one_nearly_as_often_as_may_be() -> (
@@ -155,11 +147,10 @@ def test_no_kind_of_trainee_passes_too_often_and_one_nearly_as_often_as_may_be()
         return calibrate(rule, false_pass=false_pass, rng=3, n_simulated=300)
 
     result = calibrated_at(0.1, 48)
-    shares = [errors.false_pass for errors in result.errors]
-    known = [share for share in shares if share is not None]
     # two standard errors of a share of 300 below, and a trainee at most
-    assert max(known) == pytest.approx(0.1 - 2.0 * (0.09 / 300) ** 0.5, abs=1 / 300)
-    assert result.false_fail == max(e.false_fail or 0.0 for e in result.errors)
+    share = max(result.false_passes.values())
+    assert share == pytest.approx(0.1 - 2.0 * (0.09 / 300) ** 0.5, abs=1 / 300)
+    assert result.false_fail == max(result.false_fails.values())
     # the boundary rises with fewer errors and with more looks
     assert result.boundary < calibrated_at(0.02, 48).boundary
     assert calibrated_at(0.02, 48).boundary < calibrated_at(0.02, 120).boundary
