@@ -23,8 +23,8 @@ from masrel.lab.elbow._torque import (
     trace,
     work,
 )
-from masrel.lab.elbow.joint_model import JointModel, Stepper
-from masrel.lab.elbow.laws import MODELS, Tardieu, tardieu
+from masrel.lab.elbow.joint_model import Stepper
+from masrel.lab.elbow.laws import MODELS, JointModel, Tardieu, tardieu
 from masrel.lab.elbow.motions import (
     ConstantSpeed,
     Hold,

@@ -197,9 +197,8 @@ class SampledJoint:
     )
 
     def __init__(self, parameters: "ElbowParameters", *, start_angle: float) -> None:
-        rest = parameters.rest_angle
         self._parameters = parameters
-        self._pre_catch = pre_catch(parameters, start_angle if rest is None else rest)
+        self._pre_catch = pre_catch(parameters, parameters.rest_from(start_angle))
         self._law: TorqueLaw = self._pre_catch  # the one that holds
         self.phase = PRE_CATCH
         self.catch_time = math.nan

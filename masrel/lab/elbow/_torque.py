@@ -35,7 +35,7 @@ from masrel.lab.elbow._polynomials import (
     some,
     value,
 )
-from masrel.lab.elbow.joint_model import JointModel
+from masrel.lab.elbow.laws import JointModel
 from masrel.lab.elbow.motions import Floats, Motion
 from masrel.lab.elbow.parameters import ElbowParameters
 

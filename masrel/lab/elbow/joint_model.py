@@ -6,8 +6,11 @@ compared with the largest torque and slope that it can ask for.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field, fields
+from operator import itemgetter
+from types import SimpleNamespace
 from typing import Any, ClassVar, Literal, Protocol
 
 import numpy as np
@@ -15,7 +18,7 @@ import numpy as np
 from masrel.errors import ParameterError
 from masrel.lab.elbow.motions import _SAME_TIME, Floats, Motion
 
-__all__ = ["JointModel", "Quantity", "Stepper", "ToneEvent", "ToneModel"]
+__all__ = ["Law", "Quantity", "Stepper", "ToneEvent", "ToneModel"]
 
 
 class Stepper(Protocol):
@@ -53,37 +56,105 @@ class Stepper(Protocol):
         """Give up at once what has been triggered, as when the grip is lost."""
 
 
-class JointModel(Protocol):
+Needs = Literal[
+    "positive",
+    "not negative",
+    "share",
+    "share below 1",
+    "angle",
+    "angle above 0",
+    "frequency",
+    "finite",
+]
+
+_RANGES: dict[Needs, tuple[str, Callable[[float], bool]]] = {
+    "positive": ("more than 0", lambda value: value > 0.0),
+    "not negative": ("0 or more", lambda value: value >= 0.0),
+    "share": ("0 to 1", lambda value: 0.0 <= value <= 1.0),
+    "share below 1": ("[0, 1)", lambda value: 0.0 <= value < 1.0),
+    "angle": ("0 to 180 degrees", lambda value: 0.0 <= value <= math.pi),
+    "angle above 0": ("(0, 180] degrees", lambda value: 0.0 < value <= math.pi),
+    "frequency": ("more than 0, at most 100", lambda value: 0.0 < value <= 100.0),
+    "finite": ("a finite number", math.isfinite),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quantity:
+    """What is known of a parameter besides its value.
+
+    Attributes
+    ----------
+    unit : str
+        Its unit in Python: "rad", "N·m/rad"; "" for a plain number.
+    needs : {"positive", "not negative", "share", "angle", "frequency", ...}
+        The range that it has to lie in.
+    is_choice : bool
+        Whether its default is a choice of ours, not from a source.
+    """
+
+    unit: str
+    needs: Needs
+    is_choice: bool
+
+
+def quantity(
+    default: float | None, unit: str, needs: Needs, *, is_choice: bool = True
+) -> Any:
+    """Return the field of a parameter with its unit and range."""
+    return field(default=default, metadata=known(unit, needs, is_choice=is_choice))
+
+
+def known(unit: str, needs: Needs, *, is_choice: bool = False) -> dict[str, Quantity]:
+    """Return the metadata of such a field."""
+    return {"quantity": Quantity(unit=unit, needs=needs, is_choice=is_choice)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Law(ABC):
     """A law of the joint with its parameters, in SI units.
 
-    Parameters are checked where they are made: a `JointModel` that exists is valid.
+    Parameters are checked where they are made: a law that exists is valid.
 
     Attributes
     ----------
     kind : str
         Name of the law in `MODELS`, as a protocol file spells it.
+    is_passive : bool
+        Whether it never gives back more than it took, whatever the motion. A joint with
+        a delay, a trigger or a change in time is not passive in this sense, and is
+        presented behind a guard only.
     """
 
-    __slots__ = ()
-
     kind: ClassVar[str]
+    is_passive: ClassVar[bool] = False
 
-    @property
-    def is_passive(self) -> bool:
-        """Whether it never gives back more than it took, whatever the motion.
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            name, of = entry.name, entry.metadata.get("quantity")
+            value = getattr(self, name)
+            if of is None or (value is None and entry.default is None):
+                continue
+            is_number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not is_number or not math.isfinite(value):
+                raise ParameterError(f"{name}: needs a finite number, got {value!r}")
+            needed, is_met = _RANGES[of.needs]
+            if not is_met(value):
+                raise ParameterError(
+                    f"{name}: needs {needed}, got {value:g} {of.unit}".rstrip()
+                )
+        self._check_together()
 
-        A joint with a delay, a trigger or a change in time is not passive in this
-        sense, and is presented behind a guard only.
-        """
+    def _check_together(self) -> None:
+        # A model whose parameters have to go together refuses here those that do not.
+        return
 
-    @property
-    def range_end(self) -> float:
-        """End of the range of motion, rad."""
+    def rest_from(self, start_angle: float) -> float:
+        """Return where the spring has no torque, rad: where it starts unless set."""
+        rest: float | None = getattr(self, "rest_angle", None)
+        return start_angle if rest is None else rest
 
-    @property
-    def speed_threshold(self) -> float:
-        """Speed from which the arm counts as moving, rad/s."""
-
+    @abstractmethod
     def stepper(self, start_angle: float) -> Stepper:
         """Return a joint that has not seen a sample yet.
 
@@ -98,6 +169,7 @@ class JointModel(Protocol):
             The state machine of one presentation.
         """
 
+    @abstractmethod
     def largest_torque(self, *, start_angle: float, speed: float) -> float:
         """Return the largest torque of a stretch and the way back.
 
@@ -114,6 +186,7 @@ class JointModel(Protocol):
             A bound of the torque's size, N·m, that no such motion passes.
         """
 
+    @abstractmethod
     def largest_slope(self, *, speed: float) -> tuple[float, float]:
         """Return the largest slopes of the torque where it does not jump.
 
@@ -127,44 +200,6 @@ class JointModel(Protocol):
         tuple of two floats
             Over angle, N·m/rad, and over angular velocity, N·m·s/rad.
         """
-
-
-Needs = Literal["positive", "not negative", "share", "angle", "frequency"]
-
-_RANGES: dict[Needs, tuple[str, Callable[[float], bool]]] = {
-    "positive": ("more than 0", lambda value: value > 0.0),
-    "not negative": ("0 or more", lambda value: value >= 0.0),
-    "share": ("0 to 1", lambda value: 0.0 <= value <= 1.0),
-    "angle": ("0 to 180 degrees", lambda value: 0.0 <= value <= math.pi),
-    "frequency": ("more than 0, at most 100", lambda value: 0.0 < value <= 100.0),
-}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Quantity:
-    """What is known of a parameter besides its value.
-
-    Attributes
-    ----------
-    unit : str
-        Its unit in Python: "rad", "N·m/rad"; "" for a plain number.
-    needs : {"positive", "not negative", "share", "angle", "frequency"}
-        The range that it has to lie in.
-    is_choice : bool
-        Whether its default is a choice of ours, not from a source.
-    """
-
-    unit: str
-    needs: Needs
-    is_choice: bool
-
-
-def quantity(
-    default: float | None, unit: str, needs: Needs, *, is_choice: bool = True
-) -> Any:
-    """Return the field of a parameter with its unit and range."""
-    known = Quantity(unit=unit, needs=needs, is_choice=is_choice)
-    return field(default=default, metadata={"quantity": known})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -187,34 +222,25 @@ class ToneEvent:
 
 
 class ToneStepper:
-    """A law that sees one sample at a time; one with a memory adds it."""
+    """A law that sees one sample at a time."""
 
-    is_given_up = False
-    phase = 0
-
-    def __init__(self, model: Any, start_angle: float) -> None:
+    def __init__(self, model: "ToneModel", start_angle: float) -> None:
         self.model, self.rest = model, model.rest_from(start_angle)
+        self.phase, self.is_given_up = 0, False
+        self.kept = SimpleNamespace(**deepcopy(model._kept))
 
     def release(self) -> None:
         """Give up at once what has been triggered; a law says until when."""
-        self.is_given_up = True
-        self.phase = 0
-
-    def remember(
-        self, _time_s: float, _angle: float, _velocity: float, /
-    ) -> tuple[float, ...]:
-        """Take a sample in -> what the law's torque depends on besides."""
-        return ()
+        self.phase, self.is_given_up = 0, True
 
     def step(self, time_s: float, angle: float, velocity: float) -> float:
         """Decide the torque of one sample, N·m."""
-        memory = self.remember(time_s, angle, velocity)
-        torque: float = self.model._law(angle, velocity, self.rest, *memory)
-        return torque
+        memory = self.model._sampled(self, time_s, angle, velocity)
+        return self.model._law(angle, velocity, self.rest, *memory)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ToneModel(JointModel, ABC):
+class ToneModel(Law):
     """A law of tone: what every model in `masrel.lab.elbow.tone` is.
 
     Attributes
@@ -236,35 +262,13 @@ class ToneModel(JointModel, ABC):
         If a parameter is not finite or outside its range; the message names it.
     """
 
-    kind: ClassVar[str]
-    is_passive: ClassVar[bool] = False
     catch_event: ClassVar[str | None] = None
-    _stepper: ClassVar[type[ToneStepper]] = ToneStepper
+    _kept: ClassVar[dict[str, Any]] = {}  # by a stepper, before the first sample
 
     range_end: float = quantity(math.radians(146.0), "rad", "angle", is_choice=False)
     speed_threshold: float = quantity(
         math.radians(20.0), "rad/s", "positive", is_choice=False
     )
-
-    def __post_init__(self) -> None:
-        defaults = {entry.name: entry.default for entry in fields(self)}
-        for name, known in self.quantities().items():
-            value = getattr(self, name)
-            if value is None and defaults[name] is None:
-                continue
-            is_number = isinstance(value, int | float) and not isinstance(value, bool)
-            if not is_number or not math.isfinite(value):
-                raise ParameterError(f"{name}: needs a finite number, got {value!r}")
-            needed, is_met = _RANGES[known.needs]
-            if not is_met(value):
-                raise ParameterError(
-                    f"{name}: needs {needed}, got {value:g} {known.unit}".rstrip()
-                )
-        self._check_together()
-
-    def _check_together(self) -> None:
-        # A model whose parameters have to go together refuses here those that do not.
-        return
 
     @classmethod
     def quantities(cls) -> dict[str, Quantity]:
@@ -273,14 +277,8 @@ class ToneModel(JointModel, ABC):
 
     def stepper(self, start_angle: float) -> ToneStepper:
         """Return the joint as a state machine that has not seen a sample yet."""
-        return self._stepper(self, start_angle)
+        return ToneStepper(self, start_angle)
 
-    def rest_from(self, start_angle: float) -> float:
-        """Return where the spring has no torque, rad: where it starts unless set."""
-        rest: float | None = getattr(self, "rest_angle", None)
-        return start_angle if rest is None else rest
-
-    @abstractmethod
     def events(self, motion: Motion) -> tuple[ToneEvent, ...]:
         """Return what happens along a motion, as roots of it: nothing is stepped.
 
@@ -292,8 +290,18 @@ class ToneModel(JointModel, ABC):
         Returns
         -------
         tuple of ToneEvent
-            In order of their times.
+            In order of their times. What would begin at the very end of the motion, or
+            later, is none.
         """
+        last = motion.duration - _SAME_TIME
+        inside = sorted(
+            (e for e in self._events(motion) if e[1] < last), key=itemgetter(1)
+        )
+        angles = motion.angle(np.array([time for _, time in inside])).tolist()
+        return tuple(
+            ToneEvent(name=name, time=time, angle=angle)
+            for (name, time), angle in zip(inside, angles, strict=True)
+        )
 
     def torque(self, motion: Motion, times: Sequence[float] | Floats) -> Floats:
         """Return the torque along a motion, its events at their own times.
@@ -331,25 +339,19 @@ class ToneModel(JointModel, ABC):
     ) -> float:
         """Return the torque, N·m."""
 
+    @abstractmethod
+    def _events(self, motion: Motion, /) -> Iterator[tuple[str, float]]:
+        """Yield the events of a motion in any order: name and time, s."""
+
+    def _sampled(
+        self, _joint: ToneStepper, _time_s: float, _angle: float, _velocity: float, /
+    ) -> tuple[float, ...]:
+        """Take a sample in -> what `_law` depends on besides."""
+        return ()
+
     def _memory(self, _motion: Motion, _times: Floats, /) -> list[Floats]:
         """Return what `_law` depends on besides, at times of a motion (n,) each."""
         return []
-
-
-def events_at(
-    motion: Motion, times: Iterable[tuple[str, float]]
-) -> tuple[ToneEvent, ...]:
-    """Return events of these names and times, in order.
-
-    What would begin at the very end of the motion, or later, is none.
-    """
-    last = motion.duration - _SAME_TIME
-    inside = sorted((e for e in times if e[1] < last), key=lambda event: event[1])
-    angles = motion.angle(np.array([time for _, time in inside])).tolist()
-    return tuple(
-        ToneEvent(name=name, time=time, angle=angle)
-        for (name, time), angle in zip(inside, angles, strict=True)
-    )
 
 
 def grade_of(table: dict[str, Any], grade: object, name: str) -> Any:

@@ -6,14 +6,17 @@ from dataclasses import dataclass
 from masrel._input import refuse
 from masrel.errors import ParameterError
 from masrel.lab.elbow._events import events
-from masrel.lab.elbow.joint_model import JointModel, ToneModel
+from masrel.lab.elbow.joint_model import ToneModel
 from masrel.lab.elbow.motions import ConstantSpeed
 from masrel.lab.elbow.parameters import ElbowParameters
 from masrel.lab.elbow.tone import LAWS
 
-__all__ = ["MODELS", "Tardieu", "tardieu"]
+__all__ = ["MODELS", "JointModel", "Tardieu", "tardieu"]
 
 _SPEEDS = (math.radians(10.0), math.radians(100.0), math.radians(150.0))
+
+JointModel = ElbowParameters | ToneModel
+"""A law of the joint with its parameters, in SI units."""
 
 MODELS: dict[str, type[JointModel]] = {
     ElbowParameters.kind: ElbowParameters,

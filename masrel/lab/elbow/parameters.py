@@ -5,13 +5,14 @@ https://doi.org/10.1109/TNSRE.2012.2195330, equations (1)-(6) and Table III.
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from typing import ClassVar, Literal
 
 from masrel.errors import ParameterError
 from masrel.lab.elbow import _law
 from masrel.lab.elbow._law import SampledJoint
+from masrel.lab.elbow.joint_model import Law, known, quantity
 
 __all__ = ["STANDARD_MODELS", "ElbowParameters", "PostCatch", "ResidualReading"]
 
@@ -22,33 +23,7 @@ ResidualReading = Literal["residual", "decrease"]
 """What Q is a share of the rise for: the residual (section II), or the decrease."""
 
 
-# What is needed, in words, whether a value meets it, and of which parameters.
-_RANGES: tuple[tuple[str, Callable[[float], bool], tuple[str, ...]], ...] = (
-    (
-        "(0, 180] degrees, got {} (SI units)",
-        lambda angle: 0.0 < angle <= math.pi,
-        ("catch_angle_constant", "catch_travel", "range_end"),
-    ),
-    (
-        "more than 0, got {} (SI units)",
-        lambda value: value > 0.0,
-        ("catch_slope", "peak_duration", "speed_threshold"),
-    ),
-    ("[0, 1), got {}", lambda share: 0.0 <= share < 1.0, ("residual_ratio",)),
-    (
-        "0 or more, got {}",
-        lambda value: value >= 0.0,
-        (
-            "catch_torque_constant",
-            "inertia",
-            "damping",
-            "stiffness",
-            "post_catch_stiffness",
-            "slowest_mean_speed",
-            "smallest_catch_angle",
-        ),
-    ),
-)
+_published = partial(quantity, is_choice=False)
 
 READINGS = {
     "post_catch": ("continuous", "additive"),
@@ -57,7 +32,7 @@ READINGS = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ElbowParameters:
+class ElbowParameters(Law):
     """Parameters of the joint model, in SI units (angles in rad).
 
     Angle 0 is full flexion and grows with extension.
@@ -111,40 +86,34 @@ class ElbowParameters:
 
     kind: ClassVar[str] = "spastic-elbow"
 
-    catch_angle_constant: float
-    catch_torque_constant: float
-    residual_ratio: float
-    catch_travel: float
-    inertia: float = 0.0
-    damping: float = 1.26
-    stiffness: float = 3.15
-    catch_slope: float = 0.35
-    peak_duration: float = 0.1
-    post_catch_stiffness: float = 5.8
-    speed_threshold: float = math.radians(20.0)
-    slowest_mean_speed: float = math.radians(60.0)
-    smallest_catch_angle: float = math.radians(60.0)
-    range_end: float = math.radians(146.0)
-    rest_angle: float | None = None
+    # is_passive is False: an arm led back slowly in its catch is pushed by the residual
+    # torque
+
+    catch_angle_constant: float = field(metadata=known("rad", "angle above 0"))
+    catch_torque_constant: float = field(metadata=known("N·m·s/rad", "not negative"))
+    residual_ratio: float = field(metadata=known("", "share below 1"))
+    catch_travel: float = field(metadata=known("rad", "angle above 0"))
+    inertia: float = _published(0.0, "kg·m²", "not negative")
+    damping: float = _published(1.26, "N·m·s/rad", "not negative")
+    stiffness: float = _published(3.15, "N·m/rad", "not negative")
+    catch_slope: float = _published(0.35, "s", "positive")
+    peak_duration: float = _published(0.1, "s", "positive")
+    post_catch_stiffness: float = _published(5.8, "N·m/rad", "not negative")
+    speed_threshold: float = _published(math.radians(20.0), "rad/s", "positive")
+    slowest_mean_speed: float = _published(math.radians(60.0), "rad/s", "not negative")
+    smallest_catch_angle: float = _published(math.radians(60.0), "rad", "not negative")
+    range_end: float = _published(math.radians(146.0), "rad", "angle above 0")
+    rest_angle: float | None = _published(None, "rad", "finite")
     post_catch: PostCatch = "continuous"
     residual_reading: ResidualReading = "residual"
-    catch_rise: float = 0.0
+    catch_rise: float = _published(0.0, "s", "finite")
 
-    def __post_init__(self) -> None:
-        for name in self.__slots__:
-            value = getattr(self, name)
-            if name in READINGS:
-                if value not in (two := READINGS[name]):
-                    raise ParameterError(
-                        f'{name}: needs "{two[0]}" or "{two[1]}", got {value!r}'
-                    )
-            elif isinstance(value, int | float) and not math.isfinite(value):
-                raise ParameterError(f"{name}: needs a finite number, got {value}")
-        for needed, is_met, names in _RANGES:
-            for name in names:
-                value = getattr(self, name)
-                if not is_met(value):
-                    raise ParameterError(f"{name}: needs {needed.format(value)}")
+    def _check_together(self) -> None:
+        for name, (one, other) in READINGS.items():
+            if (value := getattr(self, name)) not in (one, other):
+                raise ParameterError(
+                    f'{name}: needs "{one}" or "{other}", got {value!r}'
+                )
         if not 0.0 <= self.catch_rise <= self.peak_duration:
             raise ParameterError(
                 f"catch_rise: needs 0 to peak_duration, {self.peak_duration:g} s, "
@@ -180,12 +149,6 @@ class ElbowParameters:
         slowed = max(mean_speed, self.slowest_mean_speed)  # first line of (6)
         return self.catch_angle_constant - self.catch_slope * slowed  # (2)
 
-    @property
-    def is_passive(self) -> bool:
-        """Whether it never gives back more than it took: False, it has a trigger."""
-        # an arm led back slowly in its catch is pushed by the residual torque
-        return False
-
     def stepper(self, start_angle: float) -> SampledJoint:
         """Return the joint as a state machine that has not seen a sample yet."""
         return SampledJoint(self, start_angle=start_angle)
@@ -204,8 +167,7 @@ class ElbowParameters:
         >>> round(bound, 3)
         12.897
         """
-        rest = start_angle if self.rest_angle is None else self.rest_angle
-        end = self.range_end
+        rest, end = self.rest_from(start_angle), self.range_end
         first = min(self.catch_angle(0.0), self.smallest_catch_angle)  # (6)
         earliest = min(max(first, start_angle), end)
         held = end if self.post_catch == "additive" else earliest

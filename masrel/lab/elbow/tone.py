@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -22,7 +22,6 @@ from masrel.lab.elbow.joint_model import (
     ToneEvent,
     ToneModel,
     ToneStepper,
-    events_at,
     grade_of,
     quantity,
 )
@@ -63,25 +62,6 @@ _FULL_RANGE = math.radians(146.0)
 _SHORTENED_DEG = {"1": 10.0, "2": 20.0, "3": 30.0, "4": 40.0}
 # A stretch that goes on so far beyond θ_e meets about 10 N·m: as far as a hand goes.
 _BEYOND = math.radians(10.0)
-
-
-class _Rigid(ToneStepper):
-    """Rigidity; nothing is ever triggered."""
-
-    _angle, _bristle = math.nan, 0.0
-
-    def release(self) -> None:
-        """Straighten the bristle."""
-        self._bristle = 0.0
-
-    def remember(
-        self, _time_s: float, angle: float, _velocity: float
-    ) -> tuple[float, ...]:
-        if not math.isnan(self._angle):  # the first sample finds it straight
-            moved = self._bristle + angle - self._angle
-            self._bristle = _clip(moved, self.model.bristle_travel)
-        self._angle = angle
-        return (self._bristle,)
 
 
 def _clip(value: float, limit: float) -> float:
@@ -136,7 +116,7 @@ class LeadPipe(ToneModel):
 
     kind: ClassVar[str] = "lead-pipe-rigidity"
     is_passive: ClassVar[bool] = True
-    _stepper: ClassVar[type[ToneStepper]] = _Rigid
+    _kept: ClassVar[dict[str, Any]] = {"angle": math.nan, "bristle": 0.0}
 
     coulomb_torque: float = quantity(1.6, "N·m", "not negative")
     stiffness: float = quantity(1.4, "N·m/rad", "not negative")
@@ -164,24 +144,34 @@ class LeadPipe(ToneModel):
         spring = self.stiffness * (angle - rest) + self.damping * velocity
         return spring + self.coulomb_torque * memory[0] / self.bristle_travel
 
-    def events(self, motion: Motion) -> tuple[ToneEvent, ...]:
-        """Return when the bristle slips and sticks along a motion, in order."""
-        times: list[tuple[str, float]] = []
+    def _sampled(
+        self, joint: ToneStepper, _time_s: float, angle: float, _velocity: float
+    ) -> tuple[float, ...]:
+        kept = joint.kept
+        if joint.is_given_up:  # a release straightens the bristle
+            kept.bristle, joint.is_given_up = 0.0, False
+        if not math.isnan(kept.angle):  # the first sample finds it straight
+            moved = kept.bristle + angle - kept.angle
+            kept.bristle = _clip(moved, self.bristle_travel)
+        kept.angle = angle
+        return (kept.bristle,)
+
+    def _events(self, motion: Motion) -> Iterator[tuple[str, float]]:
+        # when the bristle slips and sticks
         slips = 0
         for part, bent in self._bends(motion):
             way = part.direction
             if not way:
                 continue
             if slips == -way:
-                times.append(("stick", part.start))
+                yield "stick", part.start
                 slips = 0
             if not slips:
                 slips_at = part.angle[0] - bent + way * self.bristle_travel
                 time = part.reached([way * c for c in part.beyond(slips_at)])
                 if time is not None:
-                    times.append(("slip", time))
+                    yield "slip", time
                     slips = way
-        return events_at(motion, times)
 
     def _bends(self, motion: Motion) -> Iterator[tuple[OneWay, float]]:
         # parts that go one way, and how far the bristle is bent where they start, rad
@@ -199,35 +189,6 @@ class LeadPipe(ToneModel):
             travel = part.angle_at(until) - part.angle[0]
             bent[mine] = np.clip(before + travel, -limit, limit)
         return [bent]
-
-
-class _Cogwheel(_Rigid):
-    """Cogwheel rigidity; nothing is ever triggered."""
-
-    _way = 0  # of the movement, 0 at rest
-    _onset = 0.0  # s
-    _ended = -math.inf  # when the movement before ended, s
-    _last = 0.0  # how far its last gap was open
-
-    def release(self) -> None:
-        """Straighten the bristle, and begin anew."""
-        super().release()
-        self._way, self._last = 0, 0.0
-
-    def remember(
-        self, time_s: float, angle: float, velocity: float
-    ) -> tuple[float, ...]:
-        model = self.model
-        slow = abs(velocity) < model.movement_speed
-        way = 0 if slow else (1 if velocity > 0.0 else -1)
-        if way != self._way:
-            if self._way:
-                self._last = model._gap(time_s - self._onset)
-                self._ended = time_s
-            self._way, self._onset = way, time_s
-        gap = model._gap(time_s - self._onset) if way else 0.0
-        gap += model._closing(self._last, time_s - self._ended)
-        return (*super().remember(time_s, angle, velocity), gap)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -273,7 +234,13 @@ class Cogwheel(LeadPipe):
     """
 
     kind: ClassVar[str] = "cogwheel-rigidity"
-    _stepper: ClassVar[type[ToneStepper]] = _Cogwheel
+    _kept: ClassVar[dict[str, Any]] = {
+        **LeadPipe._kept,
+        "way": 0,  # of the movement, 0 at rest
+        "onset": 0.0,  # s
+        "ended": -math.inf,  # when the movement before ended, s
+        "last": 0.0,  # how far its last gap was open
+    }
     is_passive: ClassVar[bool] = False  # a gap that ends while it sticks pushes
 
     gap_rate: float = quantity(6.0, "Hz", "frequency")
@@ -310,17 +277,33 @@ class Cogwheel(LeadPipe):
         lost = self.gap_depth * gap * self.coulomb_torque
         return torque - lost * bristle / self.bristle_travel
 
-    def events(self, motion: Motion) -> tuple[ToneEvent, ...]:
-        """Return when gaps begin and end and the bristle slips and sticks, in order."""
-        times = [(event.name, event.time) for event in LeadPipe.events(self, motion)]
+    def _sampled(
+        self, joint: ToneStepper, time_s: float, angle: float, velocity: float
+    ) -> tuple[float, ...]:
+        kept = joint.kept
+        if joint.is_given_up:  # a release begins anew
+            kept.way, kept.last = 0, 0.0
+        slow = abs(velocity) < self.movement_speed
+        way = 0 if slow else (1 if velocity > 0.0 else -1)
+        if way != kept.way:
+            if kept.way:
+                kept.last = self._gap(time_s - kept.onset)
+                kept.ended = time_s
+            kept.way, kept.onset = way, time_s
+        gap = self._gap(time_s - kept.onset) if way else 0.0
+        gap += self._closing(kept.last, time_s - kept.ended)
+        return (*LeadPipe._sampled(self, joint, time_s, angle, velocity), gap)
+
+    def _events(self, motion: Motion) -> Iterator[tuple[str, float]]:
+        # when gaps begin and end, too
+        yield from LeadPipe._events(self, motion)
         period = 1.0 / self.gap_rate
         for begun, until in movements(motion, self.movement_speed):
             for n in range(math.ceil((until - begun) * self.gap_rate)):
                 opens = begun + (n + 1.0 - self.gap_share) * period
                 closes = min(begun + (n + 1.0) * period, until)
                 if opens < until:
-                    times += [("gap", opens), ("gap ends", closes)]
-        return events_at(motion, times)
+                    yield from (("gap", opens), ("gap ends", closes))
 
     def _memory(self, motion: Motion, times: Floats) -> list[Floats]:
         gap = np.zeros(times.size)
@@ -338,29 +321,6 @@ def _edge(since: float, length: float) -> float:
     if since >= length:
         return 1.0
     return 0.5 - 0.5 * math.cos(math.pi * since / length)
-
-
-class _ClaspKnife(ToneStepper):
-    """A clasp-knife; a release gives it up until the arm is back beyond θ_arm."""
-
-    _fired = math.nan  # when the latch closed, s
-
-    def remember(
-        self, time_s: float, angle: float, velocity: float
-    ) -> tuple[float, ...]:
-        model = self.model
-        if angle < model.arming_angle:
-            self.phase, self.is_given_up = PRE_CATCH, False
-        if self.is_given_up:
-            return (0.0,)
-        if self.phase == PRE_CATCH:
-            force = model._reflex(angle, velocity)
-            if angle < model.arming_angle or force < model.firing_torque:
-                return (1.0,)
-            self._fired = time_s
-        since = time_s - self._fired
-        self.phase = CATCH if since < model.release_delay else POST_CATCH
-        return (model._scale(since),)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -414,7 +374,7 @@ class ClaspKnife(ToneModel):
     """
 
     kind: ClassVar[str] = "clasp-knife"
-    _stepper: ClassVar[type[ToneStepper]] = _ClaspKnife
+    _kept: ClassVar[dict[str, Any]] = {"fired": math.nan}  # when the latch closed, s
     catch_event: ClassVar[str | None] = "fire"
 
     threshold: float = quantity(math.radians(56.27), "rad", "angle", is_choice=False)
@@ -463,6 +423,23 @@ class ClaspKnife(ToneModel):
         passive = self.passive_stiffness * (angle - rest)
         return passive + memory[0] * self._reflex(angle, velocity)
 
+    def _sampled(
+        self, joint: ToneStepper, time_s: float, angle: float, velocity: float
+    ) -> tuple[float, ...]:
+        # a release gives it up until the arm is back beyond θ_arm
+        if angle < self.arming_angle:
+            joint.phase, joint.is_given_up = PRE_CATCH, False
+        if joint.is_given_up:
+            return (0.0,)
+        if joint.phase == PRE_CATCH:
+            force = self._reflex(angle, velocity)
+            if angle < self.arming_angle or force < self.firing_torque:
+                return (1.0,)
+            joint.kept.fired = time_s
+        since = time_s - joint.kept.fired
+        joint.phase = CATCH if since < self.release_delay else POST_CATCH
+        return (self._scale(since),)
+
     def _beyond(self, part: OneWay, angle: float) -> Polynomial:
         # how far θ + μ·max(ω, 0) is beyond an angle
         lead = self.threshold_slope if part.direction > 0 else 0.0
@@ -480,17 +457,15 @@ class ClaspKnife(ToneModel):
             lambda _: self.arming_angle,
         )
 
-    def events(self, motion: Motion) -> tuple[ToneEvent, ...]:
-        """Return when the reflex sets in, fires, gives way, ends and is armed again."""
-        times = []
+    def _events(self, motion: Motion) -> Iterator[tuple[str, float]]:
+        # when the reflex sets in, fires, gives way, ends and is armed again
         reflex = spans(motion, lambda part: self._beyond(part, self.threshold))
         for begun, until in reflex:
-            times += [("reflex", begun), ("reflex ends", until)]
+            yield from (("reflex", begun), ("reflex ends", until))
         for closed, opened in self._latched(motion):
-            times += [("fire", closed), ("arm", opened)]
+            yield from (("fire", closed), ("arm", opened))
             if closed + self.release_delay < opened:
-                times.append(("release", closed + self.release_delay))
-        return events_at(motion, times)
+                yield "release", closed + self.release_delay
 
     def _memory(self, motion: Motion, times: Floats) -> list[Floats]:
         scale = np.ones(times.size)
@@ -601,29 +576,11 @@ class Contracture(ToneModel):
             end += self.end_stiffness * (angle - cap)
         return self.stiffness * (angle - rest) + self.damping * velocity + end
 
-    def events(self, motion: Motion) -> tuple[ToneEvent, ...]:
-        """Return when a motion goes beyond θ_e and θ_cap, in order."""
-        times: list[tuple[str, float]] = []
+    def _events(self, motion: Motion) -> Iterator[tuple[str, float]]:
+        # when it goes beyond θ_e and θ_cap
         for name, at in (("end", self.end_angle), ("cap", self.cap_angle)):
             for begun, until in spans(motion, partial(OneWay.beyond, angle=at)):
-                times += [(name, begun), (f"{name} left", until)]
-        return events_at(motion, times)
-
-
-class _Dystonia(ToneStepper):
-    """Dystonia; once released it stays at its resting activation."""
-
-    _begun = math.nan  # the first sample, s
-
-    def remember(
-        self, time_s: float, _angle: float, _velocity: float
-    ) -> tuple[float, ...]:
-        if math.isnan(self._begun):
-            self._begun = time_s
-        since = 0.0 if self.is_given_up else time_s - self._begun
-        activation = self.model._activation(since)
-        self.phase = int(activation > self.model.resting_activation)
-        return (activation,)
+                yield from ((name, begun), (f"{name} left", until))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -670,7 +627,7 @@ class Dystonia(ToneModel):
     """
 
     kind: ClassVar[str] = "dystonia"
-    _stepper: ClassVar[type[ToneStepper]] = _Dystonia
+    _kept: ClassVar[dict[str, Any]] = {"begun": math.nan}  # the first sample, s
 
     stiffness: float = quantity(3.0, "N·m/rad", "not negative")
     damping: float = quantity(0.5, "N·m·s/rad", "not negative")
@@ -707,37 +664,24 @@ class Dystonia(ToneModel):
         full = self.stiffness * (angle - self.posture_angle) + self.damping * velocity
         return memory[0] * full
 
-    def events(self, motion: Motion) -> tuple[ToneEvent, ...]:
-        """Return when the episode begins and ends."""
-        begun = self.episode_start
-        until = begun + self.episode_duration
-        return events_at(motion, [("episode", begun), ("episode ends", until)])
+    def _sampled(
+        self, joint: ToneStepper, time_s: float, _angle: float, _velocity: float
+    ) -> tuple[float, ...]:
+        kept = joint.kept
+        if math.isnan(kept.begun):
+            kept.begun = time_s
+        # once released it stays at its resting activation
+        since = 0.0 if joint.is_given_up else time_s - kept.begun
+        activation = self._activation(since)
+        joint.phase = int(activation > self.resting_activation)
+        return (activation,)
+
+    def _events(self, _motion: Motion) -> Iterator[tuple[str, float]]:
+        yield "episode", self.episode_start
+        yield "episode ends", self.episode_start + self.episode_duration
 
     def _memory(self, _motion: Motion, times: Floats) -> list[Floats]:
         return [np.array([self._activation(time) for time in times.tolist()])]
-
-
-class _Clonus(ToneStepper):
-    """Clonus; a release stops the beats until the arm has been moved back."""
-
-    _begun = math.nan  # when the beats were set off, s
-    _farthest = 0.0  # that the arm has been since, rad
-
-    def remember(
-        self, time_s: float, angle: float, velocity: float
-    ) -> tuple[float, ...]:
-        model = self.model
-        is_far = angle >= model.trigger_angle
-        if self.is_given_up:
-            self.is_given_up = is_far and velocity > -model.speed_threshold
-        elif self.phase == CATCH:
-            self._farthest = max(self._farthest, angle)
-            if angle < model._given_up(self._farthest):
-                self.phase = PRE_CATCH
-        elif is_far and velocity >= model.trigger_speed:
-            self.phase, self._begun, self._farthest = CATCH, time_s, angle
-        idle = self.phase == PRE_CATCH
-        return (-math.inf if idle else time_s - self._begun - model.delay,)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -793,7 +737,10 @@ class Clonus(ToneModel):
     """
 
     kind: ClassVar[str] = "clonus"
-    _stepper: ClassVar[type[ToneStepper]] = _Clonus
+    _kept: ClassVar[dict[str, Any]] = {
+        "begun": math.nan,  # when the beats were set off, s
+        "farthest": 0.0,  # that the arm has been since, rad
+    }
     catch_event: ClassVar[str | None] = "trigger"
 
     beat_rate: float = quantity(5.0, "Hz", "frequency")
@@ -834,6 +781,22 @@ class Clonus(ToneModel):
         beat = math.sin(math.pi * x)
         return self.base_torque + self.beat_torque * left * beat * beat
 
+    def _sampled(
+        self, joint: ToneStepper, time_s: float, angle: float, velocity: float
+    ) -> tuple[float, ...]:
+        # a release stops the beats until the arm has been moved back
+        kept, is_far = joint.kept, angle >= self.trigger_angle
+        if joint.is_given_up:
+            joint.is_given_up = is_far and velocity > -self.speed_threshold
+        elif joint.phase == CATCH:
+            kept.farthest = max(kept.farthest, angle)
+            if angle < self._given_up(kept.farthest):
+                joint.phase = PRE_CATCH
+        elif is_far and velocity >= self.trigger_speed:
+            joint.phase, kept.begun, kept.farthest = CATCH, time_s, angle
+        idle = joint.phase == PRE_CATCH
+        return (-math.inf if idle else time_s - kept.begun - self.delay,)
+
     def _given_up(self, farthest: float) -> float:
         # where the stretch is given up that has been so far, rad
         return max(self.trigger_angle, farthest - self.return_travel)
@@ -849,15 +812,13 @@ class Clonus(ToneModel):
             self._given_up,
         )
 
-    def events(self, motion: Motion) -> tuple[ToneEvent, ...]:
-        """Return when beats are set off, each beat begins, and they stop."""
-        times = []
+    def _events(self, motion: Motion) -> Iterator[tuple[str, float]]:
+        # when beats are set off, each beat begins, and they stop
         for begun, until in self._trains(motion):
-            times += [("trigger", begun), ("stop", until)]
+            yield from (("trigger", begun), ("stop", until))
             first, last = begun + self.delay, min(until, motion.duration)
             for n in range(max(math.ceil((last - first) * self.beat_rate), 0)):
-                times.append(("beat", first + n / self.beat_rate))
-        return events_at(motion, times)
+                yield "beat", first + n / self.beat_rate
 
     def _memory(self, motion: Motion, times: Floats) -> list[Floats]:
         since = np.full(times.size, -math.inf)
@@ -865,39 +826,6 @@ class Clonus(ToneModel):
             mine = (times >= begun) & (times < until)
             since[mine] = times[mine] - begun - self.delay
         return [since]
-
-
-class _ThresholdReflex(ToneStepper):
-    """A threshold reflex; a release gives it up until the arm is back below it.
-
-    The late sample is the latest that is as old as the delay: at a regular rate that is
-    a whole number of samples, and after a missed tick it is still right. Before the
-    first is old enough the arm is taken to have rested where it was then.
-    """
-
-    _late: tuple[float, float] | None = None  # rad, rad/s
-
-    def __init__(self, model: "ThresholdReflex", start_angle: float) -> None:
-        super().__init__(model, start_angle)
-        self._samples: deque[tuple[float, float, float]] = deque()
-
-    def remember(
-        self, time_s: float, angle: float, velocity: float
-    ) -> tuple[float, ...]:
-        samples, model = self._samples, self.model
-        samples.append((time_s, angle, velocity))
-        late = self._late or (angle, 0.0)
-        # a sample as old as the delay but for rounding is old enough
-        while samples and time_s - samples[0][0] >= model.delay - 1e-6:
-            late = samples.popleft()[1:]
-        self._late = late
-        reflex = model._reflex(*late)
-        if reflex == 0.0:
-            self.is_given_up = False
-        elif self.is_given_up:
-            reflex = 0.0
-        self.phase = CATCH if reflex > 0.0 else PRE_CATCH
-        return (reflex,)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -951,7 +879,10 @@ class ThresholdReflex(ToneModel):
     """
 
     kind: ClassVar[str] = "threshold-stretch-reflex"
-    _stepper: ClassVar[type[ToneStepper]] = _ThresholdReflex
+    _kept: ClassVar[dict[str, Any]] = {
+        "samples": deque(),  # younger than the delay: s, rad, rad/s
+        "late": None,  # the latest of the others: rad, rad/s
+    }
     catch_event: ClassVar[str | None] = "reflex"
 
     threshold: float = quantity(math.radians(61.97), "rad", "angle", is_choice=False)
@@ -1023,14 +954,32 @@ class ThresholdReflex(ToneModel):
         limit = self.largest_reflex
         return torque if limit is None else min(torque, limit)
 
-    def events(self, motion: Motion) -> tuple[ToneEvent, ...]:
-        """Return when the threshold is met and left, and the reflex a delay later."""
-        times = []
+    def _sampled(
+        self, joint: ToneStepper, time_s: float, angle: float, velocity: float
+    ) -> tuple[float, ...]:
+        # The late sample is the latest that is as old as the delay: at a regular rate
+        # that is a whole number of samples, and after a missed tick it is still right.
+        # Before the first is old enough the arm is taken to have rested where it was.
+        kept = joint.kept
+        kept.samples.append((time_s, angle, velocity))
+        kept.late = kept.late or (angle, 0.0)
+        # a sample as old as the delay but for rounding is old enough
+        while kept.samples and time_s - kept.samples[0][0] >= self.delay - 1e-6:
+            kept.late = kept.samples.popleft()[1:]
+        reflex = self._reflex(*kept.late)
+        if reflex == 0.0:
+            joint.is_given_up = False
+        elif joint.is_given_up:  # by a release, until the arm is back below it
+            reflex = 0.0
+        joint.phase = CATCH if reflex > 0.0 else PRE_CATCH
+        return (reflex,)
+
+    def _events(self, motion: Motion) -> Iterator[tuple[str, float]]:
+        # when the threshold is met and left, and the reflex a delay later
         angle, lead = self.threshold, self.threshold_slope
         for begun, until in spans(motion, lambda part: part.beyond(angle, lead)):
-            times += [("threshold", begun), ("reflex", begun + self.delay)]
-            times += [("threshold left", until), ("reflex ends", until + self.delay)]
-        return events_at(motion, times)
+            yield from (("threshold", begun), ("reflex", begun + self.delay))
+            yield from (("threshold left", until), ("reflex ends", until + self.delay))
 
     def _memory(self, motion: Motion, times: Floats) -> list[Floats]:
         late = np.maximum(times - self.delay, 0.0)

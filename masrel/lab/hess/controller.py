@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 from masrel.errors import LimitExceededError, ParameterError
-from masrel.lab.elbow.joint_model import JointModel
+from masrel.lab.elbow.laws import JointModel
 from masrel.lab.elbow.parameters import ElbowParameters
 from masrel.lab.hess._signals import CUTOFF_RAD_S, raised_cosine
 from masrel.lab.hess.limits import _check_not_negative, _check_positive

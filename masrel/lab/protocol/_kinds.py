@@ -10,8 +10,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from masrel.errors import ParameterError
-from masrel.lab.elbow.joint_model import JointModel
-from masrel.lab.elbow.laws import MODELS
+from masrel.lab.elbow.laws import MODELS, JointModel
 from masrel.lab.elbow.parameters import ElbowParameters
 from masrel.lab.elbow.tone import ToneModel
 from masrel.lab.protocol._decode import closest, got
@@ -74,7 +73,9 @@ def keys_of(kind: str) -> dict[str, Key]:
 def model_of_kind(kind: str, values: Mapping[str, float]) -> JointModel:
     """Return the law of a kind with these values, by key; defaults for the rest."""
     keys = keys_of(kind)
-    changes = {keys[key].parameter: keys[key].in_si(v) for key, v in values.items()}
+    changes: dict[str, Any] = {
+        keys[key].parameter: keys[key].in_si(v) for key, v in values.items()
+    }
     return MODELS[kind](**changes)
 
 

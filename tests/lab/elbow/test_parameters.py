@@ -89,7 +89,7 @@ OUTSIDE = [  # a value of each that is refused, and one at the edge that is not
             "smallest_catch_angle",
         )
     ),
-    ("residual_ratio", 1.0, 0.0, r"needs \[0, 1\), got 1.0"),
+    ("residual_ratio", 1.0, 0.0, r"needs \[0, 1\), got 1"),
     ("residual_ratio", -0.01, 0.99, r"needs \[0, 1\), got -0.01"),
     ("catch_rise", 0.2, 0.1, "needs 0 to peak_duration, 0.1 s, got 0.2 s"),
     ("post_catch", "both", "additive", 'needs "continuous" or "additive", got \'both'),
