@@ -37,7 +37,6 @@ from masrel.lab.report._traced_scenes import (
     SCENE_VIEWS,
     Quantities,
     Scene,
-    check_view,
     scene_document,
     scene_text,
     scenes_content,
@@ -58,7 +57,6 @@ _KINDS = (*_STRETCHES, "recording")
 
 _COLUMNS = ("time_s", "angle_deg", "velocity_deg_s", "torque_nm", "phase")
 _MAX_SAMPLES = 5_000_000  # rows of a CSV file: at 1 kHz 83 minutes, and some 400 MB
-_N_AT_ONCE = 10_000  # rows between two signs of progress
 _MAX_SPEEDS = 100_000
 _MAX_REPEATS = 1000  # which take a second to solve
 
@@ -231,8 +229,9 @@ def trace(
         low, high, n = speed_range
         speeds += tuple(low + (high - low) * i / (n - 1) for i in range(n))
     scenes = _scenes(joints_of(joints), stretch, speeds)
+    content = cache(partial(scenes_content, scenes, view or SCENE_VIEWS[0]))
     if output.figure is not None:
-        check_view(scenes, view or SCENE_VIEWS[0])
+        content()  # which refuses what cannot be drawn before anything is written
     documents = _documents(scenes, quantities, quiet=output.quiet)
     if csv_file is not None:
         rate = 1000.0 if rate_hz is None else rate_hz
@@ -244,7 +243,7 @@ def trace(
         text=lambda: (
             scene_text(documents[0], scenes[0].title) if one else scenes_text(documents)
         ),
-        figure=lambda: scenes_content(scenes, view or SCENE_VIEWS[0]),
+        figure=content,
         stamp=SCENE_STAMP,
     )
 
@@ -374,37 +373,30 @@ def _write_samples(
             f"{sum(durations):.4g} s at {rate_hz:g} Hz; --rate-hz makes them fewer"
         )
     several = len(scenes) > 1
-    with (
-        new_file(csv_file) as out,
-        tqdm(
-            total=int(n_samples), desc="samples", delay=1.0, disable=quiet or None
-        ) as bar,
-    ):
+    rows = tqdm(
+        _sample_rows(scenes, rate_hz, several=several),
+        total=int(n_samples), desc="samples", delay=1.0, disable=quiet or None,
+    )  # fmt: skip
+    with new_file(csv_file) as out:
         out.write("# simulated: true\n")
         writer = csv.writer(out, lineterminator="\n")
         writer.writerow((*(("model", "speed_deg_s") if several else ()), *_COLUMNS))
-        for scene in scenes:
-            names = (safe_cell(scene.model), scene.speed_deg_s) if several else ()
-            for rows in _blocks_of_rows(scene, rate_hz):
-                writer.writerows((*names, *row) for row in rows)
-                bar.update(len(rows))
+        writer.writerows(rows)
 
 
-def _blocks_of_rows(scene: Scene, rate_hz: float) -> Iterator[list[tuple[Any, ...]]]:
-    # as many samples at once as are written between two signs of progress
+def _sample_rows(
+    scenes: Sequence[Scene], rate_hz: float, *, several: bool
+) -> Iterator[tuple[Any, ...]]:
     import numpy as np
 
     from masrel.lab import elbow
     from masrel.lab.recording import PHASES
 
-    samples = elbow.trace(scene.joint, scene.motion, rate_hz=rate_hz)
-    columns = (
-        samples.time,
-        np.degrees(samples.angle),
-        np.degrees(samples.velocity),
-        samples.torque,
-    )
-    for start in range(0, samples.time.size, _N_AT_ONCE):
-        block = slice(start, start + _N_AT_ONCE)
-        phases = [PHASES[code] for code in samples.phase[block].tolist()]
-        yield list(zip(*(c[block].tolist() for c in columns), phases, strict=True))
+    for scene in scenes:
+        made = elbow.trace(scene.joint, scene.motion, rate_hz=rate_hz)
+        degrees = map(np.degrees, (made.angle, made.velocity))
+        names = (safe_cell(scene.model), scene.speed_deg_s) if several else ()
+        for *numbers, code in zip(
+            made.time, *degrees, made.torque, made.phase, strict=True
+        ):
+            yield (*names, *numbers, PHASES[code])

@@ -2,7 +2,8 @@
 
 Each is a frozen dataclass of its parameters with its law, `_law`: the torque of an
 angle, a velocity, the rest angle, and what the joint remembers. What that is at a time
-of a motion says `_memory`; what it is at a sample, the law's stepper.
+of a motion says `_memory`; what it is at a sample, `_sampled`, which keeps in between
+what `_kept` lists.
 """
 
 import math

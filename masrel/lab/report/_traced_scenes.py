@@ -6,7 +6,8 @@ Of any joint, also the angles of the Tardieu scale.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from functools import partial
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal
 
 from masrel._input import refuse
@@ -25,20 +26,14 @@ if TYPE_CHECKING:
 _FIGURES = "masrel.lab.report._stretch_figures:"
 
 SCENE_OUTPUTS = {
-    "residual-torque": "residual_torque_nm",
-    "work": "work_j",
-    "impulse": "impulse_nms",
+    "residual-torque": ("residual_torque_nm", "residual torque", "N·m"),
+    "work": ("work_j", "work", "J"),
+    "impulse": ("impulse_nms", "impulse", "N·m·s"),
 }
-"""What may be computed beside events and peak, and its key in the document."""
+"""What may be computed beside events and peak: key in the document, name, and unit."""
 
 SCENE_VIEWS = ("angle", "time", "catch", "schematic")
 """What a figure may show."""
-
-_LINES = {
-    "residual_torque_nm": ("residual torque", "N·m"),
-    "work_j": ("work", "J"),
-    "impulse_nms": ("impulse", "N·m·s"),
-}
 
 # Where torque may be computed: a list of the document, its key of the place, and a unit
 _PLACES = (("torque_at_s", "time_s", "s"), ("torque_at_deg", "angle_deg", "deg"))
@@ -77,15 +72,19 @@ def scene_document(scene: Scene, quantities: Quantities) -> dict[str, object]:
     """Return the events of a scene, its peak torque, and what else was requested."""
     from masrel.lab.elbow import ElbowParameters
 
-    is_elbow = isinstance(scene.joint, ElbowParameters)
+    joint, motion, kind = scene.joint, scene.motion, {}
+    if isinstance(joint, ElbowParameters):
+        found = _of_elbow(joint, motion, quantities)
+    else:
+        kind, found = {"kind": joint.kind}, _of_tone(joint, motion, quantities)
     document: dict[str, object] = {
         "model": scene.model,
-        **({} if is_elbow else {"kind": scene.joint.kind}),
+        **kind,
         "motion": scene.kind,
         "speed_deg_s": scene.speed_deg_s,
         "from_deg": scene.start_deg,
         "to_deg": scene.end_deg,
-        **(_of_elbow if is_elbow else _of_tone)(scene, quantities),
+        **found,
     }
     for key, number in document.items():
         if isinstance(number, float) and not math.isfinite(number):
@@ -96,17 +95,15 @@ def scene_document(scene: Scene, quantities: Quantities) -> dict[str, object]:
     return document
 
 
-def _of_elbow(scene: Scene, quantities: Quantities) -> dict[str, object]:
+def _of_elbow(
+    joint: "ElbowParameters", motion: "Motion", quantities: Quantities
+) -> dict[str, object]:
     from masrel.lab import elbow
 
-    (joint,), motion = _elbows([scene]), scene.motion
-    events = elbow.events(joint, motion)
-    functions = {
-        "residual-torque": elbow.residual_torque,
-        "work": elbow.work,
-        "impulse": elbow.impulse,
-    }
-    values = {name: functions[name](joint, motion) for name in quantities.outputs}
+    events, outputs = elbow.events(joint, motion), {}
+    for name in quantities.outputs:
+        number = getattr(elbow, name.replace("-", "_"))(joint, motion)
+        outputs[SCENE_OUTPUTS[name][0]] = None if math.isnan(number) else number
     return {
         "catch_angle_deg": _degrees(events.catch_angle),
         "mean_speed_deg_s": _degrees(events.mean_speed),
@@ -121,57 +118,51 @@ def _of_elbow(scene: Scene, quantities: Quantities) -> dict[str, object]:
             }
             for span in events.phases
         ],
-        **{SCENE_OUTPUTS[k]: None if math.isnan(v) else v for k, v in values.items()},
+        **outputs,
         **_torques(
             quantities,
-            lambda times: elbow.torque(joint, motion, times),
-            lambda angles: elbow.torque_at(joint, motion, angles),
+            partial(elbow.torque, joint, motion),
+            partial(elbow.torque_at, joint, motion),
         ),
     }
 
 
-def _of_tone(scene: Scene, quantities: Quantities) -> dict[str, object]:
-    if quantities.outputs:
-        raise ParameterError(f"--output: needs spastic elbows, got {scene.joint.kind}")
+def _of_tone(
+    joint: "ToneModel", motion: "Motion", quantities: Quantities
+) -> dict[str, object]:
     import numpy as np
 
     from masrel.lab.elbow import times_at, trace
 
-    joint, motion = _tone_of(scene), scene.motion
+    late = [t for t in quantities.times if not 0.0 <= t <= motion.duration]
+    refuse(
+        (quantities.outputs, f"--output: needs spastic elbows, got {joint.kind}"),
+        (
+            late,
+            "--at-s: needs times within the motion, 0 to "
+            f"{significant(motion.duration)} s, got {significant(sum(late[:1]))}",
+        ),
+    )
     events = joint.events(motion)
-    caught = [event for event in events if event.name == joint.catch_event]
+    caught = [event.angle for event in events if event.name == joint.catch_event]
     sampled = trace(joint, motion, rate_hz=_RATE_HZ)
     every = np.append(sampled.time, motion.duration)
     at_events = joint.torque(motion, [event.time for event in events])
-    phases, first = [], 0
-    for code, group in groupby(sampled.phase.tolist()):
-        end = first + len(list(group))
-        phases.append((PHASES[code], float(every[first]), float(every[end])))
-        first = end
-
-    def at_times(times: Sequence[float]) -> "NDArray[np.float64]":
-        late = [time for time in times if not 0.0 <= time <= motion.duration]
-        if late:
-            raise ParameterError(
-                "--at-s: needs times within the motion, 0 to "
-                f"{significant(motion.duration)} s, got {significant(late[0])}"
-            )
-        return joint.torque(motion, times)
-
+    begins = np.flatnonzero(np.diff(sampled.phase, prepend=-1)).tolist()
     return {
-        "catch_angle_deg": _degrees(caught[0].angle if caught else None),
+        "catch_angle_deg": _degrees(next(iter(caught), None)),
         "mean_speed_deg_s": None,
         # of every millisecond and every event
         "peak_torque_nm": float(max(*joint.torque(motion, every), *at_events)),
         "phases": [
             {
-                "name": name,
-                "start_s": start,
-                "end_s": end,
-                "start_deg": math.degrees(motion.angle(start)),
-                "end_deg": math.degrees(motion.angle(end)),
+                "name": PHASES[sampled.phase[begin]],
+                "start_s": float(every[begin]),
+                "end_s": float(every[end]),
+                "start_deg": math.degrees(motion.angle(every[begin])),
+                "end_deg": math.degrees(motion.angle(every[end])),
             }
-            for name, start, end in phases
+            for begin, end in pairwise([*begins, sampled.phase.size])
         ],
         "events": [
             {
@@ -183,7 +174,7 @@ def _of_tone(scene: Scene, quantities: Quantities) -> dict[str, object]:
         ],
         **_torques(
             quantities,
-            at_times,
+            partial(joint.torque, motion),
             lambda angles: joint.torque(motion, times_at(motion, angles)),
         ),
     }
@@ -201,27 +192,15 @@ def _torques(
 ) -> dict[str, object]:
     # the torque at each time, s, and where each angle, rad, is first reached
     requested: dict[str, object] = {}
-    if times := quantities.times:
-        torques = at_times(times).tolist()
-        rows = zip(times, torques, strict=True)
-        requested["torque_at_s"] = [{"time_s": t, "torque_nm": nm} for t, nm in rows]
-    if angles := quantities.angles:
-        torques = at_angles([math.radians(angle) for angle in angles]).tolist()
-        rows = zip(angles, torques, strict=True)
-        requested["torque_at_deg"] = [
-            {"angle_deg": angle, "torque_nm": nm} for angle, nm in rows
-        ]
+    angles = [math.radians(angle) for angle in quantities.angles]
+    for (key, place, _), at, torques in (
+        (_PLACES[0], quantities.times, at_times(quantities.times)),
+        (_PLACES[1], quantities.angles, at_angles(angles)),
+    ):
+        if at:
+            rows = zip(at, torques.tolist(), strict=True)
+            requested[key] = [{place: x, "torque_nm": torque} for x, torque in rows]
     return requested
-
-
-def _tone_of(scene: Scene) -> "ToneModel":
-    from masrel.lab.elbow.tone import ToneModel
-
-    if not isinstance(scene.joint, ToneModel):
-        raise ParameterError(
-            f"--model: needs a law with exact events, got {scene.model}"
-        )
-    return scene.joint
 
 
 def scene_text(document: dict[str, Any], title: str) -> str:
@@ -245,7 +224,7 @@ def scene_text(document: dict[str, Any], title: str) -> str:
         for event in document.get("events", ())  # of another kind of joint
     ]
     values = [("peak torque", document["peak_torque_nm"], "N·m")]
-    for key, (name, unit) in _LINES.items():
+    for key, name, unit in SCENE_OUTPUTS.values():
         if key in document:
             values.append((name, document[key], unit))
     for key, place, unit in _PLACES:
@@ -264,7 +243,7 @@ def scene_text(document: dict[str, Any], title: str) -> str:
 def scenes_text(documents: Sequence[dict[str, Any]]) -> str:
     """Return the documents of many scenes for a person, one a line."""
     keys = ["speed_deg_s", "catch_angle_deg", "mean_speed_deg_s", "peak_torque_nm"]
-    keys += [key for key in _LINES if key in documents[0]]
+    keys += [key for key, *_ in SCENE_OUTPUTS.values() if key in documents[0]]
     places = [
         f"torque_nm at {significant(row[place])} {unit}"
         for key, place, unit in _PLACES
@@ -288,9 +267,11 @@ def scenes_text(documents: Sequence[dict[str, Any]]) -> str:
     return "\n".join(aligned(rows, ["left", *numeric]))
 
 
-def check_view(scenes: Sequence[Scene], view: str) -> None:
-    """Refuse a figure that cannot be drawn, before anything is computed for it."""
-    models = _by_model(scenes)
+def scenes_content(scenes: Sequence[Scene], view: str) -> Drawn:
+    """Return what a figure of scenes shows, refusing what cannot be drawn."""
+    models: dict[str, list[Scene]] = {}
+    for scene in scenes:
+        models.setdefault(scene.model, []).append(scene)
     max_speeds = max(map(len, models.values()))
     is_large = len(models) > 4 or max_speeds > 5
     refuse(
@@ -308,23 +289,16 @@ def check_view(scenes: Sequence[Scene], view: str) -> None:
             f"--view schematic: shows one scene, got {len(scenes)}",
         ),
     )
-    for name, of_model in models.items() if view in ("catch", "schematic") else ():
-        n_caught, n = _n_caught(of_model), len(of_model)
-        refuse(
-            (
-                view == "schematic" and not n_caught,
-                "--view schematic: needs a stretch that catches",
-            ),
-            (
-                view == "catch" and n < 2,
-                f"--view catch: needs two or more speeds, got {n}",
-            ),
-            (
-                view == "catch" and n_caught < 2,
-                f"--view catch: needs two or more speeds at which {name} catches, got "
-                f"{n_caught} of {n}",
-            ),
-        )
+    if view == "catch":
+        curves = tuple(_catches(*of_model) for of_model in models.items())
+        return Drawn(_FIGURES + "catch_figure", (curves,))
+    if view == "schematic":
+        return Drawn(_FIGURES + "schematic_figure", _schematic(scenes[0]))
+    panels = tuple(
+        (name, [*map(_line, of)], [False] * len(of), [*map(_label, of)], None)
+        for name, of in models.items()
+    )
+    return Drawn(_FIGURES + "trace_figure", (panels, view))
 
 
 def _elbows(scenes: Sequence[Scene]) -> list["ElbowParameters"]:
@@ -332,38 +306,6 @@ def _elbows(scenes: Sequence[Scene]) -> list["ElbowParameters"]:
 
     joints = [scene.joint for scene in scenes]
     return [joint for joint in joints if isinstance(joint, ElbowParameters)]
-
-
-def _n_caught(scenes: Sequence[Scene]) -> int:
-    import numpy as np
-
-    from masrel.lab.elbow import evaluate
-
-    motions = [scene.motion for scene in scenes]
-    outputs = evaluate(_elbows(scenes), motions, ["catch"])
-    return int(np.isfinite(outputs.column("catch")).sum())
-
-
-def scenes_content(scenes: Sequence[Scene], view: str) -> Drawn:
-    """Return what a figure of scenes shows."""
-    models = _by_model(scenes).items()
-    if view == "catch":
-        curves = tuple(_catches(*of_model) for of_model in models)
-        return Drawn(_FIGURES + "catch_figure", (curves,))
-    if view == "schematic":
-        return Drawn(_FIGURES + "schematic_figure", _schematic(scenes[0]))
-    panels = tuple(
-        (name, [*map(_line, of)], [False] * len(of), [*map(_label, of)], None)
-        for name, of in models
-    )
-    return Drawn(_FIGURES + "trace_figure", (panels, view))
-
-
-def _by_model(scenes: Sequence[Scene]) -> dict[str, list[Scene]]:
-    models: dict[str, list[Scene]] = {}
-    for scene in scenes:
-        models.setdefault(scene.model, []).append(scene)
-    return models
 
 
 def _label(scene: Scene) -> str:
@@ -376,7 +318,7 @@ def _line(scene: Scene) -> "Outline | Trace":
 
     if isinstance(scene.joint, ElbowParameters):
         return outline(scene.joint, scene.motion)
-    return trace(_tone_of(scene), scene.motion, rate_hz=_RATE_HZ)
+    return trace(scene.joint, scene.motion, rate_hz=_RATE_HZ)
 
 
 def _schematic(
@@ -404,7 +346,15 @@ def _catches(name: str, scenes: Sequence[Scene]) -> tuple[object, ...]:
     joints, motions = _elbows(scenes), [scene.motion for scene in scenes]
     names = ("mean_speed", "catch_angle", "catch", "catch_end")
     outputs = evaluate(joints, motions, names)
-    caught = np.flatnonzero(np.isfinite(outputs.column("catch")))
+    caught, n = np.flatnonzero(np.isfinite(outputs.column("catch"))), len(scenes)
+    refuse(
+        (n < 2, f"--view catch: needs two or more speeds, got {n}"),
+        (
+            caught.size < 2,
+            f"--view catch: needs two or more speeds at which {name} catches, got "
+            f"{caught.size} of {n}",
+        ),
+    )
     caught = caught[np.argsort(outputs.column("mean_speed")[caught])]
     mean, angle, catch, end = outputs.values[caught].T
     # from the catch angle on to where the catch ends; nan where the motion ends first
