@@ -17,7 +17,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType, TracebackType
-from typing import IO, Protocol, Self, TextIO
+from typing import IO, Self, TextIO
 
 from masrel.errors import DeviceError, EmergencyStopError
 from masrel.lab.hess._clock import off_the_loop
@@ -195,8 +195,10 @@ def _wait_for_key(
     stop.press("key" if key else "terminal lost")
 
 
-class Watching(Protocol):
-    """What the control loop tells that it is alive."""
+class Watching:
+    """What the control loop tells that it is alive: nobody, unless it is a watchdog."""
+
+    # Nobody watches a device that nothing else can reach.
 
     def beat(self) -> None:
         """Tell it now, and again before its time is over."""
@@ -205,17 +207,7 @@ class Watching(Protocol):
         """Tell it that no beat follows for a while, and none is missed."""
 
 
-class NoWatchdog:
-    """Nobody watches: for a device that nothing else can reach."""
-
-    def beat(self) -> None:
-        """Tell nobody."""
-
-    def rest(self) -> None:
-        """Tell nobody."""
-
-
-class Watchdog:
+class Watchdog(Watching):
     """The process, as the control loop sees it: something to tell that it is alive."""
 
     # A context manager. The process idles the device when a `beat` is followed by

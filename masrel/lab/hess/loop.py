@@ -25,7 +25,7 @@ from masrel.lab.hess._course import Course, PresentationStatus, StretchRules
 from masrel.lab.hess._guard import ActiveGuard, Guard
 from masrel.lab.hess._recorder import Fault, Presented, Samples, as_presented
 from masrel.lab.hess._signals import VelocityEstimate, raised_cosine, speed_margin
-from masrel.lab.hess._stop import EmergencyStop, NoWatchdog, Watching
+from masrel.lab.hess._stop import EmergencyStop, Watching
 from masrel.lab.hess.controller import Controller
 from masrel.lab.hess.device import Device
 from masrel.lab.hess.limits import DeviceLimits
@@ -177,7 +177,7 @@ def run_presentation(
             course,
             samples,
             stop or EmergencyStop(),
-            watchdog or NoWatchdog(),
+            watchdog or Watching(),
         )
         # a collection could take longer than a tick
         with scheduled(clock) as facts["scheduling"], collector_off():

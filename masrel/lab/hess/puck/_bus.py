@@ -8,13 +8,15 @@ the loop's clock.
 """
 
 from types import ModuleType, TracebackType
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from masrel.errors import BusError, DeviceError, FrameError
 from masrel.lab.hess._clock import Clock
 
 if TYPE_CHECKING:
     import can  # loaded when a bus is opened
+
+    from masrel.lab.hess.puck._emulator import PuckEmulator  # which is on such a bus
 
 BITRATE = 1_000_000
 """Bits a second on a Puck's bus."""
@@ -149,19 +151,6 @@ class Frame(NamedTuple):
     is_error: bool = False
 
 
-class InProcessPeer(Protocol):
-    """Another node on a bus inside this process, served whenever the host waits."""
-
-    def next_due_ns(self) -> int | None:
-        """Return when it will act next, ns; None when it waits for a frame."""
-
-    def serve(self) -> None:
-        """Take in what was sent and do what is due by now."""
-
-    def close(self) -> None:
-        """Leave the bus, after the host."""
-
-
 class Link:
     """One end of a bus, as `connected` opens it; a context manager that leaves it.
 
@@ -171,18 +160,18 @@ class Link:
         An open bus.
     clock : Clock
         The clock of deadlines.
-    peer : InProcessPeer or None, optional
+    peer : PuckEmulator or None, optional
         An emulator in the same thread, which is served whenever this end sends or
         waits, so that a bus works on a simulated clock too, and closed with it.
 
     Attributes
     ----------
-    peer : InProcessPeer or None
+    peer : PuckEmulator or None
         That emulator.
     """
 
     def __init__(
-        self, bus: "can.BusABC", clock: Clock, *, peer: InProcessPeer | None = None
+        self, bus: "can.BusABC", clock: Clock, *, peer: "PuckEmulator | None" = None
     ) -> None:
         self._can = _python_can()
         self._bus = bus
@@ -317,7 +306,7 @@ def open_link(
     *,
     clock: Clock,
     accepted: tuple[int, ...] | None = None,
-    peer: InProcessPeer | None = None,
+    peer: "PuckEmulator | None" = None,
 ) -> Link:
     """Open one end of a bus; `accepted` identifiers are filtered in the kernel."""
     # Where no kernel filters, whoever receives looks at the identifiers: filters of

@@ -17,7 +17,7 @@ from masrel.errors import DeviceError, DeviceTimeoutError, ParameterError
 from masrel.lab.hess._clock import Clock
 from masrel.lab.hess._guard import Guard
 from masrel.lab.hess._signals import VelocityEstimate
-from masrel.lab.hess._stop import EmergencyStop, NoWatchdog, Watching
+from masrel.lab.hess._stop import EmergencyStop, Watching
 from masrel.lab.hess.device import Device
 from masrel.lab.hess.limits import DeviceLimits
 from masrel.lab.hess.puck._bus import MAX_NODE, Link
@@ -201,7 +201,7 @@ def zero(link: Link, clock: Clock, options: PuckOptions, *, angle: float) -> int
     DeviceError
         If the puck does not answer, is not supported, or does not take a setting.
     """
-    return _awake(link, clock, options).set_position(angle)
+    return AwakePuck(link, clock, options).set_position(angle)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -249,7 +249,7 @@ def check(link: Link, clock: Clock, options: PuckOptions) -> tuple[Check, ...]:
         If the bus fails, or the puck does not answer, is not supported, does not take a
         setting, or cannot be idled again.
     """
-    puck = _awake(link, clock, options)
+    puck = AwakePuck(link, clock, options)
     node, transmission = puck.node, puck.transmission
     counts, took_s, n_lost = _request_positions(puck, options.patience_s)
     checks = [
@@ -275,22 +275,15 @@ def check(link: Link, clock: Clock, options: PuckOptions) -> tuple[Check, ...]:
     return (*checks, errors)
 
 
-def _awake(link: Link, clock: Clock, options: PuckOptions) -> AwakePuck:
-    node = PuckNode(link, clock, options.puck)
-    identity = identify(node)
-    return AwakePuck(node, identity, identity.table(options.properties), options)
-
-
 def _request_positions(
     puck: AwakePuck, patience_s: float
 ) -> tuple[list[int], list[float], int]:
     # -> counts, how long each took s, how many stayed without an answer
-    node, number = puck.node, puck.table.number("P")
-    counts, took_s = [], []
+    node, counts, took_s = puck.node, [], []
     for _ in range(_N_REQUESTS):
         request_ns = node.now_ns()
         with suppress(DeviceTimeoutError):
-            counts.append(node.position(number, patience_s=patience_s)[1])
+            counts.append(node.position(puck.position_id, patience_s=patience_s)[1])
             took_s.append((node.now_ns() - request_ns) * 1e-9)
         node.wait(max(0.0, 0.001 - (node.now_ns() - request_ns) * 1e-9))
     return counts, took_s, _N_REQUESTS - len(counts)
@@ -424,7 +417,7 @@ def steady_runs(
         wrong way, is held or blocked, or is not between 30 and 125 deg to begin with.
         Whoever opened the device closes it: then it is idle.
     """
-    watching = watchdog or NoWatchdog()
+    watching = watchdog or Watching()
     arm = _TurningArm(device, clock, watching, stop or EmergencyStop())
     arm.check_direction()
     away = 1.0 if arm.is_low else -1.0

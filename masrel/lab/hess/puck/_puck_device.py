@@ -9,7 +9,7 @@ import atexit
 import itertools
 import math
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack
 from dataclasses import dataclass
 
 from masrel.errors import (
@@ -56,6 +56,8 @@ from masrel.lab.hess.puck._puck_options import (
 
 # From a request to the sample of the encoder, as one of the public drivers has it
 _SAMPLING_NS = 75_000
+
+_POSITION = -1  # stands for its position among the numbers of other properties
 
 # What every puck answers; requested for the order of the answers, not for the values
 _MARKERS = (VERSION, ROLE, SERIAL_NUMBER, ID, STATUS)
@@ -111,16 +113,12 @@ class PuckNode:
         """Request a property, wait for the reply, and return its value."""
         self.receive_waiting()
         self.values.pop(number, None)
-        deadline_ns = self.request(number) + round(patience_s * 1e9)
-        self._n_overdue = 0
-        while number not in self.values:
-            frame = self._next_frame(deadline_ns)
-            if frame is None:
-                raise DeviceTimeoutError(
-                    f"puck {self.puck}: no answer for property {number} within "
-                    f"{patience_s * 1e3:g} ms"
-                )
-            self._sort(frame)
+        request_ns = self.request(number)
+        if not self._receive_until(number, request_ns + round(patience_s * 1e9)):
+            raise DeviceTimeoutError(
+                f"puck {self.puck}: no answer for property {number} within "
+                f"{patience_s * 1e3:g} ms"
+            )
         return self.values.pop(number)
 
     def position(self, number: int, *, patience_s: float) -> tuple[int, int]:
@@ -131,32 +129,32 @@ class PuckNode:
         # one each time: a puck answers requests in their order, so that the last
         # position before that reply is the one that was requested now.
         self.receive_waiting()
+        self.values.pop(_POSITION, None)
         request_ns = self.request(number)
-        marker = next(self._markers) if self._in_doubt else None
-        if marker is not None:
-            self.values.pop(marker, None)
-            self.request(marker)
-        counts = self._marked_position(request_ns + round(patience_s * 1e9), marker)
-        if counts is None:
+        awaited = _POSITION
+        if self._in_doubt:
+            awaited = next(self._markers)
+            self.values.pop(awaited, None)
+            self.request(awaited)
+        deadline_ns = request_ns + round(patience_s * 1e9)
+        # After the awaited reply nothing earlier can come any more.
+        self._in_doubt = not self._receive_until(awaited, deadline_ns)
+        counts = self.values.pop(_POSITION, None)
+        if self._in_doubt or counts is None:
             raise DeviceTimeoutError(
                 f"puck {self.puck}: no position within {patience_s * 1e3:g} ms"
             )
         return min(request_ns + _SAMPLING_NS, self._clock.now_ns()), counts
 
-    def _marked_position(self, deadline_ns: int, marker: int | None) -> int | None:
-        # The first position that comes; with a marker, the last before its reply
-        last: int | None = None
+    def _receive_until(self, awaited: int, deadline_ns: int) -> bool:
+        # Whether the reply came in time
         self._n_overdue = 0
-        while last is None if marker is None else marker not in self.values:
+        while awaited not in self.values:
             frame = self._next_frame(deadline_ns)
             if frame is None:
-                self._in_doubt = True
-                return None
-            counts = self._sort(frame)
-            if counts is not None:
-                last = counts
-        self._in_doubt = False  # nothing earlier can come any more
-        return last
+                return False
+            self._sort(frame)
+        return True
 
     def _next_frame(self, deadline_ns: int) -> Frame | None:
         # What waits is taken after the deadline too, because this end may be late;
@@ -176,18 +174,16 @@ class PuckNode:
             self._sort(frame)
         raise BusError(f"puck {self.puck}: the bus is flooded with frames", "flooded")
 
-    def _sort(self, frame: Frame) -> int | None:
-        # The position that a frame holds; keeps note of all else
+    def _sort(self, frame: Frame) -> None:
         if frame.is_error:
             self._count_error(frame.identifier)
         elif frame.identifier == self._position_reply:
-            return decode_position(frame.data)
+            self.values[_POSITION] = decode_position(frame.data)
         elif frame.identifier == self._property_reply:
             number, value = decode_value(frame.data)
             self.values[number] = value
         else:
             self.n_foreign += 1
-        return None
 
     def _count_error(self, error_class: int) -> None:
         if error_class & BUS_RESTARTED:
@@ -254,20 +250,26 @@ def identify(node: PuckNode, *, patience_s: float = 0.05) -> Identity:
 class AwakePuck:
     """A puck that is awake, idle and configured for the driver."""
 
-    # Making one wakes the puck if it sleeps, idles it, and sets what the driver needs.
+    # Making one wakes the puck if it sleeps, unless that is refused, idles it, and sets
+    # what the driver needs.
 
     def __init__(
-        self,
-        node: PuckNode,
-        identity: Identity,
-        table: PropertyTable,
-        options: PuckOptions,
+        self, link: Link, clock: Clock, options: PuckOptions, *, wakes: bool = True
     ) -> None:
-        self.node = node
-        self.table = table  # numbers of its properties
+        self.node = node = PuckNode(link, clock, options.puck)
+        identity = identify(node)
+        self.table = table = identity.table(options.properties)
+        self.torque_id, self.mode_id = table.number("T"), table.number("MODE")
+        self.position_id = table.number("P")
         # Whether it is woken now, and so does not know where the arm is
         self.was_asleep = not identity.is_awake
         if self.was_asleep:
+            if not wakes:
+                raise DeviceError(
+                    f"puck {node.puck}: has been switched on and does not know where "
+                    "the arm is; hold the arm at a known angle and run masrel device "
+                    "zero, or set angle_after_reset"
+                )
             self._wake()
         # It may still hold the torque of a driver that was killed.
         self._set("T", 0)
@@ -325,7 +327,7 @@ class AwakePuck:
 
     def set_position(self, angle: float) -> int:
         """Set the position of an idle puck, and return the count that it reports."""
-        node, table = self.node, self.table
+        node = self.node
         if not 0.0 <= angle <= math.pi:
             raise ParameterError(f"angle: needs 0 to 180 degrees, got {angle} rad")
         mode = self._get("MODE")
@@ -334,9 +336,9 @@ class AwakePuck:
                 f"puck {node.puck}: needs MODE {IDLE} to be zeroed, is {mode}"
             )
         target = self.transmission.counts(angle)
-        node.set(table.settable("P"), target)
+        node.set(self.table.settable("P"), target)
         node.wait(_SETTING_TIME_S)
-        _, counts = node.position(table.number("P"), patience_s=0.05)
+        _, counts = node.position(self.position_id, patience_s=0.05)
         if abs(counts - target) > _COUNT_TOLERANCE:
             raise DeviceError(
                 f"puck {node.puck}: needs a position of {target} counts after zeroing, "
@@ -369,8 +371,7 @@ class AwakePuck:
 
     def release(self) -> None:
         """Zero the torque and idle it, until it confirms."""
-        table = self.table
-        release(self.node, torque_id=table.number("T"), mode_id=table.number("MODE"))
+        release(self.node, torque_id=self.torque_id, mode_id=self.mode_id)
 
 
 def release(node: PuckNode, *, torque_id: int, mode_id: int) -> None:
@@ -441,48 +442,34 @@ class PuckDevice(Device):
         self._n_lost = 0
 
     def _start(self) -> None:
-        setup, options = self._setup, self._options
-        self._link = connected(
-            options, clock=setup.clock, hand=setup.hand, range_end=setup.range_end
+        setup = self._setup
+        link = connected(
+            self._options, clock=setup.clock, hand=setup.hand, range_end=setup.range_end
         )
-        self.emulator = self._link.peer
-        try:
+        self.emulator = link.peer
+        with ExitStack() as failing:  # then the bus is left
+            self._link = failing.enter_context(link)
             self._bring_up()
-        except BaseException:
-            self._abandon()
-            raise
-
-    def _abandon(self) -> None:
-        with suppress(BusError):  # what is on its way to the caller matters more
-            self._link.close()
+            failing.pop_all()
 
     def _bring_up(self) -> None:
-        options = self._options
-        self._node = node = PuckNode(self._link, self._setup.clock, options.puck)
-        self.identity = identity = identify(node)
-        table = identity.table(options.properties)
-        if not identity.is_awake and options.angle_after_reset is None:
-            raise DeviceError(
-                f"puck {node.puck}: has been switched on and does not know where "
-                "the arm is; hold the arm at a known angle and run masrel device "
-                "zero, or set angle_after_reset"
-            )
-        self._puck = puck = AwakePuck(node, identity, table, options)
-        self.transmission = puck.transmission
-        if puck.was_asleep and options.angle_after_reset is not None:
-            puck.set_position(options.angle_after_reset)
-        self._position_id = table.number("P")
-        self._torque_id, self._mode_id = table.number("T"), table.number("MODE")
+        angle = self._options.angle_after_reset
+        self._puck = puck = AwakePuck(
+            self._link, self._setup.clock, self._options, wakes=angle is not None
+        )
+        self._node = puck.node
+        if puck.was_asleep and angle is not None:
+            puck.set_position(angle)
         self._check_angle()
         try:
-            puck.activate(checks_torque=options.checks_torque)
+            puck.activate(checks_torque=self._options.checks_torque)
         except BaseException:
             puck.release()
             raise
 
     def _check_angle(self) -> None:
-        _, counts = self._node.position(self._position_id, patience_s=0.05)
-        angle = self.transmission.angle(counts)
+        _, counts = self._node.position(self._puck.position_id, patience_s=0.05)
+        angle = self._puck.transmission.angle(counts)
         limits = DeviceLimits()
         if not limits.lowest_angle <= angle <= limits.highest_angle:
             raise DeviceError(
@@ -491,28 +478,28 @@ class PuckDevice(Device):
             )
 
     def _read(self) -> Reading:
+        puck, values = self._puck, self._node.values
         time_ns, counts = self._node.position(
-            self._position_id, patience_s=self._options.patience_s
+            puck.position_id, patience_s=self._options.patience_s
         )
-        values = self._node.values
         if values:
-            if self._mode_id in values:
-                self._check_mode(values[self._mode_id])
-            if self._torque_id in values:
-                self._check_torque(values[self._torque_id])
+            if puck.mode_id in values:
+                self._check_mode(values[puck.mode_id])
+            if puck.torque_id in values:
+                self._check_torque(values[puck.torque_id])
             values.clear()
         self._check_answers()
-        return Reading(time_ns, self.transmission.angle(counts))
+        return Reading(time_ns, puck.transmission.angle(counts))
 
     def _send(self, torque_nm: float) -> None:
-        units = self.transmission.units(torque_nm)
+        units = self._puck.transmission.units(torque_nm)
         if abs(units) > self._puck.max_units:
             raise LimitExceededError(
                 f"torque: needs at most {self._options.largest_torque:g} N·m on this "
                 f"puck, got {torque_nm:.3f} N·m",
                 "torque",
             )
-        self._node.set(self._torque_id, units)
+        self._node.set(self._puck.torque_id, units)
         self._n_left -= 1
         if self._n_left == 0:
             self._ask(units)
@@ -521,15 +508,17 @@ class PuckDevice(Device):
         self._n_left = self._options.poll_ticks
         self._n_unanswered += 1  # until the reply comes
         if self._next_is_mode or not self._options.checks_torque:
-            self._node.request(self._mode_id)
+            self._node.request(self._puck.mode_id)
         else:
             self._asked_units = units
-            self._node.request(self._torque_id)
+            self._node.request(self._puck.torque_id)
         self._next_is_mode = not self._next_is_mode
 
     def _check(self) -> None:
         try:
-            mode = self._node.get(self._mode_id, patience_s=self._options.patience_s)
+            mode = self._node.get(
+                self._puck.mode_id, patience_s=self._options.patience_s
+            )
         except DeviceTimeoutError:
             self._n_unanswered += 1
             self._check_answers()
@@ -563,19 +552,15 @@ class PuckDevice(Device):
             )
 
     def _stop(self) -> None:
-        try:
+        with self._link:  # which is left whatever comes
             self._puck.release()
-        except BaseException:
-            self._abandon()
-            raise
-        self._link.close()
 
     def idle_command(self) -> IdleCommand | None:
         """Return how another process can idle the puck, once it is open."""
         options = self._options
         if options.interface not in _SHARED_INTERFACES:
             return None
-        numbers = (options.puck, self._torque_id, self._mode_id)
+        numbers = (options.puck, self._puck.torque_id, self._puck.mode_id)
         return IdleCommand(
             "masrel.lab.hess.puck._puck_device",
             (options.interface, options.channel, *map(str, numbers)),

