@@ -116,24 +116,6 @@ def _p_value(estimate: Estimate) -> tuple[float, str | None]:
         return p_value(estimate), estimate.reason
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Change:
-    """One value that differs; None where an analysis does not have it."""
-
-    of: str  # what it is of, such as a line of the plan
-    field: str
-    old: str | float | None
-    new: str | float | None
-
-    @property
-    def difference(self) -> float | None:
-        """The new number less the old one, if both are numbers."""
-        old, new = self.old, self.new
-        if isinstance(old, bool | str) or isinstance(new, bool | str):
-            return None
-        return None if old is None or new is None else new - old
-
-
 def read_old_analysis(place: Path, study: str, *, option: str) -> dict[str, Any]:
     """Read the analysis of a report's folder, of a study, or of a file of its own."""
     within = (place / "analysis.json", place / "report" / "analysis.json")
@@ -166,22 +148,36 @@ def read_old_analysis(place: Path, study: str, *, option: str) -> dict[str, Any]
 
 def changes_between(
     old: Mapping[str, Any], new: Mapping[str, Any]
-) -> tuple[Change, ...]:
-    """Return every value that two analyses do not have in common."""
+) -> list[dict[str, Any]]:
+    """Return every value that two analyses do not have in common, and by how much."""
     before, after = dict(_values(old)), dict(_values(new))
-    places = [*after, *(place for place in before if place not in after)]
-    changes = (
-        Change(
-            of=" ".join(p for p in place[:-1] if p not in _WITHIN).replace("_", " "),
-            field=place[-1].replace("_", " "),
-            old=before.get(place),
-            new=after.get(place),
+    places = (p for p in {**after, **before} if before.get(p) != after.get(p))
+    changes = dict.fromkeys(  # once where an estimate repeats what its line says
+        (
+            " ".join(p for p in place[:-1] if p not in _WITHIN).replace("_", " "),
+            place[-1].replace("_", " "),
+            before.get(place),
+            after.get(place),
         )
         for place in places
-        if before.get(place) != after.get(place)
     )
-    # once where an estimate repeats what its line of the plan says
-    return tuple(dict.fromkeys(changes))
+    return [
+        {
+            "of": of,
+            "field": field,
+            "old": one,
+            "new": other,
+            "difference": _difference(one, other),
+        }
+        for of, field, one, other in changes
+    ]
+
+
+def _difference(old: str | float | None, new: str | float | None) -> float | None:
+    # the new number less the old one, if both are numbers
+    if isinstance(old, bool | str | None) or isinstance(new, bool | str | None):
+        return None
+    return new - old
 
 
 def changed_inputs(old: Mapping[str, Any], new: Mapping[str, Any]) -> tuple[str, ...]:

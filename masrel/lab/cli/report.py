@@ -1,10 +1,10 @@
 """``masrel report``: write the report of a study."""
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -29,15 +29,9 @@ from masrel.lab.report._report_folder import (
     NOTES,
     NUMBERS,
     Build,
-    changed_files,
     replace_report,
-    stale_assets,
-    stale_pages,
+    report_changes,
 )
-
-if TYPE_CHECKING:
-    from masrel.lab.analysis._comparison import Change
-    from masrel.tables._tables import Table
 
 FORMATS = ("html", "markdown", "latex", "docx")
 _LONGEST = 40  # letters of a text in a cell
@@ -74,45 +68,38 @@ class _CompareOptions:
     ) -> dict[str, object]:
         """Return what has changed as a document, and show it unless JSON is printed."""
         from masrel.lab.analysis._comparison import changed_inputs, changes_between
-        from masrel.tables._tables import as_text
+        from masrel.tables._tables import Column, as_text, table_of
 
         changes, inputs = changes_between(old, new), changed_inputs(old, new)
         if shows and changes:
-            is_simulated = bool(old.get("simulated") or new.get("simulated"))
-            click.echo(as_text(self._table(changes, inputs, is_simulated)))
+            table = table_of(
+                "changes",
+                f"What has changed since {self.against}",
+                (
+                    Column(key="of", heading="Of", align="left"),
+                    Column(key="field", heading="What", align="left"),
+                    Column(key="old", heading="Before", digits=4),
+                    Column(key="new", heading="Now", digits=4),
+                    Column(key="difference", heading="Difference", digits=4),
+                ),
+                [
+                    {**each, "old": _short(each["old"]), "new": _short(each["new"])}
+                    for each in changes
+                ],
+                in_units=tuple(range(len(changes))),
+                notes=inputs,
+                data="simulated" * bool(old.get("simulated") or new.get("simulated")),
+            )
+            click.echo(as_text(table))
         elif shows:
             click.echo(
                 "\n".join((f"no number has changed since {self.against}", *inputs))
             )
         return {
             "against": str(self.against),
-            "changes": [{**asdict(c), "difference": c.difference} for c in changes],
+            "changes": changes,
             "inputs": list(inputs),
         }
-
-    def _table(
-        self, changes: "Sequence[Change]", inputs: Sequence[str], is_simulated: bool
-    ) -> "Table":
-        from masrel.tables._tables import Column, Table
-
-        return Table(
-            name="changes",
-            caption=f"What has changed since {self.against}",
-            columns=(
-                Column(key="of", heading="Of", align="left"),
-                Column(key="field", heading="What", align="left"),
-                Column(key="old", heading="Before", digits=4),
-                Column(key="new", heading="Now", digits=4),
-                Column(key="difference", heading="Difference", digits=4),
-            ),
-            rows=tuple(
-                (c.of, c.field, _short(c.old), _short(c.new), c.difference)
-                for c in changes
-            ),
-            in_units=tuple(range(len(changes))),
-            notes=tuple(inputs),
-            data="simulated" if is_simulated else "",
-        )
 
 
 def _short(value: str | float | None) -> str | float | None:
@@ -338,9 +325,11 @@ def _made(
 
 
 def _changes(files: Mapping[str, bytes], folder: Path) -> list[str]:
-    places = (folder / name for name in changed_files(folder, files))
+    changed, stale = report_changes(folder, files)
     return [
-        *(f"{p}: would {'change' if p.exists() else 'be new'}" for p in places),
-        *(f"{path}: would go" for path in stale_assets(folder, files)),
-        *(f"{path}: would go" for path in stale_pages(folder, files)),
+        *(
+            f"{path}: would {'change' if path.exists() else 'be new'}"
+            for path in (folder / name for name in changed)
+        ),
+        *(f"{path}: would go" for path in stale),
     ]

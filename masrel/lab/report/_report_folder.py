@@ -10,12 +10,13 @@ code: a note in a folder of the study has their hash. Nothing heavy is loaded fo
 """
 
 import contextlib
+import glob
 import hashlib
 import json
 import os
 import re
 import sys
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,6 +40,7 @@ NUMBERS = "analysis.json"
 
 _N_HEX = 16  # of a hash in a name
 _ASSET_FOLDERS = ("tables", "figures")
+_PAGES = ("report.html", "report.md", "report.tex", "report.docx")
 _ASSET = re.compile(r"(?:tables|figures)/[\w.-]+-([0-9a-f]{16})\.(?:csv|png|svg)")
 
 
@@ -76,14 +78,17 @@ def replace_report(folder: Path, files: Mapping[str, bytes]) -> None:
         if "/" not in name:
             refuse_record(folder / name)
     with _alone(folder):
-        stale = [*stale_assets(folder, files), *stale_pages(folder, files)]
-        new = {folder / place: files[place] for place in changed_files(folder, files)}
+        changed, stale = report_changes(folder, files)
+        new = {folder / place: files[place] for place in changed}
         assets = {path: data for path, data in new.items() if path.parent != folder}
         write_files(assets, within=folder)
         for path, data in new.items():  # the pages, and the manifest last
             if path not in assets:
                 write_files({path: data}, within=folder)
-        _remove(stale)
+        for path in stale:
+            path.unlink()
+        for parent in dict.fromkeys(path.parent for path in stale):
+            sync_folder(parent)
 
 
 @contextmanager
@@ -101,36 +106,21 @@ def _alone(folder: Path) -> Iterator[None]:
         yield
 
 
-def _remove(paths: Sequence[Path]) -> None:
-    for path in paths:
-        path.unlink()
-    for folder in dict.fromkeys(path.parent for path in paths):
-        sync_folder(folder)
-
-
-def changed_files(folder: Path, files: Mapping[str, bytes]) -> list[str]:
-    """Return those files of a report that are not in a folder as they should be."""
-    return [p for p, data in files.items() if not _is_there(folder / p, data)]
+def report_changes(
+    folder: Path, files: Mapping[str, bytes]
+) -> tuple[list[str], list[Path]]:
+    """Return files that a folder lacks, and those in it of a report before."""
+    hashes = ((place, _hash(data)) for place, data in files.items())
+    changed = [place for place, digest in hashes if _differs(folder / place, digest)]
+    return changed, [*_stale_files(folder, files)]
 
 
 def _hash(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def _is_there(path: Path, data: bytes) -> bool:
-    return not path.is_symlink() and file_hash(str(path)) == _hash(data)
-
-
-def stale_pages(folder: Path, named: Collection[str]) -> Iterator[Path]:
-    """Yield pages of the last report in a folder that this one does not have."""
-    # Only if nobody has written in them since: the manifest has their hashes.
-    hashes = _hashes_in(folder)
-    for name in ("report.html", "report.md", "report.tex", "report.docx"):
-        page = folder / name
-        if name in named or name not in hashes or page.is_symlink():
-            continue
-        if hashes[name] == file_hash(str(page)):
-            yield page
+def _differs(path: Path, digest: str) -> bool:
+    return path.is_symlink() or file_hash(str(path)) != digest
 
 
 def _hashes_in(folder: Path) -> dict[str, str]:
@@ -144,21 +134,21 @@ def _hashes_in(folder: Path) -> dict[str, str]:
     return {name: digest for name, digest in pairs if isinstance(digest, str)}
 
 
-def stale_assets(folder: Path, named: Collection[str]) -> Iterator[Path]:
-    """Yield tables and figures of a folder that its report does not name."""
-    # Only what a report wrote: its name holds its hash.
+def _stale_files(folder: Path, named: Collection[str]) -> Iterator[Path]:
+    # tables, figures and pages of a report before, which this one does not name; only
+    # if nobody has written in them since: a name, or the manifest, has their hash
     for name in _ASSET_FOLDERS:
-        inside = folder / name
-        if inside.is_symlink() or not inside.is_dir():
-            continue
-        for path in sorted(inside.iterdir()):
+        inside = () if (folder / name).is_symlink() else (folder / name).glob("*")
+        for path in sorted(inside):
             place = f"{name}/{path.name}"
             asset = _ASSET.fullmatch(place)
             if asset is None or place in named or path.is_symlink():
                 continue
-            digest = file_hash(str(path))
-            if digest is not None and digest.startswith(asset[1]):
+            if (file_hash(str(path)) or "").startswith(asset[1]):
                 yield path
+    for name, digest in _hashes_in(folder).items():
+        if name in _PAGES and name not in named and not _differs(folder / name, digest):
+            yield folder / name
 
 
 def file_hash(path: str) -> str | None:
@@ -202,7 +192,7 @@ class Build:
         call = [os.path.abspath(self.study), os.environ.get("MASREL_FONT")]
         digest = hashlib.sha256(json.dumps([call, self.options, sys.version]).encode())
         outputs = tuple(map(os.path.abspath, (self.folder, self.notes)))
-        files = [*_files_below(self.study, outputs), *_sources(_PACKAGE)]
+        files = [*_files_below(self.study, outputs), *_sources()]
         for path in (*files, *filter(None, [self.ratings_file])):
             digest.update(f"{path}\0{file_hash(str(path))}\n".encode())
         digest.update(json.dumps(_libraries()).encode())
@@ -238,31 +228,21 @@ class Build:
         return _hash(made_from.encode() + text).encode()
 
 
-def _files_below(folder: Path, but: Collection[str], depth: int = _DEPTH) -> list[str]:
+def _files_below(folder: Path, but: Collection[str]) -> Iterator[str]:
     # hidden ones are none of a study's, but for its key
-    try:
-        entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
-    except OSError:
-        return []
-    paths = []
-    for entry in entries:
-        is_hidden = entry.name.startswith(".") and entry.name != ".key"
-        if is_hidden or os.path.abspath(entry.path) in but:
-            continue
-        if not entry.is_dir():
-            paths.append(entry.path)
-        elif depth:
-            paths += [entry.path, *_files_below(Path(entry.path), but, depth - 1)]
-    return paths
+    patterns = [".key", ".key/*", *("*/" * depth + "*" for depth in range(_DEPTH + 1))]
+    names = (name for of in patterns for name in glob.iglob(of, root_dir=folder))
+    for path in (os.path.join(folder, name) for name in sorted(names)):
+        within = f"{os.path.abspath(path)}{os.sep}"
+        if not any(within.startswith(f"{output}{os.sep}") for output in but):
+            yield path
 
 
-def _sources(folder: str) -> Iterator[str]:
+def _sources() -> Iterator[str]:
     # every file of masrel: who edits its code has no other version
-    for entry in sorted(os.scandir(folder), key=lambda entry: entry.name):
-        if entry.name.endswith(_SOURCES):
-            yield entry.path
-        elif entry.name != "__pycache__" and entry.is_dir():
-            yield from _sources(entry.path)
+    for name in sorted(glob.iglob("**", root_dir=_PACKAGE, recursive=True)):
+        if name.endswith(_SOURCES):
+            yield os.path.join(_PACKAGE, name)
 
 
 def _libraries() -> list[str]:
@@ -281,7 +261,5 @@ def _is_whole(folder: Path, manifest: str) -> bool:
     if file_hash(str(folder / MANIFEST)) != manifest:
         return False
     hashes = _hashes_in(folder)
-    return not any(
-        os.path.islink(folder / name) or file_hash(str(folder / name)) != digest
-        for name, digest in hashes.items()
-    ) and not any(stale_assets(folder, hashes))
+    differ = (_differs(folder / name, digest) for name, digest in hashes.items())
+    return not any(differ) and not any(_stale_files(folder, hashes))
