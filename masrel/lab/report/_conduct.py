@@ -156,46 +156,42 @@ def conduct_section(material: Material) -> Iterator[Content]:
         )
 
 
-def _analysed(material: Material, session: str | None = None) -> set[str]:
-    # raters with a grade that is analysed
+def _flow(
+    material: Material, conduct: StudyConduct, session: str | None = None
+) -> dict[str, list[str]]:
+    # the raters of each step, of a session or of the whole study
+    stages: dict[str, set[str]] = {rater.rater: set() for rater in conduct.raters}
+    for each in conduct.sessions:
+        if session in (None, each.session):
+            stages[each.rater].add(each.stage)
+    raters = [rater for rater in conduct.raters if stages[rater.rater]]
     graded = {
         row.rater
         for row in material.ratings.rows
         if row.grade is not None and session in (None, row.session)
     }
-    return graded - set(material.analysis.excluded)
+    return {
+        "planned": [r.rater for r in raters],
+        "begun": [r.rater for r in raters if stages[r.rater] & {"begun", "complete"}],
+        "complete": [r.rater for r in raters if stages[r.rater] == {"complete"}],
+        "withdrawn": [r.rater for r in raters if r.status == "withdrawn"],
+        "excluded": [r.rater for r in raters if r.status == "excluded"],
+        "late": [r.rater for r in raters if r.is_late],
+        "analysed": [*graded - set(material.analysis.excluded)],
+    }
 
 
 def _flow_table(material: Material, conduct: StudyConduct) -> Table:
-    rows: list[tuple[Value, ...]] = []
-    for session in (*(s.id for s in material.protocol.sessions), None):
-        stages: dict[str, set[str]] = {}
-        for each in conduct.sessions:
-            if session in (None, each.session):
-                stages.setdefault(each.rater, set()).add(each.stage)
-        of_session = [rater for rater in conduct.raters if rater.rater in stages]
-        status = Counter(rater.status for rater in of_session)
-        rows.append(
-            (
-                session or "study",
-                len(stages),
-                sum(bool(s & {"begun", "complete"}) for s in stages.values()),
-                sum(s == {"complete"} for s in stages.values()),
-                status["withdrawn"],
-                status["excluded"],
-                sum(rater.is_late for rater in of_session),
-                len(_analysed(material, session)),
-            )
-        )
-    keys = ("planned", "begun", "complete", "withdrawn", "excluded", "late", "analysed")
+    sessions = [session.id for session in material.protocol.sessions]
+    flows = [(of or "study", _flow(material, conduct, of)) for of in (*sessions, None)]
     return Table(
         name="rater_flow",
         caption="Raters, from planned to analysed",
         columns=(
             Column(key="session", heading="Session", align="left"),
-            *(Column(key=key, heading=key.capitalize()) for key in keys),
+            *(Column(key=key, heading=key.capitalize()) for key in flows[0][1]),
         ),
-        rows=tuple(rows),
+        rows=tuple((name, *map(len, flow.values())) for name, flow in flows),
         notes=(
             "study: complete in all sessions. Late: joined after the site's first draw "
             "of schedules. Analysed: with a grade, not excluded.",
@@ -205,33 +201,25 @@ def _flow_table(material: Material, conduct: StudyConduct) -> Table:
 
 
 def _flow_figure(material: Material, conduct: StudyConduct) -> Drawing:
-    status = {rater.rater: rater.status for rater in conduct.raters}
-    stages: dict[str, set[str]] = {rater: set() for rater in status}
-    for each in conduct.sessions:
-        stages[each.rater].add(each.stage)
-    begun = [r for r, s in stages.items() if s & {"begun", "complete"}]
-    complete = [r for r, s in stages.items() if s == {"complete"}]
-    left = [r for r in status if r not in complete and status[r] == "withdrawn"]
-    late = [rater.rater for rater in conduct.raters if rater.is_late]
+    flow = _flow(material, conduct)
+    planned, begun, complete = (flow[key] for key in ("planned", "begun", "complete"))
+    left = [r for r in flow["withdrawn"] if r not in complete]
     # how many came so far, and what became of the others
-    groups: dict[str, tuple[int, dict[str, Collection[str]]]] = {
-        "Planned": (len(status), {"Late": late}),
-        "Begun": (len(begun), {"Not begun": [r for r in status if r not in begun]}),
-        "Complete": (
-            len(complete),
-            {
-                "Withdrawn": left,
-                "Not complete": [r for r in begun if r not in (*complete, *left)],
-            },
-        ),
-        "Analysed": (
-            len(_analysed(material)),
-            {"Excluded": material.analysis.excluded},
-        ),
+    groups: dict[str, dict[str, Sequence[str]]] = {
+        "planned": {"Late": flow["late"]},
+        "begun": {"Not begun": [r for r in planned if r not in begun]},
+        "complete": {
+            "Withdrawn": left,
+            "Not complete": [r for r in begun if r not in (*complete, *left)],
+        },
+        "analysed": {"Excluded": material.analysis.excluded},
     }
     steps = tuple(
-        (f"{label}: {n}", [f"{k}: {len(r)} ({listed(r)})" for k, r in of.items() if r])
-        for label, (n, of) in groups.items()
+        (
+            f"{key.capitalize()}: {len(flow[key])}",
+            [f"{k}: {len(r)} ({listed(r)})" for k, r in of.items() if r],
+        )
+        for key, of in groups.items()
     )
     shown = "; ".join(", ".join((label, *others)) for label, others in steps)
     return Drawing(
@@ -245,7 +233,7 @@ def _flow_figure(material: Material, conduct: StudyConduct) -> Drawing:
 
 def _characteristics(material: Material, conduct: StudyConduct) -> Iterator[Table]:
     # of the raters who are analysed, in the fields that may be shown
-    analysed = _analysed(material)
+    analysed = _flow(material, conduct)["analysed"]
     raters = [rater for rater in conduct.raters if rater.rater in analysed]
     numbers: list[tuple[Value, ...]] = []
     counts: list[tuple[Value, ...]] = []

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+from masrel.lab.analysis._results import as_plain
 from masrel.lab.elbow._model_file import ALL_QUANTITIES, Quantity
 from masrel.lab.elbow.identification import (
     ComparedFit,
@@ -171,22 +172,24 @@ def comparison_document(compared: Sequence[ComparedFit]) -> dict[str, object]:
     if not compared:
         return {}
     return {
-        "comparison": [
-            {
-                "fitted": list(each.fitted),
-                "error_nm": _finite(each.error),
-                "worse_nm2": _finite(each.worse),
-                "worse_se_nm2": _finite(each.worse_se),
-                "chosen": each.is_chosen,
-                "verdict": each.fit.lack_of_fit.verdict if each.fit else None,
-                "reason": each.reason,
-                "estimates": [
-                    _estimate(e, ALL_QUANTITIES[e.name])
-                    for e in (each.fit.estimates if each.fit else ())
-                ],
-            }
-            for each in compared
-        ]
+        "comparison": as_plain(
+            [
+                {
+                    "fitted": list(each.fitted),
+                    "error_nm": each.error,
+                    "worse_nm2": each.worse,
+                    "worse_se_nm2": each.worse_se,
+                    "chosen": each.is_chosen,
+                    "verdict": each.fit.lack_of_fit.verdict if each.fit else None,
+                    "reason": each.reason,
+                    "estimates": [
+                        _estimate(e, ALL_QUANTITIES[e.name])
+                        for e in (each.fit.estimates if each.fit else ())
+                    ],
+                }
+                for each in compared
+            ]
+        )
     }
 
 
@@ -213,17 +216,22 @@ def _row(
 
 def fit_document(fit: ElbowFit | FrictionFit) -> dict[str, object]:
     """Return a fit as plain values for JSON, units in the keys, ``nan`` as None."""
-    if isinstance(fit, FrictionFit):
-        return _friction_document(fit)
+    document: dict[str, object] = as_plain(
+        _joint_values(fit) if isinstance(fit, ElbowFit) else _friction_values(fit)
+    )
+    return document
+
+
+def _joint_values(fit: ElbowFit) -> dict[str, object]:
     return {
         "simulated": fit.simulated,
         "level": fit.level,
-        "relative_error": _finite(fit.relative_error),
+        "relative_error": fit.relative_error,
         "torque_sd_nm": fit.torque_sd,
         "lack_of_fit": _lack_of_fit(fit.lack_of_fit),
         "arm": dict(fit.arm),
         "estimates": [_estimate(e, ALL_QUANTITIES[e.name]) for e in fit.estimates],
-        "correlation": _matrix(fit.correlation.tolist()),
+        "correlation": fit.correlation.tolist(),
         "steps": [
             {
                 "name": step.name,
@@ -261,7 +269,7 @@ def _lack_of_fit(lack: LackOfFit) -> dict[str, object]:
             }
             for test in lack.tests
         ],
-        "explained": _finite(lack.explained),
+        "explained": lack.explained,
         "phases": [
             {
                 "phase": phase.phase,
@@ -272,20 +280,20 @@ def _lack_of_fit(lack: LackOfFit) -> dict[str, object]:
             }
             for phase in lack.phases
         ],
-        "after_to_before": _finite(lack.after_to_before),
-        "rest_sd_nm": _finite(lack.rest_sd),
+        "after_to_before": lack.after_to_before,
+        "rest_sd_nm": lack.rest_sd,
     }
 
 
-def _friction_document(fit: FrictionFit) -> dict[str, object]:
+def _friction_values(fit: FrictionFit) -> dict[str, object]:
     return {
         "simulated": fit.simulated,
         "level": fit.level,
         "n_strokes": len(fit.strokes),
-        "relative_error": _finite(fit.relative_error),
+        "relative_error": fit.relative_error,
         "torque_sd_nm": fit.torque_sd,
         "estimates": [_estimate(e, FRICTION[e.name]) for e in fit.estimates],
-        "correlation": _matrix(fit.correlation.tolist()),
+        "correlation": fit.correlation.tolist(),
     }
 
 
@@ -293,11 +301,11 @@ def _estimate(estimate: FittedParameter, quantity: Quantity) -> dict[str, object
     factor = quantity.factor
     return {
         "key": quantity.key,
-        "value": _finite(estimate.value * factor),
-        "standard_error": _finite(estimate.standard_error * factor),
-        "degrees_of_freedom": _finite(estimate.df),
-        "low": _finite(estimate.low * factor),
-        "high": _finite(estimate.high * factor),
+        "value": estimate.value * factor,
+        "standard_error": estimate.standard_error * factor,
+        "degrees_of_freedom": estimate.df,
+        "low": estimate.low * factor,
+        "high": estimate.high * factor,
         "n_trials": estimate.n_trials,
         "reason": estimate.reason,
     }
@@ -323,14 +331,6 @@ def _trial(trial: Trial) -> dict[str, object]:
             "catch_travel_deg": math.degrees(catch.travel),
         }
     return document
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
-
-def _matrix(rows: list[list[float]]) -> list[list[float | None]]:
-    return [[_finite(value) for value in row] for row in rows]
 
 
 def fit_figures(fit: ElbowFit | FrictionFit) -> dict[str, dict[Form, bytes]]:

@@ -8,6 +8,7 @@ import math
 from collections import Counter
 
 from masrel import __version__
+from masrel.lab.analysis._results import as_plain
 from masrel.lab.protocol import Protocol, protocol_hash
 from masrel.lab.report._material import FIGURES, SIMULATED_GRADES
 from masrel.lab.training._lessons import (
@@ -129,35 +130,30 @@ def training_stamp(record: TrainingRecord, study: str) -> str:
 def training_document(record: TrainingRecord, *, level: float) -> dict[str, object]:
     """Return a training as plain values; null for what is undefined."""
     criterion = record.criterion
-    return {
-        "rater": record.rater,
-        "simulated": record.simulated,
-        "enters_ratings": False,
-        "passed": record.passed,
-        "n_presentations": len(record.lessons),
-        "criterion": {
-            "weights": criterion.weights,
-            "kappa_insufficient": criterion.insufficient,
-            "kappa_sufficient": criterion.sufficient,
-            "window": criterion.window,
-            "max_presentations": criterion.max_presentations,
-            "order": criterion.order,
-            "boundary": record.boundary,
-            "false_pass": record.false_pass,
-            "false_fail": record.false_fail,
-        },
-        "level": level,
-        "curve": [_point(point) for point in learning_curve(record, level=level)],
-        "lessons": [
-            {
-                "position": one.position,
-                "model": one.model,
-                "intended": one.intended,
-                "grade": one.grade,
-            }
-            for one in record.lessons
-        ],
-    }
+    document: dict[str, object] = as_plain(
+        {
+            "rater": record.rater,
+            "simulated": record.simulated,
+            "enters_ratings": False,
+            "passed": record.passed,
+            "n_presentations": len(record.lessons),
+            "criterion": {
+                "weights": criterion.weights,
+                "kappa_insufficient": criterion.insufficient,
+                "kappa_sufficient": criterion.sufficient,
+                "window": criterion.window,
+                "max_presentations": criterion.max_presentations,
+                "order": criterion.order,
+                "boundary": record.boundary,
+                "false_pass": record.false_pass,
+                "false_fail": record.false_fail,
+            },
+            "level": level,
+            "curve": [_point(point) for point in learning_curve(record, level=level)],
+            "lessons": record.lessons,
+        }
+    )
+    return document
 
 
 def _point(point: CurvePoint) -> dict[str, object]:
@@ -166,16 +162,12 @@ def _point(point: CurvePoint) -> dict[str, object]:
         "position": point.position,
         "n_presentations": point.n_presentations,
         "n_right": point.n_right,
-        "kappa": _finite(point.kappa.value),
-        "low": _finite(low),
-        "high": _finite(high),
+        "kappa": point.kappa.value,
+        "low": low,
+        "high": high,
         "method": None if interval is None else interval.method,
-        "evidence": _finite(point.evidence),
+        "evidence": point.evidence,
     }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def learning_content(record: TrainingRecord, *, level: float) -> Drawn:
