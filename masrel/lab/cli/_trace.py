@@ -23,7 +23,7 @@ from masrel.cli._options import (
 from masrel.cli._paths import FileInFolder, InputFile
 from masrel.errors import ParameterError
 from masrel.lab._study_files import new_file
-from masrel.lab.cli._joints import (
+from masrel.lab.cli.joint import (
     END_DEG,
     START_DEG,
     JointOptions,

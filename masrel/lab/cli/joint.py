@@ -1,8 +1,12 @@
-"""``masrel joint``: traces of joints, joints of recordings, and models between."""
+"""``masrel joint``: joints as options name them, and what needs no file of its own.
+
+The angles of Tardieu of joints, and models between models.
+"""
 
 import hashlib
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,14 +14,21 @@ import click
 
 import masrel
 from masrel._files import write_file
+from masrel._input import refuse
 from masrel.cli._commands import ListedCommands
-from masrel.cli._options import OutputOptions, output_options, write_output
-from masrel.cli._paths import InputFile, refuse_inputs
+from masrel.cli._options import (
+    GroupedHelp,
+    OutputOptions,
+    grouped,
+    output_options,
+    write_output,
+)
+from masrel.cli._paths import InputFile, note_inputs, refuse_inputs
 from masrel.errors import ParameterError
 from masrel.lab._study_files import MAX_SMALL, parse_toml, read_regular
 
 if TYPE_CHECKING:
-    from masrel.lab.elbow import ElbowParameters
+    from masrel.lab.elbow import ElbowParameters, JointModel
     from masrel.tables._tables import Table
 
 
@@ -28,17 +39,226 @@ _COMMANDS = {
     "friction": "Fit the friction of a device to recordings of backdriving.",
     "between": "Put models at even steps between neighbours, to hide standards.",
 }
-_MODULES = {"trace": "_trace", "tardieu": "_joints", "between": "joint"}
+_MODULES = {"trace": "_trace", "fit": "_fit", "friction": "_fit"}
 
 
 @click.group(
     "joint",
     cls=ListedCommands,
     parts={"Commands": _COMMANDS},
-    place=lambda name: f"masrel.lab.cli.{_MODULES.get(name, '_fit')}",
+    place=lambda name: f"masrel.lab.cli.{_MODULES.get(name, 'joint')}",
 )
 def joint() -> None:
     """Traces of joints, joints of recordings, and models between models."""
+
+
+START_DEG, END_DEG = 30.0, 146.0
+"""Where a stretch starts and ends unless it is said, deg."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointOptions:
+    """The joints, however they are named, and what is changed of every one."""
+
+    models: tuple[str, ...]
+    study: Path | None
+    kinds: tuple[str, ...]
+    parameters: tuple[str, ...]  # KEY=VALUE each
+    # None changes nothing
+    rest: float | None  # θ_rest, deg
+    post_catch: str | None  # reading of (5)
+    reading: str | None  # reading of Q
+    rise: float | None  # how long torque takes to its peak, s
+    inertia: float | None  # m of (1) and (5), kg·m²
+
+    def changed(self, joint: "JointModel") -> "JointModel":
+        """Return a joint with the changes, which only a spastic elbow can have."""
+        from masrel.lab.elbow import ElbowParameters
+
+        options = {
+            "rest_angle": None if self.rest is None else math.radians(self.rest),
+            "post_catch": self.post_catch,
+            "residual_reading": self.reading,
+            "catch_rise": self.rise,
+            "inertia": self.inertia,
+        }
+        changes: Any = {
+            name: value for name, value in options.items() if value is not None
+        }
+        if not changes:
+            return joint
+        if not isinstance(joint, ElbowParameters):
+            raise ParameterError(
+                "--rest-deg, --post-catch, --q-reading, --catch-rise-s, "
+                f"--inertia-kg-m2: need a spastic elbow, got {joint.kind}"
+            )
+        return replace(joint, **changes)
+
+
+joint_options = grouped(
+    "joints",
+    JointOptions,
+    click.option(
+        "--model", "models", multiple=True,
+        help="HM1 to HM4, a model of --study, or a model file (.toml); may be given "
+        "again.",
+    ),
+    click.option(
+        "--study", type=click.Path(path_type=Path),
+        help="Take models from this study's protocol.",
+    ),
+    click.option(
+        "--kind", "kinds", multiple=True,
+        help="Another kind of joint with its defaults, as in a protocol; may be given "
+        "again.",
+    ),
+    click.option(
+        "--parameter", "parameters", multiple=True, metavar="KEY=VALUE",
+        help="One of its numbers, as in [models.parameters]; may be given again.",
+    ),
+    click.option("--rest-deg", "rest", type=float, help="θ_rest; default: the start."),
+    click.option(
+        "--post-catch", type=click.Choice(["continuous", "additive"]),
+        help="How (5) is read.",
+    ),
+    click.option(
+        "--q-reading", "reading", type=click.Choice(["residual", "decrease"]),
+        help="What Q is a share of the peak for.",
+    ),
+    click.option(
+        "--catch-rise-s", "rise", type=float, help="Smooth the catch's onset."
+    ),
+    click.option("--inertia-kg-m2", "inertia", type=float, help="m of (1) and (5)."),
+)  # fmt: skip
+
+
+@click.command("tardieu", cls=GroupedHelp)
+@joint_options
+@click.option("--from-deg", "start", type=float, default=START_DEG, show_default=True)
+@click.option(
+    "--speed-deg-s", "speeds", type=(float, float, float), metavar="V1 V2 V3",
+    default=(10.0, 100.0, 150.0),
+    help="Speeds of the stretches.  [default: 10 100 150]",
+)  # fmt: skip
+@output_options(json="Write them as JSON here; - for the screen.")
+def tardieu(
+    joints: JointOptions,
+    start: float,
+    speeds: tuple[float, float, float],
+    output: OutputOptions,
+) -> None:
+    """R2, R1 and their difference, by stretches to the end of range at three speeds."""
+    from masrel.lab.report._traced_scenes import tardieu_document, tardieu_text
+
+    documents = [
+        tardieu_document(name, joint, start, speeds)
+        for name, joint in joints_of(joints).items()
+    ]
+    write_output(
+        output,
+        document=lambda: (
+            documents[0] if len(documents) == 1 else {"tardieu": documents}
+        ),
+        text=lambda: tardieu_text(documents),
+    )
+
+
+def end_within(joint: "JointModel", end_deg: float | None) -> float:
+    """Return where a stretch ends, deg: at most where the range of the joint does."""
+    limit = math.degrees(joint.range_end)
+    if end_deg is None:
+        return min(END_DEG, limit)
+    if end_deg > limit + 1e-9:
+        raise ParameterError(
+            f"--to-deg: needs at most the end of range of every model, {limit:g} deg, "
+            f"got {end_deg:g}"
+        )
+    return end_deg
+
+
+def joints_of(names: JointOptions) -> dict[str, "JointModel"]:
+    """Return joints by name."""
+    from masrel.lab.protocol import StudyPaths, joint_model, read_protocol
+
+    if not names.models and not names.kinds:
+        raise click.UsageError("Missing option '--model' or '--kind'.")
+    if names.parameters and len(names.kinds) != 1:
+        raise ParameterError("--parameter: goes with one --kind, whose it is")
+    joints: dict[str, JointModel] = {}
+    models, study = tuple(dict.fromkeys(names.models)), names.study
+    more = ", or --study to name a study's own"
+    for name, model in zip(_names("--model", models), models, strict=True):
+        if study is None:
+            joints[name] = _read_joint("--model", model, more)
+        elif model.endswith(".toml"):
+            raise ParameterError(
+                f"--model: needs a model of --study, got the file {model}; without "
+                "--study it is read with the usual constants"
+            )
+        else:
+            joints[name] = joint_model(read_protocol(StudyPaths(study).protocol), model)
+    for kind in dict.fromkeys(names.kinds):
+        joints[kind] = _joint_of_kind(kind, names.parameters)
+    return {name: names.changed(joint) for name, joint in joints.items()}
+
+
+def _names(option: str, models: Sequence[str]) -> list[str]:
+    # of standard models, and of files without their endings
+    names = [Path(m).stem if m.endswith(".toml") else m for m in models]
+    for name in names:
+        if names.count(name) > 1:
+            raise ParameterError(
+                f"{option}: needs models whose names differ, got two called {name}"
+            )
+    return names
+
+
+def _read_joint(option: str, model: str, more: str = "") -> "ElbowParameters":
+    # a standard model, or that of a file
+    from masrel.lab.elbow import STANDARD_MODELS
+    from masrel.lab.protocol import read_model_file
+
+    if model.endswith(".toml"):
+        note_inputs(Path(model))
+        return read_model_file(Path(model))
+    if model not in STANDARD_MODELS:
+        raise ParameterError(
+            f"{option}: needs one of {', '.join(STANDARD_MODELS)}, or a model file "
+            f"(.toml){more}, got {model!r}"
+        )
+    return STANDARD_MODELS[model]
+
+
+def _joint_of_kind(kind: str, settings: Sequence[str]) -> "JointModel":
+    # settings: KEY=VALUE each
+    from masrel.lab.protocol._kinds import (
+        DEFAULT_KIND,
+        kind_problem,
+        model_of_kind,
+        value_problems,
+    )
+
+    refuse(
+        ((problem := kind_problem(kind)) is not None, f"--kind: {problem}"),
+        (
+            kind == DEFAULT_KIND,
+            f"--kind: needs another kind than {kind}, whose models --model names",
+        ),
+    )
+    values: dict[str, float] = {}
+    for setting in settings:
+        key, _, text = setting.partition("=")
+        if key in values:
+            raise ParameterError(f"--parameter {key}: needs one value, got two")
+        try:
+            values[key] = float(text)
+        except ValueError as error:
+            raise ParameterError(
+                f"--parameter: needs KEY=VALUE with a number, got {setting!r}"
+            ) from error
+    for key, problem in value_problems(kind, values):
+        raise ParameterError(f"--parameter {key}: {problem}")
+    return model_of_kind(kind, values)
 
 
 _PLACES = ("name", "from", "to", "way", "file")  # what JSON says beside the content
@@ -46,16 +266,6 @@ _RULE = (
     "Of n models in a gap, the i-th is i/(n + 1) of the way, each number interpolated "
     "linearly."
 )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Source:
-    """A model that others are put next to."""
-
-    name: str  # name of a standard model, or that of a file without its ending
-    label: str  # the same with the file and the start of its checksum
-    joint: "ElbowParameters"
-    simulated: bool  # whether it comes from simulated recordings
 
 
 @click.command("between")
@@ -101,7 +311,7 @@ def between(
     """
     if overwrite and folder is None:
         raise ParameterError("--overwrite: needs --output: nothing is written without")
-    rows = _rows([_read_source(model) for model in models], n_models)
+    rows = _rows(models, n_models)
     if folder is not None:
         _write(rows, folder, overwrite=overwrite)
     write_output(
@@ -115,65 +325,46 @@ def between(
     )
 
 
-def _read_source(model: str) -> _Source:
-    from masrel.lab.elbow import STANDARD_MODELS
-    from masrel.lab.protocol import read_model_file
-
-    if not model.endswith(".toml"):
-        if model not in STANDARD_MODELS:
-            known = ", ".join(STANDARD_MODELS)
-            raise ParameterError(
-                f"MODEL: needs {known} or a model file (.toml), got {model!r}"
-            )
-        joint = STANDARD_MODELS[model]
-        return _Source(name=model, label=model, joint=joint, simulated=False)
-    path = Path(model)
-    joint = read_model_file(path)
-    content = read_regular(path, most=MAX_SMALL)
-    simulated = parse_toml(content).get("simulated")
-    if not isinstance(simulated, bool):
-        raise ParameterError(
-            f"{path}: simulated must be true or false: what is made of the model says "
-            f"the same; got {'nothing' if simulated is None else repr(simulated)}"
-        )
-    checksum = hashlib.sha256(content).hexdigest()
-    return _Source(
-        name=path.stem,
-        label=f"{path.stem} ({path}, sha256 {checksum[:16]})",
-        joint=joint,
-        simulated=simulated,
-    )
-
-
-def _rows(sources: Sequence[_Source], n_models: int) -> list[dict[str, Any]]:
+def _rows(models: Sequence[str], n_models: int) -> list[dict[str, Any]]:
     # for every new model its name, its neighbours, and the content of its file
     from masrel.lab.elbow import intermediate_models
     from masrel.lab.elbow._model_file import model_document
 
-    joints = {source.name: source.joint for source in sources}
-    if len(joints) < len(sources):
-        names = [source.name for source in sources]
-        twice = next(name for name in names if names.count(name) > 1)
-        raise ParameterError(
-            f"MODEL: needs models whose names differ, got two called {twice}"
-        )
-    made = intermediate_models(joints, n_models)
-    each = n_models // (len(sources) - 1)
-    rows = []
+    names, rows = _names("MODEL", models), []
+    joints = [_read_joint("MODEL", model) for model in models]
+    sources = [_source(*of) for of in zip(names, models, strict=True)]
+    made = intermediate_models(dict(zip(names, joints, strict=True)), n_models)
+    each = n_models // (len(models) - 1)
     for i, (name, joint) in enumerate(made.items()):
-        first, second = sources[i // each : i // each + 2]
-        fraction = f"{i % each + 1}/{each + 1}"
+        gap, fraction = i // each, f"{i % each + 1}/{each + 1}"
+        (first, is_simulated), (second, is_other) = sources[gap : gap + 2]
         document = model_document(
             joint,
-            simulated=first.simulated or second.simulated,
+            simulated=is_simulated or is_other,
             made_from=(
                 f"masrel joint between {masrel.__version__}: {fraction} of the way "
-                f"from {first.label} to {second.label}"
+                f"from {first} to {second}"
             ),
         )
-        places = {"from": first.name, "to": second.name, "way": fraction}
+        places = {"from": names[gap], "to": names[gap + 1], "way": fraction}
         rows.append({"name": name, **places, "file": None, **document})
     return rows
+
+
+def _source(name: str, model: str) -> tuple[str, bool]:
+    # what a model is called, of a file with the start of its checksum, and whether it
+    # comes from simulated recordings
+    if name == model:
+        return name, False
+    content = read_regular(Path(model), most=MAX_SMALL)
+    simulated = parse_toml(content).get("simulated")
+    if not isinstance(simulated, bool):
+        raise ParameterError(
+            f"{model}: simulated must be true or false: what is made of the model says "
+            f"the same; got {'nothing' if simulated is None else repr(simulated)}"
+        )
+    checksum = hashlib.sha256(content).hexdigest()
+    return f"{name} ({model}, sha256 {checksum[:16]})", simulated
 
 
 def _write(rows: list[dict[str, Any]], folder: Path, *, overwrite: bool) -> None:

@@ -194,11 +194,11 @@ def _torques(
     requested: dict[str, object] = {}
     angles = [math.radians(angle) for angle in quantities.angles]
     for (key, place, _), at, torques in (
-        (_PLACES[0], quantities.times, at_times(quantities.times)),
-        (_PLACES[1], quantities.angles, at_angles(angles)),
+        (_PLACES[0], quantities.times, partial(at_times, quantities.times)),
+        (_PLACES[1], quantities.angles, partial(at_angles, angles)),
     ):
         if at:
-            rows = zip(at, torques.tolist(), strict=True)
+            rows = zip(at, torques().tolist(), strict=True)
             requested[key] = [{place: x, "torque_nm": torque} for x, torque in rows]
     return requested
 
@@ -379,15 +379,13 @@ def tardieu_document(
     model: str, joint: "JointModel", start_deg: float, speeds: Sequence[float]
 ) -> dict[str, object]:
     """Return R2, R1, their difference and the catch at V1, V2 and V3 of a joint."""
-    # speeds: V1, V2 and V3, deg/s; none for the usual ones
+    # speeds: V1, V2 and V3, deg/s
     from masrel.lab.elbow import tardieu
 
-    start = math.radians(start_deg)
-    if speeds:
-        first, second, third = map(math.radians, speeds)
-        made = tardieu(joint, start_angle=start, speeds=(first, second, third))
-    else:
-        made = tardieu(joint, start_angle=start)
+    first, second, third = map(math.radians, speeds)
+    made = tardieu(
+        joint, start_angle=math.radians(start_deg), speeds=(first, second, third)
+    )
     return {
         "model": model,
         "kind": joint.kind,
