@@ -115,6 +115,19 @@ def parse_json(text: str | bytes) -> Any:
         raise ValueError("nested too deep") from None
 
 
+def leaves(
+    document: Any, place: str = "", *, within: tuple[type, ...] = (dict,)
+) -> Iterator[tuple[str, str]]:
+    """Yield the places of a document, and the JSON of what stands there."""
+    # within: what is gone into; anything else, and what is empty, stands in one place
+    if type(document) in within and document:
+        named = document if isinstance(document, dict) else dict(enumerate(document))
+        for name, part in named.items():
+            yield from leaves(part, f"{place}.{name}".lstrip("."), within=within)
+    else:
+        yield place, json.dumps(document, ensure_ascii=False)
+
+
 def parse_toml(data: bytes) -> dict[str, Any]:
     """Return what a TOML file holds; ValueError says why it cannot be read."""
     import tomllib  # a file of ratings needs none

@@ -5,7 +5,6 @@ raters alone. Out: a new folder with all raters, schedules, logs and recordings,
 verified before and after.
 """
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import count
 from pathlib import Path
@@ -20,6 +19,7 @@ from masrel.lab._event_log import line_hashes
 from masrel.lab._study_files import (
     MAX_RECORDING,
     MAX_SMALL,
+    leaves,
     new_folder,
     parse_toml,
     read_regular,
@@ -132,8 +132,7 @@ def _check_protocols(
     for study, protocol in zip(studies[1:], protocols[1:], strict=True):
         raters = {r.id for r in protocols[0].raters} & {r.id for r in protocol.raters}
         first, other = (
-            dict(_leaves(_comparable(each, raters)))
-            for each in (protocols[0], protocol)
+            dict(leaves(_comparable(each, raters))) for each in (protocols[0], protocol)
         )
         for key in sorted({**first, **other}):
             values = first.get(key, "none"), other.get(key, "none")
@@ -160,15 +159,6 @@ def _comparable(protocol: Protocol, raters: set[str]) -> dict[str, Any]:
     for array in ("models", "raters", "sessions"):
         content[array] = {entry["id"]: entry for entry in content[array]}
     return content
-
-
-def _leaves(content: object, place: str = "") -> Iterator[tuple[str, str]]:
-    # the places of a document, and the JSON of what stands there
-    if isinstance(content, Mapping) and content:
-        for key, value in content.items():
-            yield from _leaves(value, f"{place}.{key}".lstrip("."))
-    else:
-        yield place, json.dumps(content, ensure_ascii=False)
 
 
 def _check_secrets(studies: Sequence[StudyPaths]) -> None:

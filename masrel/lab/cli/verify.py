@@ -2,6 +2,7 @@
 
 import dataclasses
 import sys
+from collections.abc import Iterable
 from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -60,7 +61,7 @@ def verify(study: Path, anchor_file: Path | None, output: OutputOptions) -> None
 
 def _anchored(
     study: StudyPaths, file: Path | None, anchors: "tuple[Anchor, ...]"
-) -> "tuple[Finding, ...]":
+) -> "Iterable[Finding]":
     from masrel.lab.verification import anchor_findings, read_anchors, write_anchors
 
     if file is None:

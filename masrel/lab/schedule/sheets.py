@@ -7,12 +7,11 @@ import shlex
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from masrel._files import make_folder, write_files
 from masrel._input import listed
 from masrel.errors import ScheduleError
-from masrel.lab._study_files import MAX_SMALL, read_regular
+from masrel.lab._study_files import MAX_SMALL, leaves, read_regular
 from masrel.lab.protocol import (
     Protocol,
     StudyPaths,
@@ -427,30 +426,20 @@ def _changes(protocol: Protocol, file: Path, sha256: str) -> str:
             "a key of the study id, scale, elbow, models, schedule, stretch, "
             "presentation, occasions or device has changed"
         )
-    before, now = (
-        dict(_leaves(json.loads(text))) for text in (drawn, presented_content(protocol))
-    )
+    contents = [json.loads(text) for text in (drawn, presented_content(protocol))]
+    models = [{each["id"]: each for each in content["models"]} for content in contents]
     # of a model that is new or gone the list of models says all
-    in_both = {key[1] for key in before if key[1:]} & {key[1] for key in now if key[1:]}
-    changed = {
-        ".".join(key): (before.get(key, "not set"), now.get(key, "not set"))
-        for key in now | before
+    in_both = models[0].keys() & models[1].keys()
+    before, now = (
+        dict(leaves({name: by_id[name] for name in in_both}, "models"))
+        | dict(leaves({**content, "models": [*by_id]}))
+        for content, by_id in zip(contents, models, strict=True)
+    )
+    shown = [
+        f"{key} was {before.get(key, 'not set')} and is {now.get(key, 'not set')}"
+        for key in sorted(now | before)
         if before.get(key) != now.get(key)
-        and (key[0] != "models" or not key[1:] or key[1] in in_both)
-    }
-    shown = [f"{key} was {was} and is {is_}" for key, (was, is_) in changed.items()]
+    ]
     more = len(shown) - _SHOWN
     others = f", and {more} more keys differ" if more > 0 else ""
     return ", ".join(shown[:_SHOWN]) + others
-
-
-def _leaves(content: Any, *keys: str) -> Iterator[tuple[tuple[str, ...], str]]:
-    # values of a document as JSON by their keys; models by their ids, and these
-    if keys == ("models",):
-        yield keys, json.dumps([model["id"] for model in content], ensure_ascii=False)
-        content = {model["id"]: model for model in content}
-    if isinstance(content, dict):
-        for key, value in content.items():
-            yield from _leaves(value, *keys, key)
-    else:
-        yield keys, json.dumps(content, ensure_ascii=False)

@@ -140,10 +140,22 @@ def hashed_facts(
 
 
 def recording_findings(
-    path: Path, shown: Presentation, of: Mapping[str, str], event: Event, where: str
+    path: Path,
+    folder: Path,
+    code: str,
+    shown: Mapping[str, Presentation],
+    of: Mapping[str, object],
+    event: Event,
+    log: Path,
 ) -> Iterator[Finding]:
-    """Yield what is wrong with the recording that an event names."""
-    # of: study, rater and session; where: the event's line and log, in words
+    """Yield what is wrong with the recording that an event of a log names."""
+    # folder: where it has to lie, under its code; of: study, rater and session
+    attempt = event.fields["attempt"]
+    name = code if attempt == 1 else f"{code}-{attempt}"
+    if code not in shown or path != folder / f"{name}.npz":
+        yield broken(log, f"line {event.line}: {path} is not where {name} is recorded")
+        return
+    where = f"line {event.line} of {log}"
     data, findings = hashed_facts(path, event, where)
     yield from findings
     if data is None:
@@ -163,7 +175,7 @@ def recording_findings(
     needed: dict[str, object] = {
         **of,
         "sha256": event.fields["sha256"],
-        **{name: getattr(shown, name) for name in _FROM_SCHEDULE},
+        **{name: getattr(shown[code], name) for name in _FROM_SCHEDULE},
         **{name: event.fields[name] for name in _FROM_LOG if name in event.fields},
     }
     for name, value in needed.items():
@@ -298,9 +310,7 @@ def write_anchors(anchors: Iterable[Anchor], path: Path) -> None:
     write_file(path, _HEAD + "".join(f"{anchor}\n" for anchor in anchors))
 
 
-def anchor_findings(
-    study: StudyPaths, anchors: Iterable[Anchor]
-) -> tuple[Finding, ...]:
+def anchor_findings(study: StudyPaths, anchors: Iterable[Anchor]) -> Iterator[Finding]:
     """Hold the logs of a study against hashes that were kept elsewhere.
 
     Parameters
@@ -310,9 +320,9 @@ def anchor_findings(
     anchors : iterable of Anchor
         The hashes.
 
-    Returns
-    -------
-    tuple of Finding
+    Yields
+    ------
+    Finding
         A log that is gone, is shorter than it was, or has another line there. Logs
         that have grown since are fine.
 
@@ -321,10 +331,6 @@ def anchor_findings(
     OSError
         If a log cannot be read.
     """
-    return tuple(_findings(study, anchors))
-
-
-def _findings(study: StudyPaths, anchors: Iterable[Anchor]) -> Iterator[Finding]:
     logs = {log.relative_to(study.root).as_posix(): log for log in _logs(study)}
     hashes: dict[str, tuple[str, ...]] = {}
     for anchor in anchors:

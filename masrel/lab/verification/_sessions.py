@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -79,10 +80,8 @@ def check_session(
     file, log = study.schedule_file(rater, session), study.log_file(rater, session)
     schedule, findings = None, []
     if file.exists():
-        try:
+        with suppress(ScheduleError):  # which `schedule_problems` has
             schedule = read_schedule(file)
-        except ScheduleError:
-            pass  # one of `schedule_problems`
     elif log.exists():
         needed = "needed the schedule of a session that has begun, got no file"
         findings.append(broken(file, needed))
@@ -181,12 +180,12 @@ def _against_schedule(
     findings += _event_findings(protocol, shown, events, log)
     findings += _answer_findings(protocol, events, log)
     findings += time_findings(events, log)
-    of = {name: str(needed[name]) for name in ("study", "rater", "session")}
+    of = {name: needed[name] for name in ("study", "rater", "session")}
     for event in state.all_presented:
         code = str(event.fields["code"])
         folder = study.recording_file(schedule.rater, schedule.session, code).parent
         path = study.sessions / str(event.fields["recording"])
-        findings += _recording_findings(path, folder, code, shown, of, event, log)
+        findings += recording_findings(path, folder, code, shown, of, event, log)
     return _checked_session(study, events, state, findings, n_presentations)
 
 
@@ -267,25 +266,6 @@ def _off_scale(protocol: Protocol, log: Path, where: str, grade: object) -> Find
     return broken(log, f"{where}: needed one of {grades}, got {grade!r}")
 
 
-def _recording_findings(
-    path: Path,
-    folder: Path,
-    code: str,
-    shown: dict[str, Presentation],
-    of: dict[str, str],
-    event: Event,
-    log: Path,
-) -> Iterator[Finding]:
-    # of a recording that has to lie in this folder under its code
-    attempt = event.fields["attempt"]
-    name = code if attempt == 1 else f"{code}-{attempt}"
-    if code not in shown or path != folder / f"{name}.npz":
-        yield broken(log, f"line {event.line}: {path} is not where {name} is recorded")
-        return
-    where = f"line {event.line} of {log}"
-    yield from recording_findings(path, shown[code], of, event, where)
-
-
 def check_training(study: StudyPaths, protocol: Protocol, log: Path) -> CheckedLog:
     """Hold a training's log against the protocol, and its recordings against it."""
     rater = log.stem
@@ -309,9 +289,8 @@ def check_training(study: StudyPaths, protocol: Protocol, log: Path) -> CheckedL
             continue  # said of the event
         code, model = f"{place:03d}", str(event.fields["model"])
         shown = Presentation(position=place, code=code, model=model, repeat=place)
-        folder = log.with_suffix("")
-        findings += _recording_findings(
-            path, folder, code, {code: shown}, of, event, log
+        findings += recording_findings(
+            path, log.with_suffix(""), code, {code: shown}, of, event, log
         )
     ends = [event.fields["passed"] for event in events if event.kind == "complete"]
     record = SessionRecord(

@@ -1,11 +1,11 @@
 """The record of a study, from protocol to report, each file held against the last."""
 
 import hashlib
-import json
 import os
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,7 @@ from masrel.lab._study_files import (
     MAX_RECORDING,
     MAX_TABLE,
     format_problem,
+    leaves,
     parse_json,
     read_once,
     read_regular,
@@ -109,16 +110,12 @@ def verify_study(study: StudyPaths) -> Verification:
         )
     with read_once():
         record = verify_sessions(study, protocol)
-        return Verification(
-            sessions=record.sessions,
-            trainings=record.trainings,
-            rehearsals=record.rehearsals,
-            findings=(
-                *_of_problems(study.schedules, schedule_problems(protocol, study)),
-                *record.findings,
-                *_output_findings(study, protocol),
-            ),
+        findings = (
+            *_of_problems(study.schedules, schedule_problems(protocol, study)),
+            *record.findings,
+            *_output_findings(study, protocol),
         )
+    return replace(record, findings=findings)
 
 
 def verify_sessions(study: StudyPaths, protocol: Protocol) -> Verification:
@@ -159,12 +156,9 @@ def verify_sessions(study: StudyPaths, protocol: Protocol) -> Verification:
         trainings=tuple(of_rater.record for of_rater in trained),
         rehearsals=tuple(rehearsal.record for rehearsal in rehearsed),
         findings=(
-            *(finding for of_session in checked for finding in of_session.findings),
-            *_unnamed(study.sessions, checked, "rater in a session"),
-            *(finding for of_rater in trained for finding in of_rater.findings),
-            *_unnamed(study.training, trained, "rater"),
-            *(finding for rehearsal in rehearsed for finding in rehearsal.findings),
-            *_unnamed(study.rehearsals, rehearsed, "rehearsal"),
+            *_of_logs(study.sessions, checked, "rater in a session"),
+            *_of_logs(study.training, trained, "rater"),
+            *_of_logs(study.rehearsals, rehearsed, "rehearsal"),
             *_conduct_findings(study, protocol),
         ),
     )
@@ -186,10 +180,11 @@ def _of_problems(path: Path, problems: Iterable[str]) -> tuple[Finding, ...]:
     )
 
 
-def _unnamed(
+def _of_logs(
     folder: Path, checked: Sequence[CheckedLog], whose: str
 ) -> Iterator[Finding]:
-    # what lies in a folder of logs and no log speaks for
+    # of a folder of logs: of each, then what lies there and no log speaks for
+    yield from chain.from_iterable(of_log.findings for of_log in checked)
     recordings = [path for of_log in checked for path in of_log.recordings]
     facts = [path.with_suffix(".json") for path in recordings]
     logs = {of_log.log: of_log.record.stage for of_log in checked}
@@ -336,9 +331,11 @@ def _analysis_findings(
     if document.get("masrel_version") != analysis.masrel_version:
         yield _not_rebuilt(path, document)
         document, needed = {"inputs": inputs}, {"inputs": needed["inputs"]}
-    leaves, needed_leaves = dict(_leaves(document)), dict(_leaves(needed))
-    for place in (*needed_leaves, *leaves):
-        got, value = (each.get(place, "absent") for each in (leaves, needed_leaves))
+    made, of_now = (
+        dict(leaves(each, within=(dict, list))) for each in (document, needed)
+    )
+    for place in (*of_now, *made):
+        got, value = (each.get(place, "absent") for each in (made, of_now))
         if got != value:
             message = f"{place} is {got:.60}, but {value:.60} when it is computed again"
             yield broken(path, message)
@@ -352,16 +349,6 @@ def _not_rebuilt(path: Path, document: Mapping[str, object]) -> Finding:
         f"made by masrel {version}, not rebuilt by this, {masrel.__version__}: only "
         "what it was made from is looked at",
     )
-
-
-def _leaves(value: object, place: str = "") -> Iterator[tuple[str, str]]:
-    # the places of a document, and the JSON of what stands there
-    if isinstance(value, dict | list) and value:
-        pairs = value.items() if isinstance(value, dict) else enumerate(value)
-        for name, part in pairs:
-            yield from _leaves(part, f"{place}.{name}".lstrip("."))
-    else:
-        yield place, json.dumps(value)
 
 
 def _report_findings(

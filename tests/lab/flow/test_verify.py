@@ -352,7 +352,7 @@ def test_with_an_anchor_a_chain_computed_anew_is_found(
     anchors = tmp_path / "anchors.txt"
     write_anchors(anchors_of(study), anchors)
     assert {anchor.log for anchor in read_anchors(anchors)} > {*LOGS}
-    assert anchor_findings(study, read_anchors(anchors)) == ()
+    assert [*anchor_findings(study, read_anchors(anchors))] == []
     log = forge(study.root / file)
     shutil.rmtree(study.report)
     for verb in ("ratings", "analyze"):
@@ -364,7 +364,7 @@ def test_with_an_anchor_a_chain_computed_anew_is_found(
 def test_a_log_that_has_grown_still_fits_its_anchor(study: StudyPaths) -> None:
     anchors = anchors_of(study)
     corrected(study)
-    assert anchor_findings(study, anchors) == ()
+    assert [*anchor_findings(study, anchors)] == []
     assert {a.log for a in anchors_of(study)} == {a.log for a in anchors}
     assert anchors_of(study) != anchors
 
