@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import chain
 from operator import attrgetter
 
@@ -18,10 +18,13 @@ from masrel.lab.protocol.definition import (
     _FIELD_NAME,
     ElbowConstants,
     EstimatePlan,
+    GateKeys,
     Model,
     Protocol,
     Question,
+    Rater,
     SampleSize,
+    Session,
 )
 
 # Presentations of one session; blinded codes are drawn from 1800
@@ -45,17 +48,20 @@ _SESSIONS_NEEDED = {
 
 def broken_rules(protocol: Protocol) -> Iterator[str]:
     """Check the rules across keys."""
-    return chain.from_iterable(rule(protocol) for rule in _RULES)
+    for array, rule in _RULES:
+        if array is None:
+            yield from rule(protocol)
+            continue
+        for index, entry in enumerate(attrgetter(array)(protocol)):
+            # its id helps to find it in the file
+            at_end = f" (id {got(entry.id)})" if hasattr(entry, "id") else ""
+            for problem in rule(entry, protocol):
+                yield f"{array}[{index}].{problem}{at_end}"
 
 
 def _broken(*rules: tuple[object, str]) -> Iterator[str]:
     """Yield what is said of those rules that are broken."""
     return (sentence for is_broken, sentence in rules if is_broken)
-
-
-def _id(name: str) -> str:
-    # names an entry of an array of tables at the end of a message
-    return f" (id {got(name)})"
 
 
 def _again(names: Sequence[str], where: str, needs: str) -> Iterator[str]:
@@ -121,38 +127,31 @@ def _ids(protocol: Protocol) -> Iterator[str]:
             )
 
 
-def _references(protocol: Protocol) -> Iterator[str]:
-    # grades of models that the scale has, raters of sessions that the study has
-    grades = protocol.scale.grades
-    for index, model in enumerate(protocol.models):
-        if model.intended_grade not in (None, *grades):
-            yield (
-                f"models[{index}].intended_grade: needed a grade of the scale "
-                f"({listed(grades)}), got {got(model.intended_grade)}{_id(model.id)}"
-            )
+def _intended_grade(model: Model, protocol: Protocol) -> Iterator[str]:
+    # of the scale
+    grades, grade = protocol.scale.grades, model.intended_grade
+    if grade not in (None, *grades):
+        yield (
+            f"intended_grade: needed a grade of the scale ({listed(grades)}), got "
+            f"{got(grade)}"
+        )
+
+
+def _session_raters(session: Session, protocol: Protocol) -> Iterator[str]:
+    # of the study, each once
     known = dict.fromkeys(rater.id for rater in protocol.raters)
-    for index, session in enumerate(protocol.sessions):
-        for place, rater in enumerate(session.raters):
-            where = f"sessions[{index}].raters[{place}]"
-            is_again = rater in session.raters[:place]
-            yield from _broken(
-                (
-                    is_again,
-                    f"{where}: needed each rater once, got {got(rater)} again"
-                    f"{_id(session.id)}",
-                ),
-                (
-                    not is_again and rater not in known,
-                    f"{where}: needed a rater of [[raters]] ({listed(known)}), "
-                    f"got {got(rater)}{_id(session.id)}",
-                ),
+    yield from _again(session.raters, "raters", "each rater once")
+    for place, rater in enumerate(session.raters):
+        if rater not in known:
+            yield (
+                f"raters[{place}]: needed a rater of [[raters]] ({listed(known)}), got "
+                f"{got(rater)}"
             )
 
 
 def _rater_fields(protocol: Protocol) -> Iterator[str]:
-    # fields that can be columns of a table, and what raters have in them
-    fields = protocol.rater_fields
-    for name, field in fields.items():
+    # fields that can be columns of a table
+    for name, field in protocol.rater_fields.items():
         where, kind = f"rater_fields.{name}", field.type
         yield from _broken(
             (
@@ -175,20 +174,19 @@ def _rater_fields(protocol: Protocol) -> Iterator[str]:
                 f"{where}.unit: needed for numbers only, got it for {got(kind)}",
             ),
         )
-    for index, rater in enumerate(protocol.raters):
-        for name, value in rater.fields.items():
-            where = f"raters[{index}].fields.{name}"
-            if name not in fields:
-                yield (
-                    f"{where}: needed a field of [rater_fields] "
-                    f"({listed(fields) or 'there is none'}), got {got(name)}"
-                    f"{_id(rater.id)}"
-                )
-            elif field_value(fields[name], value) is None:
-                yield (
-                    f"{where}: needed {needed_of(fields[name])}, got {got(value)}"
-                    f"{_id(rater.id)}"
-                )
+
+
+def _rater_values(rater: Rater, protocol: Protocol) -> Iterator[str]:
+    # what a rater has in them
+    fields = protocol.rater_fields
+    for name, value in rater.fields.items():
+        if name not in fields:
+            yield (
+                f"fields.{name}: needed a field of [rater_fields] "
+                f"({listed(fields) or 'there is none'}), got {got(name)}"
+            )
+        elif field_value(fields[name], value) is None:
+            yield f"fields.{name}: needed {needed_of(fields[name])}, got {got(value)}"
 
 
 def _schedules(protocol: Protocol) -> Iterator[str]:
@@ -287,24 +285,22 @@ def _too_strict(protocol: Protocol) -> Iterator[str]:
             )
 
 
-def _sites(protocol: Protocol) -> Iterator[str]:
+def _site(rater: Rater, protocol: Protocol) -> Iterator[str]:
     # with strata everybody has a site, and none is written in two ways
-    first: dict[str, str] = {}
-    for index, rater in enumerate(protocol.raters):
-        where, site = f"raters[{index}].site", rater.site
-        other = None if site is None else first.setdefault(site.casefold(), site)
-        yield from _broken(
-            (
-                site is None and protocol.schedule.strata == "site",
-                f'{where}: needed the id of a site with schedule.strata = "site", got '
-                f"none{_id(rater.id)}",
-            ),
-            (
-                other != site,
-                f"{where}: needed sites that differ by more than case, got {got(site)} "
-                f"beside {got(other)}{_id(rater.id)}",
-            ),
-        )
+    site = rater.site or ""
+    sites = (each.site or "" for each in protocol.raters)
+    first = next(each for each in sites if each.casefold() == site.casefold())
+    return _broken(
+        (
+            rater.site is None and protocol.schedule.strata == "site",
+            'site: needed the id of a site with schedule.strata = "site", got none',
+        ),
+        (
+            first != site,
+            f"site: needed sites that differ by more than case, got {got(site)} "
+            f"beside {got(first)}",
+        ),
+    )
 
 
 # Keys, and how each compares with another
@@ -407,46 +403,34 @@ def _occasions(protocol: Protocol) -> Iterator[str]:
     )
 
 
-def _session_order(protocol: Protocol) -> Iterator[str]:
+def _session_order(session: Session, protocol: Protocol) -> Iterator[str]:
     # sessions that come after others, and how long after
-    earlier = {session.id: session.after for session in protocol.sessions}
-    for index, session in enumerate(protocol.sessions):
-        where, after = f"sessions[{index}]", session.after
-        low, high = session.at_least_days, session.at_most_days
-        needing_after = ("at_least_days", "at_most_days", "order_policy")
-        yield from _broken(
-            (
-                after not in (None, *earlier),
-                f"{where}.after: needed another session of [[sessions]] "
-                f"({listed(earlier)}), got {got(after)}{_id(session.id)}",
-            ),
-            (
-                after in earlier and _comes_back(session.id, earlier),
-                f"{where}.after: needed a session that does not come after this "
-                f"one, got {got(after)}{_id(session.id)}",
-            ),
-            (
-                low is not None and high is not None and low > high,
-                f"{where}.at_least_days: needed at most at_most_days ({high}), "
-                f"got {low}{_id(session.id)}",
-            ),
-            *(
-                (
-                    after is None,
-                    f"{where}.{key}: needed with after only, got it alone"
-                    f"{_id(session.id)}",
-                )
-                for key in _chosen(session, *needing_after)
-            ),
-        )
-
-
-def _comes_back(name: str, earlier: dict[str, str | None]) -> bool:
-    # whether the sessions before a session lead back to it
-    before, n_steps = earlier.get(name), 0
-    while before is not None and before != name and n_steps < len(earlier):
-        before, n_steps = earlier.get(before), n_steps + 1
-    return before == name
+    earlier = {each.id: each.after for each in protocol.sessions}
+    after, low, high = session.after, session.at_least_days, session.at_most_days
+    before = after
+    for _ in earlier:  # at most so many come before it
+        if before != session.id:
+            before = earlier.get(before or "")
+    return _broken(
+        (
+            after not in (None, *earlier),
+            f"after: needed another session of [[sessions]] ({listed(earlier)}), got "
+            f"{got(after)}",
+        ),
+        (
+            before == session.id,
+            f"after: needed a session that does not come after this one, got "
+            f"{got(after)}",
+        ),
+        (
+            low is not None and high is not None and low > high,
+            f"at_least_days: needed at most at_most_days ({high}), got {low}",
+        ),
+        *(
+            (after is None, f"{key}: needed with after only, got it alone")
+            for key in _chosen(session, "at_least_days", "at_most_days", "order_policy")
+        ),
+    )
 
 
 def _questions(protocol: Protocol) -> Iterator[str]:
@@ -461,7 +445,7 @@ def _questions(protocol: Protocol) -> Iterator[str]:
                     f"{got(question.id)} again"
                 )
             for problem in chain(_range(question), _choices(question)):
-                yield f"{where}.{problem}{_id(question.id)}"
+                yield f"{where}.{problem} (id {got(question.id)})"
 
 
 def _range(question: Question) -> Iterator[str]:
@@ -513,22 +497,6 @@ def _choices(question: Question) -> Iterator[str]:
                     f"choices[{place}]: needed a choice without spaces around it or "
                     f"control characters, got {got(choice)}"
                 )
-
-
-def _models(protocol: Protocol) -> Iterator[str]:
-    # shared constants, then models with the keys of their kind
-    elbow = protocol.elbow
-    yield from _held_torque(protocol, elbow, "elbow")
-    for index, model in enumerate(protocol.models):
-        where = f"models[{index}]"
-        for problem in model_rules(model, elbow):
-            yield f"{where}.{problem}{_id(model.id)}"
-        overrides = _overrides(model)
-        if {"rest_angle_deg", "stiffness_nm_rad"} & overrides.keys():
-            place = f"{where}.constants" if "rest_angle_deg" in overrides else "elbow"
-            joint = msgspec.structs.replace(elbow, **overrides)
-            for problem in _held_torque(protocol, joint, place):
-                yield problem + _id(model.id)
 
 
 def model_rules(model: Model, elbow: ElbowConstants) -> Iterator[str]:
@@ -609,36 +577,37 @@ def _catch_angle(constant: float | None, joint: ElbowConstants) -> Iterator[str]
     )
 
 
-def _held_torque(
-    protocol: Protocol, joint: ElbowConstants, where: str
-) -> Iterator[str]:
+def _held_torque(protocol: Protocol) -> Iterator[str]:
     # An arm that waits where the stretch starts is held by k·(θ_start - θ_rest) of
     # (1). Where that is as much torque as a frozen encoder is recognized by, no
     # presentation would begin.
-    rest, stiffness = joint.rest_angle_deg, joint.stiffness_nm_rad
     start, limit = protocol.stretch.start_deg, protocol.device.standing_torque_nm
-    if rest is None:
-        return
-    torque = stiffness * math.radians(start - rest)
-    if abs(torque) > limit:
-        yield (
-            f"{where}.rest_angle_deg: needed at most device.standing_torque_nm "
-            f"({limit:g} N·m) where the stretch starts, got {stiffness:g} N·m/rad "
-            f"times {start:g} - {rest:g} deg = {torque:.3g} N·m"
-        )
+    joints = [("elbow", protocol.elbow, "")]
+    for index, model in enumerate(protocol.models):
+        own = _overrides(model)
+        if own.keys() & {"rest_angle_deg", "stiffness_nm_rad"}:
+            where = f"models[{index}].constants" if "rest_angle_deg" in own else "elbow"
+            joint = msgspec.structs.replace(protocol.elbow, **own)
+            joints.append((where, joint, f" (id {got(model.id)})"))
+    for where, joint, at_end in joints:
+        rest, stiffness = joint.rest_angle_deg, joint.stiffness_nm_rad
+        torque = stiffness * math.radians(start - (start if rest is None else rest))
+        if rest is not None and abs(torque) > limit:
+            yield (
+                f"{where}.rest_angle_deg: needed at most device.standing_torque_nm "
+                f"({limit:g} N·m) where the stretch starts, got {stiffness:g} N·m/rad "
+                f"times {start:g} - {rest:g} deg = {torque:.3g} N·m{at_end}"
+            )
 
 
-def _plan(protocol: Protocol) -> Iterator[str]:
-    # the lines of the analysis plan, and the sections of the report
-    for index, line in enumerate(protocol.analysis.estimates):
-        for problem in _plan_line(line, protocol):
-            yield f"analysis.estimates[{index}].{problem}{_id(line.id)}"
+def _report(protocol: Protocol) -> Iterator[str]:
+    # nothing twice
     report = protocol.report
     yield from _again(report.sections or (), "report.sections", "each section once")
     yield from _again(report.formats, "report.formats", "each format once")
 
 
-def _plan_line(line: EstimatePlan, protocol: Protocol) -> Iterator[str]:
+def _plan(line: EstimatePlan, protocol: Protocol) -> Iterator[str]:
     kind, named = line.kind, line.sessions
     count, phrase = _SESSIONS_NEEDED[kind]
     raters = {session.id: set(session.raters) for session in protocol.sessions}
@@ -678,35 +647,27 @@ def _plan_line(line: EstimatePlan, protocol: Protocol) -> Iterator[str]:
     )
 
 
-def _sample_sizes(protocol: Protocol) -> Iterator[str]:
-    # each of a line of the plan, with shares of its grades
-    lines = [line.id for line in protocol.analysis.estimates]
-    names = [size.estimate for size in protocol.analysis.sample_sizes]
-    known = listed(lines) or "there is none"
-    for index, size in enumerate(protocol.analysis.sample_sizes):
-        where, name = f"analysis.sample_sizes[{index}]", size.estimate
-        yield from _broken(
-            (
-                name not in lines,
-                f"{where}.estimate: needed an estimate of the plan ({known}), got "
-                f"{got(name)}",
-            ),
-            (
-                name in names[:index],
-                f"{where}.estimate: needed each once, got {got(name)} again",
-            ),
-        )
-        for problem in _shares(size, len(protocol.scale.grades)):
-            yield f"{where}.{problem}"
-
-
 _SUM = 1e-6  # by which prevalences may miss 1
 
 
-def _shares(size: SampleSize, n_grades: int) -> Iterator[str]:
+def _sample_size(size: SampleSize, protocol: Protocol) -> Iterator[str]:
+    # of a line of the plan, with shares of its grades
+    lines = [line.id for line in protocol.analysis.estimates]
+    n_grades, known = len(protocol.scale.grades), listed(lines) or "there is none"
+    sizes = protocol.analysis.sample_sizes
+    first = next(each for each in sizes if each.estimate == size.estimate)
     shares, rows = size.prevalences, size.table
     sums = {"prevalences": sum(shares), "table": sum(map(sum, rows))}
     return _broken(
+        (
+            size.estimate not in lines,
+            f"estimate: needed an estimate of the plan ({known}), got "
+            f"{got(size.estimate)}",
+        ),
+        (
+            first is not size,
+            f"estimate: needed each once, got {got(size.estimate)} again",
+        ),
         (
             rows and size.model != "table",
             f'table: needed model = "table", got {got(size.model)}',
@@ -733,37 +694,38 @@ def _shares(size: SampleSize, n_grades: int) -> Iterator[str]:
     )
 
 
-def _gates(protocol: Protocol) -> Iterator[str]:
-    # every gate one, on an estimate of the plan
+def _gate(gate: GateKeys, protocol: Protocol) -> Iterator[str]:
+    # one on an estimate of the plan
     names = [line.id for line in protocol.analysis.estimates]
-    for index, gate in enumerate(protocol.report.gates):
-        if not gate.why.isprintable():  # it stands in a line of a table, and in XML
-            yield (
-                f"report.gates[{index}].why: needed one line without control "
-                f"characters, got {got(gate.why)}"
-            )
-        try:
-            parse_gate(gate.require, names, where=f"report.gates[{index}].require")
-        except ParameterError as error:
-            yield str(error)
+    if not gate.why.isprintable():  # it stands in a line of a table, and in XML
+        yield (f"why: needed one line without control characters, got {got(gate.why)}")
+    try:
+        parse_gate(gate.require, names, where="require")
+    except ParameterError as error:
+        yield str(error)
 
 
-_RULES = (
-    _scale,
-    _ids,
-    _references,
-    _rater_fields,
-    _schedules,
-    _orders,
-    _sites,
-    _comparisons,
-    _soft_stops,
-    _presentation,
-    _occasions,
-    _session_order,
-    _questions,
-    _models,
-    _plan,
-    _sample_sizes,
-    _gates,
+# Arrays of tables whose every entry is held against a rule; None for a rule of all
+_RULES: tuple[tuple[str | None, Callable[..., Iterator[str]]], ...] = (
+    (None, _scale),
+    (None, _ids),
+    ("models", _intended_grade),
+    ("sessions", _session_raters),
+    (None, _rater_fields),
+    ("raters", _rater_values),
+    (None, _schedules),
+    (None, _orders),
+    ("raters", _site),
+    (None, _comparisons),
+    (None, _soft_stops),
+    (None, _presentation),
+    (None, _occasions),
+    ("sessions", _session_order),
+    (None, _questions),
+    (None, _held_torque),
+    ("models", lambda model, protocol: model_rules(model, protocol.elbow)),
+    ("analysis.estimates", _plan),
+    (None, _report),
+    ("analysis.sample_sizes", _sample_size),
+    ("report.gates", _gate),
 )
