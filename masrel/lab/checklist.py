@@ -12,7 +12,7 @@ import hashlib
 import statistics
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import date
 from importlib.resources import files
 from itertools import pairwise
@@ -185,16 +185,21 @@ def _range_of(values: Sequence[float], unit: str) -> str:
 _State = Literal["filled", "in part", "authors"]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _ChecklistItem:
-    """One item of a guideline."""
+_Source = Literal["protocol", "logs", "ratings"]
 
-    number: str  # in the guideline
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Item:
+    """One item of a guideline, as it is asked for and once it is filled."""
+
     topic: str  # what it asks for, in our words
-    state: _State
-    facts: tuple[str, ...] = ()  # what the record says, one sentence or more each
+    # macros of the template, none where nothing is known; then what they say
+    facts: tuple[str, ...] = ()
+    sources: tuple[_Source, ...] = ("protocol",)  # what the facts are from
     to_add: str = ""  # what the authors have to add
-    sources: tuple[Path, ...] = ()  # that say so, from the study's folder
+    number: str = ""  # in the guideline
+    state: _State = "authors"
+    files: tuple[Path, ...] = ()  # that say so, from the study's folder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -205,87 +210,73 @@ class _Checklist:
     title: str
     reference: str  # where it is published
     study: str  # its title
-    items: tuple[_ChecklistItem, ...]
+    items: tuple[_Item, ...]
     notes: tuple[str, ...]  # what a reader must know before the items
     files: Mapping[str, str] = field(hash=False)  # SHA-256 of each that an item names
     masrel_version: str
 
 
-_Source = Literal["protocol", "logs", "ratings"]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Entry:
-    """An item, what fills it, and what only the authors know."""
-
-    topic: str
-    facts: tuple[str, ...] = ()  # macros of the template; none where nothing is known
-    sources: tuple[_Source, ...] = ("protocol",)
-    to_add: str = ""  # beside the facts
-
-
 _GRADE = "Very good, adequate, doubtful or inadequate: the authors grade this."
 
 
-def _standard(topic: str, *facts: str) -> _Entry:
-    sources: tuple[_Source, ...] = ("protocol", "logs")
-    return _Entry(topic=topic, facts=facts, sources=sources, to_add=_GRADE)
+def _standard(topic: str, *facts: str) -> _Item:
+    return _Item(topic=topic, facts=facts, sources=("protocol", "logs"), to_add=_GRADE)
 
 
-_GUIDELINES: dict[str, tuple[str, str, tuple[_Entry, ...]]] = {
+_GUIDELINES: dict[str, tuple[str, str, tuple[_Item, ...]]] = {
     "grras": (
         "Guidelines for Reporting Reliability and Agreement Studies (GRRAS)",
         "Kottner et al. 2011, J Clin Epidemiol 64:96-106, "
         "doi 10.1016/j.jclinepi.2010.03.002",
         (
-            _Entry(topic="Title or abstract names agreement or reliability"),
-            _Entry(
+            _Item(topic="Title or abstract names agreement or reliability"),
+            _Item(
                 topic="Device or scale",
                 facts=("device",),
                 to_add="Why this scale and this device; what is known of both.",
             ),
-            _Entry(topic="Subjects: the population that is of interest"),
-            _Entry(
+            _Item(topic="Subjects: the population that is of interest"),
+            _Item(
                 topic="Raters: the population that is of interest",
                 facts=("raters", "characteristics"),
                 to_add="Whom these raters stand for: profession, experience, training.",
             ),
-            _Entry(topic="What is known already, and why this study is needed"),
-            _Entry(topic="Planned subjects, raters, replicates", facts=("sizes",)),
-            _Entry(
+            _Item(topic="What is known already, and why this study is needed"),
+            _Item(topic="Planned subjects, raters, replicates", facts=("sizes",)),
+            _Item(
                 topic="How subjects and raters were sampled",
                 facts=("sampling",),
                 to_add="How the raters were recruited, and how the models were chosen.",
             ),
-            _Entry(
+            _Item(
                 topic="The process of measurement and rating",
                 facts=("order", "blinding", "stretches", "dates"),
                 sources=("protocol", "logs"),
             ),
-            _Entry(
+            _Item(
                 topic="Whether ratings were independent",
                 facts=("independence",),
                 sources=("logs",),
             ),
-            _Entry(topic="Statistical analysis", facts=("analysis",)),
-            _Entry(
+            _Item(topic="Statistical analysis", facts=("analysis",)),
+            _Item(
                 topic="Actual numbers",
                 facts=("numbers", "remarks"),
                 sources=("ratings",),
             ),
-            _Entry(
+            _Item(
                 topic="Characteristics of raters and subjects",
                 facts=("subjects", "characteristics"),
                 to_add="Characteristics of the raters, as far as the protocol has "
                 "none.",
             ),
-            _Entry(
+            _Item(
                 topic="Estimates with their uncertainty",
                 facts=("estimates",),
                 sources=("ratings",),
             ),
-            _Entry(topic="Relevance for practice"),
-            _Entry(topic="Detailed results", facts=("details",), sources=("ratings",)),
+            _Item(topic="Relevance for practice"),
+            _Item(topic="Detailed results", facts=("details",), sources=("ratings",)),
         ),
     ),
     "cosmin": (
@@ -322,15 +313,15 @@ def fill_checklist(study: StudyPaths, protocol: Protocol, guideline: str) -> _Ch
         raise ParameterError(
             f"guideline: needed one of {', '.join(_GUIDELINES)}, got {guideline!r}"
         )
-    title, reference, entries = _GUIDELINES[guideline]
+    title, reference, asked_for = _GUIDELINES[guideline]
     facts = _gather_facts(study, protocol)
     say = _environment().overlay(finalize=_in_one_line).get_template("facts.txt")
     macros = say.make_module(_words_of(facts, protocol))
     items = tuple(
-        _item(facts, str(number), entry, lambda name: str(getattr(macros, name)()))
-        for number, entry in enumerate(entries, start=1)
+        _filled(facts, str(number), item, lambda name: str(getattr(macros, name)()))
+        for number, item in enumerate(asked_for, start=1)
     )
-    named = sorted({file for item in items for file in item.sources})
+    named = sorted({file for item in items for file in item.files})
     return _Checklist(
         guideline=guideline,
         title=title,
@@ -348,28 +339,25 @@ def fill_checklist(study: StudyPaths, protocol: Protocol, guideline: str) -> _Ch
     )
 
 
-def _item(
-    facts: _StudyFacts, number: str, entry: _Entry, say: Callable[[str], str]
-) -> _ChecklistItem:
-    to_add, names = entry.to_add, entry.facts
-    if "ratings" in entry.sources and facts.ratings is None:
+def _filled(
+    facts: _StudyFacts, number: str, item: _Item, say: Callable[[str], str]
+) -> _Item:
+    to_add, names = item.to_add, item.facts
+    if "ratings" in item.sources and facts.ratings is None:
         to_add, names = "There are no ratings yet.", ()
     elif not names:
         to_add = "For the authors to say."
-    elif "logs" in entry.sources and not (facts.sessions or to_add):
+    elif "logs" in item.sources and not (facts.sessions or to_add):
         to_add = "What no log of a session says."
+    item = replace(item, number=number, facts=(), to_add=to_add)
     if not names:
-        return _ChecklistItem(
-            number=number, topic=entry.topic, state="authors", to_add=to_add
-        )
+        return item
     lines = (line.strip() for name in names for line in say(name).split("\n"))
-    return _ChecklistItem(
-        number=number,
-        topic=entry.topic,
+    return replace(
+        item,
         state="in part" if to_add else "filled",
         facts=tuple(line for line in lines if line),
-        to_add=to_add,
-        sources=tuple(file for key in entry.sources for file in facts.files[key]),
+        files=tuple(file for key in item.sources for file in facts.files[key]),
     )
 
 
@@ -443,11 +431,11 @@ def _summary(checklist: _Checklist) -> str:
     return f"Of {len(checklist.items)} items {', '.join(parts)}."
 
 
-def _numbers(checklist: _Checklist, item: _ChecklistItem) -> str:
+def _numbers(checklist: _Checklist, item: _Item) -> str:
     # of the files an item names, such as "1, 3-24" where they follow each other
     places = list(checklist.files)
     ranges: list[list[int]] = []
-    for place in sorted(places.index(file.as_posix()) + 1 for file in item.sources):
+    for place in sorted(places.index(file.as_posix()) + 1 for file in item.files):
         if ranges and place == ranges[-1][-1] + 1:
             ranges[-1].append(place)
         else:

@@ -119,7 +119,7 @@ def test_of_grras_seven_are_filled_four_in_part_and_four_the_authors(
     numbers = "Session test: 2 raters, 3 models, 6 ratings, 0 missing."
     assert numbers in facts(checklist, "11")
     # every file that is named has its hash
-    named = {file.as_posix() for item in checklist.items for file in item.sources}
+    named = {file.as_posix() for item in checklist.items for file in item.files}
     assert {"protocol.toml", "sessions/retest_R1.jsonl"} < named
     assert checklist.files == {
         name: hashlib.sha256((study.root / name).read_bytes()).hexdigest()
