@@ -8,7 +8,7 @@ import csv
 import io
 import shlex
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
 from operator import itemgetter
 from pathlib import Path
@@ -117,23 +117,21 @@ def session_progress(
 def _progress(
     study: StudyPaths, protocol: Protocol, rater: str, session: str
 ) -> SessionProgress:
-    n_presentations = len(protocol.models) * protocol.schedule.repeats
-    log = study.log_file(rater, session)
+    events, state, problem = _events(study.log_file(rater, session))
     stage: _SessionStage = "not drawn"
-    if study.schedule_file(rater, session).exists():
-        stage = "drawn"
-    events, state, problem = _events(log)
-    if problem is not None and not events:
-        stage = "unreadable"
     if state.header:
         stage = "complete" if state.is_complete else "begun"
+    elif problem is not None and not events:
+        stage = "unreadable"
+    elif study.schedule_file(rater, session).exists():
+        stage = "drawn"
     counts = Counter(event.kind for event in events)
     presented = [event for of_code in state.presented.values() for event in of_code]
     return SessionProgress(
         session=session,
         rater=rater,
         stage=stage,
-        n_presentations=n_presentations,
+        n_presentations=len(protocol.models) * protocol.schedule.repeats,
         n_graded=len(state.grades),
         n_skipped=len(state.skipped),
         n_faults=sum(event.fields["fault"] is not None for event in presented),
@@ -222,38 +220,34 @@ def rater_progress(
         If the log of the study's conduct is damaged.
     """
     values, late = rater_values(study, protocol), _late_raters(study, protocol)
-    excluded = excluded_raters(study)
     withdrawn = {
         event.fields["rater"]
         for event in read_conduct(study)
         if event.kind == "withdrawn"
     }
-    sites = {rater.id: rater.site for rater in protocol.raters}
-    stages: dict[str, set[str]] = {rater.id: set() for rater in protocol.raters}
-    for session in sessions:
-        stages[session.rater].add(session.stage)
+    open_ = {each.rater for each in sessions if each.stage != "complete"}
+    idle = ("drawn", "not drawn")
+    begun = {each.rater for each in sessions if each.stage not in idle}
+    # the last that holds
+    statuses: tuple[tuple[_RaterStatus, Container[object]], ...] = (
+        ("begun", begun),
+        ("complete", begun - open_),
+        ("withdrawn", withdrawn),
+        ("excluded", excluded_raters(study)),
+    )
     return tuple(
         RaterProgress(
-            rater=rater,
-            site=sites[rater],
-            status=(
-                "excluded"
-                if rater in excluded
-                else "withdrawn"
-                if rater in withdrawn
-                else _reached(of_rater)
+            rater=rater.id,
+            site=rater.site,
+            status=next(
+                (status for status, of in reversed(statuses) if rater.id in of),
+                "planned",
             ),
-            is_late=rater in late,
-            values=values[rater],
+            is_late=rater.id in late,
+            values=values[rater.id],
         )
-        for rater, of_rater in stages.items()
+        for rater in protocol.raters
     )
-
-
-def _reached(stages: set[str]) -> _RaterStatus:
-    if stages == {"complete"}:
-        return "complete"
-    return "begun" if stages & {"begun", "complete", "unreadable"} else "planned"
 
 
 def _late_raters(study: StudyPaths, protocol: Protocol) -> set[str]:

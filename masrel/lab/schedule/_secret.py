@@ -232,9 +232,8 @@ class Stream:
 
     def __init__(self, seed: int, *purpose: str, secret: bytes | None = None) -> None:
         name = _named(seed, *purpose)
-        if secret is None:
-            digest = hashlib.sha256(name).digest()
-        else:
+        digest = hashlib.sha256(name).digest()
+        if secret is not None:
             digest = hmac.digest(secret, name, "sha256")
         self._generator = PCG64(0)
         self._generator.state = {

@@ -310,18 +310,40 @@ def read_schedule(path: Path) -> Schedule:
         If there is no such file, or it is not a schedule: the message has every
         problem with file and line.
     """
-    lines = _read_lines(path)
-    n_head = next((i for i, s in enumerate(lines) if not s.startswith("#")), len(lines))
+    try:
+        lines = read_regular(path, most=MAX_SMALL).decode("utf-8").splitlines()
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise ScheduleError(f"{path}: needed a schedule file, got: {reason}") from error
+    except UnicodeDecodeError as error:
+        raise ScheduleError(f"{path}: {not_utf8(error)}") from error
     problem = _format_problem(lines)
     if problem is not None:
         raise ScheduleError(f"{path}: {problem}")
-    problems: list[str] = []
-    head = _read_head(lines[:n_head], path, problems)
-    rows = _read_rows(lines, n_head, path, problems)
+    n_head = next((i for i, s in enumerate(lines) if not s.startswith("#")), len(lines))
+    head = [_head_entry(line) for line in lines[:n_head]]
+    # a cell longer than csv takes is in no schedule
+    table = [line.split(",") if line else [] for line in lines[n_head:]]
+    problems = [*_head_problems(lines, head), *_row_problems(table, n_head)]
     if problems:
-        raise ScheduleError("\n".join(problems))
-    whole: dict[str, Any] = {key: int(head[key]) for key in _WHOLE if key in head}
-    return Schedule(**(head | whole), presentations=tuple(rows))
+        raise ScheduleError("\n".join(f"{path}: {each}" for each in problems))
+    values: dict[str, Any] = {
+        key: int(value) if key in _WHOLE else value
+        for key, value in head
+        if key in _HEAD
+    }
+    return Schedule(
+        **values,
+        presentations=tuple(
+            Presentation(position=int(p), code=code, model=model, repeat=int(repeat))
+            for p, code, model, repeat in table[1:]
+        ),
+    )
+
+
+def _head_entry(line: str) -> tuple[str, str]:
+    key, _, value = line.removeprefix("#").partition(":")
+    return key.strip(), value.strip()
 
 
 def _read_drawn(
@@ -338,69 +360,43 @@ def _read_drawn(
                     raise
 
 
-def _read_lines(path: Path) -> list[str]:
-    try:
-        return read_regular(path, most=MAX_SMALL).decode("utf-8").splitlines()
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise ScheduleError(f"{path}: needed a schedule file, got: {reason}") from error
-    except UnicodeDecodeError as error:
-        raise ScheduleError(f"{path}: {not_utf8(error)}") from error
-
-
 def _format_problem(lines: Sequence[str]) -> str | None:
     return format_problem(csv_format("\n".join(lines)), newest=_FORMAT)
 
 
-def _read_head(lines: list[str], path: Path, problems: list[str]) -> dict[str, str]:
-    head: dict[str, str] = {}
-    for number, line in enumerate(lines, start=1):
-        key, _, value = line.removeprefix("#").partition(":")
-        key, value = key.strip(), value.strip()
+def _head_problems(
+    lines: Sequence[str], head: Sequence[tuple[str, str]]
+) -> Iterator[str]:
+    keys = [key for key, _ in head]
+    for place, (key, value) in enumerate(head):
+        where = f"line {place + 1}"
         if key == "format":
             continue  # it is known
-        if key not in _HEAD or key in head:
-            problems.append(
-                f"{path}: line {number}: needed '# key: value' with each of "
-                f"{', '.join(_HEAD)} once, got {line!r}"
+        if key not in _HEAD or key in keys[:place]:
+            yield (
+                f"{where}: needed '# key: value' with each of {', '.join(_HEAD)} once, "
+                f"got {lines[place]!r}"
             )
         elif not re.fullmatch(_HEAD[key], value):
-            problems.append(
-                f"{path}: line {number}: needed {key} as {_HEAD[key]}, got {value!r}"
-            )
-            head[key] = ""
-        else:
-            head[key] = value
-    absent = [key for key in _HEAD if key not in head and key not in _OPTIONAL]
+            yield f"{where}: needed {key} as {_HEAD[key]}, got {value!r}"
+    absent = [key for key in _HEAD if key not in (*keys, *_OPTIONAL)]
     if absent:
-        problems.append(f"{path}: needed a line '# {absent[0]}: ...', got none")
-    return head
+        yield f"needed a line '# {absent[0]}: ...', got none"
 
 
-def _read_rows(
-    lines: list[str], n_head: int, path: Path, problems: list[str]
-) -> Iterator[Presentation]:
-    # a cell longer than csv takes is in no schedule
-    table = [line.split(",") if line else [] for line in lines[n_head:]]
+def _row_problems(table: Sequence[Sequence[str]], n_head: int) -> Iterator[str]:
     if not table or table[0] != _COLUMNS:
         header = ",".join(table[0]) if table else "nothing"
-        problems.append(
-            f"{path}: line {n_head + 1}: needed columns {','.join(_COLUMNS)}, "
-            f"got {header}"
-        )
-        return iter(())
+        yield f"line {n_head + 1}: needed columns {','.join(_COLUMNS)}, got {header}"
+        return
     if len(table) == 1:
-        problems.append(f"{path}: needed at least one presentation, got none")
+        yield "needed at least one presentation, got none"
     seen: set[str] = set()
     for place, row in enumerate(table[1:], start=1):
         problem = _row_problem(row, place, seen)
         if problem:
-            problems.append(f"{path}: line {n_head + 1 + place}: {problem}")
+            yield f"line {n_head + 1 + place}: {problem}"
         seen.update(row[1:2])
-    return (
-        Presentation(position=int(p), code=code, model=model, repeat=int(repeat))
-        for p, code, model, repeat in table[1:]
-    )
 
 
 def _row_problem(row: Sequence[str], place: int, seen: set[str]) -> str | None:
