@@ -89,18 +89,35 @@ def answers_from_logs(study: StudyPaths, protocol: Protocol) -> tuple[GivenAnswe
     """
     if not protocol.questionnaires:
         return ()
-    begun = {
-        (session, rater): state
+    begun = [
+        (rater, session, read_session(log)[1])
         for rater, session in protocol.rater_sessions
-        if (state := _state_of(study, rater, session)).header
-    }
+        if (log := study.log_file(rater, session)).exists()
+    ]
+    begun = [each for each in begun if each[2].header]
     of_sessions = [
         answer
-        for (session, rater), state in begun.items()
+        for rater, session, state in begun
         for answer in _of_session(study, protocol, session, rater, state)
     ]
-    sources = {rater: str(state.source) for (_, rater), state in begun.items()}
-    return (*of_sessions, *_of_study(study, protocol, sources))
+    # who answers for each rater who has begun
+    sources = {rater: str(state.source) for rater, _, state in begun}
+    of_study = study_answers(study)
+    about_study = [
+        GivenAnswer(
+            session=None,
+            rater=rater,
+            questionnaire=questionnaire.id,
+            question=question.id,
+            model=None,
+            repeat=None,
+            answer=of_study.get(rater, {}).get((questionnaire.id, question.id)),
+            grades_from=source,
+        )
+        for rater, source in sources.items()
+        for questionnaire, question in questions_of(protocol, "study")
+    ]
+    return (*of_sessions, *about_study)
 
 
 def answers_of(
@@ -143,11 +160,6 @@ def answers_of(
     return read_answers(path, protocol) if path.is_file() else ()
 
 
-def _state_of(study: StudyPaths, rater: str, session: str) -> SessionState:
-    log = study.log_file(rater, session)
-    return read_session(log)[1] if log.exists() else SessionState()
-
-
 def _of_session(
     study: StudyPaths, protocol: Protocol, session: str, rater: str, state: SessionState
 ) -> Iterator[GivenAnswer]:
@@ -173,26 +185,6 @@ def _of_session(
             answer=state.answers.get(key),
             grades_from=state.answered_from.get(key, str(state.source)),
         )
-
-
-def _of_study(
-    study: StudyPaths, protocol: Protocol, sources: Mapping[str, str]
-) -> Iterator[GivenAnswer]:
-    # sources: who answers for each rater who has begun
-    answers = study_answers(study)
-    for rater, source in sources.items():
-        for questionnaire, question in questions_of(protocol, "study"):
-            answer = answers.get(rater, {}).get((questionnaire.id, question.id))
-            yield GivenAnswer(
-                session=None,
-                rater=rater,
-                questionnaire=questionnaire.id,
-                question=question.id,
-                model=None,
-                repeat=None,
-                answer=answer,
-                grades_from=source,
-            )
 
 
 def answers_csv(answers: tuple[GivenAnswer, ...]) -> str:

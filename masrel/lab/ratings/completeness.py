@@ -175,10 +175,16 @@ def _of_conduct(study: StudyPaths, include: Collection[str]) -> Iterator[str]:
             continue
         by = f"on {event.time_utc[:10]}{_by_whom(event, include)}."
         if event.kind == "withdrawn":
-            n_graded = _n_graded(study, str(fields["rater"]))
-            counted = "" if fields["rater"] in latest else " and counted"
+            rater = fields["rater"]
+            states = map(_state_of, study.sessions.glob(f"*_{rater}.jsonl"))
+            n_graded = sum(
+                len(state.grades)
+                for state in states
+                if state.header.get("rater") == rater
+            )
+            counted = "" if rater in latest else " and counted"
             yield (
-                f"Rater {fields['rater']} was withdrawn {by} Grades given before, "
+                f"Rater {rater} was withdrawn {by} Grades given before, "
                 f"{n_graded} by the logs, are kept{counted}."
             )
         elif event.kind == "unblinded":
@@ -200,15 +206,6 @@ def _of_unblinding(event: Event, by: str) -> str:
     what = "All codes" if fields["code"] is None else f"Code {fields['code']}"
     verb = "were" if fields["code"] is None else "was"
     return f"{what}{where} {verb} unblinded {by}"
-
-
-def _n_graded(study: StudyPaths, rater: str) -> int:
-    count = 0
-    for log in sorted(study.sessions.glob(f"*_{rater}.jsonl")):
-        state = _state_of(log)
-        if state.header.get("rater") == rater:
-            count += len(state.grades)
-    return count
 
 
 def _of_sessions(

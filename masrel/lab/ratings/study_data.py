@@ -269,17 +269,22 @@ def _rows(
             "grades are no ratings of the study: move it away"
         )
     schedule = _schedule(study, protocol, state, log)
-    _check_codes(schedule, state, log)
-    if check_recordings:
-        for events in state.presented.values():
-            for event in events:
-                _check_recording(study, log, event)
+    presented = [event for events in state.presented.values() for event in events]
+    for event in presented if check_recordings else ():
+        _check_recording(study, log, event)
+    is_simulated = any(event.fields["simulated"] for event in presented)
+    device = str(state.header["device"])
+    if device != "simulated" and is_simulated:
+        device = f"simulated {device}"  # such as an amplifier that is emulated
     of_session = {
         "session": session,
         "rater": rater,
-        "source": "simulated" if _is_simulated(state) else "recorded",
-        "device": _device(state),
+        "source": "simulated"
+        if state.header["simulated"] or is_simulated
+        else "recorded",
+        "device": device,
     }
+    is_on_paper = state.header["grades"] == FROM_PAPER
     for shown in schedule.presentations:
         grade = state.grades.get(shown.code)
         if grade is not None and grade not in protocol.scale.grades:
@@ -296,27 +301,14 @@ def _rows(
             "graded_stretch": state.graded_stretches.get(shown.code),
             "position": shown.position,
             "code": shown.code,
-            "n_attempts": _n_attempts(state, shown.code),
+            # how often a device presented it; of a sheet nobody knows
+            "n_attempts": None
+            if is_on_paper
+            else len(state.presented.get(shown.code, [])),
             "first_grade": state.first_grades.get(shown.code),
             "graded_at": _graded_at(state, shown.code, log),
             **_of_stretches(state.presented.get(shown.code, [])),
         }
-
-
-def _check_codes(schedule: Schedule, state: SessionState, log: Path) -> None:
-    codes = {shown.code for shown in schedule.presentations}
-    for code, events in state.presented.items():
-        if code not in codes:
-            line = f"line {events[0].line}: " if events else ""
-            raise RatingsError(
-                f"{log}: {line}needed a code of the schedule, got {code!r}"
-            )
-
-
-def _n_attempts(state: SessionState, code: str) -> int | None:
-    # how often a device presented it; of a sheet nobody knows
-    is_on_paper = state.header["grades"] == FROM_PAPER
-    return None if is_on_paper else len(state.presented.get(code, []))
 
 
 def _graded_at(state: SessionState, code: str, log: Path) -> str | None:
@@ -344,6 +336,13 @@ def _schedule(
     data = read_regular(path, most=MAX_SMALL)
     if state.header["schedule_sha256"] != hashlib.sha256(data).hexdigest():
         raise RatingsError(f"{log}: was recorded with another schedule than {path}")
+    codes = {shown.code for shown in schedule.presentations}
+    for code, events in state.presented.items():
+        if code not in codes:
+            line = f"line {events[0].line}: " if events else ""
+            raise RatingsError(
+                f"{log}: {line}needed a code of the schedule, got {code!r}"
+            )
     return schedule
 
 
@@ -378,19 +377,3 @@ def _of_stretches(presented: list[Event]) -> dict[str, object]:
         "felt": fields.get("felt"),
         "grip_lost": fields.get("grip_lost"),
     }
-
-
-def _device(state: SessionState) -> str:
-    name = str(state.header["device"])
-    moved = [event for events in state.presented.values() for event in events]
-    if name != "simulated" and any(event.fields["simulated"] for event in moved):
-        return f"simulated {name}"  # such as an amplifier that is emulated
-    return name
-
-
-def _is_simulated(state: SessionState) -> bool:
-    return bool(state.header["simulated"]) or any(
-        event.fields["simulated"]
-        for events in state.presented.values()
-        for event in events
-    )
