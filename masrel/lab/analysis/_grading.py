@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from masrel._input import refuse
 from masrel.errors import RatingsError, UndefinedStatisticWarning
-from masrel.lab.protocol import Protocol, elbow_parameters
+from masrel.lab.elbow.parameters import ElbowParameters
+from masrel.lab.protocol import Protocol, joint_model
 from masrel.lab.ratings import Ratings
 
 if TYPE_CHECKING:
@@ -260,9 +261,10 @@ def _predictor_table(
             continue
         of_model = {m: getattr(selected[m], key) for m in selected}
         if name == "Q":  # one meaning, whichever way a model reads its Q
+            joints = {m: joint_model(protocol, m) for m in selected}
             of_model = {
-                m: None if q is None else elbow_parameters(protocol, m).residual_share
-                for m, q in of_model.items()
+                m: joint.residual_share if isinstance(joint, ElbowParameters) else None
+                for m, joint in joints.items()
             }
         # none of them is any of a model of another kind than the spastic elbow
         values = [of_model[model] for model in table["model"]]

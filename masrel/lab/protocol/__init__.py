@@ -6,7 +6,6 @@ the joint parameters of each model in SI units, and two hashes.
 
 from masrel.lab.protocol.content import (
     Gate,
-    elbow_parameters,
     gates_of,
     joint_model,
     parse_gate,
@@ -71,7 +70,6 @@ __all__ = [
     "StudyPaths",
     "Training",
     "copy_template",
-    "elbow_parameters",
     "gates_of",
     "joint_model",
     "parse_gate",

@@ -48,11 +48,6 @@ class Key:
         return math.radians(value) if self.is_angle else float(value)
 
 
-def kind_names() -> tuple[str, ...]:
-    """Return every kind, the default one first."""
-    return (DEFAULT_KIND, *(kind for kind in MODELS if kind != DEFAULT_KIND))
-
-
 def keys_of(kind: str) -> dict[str, Key]:
     """Return the keys of `[models.parameters]` for a kind; none for the default one."""
     model = MODELS[kind]
@@ -103,10 +98,9 @@ def all_values(kind: str, values: Mapping[str, float]) -> dict[str, float | None
 
 def kind_problem(kind: str) -> str | None:
     """Say what is wrong with the name of a kind; None if nothing is."""
-    names = kind_names()
-    if kind in names:
+    if kind in MODELS:
         return None
-    return f"needed one of {', '.join(names)}, got {got(kind)}{closest(kind, names)}"
+    return f"needed one of {', '.join(MODELS)}, got {got(kind)}{closest(kind, MODELS)}"
 
 
 def value_problems(kind: str, values: Mapping[str, float]) -> Iterator[tuple[str, str]]:

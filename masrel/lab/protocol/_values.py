@@ -2,6 +2,7 @@
 
 import math
 import re
+from contextlib import suppress
 from datetime import date, datetime
 
 from masrel._input import listed
@@ -102,8 +103,9 @@ def field_value(field: RaterField, value: object) -> FieldValue | None:
             return None
         case "date", date():
             return value.isoformat()
-        case "date", str() if _is_day(value):
-            return value
+        case "date", str():
+            with suppress(ValueError):
+                return value if date.fromisoformat(value).isoformat() == value else None
         case "whole", int(number) if abs(number) < _LARGEST:
             return number
         case "number", int(number) | float(number) if abs(number) < _LARGEST:
@@ -122,13 +124,6 @@ def parsed_value(field: RaterField, text: str) -> FieldValue | None:
         return field_value(field, kind(text.strip()))
     except ValueError:
         return None
-
-
-def _is_day(text: str) -> bool:
-    try:
-        return text == date.fromisoformat(text).isoformat()
-    except ValueError:
-        return False
 
 
 def field_heading(name: str, field: RaterField) -> str:

@@ -57,43 +57,14 @@ def joint_model(protocol: Protocol, model_id: str) -> JointModel:
     ParameterError
         If the protocol has no such model; the message names those there are.
     """
-    model = _model_of(protocol, model_id)
+    models = {model.id: model for model in protocol.models}
+    if model_id not in models:
+        known = ", ".join(models)
+        raise ParameterError(f"model: needed one of {known}, got {model_id!r}")
+    model = models[model_id]
     if model.kind == DEFAULT_KIND:
         return _joint_of(model, protocol.elbow)
     return model_of_kind(model.kind, model.parameters)
-
-
-def elbow_parameters(protocol: Protocol, model_id: str) -> ElbowParameters:
-    """Return the joint parameters of one spastic elbow, in SI units.
-
-    Parameters
-    ----------
-    protocol : Protocol
-        A protocol; its angles are degrees.
-    model_id : str
-        Id of one of its models.
-
-    Returns
-    -------
-    ElbowParameters
-        The model's L, H, Q and D and constants, with those of ``[elbow]``
-        for the rest; rad, rad/s, s.
-
-    Raises
-    ------
-    ParameterError
-        If the protocol has no such model, or it is of another kind; the message names
-        those there are.
-    """
-    model = _model_of(protocol, model_id)
-    if model.kind != DEFAULT_KIND:
-        elbows = [m.id for m in protocol.models if m.kind == DEFAULT_KIND]
-        raise ParameterError(
-            f"model: needed one of kind {DEFAULT_KIND!r} "
-            f"({', '.join(elbows) or 'there is none'}), got {model_id!r} of kind "
-            f"{model.kind!r}"
-        )
-    return _joint_of(model, protocol.elbow)
 
 
 def report_sections(protocol: Protocol) -> tuple[str, ...]:
@@ -140,14 +111,6 @@ _STORY = (
     "questionnaires",
     "methods",
 )
-
-
-def _model_of(protocol: Protocol, model_id: str) -> Model:
-    models = {model.id: model for model in protocol.models}
-    if model_id not in models:
-        known = ", ".join(models)
-        raise ParameterError(f"model: needed one of {known}, got {model_id!r}")
-    return models[model_id]
 
 
 def _joint_of(model: Model, shared: ElbowConstants) -> ElbowParameters:

@@ -106,9 +106,18 @@ def _resolve_model_files(raw: dict[str, object], folder: Path) -> Iterator[str]:
         where, read = f"models[{index}]", _read_tables(folder / entry["file"])
         if isinstance(read, str):
             yield f"{where}.file: {read}"
-        else:
-            yield from (f"{where}.{problem}" for problem in _in_both(entry, read))
-            models[index] = _merged(entry, read)
+            continue
+        filed, constants = read.get("model", {}), read.get("constants", {})
+        if "simulated" in read:
+            filed = {**filed, "simulated": read["simulated"]}
+        inline = entry.get("constants", {})
+        both = [key for key in filed if key in entry]
+        if isinstance(inline, Mapping):
+            both += [f"constants.{key}" for key in inline if key in constants]
+            inline = {**constants, **inline}
+        for key in both:
+            yield f"{where}.{key}: needed in {entry['file']} or here, got it in both"
+        models[index] = {**filed, **entry, "constants": inline}
 
 
 def read_model_file(path: Path) -> ElbowParameters:
@@ -169,26 +178,6 @@ def _read_tables(path: Path) -> dict[str, Any] | str:
                 f"{', '.join(foreign)} in {path}"
             )
     return content
-
-
-def _in_both(entry: Mapping[str, Any], read: Mapping[str, Any]) -> Iterator[str]:
-    # what stands in the protocol and in the file that it names
-    inline, keys = entry.get("constants", {}), [*read.get("model", {})]
-    keys += [key for key in ("simulated",) if key in read]
-    both = [key for key in keys if key in entry]
-    if isinstance(inline, Mapping):
-        constants = read.get("constants", {})
-        both += [f"constants.{key}" for key in inline if key in constants]
-    for key in both:
-        yield f"{key}: needed in {entry['file']} or here, got it in both"
-
-
-def _merged(entry: Mapping[str, Any], read: Mapping[str, Any]) -> dict[str, object]:
-    inline = entry.get("constants", {})
-    if isinstance(inline, Mapping):
-        inline = {**read.get("constants", {}), **inline}
-    known = {key: read[key] for key in ("simulated",) if key in read}
-    return {**read.get("model", {}), **known, **entry, "constants": inline}
 
 
 def _spell_out_scale(raw: dict[str, object]) -> Iterator[str]:

@@ -10,7 +10,7 @@ import pytest
 
 from masrel.lab.elbow import STANDARD_MODELS
 from masrel.lab.elbow.identification import Movement
-from masrel.lab.protocol import elbow_parameters, read_protocol
+from masrel.lab.protocol import joint_model, read_protocol
 from tests.cli.process import Caller
 from tests.lab.elbow.identification.synthesis import study
 from tests.lab.elbow.identification.test_friction import backdriven
@@ -58,7 +58,7 @@ def test_a_fit_goes_into_a_protocol(
     protocol = dict(VALID)
     entry = {"id": "S3", "file": "s3.toml"}
     protocol["models"] = [entry, *VALID["models"][1:]]
-    joint = elbow_parameters(read_protocol(write(protocol, tmp_path)), "S3")
+    joint = joint_model(read_protocol(write(protocol, tmp_path)), "S3")
     assert joint.damping == fitted["damping_nms_rad"]
     assert joint.residual_ratio == fitted["residual_ratio"]
     assert joint.catch_slope == pytest.approx(0.35, rel=0.1)

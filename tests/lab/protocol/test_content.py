@@ -5,7 +5,7 @@ from math import radians
 from pathlib import Path
 
 from masrel.lab.elbow.parameters import STANDARD_MODELS, ElbowParameters
-from masrel.lab.protocol import elbow_parameters, read_protocol
+from masrel.lab.protocol import joint_model, read_protocol
 from tests.lab.protocol.documents import changed, write
 
 ELBOW = {
@@ -28,7 +28,7 @@ ELBOW = {
 
 def test_every_constant_is_taken_and_degrees_become_radians(tmp_path: Path) -> None:
     protocol = read_protocol(write(changed("elbow", to=ELBOW), tmp_path))
-    joint = elbow_parameters(protocol, "D1")
+    joint = joint_model(protocol, "D1")
     assert joint == ElbowParameters(
         catch_angle_constant=radians(125.5),
         catch_torque_constant=1.7,
@@ -61,8 +61,8 @@ def test_a_models_own_constants_take_the_place_of_the_shared_ones(
 ) -> None:
     own = {"damping_nms_rad": 0.9, "catch_slope_s": 0.3}
     protocol = read_protocol(write(changed("models", 0, "constants", to=own), tmp_path))
-    first = elbow_parameters(protocol, "HM1")
-    second = elbow_parameters(protocol, "D1")
+    first = joint_model(protocol, "HM1")
+    second = joint_model(protocol, "D1")
     assert (first.damping, first.catch_slope) == (0.9, 0.3)
     assert first.stiffness == second.stiffness
     assert second.damping == protocol.elbow.damping_nms_rad

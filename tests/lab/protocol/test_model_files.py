@@ -10,7 +10,7 @@ import pytest
 from masrel.lab.elbow.identification import as_toml, model_document
 from masrel.lab.elbow.parameters import STANDARD_MODELS
 from masrel.lab.protocol import (
-    elbow_parameters,
+    joint_model,
     presented_hash,
     protocol_hash,
     read_protocol,
@@ -48,7 +48,7 @@ def put(folder: Path, name: str = "s3.toml", **changes: dict[str, object]) -> Pa
 def test_a_named_model_is_the_one_in_the_file(tmp_path: Path) -> None:
     put(tmp_path, constants={"damping_nms_rad": 0.77})
     protocol = read_protocol(write(named(), tmp_path))
-    found = elbow_parameters(protocol, protocol.models[0].id)
+    found = joint_model(protocol, protocol.models[0].id)
     expected = STANDARD_MODELS["HM3"]
     assert found.damping == 0.77
     assert found.catch_torque_constant == expected.catch_torque_constant
@@ -63,10 +63,10 @@ def test_a_file_keeps_the_law_its_numbers_were_fitted_with(tmp_path: Path) -> No
     document = named()
     document["elbow"] = {"residual_reading": "decrease", "post_catch": "additive"}
     protocol = read_protocol(write(document, tmp_path))
-    filed = elbow_parameters(protocol, protocol.models[0].id)
+    filed = joint_model(protocol, protocol.models[0].id)
     assert (filed.residual_reading, filed.post_catch) == ("residual", "continuous")
     assert filed.residual_share == 0.6
-    beside = elbow_parameters(protocol, protocol.models[1].id)
+    beside = joint_model(protocol, protocol.models[1].id)
     assert (beside.residual_reading, beside.post_catch) == ("decrease", "additive")
 
 

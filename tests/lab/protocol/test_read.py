@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from masrel.errors import MasrelError, ProtocolError
-from masrel.lab.protocol import elbow_parameters, read_protocol
+from masrel.lab.protocol import joint_model, read_protocol
 from tests.lab.protocol.documents import (
     VALID,
     changed,
@@ -551,6 +551,6 @@ def test_no_value_anywhere_ends_in_anything_but_a_protocol_or_its_error(
     else:
         # What the file may say, the joint model takes.
         for model in protocol.models:
-            assert elbow_parameters(protocol, model.id).catch_travel > 0
+            assert joint_model(protocol, model.id).catch_travel > 0
         return
     assert problems

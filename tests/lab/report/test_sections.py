@@ -17,7 +17,7 @@ from masrel.errors import MasrelWarning, RecordingError
 from masrel.intervals import diagnose
 from masrel.lab.analysis import analyze
 from masrel.lab.elbow import ConstantSpeed, peak_torque
-from masrel.lab.protocol import Protocol, SampleSize, elbow_parameters, report_sections
+from masrel.lab.protocol import Protocol, SampleSize, joint_model, report_sections
 from masrel.lab.ratings import Ratings, ratings_from_rows
 from masrel.lab.recording import (
     MEASURED_TORQUE,
@@ -332,7 +332,7 @@ def test_constants_of_all_are_told_once(tmp_path: Path) -> None:
 def test_peaks_are_those_of_each_models_law(tmp_path: Path) -> None:
     # R1 stretched HM1 at 122 deg/s from 30 deg to the end of the range, 146 deg.
     motion = ConstantSpeed(start=radians(30), end=radians(146), speed=radians(122))
-    peak = peak_torque(elbow_parameters(hess2012(), "HM1"), motion)
+    peak = peak_torque(joint_model(hess2012(), "HM1"), motion)
     laws = ({}, {"rest_angle_deg": 20.0})
     plain, other = (
         rows_of(written(tmp_path / str(n), with_laws({}, of), table_v()), "peak_torque")

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from masrel.errors import ParameterError
 from masrel.lab.elbow import STANDARD_MODELS, ElbowParameters, intermediate_models
 from masrel.lab.elbow.identification import as_toml, model_document
-from masrel.lab.protocol import elbow_parameters, read_protocol
+from masrel.lab.protocol import joint_model, read_protocol
 
 
 @given(
@@ -81,7 +81,7 @@ def test_the_twelve_dummies_of_the_bundled_study_are_these() -> None:
     made = intermediate_models(STANDARD_MODELS, 12)
     assert list(made) == [f"D{i:02}" for i in range(1, 13)]
     for name, model in made.items():
-        written = elbow_parameters(protocol, name)
+        written = joint_model(protocol, name)
         for field in fields(model):
             expected = getattr(written, field.name)
             if isinstance(expected, float):
