@@ -243,7 +243,10 @@ class SampledJoint:
         elif self.phase == CATCH:
             # (4): t - t_c > D / v̄_c, the angle travelled exceeds D
             if angle - self.catch_angle > self._parameters.catch_travel:
-                self._to_post_catch(angle)
+                self.phase, rest = POST_CATCH, self._pre_catch.origin
+                self._law = post_catch(
+                    self._parameters, self._residual, self._pre_end, angle, rest
+                )
         elif velocity < threshold:  # post-catch ends, Fig. 7
             self._to_pre_catch()
         if self.phase == CATCH:
@@ -281,13 +284,6 @@ class SampledJoint:
             share = onset_share(since / parameters.catch_rise)
             return float(self._pre_end + self._rise * share)
         return self._peak if since < parameters.peak_duration else self._residual
-
-    def _to_post_catch(self, angle: float) -> None:
-        self.phase = POST_CATCH
-        rest = self._pre_catch.origin
-        self._law = post_catch(
-            self._parameters, self._residual, self._pre_end, angle, rest
-        )
 
     def _to_pre_catch(self) -> None:
         self.phase = PRE_CATCH

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from masrel._input import refuse
 from masrel.errors import ParameterError
@@ -271,18 +271,18 @@ def evaluate(
     for rows, p, motion, is_alone in _batches(joints, moves, n, chunk):
         n_alone += is_alone
         if not isinstance(parameters, ElbowParameters) or moves is motions:
-            check_starts(motion.start, p.range_end, rows)
+            check_starts(motion.start, p.range_end, rows.tolist())
         if is_alone:
             values[rows[0]] = _found(p, motion, names)
             continue
         with np.errstate(all="ignore"):  # rows that a formula does not mean
             for i, column in enumerate(_found(p, motion, names)):
-                values[_slice(rows), i] = column
+                values[rows, i] = column
     values.setflags(write=False)
     return SceneTable(outputs=names, values=values, n_alone=n_alone)
 
 
-Rows = Any
+_Rows = NDArray[np.intp]
 _OUTPUTS = EVENTS + LOADS
 
 
@@ -311,28 +311,24 @@ def _batches(
     moves: Sequence[Motion] | Columns,
     n: int,
     chunk: int,
-) -> Iterator[tuple[Rows, ElbowParameters, Motion, bool]]:
+) -> Iterator[tuple[_Rows, ElbowParameters, Motion, bool]]:
     # rows that go through together, and their joint and motion with columns in them
-    places: dict[type, Rows] = {}
-    kinds = {moves.kind} if isinstance(moves, Columns) else set(map(type, moves))
-    if len(kinds) == 1:
-        places[kinds.pop()] = range(n)
-    else:
-        of_each = np.array([id(type(_row(moves, i))) for i in range(n)])
-        places = {kind: np.flatnonzero(of_each == id(kind)) for kind in kinds}
-    for kind, of_kind in places.items():
-        if kind not in _FIELDS or n == 1:
-            for i in of_kind:
-                yield [i], _row(joints, i), _row(moves, i), True
-            continue
-        for first in range(0, len(of_kind), chunk):
-            rows = of_kind[first : first + chunk]
-            motion = _columns_of(moves, kind, rows)
-            for name, column in motion.items():
-                motion[name] = np.broadcast_to(column, len(rows))
-            joint = _columns_of(joints, ElbowParameters, rows)
-            joint, motion = _unchecked(ElbowParameters, joint), _unchecked(kind, motion)
-            yield rows, joint, motion, False
+    kinds = {moves.kind} if isinstance(moves, Columns) else {type(m) for m in moves}
+    for first in range(0, n, chunk):
+        every = np.arange(first, min(first + chunk, n))
+        for kind in kinds:
+            rows = every
+            if len(kinds) > 1:
+                rows = every[[type(_row(moves, i)) is kind for i in every.tolist()]]
+            if kind not in _FIELDS or n == 1:
+                for i in rows.tolist():
+                    yield np.array([i]), _row(joints, i), _row(moves, i), True
+            elif rows.size:
+                columns = _columns_of(moves, kind, rows).items()
+                motion = {name: np.broadcast_to(c, rows.shape) for name, c in columns}
+                joint = _columns_of(joints, ElbowParameters, rows)
+                joint = _unchecked(ElbowParameters, joint)
+                yield rows, joint, _unchecked(kind, motion), False
 
 
 def _unchecked(kind: type, values: dict[str, Any]) -> Any:
@@ -341,10 +337,6 @@ def _unchecked(kind: type, values: dict[str, Any]) -> Any:
     for name, column in values.items():
         object.__setattr__(made, name, column)
     return made
-
-
-def _slice(rows: Rows) -> Any:
-    return slice(rows.start, rows.stop) if isinstance(rows, range) else rows
 
 
 _FIELDS: dict[type, tuple[str, ...]] = {
@@ -371,19 +363,16 @@ _MARGINS: dict[type, Callable[[SimpleNamespace], list[Any]]] = {
 }
 
 
-def _columns_of(items: Any, kind: type, rows: Rows) -> dict[str, Any]:
+def _columns_of(items: Any, kind: type, rows: _Rows) -> dict[str, Any]:
     # fields by name, each a column or one value for all
-    which = _slice(rows) if len(items) > 1 else slice(None)
+    which = rows if len(items) > 1 else np.zeros(1, dtype=np.intp)
     if isinstance(items, Columns):
         fields_of = {
             name: column[which] if isinstance(column, np.ndarray) else column
             for name, column in items.columns.items()
         }
         return _DEFAULTS[kind] | fields_of
-    if isinstance(which, np.ndarray):
-        chosen = [items[i] for i in which.tolist()]
-    else:
-        chosen = items[which]
+    chosen = [items[i] for i in which.tolist()]
     columns: dict[str, Any] = {}
     for name in _FIELDS[kind]:
         values = list(map(attrgetter(name), chosen))

@@ -386,18 +386,14 @@ def segment_torque(segment: TorqueSegment, motion: Motion, at: Floats) -> Floats
     return np.asarray(values)
 
 
-class Section(NamedTuple):
-    """What a law and a piece of the motion, or a column of either, have in common."""
-
-    length: Number  # s; 0 or less where nothing
-    angle: Polynomial  # rad, over s since the section began
-    torque: Polynomial  # N·m
-
-
 def sections(
     line: Timeline, motion: Motion, laid: list[TorqueSegment]
-) -> Iterator[Section]:
-    """Cut laws where the motion's polynomial changes, the last first."""
+) -> Iterator[tuple[Number, Polynomial, Polynomial]]:
+    """Cut laws where the motion's polynomial changes, the last first.
+
+    Yields what a law and a piece, or a column of either, have in common: how long, s, 0
+    or less where nothing, and angle, rad, and torque, N·m, over s since it began.
+    """
     pieces: list[Any] = [piece[:3] for piece in line.pieces]
     for begun, ended, law in reversed(laid):
         if len(line.pieces) > _MANY:
@@ -406,7 +402,7 @@ def sections(
             low, high = greatest(begun - start, 0.0), least(ended - start, length)
             if some(high > low):
                 part = shifted(angle, low)
-                yield Section(high - low, part, law.along(part, start + low - begun))
+                yield high - low, part, law.along(part, start + low - begun)
 
 
 def _column_of_pieces(
