@@ -24,7 +24,6 @@ from masrel.lab.elbow._torque import (
     work,
 )
 from masrel.lab.elbow.joint_model import Stepper
-from masrel.lab.elbow.laws import MODELS, JointModel, Tardieu, tardieu
 from masrel.lab.elbow.motions import (
     ConstantSpeed,
     Hold,
@@ -38,6 +37,7 @@ from masrel.lab.elbow.motions import (
     interrupted,
 )
 from masrel.lab.elbow.parameters import STANDARD_MODELS, ElbowParameters
+from masrel.lab.elbow.tone import MODELS, JointModel, Tardieu, tardieu
 
 if TYPE_CHECKING:
     from masrel.lab.elbow.identification import fit, fit_friction, read_movement

@@ -35,9 +35,9 @@ from masrel.lab.elbow._polynomials import (
     some,
     value,
 )
-from masrel.lab.elbow.laws import JointModel
 from masrel.lab.elbow.motions import Floats, Motion
 from masrel.lab.elbow.parameters import ElbowParameters
+from masrel.lab.elbow.tone import JointModel
 
 __all__ = [
     "Outline",

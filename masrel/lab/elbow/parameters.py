@@ -185,9 +185,8 @@ class ElbowParameters(Law):
             + self.post_catch_stiffness * climb,
         )
 
-    def largest_slope(self, *, speed: float) -> tuple[float, float]:
+    def largest_slope(self, *, speed: float) -> tuple[float, float]:  # noqa: ARG002 - as all
         """Return the largest slopes, over angle and velocity, where nothing jumps."""
-        del speed
         after = self.post_catch_stiffness
         if self.post_catch == "additive":
             after += self.stiffness

@@ -1,5 +1,7 @@
 """Other tone: laws of the joint besides the paper's spastic elbow; SI units inside.
 
+Also all of them by name, and the Tardieu scale's angles of any.
+
 Each is a frozen dataclass of its parameters with its law, `_law`: the torque of an
 angle, a velocity, the rest angle, and what the joint remembers. What that is at a time
 of a motion says `_memory`; what it is at a sample, `_sampled`, which keeps in between
@@ -15,7 +17,9 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from masrel._input import refuse
 from masrel.errors import ParameterError
+from masrel.lab.elbow._events import events
 from masrel.lab.elbow._law import CATCH, POST_CATCH, PRE_CATCH
 from masrel.lab.elbow._polynomials import Polynomial
 from masrel.lab.elbow.joint_model import (
@@ -27,6 +31,7 @@ from masrel.lab.elbow.joint_model import (
     quantity,
 )
 from masrel.lab.elbow.motions import (
+    ConstantSpeed,
     Floats,
     Motion,
     OneWay,
@@ -35,6 +40,7 @@ from masrel.lab.elbow.motions import (
     one_way,
     spans,
 )
+from masrel.lab.elbow.parameters import ElbowParameters
 
 __all__ = [
     "ClaspKnife",
@@ -59,6 +65,7 @@ _BY_UPDRS = {
 }
 _MAS = {"0": 0.0, "1": 1.0, "1+": 1.5, "2": 2.0, "3": 3.0, "4": 4.0}
 _FADE_S = {"3": 2.0, "4": 0.0}
+_TARDIEU_SPEEDS = (math.radians(10.0), math.radians(100.0), math.radians(150.0))
 _FULL_RANGE = math.radians(146.0)
 _SHORTENED_DEG = {"1": 10.0, "2": 20.0, "3": 30.0, "4": 40.0}
 # A stretch that goes on so far beyond θ_e meets about 10 N·m: as far as a hand goes.
@@ -136,9 +143,8 @@ class LeadPipe(ToneModel):
         off = max(abs(start_angle - self.rest_angle), self.range_end - self.rest_angle)
         return self.stiffness * off + self.damping * speed + self.coulomb_torque
 
-    def largest_slope(self, *, speed: float) -> tuple[float, float]:
+    def largest_slope(self, *, speed: float) -> tuple[float, float]:  # noqa: ARG002 - as all
         """Return the largest slopes, over angle and velocity: a bristle that sticks."""
-        del speed
         return self.stiffness + self.coulomb_torque / self.bristle_travel, self.damping
 
     def _law(self, angle: float, velocity: float, rest: float, *memory: float) -> float:
@@ -402,9 +408,8 @@ class ClaspKnife(ToneModel):
         off = max(abs(start_angle - rest), abs(self.range_end - rest))
         return self.passive_stiffness * off + self._reflex(self.range_end, speed)
 
-    def largest_slope(self, *, speed: float) -> tuple[float, float]:
+    def largest_slope(self, *, speed: float) -> tuple[float, float]:  # noqa: ARG002 - as all
         """Return the largest slopes, over angle and velocity: before the release."""
-        del speed
         reflex = self.reflex_stiffness
         return self.passive_stiffness + reflex, reflex * self.threshold_slope
 
@@ -560,9 +565,8 @@ class Contracture(ToneModel):
         ends = [abs(self._law(at, 0.0, rest)) for at in (start_angle, self.range_end)]
         return max(ends) + self.damping * speed
 
-    def largest_slope(self, *, speed: float) -> tuple[float, float]:
+    def largest_slope(self, *, speed: float) -> tuple[float, float]:  # noqa: ARG002 - as all
         """Return the largest slopes, over angle and velocity: those at `range_end`."""
-        del speed
         beyond = min(self.range_end, self.cap_angle) - self.end_angle
         steep = self.end_torque * self.end_steepness
         return self.stiffness + steep * math.exp(
@@ -645,9 +649,8 @@ class Dystonia(ToneModel):
         off = max(abs(end - self.posture_angle) for end in ends)
         return self.stiffness * off + self.damping * speed
 
-    def largest_slope(self, *, speed: float) -> tuple[float, float]:
+    def largest_slope(self, *, speed: float) -> tuple[float, float]:  # noqa: ARG002 - as all
         """Return the largest slopes, over angle and velocity: at full activation."""
-        del speed
         return self.stiffness, self.damping
 
     def _activation(self, since: float) -> float:
@@ -759,14 +762,12 @@ class Clonus(ToneModel):
         """Return clonus of Tardieu's quality 3, which fades, or 4: choices of ours."""
         return cls(fade_time=grade_of(_FADE_S, quality, "quality"))
 
-    def largest_torque(self, *, start_angle: float, speed: float) -> float:
+    def largest_torque(self, *, start_angle: float, speed: float) -> float:  # noqa: ARG002 - as all
         """Return the largest torque of a stretch and the way back, N·m."""
-        del start_angle, speed
         return self.base_torque + self.beat_torque
 
-    def largest_slope(self, *, speed: float) -> tuple[float, float]:
+    def largest_slope(self, *, speed: float) -> tuple[float, float]:  # noqa: ARG002 - as all
         """Return the largest slopes, over angle and velocity: it changes in time."""
-        del speed
         return 0.0, 0.0
 
     def _law(
@@ -990,7 +991,11 @@ class ThresholdReflex(ToneModel):
         return [np.array([self._reflex(*sample) for sample in samples])]
 
 
-LAWS: tuple[type[ToneModel], ...] = (
+JointModel = ElbowParameters | ToneModel
+"""A law of the joint with its parameters, in SI units."""
+
+_LAWS: tuple[type[JointModel], ...] = (
+    ElbowParameters,
     LeadPipe,
     Cogwheel,
     ClaspKnife,
@@ -999,3 +1004,119 @@ LAWS: tuple[type[ToneModel], ...] = (
     Clonus,
     ThresholdReflex,
 )
+
+MODELS: dict[str, type[JointModel]] = {law.kind: law for law in _LAWS}
+"""Every law by the name of its kind; `kind = "..."` of a protocol file."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tardieu:
+    """What three stretches of a joint at constant speed show.
+
+    Attributes
+    ----------
+    speeds : tuple of three floats
+        V1, V2 and V3, rad/s.
+    catch_angles : tuple of three floats or None
+        Where the joint catches at V1, V2 and V3, rad; None where it does not.
+    range_angle : float
+        R2, rad: how far the joint goes at V1, the end of its range of motion.
+
+    References
+    ----------
+    .. [1] Boyd, R. N. and Graham, H. K. (1999). Objective measurement of clinical
+       findings in the use of botulinum toxin type A for the management of children
+       with cerebral palsy. European Journal of Neurology, 6(S4), S23-S35.
+       https://doi.org/10.1111/j.1468-1331.1999.tb00031.x
+    """
+
+    speeds: tuple[float, float, float]
+    catch_angles: tuple[float | None, float | None, float | None]
+    range_angle: float
+
+    @property
+    def catch_angle(self) -> float:
+        """R1, rad: where the joint catches at V3, or R2 where nothing catches."""
+        caught = self.catch_angles[2]
+        return self.range_angle if caught is None else caught
+
+    @property
+    def difference(self) -> float:
+        """R2 - R1, rad: large for what depends on the speed, 0 for a contracture."""
+        return self.range_angle - self.catch_angle
+
+
+def tardieu(
+    model: JointModel,
+    *,
+    start_angle: float = math.radians(30.0),
+    speeds: tuple[float, float, float] = _TARDIEU_SPEEDS,
+) -> Tardieu:
+    """Stretch a joint at three speeds, and say where it catches.
+
+    The catch is where the phase "catch" begins, a root of the motion: nothing is
+    stepped.
+
+    Parameters
+    ----------
+    model : JointModel
+        The joint, one of `MODELS`.
+    start_angle : float, optional
+        Where each stretch starts, rad.
+    speeds : tuple of three floats, optional
+        V1 (as slow as possible), V2 (a limb that falls) and V3 (as fast as possible),
+        rad/s, each faster than the one before. The defaults, 10, 100 and 150 deg/s,
+        are choices of ours: a forearm that falls is faster than a device may be.
+
+    Returns
+    -------
+    Tardieu
+        R1, R2 and the catch at each speed.
+
+    Raises
+    ------
+    ParameterError
+        If the speeds are not above 0 and in order, the stretch starts at or beyond
+        the end of range, or the model offers no exact events.
+
+    Examples
+    --------
+    >>> from math import degrees
+    >>> from masrel.lab.elbow import STANDARD_MODELS
+    >>> result = tardieu(STANDARD_MODELS["HM1"])
+    >>> round(degrees(result.catch_angle), 6), round(degrees(result.difference), 6)
+    (77.5, 68.5)
+    """
+    slow, falling, fast = speeds
+    refuse(
+        (
+            not 0.0 < slow < falling < fast < math.inf,
+            "speeds: need three above 0 deg/s, each faster than the one before, got "
+            + ", ".join(f"{math.degrees(speed):g}" for speed in speeds),
+        ),
+        (
+            not 0.0 <= start_angle < model.range_end,
+            f"start_angle: needs 0 to less than {math.degrees(model.range_end):g} "
+            f"degrees, the end of range, got {math.degrees(start_angle):g} degrees",
+        ),
+    )
+    first, second, third = (_caught(model, start_angle, speed) for speed in speeds)
+    return Tardieu(
+        speeds=speeds,
+        catch_angles=(first, second, third),
+        range_angle=model.range_end,
+    )
+
+
+def _caught(model: JointModel, start: float, speed: float) -> float | None:
+    stretch = ConstantSpeed(start=start, end=model.range_end, speed=speed)
+    if isinstance(model, ElbowParameters):
+        return events(model, stretch).catch_angle
+    if not isinstance(model, ToneModel):
+        raise ParameterError(
+            f"model: needs one with exact events, got {type(model).__name__}"
+        )
+    for event in model.events(stretch):
+        if event.name == model.catch_event:
+            return event.angle
+    return None

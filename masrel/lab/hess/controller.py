@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 from masrel.errors import LimitExceededError, ParameterError
-from masrel.lab.elbow.laws import JointModel
 from masrel.lab.elbow.parameters import ElbowParameters
+from masrel.lab.elbow.tone import JointModel
 from masrel.lab.hess._signals import CUTOFF_RAD_S, raised_cosine
 from masrel.lab.hess.limits import _check_not_negative, _check_positive
 from masrel.lab.recording import PHASES

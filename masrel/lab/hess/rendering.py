@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from masrel.lab.elbow._torque import _stepped
-from masrel.lab.elbow.laws import JointModel
 from masrel.lab.elbow.motions import Motion
+from masrel.lab.elbow.tone import JointModel
 from masrel.lab.hess._clock import SimulatedClock
 from masrel.lab.hess._recorder import Presented
 from masrel.lab.hess._signals import passive_damping

@@ -10,9 +10,8 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from masrel.errors import ParameterError
-from masrel.lab.elbow.laws import MODELS, JointModel
 from masrel.lab.elbow.parameters import ElbowParameters
-from masrel.lab.elbow.tone import ToneModel
+from masrel.lab.elbow.tone import MODELS, JointModel, ToneModel
 from masrel.lab.protocol._decode import closest, got
 
 DEFAULT_KIND = ElbowParameters.kind

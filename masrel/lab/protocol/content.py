@@ -13,8 +13,8 @@ import msgspec
 from masrel._input import listed
 from masrel.errors import ParameterError
 from masrel.lab._study_files import once
-from masrel.lab.elbow.laws import JointModel
 from masrel.lab.elbow.parameters import ElbowParameters
+from masrel.lab.elbow.tone import JointModel
 from masrel.lab.protocol._kinds import DEFAULT_KIND, model_of_kind, without_defaults
 from masrel.lab.protocol.definition import ElbowConstants, Model, Protocol
 from masrel.scales import Scale

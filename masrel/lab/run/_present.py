@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from masrel.lab.elbow import JointModel
-from masrel.lab.elbow.laws import _caught
+from masrel.lab.elbow.tone import _caught
 from masrel.lab.hess import (
     Clock,
     DeviceLimits,
