@@ -71,7 +71,7 @@ class _MotionOptions:
     end: float | None
     acceleration: float | None  # of a trapezoid, deg/s²
     recording: Path | None  # the file of a recording
-    interpolation: str | None  # of a recording
+    interpolation: "Interpolation | None"  # of a recording
     # stop, pause: when it is stopped and for how long, s
     stop: float | None
     pause: float | None
@@ -306,21 +306,22 @@ def _motion_of(
 
     if stretch.recording is not None:
         once = _recorded(stretch.recording, stretch.interpolation, speed_deg_s)
-        return _stopped_and_repeated(stretch, once)
-    if speed_deg_s is None:
+    elif speed_deg_s is None:
         raise ParameterError(
             f"--speed-deg-s: needs a speed for --motion {stretch.kind}"
         )
-    kind, speed = _STRETCHES[stretch.kind]
-    degrees = {"start": start_deg, "end": end_deg, speed: speed_deg_s}
-    if stretch.acceleration is not None:
-        degrees["acceleration_rate"] = stretch.acceleration
-    values = {name: math.radians(value) for name, value in degrees.items()}
-    return _stopped_and_repeated(stretch, getattr(elbow, kind)(**values))
+    else:
+        kind, speed = _STRETCHES[stretch.kind]
+        degrees = {"start": start_deg, "end": end_deg, speed: speed_deg_s}
+        if stretch.acceleration is not None:
+            degrees["acceleration_rate"] = stretch.acceleration
+        values = {name: math.radians(value) for name, value in degrees.items()}
+        once = getattr(elbow, kind)(**values)
+    return _stopped_and_repeated(stretch, once)
 
 
 def _recorded(
-    file: Path, interpolation: str | None, speed_deg_s: float | None
+    file: Path, interpolation: "Interpolation | None", speed_deg_s: float | None
 ) -> "Motion":
     from masrel.lab.elbow import Recorded
     from masrel.lab.elbow.identification._reading import read_angles
@@ -330,9 +331,8 @@ def _recorded(
     if file.suffix.lower() == ".json":  # beside the columns
         file = file.with_suffix(".npz")
     time, angle = read_angles(file)
-    between: Interpolation = "linear" if interpolation == "linear" else "pchip"
     try:
-        return Recorded(time=time, angle=angle, interpolation=between)
+        return Recorded(time=time, angle=angle, interpolation=interpolation or "pchip")
     except ParameterError as error:
         raise ParameterError(f"{file}: {error}") from error
 

@@ -46,15 +46,19 @@ where most of many are: "time", and the ends of "angle", deg, and of "torque".""
 
 View = Literal["time", "angle", "small"]
 
+_ROWS: dict[View, tuple[Against, ...]] = {
+    "time": ("torque", "angle"),
+    "angle": ("torque over angle",),
+    "small": ("torque",),
+}
+
 
 def trace_figure(panels: Sequence[TracePanel], view: View) -> Figure:
     """Return torque and angle against time, torque against angle, or torque alone."""
-    rows: tuple[Against, ...] = ("torque over angle",)
+    rows = _ROWS[view]
     if view == "small":
         figure, grid = _small_panels(panels)
     else:
-        if view == "time":
-            rows = ("torque", "angle")
         figure, grid = _grid(len(panels), len(rows))
         for column, panel in zip(grid.T, panels, strict=True):
             for axes, quantity in zip(column, rows, strict=True):
@@ -63,7 +67,7 @@ def trace_figure(panels: Sequence[TracePanel], view: View) -> Figure:
         _finish(figure, grid, "model torque (N·m)")
     for axes, (_, lines, _, names, _) in zip(grid.flat, panels, strict=False):
         if names:
-            name_traces(axes, lines, "torque" if view == "small" else rows[0], names)
+            name_traces(axes, lines, rows[0], names)
     handles: list[Any] = phase_handles([of for panel in panels for of in panel[1]])
     if any(band is not None for *_, band in panels):
         handles += [Patch(facecolor=of, label=name) for name, of in _BAND.items()]
@@ -179,9 +183,14 @@ def catch_figure(curves: Sequence[Catches]) -> Figure:
     angle, duration, travel = figure.subplots(1, 3)
     for curve, (colour, marker) in zip(curves, _MARKERS, strict=False):
         label, mean, angles, during, durations, clamps = curve
-        look: dict[str, Any] = {"color": colour, "linewidth": 1.0, "label": label}
-        look |= {"marker": marker, "markersize": 3.2}
-        look["markevery"] = max(1, mean.size // 8)
+        look: dict[str, Any] = {
+            "color": colour,
+            "linewidth": 1.0,
+            "label": label,
+            "marker": marker,
+            "markersize": 3.2,
+            "markevery": max(1, mean.size // 8),
+        }
         angle.plot(mean, angles, **look)
         duration.plot(during, durations, **look)
         travel.plot(during, durations * during, **look)

@@ -5,8 +5,9 @@ Measured torque stands beside the torque that was sent where recordings have it.
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Literal
@@ -18,6 +19,7 @@ from masrel.lab.analysis import Speed, SpeedSummary
 from masrel.lab.elbow import (
     ConstantSpeed,
     ElbowParameters,
+    JointModel,
     Outline,
     Trace,
     evaluate,
@@ -25,7 +27,6 @@ from masrel.lab.elbow import (
     trace,
 )
 from masrel.lab.protocol import Model, Protocol, joint_model
-from masrel.lab.protocol._kinds import DEFAULT_KIND
 from masrel.lab.recording import MEASURED_TORQUE, Recording, read_recording, stretches
 from masrel.lab.report._material import (
     FIGURES,
@@ -162,6 +163,7 @@ class TracedModel:
     """A model at the speeds of the raters."""
 
     id: str
+    joint: JointModel
     title: str  # the model, its intended grade, and the range of speeds
     speeds: Sequence[Speed]
     peaks: Sequence[float]  # largest torque at each speed, N·m
@@ -232,31 +234,28 @@ def _traced(
 ) -> TracedModel:
     # at constant speed over the whole range
     joint = joint_model(protocol, model.id)
-    start, rate_hz = math.radians(protocol.stretch.start_deg), protocol.device.rate_hz
+    start = math.radians(protocol.stretch.start_deg)
     end = min(math.radians(end_deg), joint.range_end)
 
-    def motions(speeds_deg_s: Sequence[float]) -> list[ConstantSpeed]:
-        speeds = map(math.radians, speeds_deg_s)
-        return [ConstantSpeed(start=start, end=end, speed=speed) for speed in speeds]
-
-    def lines(speeds_deg_s: Sequence[float]) -> list[_Line]:
-        made = motions(speeds_deg_s)
-        if isinstance(joint, ElbowParameters):
-            return [outline(joint, motion, n_points=_N_POINTS) for motion in made]
-        return [trace(joint, motion, rate_hz=rate_hz) for motion in made]
+    def stretch(deg_s: float) -> ConstantSpeed:
+        return ConstantSpeed(start=start, end=end, speed=math.radians(deg_s))
 
     known = [speed.mean_speed_deg_s for speed in speeds]
+    line_of: Callable[[ConstantSpeed], _Line]
+    if isinstance(joint, ElbowParameters):
+        line_of = partial(outline, joint, n_points=_N_POINTS)
+        outputs = evaluate(joint, [*map(stretch, known)], ["peak_torque"])
+        peaks = outputs.column("peak_torque").tolist()
+    else:
+        line_of = partial(trace, joint, rate_hz=protocol.device.rate_hz)
+        peaks = [float(line_of(stretch(deg_s)).torque.max()) for deg_s in known]
     shown, band = list(range(len(known))), None
     if len(known) > MANY_STRETCHES:
         ranks = at_ranks(known)
         shown = [ranks[name] for name in ("lowest", "median", "highest")]
         steps = (np.arange(_N_IN_BAND) + 0.5) / _N_IN_BAND
-        band = _band(lines(np.quantile(known, steps).tolist()))
-    if isinstance(joint, ElbowParameters):
-        outputs = evaluate(joint, motions(known), ["peak_torque"])
-        peaks = outputs.column("peak_torque").tolist()
-    else:
-        peaks = [float(line.torque.max()) for line in lines(known)]
+        quantiles = np.quantile(known, steps).tolist()
+        band = _band([line_of(stretch(deg_s)) for deg_s in quantiles])
     digits = _whole_or_tenths(known)
     grade = ""
     if model.intended_grade is not None:
@@ -264,11 +263,12 @@ def _traced(
     ends = f"{number(min(known), digits)} to {number(max(known), digits)} deg/s"
     return TracedModel(
         id=model.id,
+        joint=joint,
         title=f"{model.id}{grade}\n{ends}",
         speeds=speeds,
         peaks=peaks,
         shown=[speeds[i] for i in shown],
-        lines=lines([known[i] for i in shown]),
+        lines=[line_of(stretch(known[i])) for i in shown],
         band=band,
     )
 
@@ -281,18 +281,21 @@ def _band(lines: Sequence[_Line]) -> dict[str, _Floats]:
     under_way = time <= ends[:, np.newaxis]  # (n_lines, n_points)
     n_under_way = under_way.sum(axis=0)
     band = {"time": time}
-    for name in ("angle", "torque"):
-        known = [np.interp(time, line.time, _column(line, name)) for line in lines]
+    columns = {
+        "angle": [np.degrees(line.angle) for line in lines],
+        "torque": [line.torque for line in lines],
+    }
+    for name, column in columns.items():
+        known = [
+            np.interp(time, line.time, values)
+            for line, values in zip(lines, column, strict=True)
+        ]
         ordered = np.sort(np.where(under_way, np.stack(known), np.inf), axis=0)
         band[name] = np.empty((len(_BAND_SHARES), time.size))
         for n in np.unique(n_under_way):
             of_n = n_under_way == n
             band[name][:, of_n] = np.quantile(ordered[:n, of_n], _BAND_SHARES, axis=0)
     return band
-
-
-def _column(line: _Line, name: str) -> _Floats:
-    return np.degrees(line.angle) if name == "angle" else line.torque
 
 
 def _traces_drawing(
@@ -303,7 +306,7 @@ def _traces_drawing(
         "Torque rises slowly, jumps at the catch, falls to a residual, and rises again "
         "after the catch; the"
     )
-    if _of_other_kinds(material, models):
+    if not all(isinstance(model.joint, ElbowParameters) for model in models):
         shape = "The"
     what = "Torque and angle" if has_angle else "Torque"
     panels = tuple(
@@ -357,11 +360,6 @@ _PHASE_LOOKS = (
 )
 
 
-def _of_other_kinds(material: Material, models: Sequence[TracedModel]) -> list[str]:
-    others = {m.id for m in material.protocol.models if m.kind != DEFAULT_KIND}
-    return [model.id for model in models if model.id in others]
-
-
 def _peak_table(
     material: Material, models: Sequence[TracedModel], session: str
 ) -> Table:
@@ -377,7 +375,7 @@ def _peak_table(
         "The largest torque of all phases, be it in the catch or at the end of the "
         "stretch, computed from the exact events of the motion, not from the samples."
     ]
-    if others := _of_other_kinds(material, models):
+    if others := [m.id for m in models if not isinstance(m.joint, ElbowParameters)]:
         notes.append(f"Of {', '.join(others)} it is the largest sample.")
     if _has_many(made):
         notes.append("Of several stretches the largest peak is given.")

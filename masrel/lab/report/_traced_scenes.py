@@ -205,13 +205,12 @@ def _torques(
 
 def scene_text(document: dict[str, Any], title: str) -> str:
     """Return the document of one scene for a person."""
+    columns = (("start_s", 3), ("end_s", 3), ("start_deg", 2), ("end_deg", 2))
     rows = [["phase", "start s", "end s", "start deg", "end deg"]]
-    for span in document["phases"]:
-        times = [fixed_or_significant(span[key], 3) for key in ("start_s", "end_s")]
-        angles = [
-            fixed_or_significant(span[key], 2) for key in ("start_deg", "end_deg")
-        ]
-        rows.append([span["name"], *times, *angles])
+    rows += [
+        [span["name"], *(fixed_or_significant(span[key], n) for key, n in columns)]
+        for span in document["phases"]
+    ]
     lines = [title]
     for name, *cells in rows:
         # as wide as an ordinary stretch needs; a long number keeps its distance
