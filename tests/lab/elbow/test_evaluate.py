@@ -22,18 +22,19 @@ from masrel.lab.elbow import (
     residual_torque,
     work,
 )
-from masrel.lab.elbow._scenes import EVENTS, LOADS
 from tests.lab.elbow.scenes import KINDS, random_scene
 from tests.lab.elbow.stretches import constant
 
 HM3 = STANDARD_MODELS["HM3"]
 ANGLES = ("catch_angle", "catch_speed", "mean_speed")
+EVENTS = ("onset", "catch", *ANGLES, "peak_end", "catch_end", "post_catch_end", "end")
 FUNCTIONS = {
     "peak_torque": peak_torque,
     "residual_torque": residual_torque,
     "work": work,
     "impulse": impulse,
 }
+LOADS = tuple(FUNCTIONS)
 
 
 def drawn(

@@ -9,7 +9,6 @@ import pytest
 from masrel.errors import ParameterError
 from masrel.lab.elbow import (
     STANDARD_MODELS,
-    ElbowParameters,
     Hold,
     Joined,
     Motion,
@@ -19,13 +18,13 @@ from masrel.lab.elbow import (
     torque,
     trace,
 )
-from masrel.lab.elbow._law import CATCH, POST_CATCH, PRE_CATCH
 from masrel.lab.recording import PHASES
 from tests.lab.elbow.scenes import KINDS, random_scene
 from tests.lab.elbow.stretches import constant, minimum_jerk
 from tests.lab.elbow.tone.joints import stepped
 
 HM3 = STANDARD_MODELS["HM3"]
+PRE_CATCH, CATCH, POST_CATCH = range(len(PHASES))
 
 
 def move(joint: SampledJoint, angle_deg: float, speed_deg_s: float, time: float) -> int:
@@ -144,16 +143,12 @@ def test_a_trace_equals_stepping_sample_by_sample_bit_for_bit(
     scenes = [random_scene(rng, kind, wide=False) for _ in range(20)]
     for joint, motion in scenes:
         if motion.start < joint.range_end:
-            hold_to_steps(joint, motion, rate_hz)
-
-
-def hold_to_steps(joint: ElbowParameters, motion: Motion, rate_hz: float) -> None:
-    made = trace(joint, motion, rate_hz=rate_hz)
-    times, torque, phase = stepped(joint, motion, rate_hz)
-    n = min(made.time.size, times.size)  # it is cut at the end of range
-    assert n >= made.time.size - 1
-    np.testing.assert_array_equal(made.torque[:n], torque[:n])
-    np.testing.assert_array_equal(made.phase[:n], phase[:n])
+            made = trace(joint, motion, rate_hz=rate_hz)
+            times, torque, phase = stepped(joint, motion, rate_hz)
+            n = min(made.time.size, times.size)  # it is cut at the end of range
+            assert n >= made.time.size - 1
+            np.testing.assert_array_equal(made.torque[:n], torque[:n])
+            np.testing.assert_array_equal(made.phase[:n], phase[:n])
 
 
 def test_a_trace_is_cut_at_the_end_of_range() -> None:

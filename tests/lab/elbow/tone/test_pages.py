@@ -1,4 +1,4 @@
-"""The tables of the pages say of each parameter what the code says of it."""
+"""The tables of the pages say what the code says, and every law has a figure."""
 
 import dataclasses
 import re
@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from docs.make.tone import FIGURES, SCENES
 from masrel.lab.elbow import MODELS
 from masrel.lab.elbow.tone import ToneModel
 
@@ -55,3 +56,12 @@ def test_the_table_of_values(law: type[ToneModel]) -> None:
         else:
             assert unit == (known.unit or "1")
         assert float(value) == pytest.approx(default, abs=1e-9), name
+
+
+def test_every_law_has_a_figure_in_its_page() -> None:
+    drawn = {model.kind for s in SCENES.values() for model in s.models.values()}
+    assert drawn == {law.kind for law in LAWS}
+    pages = "".join(page.read_text(encoding="utf-8") for page in PAGES.glob("*.md"))
+    for name in SCENES:
+        assert (FIGURES / f"{name}.png").is_file()
+        assert f"](../figures/{name}.png)" in pages
