@@ -3,8 +3,8 @@
 import math
 import statistics
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise, product
 from operator import attrgetter
 
 from masrel.errors import RatingsError
@@ -29,6 +29,8 @@ from masrel.lab.ratings import (
     Rating,
     Ratings,
 )
+
+_Place = tuple[str, str]  # a session, and a model or a rater
 
 
 def intended_agreement(
@@ -77,11 +79,10 @@ def in_person_agreement(
     ratings: Ratings, in_person: InPerson | None, session: str | None
 ) -> InPersonAgreement:
     """Return pairs of grades given in person and the same rater's haptic grades."""
-    reason = None
+    reason = "no grades given in person belong to these ratings"
     entries: list[tuple[InPersonRow, str | None]] = []
-    if in_person is None:
-        reason = "no grades given in person belong to these ratings"
-    else:
+    if in_person is not None:
+        reason = "no rater has a grade both in person and haptic"
         entries = _entries(in_person, ratings, session)
     pairs = tuple(
         InPersonPair(
@@ -93,15 +94,13 @@ def in_person_agreement(
         for row, grade in entries
         if row.in_person_grade is not None and grade is not None
     )
-    if in_person is not None and not pairs:
-        reason = "no rater has a grade both in person and haptic"
     return InPersonAgreement(
         session=session,
         pairs=pairs,
         n_pairs=len(pairs),
         n_equal=sum(pair.in_person == pair.haptic for pair in pairs),
         n_unpaired=len(entries) - len(pairs),
-        reason=reason,
+        reason=None if pairs else reason,
     )
 
 
@@ -136,19 +135,13 @@ def stretching_speeds(protocol: Protocol, ratings: Ratings) -> Speeds:
     """Return the mean speeds of the stretches, and summaries of them."""
     known = [row for row in ratings.rows if not math.isnan(row.mean_speed_deg_s)]
     values = tuple(speed for row in known for speed in _speeds_of(row))
-    by_model: dict[tuple[str, str], list[float]] = {}
-    by_rater: dict[tuple[str, str], list[float]] = {}
-    for value in values:
-        for groups, name in ((by_model, value.model), (by_rater, value.rater)):
-            key = (value.session, name)
-            groups.setdefault(key, []).append(value.mean_speed_deg_s)
     sessions = [session.id for session in protocol.sessions]
-    models = [model.id for model in protocol.models]
-    raters = [rater.id for rater in protocol.raters]
+    models = [((v.session, v.model), v.mean_speed_deg_s) for v in values]
+    raters = [((v.session, v.rater), v.mean_speed_deg_s) for v in values]
     return Speeds(
         values=values,
-        by_model=_summaries(by_model, sessions, models),
-        by_rater=_summaries(by_rater, sessions, raters),
+        by_model=_summaries(models, product(sessions, [m.id for m in protocol.models])),
+        by_rater=_summaries(raters, product(sessions, [r.id for r in protocol.raters])),
         n_missing=len(ratings.rows) - len(known),
         reason=None if values else "no rating comes with a stretching speed",
     )
@@ -190,24 +183,24 @@ def presentations(ratings: Ratings) -> Presentations | None:
 
 
 def _summaries(
-    groups: dict[tuple[str, str], list[float]],
-    sessions: Sequence[str],
-    names: Sequence[str],
+    speeds: Iterable[tuple[_Place, float]], places: Iterable[_Place]
 ) -> tuple[SpeedSummary, ...]:
-    # in the protocol's order
-    present = [(s, n) for s in sessions for n in names if (s, n) in groups]
+    # places: sessions with names of models or raters, in the protocol's order
+    groups: dict[_Place, list[float]] = {}
+    for place, speed in speeds:
+        groups.setdefault(place, []).append(speed)
     return tuple(
         SpeedSummary(
-            session=session,
-            name=name,
-            n=len(speeds),
-            mean=statistics.fmean(speeds),
-            sd=statistics.stdev(speeds) if len(speeds) > 1 else math.nan,
-            least=min(speeds),
-            most=max(speeds),
+            session=place[0],
+            name=place[1],
+            n=len(of_place),
+            mean=statistics.fmean(of_place),
+            sd=statistics.stdev(of_place) if len(of_place) > 1 else math.nan,
+            least=min(of_place),
+            most=max(of_place),
         )
-        for session, name in present
-        for speeds in [groups[session, name]]
+        for place in places
+        if (of_place := groups.get(place))
     )
 
 
@@ -222,28 +215,25 @@ def question_summaries(
     protocol: Protocol, answers: Sequence[GivenAnswer]
 ) -> tuple[QuestionSummary, ...]:
     """Return a summary of each question in each session, and of each model in it."""
-    questions = {
-        (questionnaire.id, question.id): question
-        for questionnaire in protocol.questionnaires
-        for question in questionnaire.questions
-    }
     groups: dict[tuple[str, str, str | None, str | None], list[GivenAnswer]] = {}
     for each in answers:
         key = (each.questionnaire, each.question, each.session, each.model)
         groups.setdefault(key, []).append(each)
     # As the protocol has them: the order in which models came says who met which when.
-    order = {key: place for place, key in enumerate(questions)}
-    sessions = {each.id: place for place, each in enumerate(protocol.sessions)}
-    models = {each.id: place for place, each in enumerate(protocol.models)}
-    keys = sorted(
-        groups,
-        key=lambda key: (
-            order[key[:2]],
-            sessions.get(str(key[2]), len(sessions)),
-            models.get(str(key[3]), len(models)),
-        ),
+    places = product(
+        [
+            (of.id, question)
+            for of in protocol.questionnaires
+            for question in of.questions
+        ],
+        (*(session.id for session in protocol.sessions), None),
+        (*(model.id for model in protocol.models), None),
     )
-    return tuple(_summary(questions[key[:2]], *key, groups[key]) for key in keys)
+    return tuple(
+        _summary(question, *key, group)
+        for (of, question), session, model in places
+        if (group := groups.get(key := (of, question.id, session, model)))
+    )
 
 
 def _summary(

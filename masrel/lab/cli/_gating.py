@@ -3,6 +3,7 @@
 What a job is told of them: estimates and gates as JUnit and as Markdown.
 """
 
+import hashlib
 import math
 import os
 from dataclasses import dataclass
@@ -15,7 +16,8 @@ from masrel._files import write_file
 from masrel.cli._options import Decorator, grouped
 from masrel.cli._paths import OutputFile
 from masrel.errors import ParameterError
-from masrel.lab._study_files import no_follow, read_regular
+from masrel.lab._study_files import no_follow
+from masrel.lab.report._report_folder import file_hash
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -75,8 +77,9 @@ class Verdict:
 
     def conclude(self, options: GateOptions) -> None:
         """Write it, say which gates fail, and end with 1 if one does."""
-        if options.junit is not None and not _is_text_of(options.junit, self.junit):
-            write_file(options.junit, self.junit)
+        junit, digest = options.junit, hashlib.sha256(self.junit.encode()).hexdigest()
+        if junit is not None and file_hash(str(junit)) != digest:
+            write_file(junit, self.junit)
         for line in self.lines:
             click.echo(line, err=True)
         summary = os.environ.get("GITHUB_STEP_SUMMARY")
@@ -177,14 +180,6 @@ def _as_document(result: "GateResult") -> dict[str, object]:
         "holds": result.holds,
         "reason": result.reason,
     }
-
-
-def _is_text_of(file: Path, text: str) -> bool:
-    data = text.encode()
-    try:
-        return read_regular(file, most=len(data)) == data
-    except OSError:
-        return False
 
 
 def _append(file: Path, text: str) -> None:

@@ -13,7 +13,7 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from masrel._input import listed
+from masrel._input import check_option, listed
 from masrel.errors import ParameterError
 from masrel.lab._study_files import (
     MAX_SMALL,
@@ -68,15 +68,6 @@ def json_bytes(document: object) -> bytes:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RecordingFile:
-    """The recording of one presentation, and what it is of."""
-
-    rater: str
-    session: str
-    path: Path  # its stem is the code, with the attempt where there were several
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Dataset:
     """Everything of a study that is exported."""
 
@@ -85,7 +76,8 @@ class Dataset:
     ratings: DataTable
     raters: DataTable
     answers: DataTable | None  # None where nothing is asked, or may leave
-    recordings: list[RecordingFile]
+    # raters, sessions and files, whose stems are codes, with the attempt of several
+    recordings: list[tuple[str, str, Path]]
     # files of the study by their place in it, as they leave it
     files: dict[str, bytes]
     # those of the report, where it shows nothing that may not leave
@@ -107,12 +99,8 @@ def gather_dataset(
     }
     fields = [name for name, field in protocol.rater_fields.items() if not field.public]
     private = [*fields, *(name for name in questions if not questions[name].public)]
-    known = ("notes", "logs", *private)
     for name in include:
-        if name not in known:
-            raise ParameterError(
-                f"include: needed one of {', '.join(known)}, got {name!r}"
-            )
+        check_option("include", name, ("notes", "logs", *private))
     hidden = [name for name in private if name not in include]
     data = read_study_data(paths, protocol)
     text, left_out = _protocol_text(paths, hidden, has_notes="notes" in include)
@@ -147,9 +135,7 @@ def gather_dataset(
         if answers
         else None,
         recordings=[
-            recording
-            for recording in _recordings(paths, protocol)
-            if recording.rater not in excluded
+            each for each in _recordings(paths, protocol) if each[0] not in excluded
         ],
         files=files,
         report=[] if shown else sorted(paths.report.rglob("*")),
@@ -291,7 +277,9 @@ _OF_ANSWERS = {
 }
 
 
-def _recordings(paths: StudyPaths, protocol: Protocol) -> Iterator[RecordingFile]:
+def _recordings(
+    paths: StudyPaths, protocol: Protocol
+) -> Iterator[tuple[str, str, Path]]:
     # those that a log names, in its order
     for rater, session in protocol.rater_sessions:
         log = paths.log_file(rater, session)
@@ -299,7 +287,7 @@ def _recordings(paths: StudyPaths, protocol: Protocol) -> Iterator[RecordingFile
             if event.kind == "presented":
                 path = paths.sessions / str(event.fields["recording"])
                 if path.is_file():
-                    yield RecordingFile(rater=rater, session=session, path=path)
+                    yield rater, session, path
 
 
 def _description(protocol: Protocol, ratings: Ratings) -> str:

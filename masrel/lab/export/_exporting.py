@@ -18,13 +18,13 @@ import numpy as np
 
 import masrel
 from masrel._files import write_files
+from masrel._input import check_option
 from masrel.errors import ParameterError
 from masrel.lab._study_files import MAX_RECORDING, new_folder, read_regular
 from masrel.lab.export._dataset import (
     MISSING,
     Column,
     Dataset,
-    RecordingFile,
     column,
     gather_dataset,
     json_bytes,
@@ -89,9 +89,7 @@ def export_study(
     OSError
         If a file cannot be written; there is no such folder then.
     """
-    if form not in EXPORT_FORMS:
-        known = ", ".join(EXPORT_FORMS)
-        raise ParameterError(f"form: needed one of {known}, got {form!r}")
+    check_option("form", form, EXPORT_FORMS)
     dataset = gather_dataset(study, protocol, include, day or date.today())
     files_of = _bids_files if form == "bids" else _ro_crate_files
     with new_folder(folder) as part:
@@ -151,8 +149,8 @@ def _bids_files(dataset: Dataset) -> Iterator[tuple[str, bytes]]:
             if rows:
                 stem = f"sub-{subject}/ses-{name}/beh/sub-{subject}_ses-{name}"
                 yield f"{stem}_task-{task}_beh.tsv", _tsv([[*ratings.columns], *rows])
-    for file in dataset.recordings:
-        subject, name = subjects[file.rater], sessions[file.session]
+    for rater, session, file in dataset.recordings:
+        subject, name = subjects[rater], sessions[session]
         stem = f"sub-{subject}/ses-{name}/beh/sub-{subject}_ses-{name}_task-{task}"
         yield from _recording_files(file, stem, task_name)
     # what masrel reads again, as it is
@@ -193,10 +191,10 @@ def _tsv(rows: Iterable[Sequence[str]]) -> bytes:
 
 
 def _recording_files(
-    file: RecordingFile, stem: str, task_name: dict[str, object]
+    file: Path, stem: str, task_name: dict[str, object]
 ) -> Iterator[tuple[str, bytes]]:
-    recording = read_recording(file.path)
-    place = f"{stem}_recording-{_label(file.path.stem)}_physio"
+    recording = read_recording(file)
+    place = f"{stem}_recording-{_label(file.stem)}_physio"
     names = [*RECORDING_COLUMNS, *(channel.column for channel in recording.channels)]
     samples = "".join("\t".join(row) + "\n" for row in _sample_rows(recording, names))
     # the same bytes every time
@@ -269,8 +267,8 @@ def _contents(dataset: Dataset) -> Iterator[tuple[str, bytes]]:
         yield "ratings/answers.csv", dataset.answers.as_csv()
     made = [*sorted(dataset.paths.schedules.glob("*.csv"))]
     made += [dataset.paths.analysis_file, *dataset.report]
-    for recording in dataset.recordings:
-        made += [recording.path, recording.path.with_suffix(".json")]
+    for _, _, recording in dataset.recordings:
+        made += [recording, recording.with_suffix(".json")]
     for path in made:
         if path.is_file():
             content = read_regular(path, most=MAX_RECORDING)

@@ -6,8 +6,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from masrel._input import listed
-from masrel.errors import ParameterError
+from masrel._input import check_option, listed
 from masrel.lab._event_log import Event
 from masrel.lab.conduct import read_conduct
 from masrel.lab.conduct._study_log import conduct_hash
@@ -23,7 +22,7 @@ from masrel.lab.ratings import Correction, corrections_of, study_remarks
 from masrel.lab.report._material import FIGURES, Material
 from masrel.pages._sections import Content, Drawing, Paragraph
 from masrel.plots._drawn_values import Drawn
-from masrel.tables._tables import Column, Table, Value
+from masrel.tables._tables import Column, Table, Value, table_of
 
 _WHO, _NOTES = "who", "notes"
 """What `include` may name beside fields of raters."""
@@ -102,12 +101,8 @@ def study_conduct(
     SessionLogError
         If a log is damaged.
     """
-    known = (_WHO, _NOTES, *protocol.rater_fields)
     for name in include:
-        if name not in known:
-            raise ParameterError(
-                f"include: needed one of {', '.join(known)}, got {name!r}"
-            )
+        check_option("include", name, (_WHO, _NOTES, *protocol.rater_fields))
     if not (study.sessions.is_dir() or study.conduct_logs()):
         return None
     sessions = session_progress(study, protocol)
@@ -287,31 +282,27 @@ def _summary(known: Sequence[object]) -> tuple[Value, ...]:
 
 def _events_table(material: Material, conduct: StudyConduct) -> Table:
     by = [Column(key="who", heading="By", align="left")] * (_WHO in conduct.include)
-    rows: list[tuple[Value, ...]] = []
-    for event in conduct.events:
-        fields = event.fields
-        who = [str(fields.get("who", "")) or None] * len(by)
-        kind = str(fields["kind"]) if event.kind == "noted" else event.kind
-        place = (_text(fields.get("rater")), _text(fields.get("session")))
-        details = "; ".join(_details(event, has_texts=_NOTES in conduct.include))
-        rows.append((event.time_utc[:10], kind, *place, details or None, *who))
-    return Table(
-        name="events",
-        caption="What happened beside the sessions, in order of time",
-        columns=(
-            Column(key="date", heading="Date", align="left"),
-            Column(key="event", heading="Event", align="left"),
-            Column(key="rater", heading="Rater", align="left"),
-            Column(key="session", heading="Session", align="left"),
-            Column(key="details", heading="Details", align="left"),
-            *by,
-        ),
-        rows=tuple(rows),
+    keys = ("date", "event", "rater", "session", "details")
+    return table_of(
+        "events",
+        "What happened beside the sessions, in order of time",
+        [*(Column(key=k, heading=k.capitalize(), align="left") for k in keys), *by],
+        [
+            {
+                **event.fields,
+                "who": event.fields.get("who") or None,
+                "date": event.time_utc[:10],
+                "event": event.fields["kind"] if event.kind == "noted" else event.kind,
+                "details": "; ".join(_details(event, _NOTES in conduct.include))
+                or None,
+            }
+            for event in conduct.events
+        ],
         data=material.data,
     )
 
 
-def _details(event: Event, *, has_texts: bool) -> Iterator[str]:
+def _details(event: Event, has_texts: bool) -> Iterator[str]:
     # what else is said of an event
     fields = event.fields
     if event.kind == "merged":
@@ -323,10 +314,6 @@ def _details(event: Event, *, has_texts: bool) -> Iterator[str]:
     for name in ("severity", *(("action", "outcome") if has_texts else ())):
         if fields.get(name) is not None:
             yield f"{name}: {fields[name]}"
-
-
-def _text(value: object) -> str | None:
-    return None if value is None else str(value)
 
 
 def _corrections_table(material: Material, conduct: StudyConduct) -> Table:

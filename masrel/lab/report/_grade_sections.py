@@ -270,44 +270,21 @@ def in_person_section(material: Material) -> Iterator[Content]:
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _GivenGrades:
-    """Grades of the first session that has some, by intended ones."""
-
-    session: str
-    intended: list[str]
-    counts: NDArray[np.int64]  # (n_intended, n_grades)
-    # which part is the intended grade, and the ends of its interval, raters random
-    shares: NDArray[np.float64]  # (3, n_intended)
-
-
-def given_grades(material: Material) -> _GivenGrades | None:
-    """Return what models of each intended grade were given in the first session."""
-    analysis, grades = material.analysis, material.ratings.scale.grades
+def given_grades(material: Material) -> tuple[str, list[str], NDArray[np.int64]]:
+    """Return the first session with grades, intended ones, and how often which came."""
+    # counts of each intended grade by rater and grade; none without intended grades
     aims = {model.id: model.intended_grade for model in material.protocol.models}
-    graded = [
-        row
-        for row in material.ratings.without(analysis.excluded).rows
-        if row.grade is not None
-    ]
+    ratings = material.ratings.without(material.analysis.excluded)
+    graded = [row for row in ratings.rows if row.grade is not None]
     present = {row.session for row in graded}
     session = next((s for s in material.sessions if s in present), "")
-    aimed = [r for r in graded if r.session == session and aims[r.model] is not None]
-    intended = [grade for grade in grades if grade in {aims[r.model] for r in aimed}]
-    if not intended:
-        return None
-    raters = sorted({row.rater for row in aimed})
-    counts = np.zeros((len(intended), len(raters), len(grades)), dtype=np.int64)
-    for row in aimed:
-        aim, rater = intended.index(str(aims[row.model])), raters.index(row.rater)
-        counts[aim, rater, grades.index(str(row.grade))] += 1
-    chosen = [grades.index(grade) for grade in intended]
-    return _GivenGrades(
-        session=session,
-        intended=intended,
-        counts=counts.sum(axis=1),
-        shares=_shares(counts, chosen, analysis.level),
+    given = Counter(
+        (aims[r.model], r.rater, r.grade) for r in graded if r.session == session
     )
+    grades, raters = ratings.scale.grades, sorted({rater for _, rater, _ in given})
+    intended = [grade for grade in grades if grade in {aim for aim, *_ in given}]
+    counts = [[[given[a, r, g] for g in grades] for r in raters] for a in intended]
+    return session, intended, np.array(counts, dtype=np.int64)
 
 
 def _shares(
@@ -334,23 +311,25 @@ _CONFUSION = "Grades given for each intended grade"
 
 def confusion_section(material: Material) -> Iterator[Content]:
     """Show which grades models of each intended grade were given."""
-    result = given_grades(material)
-    if result is None:
+    session, intended, by_rater = given_grades(material)
+    if not intended:
         yield lacking("no model with an intended grade has ratings")
         return
     grades, level = material.ratings.scale.grades, material.analysis.level
-    caption = f"{_CONFUSION}, session {result.session}"
-    framed = np.array([[grade == aim for grade in grades] for aim in result.intended])
+    caption = f"{_CONFUSION}, session {session}"
+    shares = _shares(by_rater, [grades.index(aim) for aim in intended], level)
+    counts = by_rater.sum(axis=1)  # (n_intended, n_grades)
+    framed = np.array([[grade == aim for grade in grades] for aim in intended])
     yield Paragraph(
-        text=f"Of {counted(int(result.counts.sum()), 'grade')} of models with an "
-        f"intended grade, {result.counts[framed].sum()} are the intended one."
+        text=f"Of {counted(int(counts.sum()), 'grade')} of models with an "
+        f"intended grade, {counts[framed].sum()} are the intended one."
     )
     texts = [
         f"intended {aim}: "
-        + ", ".join(f"{n} of {g}" for g, n in zip(grades, counts, strict=True) if n)
-        for aim, counts in zip(result.intended, result.counts.tolist(), strict=True)
+        + ", ".join(f"{n} of {g}" for g, n in zip(grades, of_aim, strict=True) if n)
+        for aim, of_aim in zip(intended, counts.tolist(), strict=True)
     ]
-    pictured = (result.intended, result.counts, framed, result.shares, grades, level)
+    pictured = (intended, counts, framed, shares, grades, level)
     yield Drawing(
         name="confusion",
         caption=(
@@ -375,12 +354,9 @@ def confusion_section(material: Material) -> Iterator[Content]:
             Column(key="high", heading="High", digits=1),
         ),
         rows=tuple(
-            (aim, *counts, sum(counts), *shares)
-            for aim, counts, shares in zip(
-                result.intended,
-                result.counts.tolist(),
-                (100.0 * result.shares.T).tolist(),
-                strict=True,
+            (aim, *of_aim, sum(of_aim), *percents)
+            for aim, of_aim, percents in zip(
+                intended, counts.tolist(), (100.0 * shares.T).tolist(), strict=True
             )
         ),
         notes=(

@@ -246,7 +246,7 @@ def _of_sections(material: Material, used: list[str]) -> Iterator[str]:
             interval_reference=_cite(["korn1998"], used),
             kappa_reference=_cite(["fleiss1971"], used),
         )
-    if "confusion" in sections and given_grades(material) is not None:
+    if "confusion" in sections and given_grades(material)[1]:
         yield sentence("methods", "confusion", reference=_cite(["korn1998"], used))
     ratings = material.ratings.without(material.analysis.excluded)
     if "order" in sections and effect_rows(

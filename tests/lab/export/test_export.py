@@ -283,9 +283,9 @@ def test_a_stop_leaves_no_folder(rated: Study, tmp_path: Path) -> None:
 
 def test_what_is_wrong_is_said_in_one_sentence(rated: Study, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    with pytest.raises(ParameterError, match=r"form: needed one of bids, .*got 'xml'"):
+    with pytest.raises(ParameterError, match=r"form: needs one of bids, .*got 'xml'"):
         export_study(*rated, "xml", out)
-    with pytest.raises(ParameterError, match=r"include: needed one of .* got 'who'"):
+    with pytest.raises(ParameterError, match=r"include: needs one of .* got 'who'"):
         export_study(*rated, "bids", out, include=("who",))
     with pytest.raises(ParameterError, match="needed a new or empty folder"):
         export_study(*rated, "bids", rated[0].root)
