@@ -279,21 +279,20 @@ def _independent(
     # the predictors that are no combination of earlier ones, and why others are out
     names: list[str] = []
     dropped: list[tuple[str, str]] = []
-    basis = np.ones((len(table), 1)) / math.sqrt(len(table))  # (n_ratings, n_names + 1)
+    basis = np.ones((len(table), 1))  # (n_ratings, n_names + 1)
     for name in predictors:
         column = table[name].to_numpy(dtype=np.float64)
         centred = column - column.mean()
-        residual = column - basis @ (basis.T @ column)
-        residual = residual - basis @ (basis.T @ residual)  # again, for rounding
+        known = basis @ np.linalg.lstsq(basis, column, rcond=None)[0]
         size = float(np.linalg.norm(column))
         if np.linalg.norm(centred) <= 1e-9 * size:
             dropped.append((name, "it is the same in all ratings"))
-        elif np.linalg.norm(residual) <= 1e-9 * size:
+        elif np.linalg.norm(column - known) <= 1e-9 * size:
             others = ", ".join(names)
             dropped.append((name, f"it is a combination of {others} in these ratings"))
         else:
             names.append(name)
-            basis = np.column_stack([basis, residual / np.linalg.norm(residual)])
+            basis = np.column_stack([basis, centred / np.linalg.norm(centred)])
     if not names:
         raise RatingsError(f"predictors: {'; '.join(': '.join(d) for d in dropped)}")
     return names, dropped
@@ -355,15 +354,17 @@ def _fit(
     from statsmodels.miscmodels.ordinal_model import OrderedModel
 
     model = OrderedModel(codes, values, distr="logit")
-    result = model.fit(method="bfgs", disp=False, gtol=1e-8, maxiter=1000)
-    p = values.shape[1]
-    inverse = np.linalg.inv(model.hessian(result.params))
-    scores = np.asarray(model.score_obs(result.params))
-    n_raters = int(raters.max()) + 1
-    by_rater = np.zeros((n_raters, scores.shape[1]))
-    np.add.at(by_rater, raters, scores)
-    meat = by_rater.T @ by_rater * n_raters / (n_raters - 1)
-    errors = np.sqrt(np.diag((inverse @ meat @ inverse)[:p, :p]))
+    clusters = {"groups": raters, "use_correction": False}
+    result = model.fit(
+        method="bfgs",
+        disp=False,
+        gtol=1e-8,
+        maxiter=1000,
+        cov_type="cluster",
+        cov_kwds=clusters,
+    )
+    p, n_raters = values.shape[1], int(raters.max()) + 1
+    errors = result.bse[:p] * math.sqrt(n_raters / (n_raters - 1))
     thresholds = np.asarray(model.transform_threshold_params(result.params))[1:-1]
     return [np.asarray(result.params[:p]), errors, thresholds], float(result.llf)
 

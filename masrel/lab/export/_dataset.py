@@ -47,18 +47,16 @@ def column(title: str, unit: str = "", levels: Collection[str] = ()) -> Column:
 class DataTable:
     """A table as texts."""
 
-    columns: dict[str, Column]  # by their names
-    rows: list[list[str]]
-
-    def cells(self, name: str) -> list[str]:
-        """Return the cells of a column."""
-        place = list(self.columns).index(name)
-        return [row[place] for row in self.rows]
+    # both by the names of columns, in their order
+    columns: dict[str, Column]
+    rows: list[dict[str, str]]
 
     def as_csv(self) -> bytes:
         """Return the table as CSV, names of columns in its first line."""
         out = io.StringIO(newline="")
-        csv.writer(out, lineterminator="\n").writerows([[*self.columns], *self.rows])
+        writer = csv.DictWriter(out, self.columns, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(self.rows)
         return out.getvalue().encode()
 
 
@@ -131,7 +129,7 @@ def gather_dataset(
         protocol=protocol,
         ratings=_ratings_table(protocol, data.ratings, excluded),
         raters=_raters_table(paths, protocol, hidden),
-        answers=DataTable(columns=_OF_ANSWERS, rows=_records(answers_csv(answers))[1:])
+        answers=DataTable(columns=_OF_ANSWERS, rows=[*_records(answers_csv(answers))])
         if answers
         else None,
         recordings=[
@@ -186,10 +184,11 @@ def _protocol_text(
     return "\n".join((*toml_lines(document), "")).encode(), left_out
 
 
+_MODEL = "Haptic model that was presented"
 _OF_RATINGS = {
     "session": column("Session"),
     "rater": column("Rater"),
-    "model": column("Haptic model that was presented"),
+    "model": column(_MODEL),
     "repeat": column("Which presentation of the model in the session"),
     "grade": column("Grade"),
     "mean_speed_deg_s": column("Mean speed before the catch", "deg/s"),
@@ -215,28 +214,22 @@ _OF_RATINGS = {
 def _ratings_table(
     protocol: Protocol, ratings: Ratings, excluded: Collection[str]
 ) -> DataTable:
-    names, *rows = _records(ratings_csv(ratings))
-    levels = {
-        "grade": protocol.scale.grades,
-        "model": [model.id for model in protocol.models],
+    rows = _records(ratings_csv(ratings))
+    models = column(_MODEL, levels=[model.id for model in protocol.models])
+    described = _OF_RATINGS | {
+        "model": models,
+        "grade": column("Grade", levels=protocol.scale.grades),
     }
-    of_levels = {
-        name: column(str(_OF_RATINGS[name]["Description"]), levels=levels[name])
-        for name in levels
-    }
-    described = _OF_RATINGS | of_levels
-    rater = names.index("rater")
     return DataTable(
-        columns={name: described[name] for name in names},
-        rows=[row for row in rows if row[rater] not in excluded],
+        columns={name: described[name] for name in rows.fieldnames or ()},
+        rows=[row for row in rows if row["rater"] not in excluded],
     )
 
 
-def _records(text: str) -> list[list[str]]:
+def _records(text: str) -> "csv.DictReader[str]":
     # those of a table of masrel, without the comments above it
     lines = text.splitlines(keepends=True)
-    body = "".join(line for line in lines if not line.startswith("#"))
-    return list(csv.reader(io.StringIO(body)))
+    return csv.DictReader(line for line in lines if not line.startswith("#"))
 
 
 _OF_RATERS = {
@@ -252,7 +245,7 @@ def _raters_table(
 ) -> DataTable:
     sessions = session_progress(paths, protocol)
     raters = rater_progress(paths, protocol, sessions)
-    names, *rows = _records(raters_csv(raters, protocol, simulated=False))
+    rows = _records(raters_csv(raters, protocol, simulated=False))
     # of ratings that were published nobody knows how they came about
     known = [*_OF_RATERS] if paths.logs() else ["rater", "site"]
     described = {name: _OF_RATERS[name] for name in known}
@@ -261,7 +254,7 @@ def _raters_table(
             described[name] = column(field.title or name, field.unit, field.choices)
     return DataTable(
         columns=described,
-        rows=[[row[names.index(name)] for name in described] for row in rows],
+        rows=[{name: row[name] for name in described} for row in rows],
     )
 
 

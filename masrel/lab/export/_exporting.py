@@ -133,19 +133,20 @@ def _bids_files(dataset: Dataset) -> Iterator[tuple[str, bytes]]:
     subjects = _labels([rater.id for rater in protocol.raters])
     sessions = _labels([session.id for session in protocol.sessions])
     participants = [
-        [f"sub-{subjects[rater]}", *row]
-        for rater, row in zip(raters.cells("rater"), raters.rows, strict=True)
+        [f"sub-{subjects[row['rater']]}", *row.values()] for row in raters.rows
     ]
     yield "participants.tsv", _tsv([["participant_id", *raters.columns], *participants])
     yield "participants.json", json_bytes(raters.columns)
     task = _label(protocol.scale.name)
     task_name: dict[str, object] = {"TaskName": protocol.scale.name}
     yield f"task-{task}_beh.json", json_bytes(task_name | ratings.columns)
-    of_rows = [*zip(ratings.cells("rater"), ratings.cells("session"), strict=True)]
     for rater, subject in subjects.items():
         for session, name in sessions.items():
-            of_both = zip(of_rows, ratings.rows, strict=True)
-            rows = [row for place, row in of_both if place == (rater, session)]
+            rows = [
+                [*row.values()]
+                for row in ratings.rows
+                if (row["rater"], row["session"]) == (rater, session)
+            ]
             if rows:
                 stem = f"sub-{subject}/ses-{name}/beh/sub-{subject}_ses-{name}"
                 yield f"{stem}_task-{task}_beh.tsv", _tsv([[*ratings.columns], *rows])

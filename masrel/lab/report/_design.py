@@ -216,15 +216,15 @@ def _constants(material: Material) -> Iterator[Table]:
 
 def _other_kinds(material: Material) -> Iterator[Table]:
     # every number of the models that are no spastic elbows, if there are any
-    rows: list[tuple[Value, ...]] = []
-    for model in material.protocol.models:
-        if model.kind != DEFAULT_KIND:
-            numbers = "; ".join(
-                f"{key} {'none' if value is None else as_entered(value)}"
-                for key, value in all_values(model.kind, model.parameters).items()
-            )
-            rows.append((model.id, model.kind, numbers))
-    if rows:
+    others = [m for m in material.protocol.models if m.kind != DEFAULT_KIND]
+    numbers = (
+        "; ".join(
+            f"{key} {'none' if value is None else as_entered(value)}"
+            for key, value in all_values(model.kind, model.parameters).items()
+        )
+        for model in others
+    )
+    if others:
         heading = "Numbers, by the keys of the protocol"
         yield Table(
             name="other_kinds",
@@ -234,7 +234,10 @@ def _other_kinds(material: Material) -> Iterator[Table]:
                 Column(key="kind", heading="Kind", align="left"),
                 Column(key="numbers", heading=heading, align="left"),
             ),
-            rows=tuple(rows),
+            rows=tuple(
+                (model.id, model.kind, text)
+                for model, text in zip(others, numbers, strict=True)
+            ),
             notes=("Keys end in their units; what each is stands in docs/tone.md.",),
             data=material.data,
         )

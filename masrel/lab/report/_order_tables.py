@@ -14,6 +14,7 @@ from operator import attrgetter
 
 import numpy as np
 
+from masrel.intervals._question import student_t
 from masrel.lab.protocol import Protocol
 from masrel.lab.ratings import Rating, Ratings
 from masrel.lab.report._material import Material, lacking, sentence
@@ -155,13 +156,12 @@ def _paired(
     # grades given again, and the first ones, of what has these columns in common
     columns = attrgetter(*shared)
     before = {columns(row): steps[row] for row in first}
-    by_rater: dict[str, tuple[list[float], list[float]]] = {}
-    for row in again:
-        if columns(row) in before:
-            later, earlier = by_rater.setdefault(row.rater, ([], []))
-            later.append(steps[row])
-            earlier.append(before[columns(row)])
-    return by_rater
+    return _complete(
+        (row.rater, is_later, step)
+        for row in again
+        if columns(row) in before
+        for is_later, step in ((True, steps[row]), (False, before[columns(row)]))
+    )
 
 
 def _effect_row(
@@ -178,9 +178,7 @@ def _effect_row(
     elif (sd := float(differences.std(ddof=1))) <= 1e-12:
         reason = "it is the same for every rater"
     else:
-        from scipy.special import stdtrit  # loaded only when an interval needs it
-
-        half = float(stdtrit(n - 1, 0.5 + 0.5 * level)) / math.sqrt(n) * sd
+        half = student_t(level, n - 1) / math.sqrt(n) * sd
         low, high = mean - half, mean + half
     n_pairs = n_equal = None  # where means of many are compared
     if kind in ("again", "session"):

@@ -76,14 +76,17 @@ def _between(analysis: Analysis) -> Iterator[str]:
     if entry is None:
         yield sentence("result", "none")
         return
-    words = {**_words(entry), "session": entry.line.sessions[0]}
-    if entry.estimate is None:
-        yield sentence("result", "absent", **words)
-        return
-    name = "undefined" if math.isnan(entry.estimate.value) else "agreement"
+    name, estimate = "absent", entry.estimate
+    if estimate is not None:
+        name = "undefined" if math.isnan(estimate.value) else "agreement"
     n_grades = len(entry.items) * len(entry.raters) - entry.n_missing
-    grades = f"{counted(n_grades, 'grade')}, {entry.n_missing or 'none'} missing"
-    yield sentence("result", name, **words, grades=grades)
+    yield sentence(
+        "result",
+        name,
+        **_words(entry),
+        session=entry.line.sessions[0],
+        grades=f"{counted(n_grades, 'grade')}, {entry.n_missing or 'none'} missing",
+    )
     # the same number for other populations
     keys = ("kind", "coefficient", "weights", "models", "sessions")
     for other in analysis.estimates:
@@ -91,7 +94,7 @@ def _between(analysis: Analysis) -> Iterator[str]:
         if interval is None or math.isnan(interval.low):
             continue
         is_one = all(getattr(other.line, k) == getattr(entry.line, k) for k in keys)
-        if is_one and other.line.target != entry.line.target:
+        if estimate and is_one and other.line.target != entry.line.target:
             name = "further_lower" if interval.is_one_sided else "further"
             yield _ends(interval, name)
 
@@ -202,7 +205,12 @@ def _study(material: Material, used: list[str]) -> Iterator[str]:
 def _statistics(material: Material, used: list[str]) -> Iterator[str]:
     analysis = material.analysis
     known = [p for p in analysis.estimates if p.estimate is not None or p.by_rater]
-    estimates = [(p.line, e) for p in known for e in _estimates(p)]
+    estimates = [
+        (planned.line, estimate)
+        for planned in known
+        for estimate in (planned.estimate, *(r.estimate for r in planned.by_rater))
+        if estimate is not None
+    ]
     for kind, name in (("inter-rater", "between"), ("test-retest", "within")):
         lines = [p.line for p in known if p.line.kind == kind]
         names = {
@@ -276,8 +284,3 @@ def _intervals(
             method=interval.method,
             reference=_cite(interval_references(interval), used),
         )
-
-
-def _estimates(entry: PlannedEstimate) -> list[Estimate]:
-    over_raters = [] if entry.estimate is None else [entry.estimate]
-    return [*over_raters, *(rater.estimate for rater in entry.by_rater)]

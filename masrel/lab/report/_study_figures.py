@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from masrel.lab.analysis import Speed, Speeds
 from masrel.lab.report._material import MANY_RATERS
 from masrel.lab.schedule._balance import OrderBalance
-from masrel.plots._cells import cells, name_columns, name_rows, room_of
 from masrel.plots._grades import categories_picture, counts_picture
 from masrel.plots._style import (
     BLACK,
@@ -24,7 +23,6 @@ from masrel.plots._style import (
     DASHES,
     GREY,
     ORANGE,
-    SEQUENTIAL,
     VERMILLION,
     Picture,
     short_name,
@@ -108,10 +106,8 @@ def _speed_row(
     sessions: Sequence[str],
 ) -> None:
     width = 0.76 / len(sessions)
-    order = {rater: place for place, rater in enumerate(raters)}
     of_column: defaultdict[tuple[str, str], list[Speed]] = defaultdict(list)
-    known = (speed for speed in speeds.values if speed.rater in order)
-    for speed in sorted(known, key=lambda speed: order[speed.rater]):
+    for speed in speeds.values:
         of_column[speed.session, speed.model].append(speed)
     for column in speeds.by_model:
         if column.name not in models:
@@ -215,40 +211,21 @@ def flow_figure(steps: Sequence[tuple[str, Sequence[str]]]) -> Figure:
     return figure
 
 
-_MAX_NUMBERS = 16  # columns up to which numbers are written in the cells
-_CELL, _WIDEST, _HIGHEST = 0.3, 7.0, 5.0  # inches of a cell and of all of them
-
-
 def order_pictures(panels: Sequence[OrderBalance]) -> list[tuple[str, Picture]]:
-    """Return two heatmaps a session: models by places, and what follows what."""
+    """Return two tables a session: models by places, and by what came right after."""
     pictures = []
     for panel in panels:
         of = ", ".join(filter(None, (panel.session, panel.site)))
-        places = [str(place + 1) for place in range(panel.n_places)]
-        title = f"{of}: {counted(panel.n_schedules, 'schedule')}, by place"
-        pictures.append((title, _freqs(panel.models, places, panel.places)))
-        after = _freqs(panel.models, panel.models, panel.pairs)
-        pictures.append(("by the model right after", after))
+        title = f"{of}: {counted(panel.n_schedules, 'schedule')}"
+        places = [str(place) for place in range(1, panel.n_places + 1)]
+        for text, columns, freqs, name in (
+            (title, places, panel.places, "place"),
+            ("", panel.models, panel.pairs, "model right after"),
+        ):
+            counts = np.array(freqs, dtype=np.int64)
+            rows = (counts, panel.models, columns, np.zeros_like(counts))
+            pictures.append((text, counts_picture(*rows, ("model", name))))
     return pictures
-
-
-def _freqs(
-    rows: Sequence[str], columns: Sequence[str], freqs: Sequence[Sequence[int]]
-) -> Picture:
-    of = np.array(freqs, dtype=np.int64)
-    across = min(_CELL, _WIDEST / len(columns))
-    down = min(_CELL, _HIGHEST / len(rows))
-
-    def draw(axes: Axes) -> None:
-        letters = of.astype(str)[: len(of) * (len(columns) <= _MAX_NUMBERS)]
-        most = max(1, int(of.max()))
-        cells(axes, of, letters, cmap=SEQUENTIAL, vmin=0.0, vmax=most)
-        name_rows(axes, rows, down)
-        name_columns(axes, columns, across, range(len(columns)))
-        axes.set_ylabel("model")
-
-    height = room_of(columns) + down * len(rows) + 0.3
-    return Picture(room_of(rows) + across * len(columns) + 0.4, height, draw)
 
 
 def learning_figure(

@@ -156,7 +156,9 @@ def test_a_report_of_before_the_last_event_is_found(
 def test_a_name_that_nothing_private_has_is_refused(
     run_study: tuple[StudyPaths, Protocol],
 ) -> None:
-    with pytest.raises(ParameterError, match="needs one of who, notes, years, job, got 'x'"):
+    with pytest.raises(
+        ParameterError, match="needs one of who, notes, years, job, got 'x'"
+    ):
         study_conduct(*run_study, include=["x"])
 
 
