@@ -14,7 +14,6 @@ from masrel.agreement import COEFFICIENTS
 from masrel.errors import (
     MasrelError,
     MasrelWarning,
-    RatingsError,
     UndefinedStatisticWarning,
 )
 from masrel.estimates import Estimate
@@ -72,21 +71,6 @@ def test_missing_ratings_are_counted_and_pass_into_no_pair() -> None:
     (found,) = analyze(protocol_with(line), gaps).estimates
     assert found.estimate is not None
     assert (found.n_missing, found.estimate.value) == (1, 0.5)
-
-
-@pytest.mark.parametrize(
-    ("row", "said"),
-    [
-        (("test", "R9", "HM1", "1"), "column 'rater'.*R1, .*got 'R9'"),
-        (("test", "R1", "HM9", "1"), "column 'model'.*HM1, .*got 'HM9'"),
-        (("third", "R1", "HM1", "1"), "column 'session'.*test, retest, got 'third'"),
-    ],
-)
-def test_ratings_the_protocol_does_not_know_are_refused(
-    row: tuple[str, str, str, str], said: str
-) -> None:
-    with pytest.raises(RatingsError, match=said):
-        analyze(protocol_with(), ratings(row))
 
 
 @pytest.mark.parametrize("kind", ["inter-rater", "test-retest"])

@@ -9,11 +9,9 @@ Table V (raters R1 to R8 across):
 """
 
 import math
-from collections import Counter
 from fractions import Fraction
 
 import pytest
-from scipy import stats
 
 from masrel.lab.analysis import Analysis, analyze
 from tests.lab.analysis.studies import (
@@ -30,23 +28,6 @@ def published(*lines: object, sections: tuple[str, ...] = ()) -> Analysis:
     return analyze(
         protocol_with(*lines, sections=sections), table_v(), in_person=in_person()
     )
-
-
-def rows_of_table_v() -> list[list[str]]:
-    table = table_v().table
-    return [list(table.loc[table["model"] == f"HM{n}", "grade"]) for n in (1, 2, 3, 4)]
-
-
-def fleiss(rows: list[list[str]]) -> Fraction:
-    """Fleiss (1971) in fractions: pairs that agree, and squares of the shares."""
-    n_raters = len(rows[0])
-    all_grades = Counter(grade for row in rows for grade in row)
-    n_pairs = n_raters * (n_raters - 1)
-    agreeing = sum(n * (n - 1) for row in rows for n in Counter(row).values())
-    observed = Fraction(agreeing, len(rows) * n_pairs)
-    total = sum(all_grades.values())
-    chance = sum((Fraction(n, total) ** 2 for n in all_grades.values()), Fraction(0))
-    return (observed - chance) / (1 - chance)
 
 
 def test_the_kappa_is_the_papers() -> None:
@@ -67,31 +48,6 @@ def test_the_kappa_is_the_papers() -> None:
     assert found.items == ("HM1", "HM2", "HM3", "HM4")
     assert found.raters == tuple(f"R{n}" for n in range(1, 9))
     assert (found.n_missing, found.reason) == (0, None)
-
-
-def test_the_interval_is_the_rater_jackknifes() -> None:
-    # Leave each rater out in turn; the error is sqrt((n - 1) / n * sum of squares of
-    # the deviations), times Student's t with 7 degrees of freedom.
-    rows = rows_of_table_v()
-    left_out = [
-        float(fleiss([[g for i, g in enumerate(row) if i != rater] for row in rows]))
-        for rater in range(8)
-    ]
-    centre = sum(left_out) / 8
-    error = math.sqrt(7 / 8 * sum((value - centre) ** 2 for value in left_out))
-    half = stats.t.ppf(0.975, 7) * error
-    (found,) = published(plan(interval="jackknife")).estimates
-    assert found.estimate is not None
-    interval = found.estimate.interval
-    assert interval is not None
-    assert interval.low == pytest.approx(KAPPA - half, abs=1e-12)
-    assert interval.high == pytest.approx(KAPPA + half, abs=1e-12)
-    assert (interval.low, interval.high) == pytest.approx((0.3196, 0.9325), abs=5e-5)
-    assert (interval.level, interval.target, interval.unit) == (
-        0.95,
-        "raters",
-        "raters",
-    )
 
 
 def test_the_intended_grade_was_given_as_the_paper_says() -> None:

@@ -1,9 +1,11 @@
 """Reports made for tests, and their pages taken apart."""
 
+import csv
 import re
 from dataclasses import dataclass, field
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -104,6 +106,23 @@ def _report(protocol: Protocol, ratings: Ratings, folder: Path) -> ReportFiles:
 def name_of(path: Path) -> str:
     """The name of a table or a figure, without the hash in its file's."""
     return re.sub(r"-[0-9a-f]{16}$", "", path.stem)
+
+
+def written(
+    folder: Path, protocol: Protocol, rows: Ratings, excluded: Any = (), **of: Any
+) -> ReportFiles:
+    analysis = analyze(protocol, rows, excluded=excluded)
+    return write_report(protocol, rows, analysis, folder, **of)
+
+
+def page(files: ReportFiles) -> str:
+    return re.sub(r"\\(.)", r"\1", files.markdown.read_text(encoding="utf-8"))
+
+
+def rows_of(files: ReportFiles, name: str) -> list[dict[str, str]]:
+    (path,) = [path for path in files.tables if name_of(path) == name]
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
 
 
 @dataclass

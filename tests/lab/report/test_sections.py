@@ -1,6 +1,5 @@
 """What each section says of its data, in the page and the tables of a report."""
 
-import csv
 import math
 import re
 from importlib.metadata import version
@@ -35,7 +34,14 @@ from tests.lab.analysis.studies import (
     ratings,
     table_v,
 )
-from tests.lab.report.pages import AGAIN, name_of, simulated_ratings
+from tests.lab.report.pages import (
+    AGAIN,
+    name_of,
+    page,
+    rows_of,
+    simulated_ratings,
+    written,
+)
 
 pytestmark = pytest.mark.filterwarnings("ignore::masrel.errors.MasrelWarning")
 
@@ -66,24 +72,6 @@ def first_model(**changes: object) -> Protocol:
     protocol = protocol_with(sections=("design",))
     first, *others = protocol.models
     return replace(protocol, models=(replace(first, **changes), *others))
-
-
-def written(
-    folder: Path, protocol: Protocol, rows: Ratings, excluded: Any = (), **of: Any
-) -> ReportFiles:
-    analysis = analyze(protocol, rows, excluded=excluded)
-    return write_report(protocol, rows, analysis, folder, **of)
-
-
-def page(files: ReportFiles) -> str:
-    assert files.markdown is not None
-    return re.sub(r"\\(.)", r"\1", files.markdown.read_text(encoding="utf-8"))
-
-
-def rows_of(files: ReportFiles, name: str) -> list[dict[str, str]]:
-    (path,) = [path for path in files.tables if name_of(path) == name]
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
 
 
 ONE = ratings(*of_session("test", R1=("1",), R2=("1",)))

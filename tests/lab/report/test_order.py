@@ -1,14 +1,17 @@
 """Effects of order, against values worked by hand."""
 
+import re
+from pathlib import Path
 from typing import Any
 
 import pytest
 from scipy.stats import ttest_1samp
 
 from masrel.lab.ratings import Ratings, ratings_from_rows
-from masrel.lab.report._order_tables import effect_rows, place_rows
+from masrel.lab.report import ReportFiles
 from masrel.scales import MODIFIED_ASHWORTH
 from tests.lab.analysis.studies import protocol_with
+from tests.lab.report.pages import page, rows_of, written
 
 
 def presented(**orders: str) -> Ratings:
@@ -27,22 +30,31 @@ NEIGHBOUR = "After a model graded higher less after one graded lower"
 AGAIN = "Second presentation in a session less first"
 
 
-def effects(rows: Ratings) -> dict[object, tuple[Any, ...]]:
+def reported(folder: Path, rows: Ratings) -> ReportFiles:
+    return written(folder, protocol_with(sections=("order",)), rows)
+
+
+def effects(folder: Path, rows: Ratings) -> dict[str, tuple[Any, ...]]:
     """By question: raters, pairs, equal ones, mean, ends, and why there are none."""
-    found = effect_rows(protocol_with(), rows, 0.95)
-    return {question: (*row, reason) for (question, *row), reason in found}
+    files = reported(folder, rows)
+    why = dict(re.findall(r"^(.*): no interval, as (.*)\.$", page(files), re.M))
+    return {
+        question: (*(float(n or "nan") for n in numbers), why.get(question))
+        for row in rows_of(files, "order_effects")
+        for question, *numbers, _ in [row.values()]
+    }
 
 
-def test_the_second_half_is_held_against_the_first() -> None:
+def test_the_second_half_is_held_against_the_first(tmp_path: Path) -> None:
     rows = presented(R1="HM1=0 HM2=3", R2="HM2=2 HM1=1")
     # steps: HM1 0 of R1 and 1 of R2, HM2 4 and 3; so half a step below the mean of the
     # model in the first half and half a step above in the second, for both
-    n_raters, _, _, mean, *_, reason = effects(rows)[PLACE]
+    n_raters, _, _, mean, *_, reason = effects(tmp_path, rows)[PLACE]
     assert (n_raters, mean) == (2, pytest.approx(1.0))
     assert reason == "it is the same for every rater"
 
 
-def test_the_interval_is_students_t_over_raters() -> None:
+def test_the_interval_is_students_t_over_raters(tmp_path: Path) -> None:
     rows = presented(
         R1="HM1=0 HM2=1 HM3=2 HM4=3",
         R2="HM4=4 HM3=3 HM2=1+ HM1=0",
@@ -67,10 +79,12 @@ def test_the_interval_is_students_t_over_raters() -> None:
     ]
     expected = ttest_1samp(by_rater, 0.0).confidence_interval(0.95)
     numbers = (sum(by_rater) / 3, expected.low, expected.high)
-    assert effects(rows)[PLACE][3:6] == pytest.approx(numbers)
+    assert effects(tmp_path, rows)[PLACE][3:6] == pytest.approx(numbers)
 
 
-def test_a_grade_drawn_to_the_one_before_is_an_effect_of_the_neighbour() -> None:
+def test_a_grade_drawn_to_the_one_before_is_an_effect_of_the_neighbour(
+    tmp_path: Path,
+) -> None:
     # HM2 after the severe HM4 is graded a step higher than after the mild HM1
     orders = {
         "R1": "HM4=3 HM2=2 HM1=1 HM2=1+",
@@ -84,7 +98,7 @@ def test_a_grade_drawn_to_the_one_before_is_an_effect_of_the_neighbour() -> None
             seen[model] = seen.get(model, 0) + 1
             row = {"rater": rater, "model": model, "grade": grade}
             rows.append({**row, "position": position, "repeat": seen[model]})
-    found = effects(ratings_from_rows(rows, MODIFIED_ASHWORTH))
+    found = effects(tmp_path, ratings_from_rows(rows, MODIFIED_ASHWORTH))
     # R1: HM2 after HM4 +1/2, HM1 after HM2 0, so 1/4 after a higher one; HM2 after HM1
     # -1/2 after a lower one: 3/4. R2: HM2 after HM1 -1/2 and HM4 after HM2 0, so -1/4
     # after a lower one; HM2 after HM4 +1/2: 3/4.
@@ -95,7 +109,7 @@ def test_a_grade_drawn_to_the_one_before_is_an_effect_of_the_neighbour() -> None
     assert low < 0.0 < high
 
 
-def test_a_session_is_held_against_the_one_before() -> None:
+def test_a_session_is_held_against_the_one_before(tmp_path: Path) -> None:
     rows = [
         {"session": session, "rater": rater, "model": model, "grade": grade}
         for session, rater, model, grade in (
@@ -108,13 +122,14 @@ def test_a_session_is_held_against_the_one_before() -> None:
             ("retest", "R2", "HM1", "1"),
         )
     ]
-    ((question, found),) = effects(ratings_from_rows(rows, MODIFIED_ASHWORTH)).items()
+    made = ratings_from_rows(rows, MODIFIED_ASHWORTH)
+    ((question, found),) = effects(tmp_path, made).items()
     # R1 half a step up on average, R2 none; R3 has no second grade
     assert question == "Session retest less session test"
     assert found[:4] == (2, 3, 2, 0.25)
 
 
-def test_models_that_are_milder_or_more_severe_are_no_effect() -> None:
+def test_models_that_are_milder_or_more_severe_are_no_effect(tmp_path: Path) -> None:
     # grades that depend on the model alone: nothing is left once that is taken off
     models = {"HM1": "0", "HM2": "1", "HM3": "2", "HM4": "4"}
     orders = (("HM1", "HM2", "HM3", "HM4"), ("HM4", "HM2", "HM1", "HM3"))
@@ -124,32 +139,39 @@ def test_models_that_are_milder_or_more_severe_are_no_effect() -> None:
             for n, order in enumerate(orders, start=1)
         }
     )
-    found = effects(rows)
+    found = effects(tmp_path, rows)
     assert {name: of[3] for name, of in found.items()} == {PLACE: 0.0, NEIGHBOUR: 0.0}
-    assert {row[3] for row in place_rows(protocol_with(), rows)} == {0.0}
+    places = rows_of(reported(tmp_path, rows), "grades_by_place")
+    assert {float(row["deviation_steps"]) for row in places} == {0.0}
 
 
-def test_one_rater_has_no_interval_and_no_place_no_effect() -> None:
+def test_one_rater_has_no_interval(tmp_path: Path) -> None:
     rows = [
         {"session": session, "rater": "R1", "model": "HM1", "grade": grade}
         for session, grade in (("test", "1"), ("retest", "1+"))
     ]
-    (found,) = effects(ratings_from_rows(rows, MODIFIED_ASHWORTH)).values()
+    made = ratings_from_rows(rows, MODIFIED_ASHWORTH)
+    (found,) = effects(tmp_path, made).values()
     assert (found[3], found[-1]) == (1.0, "one rater has no spread")
     assert found[4] != found[4]
-    one = ratings_from_rows(rows[:1], MODIFIED_ASHWORTH)
-    assert effects(one) == {}
-    assert place_rows(protocol_with(), one) == []
 
 
-def test_places_are_counted_in_quarters_and_halves() -> None:
-    order = " ".join(f"D{n:02}=1" for n in range(1, 9))
-    parts = place_rows(protocol_with(), presented(R1=order, R2=order))
-    assert [(places, n, n_standard) for places, _, n, _, n_standard, _ in parts] == [
-        (places, 4, 0) for places in ("1–2", "3–4", "5–6", "7–8")
-    ]
-    short = place_rows(
-        protocol_with(), presented(R1="HM1=1 HM2=2 HM3=2", R2="HM3=2 HM1=0 HM2=1+")
-    )
-    # intended are 1, 1+ and 2: R1 HM1; R2 HM3 in the first place; then HM3; HM2
-    assert [(row[0], *row[4:]) for row in short] == [("1", 2, 2), ("2–3", 4, 2)]
+ORDER = " ".join(f"D{n:02}=1" for n in range(1, 9))
+EIGHT = {"R1": ORDER, "R2": ORDER}
+# intended are 1, 1+ and 2: R1 HM1; R2 HM3 in the first place; then HM3; HM2
+THREE = {"R1": "HM1=1 HM2=2 HM3=2", "R2": "HM3=2 HM1=0 HM2=1+"}
+
+
+@pytest.mark.parametrize(
+    ("orders", "parts"),
+    [
+        (EIGHT, [(places, 4, 0, 0) for places in ("1–2", "3–4", "5–6", "7–8")]),
+        (THREE, [("1", 2, 2, 2), ("2–3", 4, 4, 2)]),
+    ],
+)
+def test_places_are_counted_in_quarters_and_halves(
+    orders: dict[str, str], parts: list[tuple[Any, ...]], tmp_path: Path
+) -> None:
+    names = ("n_ratings", "n_standard", "n_intended")
+    rows = rows_of(reported(tmp_path, presented(**orders)), "grades_by_place")
+    assert [(r["places"], *(int(r[n]) for n in names)) for r in rows] == parts
