@@ -23,14 +23,7 @@ from masrel.cli._options import (
 from masrel.cli._paths import FileInFolder, InputFile
 from masrel.errors import ParameterError
 from masrel.lab._study_files import new_file
-from masrel.lab.cli.joint import (
-    END_DEG,
-    START_DEG,
-    JointOptions,
-    end_within,
-    joint_options,
-    joints_of,
-)
+from masrel.lab.cli.joint import START_DEG, JointOptions, joint_options, joints_of
 from masrel.lab.report._traced_scenes import (
     SCENE_OUTPUTS,
     SCENE_STAMP,
@@ -55,6 +48,7 @@ _STRETCHES = {
 }
 _KINDS = (*_STRETCHES, "recording")
 
+_END_DEG = 146.0  # where a stretch ends unless it is said
 _COLUMNS = ("time_s", "angle_deg", "velocity_deg_s", "torque_nm", "phase")
 _MAX_SAMPLES = 5_000_000  # rows of a CSV file: at 1 kHz 83 minutes, and some 400 MB
 _MAX_SPEEDS = 100_000
@@ -274,9 +268,15 @@ def _scenes(
     motion_of = cache(partial(_motion_of, stretch))  # a recording is read once
     start = START_DEG if stretch.start is None else stretch.start
     for name, joint in joints.items():
-        end = END_DEG if stretch.end is None else stretch.end
-        if stretch.recording is None and not isinstance(joint, ElbowParameters):
-            end = end_within(joint, stretch.end)
+        end, limit = stretch.end, math.degrees(joint.range_end)
+        is_cut = isinstance(joint, ElbowParameters) or stretch.recording is not None
+        if end is None:
+            end = _END_DEG if is_cut else min(_END_DEG, limit)
+        elif not is_cut and end > limit + 1e-9:
+            raise ParameterError(
+                "--to-deg: needs at most the end of range of every model, "
+                f"{limit:g} deg, got {end:g}"
+            )
         for speed in dict.fromkeys(speeds or (None,)):
             motion, ends = motion_of(speed, start, end), (start, end)
             if stretch.recording is not None:

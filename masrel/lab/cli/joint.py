@@ -52,8 +52,8 @@ def joint() -> None:
     """Traces of joints, joints of recordings, and models between models."""
 
 
-START_DEG, END_DEG = 30.0, 146.0
-"""Where a stretch starts and ends unless it is said, deg."""
+START_DEG = 30.0
+"""Where a stretch starts unless it is said, deg."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,19 +161,6 @@ def tardieu(
         ),
         text=lambda: tardieu_text(documents),
     )
-
-
-def end_within(joint: "JointModel", end_deg: float | None) -> float:
-    """Return where a stretch ends, deg: at most where the range of the joint does."""
-    limit = math.degrees(joint.range_end)
-    if end_deg is None:
-        return min(END_DEG, limit)
-    if end_deg > limit + 1e-9:
-        raise ParameterError(
-            f"--to-deg: needs at most the end of range of every model, {limit:g} deg, "
-            f"got {end_deg:g}"
-        )
-    return end_deg
 
 
 def joints_of(names: JointOptions) -> dict[str, "JointModel"]:

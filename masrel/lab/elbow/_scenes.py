@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel._input import refuse
+from masrel._input import check_option, refuse
 from masrel.errors import ParameterError
 from masrel.lab.elbow._events import Timeline, check_starts
 from masrel.lab.elbow._polynomials import Number
@@ -89,22 +89,24 @@ class Columns:
     __slots__ = ("_n", "columns", "kind")
 
     def __init__(self, kind: type, **columns: ArrayLike) -> None:
-        if kind not in _FIELDS:
-            raise ParameterError(
-                "kind: needs ElbowParameters, ConstantSpeed, MinimumJerk or Trapezoid, "
-                f"got {kind.__name__}"
-            )
         self.kind = kind
         self.columns = {
             name: np.asarray(column) if np.ndim(column) else column
             for name, column in columns.items()
         }
         shapes = {c.shape for c in self.columns.values() if isinstance(c, np.ndarray)}
-        if len(shapes) > 1 or any(len(shape) > 1 for shape in shapes):
-            raise ParameterError(
+        refuse(
+            (
+                kind not in _FIELDS,
+                "kind: needs ElbowParameters, ConstantSpeed, MinimumJerk or Trapezoid, "
+                f"got {kind.__name__}",
+            ),
+            (
+                len(shapes) > 1 or any(len(shape) > 1 for shape in shapes),
                 "columns: need one length, got the shapes "
-                f"{', '.join(map(str, sorted(shapes)))}"
-            )
+                f"{', '.join(map(str, sorted(shapes)))}",
+            ),
+        )
         self._n: int = next(iter(shapes), (1,))[0]
         for i in self._suspects() if self._n else ():
             try:
@@ -194,10 +196,7 @@ class SceneTable:
         ParameterError
             If it was not asked for.
         """
-        if output not in self.outputs:
-            raise ParameterError(
-                f"output: needs one of {', '.join(self.outputs)}, got {output!r}"
-            )
+        check_option("output", output, self.outputs)
         return np.asarray(self.values[:, self.outputs.index(output)])
 
 

@@ -448,7 +448,17 @@ def _peak(line: Timeline, motion: Motion, laid: list[TorqueSegment]) -> Number:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trace:
+class _Line:
+    """What a figure draws of a motion."""
+
+    time: Floats = field(compare=False, repr=False)
+    angle: Floats = field(compare=False, repr=False)
+    torque: Floats = field(compare=False, repr=False)
+    phase: NDArray[np.int8] = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trace(_Line):
     """Columns of a motion at a fixed rate; arrays are read-only.
 
     Attributes
@@ -467,11 +477,7 @@ class Trace:
         Samples a second.
     """
 
-    time: NDArray[np.float64] = field(compare=False, repr=False)
-    angle: NDArray[np.float64] = field(compare=False, repr=False)
-    velocity: NDArray[np.float64] = field(compare=False, repr=False)
-    torque: NDArray[np.float64] = field(compare=False, repr=False)
-    phase: NDArray[np.int8] = field(compare=False, repr=False)
+    velocity: Floats = field(compare=False, repr=False)
     rate_hz: float
 
 
@@ -542,7 +548,7 @@ def _stepped(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Outline:
+class Outline(_Line):
     """Points of a line; where the torque jumps, two have the same time.
 
     Attributes
@@ -559,10 +565,6 @@ class Outline:
         The events of the motion.
     """
 
-    time: Floats = field(compare=False, repr=False)
-    angle: Floats = field(compare=False, repr=False)
-    torque: Floats = field(compare=False, repr=False)
-    phase: NDArray[np.int8] = field(compare=False, repr=False)
     events: Events
 
 

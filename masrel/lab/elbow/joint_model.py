@@ -15,6 +15,7 @@ from typing import Any, ClassVar, Literal, Protocol
 
 import numpy as np
 
+from masrel._input import check_option
 from masrel.errors import ParameterError
 from masrel.lab.elbow.motions import _SAME_TIME, Floats, Motion
 
@@ -356,10 +357,5 @@ class ToneModel(Law):
 
 def grade_of(table: dict[str, Any], grade: object, name: str) -> Any:
     """Return the row of a grade, refusing one that the table does not have."""
-    row = table.get(str(grade))
-    if row is None or isinstance(grade, bool):
-        *others, last = table
-        raise ParameterError(
-            f"{name}: needs {', '.join(others)} or {last}, got {grade!r}"
-        )
-    return row
+    check_option(name, str(grade), table)
+    return table[str(grade)]

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from masrel._input import refuse
+from masrel._input import check_option, refuse
 from masrel.errors import ParameterError
 from masrel.lab.elbow._polynomials import (
     Number,
@@ -198,16 +198,18 @@ class _Stretch(Motion):
             )
         for name in self.__slots__:  # those that a kind adds
             rate, unit = getattr(self, name), _UNITS[name]
-            if not 0.0 < rate < math.inf:
-                raise ParameterError(
-                    f"{name}: needs more than 0 and finite, got {math.degrees(rate):g} "
-                    f"{unit}"
-                )
-            if not 1e-30 <= rate <= 1e30:  # whose tenth powers a float holds
-                raise ParameterError(
+            came = f"got {math.degrees(rate):g} {unit}"
+            refuse(
+                (
+                    not 0.0 < rate < math.inf,
+                    f"{name}: needs more than 0 and finite, {came}",
+                ),
+                (
+                    not 1e-30 <= rate <= 1e30,  # whose tenth powers a float holds
                     f"{name}: needs a rate that some motion has, 1e-28 to 1e31 {unit}, "
-                    f"got {math.degrees(rate):g} {unit}"
-                )
+                    f"{came}",
+                ),
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -475,10 +477,7 @@ class Recorded(_Laid):
         angle: ArrayLike,
         interpolation: Interpolation = "pchip",
     ) -> None:
-        if interpolation not in ("pchip", "linear"):
-            raise ParameterError(
-                f"interpolation: needs one of pchip, linear, got {interpolation!r}"
-            )
+        check_option("interpolation", interpolation, ("pchip", "linear"))
         times, angles = _checked(time, angle)
         self.interpolation = interpolation
         knots, low = times - times[0], angles - angles[0]

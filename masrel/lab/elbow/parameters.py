@@ -187,9 +187,8 @@ class ElbowParameters(Law):
 
     def largest_slope(self, *, speed: float) -> tuple[float, float]:  # noqa: ARG002 - as all
         """Return the largest slopes, over angle and velocity, where nothing jumps."""
-        after = self.post_catch_stiffness
-        if self.post_catch == "additive":
-            after += self.stiffness
+        goes_on = self.post_catch == "additive"
+        after = self.post_catch_stiffness + goes_on * self.stiffness
         return max(self.stiffness, after), self.damping
 
 
