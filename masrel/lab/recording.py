@@ -163,12 +163,8 @@ class Recording:
                 f"a recording needs the columns {', '.join(names)}, "
                 f"got {', '.join(sorted(self.columns)) or 'none'}"
             )
-        if "ramp" not in self.columns:
-            ramp = _ramp_without_column(self.columns["time_s"], self.facts)
-            object.__setattr__(self, "columns", {**self.columns, "ramp": ramp})
-        if "stretch" not in self.columns:
-            stretch = (self.columns["ramp"] < _END).astype(np.float64)
-            object.__setattr__(self, "columns", {**self.columns, "stretch": stretch})
+        if len(others) < len(RECORDING_COLUMNS):  # made before it had all of them
+            object.__setattr__(self, "columns", _completed(self.columns, self.facts))
         shapes = {column.shape for column in self.columns.values()}
         if len(shapes) != 1 or len(next(iter(shapes))) != 1:
             raise RecordingError(
@@ -188,15 +184,14 @@ class Recording:
         return int(np.count_nonzero(self.columns["ramp"] < _END))
 
 
-def _ramp_without_column(
-    time_s: NDArray[np.float64], facts: Mapping[str, _Fact]
-) -> NDArray[np.float64]:
-    # (n,) -> (n,): before recordings had the column, faults alone had a ramp
+def _completed(columns: _Columns, facts: Mapping[str, _Fact]) -> _Columns:
+    # Before recordings had these columns, faults alone had a ramp, and all before the
+    # end was one stretch.
     fault_s = facts.get("fault_time_s")
-    ramp = np.zeros(time_s.shape)
-    if isinstance(fault_s, float):
-        ramp[time_s >= fault_s] = _FAULT
-    return ramp
+    begins_s = fault_s if isinstance(fault_s, float) else np.inf
+    ramp = np.where(columns["time_s"] >= begins_s, float(_FAULT), 0.0)
+    columns = {"ramp": ramp, **columns}
+    return {"stretch": (columns["ramp"] < _END).astype(np.float64), **columns}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,10 +4,10 @@ import dataclasses
 import functools
 import math
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import click
 from tqdm import tqdm
@@ -94,16 +94,10 @@ class _Session:
             all_nodes=all_nodes,
         )
 
-    @contextmanager
-    def progress(self, total: int) -> Iterator[Callable[[], None]]:
-        """Show a bar of steps on a terminal."""
+    def progress(self, total: int) -> "tqdm[NoReturn]":
+        """Make a bar of steps on a terminal, for a ``with`` block."""
         hidden = self.output.json_file == STDOUT or self.output.quiet or None
-        with tqdm(total=total, unit="", leave=False, disable=hidden) as bar:
-
-            def step() -> None:
-                bar.update()
-
-            yield step
+        return tqdm(total=total, unit="", leave=False, disable=hidden)
 
     def write_output(self, lines: list[str], document: dict[str, object]) -> None:
         """Print lines, or write the document as JSON; both say whether it is real."""
@@ -168,12 +162,12 @@ def device() -> None:
 @_puck_command
 def _probe(session: _Session) -> None:
     """Ask every node who it is; nothing is set and nobody is woken."""
-    with session.link(all_nodes=True) as link, session.progress(_N_NODES) as progress:
+    with session.link(all_nodes=True) as link, session.progress(_N_NODES) as bar:
         reports = probe(
             link,
             session.clock,
             properties=session.options.properties,
-            progress=progress,
+            progress=bar.update,
         )
     session.write_output(
         [_report_line(report) for report in reports] or ["nobody answers"],
@@ -261,14 +255,14 @@ def _friction(session: _Session, arm_is_free: bool) -> None:
             options=session.options,
         ) as device,
         watched(device, LIMITS.watchdog_time) or nullcontext() as watchdog,
-        session.progress(2 * len(SPEEDS)) as progress,
+        session.progress(2 * len(SPEEDS)) as bar,
     ):
         runs = steady_runs(
             device,
             session.clock,
             watchdog=watchdog,
             stop=stop,
-            progress=progress,
+            progress=bar.update,
         )
         estimate = fit_friction(runs)
     session.write_output(_friction_lines(estimate), dataclasses.asdict(estimate))

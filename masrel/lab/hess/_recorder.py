@@ -12,6 +12,7 @@ import mmap
 from array import array
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -363,13 +364,13 @@ def _stuck(columns: Columns) -> list[str]:
     # where the torque sensor stays while the torque does not
     time, sent = columns["time_s"], columns["command_torque_nm"]
     name = MEASURED_TORQUE.column
-    worst = max(
-        (
-            (float(np.ptp(sent[first:last])), first, last)
-            for first, last in _long_runs(time, columns[name])
-        ),
-        default=(0.0, 0, 0),
-    )
+    starts = np.flatnonzero(np.diff(columns[name], prepend=np.nan) != 0.0).tolist()
+    worst = (0.0, 0, 0)  # change, N·m, in samples from one to before another
+    for first, after in pairwise([*starts, time.size]):  # a run of equal numbers
+        ends_s = time[after - 1]
+        if ends_s - time[first] >= _STUCK_S:
+            last = int(np.searchsorted(time, ends_s - _LAG_S, side="right"))
+            worst = max(worst, (float(np.ptp(sent[first:last])), first, last))
     change, first, last = worst
     if change <= _STUCK_NM:
         return []
@@ -378,17 +379,3 @@ def _stuck(columns: Columns) -> list[str]:
         f"{time[last] - time[first]:.2f} s while the torque that is sent changes by "
         f"{change:.2f} N·m"
     ]
-
-
-def _long_runs(
-    time: NDArray[np.float64], values: NDArray[np.float64]
-) -> list[tuple[int, int]]:
-    # first sample of each long run of equal numbers, and where its last moment begins
-    starts = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
-    lasts = np.append(starts, values.size)[1:] - 1
-    runs = []
-    for first, last in zip(starts.tolist(), lasts.tolist(), strict=True):
-        if time[last] - time[first] >= _STUCK_S:
-            shorter = np.searchsorted(time, time[last] - _LAG_S, side="right")
-            runs.append((first, int(shorter)))
-    return runs

@@ -36,17 +36,12 @@ class VelocityEstimate:
         return self._velocity
 
 
-def speed_noise(angle_noise: float, rate_hz: float) -> float:
-    """Return the standard deviation that noise of the angle gives the speed, rad/s."""
-    # v = g/T (n_t - g Σ (1 - g)^k n_(t-1-k)) of independent n
-    gain = -math.expm1(-CUTOFF_RAD_S / rate_hz)
-    return angle_noise * rate_hz * gain * math.sqrt(2.0 / (2.0 - gain))
-
-
 def speed_margin(angle_noise: float, rate_hz: float) -> float:
     """Return how far noise of the angle may move the speed, rad/s."""
-    # A hundred ticks at rest all lie within so many standard deviations of the speed.
-    return 5.0 * speed_noise(angle_noise, rate_hz)
+    # Both as standard deviations: v = g/T (n_t - g Σ (1 - g)^k n_(t-1-k)) of
+    # independent n. A hundred ticks at rest all lie within five of the speed's.
+    gain = -math.expm1(-CUTOFF_RAD_S / rate_hz)
+    return 5.0 * (angle_noise * rate_hz * gain * math.sqrt(2.0 / (2.0 - gain)))
 
 
 def passive_damping(stiffness: float, damping: float, rate_hz: float) -> float:

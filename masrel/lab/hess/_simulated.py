@@ -21,6 +21,7 @@ from masrel.lab.hess.limits import _check_not_negative
 from masrel.lab.recording import MEASURED_TORQUE
 
 _LOWER, _FREE, _UPPER = -1, 0, 1  # which end stop the arm touches
+_RESOLUTION = math.radians(0.005)  # of the encoder: its step
 _MAX_HALVINGS = 10  # of a step in which something changes: 0.5 ms / 1024
 _TAYLOR_TERMS = 14
 _MAX_NORM = 0.25  # 0.25^15 / 15! is below 1e-21: the series is exact in floats
@@ -87,18 +88,13 @@ def propagator(
 def _exponential(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     # (n, n) -> (n, n), by a Taylor series of the scaled matrix, squared back
     norm = float(np.abs(matrix).sum(axis=1).max())
-    squarings = 0
-    while norm > _MAX_NORM:
-        norm *= 0.5
-        squarings += 1
+    squarings = max(0, math.ceil(math.log2(norm / _MAX_NORM)))
     scaled = matrix * 0.5**squarings
     identity = np.eye(matrix.shape[0])
     result = identity
     for term in range(_TAYLOR_TERMS, 0, -1):  # Horner
         result = identity + scaled @ result / term
-    for _ in range(squarings):
-        result = result @ result
-    return result
+    return np.linalg.matrix_power(result, 2**squarings)
 
 
 class Plant:
@@ -410,11 +406,9 @@ class SimulatedDevice(Device):
         clock: Clock,
         hand: Hand,
         parameters: PlantParameters | None = None,
-        resolution: float = math.radians(0.005),
         sensor: TorqueSensor | None = None,
     ) -> None:
         self._clock = clock
-        self._resolution = resolution
         self._plant = Plant(hand, parameters or PlantParameters())
         self._started = False
         self._sensing = None if sensor is None else _Sensing(sensor)
@@ -425,8 +419,7 @@ class SimulatedDevice(Device):
 
     def _read(self) -> Reading:
         now_ns = self._advance()
-        steps = math.floor(self._plant.angle_at(now_ns) / self._resolution + 0.5)
-        angle = steps * self._resolution
+        angle = _rounded(self._plant.angle_at(now_ns), _RESOLUTION)
         if self._sensing is None:
             return Reading(now_ns, angle)
         return Reading(now_ns, angle, (self._sensing.read(),))

@@ -247,6 +247,6 @@ def _compared(
 
 
 def _largest_and_rms(errors: NDArray[np.float64]) -> tuple[float, float]:
-    if not errors.size:
-        return 0.0, 0.0
-    return float(np.abs(errors).max()), float(np.sqrt(np.mean(errors**2)))
+    # (n,) -> 0 and 0 where there are none
+    mean_square = np.sum(errors**2) / max(errors.size, 1)
+    return float(np.abs(errors).max(initial=0.0)), float(np.sqrt(mean_square))

@@ -111,7 +111,7 @@ def probe(
     clock: Clock,
     *,
     properties: PropertyTable | None = None,
-    progress: Callable[[], None] = lambda: None,
+    progress: Callable[[], object] = lambda: None,
 ) -> tuple[NodeReport, ...]:
     """Ask every node who it is; nothing is set, and nobody is woken.
 
@@ -251,34 +251,30 @@ def check(link: Link, clock: Clock, options: PuckOptions) -> tuple[Check, ...]:
     """
     puck = AwakePuck(link, clock, options)
     node, transmission = puck.node, puck.transmission
-    counts, took_s, n_lost = _request_positions(puck, options.patience_s)
-    checks = [
-        Check(
-            name="units",
-            holds=True,
-            result=(
-                f"CTS {transmission.counts_per_turn}, IPNM {transmission.units_per_nm}"
-                f": {math.degrees(transmission.angle_step):.6f} deg and "
-                f"{transmission.torque_step:.5f} N·m a step"
-            ),
+    units = Check(
+        name="units",
+        holds=True,
+        result=(
+            f"CTS {transmission.counts_per_turn}, IPNM {transmission.units_per_nm}"
+            f": {math.degrees(transmission.angle_step):.6f} deg and "
+            f"{transmission.torque_step:.5f} N·m a step"
         ),
-        _check_replies(took_s, n_lost),
-    ]
-    if counts:
-        checks += _check_position(counts, puck)
-    checks.append(_check_torque_mode(puck, options))
-    errors = Check(
+    )
+    counts, took_s = _request_positions(puck, options.patience_s)
+    positions = _check_position(counts, puck) if counts else []
+    torque_mode = _check_torque_mode(puck, options)
+    errors = Check(  # the last, which counts those of all others
         name="error frames",
         holds=node.n_errors == 0,
         result=f"{node.n_errors}, and {node.n_foreign} frames of others",
     )
-    return (*checks, errors)
+    return (units, _check_replies(took_s), *positions, torque_mode, errors)
 
 
 def _request_positions(
     puck: AwakePuck, patience_s: float
-) -> tuple[list[int], list[float], int]:
-    # -> counts, how long each took s, how many stayed without an answer
+) -> tuple[list[int], list[float]]:
+    # -> counts, and how long each took, s; fewer than requests where some got lost
     node, counts, took_s = puck.node, [], []
     for _ in range(_N_REQUESTS):
         request_ns = node.now_ns()
@@ -286,10 +282,11 @@ def _request_positions(
             counts.append(node.position(puck.position_id, patience_s=patience_s)[1])
             took_s.append((node.now_ns() - request_ns) * 1e-9)
         node.wait(max(0.0, 0.001 - (node.now_ns() - request_ns) * 1e-9))
-    return counts, took_s, _N_REQUESTS - len(counts)
+    return counts, took_s
 
 
-def _check_replies(took_s: list[float], n_lost: int) -> Check:
+def _check_replies(took_s: list[float]) -> Check:
+    n_lost = _N_REQUESTS - len(took_s)
     if not took_s:
         return Check(name="answers", holds=False, result=f"none of {n_lost} came")
     in_time = sum(took <= _MAX_REPLY_S for took in took_s) / _N_REQUESTS
@@ -383,7 +380,7 @@ def steady_runs(
     speeds: Sequence[float] = SPEEDS,
     watchdog: Watching | None = None,
     stop: EmergencyStop | None = None,
-    progress: Callable[[], None] = lambda: None,
+    progress: Callable[[], object] = lambda: None,
 ) -> tuple[SteadyRun, ...]:
     """Turn a free arm to and fro at steady speeds.
 
@@ -420,7 +417,7 @@ def steady_runs(
     watching = watchdog or Watching()
     arm = _TurningArm(device, clock, watching, stop or EmergencyStop())
     arm.check_direction()
-    away = 1.0 if arm.is_low else -1.0
+    away = 1.0 if arm.angle < 0.5 * (_LOW_END + _HIGH_END) else -1.0
     arm.turn(-away * speeds[0])  # to the nearer end
     runs = []
     for speed in speeds:
@@ -505,10 +502,6 @@ class _TurningArm:
         self._start_ns = self._due_ns = self._sent_ns = clock.now_ns()
         self.angle = math.nan  # until it has been read
         self._velocity = 0.0
-
-    @property
-    def is_low(self) -> bool:
-        return self.angle < 0.5 * (_LOW_END + _HIGH_END)
 
     def check_direction(self) -> None:
         while math.isnan(self.angle):
