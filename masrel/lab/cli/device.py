@@ -26,7 +26,6 @@ from masrel.lab.hess import (
 )
 from masrel.lab.hess._stop import stop_on_key, stop_on_signals, watched
 from masrel.lab.hess.puck import (
-    FrictionEstimate,
     Link,
     NodeReport,
     PuckOptions,
@@ -265,7 +264,18 @@ def _friction(session: _Session, arm_is_free: bool) -> None:
             progress=bar.update,
         )
         estimate = fit_friction(runs)
-    session.write_output(_friction_lines(estimate), dataclasses.asdict(estimate))
+    session.write_output(
+        [
+            *(
+                f"{math.degrees(run.speed):7.1f} deg/s {run.torque:8.4f} N·m"
+                for run in runs
+            ),
+            f"B = {estimate.viscous:.4f} ± {estimate.viscous_error:.4f} N·m·s/rad",
+            f"β = {estimate.coulomb:.4f} ± {estimate.coulomb_error:.4f} N·m",
+            f"offset = {estimate.offset:.4f} ± {estimate.offset_error:.4f} N·m",
+        ],
+        dataclasses.asdict(estimate),
+    )
 
 
 def _report_line(report: NodeReport) -> str:
@@ -278,16 +288,3 @@ def _report_line(report: NodeReport) -> str:
         f"puck {report.puck}: {report.kind}, firmware {report.firmware}, "
         f"{state}{support}{values}"
     )
-
-
-def _friction_lines(estimate: FrictionEstimate) -> list[str]:
-    runs = [
-        f"{math.degrees(run.speed):7.1f} deg/s {run.torque:8.4f} N·m"
-        for run in estimate.runs
-    ]
-    return [
-        *runs,
-        f"B = {estimate.viscous:.4f} ± {estimate.viscous_error:.4f} N·m·s/rad",
-        f"β = {estimate.coulomb:.4f} ± {estimate.coulomb_error:.4f} N·m",
-        f"offset = {estimate.offset:.4f} ± {estimate.offset_error:.4f} N·m",
-    ]

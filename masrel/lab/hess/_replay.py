@@ -50,18 +50,18 @@ class ReplayDevice(Device):
                 f"got {n_readings} readings"
             )
         self._clock = clock
-        self._times_ns = [round(time * 1e9) for time in times.tolist()]
-        self._angles = _as_read(
-            [time_ns * 1e-9 for time_ns in self._times_ns],
+        times_ns = [round(time * 1e9) for time in times.tolist()]
+        angles = _as_read(
+            [time_ns * 1e-9 for time_ns in times_ns],
             columns["angle_deg"][:n_readings].tolist(),
             columns["velocity_deg_s"][:n_readings].tolist(),
         )
         self.channels = recording.channels
         # What the channels gave, reading by reading
         rows = (columns[each.column][:n_readings].tolist() for each in self.channels)
-        self._values = list(zip(*rows, strict=True)) or [()] * n_readings
+        values = list(zip(*rows, strict=True)) or [()] * n_readings
+        self._readings = map(Reading, times_ns, angles, values)  # times from 0 on
         self._start_ns: int | None = None
-        self._next = 0
 
     def _start(self) -> None:
         """Nothing to take hold of."""
@@ -69,13 +69,12 @@ class ReplayDevice(Device):
     def _read(self) -> Reading:
         if self._start_ns is None:
             self._start_ns = self._clock.now_ns()
-        if self._next == len(self._angles):
+        reading = next(self._readings, None)
+        if reading is None:
             raise DeviceError("replay: the recording has no more readings")
-        time_ns = self._start_ns + self._times_ns[self._next]
+        time_ns = self._start_ns + reading.time_ns
         self._clock.sleep_until_ns(time_ns)
-        reading = Reading(time_ns, self._angles[self._next], self._values[self._next])
-        self._next += 1
-        return reading
+        return reading._replace(time_ns=time_ns)
 
     def _send(self, torque_nm: float) -> None:
         """Move nothing: what the arm did is recorded."""

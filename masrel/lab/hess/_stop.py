@@ -314,20 +314,15 @@ def watch_over(arguments: list[str]) -> int:
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
     timeout_s, module, *idle_arguments = arguments
     with off_the_loop():
-        return _hold(float(timeout_s), module, idle_arguments)
-
-
-def _hold(timeout_s: float, module: str, idle_arguments: list[str]) -> int:
-    try:
-        idle: Callable[[], None] = importlib.import_module(module).prepare(
-            *idle_arguments
-        )
-        sys.stdout.write("ready\n")
-        sys.stdout.flush()
-        return watch(0, timeout_s, idle)
-    except DeviceError as error:
-        sys.stderr.write(f"watchdog: {error}\n")
-        return _FAILED
+        try:
+            device = importlib.import_module(module)
+            idle: Callable[[], None] = device.prepare(*idle_arguments)
+            sys.stdout.write("ready\n")
+            sys.stdout.flush()
+            return watch(0, float(timeout_s), idle)
+        except DeviceError as error:
+            sys.stderr.write(f"watchdog: {error}\n")
+            return _FAILED
 
 
 def watch(pipe: int, timeout_s: float, idle: Callable[[], None]) -> int:

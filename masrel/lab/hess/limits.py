@@ -44,7 +44,7 @@ def _check_positive(**values: float) -> None:
     """Refuse the first value that is not above 0, and finite."""
     for name, value in values.items():
         if not 0.0 < value < math.inf:
-            raise ParameterError(f"{name}: needs more than 0, got {value}")
+            raise ParameterError(f"{name}: needs more than 0 and finite, got {value}")
 
 
 def _check_not_negative(**values: float) -> None:
@@ -159,10 +159,7 @@ class DeviceLimits:
     end_ramp_time: float = 0.1
 
     def __post_init__(self) -> None:
-        for name in _POSITIVE:
-            value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise ParameterError(f"{name}: needs a finite limit > 0, got {value}")
+        _check_positive(**{name: getattr(self, name) for name in _POSITIVE})
         _check_not_negative(**{name: getattr(self, name) for name in _NOT_NEGATIVE})
         for name, most in _LONGEST_S.items():
             value = getattr(self, name)

@@ -175,9 +175,6 @@ class Joint:
     def release(self) -> None:
         self.n_releases += 1
 
-    def largest_torque(self, **_stretch: float) -> float:
-        return 1.0
-
     def largest_slope(self, **_stretch: float) -> tuple[float, float]:
         return 0.0, 0.0
 

@@ -31,7 +31,11 @@ def clamp(**change: object) -> SimulatedHand:
 @pytest.mark.parametrize(
     ("make", "change", "words"),
     [
-        (DeviceLimits, {"torque": 0.0}, "torque: needs a finite limit > 0, got 0.0"),
+        (
+            DeviceLimits,
+            {"torque": 0.0},
+            "torque: needs more than 0 and finite, got 0.0",
+        ),
         (DeviceLimits, {"torque": math.inf}, "torque: needs"),
         (DeviceLimits, {"speed": math.nan}, "speed: needs"),
         *(
@@ -51,7 +55,11 @@ def clamp(**change: object) -> SimulatedHand:
         (DeviceLimits, {"ramp_time": 0.101}, "ramp_time: needs 0 to 0.1 s, got 0.101"),
         (DeviceLimits, {"ramp_time": math.nan}, "ramp_time: needs"),
         *(
-            (DeviceLimits, {name: -1.0}, f"{name}: needs a finite limit > 0, got -1.0")
+            (
+                DeviceLimits,
+                {name: -1.0},
+                f"{name}: needs more than 0 and finite, got -1.0",
+            )
             for name in (
                 *("torque_rate", "stale_time", "frozen_time", "jump_angle"),
                 *("standing_time", "standing_torque", "watchdog_time"),
@@ -64,11 +72,15 @@ def clamp(**change: object) -> SimulatedHand:
             "lowest_angle, highest_angle: need",
         ),
         (StretchRules, {"n": 0}, "n: needs 1 stretch or more, got 0"),
-        (StretchRules, {"time_limit": 0.0}, "time_limit: needs more than 0, got 0.0"),
+        (
+            StretchRules,
+            {"time_limit": 0.0},
+            "time_limit: needs more than 0 and finite, got 0.0",
+        ),
         (
             StretchRules,
             {"stretch_limit": math.inf},
-            "stretch_limit: needs more than 0, got inf",
+            "stretch_limit: needs more than 0 and finite, got inf",
         ),
         (controls, {"slip_speed_drop": 0.0}, "slip_speed_drop: needs more than 0"),
         (controls, {"slip_speed_drop": math.nan}, "slip_speed_drop: needs more than 0"),
@@ -104,7 +116,11 @@ def clamp(**change: object) -> SimulatedHand:
         (clamp, {"again": (0.0,)}, r"again\[0\]: needs more than 0"),
         (clamp, {"again": (1.0, math.nan)}, r"again\[1\]: needs more than 0"),
         (clamp, {"again": (1.0, 60.0)}, "ramps shorter than the stretch"),
-        (HandTraits, {"stiffness": 0.0}, "stiffness: needs more than 0, got 0.0"),
+        (
+            HandTraits,
+            {"stiffness": 0.0},
+            "stiffness: needs more than 0 and finite, got 0.0",
+        ),
         (HandTraits, {"damping": math.inf}, "damping: needs more than 0"),
         (HandTraits, {"inertia": -1.0}, "inertia: needs more than 0"),
         (HandTraits, {"tremor": -0.1}, "tremor: needs 0 or more"),
@@ -125,7 +141,6 @@ def clamp(**change: object) -> SimulatedHand:
             "largest_torque: needs more than 0",
         ),
         (PuckOptions, {"direction": 0}, "direction: needs 1 or -1, got 0"),
-        (PuckOptions, {"poll_ticks": 0}, "poll_ticks: needs 1 or more, got 0"),
         (
             PuckOptions,
             {"angle_after_reset": 4.0},
@@ -151,17 +166,17 @@ def clamp(**change: object) -> SimulatedHand:
         (
             transmitted,
             {"counts_per_turn": 0},
-            "counts_per_turn: needs more than 0, got 0",
+            "counts_per_turn: needs more than 0 and finite, got 0",
         ),
         (
             transmitted,
             {"units_per_nm": -1},
-            "units_per_nm: needs more than 0, got -1",
+            "units_per_nm: needs more than 0 and finite, got -1",
         ),
         (
             transmitted,
             {"gear_ratio": math.nan},
-            "gear_ratio: needs more than 0, got nan",
+            "gear_ratio: needs more than 0 and finite, got nan",
         ),
         (transmitted, {"direction": 2}, "direction: needs 1 or -1, got 2"),
         (TorqueSensor, {"noise": -0.1}, "noise: needs 0 or more, got"),

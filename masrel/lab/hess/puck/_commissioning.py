@@ -21,11 +21,18 @@ from masrel.lab.hess._stop import EmergencyStop, Watching
 from masrel.lab.hess.device import Device
 from masrel.lab.hess.limits import DeviceLimits
 from masrel.lab.hess.puck._bus import MAX_NODE, Link
-from masrel.lab.hess.puck._puck_device import AwakePuck, PuckNode, identify
+from masrel.lab.hess.puck._puck_device import (
+    ROLE_MASK,
+    AwakePuck,
+    PuckNode,
+    motor_table,
+)
 from masrel.lab.hess.puck._puck_options import (
     ASLEEP,
     READY,
+    ROLE,
     STATUS,
+    VERSION,
     PropertyTable,
     PuckOptions,
 )
@@ -157,19 +164,21 @@ def _node_report(node: PuckNode, properties: PropertyTable | None) -> NodeReport
                 is_supported=False,
                 properties={},
             )
-        identity = identify(node, patience_s=_PROBE_PATIENCE_S)
+        firmware = node.get(VERSION, patience_s=_PROBE_PATIENCE_S)
+        role = node.get(ROLE, patience_s=_PROBE_PATIENCE_S)
     except DeviceTimeoutError:
         return None
     try:
-        numbers = identity.table(properties).numbers
+        numbers = motor_table(node.puck, role, firmware, properties).numbers
     except DeviceError:
         numbers = {}  # the report says that it is not supported
-    reported = [name for name in _REPORTED if identity.is_awake and name in numbers]
+    is_awake, kind = status == READY, role & ROLE_MASK
+    reported = [name for name in _REPORTED if is_awake and name in numbers]
     return NodeReport(
         puck=node.puck,
-        kind=_KINDS.get(identity.kind, f"unknown, ROLE {identity.role}"),
-        is_awake=identity.is_awake,
-        firmware=identity.firmware,
+        kind=_KINDS.get(kind, f"unknown, ROLE {role}"),
+        is_awake=is_awake,
+        firmware=firmware,
         is_supported=bool(numbers),
         properties={name: node.get(numbers[name]) for name in reported},
     )
@@ -277,11 +286,11 @@ def _request_positions(
     # -> counts, and how long each took, s; fewer than requests where some got lost
     node, counts, took_s = puck.node, [], []
     for _ in range(_N_REQUESTS):
-        request_ns = node.now_ns()
+        request_ns = node.clock.now_ns()
         with suppress(DeviceTimeoutError):
             counts.append(node.position(puck.position_id, patience_s=patience_s)[1])
-            took_s.append((node.now_ns() - request_ns) * 1e-9)
-        node.wait(max(0.0, 0.001 - (node.now_ns() - request_ns) * 1e-9))
+            took_s.append((node.clock.now_ns() - request_ns) * 1e-9)
+        node.wait(max(0.0, 0.001 - (node.clock.now_ns() - request_ns) * 1e-9))
     return counts, took_s
 
 

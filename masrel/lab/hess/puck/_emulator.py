@@ -36,7 +36,6 @@ from masrel.lab.hess.puck._puck_options import (
     ERROR,
     ID,
     IDLE,
-    MEMORY_WRITERS,
     READY,
     ROLE,
     SERIAL_NUMBER,
@@ -206,7 +205,6 @@ class PuckEmulator:
         self._events: list[tuple[int, int, Callable[[int], None]]] = []
         self._n_events = 0
         self.settings: deque[Setting] = deque(maxlen=_MAX_SETTINGS)
-        self.n_memory_writes = 0
         self.n_disturbances = 0  # frames that came while it was waking
 
     # Time: events wait for theirs, and those of one time keep their order
@@ -286,8 +284,6 @@ class PuckEmulator:
             self._offset = value - self.motor.counts(now_ns)
         elif name == "MODE":
             self._switch(value, now_ns)
-        elif name in MEMORY_WRITERS:
-            self.n_memory_writes += 1
         elif name == "STAT" and not self._is_awake and value == READY:
             self._is_waking = True
             self._at(now_ns + round(self._options.wake_s * 1e9), self._wake)

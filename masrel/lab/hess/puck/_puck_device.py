@@ -10,7 +10,6 @@ import itertools
 import math
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
 
 from masrel.errors import (
     BusError,
@@ -66,7 +65,7 @@ _MAX_WAITING = 1000  # frames; more than fit on the bus in 50 ms
 _MAX_OVERDUE = 30  # more than fit on the bus in 1 ms
 _MAX_ERROR_FRAMES = 10  # on a bus of one joint there should be none
 
-_ROLE_MASK = 0x1F  # the other bits of ROLE say what encoder it has
+ROLE_MASK = 0x1F  # the other bits of ROLE say what encoder it has
 _MOTOR_KIND = 0
 _OFF_BUS_S = 1.2  # a waking puck leaves the bus; public drivers wait 1.0 and 1.2 s
 _COUNT_TOLERANCE = 2  # an arm that is held moves the encoder by no more
@@ -77,6 +76,7 @@ _REPLY_PATIENCE_S = 0.005
 _BLIND_AFTER_S = 0.05
 _PAUSE_S = 0.001  # between two attempts
 
+_POLL_TICKS = 5  # torques after which it is asked for its mode, or for its torque
 _MAX_UNANSWERED = 2  # polls in a row; one may get lost
 _MAX_LOST_TORQUES = 1  # in a row; the next comes after a tick
 
@@ -92,7 +92,7 @@ class PuckNode:
 
     def __init__(self, link: Link, clock: Clock, puck: int) -> None:
         self._link = link
-        self._clock = clock
+        self.clock = clock
         self._position_reply, self._property_reply = reply_identifiers(puck)
         self._in_doubt = False  # whether a position may still come for an old request
         self._n_overdue = 0  # frames that came after the deadline
@@ -144,7 +144,7 @@ class PuckNode:
             raise DeviceTimeoutError(
                 f"puck {self.puck}: no position within {patience_s * 1e3:g} ms"
             )
-        return min(request_ns + _SAMPLING_NS, self._clock.now_ns()), counts
+        return min(request_ns + _SAMPLING_NS, self.clock.now_ns()), counts
 
     def _receive_until(self, awaited: int, deadline_ns: int) -> bool:
         # Whether the reply came in time
@@ -159,7 +159,7 @@ class PuckNode:
     def _next_frame(self, deadline_ns: int) -> Frame | None:
         # What waits is taken after the deadline too, because this end may be late;
         # but only so many frames, because others may never fall silent.
-        if self._clock.now_ns() > deadline_ns:
+        if self.clock.now_ns() > deadline_ns:
             self._n_overdue += 1
             if self._n_overdue > _MAX_OVERDUE:
                 return None
@@ -202,49 +202,19 @@ class PuckNode:
                 "error-frames",
             )
 
-    def now_ns(self) -> int:
-        """Return the time."""
-        return self._clock.now_ns()
-
     def wait(self, duration_s: float) -> None:
         """Let time pass without sending a frame."""
-        self._clock.sleep_until_ns(self._clock.now_ns() + round(duration_s * 1e9))
+        self.clock.sleep_until_ns(self.clock.now_ns() + round(duration_s * 1e9))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Identity:
-    """What a puck says of itself before anything is set."""
-
-    puck: int  # its node
-    is_awake: bool  # whether it has left its monitor
-    firmware: int  # VERS
-    role: int  # ROLE
-
-    @property
-    def kind(self) -> int:
-        """Its kind: on other kinds the same numbers mean other things."""
-        return self.role & _ROLE_MASK
-
-    def table(self, properties: PropertyTable | None) -> PropertyTable:
-        """Return the user's property numbers of a motor's puck, or its firmware's."""
-        if self.kind != _MOTOR_KIND:
-            raise DeviceError(
-                f"puck {self.puck}: needs a motor's puck, its ROLE is {self.kind}"
-            )
-        return properties or property_table(self.firmware)
-
-
-def identify(node: PuckNode, *, patience_s: float = 0.05) -> Identity:
-    """Request who a puck is; nothing is set."""
-    status = node.get(STATUS, patience_s=patience_s)
-    if status not in (ASLEEP, READY):
-        raise DeviceError(f"puck {node.puck}: needs STAT 0 or 2, it reports {status}")
-    return Identity(
-        puck=node.puck,
-        is_awake=status == READY,
-        firmware=node.get(VERSION, patience_s=patience_s),
-        role=node.get(ROLE, patience_s=patience_s),
-    )
+def motor_table(
+    puck: int, role: int, firmware: int, properties: PropertyTable | None
+) -> PropertyTable:
+    """Return the user's property numbers of a motor's puck, or its firmware's."""
+    kind = role & ROLE_MASK  # on other kinds the same numbers mean other things
+    if kind != _MOTOR_KIND:
+        raise DeviceError(f"puck {puck}: needs a motor's puck, its ROLE is {kind}")
+    return properties or property_table(firmware)
 
 
 class AwakePuck:
@@ -257,12 +227,17 @@ class AwakePuck:
         self, link: Link, clock: Clock, options: PuckOptions, *, wakes: bool = True
     ) -> None:
         self.node = node = PuckNode(link, clock, options.puck)
-        identity = identify(node)
-        self.table = table = identity.table(options.properties)
+        status = node.get(STATUS)
+        if status not in (ASLEEP, READY):
+            raise DeviceError(
+                f"puck {node.puck}: needs STAT 0 or 2, it reports {status}"
+            )
+        firmware, role = node.get(VERSION), node.get(ROLE)
+        self.table = table = motor_table(node.puck, role, firmware, options.properties)
         self.torque_id, self.mode_id = table.number("T"), table.number("MODE")
         self.position_id = table.number("P")
         # Whether it is woken now, and so does not know where the arm is
-        self.was_asleep = not identity.is_awake
+        self.was_asleep = status == ASLEEP
         if self.was_asleep:
             if not wakes:
                 raise DeviceError(
@@ -271,22 +246,7 @@ class AwakePuck:
                     "zero, or set angle_after_reset"
                 )
             self._wake()
-        # It may still hold the torque of a driver that was killed.
-        self._set("T", 0)
-        self._set("MODE", IDLE)
-        # Masks of a whole arm: 1 and 2 are packed torques for pucks 1-4 and 5-7.
-        arm_half = 1 if node.puck <= 4 else 2
-        for name, group in (("GRPA", 0), ("GRPB", arm_half), ("GRPC", 4)):
-            self._set(name, group)
-        self.transmission = self._read_transmission(options)  # what it counts in
-        largest = options.largest_torque
-        self.max_units = math.floor(largest / self.transmission.torque_step)
-        if not 0 < self.max_units <= MAX_TORQUE:
-            raise DeviceError(
-                f"puck {node.puck}: largest_torque needs 1 to {MAX_TORQUE} current "
-                f"units, {largest:g} N·m are {self.max_units}"
-            )
-        self._set("MT", self.max_units)
+        self._configure(options)
 
     def _wake(self) -> None:
         # Talking to a puck that has left the bus may throw the host off it, too.
@@ -298,6 +258,24 @@ class AwakePuck:
             raise DeviceError(
                 f"puck {node.puck}: needs STAT {READY} after waking, got {status}"
             )
+
+    def _configure(self, options: PuckOptions) -> None:
+        # It may still hold the torque of a driver that was killed.
+        self._set("T", 0)
+        self._set("MODE", IDLE)
+        # Masks of a whole arm: 1 and 2 are packed torques for pucks 1-4 and 5-7.
+        arm_half = 1 if self.node.puck <= 4 else 2
+        for name, group in (("GRPA", 0), ("GRPB", arm_half), ("GRPC", 4)):
+            self._set(name, group)
+        self.transmission = self._read_transmission(options)  # what it counts in
+        largest = options.largest_torque
+        self.max_units = math.floor(largest / self.transmission.torque_step)
+        if not 0 < self.max_units <= MAX_TORQUE:
+            raise DeviceError(
+                f"puck {self.node.puck}: largest_torque needs 1 to {MAX_TORQUE} "
+                f"current units, {largest:g} N·m are {self.max_units}"
+            )
+        self._set("MT", self.max_units)
 
     def _read_transmission(self, options: PuckOptions) -> Transmission:
         counts, units = self._get("CTS"), self._get("IPNM")
@@ -376,9 +354,9 @@ class AwakePuck:
 
 def release(node: PuckNode, *, torque_id: int, mode_id: int) -> None:
     """Zero the torque and idle a puck, again and again until it confirms."""
-    start_ns = node.now_ns()
+    start_ns = node.clock.now_ns()
     reason = "it does not go to idle"
-    while (since_s := (node.now_ns() - start_ns) * 1e-9) < _PATIENCE_S:
+    while (since_s := (node.clock.now_ns() - start_ns) * 1e-9) < _PATIENCE_S:
         try:
             node.set(torque_id, 0)
             if _is_asleep(node, blindly=since_s > _BLIND_AFTER_S):
@@ -435,7 +413,7 @@ class PuckDevice(Device):
         self.simulated = not options.moves_hardware
         self._setup = setup
         self._options = options
-        self._n_left = options.poll_ticks  # torques until the next of these questions
+        self._n_left = _POLL_TICKS  # torques until the next of these questions
         self._next_is_mode = True
         self._n_unanswered = 0
         self._asked_units = 0  # the torque it was set to when its torque was requested
@@ -505,7 +483,7 @@ class PuckDevice(Device):
             self._ask(units)
 
     def _ask(self, units: int) -> None:
-        self._n_left = self._options.poll_ticks
+        self._n_left = _POLL_TICKS
         self._n_unanswered += 1  # until the reply comes
         if self._next_is_mode or not self._options.checks_torque:
             self._node.request(self._puck.mode_id)

@@ -434,8 +434,6 @@ class PuckOptions(BackendOptions):
         the motor has continuously; larger commands are refused before they are sent.
     patience_s : float
         How long to wait for a position, s: one period of the loop.
-    poll_ticks : int
-        Torques after which it is asked once for its mode, or for the torque it holds.
     checks_torque : bool
         Whether it is asked for its torque. A torque is not acknowledged: without,
         nobody notices that torques get lost while positions come.
@@ -460,7 +458,6 @@ class PuckOptions(BackendOptions):
     direction: Literal[1, -1] = 1
     largest_torque: float = 28.0
     patience_s: float = 0.001
-    poll_ticks: int = 5
     checks_torque: bool = True
     angle_after_reset: float | None = None
     properties: PropertyTable | None = field(default=None, repr=False)
@@ -477,8 +474,6 @@ class PuckOptions(BackendOptions):
             patience_s=self.patience_s,
         )
         check_direction(self.direction)
-        if self.poll_ticks < 1:
-            raise ParameterError(f"poll_ticks: needs 1 or more, got {self.poll_ticks}")
         angle = self.angle_after_reset
         if angle is not None and not 0.0 <= angle <= math.pi:
             raise ParameterError(

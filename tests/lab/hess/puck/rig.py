@@ -21,7 +21,11 @@ from masrel.lab.hess.puck import EmulatorOptions, InjectedFault, Link, PuckOptio
 from masrel.lab.hess.puck._bus import open_link
 from masrel.lab.hess.puck._emulator import PuckEmulator
 from masrel.lab.hess.puck._puck_device import PuckDevice, PuckNode, build, release
-from masrel.lab.hess.puck._puck_options import FaultKind, Transmission
+from masrel.lab.hess.puck._puck_options import (
+    MEMORY_WRITERS,
+    FaultKind,
+    Transmission,
+)
 from tests.lab.hess.rig import END, LIMITS, controls, stretching
 
 __all__ = ["open_link", "release"]
@@ -113,6 +117,11 @@ def presented(
 def told(device: PuckDevice) -> list[tuple[str, int]]:
     """What an emulated puck was set to, in order."""
     return [(setting.name, setting.value) for setting in device.emulator.settings]
+
+
+def n_memory_writes(emulator: PuckEmulator) -> int:
+    """How often a puck was told to write its permanent memory."""
+    return sum(setting.name in MEMORY_WRITERS for setting in emulator.settings)
 
 
 def fault(kind: FaultKind, start_s: float = 0.4, **more) -> InjectedFault:

@@ -32,6 +32,7 @@ from tests.lab.hess.puck.rig import (
     bench,
     fault,
     loose,
+    n_memory_writes,
     opened,
     presented,
     puck_options,
@@ -385,7 +386,7 @@ def test_a_presentation_runs_on_every_kind_of_puck(traits: dict) -> None:
     done, device, _ = presented(**traits)
     assert done.fault is None
     assert done.recording.facts["ended"] == "arrived"
-    assert device.emulator.n_memory_writes == 0
+    assert n_memory_writes(device.emulator) == 0
 
 
 def test_what_is_recorded_is_what_the_puck_was_told() -> None:
@@ -447,7 +448,7 @@ def test_a_puck_that_comes_back_is_idled_and_its_memory_not_written(
     wait(clock, waited_s)
     device.close()
     assert device.emulator.mode == 0
-    assert device.emulator.n_memory_writes == 0
+    assert n_memory_writes(device.emulator) == 0
 
 
 @pytest.mark.parametrize(

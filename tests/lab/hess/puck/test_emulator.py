@@ -15,8 +15,8 @@ from tests.lab.hess.puck.rig import (
     Bench,
     PuckNode,
     bench,
-    fault,
     loose,
+    n_memory_writes,
     open_link,
     release,
 )
@@ -127,7 +127,7 @@ def test_its_own_limit_clips_and_writes_of_its_memory_are_counted(on) -> None:
     assert one.node.get(T) == 100
     assert told(one, (T, -8000)).node.get(T) == -100
     told(one, *((number, -1) for number in (30, 31, 32)))
-    assert one.emulator.n_memory_writes == 3  # SAVE, LOAD, DEF
+    assert n_memory_writes(one.emulator) == 3  # SAVE, LOAD, DEF
 
 
 def test_idle_it_brakes(on) -> None:
@@ -139,15 +139,6 @@ def test_idle_it_brakes(on) -> None:
 
     # 0.06 kg·m² against B = 0.168 and β = 0.189, with or without 1 N·m·s/rad more
     assert 0.0 < coasted_deg((T, 0), (MODE, 0)) < 0.3 * coasted_deg((T, 0))
-
-
-# Faults; they begin when it is first put into torque mode. What comes of each in a
-# presentation is in `test_faults`.
-
-
-def failing(on, kind, start_s: float = 0.0, **more) -> Bench:
-    one = on(awake=True, faults=(fault(kind, start_s, **more),))
-    return told(one, (MODE, 2))
 
 
 def test_the_babbling_of_others_is_bounded(on) -> None:
@@ -207,6 +198,3 @@ def test_a_puck_that_cannot_be_heard_is_idled_all_the_same(on) -> None:
         release(node, torque_id=T, mode_id=MODE)
     assert one.clock.now_ns() - begun_ns <= 110_000_000
     assert (one.emulator.mode, one.emulator.torque) == (0, 0)
-
-
-# What it cannot be

@@ -26,6 +26,7 @@ from tests.lab.hess.puck.rig import (
     FaultKind,
     PuckDevice,
     fault,
+    n_memory_writes,
     presented,
     puck_options,
 )
@@ -281,7 +282,7 @@ def assert_invariants(faults: tuple[InjectedFault, ...]) -> None:
         return  # one after the other they left no way to the puck: that is said
     assert held(device)[-1][1] == 0.0
     assert device.emulator.mode == 0
-    assert device.emulator.n_memory_writes == 0
+    assert n_memory_writes(device.emulator) == 0
 
 
 few = settings(deadline=None, max_examples=8)
