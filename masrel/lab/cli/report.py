@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,10 @@ from masrel.lab.report._report_folder import (
     MANIFEST,
     NOTES,
     NUMBERS,
-    Build,
+    keep_shown,
+    last_shown,
+    made_from,
+    note_of,
     replace_report,
     report_changes,
 )
@@ -204,16 +208,12 @@ def report(
             check_inside(place, study)
         refuse_record(place / "report.html")  # before anything is computed
     params = click.get_current_context().params
-    build = Build(
-        study=study,
-        folder=folder,
-        notes=notes,
-        options={k: str(v) for k, v in params.items() if k not in _OTHER_OPTIONS},
-        ratings_file=ratings_file,
-    )
+    options = {k: str(v) for k, v in params.items() if k not in _OTHER_OPTIONS}
+    hashed = partial(made_from, study, options, ratings_file, (folder, notes))
     old = comparing.read(study)  # which may be what is replaced
-    made_from = build.made_from()  # a file that comes later is a change
-    shown, changes = build.last(made_from), list[str]()
+    made = hashed()  # a file that comes later is a change
+    note = note_of(folder, notes)
+    shown, changes = last_shown(note, made, folder), list[str]()
     if shown is not None:
         echo_notes(shown["notes"])
         numbers = read_regular(folder / NUMBERS, most=MAX_TABLE)
@@ -226,7 +226,7 @@ def report(
             changes = _changes(files, folder)
         else:
             replace_report(folder, files)
-            build.keep(made_from, shown)
+            keep_shown(note, shown, before=made, after=hashed())
     verdict = Verdict(**shown["verdict"])
     prints_json = output.json_file == STDOUT
     click.echo(shown["read"], err=True)

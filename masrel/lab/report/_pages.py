@@ -9,7 +9,6 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Literal
@@ -18,7 +17,7 @@ from masrel._files import write_file
 from masrel.errors import ParameterError
 from masrel.pages._sections import Document, html_page, narrow
 from masrel.tables._latex import in_math
-from masrel.tables._tables import Column, Table, page_cells
+from masrel.tables._tables import Column, page_cells
 
 
 def _markdown(document: Document, form: Literal["latex", "docx"] | None) -> str:
@@ -39,29 +38,13 @@ def _markdown(document: Document, form: Literal["latex", "docx"] | None) -> str:
             return in_math(as_markdown(text).replace("$", r"\$"))
 
     environment.filters |= {"md": escape, "cells": page_cells, "rule": _rule}
+    environment.filters |= {"narrow": narrow}  # no wider than paper
     template = environment.get_template("report.md")
     return template.render(document=document, for_pandoc=form is not None)
 
 
 def _as_document(form: Literal["latex", "docx"], document: Document) -> bytes:
-    # tables are no wider than paper
-    sections = tuple(
-        replace(
-            section,
-            blocks=tuple(
-                replace(block, content=part)
-                for block in section.blocks
-                for part in (
-                    narrow(block.content)
-                    if isinstance(block.content, Table)
-                    else [block.content]
-                )
-            ),
-        )
-        for section in document.sections
-    )
-    document = replace(document, sections=sections)
-    blocks = [block for section in sections for block in section.blocks]
+    blocks = [block for section in document.sections for block in section.blocks]
     pictures = {
         block.files["png"]: block.pictures["png"] for block in blocks if block.files
     }

@@ -16,9 +16,8 @@ import json
 import os
 import re
 import sys
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -177,55 +176,57 @@ _MARKS = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Build:
-    """A call of ``masrel report``."""
+def made_from(
+    study: Path,
+    options: Mapping[str, str],
+    ratings_file: Path | None,
+    outputs: Iterable[Path],
+) -> str:
+    """Return a hash of a call, of every file that it may read, and of the code."""
+    # options: all that change what is made or said; ratings_file: a table that the
+    # study may not have; outputs: the folders of the report and of notes
+    call = [os.path.abspath(study), os.environ.get("MASREL_FONT")]
+    digest = hashlib.sha256(json.dumps([call, options, sys.version]).encode())
+    files = [*_files_below(study, [*map(os.path.abspath, outputs)]), *_sources()]
+    for path in (*files, *filter(None, [ratings_file])):
+        digest.update(f"{path}\0{file_hash(str(path))}\n".encode())
+    digest.update(json.dumps(_libraries()).encode())
+    return digest.hexdigest()
 
-    study: Path
-    folder: Path  # of the report
-    notes: Path  # the folder that has what builds were made from
-    options: Mapping[str, str]  # all of the call that changes what is made or said
-    ratings_file: Path | None  # a table of ratings that the study may not have
 
-    def made_from(self) -> str:
-        """Return a hash of the call, of every file that it may read, and the code."""
-        call = [os.path.abspath(self.study), os.environ.get("MASREL_FONT")]
-        digest = hashlib.sha256(json.dumps([call, self.options, sys.version]).encode())
-        outputs = tuple(map(os.path.abspath, (self.folder, self.notes)))
-        files = [*_files_below(self.study, outputs), *_sources()]
-        for path in (*files, *filter(None, [self.ratings_file])):
-            digest.update(f"{path}\0{file_hash(str(path))}\n".encode())
-        digest.update(json.dumps(_libraries()).encode())
-        return digest.hexdigest()
+def note_of(folder: Path, notes: Path) -> Path:
+    """Return the note, in a folder of notes, of the report in a folder."""
+    return notes / f"{_hash(os.path.abspath(folder).encode())}.json"
 
-    def last(self, made_from: str) -> dict[str, Any] | None:
-        """Return what the last build has shown if a new one would change nothing."""
-        with contextlib.suppress(OSError, ValueError):
-            seal, _, text = read_regular(self._note(), most=MAX_TABLE).partition(b"\n")
-            if seal == self._seal(made_from, text):
-                shown: dict[str, Any] = json.loads(text)
-                return shown if _is_whole(self.folder, shown["manifest"]) else None
-        return None
 
-    def keep(self, made_from: str, shown: Mapping[str, Any]) -> None:
-        """Note what this build has shown, or do without."""
-        # shown: the hash of its manifest, too
-        if made_from != self.made_from():
-            return  # somebody wrote in the study meanwhile
-        text = json.dumps(shown).encode()
-        # full, read-only, no folder, a link
-        with contextlib.suppress(OSError, ParameterError):
-            if not self.notes.exists():
-                for name, mark in _MARKS.items():
-                    write_file(self.notes / name, mark)
-            write_file(self._note(), self._seal(made_from, text) + b"\n" + text)
+def last_shown(note: Path, made: str, folder: Path) -> dict[str, Any] | None:
+    """Return what the last build has shown if a new one would change nothing."""
+    with contextlib.suppress(OSError, ValueError):
+        seal, _, text = read_regular(note, most=MAX_TABLE).partition(b"\n")
+        if seal == _seal(made, text):
+            shown: dict[str, Any] = json.loads(text)
+            return shown if _is_whole(folder, shown["manifest"]) else None
+    return None
 
-    def _note(self) -> Path:
-        return self.notes / f"{_hash(os.path.abspath(self.folder).encode())}.json"
 
-    def _seal(self, made_from: str, text: bytes) -> bytes:
-        # of both: a note under another's name is of no use
-        return _hash(made_from.encode() + text).encode()
+def keep_shown(
+    note: Path, shown: Mapping[str, Any], *, before: str, after: str
+) -> None:
+    """Note what a build has shown, the hash of its manifest too, or do without."""
+    if before != after:
+        return  # somebody wrote in the study meanwhile
+    text = json.dumps(shown).encode()
+    # full, read-only, no folder, a link
+    with contextlib.suppress(OSError, ParameterError):
+        if not note.parent.exists():
+            for name, mark in _MARKS.items():
+                write_file(note.with_name(name), mark)
+        write_file(note, _seal(after, text) + b"\n" + text)
+
+
+def _seal(made: str, text: bytes) -> bytes:
+    # of both: a note under another's name is of no use
+    return _hash(made.encode() + text).encode()
 
 
 def _files_below(folder: Path, but: Collection[str]) -> Iterator[str]:
