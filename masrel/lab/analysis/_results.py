@@ -474,18 +474,15 @@ def to_frame(results: "Iterable[Estimate] | Mapping[str, Estimate]") -> "DataFra
     if isinstance(results, Mapping):
         index, results = list(results), results.values()
     rows = [_row(result, place) for place, result in enumerate(results)]
-    return DataFrame(rows, index=index, columns=_columns())
+    # fields of an interval in the place of it
+    place = _OF_ESTIMATE.index("interval")
+    of_interval = ["interval_reason" if x == "reason" else x for x in _OF_INTERVAL]
+    columns = [*_OF_ESTIMATE[:place], *of_interval, *_OF_ESTIMATE[place + 1 :]]
+    return DataFrame(rows, index=index, columns=columns)
 
 
 _OF_INTERVAL = [field.name for field in dataclasses.fields(Interval) if field.repr]
 _OF_ESTIMATE = [field.name for field in dataclasses.fields(Estimate)]
-
-
-def _columns() -> list[str]:
-    # fields of an interval in the place of it
-    place = _OF_ESTIMATE.index("interval")
-    of_interval = ["interval_reason" if x == "reason" else x for x in _OF_INTERVAL]
-    return [*_OF_ESTIMATE[:place], *of_interval, *_OF_ESTIMATE[place + 1 :]]
 
 
 def _row(result: object, place: int) -> dict[str, object]:

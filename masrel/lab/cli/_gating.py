@@ -6,9 +6,10 @@ What a job is told of them: estimates and gates as JUnit and as Markdown.
 import hashlib
 import math
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -65,42 +66,33 @@ def gate_options() -> Decorator:
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Verdict:
-    """What came of the gates of a call, as it is said and written."""
-
-    holds: bool  # whether all of them do
-    gates: tuple[dict[str, object], ...]  # each for JSON
-    lines: tuple[str, ...]
-    junit: str
-    summary: str
-
-    def conclude(self, options: GateOptions) -> None:
-        """Write it, say which gates fail, and end with 1 if one does."""
-        junit, digest = options.junit, hashlib.sha256(self.junit.encode()).hexdigest()
-        if junit is not None and file_hash(str(junit)) != digest:
-            write_file(junit, self.junit)
-        for line in self.lines:
-            click.echo(line, err=True)
-        summary = os.environ.get("GITHUB_STEP_SUMMARY")
-        if summary:
-            _append(Path(summary), self.summary)
-        if not self.holds:
-            click.get_current_context().exit(1)
-
-
-def verdict_of(analysis: "Analysis", gates: "tuple[Gate, ...]") -> Verdict:
-    """Hold an analysis against gates."""
+def verdict_of(analysis: "Analysis", gates: "tuple[Gate, ...]") -> dict[str, Any]:
+    """Hold an analysis against gates; return what is said and written of it."""
     from masrel.lab.analysis import check_gates
 
     results = check_gates(analysis, gates)
-    return Verdict(
-        holds=all(result.holds for result in results),
-        gates=tuple(map(_as_document, results)),
-        lines=tuple(map(str, results)),
-        junit=_junit_text(analysis, results),
-        summary=_job_summary(analysis, results),
-    )
+    return {
+        "holds": all(result.holds for result in results),
+        "gates": [*map(_as_document, results)],
+        "lines": [*map(str, results)],
+        "junit": _junit_text(analysis, results),
+        "summary": _job_summary(analysis, results),
+    }
+
+
+def conclude(verdict: Mapping[str, Any], options: GateOptions) -> None:
+    """Write a verdict, say which gates fail, and end with 1 if one does."""
+    junit, text = options.junit, verdict["junit"]
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    if junit is not None and file_hash(str(junit)) != digest:
+        write_file(junit, text)
+    for line in verdict["lines"]:
+        click.echo(line, err=True)
+    summary = os.environ.get("GITHUB_STEP_SUMMARY")
+    if summary:
+        _append(Path(summary), verdict["summary"])
+    if not verdict["holds"]:
+        click.get_current_context().exit(1)
 
 
 def _junit_text(analysis: "Analysis", gates: "Sequence[GateResult]") -> str:

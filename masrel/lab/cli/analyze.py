@@ -13,7 +13,7 @@ from masrel.cli._options import (
     output_options,
     write_json,
 )
-from masrel.lab.cli._gating import GateOptions, gate_options, verdict_of
+from masrel.lab.cli._gating import GateOptions, conclude, gate_options, verdict_of
 from masrel.lab.cli._study_options import ratings_option, read_study, warnings_as_notes
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def analyze(
         )
     if output.json_file == STDOUT:
         write_json(library.as_analysis_document(analysis), STDOUT)
-        verdict_of(analysis, gates).conclude(gating)
+        conclude(verdict_of(analysis, gates), gating)
         return
     destination = output.json_file or data.paths.analysis_file
     library.write_analysis(
@@ -62,7 +62,7 @@ def analyze(
     )
     _show(data, analysis, csv=bool(output.csv), raw=output.raw_csv)
     click.echo(f"read: {data.read}\nanalysis: {destination}", err=True)
-    verdict_of(analysis, gates).conclude(gating)
+    conclude(verdict_of(analysis, gates), gating)
 
 
 def _show(data: "StudyData", analysis: "Analysis", *, csv: bool, raw: bool) -> None:

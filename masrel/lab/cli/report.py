@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,7 @@ from masrel.cli._options import (
 )
 from masrel.errors import ParameterError
 from masrel.lab._study_files import MAX_TABLE, parse_json, read_once, read_regular
-from masrel.lab.cli._gating import GateOptions, Verdict, gate_options, verdict_of
+from masrel.lab.cli._gating import GateOptions, conclude, gate_options, verdict_of
 from masrel.lab.cli._study_options import ratings_option, read_study, warnings_as_notes
 from masrel.lab.report._report_folder import (
     MANIFEST,
@@ -227,13 +227,13 @@ def report(
         else:
             replace_report(folder, files)
             keep_shown(note, shown, before=made, after=hashed())
-    verdict = Verdict(**shown["verdict"])
+    verdict = shown["verdict"]
     prints_json = output.json_file == STDOUT
     click.echo(shown["read"], err=True)
     pages = [folder / name for name in shown["pages"] if name != "report.md"]
     for line in changes if check else pages or [folder / "report.md"]:
         click.echo(line, err=prints_json)
-    document: dict[str, Any] = {"gates": verdict.gates}
+    document: dict[str, Any] = {"gates": verdict["gates"]}
     if check:
         document["check"] = changes
     if old is not None:
@@ -241,7 +241,7 @@ def report(
         document |= comparing.compare(old, new, shows=not prints_json)
     if output.json_file is not None:
         write_json(document, output.json_file)
-    verdict.conclude(gating)
+    conclude(verdict, gating)
     if changes or (comparing.no_change and document["changes"]):
         click.get_current_context().exit(1)
 
@@ -320,7 +320,7 @@ def _made(
             for name in files
             if "/" not in name and name not in (MANIFEST, NUMBERS)
         ],
-        "verdict": asdict(verdict_of(analysis, gates)),
+        "verdict": verdict_of(analysis, gates),
     }
 
 

@@ -23,7 +23,6 @@ from masrel.errors import ParameterError
 from masrel.lab._study_files import MAX_RECORDING, new_folder, read_regular
 from masrel.lab.export._dataset import (
     MISSING,
-    Column,
     Dataset,
     column,
     gather_dataset,
@@ -205,13 +204,15 @@ def _recording_files(
         "StartTime": 0,
         "Columns": names,
     }
-    described = {name: _sample_column(name) for name in names}
+    units = {
+        name: next((unit for end, unit in _UNITS.items() if name.endswith(end)), "")
+        for name in names
+    }
+    described = {
+        name: column(_TITLES.get(name, "Measured beside the angle"), unit)
+        for name, unit in units.items()
+    }
     yield f"{place}.json", json_bytes({**facts, **task_name, **described})
-
-
-def _sample_column(name: str) -> Column:
-    unit = next((unit for end, unit in _UNITS.items() if name.endswith(end)), "")
-    return column(_TITLES.get(name, "Measured beside the angle"), unit)
 
 
 def _sample_rows(recording: Recording, names: Sequence[str]) -> Iterator[list[str]]:

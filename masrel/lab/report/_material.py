@@ -39,6 +39,12 @@ _SIMULATED_IN_PART = (
     "Some of the grades in this report are simulated; the table of sessions says of "
     "which. Together they say nothing about people or about the models.",
 )
+_ON_SIMULATED_DEVICE = (
+    "SIMULATED DEVICE – persons gave these grades, {n} of them on hardware",
+    "Persons gave the grades in this report, {n} of them on hardware: on the simulated "
+    "device nobody felt a model, and the speeds are those of a simulated hand. Such "
+    "grades say nothing about the models.",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,8 +90,8 @@ def gather(
         stamp = trace_stamp = SIMULATED
         if ratings.n_from_persons == len(ratings.rows):
             data = data.replace("simulated", "simulated device")
-            how_many = "none" if sources == ["simulated"] else "not all"
-            banner, provenance = _on_simulated_device(how_many)
+            n = "none" if sources == ["simulated"] else "not all"
+            banner, provenance = (text.format(n=n) for text in _ON_SIMULATED_DEVICE)
             stamp = trace_stamp = SIMULATED_DEVICE
         elif ratings.n_from_persons:
             banner, provenance = _SIMULATED_IN_PART
@@ -110,16 +116,6 @@ def gather(
         raters=tuple(r.id for r in protocol.raters if r.id in raters),
         recordings=recordings,
         conduct=conduct,
-    )
-
-
-def _on_simulated_device(how_many: str) -> tuple[str, str]:
-    # banner and sentence where persons gave all grades; how many of them on hardware
-    return (
-        f"SIMULATED DEVICE – persons gave these grades, {how_many} of them on hardware",
-        f"Persons gave the grades in this report, {how_many} of them on hardware: on "
-        "the simulated device nobody felt a model, and the speeds are those of a "
-        "simulated hand. Such grades say nothing about the models.",
     )
 
 
