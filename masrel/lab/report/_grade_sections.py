@@ -271,8 +271,9 @@ def in_person_section(material: Material) -> Iterator[Content]:
 
 
 def given_grades(material: Material) -> tuple[str, list[str], NDArray[np.int64]]:
-    """Return the first session with grades, intended ones, and how often which came."""
-    # counts of each intended grade by rater and grade; none without intended grades
+    """Return a session, the intended grades of its models, and the grades given."""
+    # the first session with grades; (n_intended, n_raters, n_grades) counts, none where
+    # no model that was graded has an intended grade
     aims = {model.id: model.intended_grade for model in material.protocol.models}
     ratings = material.ratings.without(material.analysis.excluded)
     graded = [row for row in ratings.rows if row.grade is not None]
