@@ -60,26 +60,25 @@ def serve(study: Path, port: int, host: str, tls: tuple[Path, Path] | None) -> N
             )
     import asyncio
 
+    from masrel.lab.serve import _server
     from masrel.lab.serve._access import Access
     from masrel.lab.serve._manager import SessionManager
-    from masrel.lab.serve._server import alone, encryption, hosts, is_loopback, listen
-    from masrel.lab.serve._server import serve as serve_pages
 
     paths = StudyPaths(study)
     read_protocol(paths.protocol)
-    context = None if tls is None else encryption(*tls)
-    with alone(paths), listen(host, port) as listener:
-        names = hosts(listener, host, encrypted=tls is not None)
+    context = None if tls is None else _server.encryption(*tls)
+    with _server.alone(paths), _server.listen(host, port) as listener:
+        names = _server.hosts(listener, host, encrypted=tls is not None)
         scheme = "http" if tls is None else "https"
         origin = f"{scheme}://{names[0]}"
         access = Access(paths, origin=origin, hosts=frozenset(names), say=click.echo)
-        if tls is None and not is_loopback(listener.getsockname()[0]):
+        if tls is None and not _server.is_loopback(listener.getsockname()[0]):
             click.echo(
                 f"masrel: --host {host} without --tls: whoever is in this network can "
                 "read the grades, and act as the rater or the coordinator",
                 err=True,
             )
-        serving = serve_pages(
+        serving = _server.serve(
             SessionManager(paths), access, listener, context, show=lambda: _show(access)
         )
         if not asyncio.run(serving):

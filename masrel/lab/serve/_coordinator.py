@@ -6,7 +6,6 @@ import dataclasses
 import json
 import math
 import os
-import re
 import secrets
 import signal
 import sys
@@ -53,7 +52,6 @@ _N_ACTS = 1000  # of which it is known what came of them
 _N_LOG = 200  # events of the running session that are shown
 _N_LINES = 60
 _N_BYTES = 4096
-_LINE_END = re.compile(r"[\r\n]+")  # a bar of progress comes back to where it began
 _N_EVENTS = 100
 _DEVICE = (
     "backend",
@@ -317,16 +315,9 @@ def _report_file(study: StudyPaths, path: str) -> Path | None:
 class _Job:
     process: asyncio.subprocess.Process
     lines: deque[str] = field(default_factory=lambda: deque(maxlen=_N_LINES))
-    code: int | None = None
     is_cancelled: bool = False
-
-    @property
-    def status(self) -> str:
-        if self.code is None:
-            return "running"
-        if self.is_cancelled:
-            return "cancelled"
-        return "done" if self.code == 0 else "failed"
+    status: str = "running"  # then "done", "failed" or "cancelled"
+    follows: "asyncio.Task[None] | None" = None
 
 
 class Jobs:
@@ -335,7 +326,6 @@ class Jobs:
     def __init__(self, study: StudyPaths, changed: Callable[[], None]) -> None:
         self._study, self._changed = study, changed
         self._jobs: dict[str, _Job] = {}
-        self._following: set[asyncio.Task[None]] = set()
         self._starting = asyncio.Lock()
 
     async def start(self, command: str) -> None:
@@ -352,24 +342,23 @@ class Jobs:
                 start_new_session=True,
             )
             self._jobs[command] = job = _Job(process)
-            task = asyncio.create_task(self._follow(job))
-            self._following.add(task)
-            task.add_done_callback(self._following.discard)
+            job.follows = asyncio.create_task(self._follow(job))
             self._changed()
 
     def _runs(self, command: str) -> _Job | None:
         job = self._jobs.get(command)
-        return job if job is not None and job.code is None else None
+        return job if job is not None and job.status == "running" else None
 
     async def _follow(self, job: _Job) -> None:
         rest, output = "", job.process.stdout
         while output is not None and (data := await output.read(_N_BYTES)):
-            *lines, rest = _LINE_END.split(rest + data.decode(errors="replace"))
+            *lines, rest = (rest + data.decode(errors="replace")).split("\n")
             job.lines.extend(line for line in lines if line.strip())
             self._changed()
         if rest.strip():
             job.lines.append(rest)
-        job.code = await job.process.wait()
+        ended = "done" if await job.process.wait() == 0 else "failed"
+        job.status = "cancelled" if job.is_cancelled else ended
         self._changed()
 
     def cancel(self, command: str) -> None:
@@ -390,7 +379,8 @@ class Jobs:
         """Stop all of them."""
         for command in self._jobs:
             self.cancel(command)
-        await asyncio.gather(*self._following, return_exceptions=True)
+        following = [job.follows for job in self._jobs.values() if job.follows]
+        await asyncio.gather(*following, return_exceptions=True)
 
 
 @read_once()

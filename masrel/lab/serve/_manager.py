@@ -6,7 +6,6 @@ own, so that nothing here can be in the way of its control loop.
 
 import asyncio
 import contextlib
-import hashlib
 import json
 import secrets
 import socket
@@ -29,7 +28,7 @@ _TO_END_S = 10.0  # after a polite stop, until the process is terminated
 _HELD_DOWN_S = 0.1  # within this, a button pressed again says nothing new
 
 # Fields of a message that no page needs to see
-_INNER = {"kind", "n", "samples", "attempt", "rehearsal"}
+_INNER = {"kind", "samples", "attempt", "rehearsal"}
 
 
 class AskOverError(MasrelError):
@@ -70,12 +69,7 @@ class _Running:
     @property
     def ask(self) -> str | None:
         """What identifies the question; the same after a restart of the server."""
-        if self.message.get("kind") != "ask":
-            return None
-        keys = ("screen", "code", "attempt", "practice", "question", "position")
-        which = [self.message.get(key) for key in keys]
-        name = json.dumps([self.rater, self.session, self.rehearsal, *which])
-        return hashlib.sha256(name.encode()).hexdigest()[:24]
+        return self.message.get("ask")
 
     def send(self, message: Message) -> None:
         """Send a message to the process of the session."""
@@ -204,7 +198,12 @@ class SessionManager:
                 _, future = running.answered.pop(running.ask or "", (None, None))
                 _end(future, AnswerRefusedError(message["why"]))
             case "corrected":
-                running.message = {**running.message, "last": message["last"]}
+                last = running.message.get("last")  # what a page may correct
+                if last and last["code"] == message["code"]:
+                    running.message = {
+                        **running.message,
+                        "last": {**last, "grade": message["grade"]},
+                    }
                 _end(running.corrections.popleft(), None)
             case "not-corrected":
                 _end(running.corrections.popleft(), ParameterError(message["why"]))
@@ -243,8 +242,7 @@ class SessionManager:
             if ask != running.ask:
                 raise AskOverError("this is not asked any more")
             running.answered[ask] = answer, _future()
-            n = running.message["n"]
-            running.send({"kind": "answer", "n": n, "answer": answer})
+            running.send({"kind": "answer", "ask": ask, "answer": answer})
         before, future = running.answered[ask]
         if before != answer:
             raise AnsweredError("this was answered already")

@@ -41,7 +41,7 @@ _MAX_CONNECTIONS = 256
 _MAX_OF_ONE = 48  # of one computer; a browser opens six
 _MAX_HEAD = 32_768  # bytes before a request's head is whole
 _TO_END_S = 3  # for answers that are on their way
-_SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 # Addresses that are asked nothing: which of its own a computer would call them from
 _NETWORKS = ("192.168.255.254", "10.255.255.254", "172.31.255.254", "169.254.255.254")
@@ -357,9 +357,8 @@ def _signals() -> Iterator["asyncio.Queue[None]"]:
             raise KeyboardInterrupt
         loop.call_soon_threadsafe(signals.put_nowait, None)
 
-    numbers = [getattr(signal, name) for name in _SIGNALS if hasattr(signal, name)]
     # one that is ignored, as with nohup, stays so
-    caught = [each for each in numbers if signal.getsignal(each) != signal.SIG_IGN]
+    caught = [each for each in _SIGNALS if signal.getsignal(each) != signal.SIG_IGN]
     before = {number: signal.signal(number, note) for number in caught}
     try:
         yield signals

@@ -5,6 +5,7 @@ go to and fro as JSON objects, one a line: what a person at a page is asked and 
 """
 
 import contextlib
+import hashlib
 import json
 import socket
 import sys
@@ -85,11 +86,11 @@ class PageGrades(GradeSource):
     name: ClassVar[str] = "browser"
     simulated: ClassVar[bool] = False
 
-    def __init__(self, channel: Channel, scale: Scale) -> None:
+    def __init__(self, channel: Channel, scale: Scale, *, rehearsal: bool) -> None:
         self._channel = channel
         self._scale = scale
-        self._n_asked = 0
-        self._last: tuple[str, str | None] | None = None  # code and grade as it is
+        self._rehearsal = rehearsal
+        self._ask_id = ""  # what identifies the question
         # What came and was not yet heeded, in order; guarded by the condition
         self._news = threading.Condition()
         self._came: deque[Message] = deque()
@@ -133,8 +134,9 @@ class PageGrades(GradeSource):
 
     def make_ready(self, request: GradeRequest) -> None:
         """Wait until the rater begins."""
-        self._last = request.last
-        last, grades = _as_fields(request.last), list(self._scale.grades)
+        last, grades = None, list(self._scale.grades)
+        if request.last is not None:
+            last = dict(zip(("code", "grade"), request.last, strict=True))
         self._ask(request, "ready", _only("begin"), last=last, grades=grades)
 
     def grade(self, request: GradeRequest) -> str | StretchGrade | None:
@@ -238,15 +240,18 @@ class PageGrades(GradeSource):
         **fields: Any,
     ) -> Any:
         # what `checked` makes of the answer; what it refuses is asked again
-        self._n_asked += 1
-        place = {"n": self._n_asked, "screen": screen, **_place(request)}
-        self._channel.send("ask", **place, **fields)
+        shown = {"screen": screen, **_place(request), **fields}
+        # the same where the session goes on in another process
+        keys = ("screen", "code", "attempt", "practice", "question", "position")
+        which = (request.rater, request.session, self._rehearsal, *map(shown.get, keys))
+        self._ask_id = hashlib.sha256(json.dumps(which).encode()).hexdigest()[:24]
+        self._channel.send("ask", ask=self._ask_id, **shown)
         while True:
             message = self._next_answer(request)
             try:
                 return checked(message["answer"])
             except ParameterError as error:
-                self._channel.send("refused", n=self._n_asked, why=f"{error}")
+                self._channel.send("refused", why=f"{error}")
 
     def _next_answer(self, request: GradeRequest | QuestionRequest) -> Message:
         # What came before the session is left counts: a page was told that it would
@@ -255,7 +260,7 @@ class PageGrades(GradeSource):
                 self._news.wait_for(lambda: self._came)
                 message = self._came.popleft()
             match message:
-                case {"kind": "answer", "n": self._n_asked}:
+                case {"kind": "answer", "ask": self._ask_id}:
                     return message
                 case {"kind": "correct", **fields}:
                     self._correct(request, fields)
@@ -275,9 +280,7 @@ class PageGrades(GradeSource):
         except (ParameterError, SessionLogError) as error:
             self._channel.send("not-corrected", why=f"{error}")
             return
-        if self._last is not None and self._last[0] == correction["code"]:
-            self._last = correction["code"], correction["grade"]
-        self._channel.send("corrected", last=_as_fields(self._last))
+        self._channel.send("corrected", **correction)
 
 
 def _is_for_now(message: Message, request: GradeRequest, stop: "EmergencyStop") -> bool:
@@ -288,10 +291,6 @@ def _is_for_now(message: Message, request: GradeRequest, stop: "EmergencyStop") 
     elif kind == "done" and status is not None and _may_say_done(request):
         status.done()
     return kind in ("stop", "done")
-
-
-def _as_fields(last: tuple[str, str | None] | None) -> Message | None:
-    return None if last is None else {"code": last[0], "grade": last[1]}
 
 
 def _may_say_done(request: GradeRequest) -> bool:
@@ -362,7 +361,8 @@ def _run(channel: Channel, order: Message) -> str:
     # what is said of a session that is complete
     study = StudyPaths(Path(order["study"]))
     protocol = read_protocol(study.protocol)
-    grades = PageGrades(channel, scale_of(protocol))
+    scale, rehearsal = scale_of(protocol), order["rehearsal"]
+    grades = PageGrades(channel, scale, rehearsal=rehearsal)
     until = time.monotonic() + _OTHER_ENDS_S
     while True:
         try:
@@ -370,7 +370,7 @@ def _run(channel: Channel, order: Message) -> str:
                 *(study, protocol, order["rater"], order["session"]),
                 grades=grades,
                 clock=order["clock"],
-                rehearsal=order["rehearsal"],
+                rehearsal=rehearsal,
             )
             return f"session {summary.session} of {summary.rater} is complete"
         except SessionLogInUseError:
