@@ -37,9 +37,8 @@ def demo(out: Path, template: str | None, output: OutputOptions) -> None:
     if template is None:
         studies["tone"] = "tone"
     pages = []
-    with warnings.catch_warnings():
-        # Every note on an interval is in its result, and so in the report.
-        warnings.simplefilter("ignore", MasrelWarning)
+    # Every note on an interval is in its result, and so in the report.
+    with warnings.catch_warnings(action="ignore", category=MasrelWarning):
         for folder, name in studies.items():
             study = StudyPaths(out / folder)
             copy_template(name, study.root)

@@ -107,6 +107,7 @@ def _show(
     from masrel.lab.report._training import (
         learning_content,
         training_document,
+        training_page,
         training_stamp,
         training_tables,
     )
@@ -124,7 +125,4 @@ def _show(
         width=_WIDTH,
     )
     if page is not None:
-        # Imported here: the tables alone load nothing that draws.
-        from masrel.lab.report._training import training_page
-
         write_file(page, training_page(record, protocol, level=level))

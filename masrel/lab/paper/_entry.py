@@ -170,15 +170,18 @@ def _begin(
         "device": device,
         "rehearsal": False,
     }
-    if not state.header:
-        provenance: dict[str, _Fact] = {
+    if state.header:
+        check_same(log.path, state.header, same)
+        return
+    log.append(
+        "session",
+        {
+            **same,
             "protocol_sha256": protocol_hash(protocol),
             "clock": NO_DEVICE,
             "masrel_version": masrel.__version__,
-        }
-        log.append("session", {**same, **provenance})
-        return
-    check_same(log.path, state.header, same)
+        },
+    )
 
 
 def _check(on: date | None, device: str, now: Callable[[], datetime]) -> None:

@@ -28,6 +28,9 @@ FIRST_COLUMNS = ("sheet", "position", "code", "grade")
 AFTERWARDS: tuple[When, ...] = ("session", "study")
 """What stands for a position in the rows of what is asked about these."""
 
+Position = int | When
+"""The position of a presentation, or what else a row is about."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class QuestionColumn:
@@ -58,6 +61,12 @@ class Form:
     def afterwards(self) -> tuple[When, ...]:
         """What there are questions about besides presentations."""
         return tuple(when for when in AFTERWARDS if self.questions[when])
+
+    @property
+    def places(self) -> tuple[tuple[Position, str], ...]:
+        """What each row is about, in order, with its code; empty where it has none."""
+        of_codes = enumerate(self.codes, start=1)
+        return (*of_codes, *((when, "") for when in self.afterwards))
 
 
 def form_of(protocol: Protocol, schedule: Schedule) -> Form:
@@ -247,9 +256,6 @@ _MAX_PROBLEMS = 20
 
 _DECIMAL_COMMA = re.compile(r"(\d{1,2}),(\d{1,2})")
 
-Position = int | When
-"""The position of a presentation, or what else a row is about."""
-
 Answers = tuple[tuple[QuestionColumn, Answer], ...]
 
 
@@ -293,8 +299,7 @@ def fill_form(
         more = len(problems) - _MAX_PROBLEMS
         listed = problems[:_MAX_PROBLEMS] + ([f"and {more} more"] if more > 0 else [])
         raise RatingsError("\n".join(listed))
-    order: list[Position] = [*range(1, len(form.codes) + 1), *form.afterwards]
-    return tuple(filled[place] for place in order)
+    return tuple(filled[place] for place, _ in form.places)
 
 
 def _check_columns(sheet: TypedSheet, form: Form) -> None:
@@ -332,16 +337,13 @@ def _whose(form: Form | None) -> str:
 def _place(row: TypedRow, form: Form, where: str) -> Position:
     """Return the position that a row is of, or what else it is about."""
     code, position = row["code"].upper(), row["position"].casefold()
-    for when in form.afterwards:
-        if position == when and not code:
-            return when
-    if code in form.codes:
-        place = form.codes.index(code) + 1
-        if position == str(place):
+    for place, its_code in form.places:
+        if (position, code) == (str(place), its_code):
             return place
+    if code in form.codes:
         raise ParameterError(
-            f"{where}: position: needed {place}, that of code {code}, got "
-            f"{shortened(row['position'])!r}"
+            f"{where}: position: needed {form.codes.index(code) + 1}, that of code "
+            f"{code}, got {shortened(row['position'])!r}"
         )
     needed = "a code of the sheet"
     if position.isdecimal() and 1 <= int(position) <= len(form.codes):

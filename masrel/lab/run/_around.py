@@ -38,11 +38,13 @@ def ask_questions(
             correct=correct,
         )
         answer = checked_answer(question, source.answer(request), where=_place(request))
-        names: dict[str, _Fact] = {
-            "questionnaire": questionnaire.id,
-            "question": question.id,
-        }
-        log({**names, "answer": answer})
+        log(
+            {
+                "questionnaire": questionnaire.id,
+                "question": question.id,
+                "answer": answer,
+            }
+        )
 
 
 def _place(request: QuestionRequest) -> str:

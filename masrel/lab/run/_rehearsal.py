@@ -51,13 +51,15 @@ def begin_rehearsal(
     """Return the rehearsal that is not finished, or a new one."""
     # Its folder, an order and codes that no session has, and their hash
     secret = find_secret(study) or new_secret(study)
-    number = 0
-    while True:
-        number += 1
-        paths = RehearsalPaths(study.root, number)
-        schedule, checksum = _draw(protocol, rater, session, number, secret)
-        if not _is_over(paths.log_file(rater, session), checksum):
-            return paths, schedule, checksum
+    rehearsals = (
+        (RehearsalPaths(study.root, n), *_draw(protocol, rater, session, n, secret))
+        for n in count(1)
+    )
+    return next(
+        (paths, schedule, checksum)
+        for paths, schedule, checksum in rehearsals
+        if not _is_over(paths.log_file(rater, session), checksum)
+    )
 
 
 def last_rehearsal(study: StudyPaths, rater: str, session: str) -> Path | None:

@@ -8,8 +8,8 @@ import hashlib
 from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from masrel._files import check_inside
 from masrel.errors import (
@@ -27,7 +27,7 @@ from masrel.lab.conduct._study_log import (
 )
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
 from masrel.lab.protocol._values import questions_of
-from masrel.lab.recording import _Fact, _Facts
+from masrel.lab.recording import _Facts
 from masrel.lab.run._around import (
     ask_questions,
     completed_at,
@@ -248,6 +248,7 @@ class _Runner(Presenter):
         self._is_rehearsal = isinstance(study, RehearsalPaths)
         self._state: SessionState = replay(log.path, log.events)
         self._practice = practice_presentations(protocol)
+        self._correct = partial(correct_in_session, log, protocol)
 
     def begin(self, schedule_sha256: str) -> None:
         """Log which session this is; check that it is the same when it is resumed."""
@@ -359,12 +360,14 @@ class _Runner(Presenter):
         clock = CLOCKS[self._clock]()
         begun = clock.now_ns()
         self._grades.take_break(self._request(presentation), occasions.break_minutes)
-        fields: dict[str, _Fact] = {
-            "after": after,
-            "minutes": occasions.break_minutes,
-            "lasted_s": round((clock.now_ns() - begun) * 1e-9, 3),
-        }
-        self._log.append("break", fields)
+        self._log.append(
+            "break",
+            {
+                "after": after,
+                "minutes": occasions.break_minutes,
+                "lasted_s": round((clock.now_ns() - begun) * 1e-9, 3),
+            },
+        )
 
     def _rate(self, presentation: Presentation) -> None:
         is_practice = presentation in self._practice
@@ -393,7 +396,7 @@ class _Runner(Presenter):
             session=self._schedule.session,
             presentation=presentation,
             answered={key[:2] for key in self._state.answers if key[2] == code},
-            correct=self.correct,
+            correct=self._correct,
             log=lambda fields: self._log.append("answered", {**fields, "code": code}),
         )
 
@@ -411,7 +414,7 @@ class _Runner(Presenter):
                 rater=rater,
                 session=self._schedule.session,
                 answered=study_answers(study).get(rater, {}),
-                correct=self.correct,
+                correct=self._correct,
                 log=lambda fields: append_event(
                     study,
                     protocol,
@@ -435,13 +438,9 @@ class _Runner(Presenter):
             rehearsal=self._is_rehearsal,
             rules=self._protocol.presentation,
             may_skip=True,
-            correct=self.correct,
+            correct=self._correct,
             last=self._last_grade(),
         )
-
-    def correct(self, **correction: Any) -> None:
-        """Correct a grade of the session while it goes on."""
-        correct_in_session(self._log, self._protocol, **correction)
 
     def _last_grade(self) -> tuple[str, str | None] | None:
         state = replay(self._log.path, self._log.events)

@@ -6,8 +6,8 @@ own: ``docs/training.md`` lists them.
 
 import warnings
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,7 +22,7 @@ from masrel.errors import (
 from masrel.estimates import Estimate
 from masrel.intervals import estimate
 from masrel.lab._event_log import Event, check_kinds, read_log
-from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
+from masrel.lab.protocol import Protocol, StudyPaths, Training, presented_hash
 from masrel.lab.run._state import EVENTS as SESSION_EVENTS
 from masrel.lab.run._state import LATER, of_another_type
 from masrel.lab.training._criterion import Criterion, training_criterion
@@ -221,12 +221,13 @@ def record_of(
             "got one from before a change in its study id, scale, elbow, models, "
             "schedule, stretch, presentation, occasions or device"
         )
+    rules = msgspec.convert({name: header[name] for name in SETTINGS}, Training)
     ended = [event.fields for event in events if event.kind == "complete"]
     return TrainingRecord(
         rater=str(header["rater"]),
-        criterion=_criterion_of(header, protocol),
+        criterion=training_criterion(msgspec.structs.replace(protocol, training=rules)),
         boundary=float(str(header["boundary"])),
-        false_pass=float(str(header["false_pass"])),
+        false_pass=rules.false_pass,
         false_fail=float(str(header["calibrated_false_fail"])),
         order_seed=int(str(header["order_seed"])),
         is_weighted=bool(header.get("is_weighted", False)),
@@ -235,18 +236,6 @@ def record_of(
         ),
         passed=bool(ended[-1]["passed"]) if ended else None,
         simulated=bool(header["simulated"]),
-    )
-
-
-def _criterion_of(header: Mapping[str, object], protocol: Protocol) -> Criterion:
-    return replace(
-        training_criterion(protocol),
-        weights=str(header["weights"]),
-        insufficient=float(str(header["kappa_insufficient"])),
-        sufficient=float(str(header["kappa_sufficient"])),
-        window=int(str(header["window"])),
-        max_presentations=int(str(header["max_presentations"])),
-        order=str(header["order"]),
     )
 
 
@@ -312,9 +301,13 @@ def learning_curve(
         n_models = criterion.n_models
         lessons = record.lessons[first * n_models : last * n_models]
         pairs = [(lesson.intended, lesson.grade) for lesson in lessons]
-        with warnings.catch_warnings():  # a point says itself on how much it rests
-            warnings.simplefilter("ignore", SmallSampleWarning)
-            warnings.simplefilter("ignore", UndefinedStatisticWarning)
+        # a point says itself on how much it rests
+        with (
+            warnings.catch_warnings(action="ignore", category=SmallSampleWarning),
+            warnings.catch_warnings(
+                action="ignore", category=UndefinedStatisticWarning
+            ),
+        ):
             kappa = estimate(
                 "cohen_kappa",
                 pairs,
