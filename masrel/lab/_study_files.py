@@ -4,6 +4,7 @@ What is read is regular, of a bounded size and depth: no pipe or device holds a 
 up, no file fills the memory, and no nesting or number ends in an error of the parser.
 """
 
+import csv
 import errno
 import functools
 import io
@@ -13,7 +14,7 @@ import os
 import re
 import shutil
 import stat
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from datetime import date, time
@@ -97,6 +98,13 @@ def csv_format(text: str) -> object:
         if named:
             return int(named[1]) if named[1].isdecimal() else named[1]
     return 1
+
+
+def csv_text(rows: Iterable[Iterable[object]]) -> str:
+    """Return rows as the text of a CSV file."""
+    text = io.StringIO(newline="")
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
 
 
 def format_problem(version: object, *, newest: int) -> str | None:

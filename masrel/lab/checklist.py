@@ -17,7 +17,7 @@ from datetime import date
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import masrel
 from masrel._files import write_file
@@ -34,15 +34,13 @@ from masrel.lab.report._design import (
     stretches_asked_for,
 )
 from masrel.lab.report._material import TARGETS, coefficient_name
-from masrel.lab.report._pages import converted
+from masrel.lab.report._pages import TEMPLATES, converted
 from masrel.lab.run._state import read_session
 from masrel.lab.schedule._orders import orders_in_words
 from masrel.lab.schedule.presentation import _read_drawn
+from masrel.pages._sections import template_environment
 from masrel.tables._estimate_words import sentence
 from masrel.tables._tables import counted, number, percent
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
 
 __all__ = ["checklist_markdown", "fill_checklist", "write_checklist"]
 
@@ -315,7 +313,8 @@ def fill_checklist(study: StudyPaths, protocol: Protocol, guideline: str) -> _Ch
         )
     title, reference, asked_for = _GUIDELINES[guideline]
     facts = _gather_facts(study, protocol)
-    say = _environment().overlay(finalize=_in_one_line).get_template("facts.txt")
+    environment = template_environment(TEMPLATES).overlay(finalize=_in_one_line)
+    say = environment.get_template("facts.txt")
     macros = say.make_module(_words_of(facts, protocol))
     items = tuple(
         _filled(facts, str(number), item, lambda name: str(getattr(macros, name)()))
@@ -446,27 +445,10 @@ def _numbers(checklist: _Checklist, item: _Item) -> str:
     )
 
 
-def _environment() -> "Environment":
-    # Imported here: what is only imported loads no templates.
-    from jinja2 import (
-        Environment,
-        PackageLoader,
-        StrictUndefined,
-        select_autoescape,
-    )
-
-    return Environment(
-        loader=PackageLoader("masrel.lab.report"),
-        autoescape=select_autoescape(["html"]),
-        undefined=StrictUndefined,
-        keep_trailing_newline=True,
-    )
-
-
 def _html(checklist: _Checklist) -> str:
     style = files("masrel.pages").joinpath("templates/page.css")
     return (
-        _environment()
+        template_environment(TEMPLATES)
         .get_template("checklist.html")
         .render(
             list=checklist,

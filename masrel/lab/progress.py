@@ -4,8 +4,6 @@ In: a protocol, its schedules and logs. Out: where each session stands, what bec
 each rater, and one next step.
 """
 
-import csv
-import io
 import shlex
 from collections import Counter
 from collections.abc import Container, Mapping, Sequence
@@ -17,6 +15,7 @@ from typing import Literal
 from masrel._files import safe_cell
 from masrel.errors import SessionLogError
 from masrel.lab._event_log import Event, events_before_torn
+from masrel.lab._study_files import csv_text
 from masrel.lab.conduct import excluded_raters, rater_values, read_conduct
 from masrel.lab.protocol import Protocol, StudyPaths, protocol_hash
 from masrel.lab.protocol._values import FieldValue
@@ -299,44 +298,39 @@ def _first_draw(
     return min(dict.fromkeys(draws.values()), key=is_later, default=None)
 
 
-def raters_csv(
-    raters: Sequence[RaterProgress], protocol: Protocol, *, simulated: bool
-) -> str:
+def raters_csv(study: StudyPaths, protocol: Protocol) -> str:
     """Return the table of raters as the text of its file, ``ratings/raters.csv``.
 
     Parameters
     ----------
-    raters : sequence of RaterProgress
-        What `rater_progress` returned.
+    study : StudyPaths
+        Where the study is.
     protocol : Protocol
         The study's protocol.
-    simulated : bool
-        Whether any of their sessions is simulated.
 
     Returns
     -------
     str
-        One row a rater, with a column for every field; NA where nothing is known.
+        One row a rater, as protocol and logs have it now, with a column for every
+        field; NA where nothing is known.
+
+    Raises
+    ------
+    SessionLogError
+        If the log of the study's conduct is damaged.
     """
-    head = "# Raters, one row each, as they stand in the study; NA is not known.\n"
-    if simulated:
-        head = f"# SIMULATED: not sessions of persons on hardware.\n{head}"
-    text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["rater", "site", "status", "late", *protocol.rater_fields])
-    for each in raters:
-        late = "yes" if each.is_late else "no"
-        known = (each.rater, each.site, each.status, late, *each.values.values())
-        writer.writerow(map(_cell, known))
-    return f"{head}# format: 1\n{text.getvalue()}"
-
-
-def _raters_text(study: StudyPaths, protocol: Protocol) -> str:
-    """Return the table of raters as protocol and logs have it now."""
     sessions = session_progress(study, protocol)
     raters = rater_progress(study, protocol, sessions)
-    simulated = any(session.simulated for session in sessions)
-    return raters_csv(raters, protocol, simulated=simulated)
+    head = "# Raters, one row each, as they stand in the study; NA is not known.\n"
+    if any(session.simulated for session in sessions):
+        head = f"# SIMULATED: not sessions of persons on hardware.\n{head}"
+    columns = ["rater", "site", "status", "late", *protocol.rater_fields]
+    late = ["yes" if each.is_late else "no" for each in raters]
+    rows = (
+        map(_cell, (each.rater, each.site, each.status, is_late, *each.values.values()))
+        for each, is_late in zip(raters, late, strict=True)
+    )
+    return f"{head}# format: 1\n{csv_text([columns, *rows])}"
 
 
 def _cell(value: FieldValue | None) -> str:

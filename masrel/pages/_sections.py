@@ -9,9 +9,13 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from masrel.plots._drawn_values import Drawn
 from masrel.tables._tables import SYMBOL, Table, page_cells
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -163,17 +167,22 @@ def chapters(
 TEMPLATES = Path(__file__).with_name("templates")
 
 
-def html_page(document: Document) -> str:
-    """Return a document as one HTML page."""
+def template_environment(folder: Path) -> "Environment":
+    """Return what renders the templates in a folder; all but plain text is escaped."""
     # Imported here: who wants tables loads no templates.
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
+    return Environment(
+        loader=FileSystemLoader(folder),
+        autoescape=lambda name: not f"{name}".endswith((".md", ".txt")),
         undefined=StrictUndefined,
         keep_trailing_newline=True,
     )
+
+
+def html_page(document: Document) -> str:
+    """Return a document as one HTML page."""
+    environment = template_environment(TEMPLATES)
     environment.filters |= {
         "symbols": _symbols,
         "cells": page_cells,

@@ -27,7 +27,7 @@ def ratings(paths: StudyPaths, protocol: Protocol, output: Path | None) -> None:
     against its checksum. Corrections take the place of the grades they correct. The
     table of raters, raters.csv, is written beside STUDY/ratings/ratings.csv.
     """
-    from masrel.lab.progress import _raters_text
+    from masrel.lab.progress import raters_csv
     from masrel.lab.ratings import (
         answers_from_logs,
         ratings_from_logs,
@@ -42,7 +42,7 @@ def ratings(paths: StudyPaths, protocol: Protocol, output: Path | None) -> None:
     destination = output or paths.ratings_file
     write_ratings(ratings, destination, within=None if output else paths.root)
     if output is None:
-        raters = _raters_text(paths, protocol)  # also with fields that are not public
+        raters = raters_csv(paths, protocol)  # also with fields that are not public
         write_file(paths.raters_file, raters, within=paths.root, mode=0o600)
     n_rows, n_missing = len(ratings.rows), ratings.n_missing
     label = " (simulated)" if ratings.simulated else ""

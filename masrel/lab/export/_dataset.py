@@ -4,7 +4,6 @@ Every format is written from this one description.
 """
 
 import csv
-import io
 import json
 import tomllib
 from collections.abc import Collection, Iterator, Sequence
@@ -17,11 +16,12 @@ from masrel._input import check_option, listed
 from masrel.errors import ParameterError
 from masrel.lab._study_files import (
     MAX_SMALL,
+    csv_text,
     parse_json,
     read_regular,
     toml_lines,
 )
-from masrel.lab.progress import rater_progress, raters_csv, session_progress
+from masrel.lab.progress import raters_csv
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.ratings import Ratings, answers_csv, ratings_csv, read_study_data
 from masrel.lab.run import read_log
@@ -53,11 +53,8 @@ class DataTable:
 
     def as_csv(self) -> bytes:
         """Return the table as CSV, names of columns in its first line."""
-        out = io.StringIO(newline="")
-        writer = csv.DictWriter(out, self.columns, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(self.rows)
-        return out.getvalue().encode()
+        rows = ([row[name] for name in self.columns] for row in self.rows)
+        return csv_text([self.columns, *rows]).encode()
 
 
 def json_bytes(document: object) -> bytes:
@@ -243,9 +240,7 @@ _OF_RATERS = {
 def _raters_table(
     paths: StudyPaths, protocol: Protocol, hidden: Collection[str]
 ) -> DataTable:
-    sessions = session_progress(paths, protocol)
-    raters = rater_progress(paths, protocol, sessions)
-    rows = _records(raters_csv(raters, protocol, simulated=False))
+    rows = _records(raters_csv(paths, protocol))
     # of ratings that were published nobody knows how they came about
     known = [*_OF_RATERS] if paths.logs() else ["rater", "site"]
     described = {name: _OF_RATERS[name] for name in known}

@@ -1,7 +1,5 @@
 """Sheets to print for raters, and the files into which they are typed afterwards."""
 
-import csv
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,11 +7,13 @@ from pathlib import Path
 import masrel
 from masrel._files import write_files
 from masrel.errors import ParameterError, RatingsError
+from masrel.lab._study_files import csv_text
 from masrel.lab.paper._form import Form, form_of, read_typed
 from masrel.lab.protocol import Protocol, Question, StudyPaths, scale_of
 from masrel.lab.run._rehearsal import practice_presentations
 from masrel.lab.run.console import _instruction
 from masrel.lab.schedule.sheets import _drawn_schedule
+from masrel.pages._sections import template_environment
 from masrel.scales import published_scale
 
 _MOST_BOXES = 12  # answers of a question that are boxes; for more there is a blank
@@ -139,15 +139,9 @@ def has_answers(path: Path) -> bool:
 
 def _typed_text(form: Form) -> str:
     """Return a sheet as the text of the file that it is typed into."""
-    text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(form.columns)
     blank = [""] * (len(form.columns) - 3)
-    for position, code in enumerate(form.codes, start=1):
-        writer.writerow([form.id, position, code, *blank])
-    for when in form.afterwards:
-        writer.writerow([form.id, when, "", *blank])
-    return f"# format: 1\n{text.getvalue()}"
+    rows = ((form.id, place, code, *blank) for place, code in form.places)
+    return f"# format: 1\n{csv_text([form.columns, *rows])}"
 
 
 def _boxes(question: Question) -> tuple[str, ...]:
@@ -161,21 +155,13 @@ def _boxes(question: Question) -> tuple[str, ...]:
 
 
 def _page(protocol: Protocol, forms: Sequence[Form]) -> str:
-    # Imported here: what is entered loads no templates.
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("masrel.lab.paper"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        keep_trailing_newline=True,
-    )
-    style = Path(__file__).with_name("templates") / "sheet.css"
+    folder = Path(__file__).with_name("templates")
+    environment = template_environment(folder)
     scale = published_scale(scale_of(protocol))
     grades = protocol.scale.grades
     return environment.get_template("sheet.html").render(
         version=masrel.__version__,
-        style=style.read_text(encoding="utf-8"),
+        style=(folder / "sheet.css").read_text(encoding="utf-8"),
         title=protocol.study.title,
         study=protocol.study.id,
         instructions=[p for p in protocol.occasions.instructions.split("\n\n") if p],

@@ -1,7 +1,5 @@
 """Answers to a study's questionnaires: from its logs, or from a table of them."""
 
-import csv
-import io
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -9,6 +7,7 @@ from pathlib import Path
 from masrel._files import from_safe_cell, safe_cell, write_file
 from masrel._input import listed
 from masrel.errors import ParameterError
+from masrel.lab._study_files import csv_text
 from masrel.lab.conduct._study_log import study_answers
 from masrel.lab.protocol import Protocol, Question, StudyPaths
 from masrel.lab.protocol._values import Answer, checked_answer, questions_of
@@ -200,17 +199,14 @@ def answers_csv(answers: tuple[GivenAnswer, ...]) -> str:
     str
         What `write_answers` writes.
     """
-    text = io.StringIO(newline="")
+    head = "# Answers to questionnaires, one row a question; empty is missing.\n"
     if any(each.grades_from not in (*FROM_PERSONS, RECONSTRUCTED) for each in answers):
-        text.write("# SIMULATED: not answers of persons.\n")
-    text.write("# Answers to questionnaires, one row a question; empty is missing.\n")
-    text.write(f"# format: {_FORMAT}\n")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(_COLUMNS)
-    for each in answers:
-        cells = (getattr(each, name) for name in _COLUMNS)
-        writer.writerow("" if cell is None else safe_cell(str(cell)) for cell in cells)
-    return text.getvalue()
+        head = f"# SIMULATED: not answers of persons.\n{head}"
+    facts = ([getattr(each, name) for name in _COLUMNS] for each in answers)
+    rows = (
+        ["" if fact is None else safe_cell(str(fact)) for fact in row] for row in facts
+    )
+    return f"{head}# format: {_FORMAT}\n{csv_text([_COLUMNS, *rows])}"
 
 
 def write_answers(

@@ -1,7 +1,5 @@
 """What a table of ratings is, how statistics take its ratings, and its bytes."""
 
-import csv
-import io
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from masrel._files import safe_cell, write_file
 from masrel.errors import RatingsError
+from masrel.lab._study_files import csv_text
 from masrel.lab.run._state import FELT, FROM_PERSONS
 from masrel.scales import Scale
 
@@ -589,12 +588,8 @@ def _head(ratings: Ratings) -> str:
 
 
 def _body(ratings: Ratings, names: Sequence[str]) -> str:
-    text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(names)
-    for row in ratings.rows:
-        writer.writerow([_csv_cell(value) for value in row[: len(names)]])
-    return text.getvalue()
+    rows = ([_csv_cell(value) for value in row[: len(names)]] for row in ratings.rows)
+    return csv_text([names, *rows])
 
 
 def _is_unknown(value: object) -> bool:

@@ -15,22 +15,21 @@ from typing import Literal
 
 from masrel._files import write_file
 from masrel.errors import ParameterError
-from masrel.pages._sections import Document, html_page, narrow
+from masrel.pages._sections import (
+    Document,
+    html_page,
+    narrow,
+    template_environment,
+)
 from masrel.tables._latex import in_math
 from masrel.tables._tables import Column, page_cells
+
+TEMPLATES = Path(__file__).with_name("templates")
 
 
 def _markdown(document: Document, form: Literal["latex", "docx"] | None) -> str:
     # form: what pandoc makes of it, whose captions it then has
-    # Imported here: a section's tables alone load no templates.
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("masrel.lab.report"),
-        autoescape=False,
-        undefined=StrictUndefined,
-        keep_trailing_newline=True,
-    )
+    environment = template_environment(TEMPLATES)
     escape = as_markdown
     if form == "latex":  # whose own letters have no Greek ones
 

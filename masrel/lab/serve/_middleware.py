@@ -5,7 +5,7 @@ import json
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import anyio
 from starlette.datastructures import Headers, MutableHeaders
@@ -16,10 +16,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from masrel.lab._study_files import parse_json
 from masrel.lab.serve._access import ROLES, Access, AccessError, Role, Visitor
+from masrel.pages._sections import template_environment
 
-if TYPE_CHECKING:
-    from jinja2 import Environment
-
+_TEMPLATES = Path(__file__).with_name("templates")
 _MAX_BODY = 65_536
 _MAX_HEADERS = 16_384
 _MAX_PATH = 512
@@ -253,20 +252,10 @@ def _refusal(scope: Scope, status: int, why: str) -> Response:
 
 def page(name: str, **context: object) -> str:
     """Return a page as HTML, with everything escaped that comes from a study."""
-    return _environment().get_template(name).render(**context)
+    return _environment(_TEMPLATES).get_template(name).render(**context)
 
 
-@functools.cache
-def _environment() -> "Environment":
-    # Imported here: what only serves files loads no templates.
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    return Environment(
-        loader=PackageLoader("masrel.lab.serve"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        keep_trailing_newline=True,
-    )
+_environment = functools.cache(template_environment)
 
 
 def _with_headers(send: Send, headers: Mapping[str, str]) -> Send:

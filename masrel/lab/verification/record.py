@@ -269,7 +269,7 @@ def _output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]
 def _table_findings(
     study: StudyPaths, protocol: Protocol, ratings: "Ratings"
 ) -> Iterator[Finding]:
-    from masrel.lab.progress import _raters_text
+    from masrel.lab.progress import raters_csv
     from masrel.lab.ratings import answers_csv, answers_from_logs
     from masrel.lab.ratings.study_data import _table_differences
     from masrel.lab.ratings.table import _FORMAT, _texts
@@ -280,7 +280,7 @@ def _table_findings(
             lambda: [answers_csv(answers_from_logs(study, protocol))],
             1,
         ),
-        study.raters_file: (lambda: [_raters_text(study, protocol)], 1),
+        study.raters_file: (lambda: [raters_csv(study, protocol)], 1),
     }
     for path, (texts, newest) in made.items():
         if not path.is_file():

@@ -170,13 +170,14 @@ def test_the_table_of_raters_has_every_field(
 ) -> None:
     fields = '[rater_fields.clinic]\ntype = "text"\n\n[[raters]]\nid = "R1"\n'
     values = '[raters.fields]\nclinic = "=A1"\n'
-    study, protocol = new_study(('[[raters]]\nid = "R1"\n', fields + values))
-    raters = rater_progress(study, protocol, session_progress(study, protocol))
-    text = raters_csv(raters, protocol, simulated=True)
+    small = new_study(('[[raters]]\nid = "R1"\n', fields + values))
+    assert raters_csv(*small).startswith("# Raters")
+    run(small, "R1")
+    text = raters_csv(*small)
     assert text.splitlines()[0].startswith("# SIMULATED")
     assert text.splitlines()[3:] == [
         "rater,site,status,late,clinic",
-        "R1,NA,planned,no,'=A1",  # no spreadsheet runs it
+        "R1,NA,begun,no,'=A1",  # no spreadsheet runs it
         "R2,NA,planned,no,NA",
     ]
 
