@@ -21,6 +21,7 @@ from masrel.lab.training import (
 )
 from tests.cli.process import Caller
 from tests.files import edit
+from tests.lab.run.kill_at import die_at_line
 
 # A test that few presentations decide
 RULES = """
@@ -158,23 +159,8 @@ class _Killed(BaseException):
     """The process is gone."""
 
 
-def die_at(
-    monkeypatch: pytest.MonkeyPatch, fatal_line: int, n_bytes: int
-) -> pytest.MonkeyPatch:
-    """Let `os.write` write some bytes of the n-th line of a log, and then die."""
-    write, n_lines = os.write, 0
-
-    def write_or_die(descriptor: int, data: bytes) -> int:
-        nonlocal n_lines
-        is_log = os.readlink(f"/proc/self/fd/{descriptor}").endswith(".jsonl")
-        n_lines += is_log
-        if is_log and n_lines == fatal_line:
-            write(descriptor, bytes(data)[:n_bytes])
-            raise _Killed
-        return write(descriptor, data)
-
-    monkeypatch.setattr(os, "write", write_or_die)
-    return monkeypatch
+def killed() -> None:
+    raise _Killed
 
 
 @pytest.mark.slow
@@ -185,7 +171,8 @@ def test_killed_at_line_after_line_it_comes_to_the_same_end(
     while n_killed < 500:
         with pytest.MonkeyPatch.context() as patch:
             # lines of a run: recovered if the last one was torn, resumed, then others
-            die_at(patch, 2 + n_killed % 6, 40 * (n_killed % 2))
+            patch.setattr(os, "write", os.write)  # as it is afterwards
+            die_at_line(2 + n_killed % 6, 40 * (n_killed % 2), killed)
             try:
                 record = train_simulated(study)
             except _Killed:

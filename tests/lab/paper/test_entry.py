@@ -231,10 +231,7 @@ def test_a_wrong_cell_is_named_with_its_row(
     row: int, column: int, cell: str, message: str, new_study: New
 ) -> None:
     small = new_study(("[schedule]", QUESTIONS))
-    rows = filled(small, "1", "2", "3")
-    for each in rows[1:4]:
-        each[4] = "7"
-    rows[4][5] = "50"
+    rows = answered_sheet(small)
     rows[row][column] = cell
     assert refusal(small, rows) == message
 

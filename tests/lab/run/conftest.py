@@ -92,3 +92,12 @@ def small(
 ) -> tuple[StudyPaths, Protocol]:
     """The small study as it is."""
     return new_study()
+
+
+@pytest.fixture
+def faulty(
+    new_study: Callable[..., tuple[StudyPaths, Protocol]],
+) -> tuple[StudyPaths, Protocol]:
+    """A study whose speed limit every stretch exceeds."""
+    limit = "[device]\nspeed_limit_deg_s = 30.0\n\n[schedule]"
+    return new_study(("[schedule]", limit))

@@ -26,15 +26,16 @@ def die() -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def die_at_line(fatal: int, n_bytes: int) -> None:
-    """Let `os.write` write some bytes of its nth line, and no more ever."""
+def die_at_line(fatal: int, n_bytes: int, die: Callable[[], object] = die) -> None:
+    """Let `os.write` write some bytes of the nth line of a log, and no more ever."""
     write = os.write
     n_lines = 0
 
     def write_or_die(descriptor: int, data: bytes) -> int:
         nonlocal n_lines
-        n_lines += os.readlink(f"/proc/self/fd/{descriptor}").endswith(".jsonl")
-        if n_lines == fatal:
+        is_log = os.readlink(f"/proc/self/fd/{descriptor}").endswith(".jsonl")
+        n_lines += is_log
+        if is_log and n_lines == fatal:
             write(descriptor, bytes(data)[:n_bytes])
             die()
         return write(descriptor, data)

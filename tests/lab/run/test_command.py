@@ -68,13 +68,6 @@ def grades(small: Small) -> list[object]:
 
 
 @pytest.fixture
-def faulty(new_study: Callable[..., Small]) -> Small:
-    """A study whose speed limit every stretch exceeds."""
-    limit = "[device]\nspeed_limit_deg_s = 30.0\n\n[schedule]"
-    return new_study(("[schedule]", limit))
-
-
-@pytest.fixture
 def masrel(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> Callable[..., Done]:
@@ -116,18 +109,17 @@ def test_a_call_that_makes_no_sense_is_refused(
 
 
 def test_a_stop_and_a_fault_end_with_1_and_a_wrong_rater_with_2(
-    small: Small, new_study: Callable[..., Small], masrel: Callable[..., Done]
+    faulty: Small, new_study: Callable[..., Small], masrel: Callable[..., Done]
 ) -> None:
-    limit = "[device]\nspeed_limit_deg_s = 30.0\n\n[schedule]"
-    fast = new_study(("[schedule]", limit), name="fast")[0].root
-    stopped = masrel("run", small[0].root, *R1, "--clock", "simulated", answers="\n1\n")
+    fast, root = faulty[0].root, new_study(name="usual")[0].root
+    stopped = masrel("run", root, *R1, "--clock", "simulated", answers="\n1\n")
     options = ("--session", "test", "--grades", "simulated", "--quiet")
-    faulty = masrel("run", fast, "--rater", "R1", *options)
+    failed = masrel("run", fast, "--rater", "R1", *options)
     wrong = masrel("run", fast, "--rater", "R9", *options)
-    assert (stopped.code, faulty.code, wrong.code) == (1, 1, 2)
+    assert (stopped.code, failed.code, wrong.code) == (1, 1, 2)
     assert "the same command goes on there" in stopped.err
-    assert "was stopped by a fault: speed" in faulty.err
-    assert faulty.out == ""
+    assert "was stopped by a fault: speed" in failed.err
+    assert failed.out == ""
 
 
 def test_a_terminal_sees_the_presentations_counted_unless_quiet(

@@ -339,8 +339,6 @@ def test_a_rehearsal_that_was_stopped_is_gone_on_with(
     assert (before.read_bytes() == lines) is not same_secret
 
 
-NewStudy = Callable[..., tuple[StudyPaths, Protocol]]
-
 DEVICE = """
 [device]
 backend = "puck"
@@ -355,33 +353,20 @@ friction_coulomb_nm = 0.18
 [schedule]"""
 
 
-def on_a_puck(new_study: NewStudy, **changes: str) -> tuple[StudyPaths, Protocol]:
-    device = DEVICE
-    for old, new in changes.items():
-        device = device.replace(old, new)
-    return new_study(("\n[schedule]", device))
-
-
-def presented(study: StudyPaths) -> list:
-    log = read_log(study.log_file("R1", "test"))
-    return [event.fields for event in log if event.kind == "presented"]
-
-
 @pytest.mark.parametrize("by_person", [True, False])
 def test_a_session_on_an_emulated_puck_is_labelled_simulated(
-    new_study: NewStudy, by_person: bool
+    new_study: New, by_person: bool
 ) -> None:
     class Person(SimulatedGrades):
         name = "console"
         simulated = False
 
-    study, protocol = on_a_puck(new_study)
+    study, protocol = small = new_study(("\n[schedule]", DEVICE))
     grades = Person(protocol) if by_person else SimulatedGrades(protocol)
-    done = run_session(study, protocol, "R1", "test", grades=grades, clock="simulated")
-    assert done.simulated
+    assert run(small, grades).simulated
     header = read_log(study.log_file("R1", "test"))[0].fields
     assert (header["device"], header["simulated"]) == ("puck", True)
-    for one in presented(study):
+    for one in (event.fields for event in shown(small)):
         facts = read_recording(study.sessions / str(one["recording"])).facts
         assert (facts["device"], facts["simulated"]) == ("puck", True)
         assert (one["fault"], facts["ended"]) == (None, "arrived")
@@ -389,22 +374,19 @@ def test_a_session_on_an_emulated_puck_is_labelled_simulated(
 
 
 def test_its_recordings_are_those_of_the_simulated_device_but_for_the_bus(
-    new_study: NewStudy,
+    new_study: New,
 ) -> None:
     # The same hands, models and arm; the bus is 0.2 ms late and the steps differ
-    study, protocol = on_a_puck(new_study)
-    other, plain = new_study(name="plain")
     speeds = []
-    for paths, rules in ((study, protocol), (other, plain)):
-        grades = SimulatedGrades(rules)
-        run_session(paths, rules, "R1", "test", grades=grades, clock="simulated")
-        speeds.append([one["mean_speed_deg_s"] for one in presented(paths)])
+    for small in (new_study(("\n[schedule]", DEVICE)), new_study(name="plain")):
+        run(small, SimulatedGrades(small[1]))
+        speeds.append([event.fields["mean_speed_deg_s"] for event in shown(small)])
     assert speeds[0] == pytest.approx(speeds[1], rel=0.02)
 
 
-def test_a_puck_outside_this_process_needs_a_real_clock(new_study: NewStudy) -> None:
-    study, protocol = on_a_puck(new_study, virtual="socketcan")
-    grades = SimulatedGrades(protocol)
+def test_a_puck_outside_this_process_needs_a_real_clock(new_study: New) -> None:
+    device = DEVICE.replace("virtual", "socketcan")
+    small = new_study(("\n[schedule]", device))
     with pytest.raises(ParameterError, match=r"needed the real one for device 'puck'"):
-        run_session(study, protocol, "R1", "test", grades=grades, clock="simulated")
-    assert not study.log_file("R1", "test").exists()
+        run(small, SimulatedGrades(small[1]))
+    assert not small[0].log_file("R1", "test").exists()

@@ -156,13 +156,6 @@ def test_a_person_asks_what_grades_mean_feels_it_again_and_types_wrongly(
     assert [e.fields["grade"] for e in log if e.kind == "grade"] == ["1+", "2", "3"]
 
 
-@pytest.fixture
-def faulty(new_study: Callable[..., Small]) -> Small:
-    """A study whose speed limit every stretch exceeds."""
-    limit = "[device]\nspeed_limit_deg_s = 30.0\n\n[schedule]"
-    return new_study(("[schedule]", limit))
-
-
 def test_faults_are_logged_with_the_data_before_them_and_stop_the_session_after_three(
     faulty: Small,
 ) -> None:
