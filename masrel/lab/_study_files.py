@@ -34,7 +34,7 @@ from masrel._files import (
     remove_left_over,
     sync_folder,
 )
-from masrel.errors import ParameterError
+from masrel.errors import MasrelError, ParameterError
 
 # The most bytes of a protocol, a model file, a schedule, a sheet, facts of a recording
 MAX_SMALL = 1_000_000
@@ -113,6 +113,15 @@ def format_problem(version: object, *, newest: int) -> str | None:
         return None
     known = "1" if newest == 1 else f"1 to {newest}"
     return f"needed format {known}, got {version!r}"
+
+
+def check_format(
+    path: Path, version: object, *, newest: int, error: type[MasrelError]
+) -> None:
+    """Refuse a file of a version of its format that is not read."""
+    problem = format_problem(version, newest=newest)
+    if problem is not None:
+        raise error(f"{path}: {problem}")
 
 
 def parse_json(text: str | bytes) -> Any:

@@ -24,7 +24,7 @@ from masrel.errors import ParameterError, RecordingError
 from masrel.lab._study_files import (
     MAX_RECORDING,
     MAX_SMALL,
-    format_problem,
+    check_format,
     parse_json,
     read_regular,
 )
@@ -419,9 +419,8 @@ def read_recording(path: Path) -> Recording:
         raise RecordingError(f"{facts_path}: not JSON ({error})") from error
     if not isinstance(facts, dict) or "sha256" not in facts:
         raise RecordingError(f"{facts_path}: needs an object with the key sha256")
-    problem = format_problem(facts.pop("format", 1), newest=_FORMAT)
-    if problem is not None:
-        raise RecordingError(f"{facts_path}: {problem}")
+    version = facts.pop("format", 1)
+    check_format(facts_path, version, newest=_FORMAT, error=RecordingError)
     data = read_regular(path, most=MAX_RECORDING)
     checksum = hashlib.sha256(data).hexdigest()
     if facts.pop("sha256") != checksum:

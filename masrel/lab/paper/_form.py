@@ -10,11 +10,12 @@ from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
 
+from masrel._input import not_utf8
 from masrel.errors import ParameterError, RatingsError
 from masrel.lab._study_files import (
     MAX_SMALL,
+    check_format,
     csv_format,
-    format_problem,
     read_regular,
 )
 from masrel.lab.protocol import Protocol, Question
@@ -151,9 +152,7 @@ def read_typed(path: Path) -> TypedSheet:
     head = list(takewhile(_is_head, (record[0] for record in records)))
     start = len(head)
     for line in head:
-        problem = format_problem(csv_format(line), newest=1)
-        if problem is not None:
-            raise RatingsError(f"{path}: {problem}")
+        check_format(path, csv_format(line), newest=1, error=RatingsError)
     if len(records) <= start:
         raise RatingsError(
             f"{path}: needed the columns {', '.join(FIRST_COLUMNS[1:])}, got nothing"
@@ -179,10 +178,8 @@ def _text(path: Path, data: bytes) -> str:
     try:
         return data.decode("utf-16" if data.startswith(_UTF_16) else "utf-8-sig")
     except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
         raise RatingsError(
-            f"{path}: line {line}: needed UTF-8 text, got byte "
-            f'{data[error.start]:#04x}: save the sheet as "CSV UTF-8"'
+            f'{path}: {not_utf8(error)}, in a spreadsheet as "CSV UTF-8"'
         ) from error
 
 

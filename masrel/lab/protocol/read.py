@@ -11,7 +11,7 @@ from masrel._input import not_utf8
 from masrel.errors import ProtocolError
 from masrel.lab._study_files import (
     MAX_SMALL,
-    format_problem,
+    check_format,
     parse_toml,
     read_regular,
 )
@@ -60,9 +60,7 @@ def read_protocol(path: Path) -> Protocol:
     Rules across keys are applied once every key alone is right.
     """
     content = _read_toml(path)
-    problem = format_problem(content.pop("format", 1), newest=1)
-    if problem is not None:
-        raise ProtocolError(f"{path}: {problem}")
+    check_format(path, content.pop("format", 1), newest=1, error=ProtocolError)
     problems = [
         *_resolve_model_files(content, path.parent),
         *_spell_out_scale(content),

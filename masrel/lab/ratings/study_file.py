@@ -13,8 +13,8 @@ from masrel._input import listed, not_utf8
 from masrel.errors import RatingsError
 from masrel.lab._study_files import (
     MAX_TABLE,
+    check_format,
     csv_format,
-    format_problem,
     read_regular,
 )
 from masrel.lab.ratings.table import (
@@ -282,9 +282,7 @@ def _read_rows(path: Path) -> _CsvRows:
     if "\0" in text:
         line = text.count("\n", 0, text.index("\0")) + 1
         raise RatingsError(f"{path}: line {line}: needed text, got a zero byte")
-    problem = format_problem(csv_format(text), newest=_FORMAT)
-    if problem is not None:
-        raise RatingsError(f"{path}: {problem}")
+    check_format(path, csv_format(text), newest=_FORMAT, error=RatingsError)
     records = _records(path, text)
     if not records:
         raise RatingsError(f"{path}: needed a header and rows, the file has none")

@@ -12,6 +12,7 @@ from masrel._input import not_utf8
 from masrel.errors import ScheduleError
 from masrel.lab._study_files import (
     MAX_SMALL,
+    check_format,
     csv_format,
     format_problem,
     once,
@@ -317,9 +318,8 @@ def read_schedule(path: Path) -> Schedule:
         raise ScheduleError(f"{path}: needed a schedule file, got: {reason}") from error
     except UnicodeDecodeError as error:
         raise ScheduleError(f"{path}: {not_utf8(error)}") from error
-    problem = _format_problem(lines)
-    if problem is not None:
-        raise ScheduleError(f"{path}: {problem}")
+    text = "\n".join(lines)
+    check_format(path, csv_format(text), newest=_FORMAT, error=ScheduleError)
     n_head = next((i for i, s in enumerate(lines) if not s.startswith("#")), len(lines))
     head = [_head_entry(line) for line in lines[:n_head]]
     # a cell longer than csv takes is in no schedule

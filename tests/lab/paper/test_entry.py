@@ -169,7 +169,7 @@ def test_the_habits_of_spreadsheets_are_read(
     ("data", "message"),
     [
         (b"PK\x03\x04 and so on", 'got a workbook: save the sheet as "CSV UTF-8"'),
-        (b"code\n1,\xe4,2\n", "line 2: needed UTF-8 text, got byte 0xe4"),
+        (b"code\n1,\xe4,2\n", "line 2: needed UTF-8 text, got the byte 0xe4"),
         (b"", "needed the columns position, code, grade, got nothing"),
     ],
 )
