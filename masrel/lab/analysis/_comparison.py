@@ -111,8 +111,8 @@ def _number(name: str, planned: PlannedEstimate) -> tuple[float, str | None]:
 def _p_value(estimate: Estimate) -> tuple[float, str | None]:
     if not COEFFICIENTS[estimate.coefficient].chance_corrected:
         return math.nan, f"{estimate.coefficient} has no value that chance gives"
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UndefinedStatisticWarning)  # it is said
+    # the reason is said
+    with warnings.catch_warnings(action="ignore", category=UndefinedStatisticWarning):
         return p_value(estimate), estimate.reason
 
 

@@ -211,8 +211,7 @@ def unanswered(line: EstimatePlan, protocol: Protocol) -> str | None:
     )
     scale = scale_of(protocol)
     whole = Ratings(rows=rows, scale=scale, source_path=None, simulated=False)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", MasrelWarning)
+    with warnings.catch_warnings(action="ignore", category=MasrelWarning):
         try:
             return _planned(line, protocol, whole).reason
         except (ParameterError, CountsError, RatingsError) as error:

@@ -345,8 +345,8 @@ def _category_rows(
     matrix = rating_matrix(ratings, session=entry.line.sessions[0], models=entry.models)
     grades = ratings.scale.grades
     codes = code_ratings(matrix.grades, grades).codes
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", MasrelWarning)  # a grade that nobody gave
+    # of a grade that nobody gave
+    with warnings.catch_warnings(action="ignore", category=MasrelWarning):
         freq = np.ones(len(codes), dtype=np.int64)
         arrays = _category_arrays(codes, freq, len(grades), level)
         kappas = [

@@ -247,8 +247,8 @@ def _output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]
                 yield doubt(table, "no session log stands behind this table")
         if not {study.analysis_file, manifest} & {*files}:
             return
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", MasrelWarning)  # of statistics
+        # of statistics
+        with warnings.catch_warnings(action="ignore", category=MasrelWarning):
             analysis = analyze(
                 protocol,
                 ratings,
