@@ -12,8 +12,9 @@ and `masrel.lab`, the laboratory, which stands on them and which they never impo
 `masrel.agree` goes through them in one call.
 """
 
-import importlib
 from typing import TYPE_CHECKING
+
+from masrel._interpreter import loaded_from
 
 if TYPE_CHECKING:
     from masrel._agree import Agreement, agree
@@ -43,13 +44,8 @@ _HOMES = {
 }
 
 
-def __getattr__(name: str) -> object:
-    # All is loaded on first use (PEP 562): importing masrel costs nothing.
-    if name in _HOMES:
-        return getattr(importlib.import_module(f"masrel.{_HOMES[name]}"), name)
-    if name in __all__:
-        return importlib.import_module(f"masrel.{name}")
-    raise AttributeError(f"module 'masrel' has no attribute {name!r}")
+# All is loaded on first use: importing masrel costs nothing.
+__getattr__ = loaded_from(__name__, _HOMES, packages=__all__)
 
 
 def __dir__() -> list[str]:

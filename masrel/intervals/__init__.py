@@ -6,6 +6,7 @@ In: a coefficient's name, its ratings, and the `target` population. Out: an
 
 from typing import TYPE_CHECKING
 
+from masrel._interpreter import loaded_from
 from masrel.intervals.analytic import analytic
 from masrel.intervals.bootstrap import bootstrap
 from masrel.intervals.choose import estimate
@@ -62,10 +63,5 @@ _HOMES = {
 }
 
 
-def __getattr__(name: str) -> object:
-    # these load scipy, and the latent-trait model emcee
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    import importlib
-
-    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+# these load scipy, and the latent-trait model emcee
+__getattr__ = loaded_from(__name__, _HOMES)

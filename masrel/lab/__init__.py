@@ -13,8 +13,9 @@ Its interface is the command line, the files, these two libraries, recordings, a
 is exported here. Names of the other packages serve its commands, and may change.
 """
 
-import importlib
 from typing import TYPE_CHECKING
+
+from masrel._interpreter import loaded_from
 
 if TYPE_CHECKING:
     from masrel.lab.analysis import analyze
@@ -46,10 +47,5 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> object:
-    # All is loaded on first use (PEP 562): importing masrel.lab costs nothing.
-    if name in _HOMES:
-        return getattr(importlib.import_module(f"masrel.lab.{_HOMES[name]}"), name)
-    if name in __all__:
-        return importlib.import_module(f"masrel.lab.{name}")
-    raise AttributeError(f"module 'masrel.lab' has no attribute {name!r}")
+# All is loaded on first use: importing masrel.lab costs nothing.
+__getattr__ = loaded_from(__name__, _HOMES, packages=__all__)

@@ -1,7 +1,8 @@
 """Ratings from any file: what was read, checked and put together item by rater."""
 
-import importlib
 from typing import TYPE_CHECKING
+
+from masrel._interpreter import loaded_from
 
 if TYPE_CHECKING:
     from masrel.ratings._findings import Finding, Reading, Repeated
@@ -26,8 +27,4 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> object:
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    home = importlib.import_module(f"masrel.ratings.{_HOMES[name]}")
-    return getattr(home, name)
+__getattr__ = loaded_from(__name__, _HOMES)

@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel._collector import collector_off
+from masrel._interpreter import collector_off
 from masrel.errors import ParameterError, RatingsError
 from masrel.ratings._findings import Finding, Reading, refusal
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import click
 
-from masrel._collector import collector_off
 from masrel._files import check_inside, refuse_record
+from masrel._interpreter import collector_off
 from masrel.cli._options import (
     STDOUT,
     GroupedHelp,

@@ -6,6 +6,7 @@ what moving the arm takes, or the trace a controller would command.
 
 from typing import TYPE_CHECKING
 
+from masrel._interpreter import loaded_from
 from masrel.lab.elbow._events import Events, PhaseSpan, StretchEvents, events
 from masrel.lab.elbow._law import SampledJoint
 from masrel.lab.elbow._model_file import intermediate_models
@@ -85,13 +86,6 @@ __all__ = [
     "work",
 ]
 
-_IDENTIFIED = ("fit", "fit_friction", "read_movement")
-
-
-def __getattr__(name: str) -> object:
-    # identification needs scipy, which nothing else here does
-    if name not in _IDENTIFIED:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    import importlib
-
-    return getattr(importlib.import_module("masrel.lab.elbow.identification"), name)
+# identification needs scipy, which nothing else here does
+_IDENTIFIED = dict.fromkeys(("fit", "fit_friction", "read_movement"), "identification")
+__getattr__ = loaded_from(__name__, _IDENTIFIED)

@@ -10,7 +10,7 @@ import warnings
 from contextlib import closing, suppress
 from pathlib import Path
 
-from masrel._collector import collector_off
+from masrel._interpreter import collector_off
 from masrel.errors import (
     ControllerError,
     DeviceError,

@@ -6,6 +6,8 @@ same as Markdown, tables as CSV, figures as PNG and SVG.
 
 from typing import TYPE_CHECKING
 
+from masrel._interpreter import loaded_from
+
 if TYPE_CHECKING:
     from masrel.lab.report._conduct import StudyConduct, study_conduct
     from masrel.lab.report._document import ReportFiles, write_report
@@ -18,9 +20,11 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> object:
-    if name in __all__:
-        from masrel.lab.report import _conduct, _document
+_HOMES = {
+    "ReportFiles": "_document",
+    "StudyConduct": "_conduct",
+    "study_conduct": "_conduct",
+    "write_report": "_document",
+}
 
-        return getattr(_conduct if "onduct" in name else _document, name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__ = loaded_from(__name__, _HOMES)

@@ -4,11 +4,12 @@ In: a protocol and a drawn schedule. Out: an append-only session log and one
 recording a presentation.
 """
 
-import importlib
 from typing import TYPE_CHECKING
 
+from masrel._interpreter import loaded_from
+from masrel.lab._event_log import Event, SessionLog, read_log
+
 if TYPE_CHECKING:
-    from masrel.lab._event_log import Event, SessionLog, read_log
     from masrel.lab.run._corrections import (
         record_answer,
         record_correction,
@@ -48,29 +49,20 @@ __all__ = [
 ]
 
 _HOMES = {
-    "masrel.lab.run._corrections": (
-        "record_answer",
-        "record_correction",
-        "record_skip",
-    ),
-    "masrel.lab.run._grade_sources": (
-        "GradeRequest",
-        "GradeSource",
-        "QuestionRequest",
-        "ScriptGrades",
-        "Skip",
-        "StretchGrade",
-    ),
-    "masrel.lab._event_log": ("Event", "SessionLog", "read_log"),
-    "masrel.lab.run._settings": ("model_controller",),
-    "masrel.lab.run._simulated_raters": ("SimulatedGrades",),
-    "masrel.lab.run.console": ("ConsoleGrades",),
-    "masrel.lab.run.session": ("SessionSummary", "run_session"),
+    "ConsoleGrades": "console",
+    "GradeRequest": "_grade_sources",
+    "GradeSource": "_grade_sources",
+    "QuestionRequest": "_grade_sources",
+    "ScriptGrades": "_grade_sources",
+    "SessionSummary": "session",
+    "SimulatedGrades": "_simulated_raters",
+    "Skip": "_grade_sources",
+    "StretchGrade": "_grade_sources",
+    "model_controller": "_settings",
+    "record_answer": "_corrections",
+    "record_correction": "_corrections",
+    "record_skip": "_corrections",
+    "run_session": "session",
 }
 
-
-def __getattr__(name: str) -> object:
-    for module, names in _HOMES.items():
-        if name in names:
-            return getattr(importlib.import_module(module), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__ = loaded_from(__name__, _HOMES)
