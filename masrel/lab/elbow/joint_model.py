@@ -132,17 +132,17 @@ class Law(ABC):
 
     def __post_init__(self) -> None:
         for entry in fields(self):
-            name, of = entry.name, entry.metadata.get("quantity")
+            name, parameter = entry.name, entry.metadata.get("quantity")
             value = getattr(self, name)
-            if of is None or (value is None and entry.default is None):
+            if parameter is None or (value is None and entry.default is None):
                 continue
             is_number = isinstance(value, int | float) and not isinstance(value, bool)
             if not is_number or not math.isfinite(value):
                 raise ParameterError(f"{name}: needs a finite number, got {value!r}")
-            needed, is_met = _RANGES[of.needs]
+            needed, is_met = _RANGES[parameter.needs]
             if not is_met(value):
                 raise ParameterError(
-                    f"{name}: needs {needed}, got {value:g} {of.unit}".rstrip()
+                    f"{name}: needs {needed}, got {value:g} {parameter.unit}".rstrip()
                 )
         self._check_together()
 

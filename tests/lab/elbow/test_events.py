@@ -87,15 +87,19 @@ def test_hm3_at_92_deg_s_by_hand() -> None:
     # 0.1 s; the catch ends at 82.8 + 30 = 112.8 deg, after 82.8/92 = 0.9 s; the
     # stretch at 146 deg, after 116/92 s. Speed is above 20 deg/s from the first.
     found = events(STANDARD_MODELS["HM3"], constant(92.0))
-    assert found.onset == 0.0
-    assert found.catch == pytest.approx(52.8 / 92, rel=1e-15)
-    assert degrees(found.catch_angle) == pytest.approx(82.8, rel=1e-15)
-    assert degrees(found.catch_speed) == pytest.approx(92.0, rel=1e-15)
-    assert degrees(found.mean_speed) == pytest.approx(92.0, rel=1e-15)
-    assert found.peak_end == pytest.approx(52.8 / 92 + 0.1, rel=1e-15)
-    assert found.catch_end == pytest.approx(0.9, rel=1e-15)
+    seconds = {
+        "onset": 0.0,
+        "catch": 52.8 / 92,
+        "peak_end": 52.8 / 92 + 0.1,
+        "catch_end": 0.9,
+        "end": 116 / 92,
+    }
+    times = {name: getattr(found, name) for name in seconds}
+    assert times == pytest.approx(seconds, rel=1e-15, abs=0.0)
+    degrees_of = {"catch_angle": 82.8, "catch_speed": 92.0, "mean_speed": 92.0}
+    values = {name: degrees(getattr(found, name)) for name in degrees_of}
+    assert values == pytest.approx(degrees_of, rel=1e-15)
     assert found.post_catch_end is None
-    assert found.end == pytest.approx(116 / 92, rel=1e-15)
     angles = [degrees(span.end_angle) for span in found.phases]
     assert angles == pytest.approx([82.8, 112.8, 146.0], rel=1e-14)
 
