@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from masrel._interpreter import loaded_from
 from masrel.lab.elbow._events import Events, PhaseSpan, StretchEvents, events
-from masrel.lab.elbow._law import SampledJoint
 from masrel.lab.elbow._model_file import intermediate_models
 from masrel.lab.elbow._scenes import Columns, SceneTable, evaluate
 from masrel.lab.elbow._torque import (
@@ -37,7 +36,7 @@ from masrel.lab.elbow.motions import (
     Trapezoid,
     interrupted,
 )
-from masrel.lab.elbow.parameters import STANDARD_MODELS, ElbowParameters
+from masrel.lab.elbow.parameters import STANDARD_MODELS, ElbowParameters, SampledJoint
 from masrel.lab.elbow.tone import MODELS, JointModel, Tardieu, tardieu
 
 if TYPE_CHECKING:

@@ -14,8 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from masrel.errors import ParameterError
-from masrel.lab.elbow import _law
-from masrel.lab.elbow._law import CATCH, POST_CATCH, PRE_CATCH
 from masrel.lab.elbow._polynomials import (
     NOTHING,
     TIE,
@@ -34,7 +32,16 @@ from masrel.lab.elbow._polynomials import (
     value,
 )
 from masrel.lab.elbow.motions import Motion, Piece
-from masrel.lab.elbow.parameters import ElbowParameters
+from masrel.lab.elbow.parameters import (
+    CATCH,
+    POST_CATCH,
+    PRE_CATCH,
+    ElbowParameters,
+    catch_bounds,
+    catch_line,
+    pre_catch_law,
+    slow_line,
+)
 from masrel.lab.recording import PHASES, Phase
 
 __all__ = ["Events", "PhaseSpan", "StretchEvents", "events"]
@@ -248,9 +255,9 @@ class Timeline:
         rest = motion.start
         if p.rest_angle is not None:
             rest = known(p.rest_angle, rest)
-        self.law = _law.pre_catch(p, rest - self.origin)  # of pre-catch
+        self.law = pre_catch_law(p, rest - self.origin)  # of pre-catch
         self.constant = p.catch_angle_constant - self.origin  # L
-        smallest, largest = _law.catch_bounds(p, self.origin)
+        smallest, largest = catch_bounds(p, self.origin)
         # θ_catch jumps at ν_H where ν_L is above that
         self.jumps = smallest > largest
         self.lowest = least(smallest, largest)
@@ -455,9 +462,9 @@ class Timeline:
         since: Polynomial,
     ) -> Number:
         # where a movement first passes the catch angle; θ only grows
-        line = _law.catch_line(self.p, self.constant, angle, way, since)
+        line = catch_line(self.p, self.constant, angle, way, since)
         if some(self.jumps):
-            slow = [*_law.slow_line(self.p, way, since), *[0.0] * len(line)]
+            slow = [*slow_line(self.p, way, since), *[0.0] * len(line)]
             line = [pick(self.jumps, s, c) for s, c in zip(slow, line, strict=False)]
         place = first_above(line, 0.0, length, among=ready)
         if some(low := value(angle, place) < self.lowest):

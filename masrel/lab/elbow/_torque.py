@@ -16,9 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from masrel.errors import ParameterError
-from masrel.lab.elbow import _law
 from masrel.lab.elbow._events import Events, Timeline, events, phase_marks
-from masrel.lab.elbow._law import TorqueLaw
 from masrel.lab.elbow._polynomials import (
     Number,
     Polynomial,
@@ -36,7 +34,13 @@ from masrel.lab.elbow._polynomials import (
     value,
 )
 from masrel.lab.elbow.motions import Floats, Motion
-from masrel.lab.elbow.parameters import ElbowParameters
+from masrel.lab.elbow.parameters import (
+    ElbowParameters,
+    TorqueLaw,
+    catch_laws,
+    onset_share,
+    post_catch_law,
+)
 from masrel.lab.elbow.tone import JointModel
 
 __all__ = [
@@ -356,8 +360,8 @@ def segments(line: Timeline) -> list[TorqueSegment]:
             known(number, 0.0)
             for number in (stretch.pre_end, stretch.rise, stretch.left_angle)
         )
-        peak, residual = _law.catch(p, pre_end, rise)
-        post = _law.post_catch(p, residual.level, pre_end, angle, line.law.origin)
+        peak, residual = catch_laws(p, pre_end, rise)
+        post = post_catch_law(p, residual.level, pre_end, angle, line.law.origin)
         risen = least(catch + p.catch_rise, left)
         fallen = greatest(peak_end, risen)
         onset = rise, pick(p.catch_rise > 0.0, p.catch_rise, 1.0)
@@ -382,7 +386,7 @@ def segment_torque(segment: TorqueSegment, motion: Motion, at: Floats) -> Floats
     if law.onset is not None:
         rise, time = law.onset
         share = np.clip((at - segment.start) / time, 0.0, 1.0)
-        values = values + rise * _law.onset_share(share)
+        values = values + rise * onset_share(share)
     return np.asarray(values)
 
 
@@ -420,7 +424,7 @@ def load(line: Timeline, motion: Motion, name: str) -> Number:
     """Return one of the loads, by the name of its function; of columns, of each row."""
     if name == "residual_torque":
         first = line.first
-        return _law.catch(line.p, first.pre_end, first.rise)[1].level
+        return catch_laws(line.p, first.pre_end, first.rise)[1].level
     laid = segments(line)
     if name == "peak_torque":
         return _peak(line, motion, laid)

@@ -20,7 +20,6 @@ import numpy as np
 from masrel._input import refuse
 from masrel.errors import ParameterError
 from masrel.lab.elbow._events import events
-from masrel.lab.elbow._law import CATCH, POST_CATCH, PRE_CATCH
 from masrel.lab.elbow._polynomials import Polynomial
 from masrel.lab.elbow.joint_model import (
     Quantity,
@@ -40,7 +39,12 @@ from masrel.lab.elbow.motions import (
     one_way,
     spans,
 )
-from masrel.lab.elbow.parameters import ElbowParameters
+from masrel.lab.elbow.parameters import (
+    CATCH,
+    POST_CATCH,
+    PRE_CATCH,
+    ElbowParameters,
+)
 
 __all__ = [
     "ClaspKnife",
