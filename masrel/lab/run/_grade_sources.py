@@ -152,6 +152,17 @@ class QuestionRequest:
     correct: Correct | None = None
 
 
+def remarks_on(request: GradeRequest) -> list[str]:
+    """Return by name what a rater has to know of what was presented, to grade it."""
+    remarks = {
+        "time-limit": request.ended == "time-limit",
+        "max-duration": request.ended == "max-duration",
+        "too-slow": request.felt not in ("felt", None),
+        "grip-lost": request.grip_lost,
+    }
+    return [name for name, is_so in remarks.items() if is_so]
+
+
 def checked_grade(
     request: GradeRequest, grades: Sequence[str], grade: object, stretch: Any
 ) -> StretchGrade:

@@ -15,6 +15,7 @@ from masrel.lab.run._grade_sources import (
     QuestionRequest,
     Skip,
     StretchGrade,
+    remarks_on,
 )
 from masrel.scales import PublishedScale, Scale, published_scale
 
@@ -22,6 +23,15 @@ if TYPE_CHECKING:
     from masrel.lab.hess import EmergencyStop, PresentationStatus  # loads numpy
 
 _CUE_EVERY_S = 0.05  # how often it is looked whether a stretch is over
+
+_REMARKS = {
+    "time-limit": "The time limit ended the presentation: no stretch begins later than "
+    "{limit_s:g} s after the first movement.\n",
+    "max-duration": "The presentation was ended: it had gone on for too long.\n",
+    "too-slow": "That was too slow to feel the catch: once more? Then say again.\n",
+    "grip-lost": "The arm came loose, and the model let go: once more? Say again.\n",
+}
+"""A line each of what a rater has to know of a presentation."""
 
 
 class ConsoleGrades(GradeSource):
@@ -133,7 +143,8 @@ class ConsoleGrades(GradeSource):
             If the person stops, or the input ends.
         """
         grades, n_stretches = ", ".join(self._scale.grades), request.n_stretches
-        self._say(_remarks(request))
+        remarks = "".join(_REMARKS[name] for name in remarks_on(request))
+        self._say(remarks.format(limit_s=request.rules.time_limit_s))
         meanings = "" if self._published is None else "; ? for their meanings"
         rests = ""
         if n_stretches > 1:
@@ -327,30 +338,6 @@ def _meanings_in_words(scale: Scale, published: PublishedScale) -> str:
         if grade in published.meanings
     ]
     return words + ("In short, in masrel's words:\n" if lines else "") + "".join(lines)
-
-
-def _remarks(request: GradeRequest) -> str:
-    # what the rater has to know of the presentation, a line each
-    remarks = (
-        (
-            request.ended == "time-limit",
-            "The time limit ended the presentation: no stretch begins later than "
-            f"{request.rules.time_limit_s:g} s after the first movement.\n",
-        ),
-        (
-            request.ended == "max-duration",
-            "The presentation was ended: it had gone on for too long.\n",
-        ),
-        (
-            request.felt not in ("felt", None),
-            "That was too slow to feel the catch: once more? Then say again.\n",
-        ),
-        (
-            request.grip_lost,
-            "The arm came loose, and the model let go: once more? Say again.\n",
-        ),
-    )
-    return "".join(remark for is_so, remark in remarks if is_so)
 
 
 def _instruction(rules: PresentationRules, *, on_paper: bool = False) -> str:

@@ -36,7 +36,7 @@ from masrel.lab.run import (
     StretchGrade,
     run_session,
 )
-from masrel.lab.run._grade_sources import checked_grade
+from masrel.lab.run._grade_sources import checked_grade, remarks_on
 from masrel.lab.run.console import _stopped
 from masrel.scales import Scale, published_scale
 
@@ -50,7 +50,6 @@ MAX_LINE = 1 << 20
 """Bytes of the longest line that is read."""
 
 _OTHER_ENDS_S = 10.0  # within this a process ends whose server is gone
-_LIMITS = ("time-limit", "max-duration")
 _GONE = {"kind": "leave", "why": "as the server is gone", "who": "server gone"}
 
 
@@ -143,11 +142,6 @@ class PageGrades(GradeSource):
         """Return the grade; None to feel it again."""
         published = published_scale(self._scale)
         meanings = {} if published is None else published.meanings
-        remarks = [request.ended] if request.ended in _LIMITS else []
-        if request.felt not in ("felt", None):
-            remarks.append("too-slow")
-        if request.grip_lost:
-            remarks.append("grip-lost")
         chosen: StretchGrade | None = self._ask(
             request,
             "grade",
@@ -159,7 +153,7 @@ class PageGrades(GradeSource):
             ],
             meanings_source=None if published is None else published.source,
             n_stretches=request.n_stretches,
-            remarks=remarks,
+            remarks=remarks_on(request),
         )
         return chosen
 
