@@ -140,13 +140,10 @@ def filled_sheet(
 
 
 def _other_forms(study: StudyPaths, protocol: Protocol, form: Form) -> Iterator[Form]:
-    for session in protocol.sessions:
-        for rater in session.raters:
-            is_other = (rater, session.id) != (form.rater, form.session)
-            if is_other and study.schedule_file(rater, session.id).exists():
-                yield form_of(
-                    protocol, _drawn_schedule(study, protocol, rater, session.id)
-                )
+    for place in protocol.rater_sessions:
+        is_other = place != (form.rater, form.session)
+        if is_other and study.schedule_file(*place).exists():
+            yield form_of(protocol, _drawn_schedule(study, protocol, *place))
 
 
 def _begin(

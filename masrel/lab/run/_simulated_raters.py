@@ -58,10 +58,8 @@ class SimulatedGrades(GradeSource):
         self._severity = {
             model.id: severity(protocol, model) for model in protocol.models
         }
-        self._first_session: dict[str, str] = {}
-        for session in protocol.sessions:
-            for rater in session.raters:
-                self._first_session.setdefault(rater, session.id)
+        # by rater; backwards, so that of several sessions the first one stays
+        self._first_session = dict(reversed(protocol.rater_sessions))
 
     def grade(self, request: GradeRequest) -> str | None:
         """Return the grade the simulated rater gives.

@@ -267,10 +267,11 @@ class _Runner(Presenter):
         }
         header = self._state.header
         if not header:
-            interval = None
-            if not self._is_rehearsal:  # before there is anything of the session
-                where = (self._study, protocol, schedule.rater, schedule.session)
-                interval = interval_fields(*where, self._now)
+            # before there is anything of the session
+            where = (self._study, protocol, schedule.rater, schedule.session)
+            interval = (
+                None if self._is_rehearsal else interval_fields(*where, self._now)
+            )
             self._log.append("session", {**same, **self.provenance()})
             if interval is not None:
                 self._log.append("interval", interval)
