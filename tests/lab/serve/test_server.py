@@ -277,13 +277,6 @@ def test_the_server_keeps_off_the_processor_of_the_loop(tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def masrel(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Caller:
-    return Caller(monkeypatch, capsys)
-
-
-@pytest.fixture
 def study(tmp_path: Path) -> Path:
     copy_template("small", tmp_path / "study")
     return tmp_path / "study"
