@@ -14,21 +14,20 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from types import MappingProxyType, TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 from masrel._files import make_folder, naming, sync_folder
 from masrel.errors import SessionLogError, SessionLogInUseError
 from masrel.lab._study_files import (
     MAX_TABLE,
+    Fact,
+    Facts,
     format_problem,
     no_follow,
     once,
     parse_json,
     read_regular,
 )
-
-if TYPE_CHECKING:
-    from masrel.lab.recording import _Fact, _Facts  # loads numpy
 
 if sys.platform != "win32":
     import fcntl
@@ -58,7 +57,7 @@ class Event:
     line: int
     kind: str
     time_utc: str
-    fields: "Mapping[str, _Facts]" = field(hash=False)
+    fields: Mapping[str, Facts] = field(hash=False)
 
 
 @once
@@ -293,7 +292,7 @@ class SessionLog:
             self._take_in(torn, len(lines) + 1)
 
     def _take_in(self, torn: bytes, line: int) -> None:
-        facts: dict[str, _Fact] = {
+        facts: dict[str, Fact] = {
             "line": line,
             "n_bytes": len(torn),
             "sha256": _line_hash(torn),
@@ -322,7 +321,7 @@ class SessionLog:
         """Whether events can be appended."""
         return self._descriptor is not None
 
-    def append(self, kind: str, fields: "Mapping[str, _Facts]") -> Event:
+    def append(self, kind: str, fields: Mapping[str, Facts]) -> Event:
         """Append one event and wait until it is on disk.
 
         Parameters

@@ -14,7 +14,7 @@ import os
 import re
 import shutil
 import stat
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from datetime import date, time
@@ -35,6 +35,10 @@ from masrel._files import (
     sync_folder,
 )
 from masrel.errors import MasrelError, ParameterError
+
+# What an event of a log, or a recording, has by a name; also that of each of several
+Fact = str | int | float | bool | None
+Facts = Fact | Sequence[Mapping[str, Fact]]
 
 # The most bytes of a protocol, a model file, a schedule, a sheet, facts of a recording
 MAX_SMALL = 1_000_000

@@ -10,7 +10,7 @@ import json
 import re
 import zipfile
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -24,6 +24,7 @@ from masrel.errors import ParameterError, RecordingError
 from masrel.lab._study_files import (
     MAX_RECORDING,
     MAX_SMALL,
+    Fact,
     check_format,
     parse_json,
     read_regular,
@@ -73,8 +74,6 @@ _END, _FAULT = RAMPS.index("end"), RAMPS.index("fault")
 _USUAL_THRESHOLD_DEG_S = 20.0  # before recordings said what theirs was
 
 _Columns = Mapping[str, NDArray[np.float64]]
-_Fact = str | int | float | bool | None
-_Facts = _Fact | Sequence[Mapping[str, _Fact]]  # also those of each of several
 
 _COLUMN_NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 _LONGEST_NAME = 40
@@ -150,7 +149,7 @@ class Recording:
     """
 
     columns: Mapping[str, NDArray[np.float64]] = field(compare=False, repr=False)
-    facts: Mapping[str, _Fact]
+    facts: Mapping[str, Fact]
     channels: tuple[Channel, ...] = ()
 
     def __post_init__(self) -> None:
@@ -184,7 +183,7 @@ class Recording:
         return int(np.count_nonzero(self.columns["ramp"] < _END))
 
 
-def _completed(columns: _Columns, facts: Mapping[str, _Fact]) -> _Columns:
+def _completed(columns: _Columns, facts: Mapping[str, Fact]) -> _Columns:
     # Before recordings had these columns, faults alone had a ramp, and all before the
     # end was one stretch.
     fault_s = facts.get("fault_time_s")

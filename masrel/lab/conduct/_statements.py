@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Mapping
 from datetime import datetime
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 from masrel._input import listed
 from masrel.errors import ParameterError, ScheduleError, SessionLogError
 from masrel.lab._event_log import utc_now
+from masrel.lab._study_files import Fact
 from masrel.lab.conduct._study_log import (
     append_event,
     check_choice,
@@ -23,10 +24,6 @@ from masrel.lab.protocol._values import (
 )
 from masrel.lab.schedule import Presentation, Schedule
 from masrel.lab.schedule.presentation import _read_drawn
-
-if TYPE_CHECKING:
-    from masrel.lab.recording import _Fact  # loads numpy
-
 
 NoteKind = Literal["note", "adverse-event", "deviation"]
 """What a note is of."""
@@ -99,7 +96,7 @@ def record_note(
     if severity is not None:
         check_choice("severity", severity, SEVERITIES)
     facts = {name: detail for name, detail in details.items() if detail is not None}
-    fields: dict[str, _Fact] = {
+    fields: dict[str, Fact] = {
         "kind": kind,
         **stated(text=text, who=who),
         "rater": rater,
@@ -382,7 +379,7 @@ def record_unblinding(
             f"code: needed one of a single sheet, {code} is on those of {places}: say "
             "which with --rater and --session"
         )
-    where: dict[str, _Fact] = {"rater": rater, "session": session, "code": code}
+    where: dict[str, Fact] = {"rater": rater, "session": session, "code": code}
     if code is not None:
         ((schedule, _),) = revealed
         where |= {"rater": schedule.rater, "session": schedule.session}

@@ -13,7 +13,6 @@ from functools import partial
 from heapq import merge
 from itertools import accumulate
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import masrel
 from masrel._input import listed
@@ -26,16 +25,13 @@ from masrel.lab._event_log import (
     read_log,
     utc_now,
 )
+from masrel.lab._study_files import Fact
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.protocol._values import Answer
 from masrel.lab.schedule import write_schedules
 from masrel.lab.schedule._orders import WITH_ROWS
 from masrel.lab.schedule._secret import site_of
 from masrel.lab.schedule.presentation import _read_drawn
-
-if TYPE_CHECKING:
-    from masrel.lab.recording import _Fact  # loads numpy
-
 
 _FORMAT = 1
 
@@ -136,7 +132,7 @@ def append_event(
     study: StudyPaths,
     protocol: Protocol,
     kind: str,
-    fields: "Mapping[str, _Fact]",
+    fields: Mapping[str, Fact],
     *,
     now: Callable[[], datetime] = utc_now,
 ) -> None:
@@ -153,7 +149,7 @@ def open_conduct(
     with SessionLog.open(study.conduct_file, now=now) as log:
         check_kinds(log.path, log.events, _EVENTS, head="conduct", newest=_FORMAT)
         if not any(event.kind == "conduct" for event in log.events):
-            head: dict[str, _Fact] = {
+            head: dict[str, Fact] = {
                 "format": _FORMAT,
                 "study": protocol.study.id,
                 "masrel_version": masrel.__version__,

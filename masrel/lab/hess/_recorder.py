@@ -20,7 +20,13 @@ from numpy.typing import NDArray
 
 from masrel._files import make_folder
 from masrel.errors import ParameterError, RecordingError
-from masrel.lab._study_files import MAX_RECORDING, no_follow, parse_json, read_regular
+from masrel.lab._study_files import (
+    MAX_RECORDING,
+    Fact,
+    no_follow,
+    parse_json,
+    read_regular,
+)
 from masrel.lab.recording import (
     MEASURED_TORQUE,
     RAMPS,
@@ -28,7 +34,6 @@ from masrel.lab.recording import (
     Channel,
     Recording,
     _channels_of,
-    _Fact,
     _main_stretch,
 )
 
@@ -61,7 +66,7 @@ class Samples:
         channels: Sequence[Channel] = (),
         *,
         file: Path | None = None,
-        facts: dict[str, _Fact] | None = None,
+        facts: dict[str, Fact] | None = None,
     ) -> None:
         self.channels = tuple(channels)
         self.n = 0
@@ -276,7 +281,7 @@ def cut_off(spool: Path) -> Presented | None:
     )
 
 
-def _written(facts: dict[str, _Fact], data: bytes) -> NDArray[np.float64]:
+def _written(facts: dict[str, Fact], data: bytes) -> NDArray[np.float64]:
     # -> (n_columns, n): the samples, as the loop wrote them; `facts` without what is of
     # the file. Raises ValueError, KeyError or TypeError where it is no such file.
     capacity, rate_hz = facts.pop("capacity"), facts["rate_hz"]
@@ -303,7 +308,7 @@ def _written(facts: dict[str, _Fact], data: bytes) -> NDArray[np.float64]:
 
 def as_presented(
     columns: Columns,
-    facts: dict[str, _Fact],
+    facts: dict[str, Fact],
     *,
     channels: tuple[Channel, ...] = (),
     ended: str,
@@ -327,7 +332,7 @@ def as_presented(
     }
     recording = Recording(columns=columns, facts=facts, channels=channels)
     felt = _main_stretch(recording)
-    of_the_stretch: dict[str, _Fact] = {
+    of_the_stretch: dict[str, Fact] = {
         "phases": "" if felt is None else ", ".join(felt.phases),
         "catch_angle_deg": None if felt is None else felt.catch_angle_deg,
         "mean_speed_deg_s": None if felt is None else felt.mean_speed_deg_s,
@@ -339,14 +344,14 @@ def as_presented(
     )
 
 
-def _channel_facts(columns: Columns, channels: tuple[Channel, ...]) -> dict[str, _Fact]:
+def _channel_facts(columns: Columns, channels: tuple[Channel, ...]) -> dict[str, Fact]:
     # how many numbers each channel missed, and in words what failed: looked at once it
     # is over, for the loop does not act on channels
     if not channels:
         return {}
     read = columns["ramp"] != _FAULT  # the ramp after a fault has no readings
     n_read = int(np.count_nonzero(read))
-    facts: dict[str, _Fact] = {}
+    facts: dict[str, Fact] = {}
     faults = []
     for channel in channels:
         name = channel.column

@@ -20,6 +20,7 @@ from masrel.errors import (
     ParameterError,
     RecordingWarning,
 )
+from masrel.lab._study_files import Fact
 from masrel.lab.hess._clock import Clock, scheduled
 from masrel.lab.hess._course import Course, PresentationStatus, StretchRules
 from masrel.lab.hess._guard import ActiveGuard, Guard
@@ -29,7 +30,7 @@ from masrel.lab.hess._stop import EmergencyStop, Watching
 from masrel.lab.hess.controller import Controller
 from masrel.lab.hess.device import Device
 from masrel.lab.hess.limits import DeviceLimits
-from masrel.lab.recording import RAMPS, _Fact
+from masrel.lab.recording import RAMPS
 
 _NONE, _POST_CATCH, _END, _FAULT = range(len(RAMPS))
 
@@ -151,7 +152,7 @@ def run_presentation(
         max_duration_s = _MAX_DURATION_S if rules.n == 1 else many_s
     _check(device, controller, limits, rate_hz, max_duration_s, end_angle)
     controller.speed_margin = speed_margin(limits.encoder_noise, rate_hz)
-    facts: dict[str, _Fact] = {
+    facts: dict[str, Fact] = {
         "simulated": device.simulated,
         "device": device.name,
         "rate_hz": rate_hz,

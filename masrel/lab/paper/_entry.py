@@ -5,7 +5,6 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from datetime import date, datetime, time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -13,6 +12,7 @@ import masrel
 from masrel._files import check_inside
 from masrel.errors import ParameterError, RatingsError, SessionLogError
 from masrel.lab._event_log import Event, SessionLog, utc_now
+from masrel.lab._study_files import Fact
 from masrel.lab.conduct._study_log import append_event, stated, study_answers
 from masrel.lab.paper._form import (
     FilledRow,
@@ -34,10 +34,6 @@ from masrel.lab.run._state import (
     sheet_differences,
 )
 from masrel.lab.schedule.sheets import _drawn_schedule
-
-if TYPE_CHECKING:
-    from masrel.lab.recording import _Fact  # loads numpy
-
 
 NO_DEVICE = "none"
 """What logs call the device where nobody says what presented the models."""
@@ -155,7 +151,7 @@ def _begin(
     log: SessionLog,
 ) -> None:
     schedule_file = study.schedule_file(form.rater, form.session)
-    same: dict[str, _Fact] = {
+    same: dict[str, Fact] = {
         "format": FORMAT,
         "study": protocol.study.id,
         "rater": form.rater,
@@ -273,11 +269,11 @@ def _answer_about_study(
     for column, answer in row.answers:
         names = {"questionnaire": column.questionnaire, "question": column.question.id}
         if tuple(names.values()) not in answered:
-            fields: dict[str, _Fact] = {"rater": rater, **names, "answer": answer}
+            fields: dict[str, Fact] = {"rater": rater, **names, "answer": answer}
             append_event(study, protocol, "answered", fields, now=now)
 
 
-def typed_fields(row: FilledRow, sheet: TypedSheet) -> "dict[str, _Fact]":
+def typed_fields(row: FilledRow, sheet: TypedSheet) -> dict[str, Fact]:
     """Return where on a sheet something stood, as a log has it."""
     return {
         "file": sheet.path.name,
@@ -379,7 +375,7 @@ def _reenter(
     state: SessionState,
     log: SessionLog,
 ) -> None:
-    values: dict[str, _Fact] = {"grade": row.grade} if row.code is not None else {}
+    values: dict[str, Fact] = {"grade": row.grade} if row.code is not None else {}
     values |= {column.column: answer for column, answer in row.answers}
     for column, value in values.items():
         cell = {

@@ -6,9 +6,9 @@ from datetime import datetime
 
 from masrel.errors import MasrelWarning, ParameterError
 from masrel.lab._event_log import Event, read_log
+from masrel.lab._study_files import Fact
 from masrel.lab.protocol import Protocol, Question, Questionnaire, Session, StudyPaths
 from masrel.lab.protocol._values import When, checked_answer, questions_of
-from masrel.lab.recording import _Fact
 from masrel.lab.run._grade_sources import Correct, GradeSource, QuestionRequest
 from masrel.lab.schedule import Presentation
 
@@ -23,7 +23,7 @@ def ask_questions(
     presentation: Presentation | None = None,
     answered: Container[tuple[str, str]] = (),
     correct: Correct | None = None,
-    log: Callable[[dict[str, _Fact]], object],
+    log: Callable[[dict[str, Fact]], object],
 ) -> None:
     """Ask what has no answer yet, and log each answer before the next question."""
     for questionnaire, question in questions_of(protocol, when):
@@ -99,7 +99,7 @@ def interval_fields(
     rater: str,
     session: str,
     now: Callable[[], datetime],
-) -> dict[str, _Fact] | None:
+) -> dict[str, Fact] | None:
     """Return what a log says of the session before; None where none has to be.
 
     A session that begins out of order is refused, or warned of.

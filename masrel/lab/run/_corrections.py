@@ -9,10 +9,10 @@ from pathlib import Path
 
 from masrel.errors import ParameterError, SessionLogError
 from masrel.lab._event_log import SessionLog, utc_now
+from masrel.lab._study_files import Fact
 from masrel.lab.conduct._study_log import append_event, check_rater, stated
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.protocol._values import checked_answer
-from masrel.lab.recording import _Fact
 from masrel.lab.run._around import question_named
 from masrel.lab.run._state import SessionState, replay
 
@@ -80,7 +80,7 @@ def correct_in_session(
 def _append_correction(
     log: SessionLog,
     state: SessionState,
-    fields: dict[str, _Fact],
+    fields: dict[str, Fact],
     known: Iterable[str],
     what: str,
 ) -> None:
@@ -100,7 +100,7 @@ def _append_correction(
 
 def _checked_correction(
     protocol: Protocol, code: str, grade: str | None, who: str, why: str
-) -> dict[str, _Fact]:
+) -> dict[str, Fact]:
     if grade is not None and grade not in protocol.scale.grades:
         raise ParameterError(
             f"grade: needed one of {', '.join(protocol.scale.grades)}, got {grade!r}"
@@ -169,7 +169,7 @@ def record_answer(
             f"code: needed {needed}, as {question} is about each "
             f"{questionnaire.when}, got {code or 'none'}"
         )
-    fields: dict[str, _Fact] = {
+    fields: dict[str, Fact] = {
         "questionnaire": questionnaire.id,
         "question": its_question.id,
         "answer": answer,

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from masrel.lab._study_files import Fact, Facts
 from masrel.lab.elbow import JointModel
 from masrel.lab.elbow.tone import _caught
 from masrel.lab.hess import (
@@ -34,8 +35,6 @@ from masrel.lab.recording import (
     RECORDING_COLUMNS,
     Recording,
     Stretch,
-    _Fact,
-    _Facts,
     read_recording,
     stretches,
     write_recording,
@@ -155,8 +154,8 @@ _FORMATS = {
 class Outcome(NamedTuple):
     """What a presentation left, as a log says it, whatever it was for."""
 
-    logged: dict[str, _Facts]
-    fault: dict[str, _Facts]  # what stopped it; empty where nothing did
+    logged: dict[str, Facts]
+    fault: dict[str, Facts]  # what stopped it; empty where nothing did
 
 
 def present(
@@ -309,7 +308,7 @@ def _keep(
     presented: Presented, protocol: Protocol, request: GradeRequest, file: Path
 ) -> Outcome:
     presentation, recording = request.presentation, presented.recording
-    facts: dict[str, _Fact] = {
+    facts: dict[str, Fact] = {
         **recording.facts,
         "study": protocol.study.id,
         "rater": request.rater,
@@ -336,7 +335,7 @@ def _outcome(
     asked_for = protocol.presentation.stretches
     cues = dict(enumerate(asked_for if isinstance(asked_for, tuple) else (), start=1))
     r1_deg, r2_deg = _tardieu_angles(made, cues, recording)
-    felt, fault = None, dict[str, _Facts]()
+    felt, fault = None, dict[str, Facts]()
     if facts["fault"] is None:
         start = math.radians(protocol.stretch.start_deg)
         felt = _felt(made, joint_model(protocol, model), start)
@@ -349,7 +348,7 @@ def _outcome(
             "torque_nm": float(facts["fault_torque_nm"] or 0.0),
             "last_200_ms": _before(time_s, recording),
         }
-    of_each: list[dict[str, _Fact]] = [
+    of_each: list[dict[str, Fact]] = [
         {
             **dataclasses.asdict(stretch),
             "phases": ", ".join(stretch.phases),
@@ -358,7 +357,7 @@ def _outcome(
         for stretch in made
     ]
     beside = file.with_suffix(".json").read_bytes()
-    logged: dict[str, _Facts] = {
+    logged: dict[str, Facts] = {
         "recording": f"{file.parent.name}/{file.name}",
         "sha256": sha256,
         "facts_sha256": hashlib.sha256(beside).hexdigest(),

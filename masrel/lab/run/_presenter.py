@@ -16,9 +16,9 @@ from masrel.errors import (
     SessionStoppedError,
 )
 from masrel.lab._event_log import SessionLog
+from masrel.lab._study_files import Fact, Facts
 from masrel.lab.hess import Clock, EmergencyStop, RealClock, SimulatedClock
 from masrel.lab.protocol import Protocol, protocol_hash
-from masrel.lab.recording import _Fact, _Facts
 from masrel.lab.run._grade_sources import (
     GradeRequest,
     GradeSource,
@@ -78,7 +78,7 @@ class Presenter:
         """Whether grades or device are simulated."""
         return self._grades.simulated or not moves_hardware(self._protocol.device)
 
-    def provenance(self) -> dict[str, _Fact]:
+    def provenance(self) -> dict[str, Fact]:
         """Return what a log says of each time that it is begun or gone on with."""
         return {
             "protocol_sha256": protocol_hash(self._protocol),
@@ -182,7 +182,7 @@ class Presenter:
             self._log.append("fault", {**fields, **outcome.fault})
         spool_of(file).unlink(missing_ok=True)  # only now is it of no use
 
-    def _named(self) -> dict[str, _Facts]:
+    def _named(self) -> dict[str, Facts]:
         return {name: getattr(self._shown, name) for name in self._named_by}
 
     def _place(self, request: GradeRequest) -> str:
@@ -217,7 +217,7 @@ def _kind_of(request: GradeRequest) -> Literal["presented", "practised"]:
 
 
 def check_same(
-    path: Path, begun: Mapping[str, _Facts], same: Mapping[str, _Facts]
+    path: Path, begun: Mapping[str, Facts], same: Mapping[str, Facts]
 ) -> None:
     """Refuse to go on with a log that was begun with anything else."""
     for name in ("grades", *same):  # which says most comes first

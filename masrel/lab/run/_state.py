@@ -5,17 +5,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, cast, get_args
+from typing import Any, Literal, cast, get_args
 
 import msgspec
 
 from masrel.errors import SessionLogError
 from masrel.lab._event_log import Event, check_kinds, read_log
-from masrel.lab._study_files import once
-
-if TYPE_CHECKING:
-    from masrel.lab.protocol._values import Answer
-    from masrel.lab.recording import _Facts  # loads numpy
+from masrel.lab._study_files import Facts, once
+from masrel.lab.protocol._values import Answer
 
 Felt = Literal["felt", "below-threshold", "no-catch"]
 """Whether a presentation let feel what its model has."""
@@ -197,14 +194,14 @@ class SessionState(CodesState):
     """Where a session stands; what was before it began anew is set aside."""
 
     # fields of the event ``session``; empty when there is none yet
-    header: "Mapping[str, _Facts]" = field(default_factory=dict)
+    header: Mapping[str, Facts] = field(default_factory=dict)
     held_on: str | None = None  # day of a session on paper, ISO 8601
     is_complete: bool = False  # whether the session came to its end
     practice: CodesState = field(default_factory=CodesState)
     is_instructed: bool = False  # whether the rater has read the instructions
     # after how many presentations there were breaks
     breaks: set[object] = field(default_factory=set)
-    answers: "dict[AnswerKey, Answer]" = field(default_factory=dict)  # with corrections
+    answers: dict[AnswerKey, Answer] = field(default_factory=dict)  # with corrections
     answered_from: dict[AnswerKey, str] = field(default_factory=dict)
     source: str | None = None  # where grades and answers come from now
     # the last second entry of each column of each code, or of the session
@@ -453,7 +450,7 @@ class SheetDifference:
 
 
 def sheet_differences(
-    state: SessionState, of_study: "Mapping[tuple[str, str], Answer]"
+    state: SessionState, of_study: Mapping[tuple[str, str], Answer]
 ) -> tuple[SheetDifference, ...]:
     """Return in what the last second entry of a sheet differs from the logs."""
     first: dict[tuple[str | None, str], object] = {

@@ -18,6 +18,7 @@ from masrel.errors import (
     SessionLogError,
 )
 from masrel.lab._event_log import Event, SessionLog, utc_now
+from masrel.lab._study_files import Facts
 from masrel.lab.conduct._statements import refuse_withdrawn
 from masrel.lab.conduct._study_log import (
     append_event,
@@ -27,7 +28,6 @@ from masrel.lab.conduct._study_log import (
 )
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
 from masrel.lab.protocol._values import questions_of
-from masrel.lab.recording import _Facts
 from masrel.lab.run._around import (
     ask_questions,
     completed_at,
@@ -253,7 +253,7 @@ class _Runner(Presenter):
     def begin(self, schedule_sha256: str) -> None:
         """Log which session this is; check that it is the same when it is resumed."""
         protocol, schedule = self._protocol, self._schedule
-        same: dict[str, _Facts] = {
+        same: dict[str, Facts] = {
             "format": FORMAT,
             "study": protocol.study.id,
             "rater": schedule.rater,

@@ -12,9 +12,9 @@ from typing import ClassVar
 
 from masrel.errors import ParameterError, ProtocolError, SessionLogError
 from masrel.lab._event_log import SessionLog, utc_now
+from masrel.lab._study_files import Fact
 from masrel.lab.conduct._study_log import check_rater
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
-from masrel.lab.recording import _Fact
 from masrel.lab.run._grade_sources import GradeRequest, GradeSource, Skip
 from masrel.lab.run._presenter import ClockName, Presenter, check_same
 from masrel.lab.run.session import _check_device
@@ -163,7 +163,7 @@ class _Trainer(Presenter):
     def begin(self) -> None:
         """Log which training this is; check that it is the same when it goes on."""
         rules, device = self._protocol.training, self._protocol.device
-        same: dict[str, _Fact] = {
+        same: dict[str, Fact] = {
             "format": FORMAT,
             "study": self._protocol.study.id,
             "rater": self._rater,
@@ -183,7 +183,7 @@ class _Trainer(Presenter):
             n_graded = sum(event.kind == "grade" for event in events)
             self._log.append("resumed", {"n_graded": n_graded, **self.provenance()})
 
-    def _calibrated(self) -> dict[str, _Fact]:
+    def _calibrated(self) -> dict[str, Fact]:
         rules = self._protocol.training
         criterion = training_criterion(self._protocol)
         calibration = calibrate(criterion, false_pass=rules.false_pass, rng=rules.seed)
