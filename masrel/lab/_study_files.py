@@ -32,6 +32,7 @@ from masrel._files import (
     on_disk,
     refuse_record,
     remove_left_over,
+    safe_cell,
     sync_folder,
 )
 from masrel.errors import MasrelError, ParameterError
@@ -134,6 +135,37 @@ def parse_json(text: str | bytes) -> Any:
         return json.loads(text)
     except RecursionError:
         raise ValueError("nested too deep") from None
+
+
+YES_NO = ("no", "yes")
+"""Cells of False and True."""
+
+
+def is_unknown(value: object) -> bool:
+    """Return whether a table has nothing in its place."""
+    return value is None or (isinstance(value, float) and math.isnan(value))
+
+
+def table_csv(
+    columns: Iterable[str],
+    rows: Iterable[Iterable[object]],
+    *,
+    head: Iterable[str],
+    absent: str = "NA",
+) -> str:
+    """Return the text of a table of a study: comments, names of columns, rows."""
+    cells = ([_cell(value, absent) for value in row] for row in rows)
+    return "".join(f"# {line}\n" for line in head) + csv_text([columns, *cells])
+
+
+def _cell(value: object, absent: str) -> str:
+    if is_unknown(value):
+        return absent
+    if isinstance(value, bool):
+        return YES_NO[value]
+    if isinstance(value, tuple):
+        return ";".join(_cell(part, absent) for part in value)
+    return repr(value) if isinstance(value, float) else safe_cell(str(value))
 
 
 def leaves(

@@ -12,10 +12,9 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Literal
 
-from masrel._files import safe_cell
 from masrel.errors import SessionLogError
 from masrel.lab._event_log import Event, events_before_torn
-from masrel.lab._study_files import csv_text
+from masrel.lab._study_files import table_csv
 from masrel.lab.conduct import excluded_raters, rater_values, read_conduct
 from masrel.lab.protocol import Protocol, StudyPaths, protocol_hash
 from masrel.lab.protocol._values import FieldValue
@@ -272,12 +271,11 @@ def _protocols_in_force(study: StudyPaths, protocol: Protocol) -> list[tuple[str
     begun: list[tuple[str, str, str]] = []
     for rater, session in protocol.rater_sessions:
         events, state, _ = _events(study.log_file(rater, session))
-        if "protocol_sha256" in state.header:
-            sha256 = str(state.header["protocol_sha256"])
-            begun.append((events[0].time_utc, rater, sha256))
+        if (sha256 := state.header.get("protocol_sha256")) is not None:
+            begun.append((events[0].time_utc, rater, str(sha256)))
     begun.sort(key=itemgetter(0))
-    now = protocol_hash(protocol)
-    return [pair[1:] for pair in begun] + [(each.id, now) for each in protocol.raters]
+    in_force = [(rater, sha256) for _, rater, sha256 in begun]
+    return in_force + [(each.id, protocol_hash(protocol)) for each in protocol.raters]
 
 
 def _first_draw(
@@ -321,22 +319,15 @@ def raters_csv(study: StudyPaths, protocol: Protocol) -> str:
     """
     sessions = session_progress(study, protocol)
     raters = rater_progress(study, protocol, sessions)
-    head = "# Raters, one row each, as they stand in the study; NA is not known.\n"
-    if any(session.simulated for session in sessions):
-        head = f"# SIMULATED: not sessions of persons on hardware.\n{head}"
+    simulated = any(session.simulated for session in sessions)
+    head = ["SIMULATED: not sessions of persons on hardware."] * simulated
+    head += ["Raters, one row each, as they stand in the study; NA is not known."]
     columns = ["rater", "site", "status", "late", *protocol.rater_fields]
-    late = ["yes" if each.is_late else "no" for each in raters]
     rows = (
-        map(_cell, (each.rater, each.site, each.status, is_late, *each.values.values()))
-        for each, is_late in zip(raters, late, strict=True)
+        (each.rater, each.site, each.status, each.is_late, *each.values.values())
+        for each in raters
     )
-    return f"{head}# format: 1\n{csv_text([columns, *rows])}"
-
-
-def _cell(value: FieldValue | None) -> str:
-    if value is None:
-        return "NA"
-    return safe_cell(value) if isinstance(value, str) else repr(value)
+    return table_csv(columns, rows, head=[*head, "format: 1"])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,10 +4,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from masrel._files import from_safe_cell, safe_cell, write_file
+from masrel._files import from_safe_cell, write_file
 from masrel._input import listed
 from masrel.errors import ParameterError
-from masrel.lab._study_files import csv_text
+from masrel.lab._study_files import table_csv
 from masrel.lab.conduct._study_log import study_answers
 from masrel.lab.protocol import Protocol, Question, StudyPaths
 from masrel.lab.protocol._values import Answer, checked_answer, questions_of
@@ -199,14 +199,12 @@ def answers_csv(answers: tuple[GivenAnswer, ...]) -> str:
     str
         What `write_answers` writes.
     """
-    head = "# Answers to questionnaires, one row a question; empty is missing.\n"
-    if any(each.grades_from not in (*FROM_PERSONS, RECONSTRUCTED) for each in answers):
-        head = f"# SIMULATED: not answers of persons.\n{head}"
-    facts = ([getattr(each, name) for name in _COLUMNS] for each in answers)
-    rows = (
-        ["" if fact is None else safe_cell(str(fact)) for fact in row] for row in facts
-    )
-    return f"{head}# format: {_FORMAT}\n{csv_text([_COLUMNS, *rows])}"
+    of_persons = (*FROM_PERSONS, RECONSTRUCTED)
+    is_simulated = any(each.grades_from not in of_persons for each in answers)
+    head = ["SIMULATED: not answers of persons."] * is_simulated
+    head += ["Answers to questionnaires, one row a question; empty is missing."]
+    rows = ((getattr(each, name) for name in _COLUMNS) for each in answers)
+    return table_csv(_COLUMNS, rows, head=[*head, f"format: {_FORMAT}"], absent="")
 
 
 def write_answers(

@@ -13,6 +13,7 @@ from masrel._input import listed, not_utf8
 from masrel.errors import RatingsError
 from masrel.lab._study_files import (
     MAX_TABLE,
+    YES_NO,
     check_format,
     csv_format,
     read_regular,
@@ -22,7 +23,6 @@ from masrel.lab.ratings.table import (
     _FLOATS,
     _FORMAT,
     _WHOLE,
-    _YES_NO,
     RATING_COLUMNS,
     Ratings,
     _assemble,
@@ -143,8 +143,8 @@ def _value(name: str, text: str) -> str | float | None:
     # more digits than any count has
     if name in _WHOLE and text.isascii() and text.isdigit() and len(text) < 19:
         return int(text)
-    if name == "grip_lost" and text in _YES_NO:
-        return text == _YES_NO[True]
+    if name == "grip_lost" and text in YES_NO:
+        return text == YES_NO[True]
     return text
 
 

@@ -7,9 +7,9 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from masrel._files import safe_cell, write_file
+from masrel._files import write_file
 from masrel.errors import RatingsError
-from masrel.lab._study_files import csv_text
+from masrel.lab._study_files import is_unknown, table_csv
 from masrel.lab.run._state import FELT, FROM_PERSONS
 from masrel.scales import Scale
 
@@ -99,8 +99,6 @@ _FORMAT = 2  # version of the file of a study's ratings
 _N_WITHOUT_GRIP = 20
 
 _N_FORMERLY = 15  # columns of a table of format 1, which does not name its format
-
-_YES_NO = ("no", "yes")  # cells of False and True
 
 SOURCES = ("published", "recorded", "simulated", "foreign")
 """Where a rating comes from; "foreign" is a file that does not say."""
@@ -562,45 +560,25 @@ def ratings_csv(ratings: Ratings) -> str:
         What `write_ratings` writes.
     """
     has_more = any(
-        not _is_unknown(value) for row in ratings.rows for value in row[_N_ALWAYS:]
+        not is_unknown(value) for row in ratings.rows for value in row[_N_ALWAYS:]
     )
     names = RATING_COLUMNS if has_more else RATING_COLUMNS[:_N_ALWAYS]
     if all(row.grip_lost is None for row in ratings.rows):
         names = names[:_N_WITHOUT_GRIP]
-    return f"{_head(ratings)}# format: {_FORMAT}\n{_body(ratings, names)}"
+    return _text(ratings, names, f"format: {_FORMAT}")
 
 
 def _texts(ratings: Ratings) -> Iterator[str]:
     """Yield every text that a table of these ratings of logs has ever been."""
     yield ratings_csv(ratings)
-    head = _head(ratings)
-    yield head + _body(ratings, RATING_COLUMNS[:_N_FORMERLY])
+    yield _text(ratings, RATING_COLUMNS[:_N_FORMERLY])
     says_felt = any(row.felt is not None for row in ratings.rows)
     if not says_felt:  # of logs that say nothing of stretches
-        yield head + _body(ratings, RATING_COLUMNS[:_N_ALWAYS])
+        yield _text(ratings, RATING_COLUMNS[:_N_ALWAYS])
 
 
-def _head(ratings: Ratings) -> str:
-    head = "# Ratings, one row a rating; grades are text; NA is missing.\n"
-    if ratings.simulated:
-        return f"# SIMULATED: not grades of persons on hardware.\n{head}"
-    return head
-
-
-def _body(ratings: Ratings, names: Sequence[str]) -> str:
-    rows = ([_csv_cell(value) for value in row[: len(names)]] for row in ratings.rows)
-    return csv_text([names, *rows])
-
-
-def _is_unknown(value: object) -> bool:
-    return value is None or (isinstance(value, float) and math.isnan(value))
-
-
-def _csv_cell(value: object) -> str:
-    if _is_unknown(value):
-        return "NA"
-    if isinstance(value, bool):
-        return _YES_NO[value]
-    if isinstance(value, tuple):
-        return ";".join(_csv_cell(part) for part in value)
-    return repr(value) if isinstance(value, float) else safe_cell(str(value))
+def _text(ratings: Ratings, names: Sequence[str], *more: str) -> str:
+    head = ["SIMULATED: not grades of persons on hardware."] * ratings.simulated
+    head += ["Ratings, one row a rating; grades are text; NA is missing.", *more]
+    rows = (row[: len(names)] for row in ratings.rows)
+    return table_csv(names, rows, head=head)

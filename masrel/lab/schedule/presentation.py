@@ -17,6 +17,7 @@ from masrel.lab._study_files import (
     format_problem,
     once,
     read_regular,
+    table_csv,
 )
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
 from masrel.lab.schedule._orders import WITH_ROWS, draw_order
@@ -422,17 +423,15 @@ def _row_problem(row: Sequence[str], place: int, seen: set[str]) -> str | None:
 def _schedule_text(schedule: Schedule) -> str:
     """Write a schedule as the text of its file."""
     values = {key: getattr(schedule, key) for key in _HEAD}
-    head = [f"# format: {_FORMAT}"]
-    head += [f"# {key}: {value}" for key, value in values.items() if value is not None]
-    rows = [
-        f"{shown.position},{shown.code},{shown.model},{shown.repeat}"
+    head = [f"{key}: {value}" for key, value in values.items() if value is not None]
+    rows = (
+        (shown.position, shown.code, shown.model, shown.repeat)
         for shown in schedule.presentations
-    ]
-    return "\n".join([*head, ",".join(_COLUMNS), *rows]) + "\n"
+    )
+    return table_csv(_COLUMNS, rows, head=[f"format: {_FORMAT}", *head])
 
 
 def _sheet_text(schedule: Schedule) -> str:
     """Write the blinded sheet on which a rater's grades are noted."""
-    rows = [f"{shown.position},{shown.code}," for shown in schedule.presentations]
-    head = f"# format: {_FORMAT}"
-    return "\n".join([head, ",".join(_SHEET_COLUMNS), *rows]) + "\n"
+    rows = ((shown.position, shown.code, "") for shown in schedule.presentations)
+    return table_csv(_SHEET_COLUMNS, rows, head=[f"format: {_FORMAT}"])
