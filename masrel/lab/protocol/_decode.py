@@ -41,9 +41,7 @@ def type_problems(
 
 
 def _value_problems(value: object, annotation: object, where: str) -> Iterator[str]:
-    if isinstance(value, list):
-        annotation = _array_of(annotation)
-    entry = _entry_type(annotation)
+    array = _array_of(annotation)
     match value:
         case Mapping() if _is_struct(annotation):
             yield from type_problems(value, annotation, where)
@@ -51,12 +49,8 @@ def _value_problems(value: object, annotation: object, where: str) -> Iterator[s
             of_value = typing.get_args(annotation)[1]
             for name, item in value.items():
                 yield from _value_problems(item, of_value, f"{where}.{name}")
-        case list() if entry is not None:
-            yield from _array_problems(value, annotation, entry, where)
-        case _ if _is_struct(annotation):
-            yield f"{where}: needed a table, got {got(value)}"
-        case _ if entry is not None:
-            yield f"{where}: needed {_form(annotation, where)}, got {got(value)}"
+        case list() if array is not None:
+            yield from _array_problems(value, *array, where)
         case _:
             yield from _leaf_problems(value, annotation, where)
 
@@ -85,7 +79,8 @@ def _leaf_problems(value: object, annotation: object, where: str) -> Iterator[st
         info = inspect.type_info(annotation)
         options = info.values if isinstance(info, inspect.LiteralType) else ()
         hint = closest(value, map(str, options))
-        yield f"{where}: needed {needed(annotation)}, got {got(value)}{hint}"
+        needs = "a table" if _is_struct(annotation) else _form(annotation, where)
+        yield f"{where}: needed {needs}, got {got(value)}{hint}"
 
 
 def _unknown(where: str, key: str, fields: Mapping[str, FieldInfo]) -> str:
@@ -101,9 +96,10 @@ def closest(value: object, options: Iterable[str]) -> str:
 
 
 def _form(annotation: object, where: str) -> str:
+    array = _array_of(annotation)
     if _is_struct(annotation):
         return f"a table [{where}]"
-    if _is_struct(_entry_type(annotation)):
+    if array is not None and _is_struct(array[1]):
         return f"an array of tables [[{where}]]"
     return needed(annotation)
 
@@ -112,23 +108,15 @@ def _is_struct(annotation: object) -> typing.TypeGuard[type[msgspec.Struct]]:
     return isinstance(annotation, type) and issubclass(annotation, msgspec.Struct)
 
 
-def _entry_type(annotation: object) -> object | None:
-    # X of tuple[X, ...], annotated or not; None for anything else.
-    if typing.get_origin(annotation) is typing.Annotated:
-        annotation = typing.get_args(annotation)[0]
-    if typing.get_origin(annotation) is tuple:
-        entry: object = typing.get_args(annotation)[0]
-        return entry
-    return None
-
-
-def _array_of(annotation: object) -> object:
-    # the member of a union that is an array, or the annotation itself
+def _array_of(annotation: object) -> tuple[object, object] | None:
+    # the array, annotated or not, that it is or a union has, and what its entries are
     is_union = typing.get_origin(annotation) in (typing.Union, types.UnionType)
-    for member in typing.get_args(annotation) if is_union else ():
-        if _entry_type(member) is not None:
-            return member
-    return annotation
+    for member in typing.get_args(annotation) if is_union else (annotation,):
+        is_annotated = typing.get_origin(member) is typing.Annotated
+        bare = typing.get_args(member)[0] if is_annotated else member
+        if typing.get_origin(bare) is tuple:
+            return member, typing.get_args(bare)[0]
+    return None
 
 
 _IDENTIFIER = (

@@ -516,8 +516,7 @@ def model_rules(model: Model, elbow: ElbowConstants) -> Iterator[str]:
                 f"{got(DEFAULT_KIND)}, whose numbers stand beside its id and in "
                 "constants"
             )
-        overrides = _overrides(model)
-        joint = msgspec.structs.replace(elbow, **overrides)
+        joint = msgspec.structs.replace(elbow, **model.overrides)
         yield from _catch_angle(model.catch_angle_constant_deg, joint)
         rise, peak = model.constants.catch_rise_s, joint.peak_duration_s
         if rise is not None and rise > peak:
@@ -535,16 +534,10 @@ _ELBOW_KEYS = (
 )
 
 
-def _overrides(model: Model) -> dict[str, object]:
-    # the constants that a model does not share with the others
-    constants = msgspec.structs.asdict(model.constants)
-    return {key: value for key, value in constants.items() if value is not None}
-
-
 def _tone_keys(model: Model) -> Iterator[str]:
     keys = (*_ELBOW_KEYS, "file")
     foreign = [key for key in keys if getattr(model, key) is not None]
-    foreign += [f"constants.{key}" for key in _overrides(model)]
+    foreign += [f"constants.{key}" for key in model.overrides]
     for key in foreign:
         yield (
             f"{key}: needed for kind {got(DEFAULT_KIND)} only, got it for "
@@ -584,10 +577,11 @@ def _held_torque(protocol: Protocol) -> Iterator[str]:
     start, limit = protocol.stretch.start_deg, protocol.device.standing_torque_nm
     joints = [("elbow", protocol.elbow, "")]
     for index, model in enumerate(protocol.models):
-        own = _overrides(model)
-        if own.keys() & {"rest_angle_deg", "stiffness_nm_rad"}:
-            where = f"models[{index}].constants" if "rest_angle_deg" in own else "elbow"
-            joint = msgspec.structs.replace(protocol.elbow, **own)
+        overrides = model.overrides
+        if overrides.keys() & {"rest_angle_deg", "stiffness_nm_rad"}:
+            has_rest = "rest_angle_deg" in overrides
+            where = f"models[{index}].constants" if has_rest else "elbow"
+            joint = msgspec.structs.replace(protocol.elbow, **overrides)
             joints.append((where, joint, f" (id {got(model.id)})"))
     for where, joint, at_end in joints:
         rest, stiffness = joint.rest_angle_deg, joint.stiffness_nm_rad

@@ -115,12 +115,7 @@ _STORY = (
 
 def _joint_of(model: Model, shared: ElbowConstants) -> ElbowParameters:
     """Return the joint of one spastic elbow, in SI units."""
-    overrides = {
-        key: value
-        for key in model.constants.__struct_fields__
-        if (value := getattr(model.constants, key)) is not None
-    }
-    elbow = msgspec.structs.replace(shared, **overrides)
+    elbow = msgspec.structs.replace(shared, **model.overrides)
     rest = elbow.rest_angle_deg
     return ElbowParameters(
         # none is missing in a protocol that was read
@@ -170,6 +165,8 @@ _LATER: dict[str, Any] = {
             "catch_torque_nms_rad": None,
             "residual_ratio": None,
             "catch_travel_deg": None,
+            "constants": {},
+            "parameters": {},
         }
     ],
     "raters": [{"fields": {}, "site": None}],
@@ -325,7 +322,7 @@ def _canonical(content: object, ignored: tuple[str, ...] = ()) -> bytes:
     # ignored: keys of models that do not enter
     plain: dict[str, Any] = msgspec.to_builtins(content)
     for model in plain["models"]:
-        _drop_defaults(model, plain["elbow"])
+        _drop_repeated(model, plain["elbow"])
         for key in ignored:
             model.pop(key, None)
     if "report" in plain and plain["report"]["sections"] is None:
@@ -347,17 +344,15 @@ def _drop(plain: dict[str, Any], defaults: dict[str, Any]) -> None:
             del plain[key]
 
 
-def _drop_defaults(model: dict[str, Any], elbow: dict[str, Any]) -> None:
-    # takes out of a model what no protocol could say before, where nothing is said
-    constants = {k: v for k, v in model.pop("constants").items() if v is not None}
-    # what a model repeats of the shared constants does not enter twice
-    for key in ("post_catch", *_LATER["elbow"]):
-        if key in constants and constants[key] == elbow[key]:
-            del constants[key]
-    parameters = without_defaults(model["kind"], model.pop("parameters"))
-    for key, values in (("constants", constants), ("parameters", parameters)):
-        if values:
-            model[key] = values
+def _drop_repeated(model: dict[str, Any], elbow: dict[str, Any]) -> None:
+    # takes out of a model what it repeats of the shared constants, or of its kind
+    shared = {key: elbow[key] for key in ("post_catch", *_LATER["elbow"])}
+    model["constants"] = {
+        key: value
+        for key, value in model["constants"].items()
+        if value is not None and value != shared.get(key)
+    }
+    model["parameters"] = without_defaults(model["kind"], model["parameters"])
 
 
 # Numbers of an estimate that a gate can be about

@@ -6,7 +6,7 @@ Every field has its unit in its name, its range in its type, and its meaning in
 
 import re
 import sys
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
@@ -100,6 +100,12 @@ class Model(_Table, frozen=True, kw_only=True):
     simulated: bool = False
     constants: ModelConstants = ModelConstants()
     parameters: dict[str, _Finite] = {}
+
+    @property
+    def overrides(self) -> dict[str, Any]:
+        """The constants that it does not share with the others, by their keys."""
+        constants = msgspec.structs.asdict(self.constants)
+        return {key: value for key, value in constants.items() if value is not None}
 
 
 class Rater(_Table, frozen=True, kw_only=True):

@@ -465,28 +465,12 @@ def test_all_problems_come_at_once_types_before_rules(tmp_path: Path) -> None:
     assert keys() == rules
     document["study"]["tilte"] = "x"
     document["models"][0]["catch_travel_deg"] = "far"
-    document["raters"][1]["id"] = "R 2"
+    # a rater without any usable key hides no other problem, nor is one unknown for it
+    document["raters"] = [{"id": 1, "note": 1}, {"id": "R 2"}]
     del document["schedule"]
-    types = ["models[0].catch_travel_deg", "raters[1].id", "schedule", "study.tilte"]
+    of_raters = ["raters[0].id", "raters[0].note", "raters[1].id"]
+    types = ["models[0].catch_travel_deg", *of_raters, "schedule", "study.tilte"]
     assert keys() == types
-
-
-def test_a_wrong_id_makes_no_reference_to_it_unknown(tmp_path: Path) -> None:
-    document = changed("raters", 1, "id", to="R 2")
-    document["sessions"][0]["raters"] = ["R1", "R 2"]
-    keys = [text.split(": ")[0] for text in problems_of(document, tmp_path)]
-    assert keys == ["raters[1].id"]
-
-
-def test_a_rater_without_any_usable_key_hides_no_other_problem(tmp_path: Path) -> None:
-    document = changed("raters", 0, to={"id": 1, "note": 1})
-    document["scale"]["name"] = ""
-    problems = problems_of(document, tmp_path)
-    assert [problem.partition(":")[0] for problem in problems] == [
-        "scale.name",
-        "raters[0].id",
-        "raters[0].note",
-    ]
 
 
 @pytest.mark.parametrize(
