@@ -74,7 +74,7 @@ def _write_session(study: StudyPaths, protocol: Protocol, rater: str) -> None:
         ):
             where = {"code": shown.code, "position": shown.position}
             recording = read_recording(study.sessions / str(fields["recording"]))
-            path = study.recording_file(rater, "test", shown.code)
+            path = study.log_file(rater, "test").with_suffix("") / f"{shown.code}.npz"
             facts = {
                 **recording.facts,
                 **where,

@@ -108,10 +108,14 @@ def _line_of(record: "SessionRecord", *, is_training: bool) -> str:
     if record.stage in ("not begun", "unreadable") and not is_training:
         return f"{which}: {record.stage}"
     of = "" if is_training else f" of {record.n_presentations}"
-    parts = [f"{which}: {record.stage}", f"{record.n_graded}{of} graded"]
-    parts += [f"{record.n_skipped} skipped"] * bool(record.n_skipped)
-    parts += [f"{record.n_corrections} corrected"] * bool(record.n_corrections)
-    return ", ".join([*parts, f"{record.n_recordings} recordings"])
+    parts = (
+        f"{which}: {record.stage}",
+        f"{record.n_graded}{of} graded",
+        f"{record.n_skipped} skipped" if record.n_skipped else None,
+        f"{record.n_corrections} corrected" if record.n_corrections else None,
+        f"{record.n_recordings} recordings",
+    )
+    return ", ".join(filter(None, parts))
 
 
 def _show(

@@ -128,10 +128,6 @@ class StudyPaths:
         """Return the file of one rater's session log."""
         return self.sessions / f"{session}_{rater}.jsonl"
 
-    def recording_file(self, rater: str, session: str, code: str) -> Path:
-        """Return the file of the recording of one presentation."""
-        return self.log_file(rater, session).with_suffix("") / f"{code}.npz"
-
     def training_log_file(self, rater: str) -> Path:
         """Return the file of the log of one rater's training."""
         return self.training / f"{rater}.jsonl"

@@ -141,7 +141,6 @@ def hashed_facts(
 
 def recording_findings(
     path: Path,
-    folder: Path,
     code: str,
     shown: Mapping[str, Presentation],
     of: Mapping[str, object],
@@ -149,10 +148,10 @@ def recording_findings(
     log: Path,
 ) -> Iterator[Finding]:
     """Yield what is wrong with the recording that an event of a log names."""
-    # folder: where it has to lie, under its code; of: study, rater and session
+    # it has to lie beside its log, under its code; of: study, rater and session
     attempt = event.fields["attempt"]
     name = code if attempt == 1 else f"{code}-{attempt}"
-    if code not in shown or path != folder / f"{name}.npz":
+    if code not in shown or path != log.with_suffix("") / f"{name}.npz":
         yield broken(log, f"line {event.line}: {path} is not where {name} is recorded")
         return
     where = f"line {event.line} of {log}"

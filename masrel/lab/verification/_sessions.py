@@ -10,7 +10,7 @@ from typing import Any, Literal
 from masrel.errors import ParameterError, ScheduleError
 from masrel.lab._event_log import Event, read_log
 from masrel.lab._study_files import MAX_SMALL, read_regular
-from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
+from masrel.lab.protocol import Protocol, Question, StudyPaths, presented_hash
 from masrel.lab.protocol._values import checked_answer
 from masrel.lab.run._rehearsal import (
     RehearsalPaths,
@@ -105,26 +105,24 @@ def check_rehearsal(study: StudyPaths, protocol: Protocol, log: Path) -> Checked
     number = int(log.parent.name) if log.parent.name.isdecimal() else 0
     paths = RehearsalPaths(study.root, number)
     events, state, problem = checked_log(log, read_session)
-    problems = [] if problem is None else [problem]
     if state is not None:
         rater, session = str(state.header["rater"]), str(state.header["session"])
         header = {"rehearsal": False, **state.header}
         needed = {"study": protocol.study.id, "rehearsal": True}
-        problems += unlike(log, "line 1", needed, header)
-        if not problems and log != paths.log_file(rater, session):
-            problems = [
-                broken(
-                    log,
-                    f"is the log of a rehearsal of rater {rater} in session {session} "
-                    "by its first event: needed the one its name and folder say",
-                )
-            ]
-    if state is None or problems:
+        problem = next(unlike(log, "line 1", needed, header), None)
+        if problem is None and log != paths.log_file(rater, session):
+            problem = broken(
+                log,
+                f"is the log of a rehearsal of rater {rater} in session {session} by "
+                "its first event: needed the one its name and folder say",
+            )
+    if state is None or problem is not None:
         name = log.stem.removeprefix("rehearsal_")
         record = SessionRecord(
             session=name, rater="", rehearsal=number, stage="unreadable"
         )
-        return CheckedLog(record=record, findings=problems[:1], log=log)
+        findings = [] if problem is None else [problem]
+        return CheckedLog(record=record, findings=findings, log=log)
     is_changed = state.header["presented_sha256"] != presented_hash(protocol)
     try:
         drawn = None if is_changed else drawn_rehearsal(paths, protocol, rater, session)
@@ -178,14 +176,12 @@ def _against_schedule(
     every = (*practice_presentations(protocol), *schedule.presentations)
     shown = {presentation.code: presentation for presentation in every}
     findings += _event_findings(protocol, shown, events, log)
-    findings += _answer_findings(protocol, events, log)
     findings += time_findings(events, log)
     of = {name: needed[name] for name in ("study", "rater", "session")}
     for event in state.all_presented:
         code = str(event.fields["code"])
-        folder = study.recording_file(schedule.rater, schedule.session, code).parent
         path = study.sessions / str(event.fields["recording"])
-        findings += recording_findings(path, folder, code, shown, of, event, log)
+        findings += recording_findings(path, code, shown, of, event, log)
     return _checked_session(study, events, state, findings, n_presentations)
 
 
@@ -215,28 +211,6 @@ def _checked_session(
     return CheckedLog(record=record, findings=findings, log=log, recordings=recordings)
 
 
-def _answer_findings(
-    protocol: Protocol, events: Sequence[Event], log: Path
-) -> Iterator[Finding]:
-    # of questions that the protocol has; one that it had once cannot be held against it
-    known = {
-        (questionnaire.id, question.id): question
-        for questionnaire in protocol.questionnaires
-        for question in questionnaire.questions
-    }
-    for event in events:
-        key = event.fields.get("questionnaire"), event.fields.get("question")
-        answer: Any = event.fields.get("answer")
-        if key not in known or answer is None:
-            continue
-        try:
-            checked_answer(
-                known[key], answer, where=f"line {event.line}: {event.kind}: answer"
-            )
-        except ParameterError as error:
-            yield broken(log, str(error))
-
-
 def _event_findings(
     protocol: Protocol,
     shown: dict[str, Presentation],
@@ -244,9 +218,22 @@ def _event_findings(
     log: Path,
 ) -> Iterator[Finding]:
     attempts = dict.fromkeys(shown, 0)
+    # one that the protocol had once cannot be held against it
+    questions: dict[tuple[object, object], Question] = {
+        (questionnaire.id, question.id): question
+        for questionnaire in protocol.questionnaires
+        for question in questionnaire.questions
+    }
     for event in events:
         fields, where = event.fields, f"line {event.line}: {event.kind}"
         code, grade = fields.get("code"), fields.get("grade")
+        question = questions.get((fields.get("questionnaire"), fields.get("question")))
+        answer: Any = fields.get("answer")
+        if question is not None and answer is not None:
+            try:
+                checked_answer(question, answer, where=f"{where}: answer")
+            except ParameterError as error:
+                yield broken(log, str(error))
         if code is not None and code not in shown:
             yield broken(log, f"{where}: needed a code of the schedule, got {code!r}")
             continue
@@ -289,9 +276,7 @@ def check_training(study: StudyPaths, protocol: Protocol, log: Path) -> CheckedL
             continue  # said of the event
         code, model = f"{place:03d}", str(event.fields["model"])
         shown = Presentation(position=place, code=code, model=model, repeat=place)
-        findings += recording_findings(
-            path, log.with_suffix(""), code, {code: shown}, of, event, log
-        )
+        findings += recording_findings(path, code, {code: shown}, of, event, log)
     ends = [event.fields["passed"] for event in events if event.kind == "complete"]
     record = SessionRecord(
         session="training",

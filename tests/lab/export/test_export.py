@@ -198,7 +198,9 @@ def test_a_recording_of_bids_has_every_sample_to_the_last_bit(
         rows = np.array([line.split("\t") for line in text.splitlines()], dtype=float)
         label = re.search("sub-(.*)_ses-(.*)_task-MAS_recording-(.*)_", sidecar.name)
         assert label is not None
-        recording = read_recording(study.recording_file(*label.groups()))
+        rater, session, code = label.groups()
+        folder = study.log_file(rater, session).with_suffix("")
+        recording = read_recording(folder / f"{code}.npz")
         for place, name in enumerate(facts["Columns"]):
             np.testing.assert_array_equal(rows[:, place], recording.columns[name])
 

@@ -40,7 +40,7 @@ def test_every_model_of_every_kind_was_presented_without_a_fault(
     recordings = {}
     for rater in RATERS:
         for shown in read_schedule(rated.schedule_file(rater, "test")).presentations:
-            file = rated.recording_file(rater, "test", shown.code)
+            file = rated.log_file(rater, "test").with_suffix("") / f"{shown.code}.npz"
             recordings[shown.model] = recording = read_recording(file)
             facts = recording.facts
             ended = facts["fault"], facts["ended"], facts["simulated"]

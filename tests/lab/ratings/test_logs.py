@@ -129,7 +129,7 @@ def test_repeats_of_a_model_are_kept_apart(new_study: Callable[..., Small]) -> N
 def test_a_changed_recording_is_named_with_its_line(small: Small) -> None:
     graded(small, "1", "1", "1")
     code = read_schedule(small[0].schedule_file("R1", "test")).presentations[1].code
-    file = small[0].recording_file("R1", "test", code)
+    file = small[0].log_file("R1", "test").with_suffix("") / f"{code}.npz"
     file.write_bytes(file.read_bytes()[:-1] + b"x")
     with pytest.raises(RatingsError, match=rf"line 4: .*{code}\.npz is not the record"):
         ratings_from_logs(*small)

@@ -124,7 +124,7 @@ def test_a_persons_hand_may_move_the_arm(new_study: New) -> None:
 
 def until_fast(study: Small, code: str) -> float:
     """From a tenth to nine tenths of the speed at the catch, s."""
-    file = study[0].recording_file("R1", "test", code)
+    file = study[0].log_file("R1", "test").with_suffix("") / f"{code}.npz"
     columns = read_recording(file).columns
     speed = columns["velocity_deg_s"][: int(np.argmax(columns["phase"] > 0.0))]
     return float(np.sum((speed > 0.1 * speed[-1]) & (speed < 0.9 * speed[-1]))) * 1e-3

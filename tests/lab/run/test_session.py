@@ -81,7 +81,7 @@ def test_a_session_logs_each_presentation_and_its_grade(small: Small) -> None:
         schedule.presentations, log[1::2], log[2::2], strict=False
     ):
         assert presented.fields["code"] == grade.fields["code"] == shown.code
-        file = study.recording_file("R1", "test", shown.code)
+        file = study.log_file("R1", "test").with_suffix("") / f"{shown.code}.npz"
         assert study.sessions / str(presented.fields["recording"]) == file
         assert (
             presented.fields["sha256"] == hashlib.sha256(file.read_bytes()).hexdigest()
