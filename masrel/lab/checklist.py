@@ -25,7 +25,12 @@ from masrel._input import listed
 from masrel.errors import ParameterError
 from masrel.lab._study_files import MAX_TABLE, read_regular
 from masrel.lab.analysis import Analysis, analyze
-from masrel.lab.progress import RaterProgress, rater_progress, session_progress
+from masrel.lab.progress import (
+    RaterProgress,
+    SessionProgress,
+    rater_progress,
+    session_progress,
+)
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.ratings import Ratings, corrections_of, read_study_data, study_remarks
 from masrel.lab.report._design import (
@@ -55,25 +60,16 @@ _CONDITIONS = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _SessionFacts:
-    """One session of one rater that has begun."""
-
-    rater: str
-    day: date  # on which it began, UTC
-    header: Mapping[str, str]  # by the keys of `_CONDITIONS`
-    is_complete: bool
-    n_faults: int
-    log: Path
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class _StudyFacts:
     """What the record of a study says."""
 
     # None before there are ratings
     ratings: Ratings | None
     analysis: Analysis | None
-    sessions: tuple[_SessionFacts, ...]
+    sessions: tuple[SessionProgress, ...]
+    # of sessions that have begun: the days, UTC, and heads by the keys of `_CONDITIONS`
+    days: Sequence[date]
+    heads: Sequence[Mapping[str, str]]
     days_between: Sequence[int]  # of a rater's session and the one before, sorted
     n_corrections: int
     remarks: tuple[str, ...]
@@ -96,20 +92,31 @@ def _gather_facts(paths: StudyPaths, protocol: Protocol) -> _StudyFacts:
     pairs = protocol.rater_sessions
     drawn = [schedule for _, schedule in _read_drawn(paths, pairs)]
     is_published = paths.published_secret_file.is_file()
-    begun = (_session(rater, paths.log_file(rater, each)) for rater, each in pairs)
-    sessions = tuple(session for session in begun if session is not None)
+    begun = [
+        (rater, log, *read_session(log))
+        for rater, session in pairs
+        if (log := paths.log_file(rater, session)).is_file()
+    ]
+    begun = [each for each in begun if each[3].header]
     days: dict[str, list[date]] = {}
-    for session in sessions:
-        days.setdefault(session.rater, []).append(session.day)
+    for rater, _, events, _ in begun:
+        day = date.fromisoformat(events[0].time_utc[:10])
+        days.setdefault(rater, []).append(day)
+    sessions = session_progress(paths, protocol)
     named = {
         "protocol": [paths.protocol],
-        "logs": [session.log for session in sessions],
+        "logs": [log for _, log, _, _ in begun],
         "ratings": tables[:1],
     }
     return _StudyFacts(
         ratings=ratings,
         analysis=analysis,
         sessions=sessions,
+        days=[day for of_rater in days.values() for day in of_rater],
+        heads=[
+            {name: str(state.header.get(name)) for name in _CONDITIONS}
+            for _, _, _, state in begun
+        ],
         days_between=sorted(
             (after - before).days
             for of_rater in days.values()
@@ -117,28 +124,13 @@ def _gather_facts(paths: StudyPaths, protocol: Protocol) -> _StudyFacts:
         ),
         n_corrections=len(corrections_of(paths, protocol)),
         remarks=study_remarks(paths, protocol, include=()),
-        raters=rater_progress(paths, protocol, session_progress(paths, protocol)),
+        raters=rater_progress(paths, protocol, sessions),
         n_schedules=len(drawn),
         n_concealed=sum(s.commitment is not None for s in drawn) * (not is_published),
         files={
             key: [file.relative_to(paths.root) for file in files]
             for key, files in named.items()
         },
-    )
-
-
-def _session(rater: str, log: Path) -> _SessionFacts | None:
-    events, state = read_session(log) if log.is_file() else ((), None)
-    if state is None or not state.header:
-        return None
-    shown = (event for events in state.presented.values() for event in events)
-    return _SessionFacts(
-        rater=rater,
-        day=date.fromisoformat(events[0].time_utc[:10]),
-        header={name: str(state.header.get(name)) for name in _CONDITIONS},
-        is_complete=state.is_complete,
-        n_faults=sum(event.fields["fault"] is not None for event in shown),
-        log=log,
     )
 
 
@@ -346,7 +338,7 @@ def _filled(
         to_add, names = "There are no ratings yet.", ()
     elif not names:
         to_add = "For the authors to say."
-    elif "logs" in item.sources and not (facts.sessions or to_add):
+    elif "logs" in item.sources and not (facts.days or to_add):
         to_add = "What no log of a session says."
     item = replace(item, number=number, facts=(), to_add=to_add)
     if not names:
