@@ -316,11 +316,6 @@ class SessionLog:
         """Every event, those read and those appended."""
         return tuple(self._events)
 
-    @property
-    def is_open(self) -> bool:
-        """Whether events can be appended."""
-        return self._descriptor is not None
-
     def append(self, kind: str, fields: Mapping[str, Facts]) -> Event:
         """Append one event and wait until it is on disk.
 
@@ -406,19 +401,24 @@ def _is_event(path: Path, number: int, line: bytes, previous: str) -> bool:
 
 
 def _check_fact(path: Path, kind: str, name: str, fact: object) -> None:
-    if fact is not None and not isinstance(fact, str | int | float):
-        raise SessionLogError(
-            f"{path}: event {kind!r}: {name} needs text, a number, true, false or "
-            f"null, got {type(fact).__name__}"
-        )
-    if isinstance(fact, float) and not math.isfinite(fact):
-        raise SessionLogError(
-            f"{path}: event {kind!r}: {name} needs a finite number, got {fact}"
-        )
-    if isinstance(fact, str) and any("\ud800" <= sign <= "\udfff" for sign in fact):
-        raise SessionLogError(
-            f"{path}: event {kind!r}: {name} needs valid Unicode text, got {fact!a}"
-        )
+    rules = (
+        (
+            fact is not None and not isinstance(fact, str | int | float),
+            f"text, a number, true, false or null, got {type(fact).__name__}",
+        ),
+        (
+            isinstance(fact, float) and not math.isfinite(fact),
+            f"a finite number, got {fact}",
+        ),
+        (
+            isinstance(fact, str)
+            and any("\ud800" <= sign <= "\udfff" for sign in fact),
+            f"valid Unicode text, got {fact!a}",
+        ),
+    )
+    for is_broken, needs in rules:
+        if is_broken:
+            raise SessionLogError(f"{path}: event {kind!r}: {name} needs {needs}")
 
 
 def _lock(descriptor: int, path: Path) -> None:

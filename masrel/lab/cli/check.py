@@ -28,9 +28,12 @@ def check(study: Path) -> None:
     except ProtocolError as error:
         problems = list(error.problems)
     else:
+        from masrel.lab.run._settings import torque_notes  # loads numpy
+
         problems = [each for checker in _CHECKERS for each in checker(protocol, paths)]
         # What only may happen is for a study of which all else is right.
-        notes += [] if problems else _device_notes(protocol, paths)
+        for note in torque_notes(protocol) if not problems else ():
+            notes.append(f"{paths.protocol}: {note}")
         with contextlib.suppress(MasrelError):  # a checker has said it
             notes += concealment_notes(protocol, paths)
         with contextlib.suppress(MasrelError):
@@ -78,12 +81,6 @@ def _device_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
         yield f"{study.protocol}: {error}"
     for problem in torque_problems(protocol):
         yield f"{study.protocol}: {problem}"
-
-
-def _device_notes(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
-    from masrel.lab.run._settings import torque_notes  # loads numpy
-
-    return (f"{study.protocol}: {note}" for note in torque_notes(protocol))
 
 
 def _record_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:

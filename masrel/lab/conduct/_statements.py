@@ -31,9 +31,6 @@ NoteKind = Literal["note", "adverse-event", "deviation"]
 Severity = Literal["mild", "moderate", "severe"]
 """How severe an adverse event is."""
 
-NOTE_KINDS: tuple[NoteKind, ...] = get_args(NoteKind)
-SEVERITIES: tuple[Severity, ...] = get_args(Severity)
-
 
 def record_note(
     study: StudyPaths,
@@ -82,7 +79,7 @@ def record_note(
     OSError
         If it cannot be written.
     """
-    check_choice("kind", kind, NOTE_KINDS)
+    check_choice("kind", kind, get_args(NoteKind))
     if rater is not None:
         check_rater(protocol, rater)
     if session is not None:
@@ -94,7 +91,7 @@ def record_note(
                 f"{name}: needed with kind 'adverse-event' only, got it with {kind!r}"
             )
     if severity is not None:
-        check_choice("severity", severity, SEVERITIES)
+        check_choice("severity", severity, get_args(Severity))
     facts = {name: detail for name, detail in details.items() if detail is not None}
     fields: dict[str, Fact] = {
         "kind": kind,

@@ -97,7 +97,7 @@ def read_conduct(study: StudyPaths) -> tuple[Event, ...]:
     SessionLogError
         If a log is damaged or holds what is no such event.
     """
-    return tuple(event for event in all_events(study) if event.kind in _SHOWN)
+    return tuple(e for _, e in events_of_logs(study) if e.kind in _SHOWN)
 
 
 def conduct_hash(study: StudyPaths) -> str | None:
@@ -108,13 +108,8 @@ def conduct_hash(study: StudyPaths) -> str | None:
     return hashlib.sha256(json.dumps(events, sort_keys=True).encode()).hexdigest()
 
 
-def all_events(study: StudyPaths) -> tuple[Event, ...]:
-    """Return every event of a study's logs, in order of time."""
-    return tuple(event for _, event in events_of_logs(study))
-
-
 def events_of_logs(study: StudyPaths) -> Iterator[tuple[Path, Event]]:
-    """Yield the same, each with the log that it is in."""
+    """Yield every event of a study's logs, with its log, in order of time."""
     logs = [_timed(path) for path in study.conduct_logs()]
     for _, log, event in merge(*logs, key=lambda timed: timed[0]):
         yield log, event
@@ -180,7 +175,7 @@ def check_rater(protocol: Protocol, rater: str) -> None:
 def study_answers(study: StudyPaths) -> dict[str, dict[tuple[str, str], Answer]]:
     """Return the last answer of each rater by questionnaire and question."""
     answers: dict[str, dict[tuple[str, str], Answer]] = {}
-    for event in all_events(study):
+    for _, event in events_of_logs(study):
         if event.kind in ("answered", "answer-correction"):
             fields, answer = event.fields, event.fields["answer"]
             if not isinstance(answer, str | int | float | None):

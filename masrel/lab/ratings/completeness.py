@@ -203,9 +203,9 @@ def _of_unblinding(event: Event, by: str) -> str:
         for key, name in (("rater", "rater"), ("session", "session"))
         if fields[key] is not None
     )
-    what = "All codes" if fields["code"] is None else f"Code {fields['code']}"
-    verb = "were" if fields["code"] is None else "was"
-    return f"{what}{where} {verb} unblinded {by}"
+    if (code := fields["code"]) is None:
+        return f"All codes{where} were unblinded {by}"
+    return f"Code {code}{where} was unblinded {by}"
 
 
 def _of_sessions(

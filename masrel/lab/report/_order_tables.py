@@ -274,7 +274,7 @@ def summary_table(balances: Sequence[OrderBalance]) -> Table:
                 balance.n_places,
                 _range([freq for row in balance.places for freq in row]),
                 _range(balance.of_others),
-                balance.n_with_repeats,
+                sum(run > 1 for run in balance.model_runs),
                 max(balance.model_runs),
                 max(balance.grade_runs),
                 max(balance.standard_runs),

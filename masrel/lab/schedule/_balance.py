@@ -43,11 +43,6 @@ class OrderBalance:
             if i != j
         )
 
-    @property
-    def n_with_repeats(self) -> int:
-        """Schedules in which a model comes twice in a row."""
-        return sum(run > 1 for run in self.model_runs)
-
 
 def order_balance(
     protocol: Protocol, study: StudyPaths, site: str | None = None

@@ -88,8 +88,7 @@ def orders_in_words(rules: ScheduleScheme) -> str:
         (rules.standards_apart, "no two standards come in a row"),
         (n_same is not None, f"at most {n_same} of one grade come in a row"),
     )
-    if any(is_one for is_one, _ in limits):
-        words = " and ".join(limit for is_one, limit in limits if is_one)
+    if words := " and ".join(limit for is_one, limit in limits if is_one):
         return f"an order drawn from all in which {words}"
     by = rules.blocks_by if rules.scheme == "blocks" else None
     return _IN_WORDS[rules.scheme, by]

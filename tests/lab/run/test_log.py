@@ -199,7 +199,6 @@ def test_after_a_failed_write_nothing_follows_on_the_line(
         with pytest.raises(OSError, match="No space left"):
             log.append("grade", {"code": "B"})
         monkeypatch.undo()
-        assert not log.is_open
         with pytest.raises(SessionLogError, match="closed"):
             log.append("grade", {"code": "B"})
     filled(path, 1)
@@ -237,7 +236,6 @@ def test_a_log_has_one_writer_and_is_closed_once(tmp_path: Path) -> None:
         SessionLog.open(tmp_path / "a.jsonl")
     other = SessionLog.open(tmp_path / "a.jsonl")
     log.close()  # again: the descriptor is another file's now
-    assert (log.is_open, other.is_open) == (False, True)
     other.append("grade", {"code": "A"})
     other.close()
 

@@ -57,6 +57,14 @@ def test_what_was_written_is_read_back(
     assert read_schedule(path) == SCHEDULE
 
 
+def problems_of(lines: list[str], folder: Path) -> list[str]:
+    path = folder / "test_R1.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    with pytest.raises(ScheduleError) as caught:
+        read_schedule(path)
+    return [text.removeprefix(f"{path}: ") for text in str(caught.value).splitlines()]
+
+
 @pytest.mark.parametrize(
     ("number", "line", "message"),
     [
@@ -81,22 +89,14 @@ def test_a_wrong_line_is_named(
 ) -> None:
     lines = list(LINES)
     lines[number - 1 : number] = [] if line is None else [line]
-    path = tmp_path / "test_R1.csv"
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    with pytest.raises(ScheduleError) as caught:
-        read_schedule(path)
-    assert f"{path}: {message}" in str(caught.value)
+    assert any(said.startswith(message) for said in problems_of(lines, tmp_path))
 
 
 def test_every_wrong_line_is_named_at_once(tmp_path: Path) -> None:
     lines = list(LINES)
     lines[4], lines[11], lines[12] = "# seed: x", "1,47K", "3,48K,B,1"
-    path = tmp_path / "test_R1.csv"
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    with pytest.raises(ScheduleError) as caught:
-        read_schedule(path)
-    found = [text.split(": ")[1] for text in str(caught.value).splitlines()]
-    assert found == ["line 5", "line 12", "line 13"]
+    places = [said.partition(":")[0] for said in problems_of(lines, tmp_path)]
+    assert places == ["line 5", "line 12", "line 13"]
 
 
 @pytest.mark.parametrize(
