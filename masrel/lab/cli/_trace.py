@@ -262,21 +262,11 @@ def _scenes(
     speeds: Sequence[float],
 ) -> list[Scene]:
     # one of each model and speed, however often an option repeats it
-    from masrel.lab.elbow import ElbowParameters
-
     scenes: list[Scene] = []
     motion_of = cache(partial(_motion_of, stretch))  # a recording is read once
     start = START_DEG if stretch.start is None else stretch.start
     for name, joint in joints.items():
-        end, limit = stretch.end, math.degrees(joint.range_end)
-        is_cut = isinstance(joint, ElbowParameters) or stretch.recording is not None
-        if end is None:
-            end = _END_DEG if is_cut else min(_END_DEG, limit)
-        elif not is_cut and end > limit + 1e-9:
-            raise ParameterError(
-                "--to-deg: needs at most the end of range of every model, "
-                f"{limit:g} deg, got {end:g}"
-            )
+        end = _end_of(stretch, joint)
         for speed in dict.fromkeys(speeds or (None,)):
             motion, ends = motion_of(speed, start, end), (start, end)
             if stretch.recording is not None:
@@ -297,6 +287,22 @@ def _scenes(
                 )
             )
     return scenes
+
+
+def _end_of(stretch: _MotionOptions, joint: "JointModel") -> float:
+    # deg; a stretch of a spastic elbow is cut at the end of range, no other goes beyond
+    from masrel.lab.elbow import ElbowParameters
+
+    if isinstance(joint, ElbowParameters) or stretch.recording is not None:
+        return _END_DEG if stretch.end is None else stretch.end
+    limit = math.degrees(joint.range_end)
+    end = min(_END_DEG, limit) if stretch.end is None else stretch.end
+    if end > limit + 1e-9:
+        raise ParameterError(
+            f"--to-deg: needs at most the end of range of every model, {limit:g} deg, "
+            f"got {end:g}"
+        )
+    return end
 
 
 def _motion_of(
