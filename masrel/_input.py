@@ -5,7 +5,7 @@ import sys
 import warnings
 from collections.abc import Collection, Iterable
 
-from masrel.errors import ParameterError
+from masrel.errors import MasrelError, ParameterError
 
 _MAX_LISTED = 40
 
@@ -24,11 +24,13 @@ USUAL_NAMES = {
 """Names of columns that are recognized, letter case aside."""
 
 
-def refuse(*rules: tuple[object, str]) -> None:
+def refuse(
+    *rules: tuple[object, str], error: type[MasrelError] = ParameterError
+) -> None:
     """Raise for the first rule that is broken: whether it is, and what is said."""
     for is_broken, sentence in rules:
         if is_broken:
-            raise ParameterError(sentence)
+            raise error(sentence)
 
 
 def check_option(name: str, value: object, options: Collection[object]) -> None:

@@ -15,12 +15,7 @@ from numpy.typing import NDArray
 
 from masrel.lab.elbow._model_file import QUANTITIES, Quantity
 from masrel.lab.elbow.identification import ElbowFit, FittedParameter, FrictionFit
-from masrel.lab.elbow.identification._catches import (
-    Catch,
-    CatchLevels,
-    Law,
-    catch_levels,
-)
+from masrel.lab.elbow.identification._catches import Catch
 from masrel.lab.report._fits import FRICTION
 from masrel.plots._style import BLACK, BLUE, GREY, ORANGE
 from masrel.tables._tables import interval_text, number
@@ -28,8 +23,6 @@ from masrel.tables._tables import interval_text, number
 _MAX_SLOW_COLUMNS = 4
 _BINS, _MIN_IN_BIN = 40, 20
 _MAX_POINTS = 6000  # more than a print resolves say nothing
-
-_BEFORE_CATCH = ("damping", "stiffness", "inertia")
 
 _DASHES = (0, (5, 1.5))
 _MEASURED: dict[str, Any] = {"color": GREY, "label": "measured"}
@@ -68,7 +61,7 @@ def _columns(
 
 def slow_figure(fit: ElbowFit) -> Figure:
     """Return measured torque and (1) against time, one column a trial: the longest."""
-    slow = [i for i, trial in enumerate(fit.trials) if trial.pace == "slow"]
+    slow = [i for i, trial in enumerate(fit.trials) if trial.stretch.pace == "slow"]
     slow.sort(key=lambda i: -fit.trials[i].pre_catch.time.size)
     shown = sorted(slow[:_MAX_SLOW_COLUMNS])
     size = max(3.4, 0.6 + 1.7 * len(shown)), 3.7
@@ -130,26 +123,25 @@ def fast_figure(fit: ElbowFit) -> Figure:
 def _fast_trial(column: Sequence[Axes], fit: ElbowFit, place: int) -> None:
     trial = fit.trials[place]
     catch, after, pre = trial.catch, trial.after, trial.pre_catch
+    start = float(trial.stretch.samples.time[0])
     if catch is None or after is None:
         return
     top, middle, bottom = column
-    n, last = pre.time.size, float(after.time[-1] - trial.start)
-    labels: tuple[str | None, str | None] = ("measured", "law, fitted")
+    law, last = fit.fitted_torque[place], float(after.time[-1] - start)
     # before the catch and from it on: no line joins the two
-    for part, law in ((pre, slice(n)), (after, slice(n, None))):
-        time = part.time - trial.start
-        top.plot(time, part.measured, color=GREY, linewidth=0.6, label=labels[0])
-        top.plot(
-            time, fit.fitted_torque[place][law], color=BLACK, linewidth=1.3,
-            linestyle=_DASHES, label=labels[1],
-        )  # fmt: skip
-        labels = None, None
-    time = np.concatenate([pre.time, after.time]) - trial.start
+    time = _apart([pre.time, after.time]) - start
+    measured = _apart([pre.measured, after.measured])
+    top.plot(time, measured, linewidth=0.6, **_MEASURED)
+    top.plot(
+        time, _apart(np.split(law, [pre.time.size])), color=BLACK, linewidth=1.3,
+        linestyle=_DASHES, label="law, fitted",
+    )  # fmt: skip
+    time = np.concatenate([pre.time, after.time]) - start
     middle.plot(time, np.degrees(np.concatenate([pre.angle, after.angle])), **_THIN)
     speed = np.degrees(np.concatenate([pre.velocity, after.velocity]))
     bottom.plot(time, speed, **_THIN)
-    begin = catch.time - trial.start
-    end = last if catch.end is None else catch.end - trial.start
+    begin = catch.time - start
+    end = last if catch.end is None else catch.end - start
     line: dict[str, Any] = {"color": GREY, "linewidth": 0.7}
     for axes in column:
         axes.axvspan(begin, end, color=ORANGE, alpha=0.35, lw=0.0, label="catch")
@@ -160,18 +152,23 @@ def _fast_trial(column: Sequence[Axes], fit: ElbowFit, place: int) -> None:
     top.set_title(f"mean speed {number(math.degrees(catch.mean_speed), 0)} deg/s")
 
 
+def _apart(pieces: Iterable[_Floats]) -> _Floats:
+    # drawn as lines that nothing joins
+    return np.concatenate([np.append(piece, math.nan) for piece in pieces])
+
+
 def catches_figure(fit: ElbowFit) -> Figure:
     """Return what all catches say of L and α, D, H and Q."""
-    catches, readings = _catches(fit), _catch_readings(fit)
-    peaks = np.array([levels.peak for _, levels in readings])
-    levels = np.array([levels.residual for _, levels in readings])
-    speeds = np.degrees(np.array([catch.speed for catch, _ in readings]))
+    catches = _catches(fit)
+    peaks = np.array([read.peak for read in fit.levels])
+    residuals = np.array([read.residual for read in fit.levels])
+    speeds = np.degrees(np.array([read.catch.speed for read in fit.levels]))
     figure = Figure(figsize=(6.7, 5.4))
     grid = figure.subplots(2, 2)
     _catch_angles(grid[0, 0], fit, catches)
     _catch_travels(grid[0, 1], fit, catches)
     _through_zero(grid[1, 0], speeds, peaks, fit, "catch_torque_constant", 180.0)
-    _through_zero(grid[1, 1], peaks, levels, fit, "residual_ratio", math.pi)
+    _through_zero(grid[1, 1], peaks, residuals, fit, "residual_ratio", math.pi)
     texts = (
         ("mean speed before the catch (deg/s)", "catch angle (deg)"),
         ("mean speed during the catch (deg/s)", "ΔT$_c$ · mean speed (deg)"),
@@ -304,7 +301,7 @@ def _slow_residuals(fit: ElbowFit) -> tuple[_Floats, _Floats]:
     return _joined(
         (trial.pre_catch.angle, trial.pre_catch.measured - law)
         for trial, law in zip(fit.trials, fit.fitted_torque, strict=True)
-        if trial.pace == "slow"
+        if trial.stretch.pace == "slow"
     )
 
 
@@ -347,47 +344,29 @@ def _catches(fit: ElbowFit) -> list[Catch]:
     return [trial.catch for trial in fit.trials if trial.catch is not None]
 
 
-def _catch_readings(fit: ElbowFit) -> list[tuple[Catch, CatchLevels]]:
-    # the catches whose peak and residual of (3) can be read off the torque
-    values = {e.name: e.value for e in fit.estimates}
-    held: dict[str, Any] = {
-        name: values[name] if term == "fitted" else term
-        for name, term in fit.arm.items()
-        if name not in ("offset", "drift") and term != "off"
-    }
-    joint: dict[str, Any] = {n: values[n] for n in _BEFORE_CATCH if n in values}
-    names = [trial.name for trial in fit.trials]
-    drifts = dict(zip(names, fit.drifts, strict=True))
-    law = Law(**joint, **held, drifts=drifts)
-    readings = []
-    for trial in fit.trials:
-        levels = catch_levels(trial, law, fit.constants)
-        if trial.catch is not None and levels is not None:
-            readings.append((trial.catch, levels))
-    return readings
-
-
 def friction_figure(fit: FrictionFit) -> Figure:
     """Return backdriving torque beside (7), against time and against speed."""
     figure = Figure(figsize=(6.7, 2.9))
     left, right = figure.subplots(1, 2, width_ratios=(1.3, 1.0), sharey=True)
-    first = fit.strokes[0]
-    start = float(first.time[0])
-    law = {"color": BLACK, "lw": 1.0, "linestyle": _DASHES}
-    for i, stroke in enumerate(fit.strokes):
-        speed = np.degrees(stroke.velocity)
-        right.plot(speed, stroke.torque, color=GREY, lw=0.9)
-        right.plot(speed, stroke.fitted, **law)
-        if stroke.recording == first.recording:
-            labels = ("measured", "(7), fitted") if i == 0 else (None, None)
-            time = stroke.time - start
-            left.plot(time, stroke.torque, color=GREY, lw=1.8, label=labels[0])
-            left.plot(time, stroke.fitted, label=labels[1], **law)
-    for axes, label in ((left, "time (s)"), (right, "speed (deg/s)")):
+    name, start = fit.strokes[0].recording, float(fit.strokes[0].part.time[0])
+    first = [stroke for stroke in fit.strokes if stroke.recording == name]
+    times = _apart([stroke.part.time - start for stroke in first])
+    speeds = np.degrees(_apart([stroke.part.velocity for stroke in fit.strokes]))
+    for axes, strokes, x, label, width in (
+        (left, first, times, "time (s)", 1.8),
+        (right, fit.strokes, speeds, "speed (deg/s)", 0.9),
+    ):
+        measured = _apart([stroke.part.torque for stroke in strokes])
+        law = _apart([stroke.fitted for stroke in strokes])
+        axes.plot(x, measured, linewidth=width, **_MEASURED)
+        axes.plot(
+            x, law, color=BLACK, linewidth=1.0, linestyle=_DASHES, label="(7), fitted"
+        )
         axes.axhline(0.0, **_ZERO)
         axes.set_xlabel(label)
     left.set_ylabel("backdriving torque (N·m)")
-    figure.legend(loc="outside lower center", ncols=2)
+    handles, texts = left.get_legend_handles_labels()
+    figure.legend(handles, texts, loc="outside lower center", ncols=2)
     lines = [_parameter_text(fit[name], of, 4) for name, of in FRICTION.items()]
     right.set_title("\n".join(lines), fontsize=8)
     return figure

@@ -40,7 +40,7 @@ def fit_table(fit: ElbowFit | FrictionFit) -> Table:
     if isinstance(fit, ElbowFit):
         alone = {e.name: e for step in fit.steps for e in step.estimates}
         quantities = ALL_QUANTITIES
-        slow = sum(trial.pace == "slow" for trial in fit.trials)
+        slow = sum(trial.stretch.pace == "slow" for trial in fit.trials)
         notes = (
             fit.lack_of_fit.sentence,
             f"{slow} slow and {len(fit.trials) - slow} fast trials; intervals are "
@@ -312,12 +312,13 @@ def _estimate(estimate: FittedParameter, quantity: Quantity) -> dict[str, object
 
 
 def _trial(trial: Trial) -> dict[str, object]:
+    stretch, time = trial.stretch, trial.stretch.samples.time
     document: dict[str, object] = {
-        "name": trial.name,
-        "pace": trial.pace,
-        "start_s": trial.start,
-        "duration_s": trial.duration,
-        "peak_speed_deg_s": math.degrees(trial.peak_speed),
+        "name": stretch.name,
+        "pace": stretch.pace,
+        "start_s": float(time[0]),
+        "duration_s": float(time[-1] - time[0]),
+        "peak_speed_deg_s": math.degrees(stretch.peak_speed),
         "remark": trial.remark,
     }
     catch = trial.catch

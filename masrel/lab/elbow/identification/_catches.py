@@ -29,6 +29,7 @@ _Bools = NDArray[np.bool_]
 
 Pace = Literal["slow", "fast"]
 
+_WINDOW = 0.06  # of the filter of speeds, s: 20.5 Hz at 1 kHz
 _ORDER = 3  # of the polynomials that are fitted in the window of the filter
 _MIN_LENGTH = 7  # of that window, samples
 
@@ -156,8 +157,9 @@ def state_at_break(
 class Stretch:
     """One extension of the joint in a recording; SI units."""
 
-    recording: Samples = field(repr=False)
-    samples: Samples = field(repr=False)  # of the extension alone
+    name: str  # of the recording, with a number if it has several
+    recording: Samples = field(compare=False, repr=False)
+    samples: Samples = field(compare=False, repr=False)  # of the extension alone
     angle: _Floats = field(compare=False, repr=False)  # smoothed, like the next two
     velocity: _Floats = field(compare=False, repr=False)
     acceleration: _Floats = field(compare=False, repr=False)
@@ -167,7 +169,7 @@ class Stretch:
 
 
 def find_stretches(
-    movement: Movement, *, window: float, slow_below: float
+    movement: Movement, slow_below: float
 ) -> tuple[list[Stretch], float]:
     """Return where the joint is extended by 15 degrees or more, and the noise at rest.
 
@@ -176,7 +178,9 @@ def find_stretches(
     recorded velocity that is not the derivative of the angle.
     """
     samples = even_samples(movement)
-    angle, velocity, acceleration = differentiate(samples.angle, samples.period, window)
+    angle, velocity, acceleration = differentiate(
+        samples.angle, samples.period, _WINDOW
+    )
     if movement.velocity is not None:
         recorded = np.interp(samples.time, movement.time, movement.velocity)
         ratio = float(recorded @ velocity) / float(velocity @ velocity)
@@ -185,25 +189,30 @@ def find_stretches(
                 f"{movement.name}: the velocity is {ratio:.3g} times the derivative of "
                 "the angle; is its unit right?"
             )
+    runs = [
+        (start, stop)
+        for start, stop in _runs(samples, angle, velocity)
+        if angle[stop - 1] - angle[start] >= MIN_TRAVEL
+    ]
     stretches = []
-    for start, stop in _runs(samples, angle, velocity):
+    for number, (start, stop) in enumerate(runs, start=1):
         part = slice(start, stop)
-        if angle[stop - 1] - angle[start] >= MIN_TRAVEL:
-            rest = slice(max(0, start - round(0.5 / samples.period)), start + 1)
-            before = samples.angle[rest]
-            peak_speed = float(velocity[part].max())
-            stretches.append(
-                Stretch(
-                    recording=samples,
-                    samples=samples.cut(part),
-                    angle=angle[part],
-                    velocity=velocity[part],
-                    acceleration=acceleration[part],
-                    pace="slow" if peak_speed < slow_below else "fast",
-                    peak_speed=peak_speed,
-                    rest_angle=float(np.median(before[before <= before.min() + 1e-9])),
-                )
+        rest = slice(max(0, start - round(0.5 / samples.period)), start + 1)
+        before = samples.angle[rest]
+        peak_speed = float(velocity[part].max())
+        stretches.append(
+            Stretch(
+                name=f"{movement.name} #{number}" if len(runs) > 1 else movement.name,
+                recording=samples,
+                samples=samples.cut(part),
+                angle=angle[part],
+                velocity=velocity[part],
+                acceleration=acceleration[part],
+                pace="slow" if peak_speed < slow_below else "fast",
+                peak_speed=peak_speed,
+                rest_angle=float(np.median(before[before <= before.min() + 1e-9])),
             )
+        )
     return stretches, _rest_noise(samples, velocity)
 
 
@@ -250,8 +259,8 @@ class Part(NamedTuple):
     torque: _Floats
     measured: _Floats
 
-    def keep(self, which: _Bools) -> "Part":
-        """Return the samples that are marked."""
+    def keep(self, which: _Bools | _Ints) -> "Part":
+        """Return some of the samples."""
         return Part(*(column[which] for column in self))
 
     def then(self, later: "Part") -> "Part":
@@ -259,30 +268,27 @@ class Part(NamedTuple):
         return Part(*map(np.concatenate, zip(self, later, strict=True)))
 
 
-def filtered_part(stretch: Stretch, ends: tuple[int, int], window: float) -> Part:
-    """Return the samples between the ends whose window has no gap and is not saturated.
+def filtered_part(samples: Samples, window: float) -> Part:
+    """Return the samples that have a whole window without a gap or saturation.
 
     Angle and torque go through one filter, as a linear law allows.
     """
-    samples = stretch.samples
     margin = window_length(window, samples.period) // 2 + 1
-    start, stop = ends
-    if stop - start <= 2 * margin:
-        return part_of(stretch, slice(0, 0))
-    part, inner = slice(start, stop), slice(start + margin, stop - margin)
+    if samples.time.size <= 2 * margin:
+        return Part(*[np.zeros(0)] * len(Part._fields))
     angle, velocity, acceleration, torque = filter_alike(
-        samples.angle[part], samples.torque[part], samples.period, window
+        samples.angle, samples.torque, samples.period, window
     )
-    unusable = (samples.in_gap | samples.saturated)[part]
+    unusable = samples.in_gap | samples.saturated
     touched = np.convolve(unusable, np.ones(2 * margin + 1), mode="valid") > 0.5
     whole = Part(
-        samples.time[inner],
+        samples.time[margin:-margin],
         angle,
         velocity,
         acceleration,
         _slope(acceleration, samples.period),
         torque,
-        samples.torque[inner],
+        samples.torque[margin:-margin],
     )
     return whole.keep(~touched)
 
@@ -313,21 +319,24 @@ def _slope(values: _Floats, period: float) -> _Floats:
 class Law:
     """What is known of a joint before its catches, of the arm and of the sensor.
 
-    SI units; 0 is not there. `damping`, `stiffness` and `inertia` are those of (1);
-    `gravity` is m·g·l, whose torque is 0 at `gravity_angle`; `arm_inertia` acts in
-    every phase and is a regressor if `fits_inertia`; `lag` is the sensor's time
-    constant; `drift` is N·m/s, of single trials in `drifts`.
+    SI units; 0 is not there. `fitted` names what is fitted of the arm; `damping`,
+    `stiffness` and `inertia` are those of (1); `gravity` is m·g·l, whose torque is 0 at
+    `gravity_angle`; `arm_inertia` acts in every phase; `offset` is a trial's constant
+    torque above -k·θ_rest, and `drift` what that gains, N·m/s, of single trials in
+    `drifts`; `lag` is the sensor's time constant.
     """
 
+    constants: ElbowParameters
+    fitted: tuple[str, ...]
     damping: float = math.nan
     stiffness: float = math.nan
     inertia: float = 0.0
     gravity: float = 0.0
     gravity_angle: float = 0.0
     arm_inertia: float = 0.0
-    fits_inertia: bool = False
     lag: float = 0.0
     catch_rise: float = 0.0
+    offset: float = 0.0
     drift: float = 0.0
     drifts: Mapping[str, float] = field(default_factory=dict)
 
@@ -367,102 +376,69 @@ class Catch:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
-    """One stretch, as the fits see it; SI units.
+    """One stretch, as the fits see it.
 
     `pre_catch` holds samples before the catch, `after` those from it until the hand is
     slow again (None if unusable); `remark` says what is not used of it, and why.
     """
 
-    name: str
-    pace: Pace
-    start: float
-    duration: float
-    peak_speed: float
-    rest_angle: float
+    stretch: Stretch
     pre_catch: Part = field(compare=False)
     after: Part | None = field(default=None, compare=False)
     catch: Catch | None = None
     remark: str = ""
 
 
-def _trial(stretch: Stretch, name: str, pre_catch: Part, remark: str) -> Trial:
-    time = stretch.samples.time
-    return Trial(
-        name=name,
-        pace=stretch.pace,
-        start=float(time[0]),
-        duration=float(time[-1] - time[0]),
-        peak_speed=stretch.peak_speed,
-        rest_angle=stretch.rest_angle,
-        pre_catch=pre_catch,
-        remark=remark,
-    )
-
-
-def slow_trial(stretch: Stretch, name: str) -> Trial:
+def slow_trial(stretch: Stretch) -> Trial:
     """Return a slow stretch as one pre-catch phase (section II.B)."""
     lost = int((stretch.samples.in_gap | stretch.samples.saturated).sum())
-    whole = filtered_part(stretch, (0, stretch.samples.time.size), SLOW_WINDOW)
+    whole = filtered_part(stretch.samples, SLOW_WINDOW)
     remark = f"{lost} samples missing or saturated" if lost else ""
-    return _trial(stretch, name, whole, remark)
+    return Trial(stretch=stretch, pre_catch=whole, remark=remark)
 
 
-def fast_trial(
-    stretch: Stretch,
-    name: str,
-    constants: ElbowParameters,
-    law: Law,
-    window: float,
-    instant: float | None = None,
-) -> Trial:
+def fast_trial(stretch: Stretch, law: Law, instant: float | None = None) -> Trial:
     """Return a fast stretch with its catch, or a remark that says why it has none.
 
     The catch is looked for; where a fit has it begin (`instant`) goes before if that is
     near.
     """
     samples, velocity = stretch.samples, stretch.velocity
-    onset = int(np.argmax(velocity >= constants.speed_threshold))
+    onset = int(np.argmax(velocity >= law.constants.speed_threshold))
     fastest = int(np.argmax(velocity))
-    slow = np.flatnonzero(velocity[fastest:] < constants.speed_threshold)
+    slow = np.flatnonzero(velocity[fastest:] < law.constants.speed_threshold)
     stop = fastest + int(slow[0]) if slow.size else velocity.size
     # the filter sees a hand stop half a window late or early
-    stop = max(fastest, stop - round(0.5 * window / samples.period))
-    none = _trial(stretch, name, part_of(stretch, slice(0, 0)), "")
+    stop = max(fastest, stop - round(0.5 * _WINDOW / samples.period))
+    none = Trial(stretch=stretch, pre_catch=part_of(stretch, slice(0, 0)))
     if samples.in_gap[:stop].any():
         return replace(none, remark="not used: a gap in the recording")
-    catch = _catch(stretch, name, (onset, stop), constants, law, instant)
+    catch = _catch(stretch, (onset, stop), law, instant)
     if catch is None:
-        why = "not used: no catch that stands out of the noise"
-        return replace(none, remark=why)
+        return replace(none, remark="not used: no catch that stands out of the noise")
     first = int(np.searchsorted(samples.time, catch.time))
-    before = filtered_part(stretch, (0, first), _FAST_WINDOW)
-    trial = replace(none, pre_catch=before, catch=catch)
+    before = filtered_part(samples.cut(slice(0, first)), _FAST_WINDOW)
+    remark, after = "", None
     if samples.saturated[:stop].any():
-        why = "torque is saturated: nothing after the catch is used"
-        return replace(trial, remark=why)
-    if before.time.size == 0:
-        why = "it catches at once: no torque before the catch to compare with"
-        return replace(trial, remark=why)
-    after = _after(stretch, (first, stop), catch, constants, law)
-    return replace(trial, after=after)
+        remark = "torque is saturated: nothing after the catch is used"
+    elif before.time.size == 0:
+        remark = "it catches at once: no torque before the catch to compare with"
+    else:
+        after = _after(stretch, (first, stop), catch, law)
+    return replace(none, pre_catch=before, after=after, catch=catch, remark=remark)
 
 
 def _catch(
-    stretch: Stretch,
-    name: str,
-    ends: tuple[int, int],
-    constants: ElbowParameters,
-    law: Law,
-    instant: float | None,
+    stretch: Stretch, ends: tuple[int, int], law: Law, instant: float | None
 ) -> Catch | None:
     # between the samples of movement onset and of the hand's being slow again; None if
     # the torque does not say so, or the joint hardly moves there
-    samples, (first, stop) = stretch.samples, ends
+    samples, constants, (first, stop) = stretch.samples, law.constants, ends
     part = part_of(stretch, slice(0, stop))
     times = constants.peak_duration, law.catch_rise + 3.0 * law.lag, 3.0 * law.lag
     peak, gap, last_gap = (round(time / samples.period) for time in times)
     at, until, residual_sd = find_changes(
-        part.torque - law.arm(part, name),
+        part.torque - law.arm(part, stretch.name),
         law.pre_catch(part),
         part.angle,
         first=first,
@@ -532,27 +508,22 @@ def _jump(time: _Floats, angle: _Floats, near: float) -> float:
     return float(min(tried, key=squares, default=near))
 
 
-def _after(
-    stretch: Stretch,
-    part: tuple[int, int],
-    catch: Catch,
-    constants: ElbowParameters,
-    law: Law,
-) -> Part:
+def _after(stretch: Stretch, part: tuple[int, int], catch: Catch, law: Law) -> Part:
     # samples from the catch on, without those next to a step of torque
-    pushes = law.arm_inertia != 0.0 or law.fits_inertia
+    pushes = law.arm_inertia != 0.0 or "arm_inertia" in law.fitted
     window = _PUSHED_WINDOW if pushes else _AFTER_WINDOW
     after = part_of(stretch, slice(*part), anew=window)
-    additive = constants.post_catch == "additive"
+    additive = law.constants.post_catch == "additive"
     if catch.end is not None and (additive or law.inertia != 0.0):
         # speed and acceleration are regressors here, as they are before the catch
         first = int(np.searchsorted(stretch.samples.time, catch.end))
-        later = filtered_part(stretch, (first, part[1]), _FAST_WINDOW)
+        rest = stretch.samples.cut(slice(first, part[1]))
+        later = filtered_part(rest, _FAST_WINDOW)
         after = after.keep(after.time < catch.end).then(later)
     if law.lag > 0.0:  # no step passes a sensor that lags
         return after
     end = math.inf if catch.end is None else catch.end
-    steps = [min(catch.time + constants.peak_duration, end)]
+    steps = [min(catch.time + law.constants.peak_duration, end)]
     steps += [catch.time] if law.catch_rise == 0.0 else []
     steps += [end] if additive else []
     near = np.min([np.abs(after.time - step) for step in steps], axis=0) < _GUARD
@@ -561,37 +532,36 @@ def _after(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CatchLevels:
-    """Peak and residual above the end of pre-catch (N·m), and the climb after it.
+    """Peak and residual of a catch above the end of pre-catch, N·m, and the climb.
 
     The residual is ``nan`` if nothing was recorded after the peak; the climb is torque
     above the residual against the angle travelled since.
     """
 
+    catch: Catch
     peak: float
     residual: float
     climb: Rows = field(repr=False)
 
 
-def catch_levels(
-    trial: Trial, law: Law, constants: ElbowParameters
-) -> CatchLevels | None:
+def catch_levels(trial: Trial, law: Law) -> CatchLevels | None:
     """Return what is read off the torque of a trial; None without a usable catch."""
     catch, after, pre = trial.catch, trial.after, trial.pre_catch
     if catch is None or after is None or pre.torque.size == 0 or after.torque.size == 0:
         return None
-    before = pre.torque - law.arm(pre, trial.name)
-    measured = after.torque - law.arm(after, trial.name)
+    before = pre.torque - law.arm(pre, trial.stretch.name)
+    measured = after.torque - law.arm(after, trial.stretch.name)
     offset = float((before - law.pre_catch(pre)).mean())  # -k·θ_rest
-    pre_end = law.damping * catch.speed + law.stiffness * catch.angle
-    pre_end += law.inertia * catch.acceleration
+    pushed = law.inertia * catch.acceleration
+    pre_end = law.damping * catch.speed + law.stiffness * catch.angle + pushed
     above = measured - (offset + pre_end)  # over τ_pre_end of (3)
     end = math.inf if catch.end is None else catch.end
-    in_peak = after.time < min(catch.time + constants.peak_duration, end)
+    in_peak = after.time < min(catch.time + law.constants.peak_duration, end)
     risen = in_peak & (after.time >= catch.time + law.catch_rise + 3.0 * law.lag)
     later = after.time >= end
     past = np.where(later, after.angle - (catch.angle + catch.travel), 0.0)
     torque = above - np.where(later, law.inertia * after.acceleration, 0.0)
-    if constants.post_catch == "additive":
+    if law.constants.post_catch == "additive":
         torque = np.where(later, measured - law.pre_catch(after) - offset, above)
     past, torque = past[~in_peak], torque[~in_peak]
     residual, slope = float(torque.mean()) if torque.size else math.nan, 0.0
@@ -602,6 +572,7 @@ def catch_levels(
         residual -= slope * float(past.mean())
         climb = Rows(moved[:, None], left)
     return CatchLevels(
+        catch=catch,
         peak=float(above[risen].mean()) if risen.any() else math.nan,
         residual=residual,
         climb=climb,

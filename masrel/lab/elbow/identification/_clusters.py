@@ -289,9 +289,11 @@ def fitted(
             reason = (reasons or {}).get(name, UNDETERMINED)
         elif fit.n_trials[place] < 2 or not half > 0.0:
             error = half = df = math.nan
-            reason = "an interval by trial needs two trials that differ"
-            if fit.n_trials[place] >= 2:
-                reason = "these trials fit exactly: an interval needs more that differ"
+            reason = (
+                "an interval by trial needs two trials that differ"
+                if fit.n_trials[place] < 2
+                else "these trials fit exactly: an interval needs more that differ"
+            )
         estimates.append(
             FittedParameter(
                 name=name,

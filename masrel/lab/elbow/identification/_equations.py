@@ -12,11 +12,12 @@ https://doi.org/10.1109/TNSRE.2012.2195330, equations (1)-(6).
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 from scipy.special import erfcx, log_ndtr
@@ -24,13 +25,14 @@ from scipy.special import erfcx, log_ndtr
 from masrel.lab.elbow.identification._catches import Catch, Law, Part, Trial
 from masrel.lab.elbow.identification._clusters import (
     ClusteredFit,
+    FittedParameter,
     Rows,
+    Step,
     left_out_steps,
     partial_out,
     solve,
     triangle,
 )
-from masrel.lab.elbow.parameters import ElbowParameters
 
 _Floats = NDArray[np.float64]
 _Bools = NDArray[np.bool_]
@@ -48,6 +50,7 @@ LINEAR = (
     "peak",
     "residual",
 )
+_HELD = ("gravity", "arm_inertia", "drift", "offset", "lag", "catch_rise")
 _CURVED, _STEP = ("lag", "catch_rise", "shift"), 1e-4
 
 _SCATTERED = (
@@ -74,28 +77,6 @@ class DetectionLimit(NamedTuple):
     sd: float  # of where noise lets the search see one last, rad
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Known:
-    """What the equations of a trial do not change.
-
-    `names` are the shared parameters in the order of their vector; `spreads` what a
-    residual is divided by ("torque", "peak", "residual", N·m; "catch angle", "travel",
-    rad); `offset` the fixed constant torque above -k·θ_rest (None if each trial has its
-    own); `drifts` says whether a trial's offset may drift; `on_line` whether its catch
-    is on the line of (2); `limit` behind which its catch ends, if it does not end
-    before.
-    """
-
-    names: tuple[str, ...]
-    constants: ElbowParameters
-    spreads: Mapping[str, float]
-    law: Law
-    offset: float | None = None
-    drifts: bool = False
-    on_line: bool = False
-    limit: DetectionLimit | None = None
-
-
 # A residual over its spread that is not of a sample: name, size, and derivatives.
 Row = tuple[str, float, Mapping[str, float]]
 
@@ -114,10 +95,25 @@ class Equations:
     Its own (`local`) are the constant torque and its drift, and of a catch the peak and
     residual torque above the end of pre-catch (N·m), the angle travelled (rad), and how
     much later than `catch.time` it was (s), as far as the trial has them.
+
+    `names` are the shared parameters in the order of their vector; `spreads` what a
+    residual is divided by ("torque", "peak", "residual", N·m; "catch angle", "travel",
+    rad); `held` is known before; `on_line` says whether the catch is on the line of
+    (2); `limit` behind which it ends, if it does not end before.
     """
 
-    def __init__(self, trial: Trial, known: Known) -> None:
-        self.trial, self.known, self.part = trial, known, trial.pre_catch
+    def __init__(
+        self,
+        trial: Trial,
+        names: tuple[str, ...],
+        spreads: Mapping[str, float],
+        held: Law,
+        *,
+        on_line: bool = False,
+        limit: DetectionLimit | None = None,
+    ) -> None:
+        self.trial, self.names, self.spreads, self.held = trial, names, spreads, held
+        self.on_line, self.limit, self.part = on_line, limit, trial.pre_catch
         self.n_pre, later = self.part.time.size, self.part.time[:0]
         self.catch: Catch | None = None
         self.end, self.peak_end, self.fixed_end = math.inf, math.inf, False
@@ -127,37 +123,30 @@ class Equations:
             if self.catch.end is not None:
                 self.end = self.catch.end
                 # an end whose torque steps stays where it was found; others move with D
-                additive = known.constants.post_catch == "additive"
+                additive = held.constants.post_catch == "additive"
                 self.fixed_end = additive or self.catch.within_peak
             stop = self.end if self.fixed_end else math.inf
-            self.peak_end = min(self.catch.time + known.constants.peak_duration, stop)
+            self.peak_end = min(self.catch.time + held.constants.peak_duration, stop)
         self._period = float(np.median(np.diff(later))) if later.size > 1 else 0.0
-        n_peak, timed = int((later < self.peak_end).sum()), known.law.takes_time
+        n_peak = int((later < self.peak_end).sum())
         moves = math.isfinite(self.end) and not self.fixed_end
         has = {
-            "offset": known.offset is None,
-            "drift": known.drifts,
+            "offset": "offset" in held.fitted,
+            "drift": "drift" in held.fitted,
             "peak": n_peak > 0,
             "residual": n_peak < later.size,
-            "travel": moves and "catch_travel" in known.names,
-            "shift": timed and n_peak > 0,
+            "travel": moves and "catch_travel" in names,
+            "shift": held.takes_time and n_peak > 0,
         }
         self.local = tuple(name for name, is_there in has.items() if is_there)
-        self._first = self._design(known.law.lag, known.law.catch_rise, 0.0)
+        self._first = self._design(held.lag, held.catch_rise, 0.0)
 
     def values(self, shared: _Floats, local: _Floats) -> dict[str, float]:
         """Return all parameters by name, those of the arm that are held among them."""
-        law, offset = self.known.law, self.known.offset
-        held = {
-            name: getattr(law, name) for name in ("gravity", "arm_inertia", "drift")
-        }
-        held |= {"lag": law.lag, "catch_rise": law.catch_rise, "offset": offset or 0.0}
-        now = zip(self.known.names, shared.tolist(), strict=True)
-        return {
-            **held,
-            **dict(now),
-            **dict(zip(self.local, local.tolist(), strict=True)),
-        }
+        names = (*self.names, *self.local)
+        numbers = (*shared.tolist(), *local.tolist())
+        held = {name: getattr(self.held, name) for name in _HELD}
+        return held | dict(zip(names, numbers, strict=True))
 
     def _design(self, lag: float, rise: float, shift: float) -> _Design:
         part, n = self.part, self.part.time.size
@@ -175,7 +164,7 @@ class Equations:
                 climbs = part.time >= begin
                 climbs[: self.n_pre] = False
         # a drift is that of the trial's own constant, in its middle, or of a known one
-        middle = float(part.time.mean()) if n and self.known.offset is None else 0.0
+        middle = float(part.time.mean()) if n and "offset" in self.local else 0.0
         of_trial = np.column_stack([part.time - middle, np.ones(n), steps])
         return _Design(np.column_stack([columns, of_trial]), past, climbs)
 
@@ -184,7 +173,7 @@ class Equations:
         angle = part.angle - lag * (part.velocity - lag * part.acceleration)
         velocity = part.velocity - lag * (part.acceleration - lag * part.jerk)
         acceleration = part.acceleration - lag * part.jerk
-        weight = np.sin(angle - self.known.law.gravity_angle)
+        weight = np.sin(angle - self.held.gravity_angle)
         stretched = angle - self._rest()
         return np.column_stack(
             [velocity, stretched, acceleration, weight, acceleration]
@@ -192,10 +181,10 @@ class Equations:
 
     def _rest(self) -> float:
         # without an offset of its own, the torque of a trial is 0 at its rest angle
-        if self.known.offset is None:
+        if "offset" in self.local:
             return 0.0
-        rest = self.known.constants.rest_angle
-        return self.trial.rest_angle if rest is None else rest
+        rest = self.held.constants.rest_angle
+        return self.trial.stretch.rest_angle if rest is None else rest
 
     def _from_catch(
         self, part: Part, catch: Catch, timed: tuple[float, float, float]
@@ -215,11 +204,11 @@ class Equations:
             ]
         )
         over = (part.time >= self.end)[:, None]
-        if self.known.constants.post_catch == "additive":
+        if self.held.constants.post_catch == "additive":
             held = np.where(over, self._smooth(part, lag)[:, :3], held)
         else:  # m·θ̈ of (5)
             held[:, 2:] += np.where(over, part.acceleration[:, None], 0.0)
-        weight = np.sin(part.angle - lag * part.velocity - self.known.law.gravity_angle)
+        weight = np.sin(part.angle - lag * part.velocity - self.held.gravity_angle)
         # the hand slows at once, and the sensor comes from what it was before
         pushed = (
             _slow(part.acceleration, self._period, lag) + catch.acceleration * fading
@@ -243,7 +232,7 @@ class Equations:
 
     def table(self, shared: _Floats, local: _Floats) -> _Floats:
         """Return the columns [own | shared | residuals], over their spreads."""
-        values, names = self.values(shared, local), (*self.local, *self.known.names)
+        values, names = self.values(shared, local), (*self.local, *self.names)
         design = self.design(values)
         law, climb, slope = self._evaluate(design, values)
         by_name = dict(zip(LINEAR, design.matrix.T, strict=True))
@@ -254,7 +243,7 @@ class Equations:
                 for step in (_STEP, -_STEP)
             )
             by_name[name] = (more - less) / (2.0 * _STEP)
-        rows, sd, n = self.catch_rows(values), self.known.spreads["torque"], law.size
+        rows, sd, n = self.catch_rows(values), self.spreads["torque"], law.size
         table = np.zeros((n + len(rows), len(names) + 1))
         for place, name in enumerate(names):
             table[:n, place] = by_name.get(name, 0.0)
@@ -270,7 +259,7 @@ class Equations:
 
     def design(self, values: Mapping[str, float]) -> _Design:
         timed = values["lag"], values["catch_rise"], values.get("shift", 0.0)
-        if timed == (self.known.law.lag, self.known.law.catch_rise, 0.0):
+        if timed == (self.held.lag, self.held.catch_rise, 0.0):
             return self._first
         return self._design(*timed)
 
@@ -294,12 +283,12 @@ class Equations:
     def catch_rows(self, values: Mapping[str, float]) -> list[Row]:
         """Return how far the trial's own values are from what they scatter about."""
         rows: list[Row] = []
-        used, size = self.catch, self.known.spreads
+        used, size = self.catch, self.spreads
         line, slope, height, ratio, mean, peak, residual = (
             values.get(name, math.nan) for name in _SCATTERED
         )
-        if self.known.on_line and self.trial.catch is not None:
-            slowest = self.known.constants.slowest_mean_speed
+        if self.on_line and self.trial.catch is not None:
+            slowest = self.held.constants.slowest_mean_speed
             left, by_line, by_slope = line_row(self.trial.catch, line, slope, slowest)
             slopes = {"catch_angle_constant": by_line, "catch_slope": by_slope}
             rows.append(("catch angle", left, slopes))  # (2)
@@ -317,19 +306,18 @@ class Equations:
             for name, left, slopes in rows
             if not math.isnan(left)
         ]
-        limit = self.known.limit
+        limit = self.limit
         if used is not None and limit is not None and not math.isnan(mean):
             left, by_mean, _ = beyond(mean, limit, size["travel"])
             rows.append(("limit", left, {"catch_travel": by_mean}))
         return rows
 
-    def rows(self, shared: _Floats, table: _Floats) -> Rows:
+    def rows(self, shared: Mapping[str, float], table: _Floats) -> Rows:
         """Return what a whole table says of the shared parameters, linearly."""
-        names, limit = self.known.names, self.known.limit
-        if self.catch is not None and limit is not None and "catch_travel" in names:
-            place = names.index("catch_travel")
-            scale = self.known.spreads["travel"]
-            _, slope, root = beyond(float(shared[place]), limit, scale)
+        limit = self.limit
+        if self.catch is not None and limit is not None and "catch_travel" in shared:
+            scale = self.spreads["travel"]
+            _, slope, root = beyond(shared["catch_travel"], limit, scale)
             # the last row: as steep as the likelihood is curved, and of equal score
             if slope != 0.0:
                 table = table.copy()
@@ -394,63 +382,91 @@ def mills(z: _Floats) -> _Floats:
     return np.asarray(math.sqrt(2.0 / math.pi) / erfcx(-z / math.sqrt(2.0)))
 
 
-@dataclass(frozen=True, slots=True)
-class Solution:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointFit:
     """Where the sum of squares is smallest: shared parameters, and each trial's own."""
 
     equations: Sequence[Equations]
-    shared: _Floats
-    local: list[_Floats]
+    shared: dict[str, float]
     values: list[dict[str, float]]  # each trial's parameters by name
+    tables: list[_Floats]  # each trial's equations there
     laws: tuple[_Floats, ...]  # and torque, N·m
+    steps: tuple[Step, ...] = ()  # the fits before
+    fast: tuple[Trial, ...] = ()  # those without a catch among them
+
+    @property
+    def trials(self) -> list[Trial]:
+        """Return the trials that are used: slow and fast ones."""
+        return [e.trial for e in self.equations]
+
+    @property
+    def alone(self) -> dict[str, FittedParameter]:
+        """Return what the steps say, by name."""
+        return {e.name: e for step in self.steps for e in step.estimates}
+
+    @property
+    def residuals(self) -> list[_Floats]:
+        """Return each trial's torque, measured less fitted, N·m."""
+        pairs = zip(self.equations, self.laws, strict=True)
+        return [e.part.measured - law for e, law in pairs]
 
     @property
     def typical(self) -> float:
         """Return the median over catches of the mean square that is left, (N·m)²."""
-        left = [
-            float(((e.part.measured - law) ** 2).mean())
-            for e, law in zip(self.equations, self.laws, strict=True)
-            if e.catch is not None
-        ]
-        return float(np.median(left)) if left else math.nan
+        pairs = zip(self.equations, self.residuals, strict=True)
+        squares = [float((x**2).mean()) for e, x in pairs if e.catch is not None]
+        return float(np.median(squares)) if squares else math.nan
+
+    @property
+    def torque_sd(self) -> float:
+        """Return the standard deviation of torque about the law in all trials, N·m."""
+        left = np.concatenate(self.residuals)
+        spare = left.size - sum(len(e.local) for e in self.equations) - len(self.shared)
+        return math.sqrt(float(left @ left) / max(spare, 1))
+
+    def rows(self) -> list[Rows]:
+        """Return what each trial says of the shared parameters."""
+        pairs = zip(self.equations, self.tables, strict=True)
+        return [e.rows(self.shared, table) for e, table in pairs]
+
+    def clustered(self) -> ClusteredFit:
+        """Return the shared parameters with their covariance, clustered by trial."""
+        step, shared = solve(self.rows()), list(self.shared.values())
+        # what no trial determines is nan in the step and stays so
+        return replace(step, values=np.where(np.isnan(step.values), np.nan, shared))
 
 
 def fit_together(
     equations: Sequence[Equations],
     start: Mapping[str, float],
     floors: Mapping[str, float],
-) -> Solution:
+) -> JointFit:
     """Fit every parameter to every trial at once.
 
     Instants of catches stay where the change points are, unless the torque takes time:
     the law is not differentiable in them. Everything else is. No parameter falls
     below its floor.
     """
-    names = equations[0].known.names
+    names = equations[0].names
     n = len(names)
     lowest = np.array([floors.get(name, -math.inf) for name in names])
     first = np.maximum([start[name] for name in names], lowest)
     begin = np.concatenate([first, *(e.start(start) for e in equations)])
-    cuts = np.cumsum([n, *(len(e.local) for e in equations)])
+    cuts = np.cumsum([len(e.local) for e in equations])[:-1]
     jacobian = np.zeros((0, begin.size))
+
+    def own_of(x: _Floats) -> list[tuple[Equations, _Floats]]:
+        return list(zip(equations, np.split(x[n:], cuts), strict=True))
 
     def residuals(x: _Floats) -> _Floats:
         # Of each trial, R of the QR of [Jacobian | residuals]: the same sum of squares
         # and gradient in as many rows as columns.
         nonlocal jacobian
-        local = np.split(x[n:], cuts[:-1] - n)[1:]
-        tables = [
-            triangle(e.table(x[:n], own))
-            for e, own in zip(equations, local, strict=True)
-        ]
-        jacobian = np.zeros((sum(t.shape[0] for t in tables), x.size))
-        row = 0
-        for table, stop in zip(tables, cuts[1:].tolist(), strict=True):
-            rows, n_own = slice(row, row + table.shape[0]), table.shape[1] - 1 - n
-            jacobian[rows, stop - n_own : stop] = table[:, :n_own]
-            jacobian[rows, :n] = table[:, n_own:-1]
-            row = rows.stop
-        return np.concatenate([t[:, -1] for t in tables])
+        tables = [triangle(e.table(x[:n], own)) for e, own in own_of(x)]
+        whole = np.concatenate([table[:, -n - 1 :] for table in tables])
+        of_trials = block_diag(*(table[:, : -n - 1] for table in tables))
+        jacobian = np.column_stack([whole[:, :-1], of_trials])
+        return np.asarray(whole[:, -1])
 
     def derivatives(_: _Floats) -> _Floats:
         return jacobian  # of the last residuals, which are those of this point
@@ -461,67 +477,40 @@ def fit_together(
         jac=derivatives,
         bounds=(np.append(lowest, np.full(begin.size - n, -math.inf)), math.inf),
         x_scale="jac",
-        ftol=_TIMED if equations[0].known.law.takes_time else _PRECISE,
+        ftol=_TIMED if equations[0].held.takes_time else _PRECISE,
         xtol=_KINK,
         gtol=None,
         max_nfev=_EVALUATIONS,
     )
-    shared, local = solution.x[:n], np.split(solution.x[n:], cuts[:-1] - n)[1:]
-    values = [e.values(shared, own) for e, own in zip(equations, local, strict=True)]
-    laws = tuple(e.law(at) for e, at in zip(equations, values, strict=True))
-    return Solution(equations, shared, local, values, laws)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class JointFit:
-    """What a solution says of the shared parameters, and leaves over of each trial."""
-
-    fit: ClusteredFit
-    tables: list[_Floats] = field(repr=False)  # of all samples, at the solution
-    torque_sd: float
-    cross_validation: _Floats = field(repr=False)
-
-
-def joint_fit(solution: Solution) -> JointFit:
-    """Return values of all parameters with their covariance, clustered by trial."""
-    shared, equations = solution.shared, solution.equations
-    pairs = zip(equations, solution.local, strict=True)
-    tables = [e.table(shared, local) for e, local in pairs]
-    rows = [e.rows(shared, t) for e, t in zip(equations, tables, strict=True)]
-    pairs_of_torque = zip(equations, solution.laws, strict=True)
-    left = np.concatenate([e.part.measured - law for e, law in pairs_of_torque])
-    spare = left.size - sum(local.size for local in solution.local) - shared.size
-    step = solve(rows)
-    # what no trial determines is nan in the step and stays so
-    values = np.where(np.isnan(step.values), np.nan, shared)
+    shared, pairs = solution.x[:n], own_of(solution.x)
+    values = [e.values(shared, own) for e, own in pairs]
     return JointFit(
-        fit=replace(step, values=values),
-        tables=tables,
-        torque_sd=math.sqrt(float(left @ left) / max(spare, 1)),
-        cross_validation=_left_out(solution, rows, tables),
+        equations=equations,
+        shared=dict(zip(names, shared.tolist(), strict=True)),
+        values=values,
+        tables=[e.table(shared, own) for e, own in pairs],
+        laws=tuple(e.law(x) for e, x in zip(equations, values, strict=True)),
     )
 
 
-def _left_out(
-    solution: Solution, rows: Sequence[Rows], tables: Sequence[_Floats]
-) -> _Floats:
-    # Per trial the mean square of its torque less what the others' parameters give, as
-    # linear as they are at the fit. Constant, peak, residual and travel are its own;
-    # its drift is the others' mean, or a drift would better every fit.
-    drifts = np.array([values["drift"] for values in solution.values])
-    made = []
-    pairs = zip(solution.equations, left_out_steps(rows), strict=True)
-    for i, (e, step) in enumerate(pairs):
-        table, law, n = tables[i], solution.laws[i], len(e.local)
-        r = triangle(table)
+def left_out_errors(joint: JointFit) -> _Floats:
+    """Return each trial's mean square distance from what the others say of it."""
+    # What the others say is reckoned as linear as it is at the fit. Constant, peak,
+    # residual and travel are its own; its drift is the others' mean, or a drift would
+    # better every fit.
+    drifts = np.array([values["drift"] for values in joint.values])
+    squares = []
+    steps, residuals = left_out_steps(joint.rows()), joint.residuals
+    for i, (e, table) in enumerate(zip(joint.equations, joint.tables, strict=True)):
+        n, r = len(e.local), triangle(table)
         local = np.zeros(n)
         if "drift" in e.local and drifts.size > 1:
             others = (drifts.sum() - drifts[i]) / (drifts.size - 1)
             local[e.local.index("drift")] = others - drifts[i]
-        left = r[:, -1] + r[:, n:-1] @ np.nan_to_num(step) + r[:, :n] @ local
+        left = r[:, -1] + r[:, n:-1] @ np.nan_to_num(steps[i]) + r[:, :n] @ local
         free = [j for j, name in enumerate(e.local) if name != "drift"]
         local[free] = np.linalg.lstsq(r[:, free], -left, rcond=1e-12)[0]
-        columns = table[: law.size, :-1] * np.concatenate([local, step])
-        error = e.part.measured - law - e.known.spreads["torque"] * columns.sum(axis=1)
-        made.append(float((error**2).mean()) if error.size else math.nan)
-    return np.array(made)
+        moved = table[: residuals[i].size, :-1] * np.concatenate([local, steps[i]])
+        error = residuals[i] - e.spreads["torque"] * moved.sum(axis=1)
+        squares.append(float((error**2).mean()) if error.size else math.nan)
+    return np.array(squares)

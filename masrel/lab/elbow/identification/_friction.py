@@ -5,17 +5,16 @@ https://doi.org/10.1109/TNSRE.2012.2195330, section III.B.2 and Fig. 8.
 """
 
 import math
-import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from masrel._input import warn_caller
 from masrel.errors import RecordingError, RecordingWarning
-from masrel.lab.elbow.identification._catches import filter_alike, window_length
+from masrel.lab.elbow.identification._catches import Part, filtered_part, window_length
 from masrel.lab.elbow.identification._clusters import (
     FittedParameter,
     Rows,
@@ -40,43 +39,27 @@ _NAMES = ("inertia", "viscous", "coulomb")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stroke:
-    """A movement in one direction: filtered columns (n_samples,), and the law."""
+    """A movement in one direction: filtered, and the law (n_samples,)."""
 
     recording: str
-    time: _Floats = field(compare=False, repr=False)
-    velocity: _Floats = field(compare=False, repr=False)
-    acceleration: _Floats = field(compare=False, repr=False)
-    torque: _Floats = field(compare=False, repr=False)
+    part: Part = field(compare=False, repr=False)
     fitted: _Floats = field(compare=False, repr=False)
 
 
-def _strokes(movement: Movement) -> list[Stroke]:
-    # movements in one direction that last long enough and hold no gap, not fitted yet
+def _strokes(movement: Movement) -> list[Part]:
+    # movements in one direction that last long enough and hold no gap
     samples = even_samples(movement)
     margin = window_length(_WINDOW, samples.period) // 2 + 1
-    _, velocity, acceleration, torque = filter_alike(
-        samples.angle, samples.torque, samples.period, _WINDOW
-    )
-    unusable = np.convolve(
-        samples.in_gap | samples.saturated, np.ones(2 * margin + 1), mode="valid"
-    )
+    whole = filtered_part(samples, _WINDOW)
     # sgn of (7) is one number within the window of the filter, or it is not used
-    direction = np.where(np.abs(velocity) > _MOVING, np.sign(velocity), 0.0)
-    direction[unusable > 0.5] = 0.0
-    edges = np.flatnonzero(np.diff(direction, prepend=0.0, append=0.0))
+    part = whole.keep(np.abs(whole.velocity) > _MOVING)
+    breaks = np.diff(part.time) > 1.5 * samples.period
+    breaks |= np.diff(np.sign(part.velocity)) != 0.0
+    runs = np.split(np.arange(part.time.size), np.flatnonzero(breaks) + 1)
     return [
-        Stroke(
-            recording=movement.name,
-            time=samples.time[margin:-margin][inner],
-            velocity=velocity[inner],
-            acceleration=acceleration[inner],
-            torque=torque[inner],
-            fitted=torque[inner],
-        )
-        for start, stop in pairwise(edges)
-        if direction[start] != 0.0
-        and (stop - start - 2 * margin) * samples.period >= _MIN_STROKE
-        for inner in [slice(start + margin, stop - margin)]
+        part.keep(run[margin:-margin])
+        for run in runs
+        if (run.size - 2 * margin) * samples.period >= _MIN_STROKE
     ]
 
 
@@ -152,53 +135,53 @@ def fit_friction(
         else read_movement(Path(entry), of_device=True)
         for entry in recordings
     ]
-    strokes = [stroke for movement in movements for stroke in _strokes(movement)]
-    forward = sum(stroke.velocity.mean() > 0.0 for stroke in strokes)
-    if min(forward, len(strokes) - forward) < 2:
+    parts = [(m.name, part) for m in movements for part in _strokes(m)]
+    forward = sum(part.velocity.mean() > 0.0 for _, part in parts)
+    if min(forward, len(parts) - forward) < 2:
         raise RecordingError(
             "recordings: friction needs two strokes or more in each direction, got "
-            f"{forward} in extension and {len(strokes) - forward} in flexion"
+            f"{forward} in extension and {len(parts) - forward} in flexion"
         )
-    rows = _rows(strokes)
+    rows = _rows(parts)
     fit = solve(rows, n_local=len(movements))
     estimates = fitted(_NAMES, fit, level)
     for estimate in estimates:
         if estimate.value < 0.0:
-            warnings.warn(
+            warn_caller(
                 f"{estimate.name} is negative ({estimate.value:.4g}): is torque that "
                 "of the hand, counted as the angle is?",
                 RecordingWarning,
-                stacklevel=2,
             )
-    strokes = [
-        replace(stroke, fitted=stroke.torque - (row.target - row.design @ fit.values))
-        for stroke, row in zip(strokes, rows, strict=True)
-    ]
-    far = np.concatenate([stroke.torque - stroke.fitted for stroke in strokes])
-    size = np.concatenate([stroke.torque for stroke in strokes])
+    left = [row.target - row.design @ fit.values for row in rows]
+    far = np.concatenate(left)
+    size = np.concatenate([part.torque for _, part in parts])
     sd = np.sqrt(np.diag(fit.covariance))
     return FrictionFit(
         estimates=estimates,
         correlation=fit.covariance / np.outer(sd, sd),
         relative_error=float(np.abs(far).mean() / np.abs(size).mean()),
         torque_sd=fit.residual_sd,
-        strokes=tuple(strokes),
+        strokes=tuple(
+            Stroke(recording=name, part=part, fitted=part.torque - far)
+            for (name, part), far in zip(parts, left, strict=True)
+        ),
         level=level,
         simulated=any(movement.simulated for movement in movements),
     )
 
 
-def _rows(strokes: Sequence[Stroke]) -> list[Rows]:
+def _rows(parts: Sequence[tuple[str, Part]]) -> list[Rows]:
     # the constant of a recording is taken out of all its strokes together
     tables = [
-        np.stack([s.acceleration, s.velocity, np.sign(s.velocity), s.torque], axis=1)
-        for s in strokes
+        np.stack([p.acceleration, p.velocity, np.sign(p.velocity), p.torque], axis=1)
+        for _, p in parts
     ]
+    names = [name for name, _ in parts]
     means = {
         name: np.concatenate(
-            [t for s, t in zip(strokes, tables, strict=True) if s.recording == name]
+            [table for of, table in zip(names, tables, strict=True) if of == name]
         ).mean(axis=0)
-        for name in {stroke.recording for stroke in strokes}
+        for name in set(names)
     }
-    left = [t - means[s.recording] for s, t in zip(strokes, tables, strict=True)]
-    return [Rows(t[:, :3], t[:, 3]) for t in left]
+    left = [table - means[of] for of, table in zip(names, tables, strict=True)]
+    return [Rows(table[:, :3], table[:, 3]) for table in left]

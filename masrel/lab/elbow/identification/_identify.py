@@ -1,7 +1,6 @@
-"""From recordings to a joint: what is fitted, what is read, what is used of it.
+"""From recordings to a joint: what is read, what is refused, what is said of it.
 
-Trials and the fit of them take turns: each round knows what the one before found. And
-which of what an arm may have makes a fit better: cross-validation over trials.
+And which of what an arm may have makes a fit better: cross-validation over trials.
 
 Source: Park, Kim and Damiano (2012), IEEE TNSRE 20(3), 361-370,
 https://doi.org/10.1109/TNSRE.2012.2195330, section II.
@@ -10,9 +9,8 @@ https://doi.org/10.1109/TNSRE.2012.2195330, section II.
 import math
 import warnings
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
-from itertools import product
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from masrel._input import refuse
+from masrel._input import refuse, warn_caller
 from masrel.errors import (
     MasrelError,
     ParameterError,
@@ -34,29 +32,22 @@ from masrel.lab.elbow._model_file import (
     QUANTITIES,
 )
 from masrel.lab.elbow.identification._catches import (
-    Law,
+    SLOW_WINDOW,
+    CatchLevels,
     Stretch,
     Trial,
     catch_levels,
-    fast_trial,
     find_stretches,
     slow_trial,
 )
 from masrel.lab.elbow.identification._clusters import (
     UNDETERMINED,
+    ClusteredFit,
     FittedParameter,
     Step,
     fitted,
 )
-from masrel.lab.elbow.identification._equations import (
-    DetectionLimit,
-    Equations,
-    JointFit,
-    Known,
-    Solution,
-    fit_together,
-    joint_fit,
-)
+from masrel.lab.elbow.identification._equations import JointFit, left_out_errors
 from masrel.lab.elbow.identification._lack_of_fit import (
     LEVEL,
     LackOfFit,
@@ -69,20 +60,19 @@ from masrel.lab.elbow.identification._reading import (
     TorqueSource,
     read_movement,
 )
-from masrel.lab.elbow.identification._steps import (
-    SlowFit,
-    detection_limit,
-    fit_catch_line,
-    fit_catches,
-    fit_post_catch,
+from masrel.lab.elbow.identification._rounds import (
+    ALWAYS,
+    FitOptions,
+    Term,
+    fit_in_rounds,
     fit_slow,
-    on_the_line,
+    fitted_law,
+    untimed_terms,
 )
 from masrel.lab.elbow.parameters import STANDARD_MODELS, ElbowParameters
 
 _Floats = NDArray[np.float64]
 
-_WINDOW = 0.06  # of the filter of speeds, s: 20.5 Hz at 1 kHz
 # Options of `fit` that are tried in a comparison, each alone.
 TERMS = ("gravity", "arm_inertia", "drift", "lag", "rise")
 
@@ -90,22 +80,6 @@ TERMS = ("gravity", "arm_inertia", "drift", "lag", "rise")
 _MIN_DF = 4.0
 # So many times its error may each be below 0: a joint may have no inertia at all.
 _MAX_BELOW_0 = {"damping": 1.0, "stiffness": 1.0, "inertia": 2.0, "arm_inertia": 2.0}
-
-# What an arm has: nothing of it, a fixed value in SI units, or what is fitted.
-Term = float | Literal["off", "fitted"]
-
-# What slow trials tell.
-ALWAYS = ("damping", "stiffness", "inertia")
-
-# Of what takes time: where the search for it begins, s.
-_STARTS = {"lag": (0.004, 0.016), "catch_rise": (0.01, 0.04, 0.08)}
-
-# In periods of samples: none is told from nothing that is shorter. The search may go
-# below, to a quarter of it.
-_FLOORS, _BELOW = {"lag": 0.2, "catch_rise": 3.0}, 0.25
-
-# Of catches and fit, where what an arm has moves the catches, or makes them last.
-_ROUNDS, _TIMED_ROUNDS = 2, 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,6 +107,8 @@ class ElbowFit:
         parameters give, (N·m)²; ``nan`` where they do not determine one.
     trials : tuple of Trial
         What was used.
+    levels : tuple of CatchLevels
+        Peak and residual of (3) as read off the torque, of each catch that has them.
     fitted_torque : tuple of ndarray
         Per trial the law's torque at the samples of `pre_catch` and then `after`.
     constants : ElbowParameters
@@ -160,6 +136,7 @@ class ElbowFit:
     lack_of_fit: LackOfFit
     cross_validation: _Floats = field(compare=False, repr=False)
     trials: tuple[Trial, ...] = field(repr=False)
+    levels: tuple[CatchLevels, ...] = field(compare=False, repr=False)
     fitted_torque: tuple[_Floats, ...] = field(compare=False, repr=False)
     constants: ElbowParameters
     arm: Mapping[str, float | str]
@@ -177,13 +154,8 @@ class ElbowFit:
         known = ", ".join(e.name for e in self.estimates)
         raise ParameterError(f"name: needs one of {known}, got {name!r}")
 
-    def joint(self, *, missing: ElbowParameters | None = None) -> ElbowParameters:
+    def joint(self) -> ElbowParameters:
         """Make the joint of the fitted values.
-
-        Parameters
-        ----------
-        missing : ElbowParameters, optional
-            Where to take what these trials do not determine.
 
         Returns
         -------
@@ -194,315 +166,17 @@ class ElbowFit:
         Raises
         ------
         ParameterError
-            If a parameter is undetermined and `missing` is not given, or a value is
-            none that a joint can have.
+            If a parameter is undetermined, or a value is none that a joint can have.
         """
-        of_joint = {each.name for each in fields(ElbowParameters)}
-        values: dict[str, Any] = {}
         rise = self.arm["catch_rise"]
-        if not isinstance(rise, str):
-            values["catch_rise"] = rise
+        values: dict[str, Any] = {} if isinstance(rise, str) else {"catch_rise": rise}
         for estimate in self.estimates:
-            if estimate.name not in of_joint:
-                continue
-            if not math.isnan(estimate.value):
-                values[estimate.name] = estimate.value
-            elif missing is not None:
-                values[estimate.name] = getattr(missing, estimate.name)
-            elif estimate.name not in ("inertia", "catch_rise"):
-                raise ParameterError(f"{estimate.name}: {estimate.reason}")
+            name, is_told = estimate.name, not math.isnan(estimate.value)
+            if is_told and (name in QUANTITIES or name == "catch_rise"):
+                values[name] = estimate.value
+            elif name in QUANTITIES and name != "inertia":
+                raise ParameterError(f"{name}: {estimate.reason}")
         return replace(self.constants, **values)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FitOptions:
-    """The options of a fit, as it takes them; refuses those outside their ranges."""
-
-    constants: ElbowParameters
-    terms: Mapping[str, Term]  # of the arm
-    gravity_angle: float
-    inertia: str
-    slow_below: float
-    window: float
-    level: float
-
-    def __post_init__(self) -> None:
-        held, fits_inertia = self.constants, self.inertia == "fitted"
-        refuse(
-            (
-                not 0.5 < self.level < 1.0,
-                f"level: needs more than 0.5 and less than 1, got {self.level}",
-            ),
-            (
-                held.residual_reading != "residual" or held.catch_rise != 0.0,
-                "constants: a fit reads Q as section II does and takes the rise of a "
-                'catch from its option; needs residual_reading "residual" and '
-                f"catch_rise 0, got {held.residual_reading!r} and {held.catch_rise:g}",
-            ),
-            (
-                not 0.0 < self.slow_below < math.inf,
-                f"slow_below: needs more than 0, got {self.slow_below}",
-            ),
-            (
-                not 0.0 < self.window < math.inf,
-                f"window: needs more than 0 s, got {self.window}",
-            ),
-            (
-                self.inertia not in ("zero", "fitted"),
-                f'inertia: needs "zero" or "fitted", got {self.inertia!r}',
-            ),
-            (
-                fits_inertia and held.post_catch == "additive",
-                'inertia: with post_catch "additive", m is in every phase but the '
-                "catch, and where one ends cannot be told from the jump of m·θ̈; needs "
-                '"zero", got "fitted"',
-            ),
-            *(rule for term in self.terms.items() for rule in _of_term(*term, held)),
-            (
-                not math.isfinite(self.gravity_angle),
-                f"gravity_angle: needs a finite angle, got {self.gravity_angle}",
-            ),
-        )
-
-    @property
-    def fitted(self) -> tuple[str, ...]:
-        """Return the names of what is fitted of the arm."""
-        return tuple(name for name, term in self.terms.items() if term == "fitted")
-
-    @property
-    def offset(self) -> float | None:
-        """Return the constant torque of every trial, N·m; None if it is fitted."""
-        term = self.terms["offset"]
-        return None if term == "fitted" else _number(term)
-
-    def law(self) -> Law:
-        """Return what is held of the arm."""
-        values: dict[str, Any] = {
-            name: _number(term) for name, term in self.terms.items() if name != "offset"
-        }
-        fits = "arm_inertia" in self.fitted
-        return Law(gravity_angle=self.gravity_angle, fits_inertia=fits, **values)
-
-
-def _number(term: Term) -> float:
-    return 0.0 if isinstance(term, str) else float(term)
-
-
-def _of_term(
-    name: str, term: object, held: ElbowParameters
-) -> Iterator[tuple[bool, str]]:
-    # what an option must not be, in the order in which it is asked
-    name = {"catch_rise": "rise"}.get(name, name)
-    if isinstance(term, str) and term in ("off", "fitted"):
-        return
-    is_number = isinstance(term, int | float) and math.isfinite(term)
-    yield not is_number, f'{name}: needs "off", "fitted" or a number, got {term!r}'
-    value = float(term) if isinstance(term, int | float) else 0.0
-    if name in ("arm_inertia", "lag", "rise"):
-        yield value < 0.0, f"{name}: needs 0 or more, got {value:g}"
-    if name == "rise":
-        longest = f"{held.peak_duration:g} s"
-        text = f"rise: needs 0 to ΔT_peak, {longest}, got {value:g} s"
-        yield value > held.peak_duration, text
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Round:
-    """Trials, what was read off them, steps, and the fit of all together."""
-
-    fast: Sequence[Trial]
-    trials: list[Trial]  # slow and fast ones that are used
-    law: Law
-    limits: list[DetectionLimit | None]
-    steps: list[Step]
-    solution: Solution
-
-    @property
-    def shared(self) -> dict[str, float]:
-        """Return the shared parameters by name."""
-        names = self.solution.equations[0].known.names
-        return dict(zip(names, self.solution.shared.tolist(), strict=True))
-
-    def untimed(self) -> dict[str, str]:
-        """Return why a lag or a rise is not fitted: samples tell it from none."""
-        floors = {name: n * _period(self.trials) for name, n in _FLOORS.items()}
-        return {
-            name: f"shorter than {1000.0 * floors[name]:.2g} ms, which these samples "
-            "do not tell from nothing: taken as 0"
-            for name, value in self.shared.items()
-            if name in floors and value <= floors[name]
-        }
-
-
-def _period(trials: Sequence[Trial]) -> float:
-    return float(np.median(np.diff(trials[0].pre_catch.time)))
-
-
-def slow_fit(trials: Sequence[Trial], options: FitOptions) -> SlowFit:
-    """Fit what slow trials tell: step 1."""
-    more = {
-        "inertia": options.inertia == "fitted",
-        "gravity": "gravity" in options.fitted,
-    }
-    known = Known(
-        names=("damping", "stiffness", *(name for name, fits in more.items() if fits)),
-        constants=options.constants,
-        spreads={"torque": 1.0},
-        law=options.law(),
-        offset=options.offset,
-        drifts="drift" in options.fitted,
-    )
-    # in front of a catch, a lag that is not known yet is none
-    return fit_slow(
-        trials, replace(known, law=replace(known.law, lag=0.0)), level=options.level
-    )
-
-
-def fit_in_rounds(
-    stretches: Mapping[str, Stretch], slow: SlowFit, options: FitOptions
-) -> Round:
-    """Fit trials in rounds: what an arm has moves catches, and catches tell that."""
-    first = replace(options.law(), **slow.values)
-    # the sum of squares has a valley for each of several lags and rises
-    timed = [name for name in _STARTS if name in options.fitted]
-    starts: list[dict[str, Any]] = [
-        dict(zip(timed, each, strict=True))
-        for each in product(*(_STARTS[name] for name in timed))
-    ]
-    tries = [
-        _round(stretches, slow, replace(first, **each), options) for each in starts
-    ]
-    made = min(tries, key=lambda each: each.solution.typical)
-    n_rounds = _ROUNDS if set(options.fitted) - {"offset"} else 1
-    for _ in range((_TIMED_ROUNDS if made.law.takes_time else n_rounds) - 1):
-        pairs = list(zip(made.trials, made.solution.values, strict=True))
-        shifts = {
-            trial.name: (trial.catch.time, at["shift"])
-            for trial, at in pairs
-            if trial.catch is not None and "shift" in at
-        }
-        instants = {name: sum(pair) for name, pair in shifts.items()}
-        # what the fit says of the law before a catch, and of the arm
-        known = {*ALWAYS, *ARM_QUANTITIES}
-        found: dict[str, Any] = {n: x for n, x in made.shared.items() if n in known}
-        if "drift" in options.fitted:
-            found["drifts"] = {trial.name: at["drift"] for trial, at in pairs}
-        # no catch moves by more than a sample
-        furthest = max((abs(by) for _, by in shifts.values()), default=math.inf)
-        is_last = furthest < _period(made.trials)
-        made = _round(stretches, slow, replace(made.law, **found), options, instants)
-        if is_last:
-            break
-    return made
-
-
-def _round(
-    stretches: Mapping[str, Stretch],
-    slow: SlowFit,
-    law: Law,
-    options: FitOptions,
-    instants: Mapping[str, float] | None = None,
-) -> Round:
-    constants, level, instants = options.constants, options.level, instants or {}
-    fast = [
-        fast_trial(stretch, name, constants, law, options.window, instants.get(name))
-        for name, stretch in stretches.items()
-        if stretch.pace == "fast"
-    ]
-    caught = [trial for trial in fast if trial.catch is not None]
-    trials = [*slow.trials, *caught]
-    # steps take what earlier ones found as known
-    alone = replace(law, **{k: v for k, v in slow.values.items() if k in ALWAYS})
-    read = {
-        trial.name: levels
-        for trial in caught
-        if (levels := catch_levels(trial, alone, constants))
-    }
-    post = fit_post_catch(list(read.values()), level=level)
-    limits = _limits(
-        trials, list(read), alone, post["post_catch_stiffness"].value, options
-    )
-    steps, on_line = [slow.step], {}
-    if caught:
-        catches = [trial.catch for trial in caught if trial.catch is not None]
-        used = [t.catch for t in caught if t.catch is not None and t.name in read]
-        behind = [limit for limit in limits if limit is not None]
-        steps += [
-            fit_catch_line(catches, constants, level=level),
-            *fit_catches(used, list(read.values()), behind, level=level),
-            post,
-        ]
-        lies = on_the_line(catches, constants).tolist()
-        on_line = {trial.name: on for trial, on in zip(caught, lies, strict=True)}
-    start = _start(steps, options, law)
-    known = Known(
-        names=tuple(name for name, value in start.items() if not math.isnan(value)),
-        constants=constants,
-        spreads=_spreads(steps),
-        law=law,
-        offset=options.offset,
-        drifts="drift" in options.fitted,
-    )
-    equations = [
-        Equations(t, replace(known, on_line=on_line.get(t.name, False), limit=limit))
-        for t, limit in zip(trials, limits, strict=True)
-    ]
-    lowest = {name: _BELOW * n * _period(trials) for name, n in _FLOORS.items()}
-    return Round(
-        fast=fast,
-        trials=trials,
-        law=law,
-        limits=limits,
-        steps=steps,
-        solution=fit_together(equations, start, lowest),
-    )
-
-
-def _limits(
-    trials: Sequence[Trial],
-    read: Sequence[str],
-    law: Law,
-    stiffness: float,
-    options: FitOptions,
-) -> list[DetectionLimit | None]:
-    # Of catches that do not end, if those that do tell how much travels differ. With
-    # m, or where the pre-catch law goes on after a catch, the torque may climb or not
-    # whatever k_post is: what could have been seen is not one angle.
-    used = [t.catch for t in trials if t.catch is not None and t.name in read]
-    seen = {catch.travel for catch in used if catch.end is not None}
-    climbs_alone = options.constants.post_catch == "continuous" and law.inertia == 0.0
-    if not climbs_alone or len(seen) < 2:
-        return [None] * len(trials)
-    return [
-        detection_limit(trial, stiffness, options.constants)
-        if trial.name in read and trial.catch is not None and trial.catch.end is None
-        else None
-        for trial in trials
-    ]
-
-
-def _start(steps: Sequence[Step], options: FitOptions, law: Law) -> dict[str, float]:
-    start = dict.fromkeys(QUANTITIES, math.nan)
-    start |= {e.name: e.value for step in steps for e in step.estimates}
-    has_catch = not math.isnan(start["catch_torque_constant"])
-    for name in ARM_QUANTITIES:
-        if name in options.fitted and (has_catch or name not in _FLOORS):
-            start[name] = float(getattr(law, name))
-    return start
-
-
-def _spreads(steps: Sequence[Step]) -> dict[str, float]:
-    # of one trial, or of none that differ, any size serves
-    sds = {e.name: step.residual_sd for step in steps for e in step.estimates}
-    of = {
-        "torque": "damping",
-        "peak": "catch_torque_constant",
-        "residual": "residual_ratio",
-        "catch angle": "catch_slope",
-        "travel": "catch_travel",
-    }
-    sizes = {kind: sds.get(name, math.nan) for kind, name in of.items()}
-    return {kind: sd if sd > 0.0 else 1.0 for kind, sd in sizes.items()}
 
 
 def fit(
@@ -518,7 +192,6 @@ def fit(
     lag: Term = "off",
     rise: Term = "off",
     slow_below: float | None = None,
-    window: float = _WINDOW,
     level: float = 0.95,
 ) -> ElbowFit:
     """Identify the joint that made these recordings.
@@ -552,9 +225,6 @@ def fit(
     slow_below : float, optional
         A stretch whose speed stays below is slow, rad/s; ν_th by default, below which
         nothing can catch.
-    window : float, optional
-        Length of the window of the filter that gives speed and acceleration, s; of 7
-        samples at least.
     level : float, optional
         Level of the confidence intervals.
 
@@ -600,7 +270,6 @@ def fit(
         gravity_angle=gravity_angle,
         inertia=inertia,
         slow_below=held.speed_threshold if slow_below is None else slow_below,
-        window=window,
         level=level,
     )
     movements = [
@@ -614,108 +283,112 @@ def fit(
             f"beside each recording names; got some of {', '.join(models)}"
         )
     stretches, rest_sd = _stretches(movements, options)
-    trials = _slow_trials(stretches, options.slow_below)
-    slow, made, reasons = _fitted(trials, stretches, options)
-    for trial in (*slow.trials, *made.fast):
+    slow = fit_slow(_slow_trials(stretches, options.slow_below), options)
+    _check_slow(slow, stretches, options)
+    last = fit_in_rounds(stretches, slow, options)
+    reasons: dict[str, str] = {}
+    while untimed := untimed_terms(last):
+        reasons |= untimed
+        terms: dict[str, Term] = {**options.terms, **dict.fromkeys(untimed, 0.0)}
+        options = replace(options, terms=terms)
+        last = fit_in_rounds(stretches, slow, options)
+    for trial in (*slow.trials, *last.fast):
         if trial.remark:
-            _warn(f"{trial.name}: {trial.remark}")
-    result = _result(movements, slow, made, options, rest_sd, reasons)
+            warn_caller(f"{trial.stretch.name}: {trial.remark}", RecordingWarning)
+    result = _result(movements, slow, last, options, rest_sd, reasons)
     lone = [
         ALL_QUANTITIES[estimate.name].symbol
         for estimate in result.estimates
         if estimate.reason is not None and not math.isnan(estimate.value)
     ]
     if lone:
-        warnings.warn(
+        warn_caller(
             f"{', '.join(lone)}: too few trials to say how trials differ; there is no "
             "interval",
             SmallSampleWarning,
-            stacklevel=2,
         )
     return result
 
 
 def _stretches(
     movements: Sequence[Movement], options: FitOptions
-) -> tuple[dict[str, Stretch], float]:
-    # by name, and the median noise at rest
-    named: dict[str, Stretch] = {}
+) -> tuple[list[Stretch], float]:
+    # all of them, and the median noise at rest
+    stretches: list[Stretch] = []
     noise = []
     for movement in movements:
-        here, rest_sd = find_stretches(
-            movement, window=options.window, slow_below=options.slow_below
-        )
+        here, rest_sd = find_stretches(movement, options.slow_below)
         noise += [] if math.isnan(rest_sd) else [rest_sd]
         if not here:
-            _warn(f"{movement.name}: no extension of 15 degrees or more; not used")
-        for number, stretch in enumerate(here, start=1):
-            name = movement.name if len(here) == 1 else f"{movement.name} #{number}"
-            if name in named:
-                raise RecordingError(f"{name}: the recording is there twice")
-            named[name] = stretch
-    if not named:
+            words = "no extension of 15 degrees or more; not used"
+            warn_caller(f"{movement.name}: {words}", RecordingWarning)
+        for stretch in here:
+            if stretch.name in {other.name for other in stretches}:
+                raise RecordingError(f"{stretch.name}: the recording is there twice")
+            stretches.append(stretch)
+    if not stretches:
         raise RecordingError(
             "recordings: none has an extension of 15 degrees or more; the angle must "
             "grow with extension"
         )
-    return named, float(np.median(noise)) if noise else math.nan
+    return stretches, float(np.median(noise)) if noise else math.nan
 
 
-def _slow_trials(stretches: Mapping[str, Stretch], limit: float) -> list[Trial]:
-    slow = [
-        slow_trial(stretch, name)
-        for name, stretch in stretches.items()
-        if stretch.pace == "slow"
-    ]
+def _slow_trials(stretches: Sequence[Stretch], limit: float) -> list[Trial]:
+    slow = [slow_trial(stretch) for stretch in stretches if stretch.pace == "slow"]
     used = [trial for trial in slow if trial.pre_catch.time.size]
     for trial in slow:
-        if trial not in used:
+        if not trial.pre_catch.time.size:
             why = trial.remark or "too short for the filter of slow stretches"
-            _warn(f"{trial.name}: {why}; not used")
-    if slow and not used:
-        raise RecordingError(
-            f"recordings: b and k need a slow stretch; none of {len(slow)} can be used"
-        )
-    if not used:
-        slowest = min(stretch.peak_speed for stretch in stretches.values())
-        raise RecordingError(
+            warn_caller(f"{trial.stretch.name}: {why}; not used", RecordingWarning)
+    slowest = min(stretch.peak_speed for stretch in stretches)
+    refuse(
+        (
+            slow and not used,
+            f"recordings: b and k need a slow stretch; none of {len(slow)} can be used",
+        ),
+        (
+            not used,
             "recordings: b and k need a slow stretch, one whose speed stays below "
             f"{math.degrees(limit):g} deg/s; the slowest of {len(stretches)} reaches "
-            f"{math.degrees(slowest):.3g} deg/s. --slow-below raises the limit"
-        )
+            f"{math.degrees(slowest):.3g} deg/s. --slow-below raises the limit",
+        ),
+        error=RecordingError,
+    )
     return used
 
 
-def _fitted(
-    trials: Sequence[Trial], stretches: Mapping[str, Stretch], options: FitOptions
-) -> tuple[SlowFit, Round, dict[str, str]]:
-    # with why a lag or a rise that was to be fitted is not
-    slow = slow_fit(trials, options)
-    _check_slow(slow, stretches, options)
-    made = fit_in_rounds(stretches, slow, options)
-    reasons: dict[str, str] = {}
-    while untimed := made.untimed():
-        reasons |= untimed
-        terms: dict[str, Term] = {**options.terms, **dict.fromkeys(reasons, 0.0)}
-        made = fit_in_rounds(stretches, slow, replace(options, terms=terms))
-    return slow, made, reasons
+def _slow_errors(slow: JointFit) -> dict[str, float]:
+    # standard errors, of one trial those of its samples, of which the filter leaves one
+    # in so many independent
+    errors = {name: e.standard_error for name, e in slow.alone.items()}
+    told = slow.alone["damping"].value + slow.alone["stiffness"].value
+    if len(slow.trials) > 1 or math.isnan(told):
+        return errors
+    (rows,), time = slow.rows(), slow.trials[0].pre_catch.time
+    period = float(np.median(np.diff(time))) if time.size > 1 else 1.0
+    inverse = np.linalg.pinv(rows.design.T @ rows.design, hermitian=True)
+    df = max(time.size / max(SLOW_WINDOW / period, 1.0) - len(inverse) - 1, 1.0)
+    sds = np.sqrt(float(rows.target @ rows.target) / df * np.diag(inverse))
+    return dict(zip(errors, sds.tolist(), strict=True))
 
 
 def _check_slow(
-    slow: SlowFit, stretches: Mapping[str, Stretch], options: FitOptions
+    slow: JointFit, stretches: Sequence[Stretch], options: FitOptions
 ) -> None:
     # b and k are told by their error: what it does to the torque of these stretches
+    errors = _slow_errors(slow)
     torque = max(float(np.ptp(t.pre_catch.torque)) for t in slow.trials)
-    speed = max(stretch.peak_speed for stretch in stretches.values())
-    travel = max(float(np.ptp(stretch.angle)) for stretch in stretches.values())
+    speed = max(stretch.peak_speed for stretch in stretches)
+    travel = max(float(np.ptp(stretch.angle)) for stretch in stretches)
     for name, size in (("damping", speed), ("stiffness", travel)):
-        estimate, symbol = slow.step[name], QUANTITIES[name].symbol
+        estimate, symbol = slow.alone[name], QUANTITIES[name].symbol
         df = estimate.df if estimate.df > _MIN_DF else _MIN_DF
-        whole = 2.0 * slow.errors[name] * float(stdtrit(df, 0.5 + 0.5 * options.level))
+        whole = 2.0 * errors[name] * float(stdtrit(df, 0.5 + 0.5 * options.level))
         # an error that matters: of the value, and of the torque at the largest speed
         unsure = whole > abs(estimate.value) and whole * size > torque
         if math.isnan(estimate.value) or unsure:
-            raise RecordingError(_untold(name, estimate.value, slow, options))
+            raise RecordingError(_untold(estimate, errors[name], slow, options))
         if estimate.high < 0.0:
             raise RecordingError(
                 f"recordings: this is not the law: {symbol} is {estimate.value:.4g}, "
@@ -723,16 +396,19 @@ def _check_slow(
                 "resist extension, and the angle grow with it: are both signs right?"
             )
         if estimate.value < 0.0:
-            _warn(
+            warn_caller(
                 f"{symbol} is negative ({estimate.value:.4g}): torque must resist "
-                "extension, and the angle grow with it; are both signs right?"
+                "extension, and the angle grow with it; are both signs right?",
+                RecordingWarning,
             )
 
 
-def _untold(name: str, value: float, slow: SlowFit, options: FitOptions) -> str:
-    symbol, error = QUANTITIES[name].symbol, slow.errors[name]
+def _untold(
+    estimate: FittedParameter, error: float, slow: JointFit, options: FitOptions
+) -> str:
+    symbol = QUANTITIES[estimate.name].symbol
     if not math.isnan(error):
-        symbol += f" ({value:.3g}, standard error {error:.2g})"
+        symbol += f" ({estimate.value:.3g}, standard error {error:.2g})"
     parts = [trial.pre_catch for trial in slow.trials]
     drifts = own_drifts(parts, options.gravity_angle)
     if "drift" not in options.fitted and drifts and drifts.p_value < LEVEL:
@@ -741,7 +417,7 @@ def _untold(name: str, value: float, slow: SlowFit, options: FitOptions) -> str:
             f"its own way (p {p_text(drifts.p_value)}); try --drift fitted"
         )
     remedy = "they need a speed that varies within a stretch"
-    if options.offset is None:
+    if "offset" in options.fitted:
         remedy += (
             ", or, at constant speeds that differ between stretches, a sensor whose "
             "zero is known (--offset)"
@@ -754,80 +430,91 @@ def _untold(name: str, value: float, slow: SlowFit, options: FitOptions) -> str:
 
 def _result(
     movements: Sequence[Movement],
-    slow: SlowFit,
-    made: Round,
+    slow: JointFit,
+    last: JointFit,
     options: FitOptions,
     rest_sd: float,
     untimed: Mapping[str, str],
 ) -> ElbowFit:
-    joint, values = joint_fit(made.solution), made.solution.values
-    reasons = {**_reasons(made, options), **untimed}
-    estimates = _all_estimates(joint, made, reasons, options)
+    shared, reasons = last.clustered(), {**_reasons(last, options), **untimed}
+    estimates = _all_estimates(shared, last, reasons, options)
     _check_law(estimates)
-    terms = {**options.terms, **dict.fromkeys(untimed, 0.0)}
+    law = fitted_law(last)
+    levels = [catch_levels(trial, law) for trial in last.trials]
     return ElbowFit(
         estimates=estimates,
-        correlation=_correlation(joint, made, estimates),
-        steps=tuple(made.steps),
-        relative_error=slow.relative_error,
-        torque_sd=joint.torque_sd,
-        lack_of_fit=lack_of_fit(made.solution, joint.tables, rest_sd),
-        cross_validation=joint.cross_validation,
-        trials=tuple(made.trials),
-        fitted_torque=made.solution.laws,
+        correlation=_correlation(shared, last, estimates),
+        steps=last.steps,
+        relative_error=_relative_error(slow),
+        torque_sd=last.torque_sd,
+        lack_of_fit=lack_of_fit(last, rest_sd),
+        cross_validation=left_out_errors(last),
+        trials=tuple(last.trials),
+        levels=tuple(read for read in levels if read is not None),
+        fitted_torque=last.laws,
         constants=options.constants,
-        arm={**terms, "gravity_angle": options.gravity_angle},
-        offsets=tuple(each["offset"] for each in values),
-        drifts=tuple(each["drift"] for each in values),
+        arm={**options.terms, "gravity_angle": options.gravity_angle},
+        offsets=tuple(values["offset"] for values in last.values),
+        drifts=tuple(values["drift"] for values in last.values),
         level=options.level,
         simulated=any(movement.simulated for movement in movements),
         sources={m.name: m.sha256 for m in movements},
-        remarks=_remarks(movements, estimates, made),
+        remarks=_remarks(movements, estimates, last),
     )
+
+
+def _relative_error(slow: JointFit) -> float:
+    size = sum(float(np.abs(e.part.measured).sum()) for e in slow.equations)
+    far = float(np.abs(np.concatenate(slow.residuals)).sum())
+    return far / size if size > 0.0 else math.nan
 
 
 def _check_law(estimates: Sequence[FittedParameter]) -> None:
     for estimate in estimates:
-        if estimate.name == "residual_ratio" and estimate.low >= 1.0:
-            raise RecordingError(
-                f"recordings: this is not the law: Q is {estimate.value:.3g}, 1 or "
-                f"more beyond its error (from {estimate.low:.3g}): the torque does not "
-                "fall from a peak to a residual"
-            )
-        most = _MAX_BELOW_0.get(estimate.name, math.inf)
-        if estimate.value + most * (estimate.high - estimate.value) < 0.0:
-            symbol = ALL_QUANTITIES[estimate.name].symbol
-            raise RecordingError(
+        name, value = estimate.name, estimate.value
+        symbol, most = ALL_QUANTITIES[name].symbol, _MAX_BELOW_0.get(name, math.inf)
+        refuse(
+            (
+                name == "residual_ratio" and estimate.low >= 1.0,
+                f"recordings: this is not the law: Q is {value:.3g}, 1 or more beyond "
+                f"its error (from {estimate.low:.3g}): the torque does not fall from a "
+                "peak to a residual",
+            ),
+            (
+                value + most * (estimate.high - value) < 0.0,
                 f"recordings: this is not the law: {symbol} of all trials is "
-                f"{estimate.value:.4g}, below 0 by more than its error (to "
-                f"{estimate.high:.4g}); are the signs of torque and angle right?"
-            )
+                f"{value:.4g}, below 0 by more than its error (to "
+                f"{estimate.high:.4g}); are the signs of torque and angle right?",
+            ),
+            error=RecordingError,
+        )
 
 
-def _reasons(made: Round, options: FitOptions) -> dict[str, str]:
+def _reasons(last: JointFit, options: FitOptions) -> dict[str, str]:
     # why the steps do not determine what they do not
-    if all(trial.catch is None for trial in made.fast):
+    if all(trial.catch is None for trial in last.fast):
         why = "there are only slow stretches, in which nothing catches"
-        if made.fast:
+        if last.fast:
             why = "no fast stretch has a catch that can be used"
         names = [name for name in QUANTITIES if name not in ALWAYS]
         names += [name for name in options.fitted if name in ("lag", "catch_rise")]
         return dict.fromkeys(names, why)
-    estimates = [e for step in made.steps for e in step.estimates]
-    return {e.name: e.reason for e in estimates if e.reason is not None}
+    return {name: e.reason for name, e in last.alone.items() if e.reason is not None}
 
 
 def _all_estimates(
-    joint: JointFit, made: Round, reasons: Mapping[str, str], options: FitOptions
+    shared: ClusteredFit,
+    last: JointFit,
+    reasons: Mapping[str, str],
+    options: FitOptions,
 ) -> tuple[FittedParameter, ...]:
     # Where travels are censored, D is that of its step. Least squares hold the spread
     # of travels and know less than they say; and they draw each end towards D, by
     # which that spread would come out too small.
-    level, names = options.level, list(made.shared)
-    by_name = {e.name: e for e in fitted(names, joint.fit, level, reasons)}
-    if any(each is not None for each in made.limits):
-        whole = {e.name: e for step in made.steps for e in step.estimates}
-        by_name["catch_travel"] = whole["catch_travel"]
+    level, names = options.level, list(last.shared)
+    by_name = {e.name: e for e in fitted(names, shared, level, reasons)}
+    if _n_censored(last):
+        by_name["catch_travel"] = last.alone["catch_travel"]
     optional = {"inertia", *ARM_QUANTITIES} - set(options.fitted) - set(reasons)
     for name in ALL_QUANTITIES:
         if name not in by_name and name not in optional:
@@ -836,20 +523,24 @@ def _all_estimates(
     return tuple(by_name[name] for name in ALL_QUANTITIES if name in by_name)
 
 
+def _n_censored(last: JointFit) -> int:
+    return sum(e.limit is not None for e in last.equations)
+
+
 def _correlation(
-    joint: JointFit, made: Round, estimates: Sequence[FittedParameter]
+    shared: ClusteredFit, last: JointFit, estimates: Sequence[FittedParameter]
 ) -> _Floats:
-    names = list(made.shared)
+    names = list(last.shared)
     places = [names.index(e.name) if e.name in names else -1 for e in estimates]
-    sd = np.sqrt(np.diag(joint.fit.covariance))
+    sd = np.sqrt(np.diag(shared.covariance))
     whole = np.full((len(sd) + 1, len(sd) + 1), np.nan)
     with np.errstate(invalid="ignore", divide="ignore"):
-        whole[:-1, :-1] = joint.fit.covariance / np.outer(sd, sd)
+        whole[:-1, :-1] = shared.covariance / np.outer(sd, sd)
     return whole[np.ix_(places, places)]
 
 
 def _remarks(
-    movements: Sequence[Movement], estimates: Sequence[FittedParameter], made: Round
+    movements: Sequence[Movement], estimates: Sequence[FittedParameter], last: JointFit
 ) -> tuple[str, ...]:
     # first which torque it is, of recordings of masrel's driver
     texts: dict[TorqueSource, str] = {
@@ -858,10 +549,10 @@ def _remarks(
         "model": "what the joint model asked for, not measured",
     }
     n_from = Counter(movement.torque_source for movement in movements)
-    catches = [trial.catch for trial in made.trials if trial.catch is not None]
+    catches = [trial.catch for trial in last.trials if trial.catch is not None]
     unended = sum(catch.end is None for catch in catches)
-    behind = sum(limit is not None for limit in made.limits)
-    unused = sum(trial.catch is None for trial in made.fast)
+    behind = _n_censored(last)
+    unused = sum(trial.catch is None for trial in last.fast)
     remarks = [
         f"Torque of {n_from[source]} of {len(movements)} recordings: {text}"
         for source, text in texts.items()
@@ -883,13 +574,8 @@ def _remarks(
             "short one are left, and D is underestimated"
         )
     if unused:
-        remarks.append(f"{unused} of {len(made.fast)} fast stretches are not used")
+        remarks.append(f"{unused} of {len(last.fast)} fast stretches are not used")
     return tuple(remarks)
-
-
-def _warn(message: str) -> None:
-    # called by what `fit` calls: the warning points to who called that
-    warnings.warn(message, RecordingWarning, stacklevel=4)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -970,7 +656,7 @@ def compare_fits(
                 fits.append(((term,), None, str(error)))
     squares = [
         {
-            trial.name: value
+            trial.stretch.name: value
             for trial, value in zip(made.trials, made.cross_validation, strict=True)
             if math.isfinite(value)
         }

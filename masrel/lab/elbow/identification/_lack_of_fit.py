@@ -18,7 +18,7 @@ from scipy.special import fdtrc, stdtr
 
 from masrel.lab.elbow.identification._catches import Part
 from masrel.lab.elbow.identification._clusters import Rows, partial_out, solve
-from masrel.lab.elbow.identification._equations import LINEAR, Equations, Solution
+from masrel.lab.elbow.identification._equations import LINEAR, Equations, JointFit
 
 _Floats = NDArray[np.float64]
 
@@ -173,9 +173,8 @@ class LackOfFit:
             return f"Fits: {nothing}; {share}."
         if self.verdict == "no evidence either way":
             most = max(_not_noise(self.phases, self.rest_sd), key=lambda left: left.sd)
-            at_rest = "unknown"
-            if not math.isnan(self.rest_sd):
-                at_rest = f"{self.rest_sd:.2g} N·m"
+            is_known = not math.isnan(self.rest_sd)
+            at_rest = f"{self.rest_sd:.2g} N·m" if is_known else "unknown"
             return (
                 f"No evidence either way: {nothing}, but what is left is not noise "
                 f"({most.phase}: {most.sd:.2g} N·m, autocorrelation "
@@ -190,15 +189,10 @@ class LackOfFit:
         )
 
 
-def lack_of_fit(
-    solution: Solution, tables: Sequence[_Floats], rest_sd: float
-) -> LackOfFit:
-    """Return what a fit leaves over, and whether that goes with anything.
-
-    `tables` are the equations' at the solution.
-    """
-    equations, laws = solution.equations, solution.laws
-    added = list(map(_added, equations, solution.values, laws))
+def lack_of_fit(joint: JointFit, rest_sd: float) -> LackOfFit:
+    """Return what a fit leaves over, and whether that goes with anything."""
+    equations, left = joint.equations, joint.residuals
+    added = list(map(_added, equations, joint.values, joint.laws))
     # of catches that outlast their stretch, those that end are the short ones
     unended = any(e.catch is not None and e.catch.end is None for e in equations)
     names = [
@@ -209,17 +203,17 @@ def lack_of_fit(
     ]
     # rows of [shared | residuals | added] of each trial
     rest = []
-    for e, table, columns in zip(equations, tables, added, strict=True):
+    for e, table, columns in zip(equations, joint.tables, added, strict=True):
         more = [columns.get(name, np.zeros(table.shape[0])) for name in names]
         rest.append(partial_out(np.column_stack([table, *more]), len(e.local)))
-    n = len(equations[0].known.names)
-    found = [_test(name, n, n + 1 + i, rest) for i, name in enumerate(names)]
-    first = equations[0].known
-    if not first.drifts and len(equations) >= _MIN_TRIALS:
-        slow = [e.trial.pre_catch for e in equations if e.trial.pace == "slow"]
-        found.append(own_drifts(slow, first.law.gravity_angle))
-    tests = _holm([test for test in found if test is not None])
-    phases = _phases(equations, laws)
+    n = len(joint.shared)
+    tests = [_test(name, n, n + 1 + i, rest) for i, name in enumerate(names)]
+    first = equations[0].held
+    if "drift" not in first.fitted and len(equations) >= _MIN_TRIALS:
+        slow = [e.trial.pre_catch for e in equations if e.trial.stretch.pace == "slow"]
+        tests.append(own_drifts(slow, first.gravity_angle))
+    adjusted = _holm([test for test in tests if test is not None])
+    phases = _phases(equations, left)
     before, after = (
         [p for p in phases if (p.phase in ("slow", "pre-catch")) is early]
         for early in (True, False)
@@ -228,19 +222,18 @@ def lack_of_fit(
     if before and after and _pooled(before) > 0.0:
         ratio = _pooled(after) / _pooled(before)
     verdict: Verdict = "undecided"
-    if ratio > _MAX_RATIO or (tests and tests[0].adjusted < LEVEL):
+    if ratio > _MAX_RATIO or (adjusted and adjusted[0].adjusted < LEVEL):
         verdict = "does not fit"
-    elif tests:
+    elif adjusted:
         is_noise = not _not_noise(phases, rest_sd)
         verdict = "fits" if is_noise else "no evidence either way"
     measured = [e.part.measured for e in equations if e.part.measured.size]
     whole = sum(float(((m - m.mean()) ** 2).sum()) for m in measured)
-    left = [e.part.measured - law for e, law in zip(equations, laws, strict=True)]
     far = sum(float((each**2).sum()) for each in left)
     return LackOfFit(
         verdict=verdict,
         level=LEVEL,
-        tests=tests,
+        tests=adjusted,
         explained=1.0 - far / whole if whole > 0.0 else math.nan,
         phases=phases,
         after_to_before=ratio,
@@ -307,25 +300,25 @@ def _added(
     if catch is not None and after is not None:
         # what the law holds from the catch on
         held = np.arange(n) >= e.n_pre
-        if e.known.constants.post_catch == "additive":
+        if e.held.constants.post_catch == "additive":
             held &= e.part.time < e.end
         angle, speed = (
             np.where(held, catch.angle, angle),
             np.where(held, catch.speed, speed),
         )
         since, end = e.part.time - catch.time, e.end - catch.time
-        peak_end = e.known.constants.peak_duration
+        peak_end = e.held.constants.peak_duration
         slope = np.clip(np.minimum(since, end) - peak_end, 0.0, None)
         slope[: e.n_pre] = 0.0
         past = e.part.angle - catch.angle - values.get("travel", catch.travel)
         past = np.where(since >= end, np.maximum(past, 0.0), 0.0)
         columns |= {"residual slope": slope, "bent climb": past**2}
         for name, more in (("lag", _LAG), ("catch_rise", _RISE)):
-            timed = {**values, name: getattr(e.known.law, name) + more}
+            timed = {**values, name: getattr(e.held, name) + more}
             columns[name] = e.law(timed) - law
     columns |= {"bent stiffness": angle**2, "bent damping": speed**2}
     rows = [name for name, _, _ in e.catch_rows(values)]
-    sd, fitted = e.known.spreads["torque"], {*e.known.names, *e.local}
+    sd, fitted = e.spreads["torque"], {*e.names, *e.local}
     columns = {
         name: np.append(column / sd, np.zeros(len(rows)))
         for name, column in columns.items()
@@ -397,20 +390,20 @@ def _left(design: _Floats, target: _Floats) -> tuple[float, int]:
 
 
 def _phases(
-    equations: Sequence[Equations], laws: Sequence[_Floats]
+    equations: Sequence[Equations], left: Sequence[_Floats]
 ) -> tuple[PhaseResidual, ...]:
     pieces: dict[str, list[_Floats]] = {name: [] for name in _PHASES}
-    for e, law in zip(equations, laws, strict=True):
+    for e, torque in zip(equations, left, strict=True):
         time, place = e.part.time, np.zeros(e.part.time.size, dtype=np.int64)
-        if e.trial.pace == "fast":
+        if e.trial.stretch.pace == "fast":
             place[:] = 1
         if e.catch is not None:
-            peak_end = min(e.catch.time + e.known.constants.peak_duration, e.end)
+            peak_end = min(e.catch.time + e.held.constants.peak_duration, e.end)
             later = 2 + np.where(time < peak_end, 0, np.where(time < e.end, 1, 2))
             place[e.n_pre :] = later[e.n_pre :]
         for i, name in enumerate(_PHASES):
-            left = (e.part.measured - law)[place == i]
-            pieces[name] += [left] if left.size > 2 else []
+            piece = torque[place == i]
+            pieces[name] += [piece] if piece.size > 2 else []
     return tuple(_phase(name, each) for name, each in pieces.items() if each)
 
 

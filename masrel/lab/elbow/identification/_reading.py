@@ -7,7 +7,6 @@ what must not be used marked.
 import csv
 import hashlib
 import math
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,7 +15,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from masrel._input import not_utf8, refuse
+from masrel._input import not_utf8, refuse, warn_caller
 from masrel.errors import RecordingError, RecordingWarning
 from masrel.lab._study_files import MAX_RECORDING, read_regular
 from masrel.lab.recording import (
@@ -104,16 +103,20 @@ class Movement:
     sha256: str | None = None
 
     def __post_init__(self) -> None:
-        columns = [self.time, self.angle, self.torque]
-        if self.velocity is not None:
-            columns.append(self.velocity)
-        if len({column.shape for column in columns}) != 1 or self.time.ndim != 1:
-            raise RecordingError(
+        optional = [] if self.velocity is None else [self.velocity]
+        columns = [self.time, self.angle, self.torque, *optional]
+        refuse(
+            (
+                len({column.shape for column in columns}) != 1 or self.time.ndim != 1,
                 f"{self.name}: columns need one length, got shapes "
-                f"{', '.join(str(column.shape) for column in columns)}"
-            )
-        if not all(np.isfinite(column).all() for column in columns):
-            raise RecordingError(f"{self.name}: columns need finite numbers")
+                f"{', '.join(str(column.shape) for column in columns)}",
+            ),
+            (
+                not all(np.isfinite(column).all() for column in columns),
+                f"{self.name}: columns need finite numbers",
+            ),
+            error=RecordingError,
+        )
         _check_time(self.name, self.time)
         _check_sizes(self.name, self.angle, self.torque)
         object.__setattr__(self, "saturated", _saturated(self.name, self.torque))
@@ -145,22 +148,26 @@ def _check_time(name: str, time: _Floats) -> None:
 def _check_sizes(name: str, angle: _Floats, torque: _Floats) -> None:
     low, high = math.degrees(angle.min()), math.degrees(angle.max())
     largest = float(np.abs(torque).max())
+    is_small, needed = high - low < math.degrees(MIN_TRAVEL), math.degrees(MIN_TRAVEL)
     message = f"{name}: got angles from {low:.4g} to {high:.4g} degrees and torques "
     message += f"to {largest:.4g} N·m"
-    if largest > _MAX_TORQUE:
-        if high - low < math.degrees(MIN_TRAVEL) or largest < 180.0:
-            raise RecordingError(
-                f"{message}; are the columns of angle and torque swapped?"
-            )
-        raise RecordingError(f"{message}; is the unit of torque right?")
-    if angle.min() < _ANGLE_RANGE[0] or angle.max() > _ANGLE_RANGE[1]:
-        raise RecordingError(f"{message}; is the unit of the angle right?")
-    if angle.max() - angle.min() < MIN_TRAVEL:
-        needed = math.degrees(MIN_TRAVEL)
-        raise RecordingError(
+    refuse(
+        (
+            largest > _MAX_TORQUE and (is_small or largest < 180.0),
+            f"{message}; are the columns of angle and torque swapped?",
+        ),
+        (largest > _MAX_TORQUE, f"{message}; is the unit of torque right?"),
+        (
+            angle.min() < _ANGLE_RANGE[0] or angle.max() > _ANGLE_RANGE[1],
+            f"{message}; is the unit of the angle right?",
+        ),
+        (
+            angle.max() - angle.min() < MIN_TRAVEL,
             f"{message}; a stretch travels {needed:g} degrees or more. Is the unit of "
-            "the angle right, and is its column not the torque's?"
-        )
+            "the angle right, and is its column not the torque's?",
+        ),
+        error=RecordingError,
+    )
 
 
 def _saturated(name: str, torque: _Floats) -> NDArray[np.bool_]:
@@ -175,12 +182,11 @@ def _saturated(name: str, torque: _Floats) -> NDArray[np.bool_]:
         return np.zeros(torque.size, dtype=np.bool_)
     marked = np.repeat(extreme, lengths)
     limits = ", ".join(f"{value:.4g}" for value in np.unique(torque[marked]))
-    warnings.warn(
+    warn_caller(
         f"{name}: the torque stays at {limits} N·m for {int(marked.sum())} samples: "
         "the sensor is saturated; these samples are left out, and a stretch whose "
         "peak they cut off gives no H and Q",
         RecordingWarning,
-        stacklevel=4,
     )
     return marked
 
@@ -194,12 +200,6 @@ _UNITS: dict[str, dict[str, float]] = {
 }
 
 
-class _Column(NamedTuple):
-    # of a recording, and the size of its unit in SI
-    name: str
-    factor: float
-
-
 def _find_columns(
     names: Sequence[str],
     *,
@@ -207,8 +207,9 @@ def _find_columns(
     columns: Mapping[str, str],
     units: Mapping[str, str],
     quantities: Iterable[str] = _UNITS,
-) -> dict[str, _Column]:
-    # the columns of time, angle, torque and, if there is one, velocity
+) -> dict[str, tuple[str, float]]:
+    # the columns of time, angle, torque and, if there is one, velocity, and the size of
+    # their units in SI
     refuse(
         *(
             (
@@ -228,45 +229,51 @@ def _find_columns(
     result = {}
     for quantity in quantities:
         forms = [f"{quantity}_{unit}" for unit in _UNITS[quantity]]
-        declared = columns.get(quantity)
-        fitting = [n for n in names if n.strip().lower() in (quantity, *forms)]
-        if declared is not None:
-            fitting = [declared]
-            if declared not in names:
-                raise RecordingError(
-                    f"{source}: needs the column {declared!r}, got {', '.join(names)}"
-                )
-        if len(fitting) > 1:
-            raise RecordingError(
-                f"{source}: needs one column of {quantity}, got {', '.join(fitting)}"
-            )
-        if fitting:
-            requested = units.get(quantity)
-            result[quantity] = _with_unit(fitting[0], quantity, source, requested)
-        elif quantity != "velocity":
-            raise RecordingError(
+        named = [n for n in names if n.strip().lower() in (quantity, *forms)]
+        fitting = [columns[quantity]] if quantity in columns else named
+        refuse(
+            (
+                not set(fitting) <= set(names),
+                f"{source}: needs the column {columns.get(quantity)!r}, got "
+                f"{', '.join(names)}",
+            ),
+            (
+                len(fitting) > 1,
+                f"{source}: needs one column of {quantity}, got {', '.join(fitting)}",
+            ),
+            (
+                not fitting and quantity != "velocity",
                 f"{source}: needs a column of {quantity}: {', '.join(forms)}, or its "
-                f"name given; got {', '.join(names) or 'no columns'}"
-            )
+                f"name given; got {', '.join(names) or 'no columns'}",
+            ),
+            error=RecordingError,
+        )
+        for name in fitting:
+            factor = _factor(name, quantity, source, units.get(quantity))
+            result[quantity] = name, factor
     return result
 
 
-def _with_unit(name: str, quantity: str, source: str, requested: str | None) -> _Column:
+def _factor(name: str, quantity: str, source: str, requested: str | None) -> float:
+    # the size of the unit of a column, in SI
     units = _UNITS[quantity]
     suffix = name.strip().lower().removeprefix(f"{quantity}_")
-    if suffix in units and requested not in (None, suffix):
-        raise RecordingError(
+    unit = suffix if suffix in units else requested or ""
+    refuse(
+        (
+            suffix in units and requested not in (None, suffix),
             f"{source}: column {name} says {suffix}, units says {requested} for "
-            f"{quantity}"
-        )
-    unit = suffix if suffix in units else requested
-    if unit is None:
-        raise RecordingError(
+            f"{quantity}",
+        ),
+        (
+            not unit,
             f"{source}: column {name} has no unit: name it "
             f"{' or '.join(f'{quantity}_{u}' for u in units)}, or say the "
-            f"unit of {quantity}"
-        )
-    return _Column(name, units[unit])
+            f"unit of {quantity}",
+        ),
+        error=RecordingError,
+    )
+    return units[unit]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -299,7 +306,7 @@ def _read_archive(path: Path, content: bytes) -> _Table:
             name: column[: local.n_presented] for name, column in local.columns.items()
         }
         if faults := local.facts.get("channel_faults"):
-            warnings.warn(f"{path}: {faults}", RecordingWarning, stacklevel=4)
+            warn_caller(f"{path}: {faults}", RecordingWarning)
         model = local.facts.get("model")
     else:
         simulated = bool(np.any(arrays.pop("simulated", False)))
@@ -397,7 +404,7 @@ def read_angles(path: Path) -> tuple[_Floats, _Floats]:
         units={},
         quantities=("time", "angle"),
     )
-    time, angle = (table.column(c.name) * c.factor for c in columns.values())
+    time, angle = (table.column(name) * factor for name, factor in columns.values())
     return time, angle
 
 
@@ -468,8 +475,8 @@ def read_movement(
         source = "sensor" if MEASURED_TORQUE.column in table.names else "model"
         torque = MEASURED_TORQUE.column if source == "sensor" else _MODEL
         columns, units = {"torque": torque, **columns}, {"torque": "nm", **units}
-    result = _find_columns(table.names, source=str(path), columns=columns, units=units)
-    values = {key: table.column(column.name) for key, column in result.items()}
+    found = _find_columns(table.names, source=str(path), columns=columns, units=units)
+    values = {quantity: table.column(name) for quantity, (name, _) in found.items()}
     if of_device and source != "recorded":
         if source == "model":
             raise RecordingError(
@@ -477,24 +484,21 @@ def read_movement(
                 "does beside the torque that is sent only its sensor can tell"
             )
         values["torque"] = values["torque"] - table.column(_COMMANDED)
-    sizes = {result[key].name: column.size for key, column in values.items()}
+    sizes = {found[key][0]: column.size for key, column in values.items()}
     if len(set(sizes.values())) > 1:
         words = ", ".join(f"{name} {size}" for name, size in sizes.items())
         raise RecordingError(f"{path}: columns need one length, got {words}")
     whole = np.isfinite(np.stack(list(values.values()))).all(axis=0)
-    if not whole.all():
-        empty = {result[key].name: int(np.isnan(values[key]).sum()) for key in values}
+    if n_rows := int((~whole).sum()):
+        empty = {found[key][0]: int(np.isnan(values[key]).sum()) for key in values}
         words = ", ".join(f"{name} {count}" for name, count in empty.items() if count)
-        n_rows = int((~whole).sum())
-        rows, left = (
-            (f"{n_rows} rows have", "are") if n_rows > 1 else ("1 row has", "is")
-        )
-        warnings.warn(
-            f"{path}: {rows} an empty cell ({words}) and {left} left out",
+        rows = f"{n_rows} rows have" if n_rows > 1 else "1 row has"
+        are = "are" if n_rows > 1 else "is"
+        warn_caller(
+            f"{path}: {rows} an empty cell ({words}) and {are} left out",
             RecordingWarning,
-            stacklevel=2,
         )
-    si = {key: values[key][whole] * result[key].factor for key in values}
+    si = {key: values[key][whole] * found[key][1] for key in values}
     return Movement(
         name=str(path),
         time=si["time"],

@@ -6,8 +6,8 @@ https://doi.org/10.1109/TNSRE.2012.2195330, equations (1)-(6), Figs. 3 to 5.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +18,15 @@ from masrel.errors import ConvergenceError
 from masrel.lab.elbow.identification._catches import (
     MIN_GAIN,
     MIN_SIGNAL,
-    SLOW_WINDOW,
     Catch,
     CatchLevels,
+    Law,
+    Part,
     Trial,
+    catch_levels,
 )
 from masrel.lab.elbow.identification._clusters import (
+    UNDETERMINED,
     FittedParameter,
     Rows,
     Step,
@@ -32,10 +35,6 @@ from masrel.lab.elbow.identification._clusters import (
 )
 from masrel.lab.elbow.identification._equations import (
     DetectionLimit,
-    Equations,
-    Known,
-    fit_together,
-    joint_fit,
     line_row,
     mills,
 )
@@ -50,62 +49,78 @@ _CANDIDATES = 200  # ends that are tried, whatever the number of samples
 _DOUBLINGS = 60  # of a step towards a change of sign
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SlowFit:
-    """What slow trials say: b, k and m, and the paper's relative error (Fig. 3)."""
+def fit_catches(
+    trials: Sequence[Trial], law: Law, level: float
+) -> tuple[list[Step], dict[str, bool], dict[str, DetectionLimit]]:
+    """Fit what catches tell, with b, k and m as known.
 
-    trials: Sequence[Trial]
-    step: Step
-    relative_error: float
-    errors: Mapping[str, float]  # standard errors, of one trial those of its samples
-
-    @property
-    def values(self) -> dict[str, Any]:
-        """Return what was fitted, by name."""
-        return {e.name: e.value for e in self.step.estimates}
-
-
-def fit_slow(trials: Sequence[Trial], known: Known, *, level: float) -> SlowFit:
-    """Fit b, k, and of m, weight and drift what is fitted, to slow trials: step 1.
-
-    Each trial has a constant of its own, -k·θ_rest of (1) and the sensor's zero, unless
-    the offset is fixed.
+    The steps; by trial, whether its catch is on the line of (2); and where an end of
+    it would no longer have been seen, if that counts.
     """
-    equations = [Equations(trial, known) for trial in trials]
-    solution = fit_together(equations, dict.fromkeys(known.names, 0.0), {})
-    joint = joint_fit(solution)
-    fit, parts = joint.fit, [e.part for e in equations]
-    left = [part.measured - law for part, law in zip(parts, solution.laws, strict=True)]
-    away, size = (
-        np.concatenate(left),
-        sum(np.abs(part.measured).sum() for part in parts),
+    catches = [trial.catch for trial in trials if trial.catch is not None]
+    lies = on_the_line(catches, law.constants)
+    levels = {t.stretch.name: read for t in trials if (read := catch_levels(t, law))}
+    reads = list(levels.values())
+    climbs = [read.climb for read in reads if read.climb.design.any()]
+    post = _step(
+        "post-catch: k_post of (5)",
+        "post_catch_stiffness",
+        climbs,
+        level,
+        "no stretch goes on after its catch",
     )
-    step = Step(
-        name="slow trials: b, k of (1)",
-        estimates=fitted(known.names, fit, level),
-        residual_sd=math.sqrt(float((away**2).mean())),
-    )
-    errors = {e.name: e.standard_error for e in step.estimates}
-    if len(trials) == 1 and not np.isnan(fit.values[:2]).any():
-        rows = equations[0].rows(solution.shared, joint.tables[0])
-        sds = _errors_of_samples(parts[0].time, rows)
-        errors = dict(zip(errors, sds, strict=True))
-    return SlowFit(
-        trials=trials,
-        step=step,
-        relative_error=float(np.abs(away).sum() / size) if size > 0.0 else math.nan,
-        errors=errors,
-    )
+    limits = _limits(trials, levels, law, post.estimates[0].value)
+    peaks = [(read.catch.speed, read.peak) for read in reads]
+    residuals = [(read.peak, read.residual) for read in reads]
+    steps = [
+        fit_catch_line(catches, lies, law.constants, level=level),
+        _step("catch torque: H of (3)", "catch_torque_constant", _rows(peaks), level),
+        _step(
+            "residual torque: Q of (3)",
+            "residual_ratio",
+            _rows(residuals),
+            level,
+            "no torque was recorded after a peak",
+        ),
+        _travel([read.catch for read in reads], list(limits.values()), level),
+        post,
+    ]
+    on_line = dict(zip((t.stretch.name for t in trials), lies.tolist(), strict=True))
+    return steps, on_line, limits
 
 
-def _errors_of_samples(time: _Floats, rows: Rows) -> list[float]:
-    # of one trial, of which the filter leaves one sample in so many independent
-    period = float(np.median(np.diff(time))) if time.size > 1 else 1.0
-    inverse = np.linalg.pinv(rows.design.T @ rows.design, hermitian=True)
-    n_alike = max(SLOW_WINDOW / period, 1.0)
-    df = max(time.size / n_alike - len(inverse) - 1, 1.0)
-    squares = float(rows.target @ rows.target)
-    return [math.sqrt(squares / df * x) for x in np.diag(inverse)]
+def _step(
+    title: str, name: str, rows: list[Rows], level: float, reason: str = UNDETERMINED
+) -> Step:
+    # with nothing to fit, a value that no row determines
+    fit = solve(rows or [Rows(np.zeros((1, 1)), np.zeros(1))])
+    estimates = fitted((name,), fit, level, {name: reason})
+    return Step(name=title, estimates=estimates, residual_sd=fit.residual_sd)
+
+
+def _rows(pairs: Sequence[tuple[float, float]]) -> list[Rows]:
+    known = [(x, y) for x, y in pairs if not math.isnan(x + y)]
+    return [Rows(np.array([[x]]), np.array([y])) for x, y in known]
+
+
+def _travel(
+    catches: Sequence[Catch], limits: Sequence[DetectionLimit], level: float
+) -> Step:
+    # D, the angle travelled during the catch, ΔT_c·v̄_c: its mean if all catches end,
+    # otherwise where the likelihood of all travels is largest, those behind a limit
+    # censored there
+    title = "catch travel: D of (4)"
+    seen = [catch.travel for catch in catches if catch.end is not None]
+    if limits:
+        travels = Travels(np.array(seen), *np.array(limits).T)
+        estimate, sd = fit_censored(travels, level=level)
+        return Step(name=title, estimates=(estimate,), residual_sd=sd)
+    reason = "no catch ends within its stretch"
+    if catches:
+        longest = max(catch.travel for catch in catches)
+        reason += f"; D is more than {math.degrees(longest):.4g} deg"
+    rows = _rows([(1.0, travel) for travel in seen])
+    return _step(title, "catch_travel", rows, level, reason)
 
 
 def on_the_line(
@@ -127,13 +142,16 @@ def on_the_line(
 
 
 def fit_catch_line(
-    catches: Sequence[Catch], constants: ElbowParameters, *, level: float
+    catches: Sequence[Catch],
+    on_line: NDArray[np.bool_],
+    constants: ElbowParameters,
+    *,
+    level: float,
 ) -> Step:
     """Fit L and α to catch angles: (2) within the clamps of (6)."""
     names = ("catch_angle_constant", "catch_slope")
     title, slowest = "catch angles: L, α of (2)", constants.slowest_mean_speed
-    on = on_the_line(catches, constants).tolist()
-    used = [catch for catch, lies in zip(catches, on, strict=True) if lies]
+    used = [catch for catch, on in zip(catches, on_line, strict=True) if on]
     speeds = np.maximum([catch.mean_speed for catch in used], slowest)
     if np.ptp(speeds) < _MIN_SPAN:
         reason = (
@@ -152,82 +170,13 @@ def fit_catch_line(
     def slopes(x: _Floats) -> _Floats:
         return np.array([line_row(c, x[0], x[1], slowest)[1:] for c in used])
 
-    angles = np.array([catch.angle for catch in used])
-    plain = np.polyfit(-speeds, angles, 1)[::-1]
-    found = least_squares(left, plain, jac=slopes, ftol=1e-14, gtol=1e-14)
-    pairs = zip(slopes(found.x), left(found.x), strict=True)
+    plain = np.polyfit(-speeds, [catch.angle for catch in used], 1)[::-1]
+    line = least_squares(left, plain, jac=slopes, ftol=1e-14, gtol=1e-14).x
+    pairs = zip(slopes(line), left(line), strict=True)
     fit = solve([Rows(by[None], -np.array([far])) for by, far in pairs])
     return Step(
         name=title,
-        estimates=fitted(names, replace(fit, values=found.x), level),
-        residual_sd=fit.residual_sd,
-    )
-
-
-def fit_catches(
-    catches: Sequence[Catch],
-    levels: Sequence[CatchLevels],
-    limits: Sequence[DetectionLimit],
-    *,
-    level: float,
-) -> list[Step]:
-    """Fit H to peaks against speed, Q to residuals against peaks, (3), and D of (4).
-
-    D is the angle travelled during the catch, ΔT_c·v̄_c: its mean if all catches end,
-    otherwise where the likelihood of all travels is largest, those behind a limit
-    censored there, for which two that are seen have to differ.
-    """
-    read = list(zip(catches, levels, strict=True))
-    peaks = [(c.speed, at.peak) for c, at in read if not math.isnan(at.peak)]
-    ratios = [
-        (at.peak, at.residual) for at in levels if not math.isnan(at.residual + at.peak)
-    ]
-    steps = [
-        _one("catch torque: H of (3)", "catch_torque_constant", _rows(peaks), level),
-        _one(
-            "residual torque: Q of (3)",
-            "residual_ratio",
-            _rows(ratios),
-            level,
-            "no torque was recorded after a peak",
-        ),
-    ]
-    title = "catch travel: D of (4)"
-    seen = [catch.travel for catch in catches if catch.end is not None]
-    if limits:
-        behind = np.array(limits)
-        travels = Travels(np.array(seen), behind[:, 0], behind[:, 1])
-        estimate, sd = fit_censored(travels, level=level)
-        return [*steps, Step(name=title, estimates=(estimate,), residual_sd=sd)]
-    longest = max((catch.travel for catch in catches), default=0.0)
-    reason = "no catch ends within its stretch"
-    if catches:
-        reason += f"; D is more than {math.degrees(longest):.4g} deg"
-    rows = _rows([(1.0, travel) for travel in seen])
-    return [*steps, _one(title, "catch_travel", rows, level, reason)]
-
-
-def fit_post_catch(levels: Sequence[CatchLevels], *, level: float) -> Step:
-    """Fit k_post to the torque after the catch: (5)."""
-    rows = [read.climb for read in levels if read.climb.design.any()]
-    reason = "no stretch goes on after its catch"
-    title = "post-catch: k_post of (5)"
-    return _one(title, "post_catch_stiffness", rows, level, reason)
-
-
-def _rows(pairs: Sequence[tuple[float, float]]) -> list[Rows]:
-    return [Rows(np.array([[x]]), np.array([y])) for x, y in pairs]
-
-
-def _one(
-    title: str, name: str, rows: list[Rows], level: float, reason: str | None = None
-) -> Step:
-    # with nothing to fit, a value that no row determines
-    fit = solve(rows or _rows([(0.0, 0.0)]))
-    reasons = {} if reason is None else {name: reason}
-    return Step(
-        name=title,
-        estimates=fitted((name,), fit, level, reasons),
+        estimates=fitted(names, replace(fit, values=line), level),
         residual_sd=fit.residual_sd,
     )
 
@@ -239,33 +188,51 @@ def _one(
 # still be told from noise.
 
 
-def detection_limit(
-    trial: Trial, stiffness: float, constants: ElbowParameters
-) -> DetectionLimit | None:
-    """Return how late the catch of a trial could end and be seen to.
+def _limits(
+    trials: Sequence[Trial],
+    levels: Mapping[str, CatchLevels],
+    law: Law,
+    stiffness: float,
+) -> dict[str, DetectionLimit]:
+    # Of catches that do not end, if those that do tell how much travels differ. With
+    # m, or where the pre-catch law goes on after a catch, the torque may climb or not
+    # whatever k_post is: what could have been seen is not one angle.
+    catches = [read.catch for read in levels.values()]
+    seen = {catch.travel for catch in catches if catch.end is not None}
+    climbs_alone = law.constants.post_catch == "continuous" and law.inertia == 0.0
+    if not climbs_alone or len(seen) < 2 or not stiffness > 0.0:
+        return {}
+    limits = {
+        trial.stretch.name: _limit(
+            trial.after, levels[trial.stretch.name].catch, law, stiffness
+        )
+        for trial in trials
+        if trial.stretch.name in levels
+        and trial.after is not None
+        and levels[trial.stretch.name].catch.end is None
+    }
+    return {name: limit for name, limit in limits.items() if limit is not None}
 
-    None without a catch, or if no end of it could be seen at all. `stiffness` is
-    k_post: what an end makes the torque climb with, and nothing else. An end is seen if
-    its climb takes `MIN_GAIN` residual variances off the sum of squares and adds up to
-    `MIN_SIGNAL` standard deviations. The root of that gain is a t whose error has a
-    standard deviation of 1, which over the slope of t against the angle of the end is
-    the standard deviation of the limit.
-    """
-    if trial.catch is None or trial.after is None or not stiffness > 0.0:
-        return None
-    catch = trial.catch
-    angle = trial.after.angle[trial.after.time >= catch.time + constants.peak_duration]
+
+def _limit(
+    after: Part, catch: Catch, law: Law, stiffness: float
+) -> DetectionLimit | None:
+    # How late a catch could end and be seen to; None if no end could be seen at all.
+    # `stiffness` is k_post: what an end makes the torque climb with, and nothing else.
+    # An end is seen if its climb takes `MIN_GAIN` residual variances off the sum of
+    # squares and adds up to `MIN_SIGNAL` standard deviations. The root of that gain is
+    # a t whose error has a standard deviation of 1, which over the slope of t against
+    # the angle of the end is the standard deviation of the limit.
+    angle = after.angle[after.time >= catch.time + law.constants.peak_duration]
     if angle.size == 0:
         return None
     ends = np.unique(np.linspace(0, angle.size - 1, _CANDIDATES).astype(np.int64))
     climb = np.maximum(angle - angle[ends, None], 0.0)  # (n_ends, n_samples)
-    about = climb - climb.mean(axis=1, keepdims=True)
-    scatter = np.sqrt((about**2).sum(axis=1))
+    scatter = np.linalg.norm(climb - climb.mean(axis=1, keepdims=True), axis=1)
     seen = stiffness * scatter / max(catch.residual_sd, 1e-12)  # 0 of exact data
-    rises = climb[:, -1] > 0.0  # but for the last sample
-    needed = np.full(ends.size, math.sqrt(MIN_GAIN))
-    least = MIN_SIGNAL * scatter[rises] / climb[rises, -1]
-    needed[rises] = np.maximum(needed[rises], least)
+    # the last sample does not rise above itself
+    rise = np.where(climb[:, -1] > 0.0, climb[:, -1], math.inf)
+    needed = np.maximum(math.sqrt(MIN_GAIN), MIN_SIGNAL * scatter / rise)
     spare, travel = seen - needed, angle[ends] - catch.angle
     # where it runs out for good: an end at the last sample adds nothing
     enough = np.flatnonzero(spare[:-1] >= 0.0)
@@ -304,8 +271,6 @@ class Travels(NamedTuple):
     def sd_at(self, mean: float) -> float:
         """Return the most likely standard deviation for this mean."""
         first = math.log(math.sqrt(float(((self.seen - mean) ** 2).mean())))
-        if not self.limit.size:
-            return math.exp(first)
 
         def slope(log_sd: float) -> float:
             return float(self.score(mean, math.exp(log_sd))[1])

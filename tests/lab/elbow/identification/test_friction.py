@@ -51,16 +51,17 @@ def test_intervals_cover_the_truth(encoder_deg: float) -> None:
 
 def test_values_are_those_of_statsmodels_on_the_filtered_samples() -> None:
     found = fit_friction([backdriven(2)])
+    parts = [stroke.part for stroke in found.strokes]
     design = np.concatenate(
         [
             np.stack(
-                [s.acceleration, s.velocity, np.sign(s.velocity), np.ones(s.time.size)],
+                [p.acceleration, p.velocity, np.sign(p.velocity), np.ones(p.time.size)],
                 axis=1,
             )
-            for s in found.strokes
+            for p in parts
         ]
     )
-    torque = np.concatenate([s.torque for s in found.strokes])
+    torque = np.concatenate([part.torque for part in parts])
     peer = sm.OLS(torque, design).fit()
     values = [estimate.value for estimate in found.estimates]
     np.testing.assert_allclose(values, peer.params[:3], rtol=1e-8)

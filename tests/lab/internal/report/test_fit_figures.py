@@ -130,6 +130,5 @@ def test_a_bin_of_few_samples_has_no_mean() -> None:
 
 
 def test_every_catch_has_a_peak_above_its_residual(found: ElbowFit) -> None:
-    readings = figures._catch_readings(found)
-    assert [catch for catch, _ in readings] == figures._catches(found)
-    assert all(levels.peak > levels.residual > 0.0 for _, levels in readings)
+    assert [read.catch for read in found.levels] == figures._catches(found)
+    assert all(read.peak > read.residual > 0.0 for read in found.levels)

@@ -57,7 +57,8 @@ def test_late_catches_of_hands_that_speed_up_do_not_bias_the_slope() -> None:
     catches = caught(np.random.default_rng(1), 1000, math.radians(4.0))
     speeds = np.array([c.mean_speed for c in catches])
     plain = -np.polyfit(speeds, [c.angle for c in catches], 1)[0]
-    step = fit_catch_line(catches, HM3, level=0.95)
+    on_line = np.ones(1000, dtype=np.bool_)
+    step = fit_catch_line(catches, on_line, HM3, level=0.95)
     assert step["catch_slope"].value == pytest.approx(SLOPE, abs=0.03)
     assert plain < SLOPE - 0.03
     assert step["catch_angle_constant"].value == pytest.approx(LINE, abs=0.06)
@@ -67,8 +68,9 @@ def test_catches_at_the_smallest_angle_are_not_on_the_line() -> None:
     catches = caught(np.random.default_rng(3), 8, 0.0)
     fast = HM3.fastest_mean_speed * 1.3
     catches += [catch(HM3.smallest_catch_angle, fast, 0.5)] * 2
-    assert on_the_line(catches, HM3).tolist() == [True] * 8 + [False] * 2
-    step = fit_catch_line(catches, HM3, level=0.95)
+    on_line = on_the_line(catches, HM3)
+    assert on_line.tolist() == [True] * 8 + [False] * 2
+    step = fit_catch_line(catches, on_line, HM3, level=0.95)
     assert step["catch_slope"].value == pytest.approx(SLOPE, rel=1e-6)
     assert step["catch_slope"].n_trials == 8
 
