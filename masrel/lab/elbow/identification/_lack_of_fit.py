@@ -377,8 +377,9 @@ def own_drifts(slow: Sequence[Part], gravity_angle: float) -> StructureTest | No
     left = max(left, 1e-20 * float(torque @ torque))  # of torque without noise
     ratio = max((before - left) / n_more / (left / df), 0.0)
     p = float(fdtrc(n_more, df, ratio))
-    t = math.sqrt(ratio)
-    return StructureTest(name="own drifts", t=t, df=float(df), p_value=p, adjusted=p)
+    return StructureTest(
+        name="own drifts", t=math.sqrt(ratio), df=float(df), p_value=p, adjusted=p
+    )
 
 
 def _left(design: _Floats, target: _Floats) -> tuple[float, int]:

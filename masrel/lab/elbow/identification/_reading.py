@@ -386,9 +386,7 @@ def _read_text(path: Path, content: bytes) -> _Table:
 
 
 def _number(cell: str) -> float:
-    if not cell.strip():
-        return math.nan
-    value = float(cell)
+    value = float(cell.strip() or "nan")
     if math.isinf(value) or "_" in cell:
         raise ValueError(cell)
     return value

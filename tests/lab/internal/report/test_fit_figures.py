@@ -9,7 +9,6 @@ from masrel.lab.elbow import STANDARD_MODELS, fit, fit_friction
 from masrel.lab.elbow.identification import ElbowFit
 from masrel.lab.report import _fit_figures as figures
 from masrel.lab.report._fits import fit_figures, fit_table
-from masrel.tables._tables import as_text
 from tests.lab.elbow.identification.synthesis import Scatter, study
 from tests.lab.elbow.identification.test_friction import backdriven
 
@@ -51,17 +50,6 @@ def test_the_legend_of_slow_trials_has_every_term(
 ) -> None:
     movements = study(STANDARD_MODELS["HM3"], seed=31, n_slow=5, n_fast=0)
     assert svg_of(fit(movements, **terms), "slow").count(f"<!-- {law} -->") == 1  # type: ignore[arg-type]
-
-
-def test_the_table_has_a_row_a_parameter_and_its_interval(found: ElbowFit) -> None:
-    table = fit_table(found)
-    assert [row[0] for row in table.rows] == "b k L α H Q D k_post".split()
-    assert table.data == "simulated"
-    by_symbol = {row[0]: row for row in table.rows}
-    value = float(str(by_symbol["L"][2]))
-    degrees = np.degrees(found["catch_angle_constant"].value)
-    assert value == pytest.approx(degrees, abs=0.05)
-    assert "clustered by trial" in as_text(table)
 
 
 def test_friction_has_its_figure_and_table() -> None:
