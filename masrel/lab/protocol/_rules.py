@@ -535,10 +535,8 @@ _ELBOW_KEYS = (
 
 
 def _tone_keys(model: Model) -> Iterator[str]:
-    keys = (*_ELBOW_KEYS, "file")
-    foreign = [key for key in keys if getattr(model, key) is not None]
-    foreign += [f"constants.{key}" for key in model.overrides]
-    for key in foreign:
+    keys = [key for key in (*_ELBOW_KEYS, "file") if getattr(model, key) is not None]
+    for key in (*keys, *(f"constants.{key}" for key in model.overrides)):
         yield (
             f"{key}: needed for kind {got(DEFAULT_KIND)} only, got it for "
             f"{got(model.kind)}; its numbers stand in [models.parameters]"

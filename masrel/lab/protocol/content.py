@@ -6,7 +6,7 @@ import operator
 import re
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 import msgspec
 
@@ -16,7 +16,12 @@ from masrel.lab._study_files import once
 from masrel.lab.elbow.parameters import ElbowParameters
 from masrel.lab.elbow.tone import JointModel
 from masrel.lab.protocol._kinds import DEFAULT_KIND, model_of_kind, without_defaults
-from masrel.lab.protocol.definition import ElbowConstants, Model, Protocol
+from masrel.lab.protocol.definition import (
+    ElbowConstants,
+    Model,
+    Protocol,
+    _Section,
+)
 from masrel.scales import Scale
 
 
@@ -85,6 +90,7 @@ def report_sections(protocol: Protocol) -> tuple[str, ...]:
     if protocol.report.sections is not None:
         return protocol.report.sections
     has_something = {
+        **dict.fromkeys(("in-person", "claims"), False),  # only where they are named
         "sample-size": bool(protocol.analysis.sample_sizes),
         "test-retest": any(
             line.kind == "test-retest" for line in protocol.analysis.estimates
@@ -92,25 +98,7 @@ def report_sections(protocol: Protocol) -> tuple[str, ...]:
         "confusion": any(model.intended_grade is not None for model in protocol.models),
         "questionnaires": bool(protocol.questionnaires),
     }
-    return tuple(name for name in _STORY if has_something.get(name, True))
-
-
-# Sections in the order in which a paper tells them
-_STORY = (
-    "design",
-    "sample-size",
-    "grades",
-    "agreement",
-    "test-retest",
-    "categories",
-    "intended",
-    "confusion",
-    "order",
-    "speeds",
-    "traces",
-    "questionnaires",
-    "methods",
-)
+    return tuple(name for name in get_args(_Section) if has_something.get(name, True))
 
 
 def _joint_of(model: Model, shared: ElbowConstants) -> ElbowParameters:

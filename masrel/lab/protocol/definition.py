@@ -399,34 +399,32 @@ class GateKeys(_Table, frozen=True, kw_only=True):
     why: str = ""
 
 
+# Sections of a report, in the order in which a paper tells them
+_Section = Literal[
+    "design",
+    "sample-size",
+    "grades",
+    "agreement",
+    "test-retest",
+    "categories",
+    "intended",
+    "confusion",
+    "in-person",
+    "order",
+    "speeds",
+    "traces",
+    "questionnaires",
+    "claims",
+    "methods",
+]
+
+
 class Report(_Table, frozen=True, kw_only=True):
     """``[report]``: which sections the report has, in order."""
 
     title: str = ""
     # None leaves them to masrel: `report_sections` says which
-    sections: (
-        tuple[
-            Literal[
-                "design",
-                "sample-size",
-                "grades",
-                "agreement",
-                "test-retest",
-                "categories",
-                "intended",
-                "confusion",
-                "in-person",
-                "order",
-                "speeds",
-                "traces",
-                "questionnaires",
-                "claims",
-                "methods",
-            ],
-            ...,
-        ]
-        | None
-    ) = None
+    sections: tuple[_Section, ...] | None = None
     gates: tuple[GateKeys, ...] = ()
     formats: Annotated[
         tuple[Literal["html", "markdown", "latex", "docx"], ...], Meta(min_length=1)

@@ -4,7 +4,7 @@ import csv
 import io
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -156,17 +156,6 @@ def _speed(text: str) -> float | str:
     return speed if 0 <= speed < math.inf else text
 
 
-_IN_PERSON_COLUMNS = (
-    "source_table",  # where the row is printed
-    "rater",
-    "subject",  # the patient
-    "model",  # the haptic model made of the patient
-    "in_person_grade",
-    "haptic_grade",
-    "note",
-)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InPersonRow:
     """One rater's grade of one patient and of the model made of the patient.
@@ -193,6 +182,9 @@ class InPersonRow:
     in_person_grade: str | None
     haptic_grade: str | None
     note: str
+
+
+_IN_PERSON_COLUMNS = tuple(field.name for field in fields(InPersonRow))[1:]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -251,9 +243,11 @@ def read_in_person(path: Path | str) -> InPerson:
                 f"{first} has one already"
             )
             problems.append((line, None, message))
-        values: dict[str, Any] = {name: cell[name] for name in _IN_PERSON_COLUMNS}
-        for name in ("in_person_grade", "haptic_grade"):
-            values[name] = None if cell[name] in _MISSING else cell[name]
+        grades: dict[str, Any] = {
+            name: None if cell[name] in _MISSING else cell[name]
+            for name in ("in_person_grade", "haptic_grade")
+        }
+        values = {name: cell[name] for name in _IN_PERSON_COLUMNS} | grades
         graded.append(InPersonRow(line=line, **values))
     _refuse(rows.path, problems)
     return InPerson(rows=tuple(graded), source_path=rows.path)
