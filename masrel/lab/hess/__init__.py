@@ -16,13 +16,7 @@ from masrel.lab.hess.device import (
     device_names,
     open_device,
 )
-from masrel.lab.hess.hand import (
-    Hand,
-    HandDistribution,
-    HandTraits,
-    HumanHand,
-    SimulatedHand,
-)
+from masrel.lab.hess.hand import Hand, HandTraits, HumanHand, SimulatedHand
 from masrel.lab.hess.limits import DeviceLimits
 from masrel.lab.hess.loop import run_presentation
 from masrel.lab.hess.rendering import MotionHand, Rendering, render
@@ -39,7 +33,6 @@ __all__ = [
     "Friction",
     "FrictionCompensation",
     "Hand",
-    "HandDistribution",
     "HandTraits",
     "HumanHand",
     "IdleCommand",

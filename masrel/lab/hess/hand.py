@@ -5,8 +5,8 @@ from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from typing import ClassVar, NamedTuple
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -19,6 +19,19 @@ from masrel.lab.hess.limits import _check_not_negative, _check_positive
 _RAMP_S = 0.15
 _EXPECTED_DAMPING, _EXPECTED_STIFFNESS, _EXPECTED_INERTIA = 1.26, 3.15, 0.06
 _MOST_CORRECTION = 15.0
+
+
+# The least and the largest value of what people's hands differ in, each uniform in its
+# logarithm and independent of the others; docs/driver.md has the sources.
+_PEOPLE = {
+    "stiffness": (10.0, 600.0),  # N·m/rad
+    "damping_time": (0.03, 0.08),  # damping over stiffness, s
+    "inertia": (0.03, 0.2),  # kg·m²
+    "tremor": (0.005, 0.03),  # amplitude over the torque of the hand
+    "tremor_hz": (8.0, 12.0),
+    "reaction_delay": (0.07, 0.32),  # s
+    "correction_time": (0.25, 1.0),  # s
+}
 
 
 class Hand(ABC):
@@ -332,61 +345,9 @@ class HandTraits:
             correction_time=self.correction_time,
         )
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HandDistribution:
-    """How the hands of people differ.
-
-    Each attribute is the least and the largest value of a quantity that is uniform in
-    its logarithm, independently of the others; ``docs/driver.md`` has the sources.
-
-    Attributes
-    ----------
-    stiffness : tuple of float, optional
-        N·m/rad.
-    damping_time : tuple of float, optional
-        Damping over stiffness, s.
-    inertia : tuple of float, optional
-        In kg·m².
-    tremor : tuple of float, optional
-        Amplitude over the torque of the hand.
-    tremor_hz : tuple of float, optional
-        In Hz.
-    reaction_delay, correction_time : tuple of float, optional
-        In s.
-
-    Raises
-    ------
-    ParameterError
-        If a range is not of two finite values above 0 in this order.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> traits = HandDistribution().sample(np.random.default_rng(1))
-    >>> 10.0 <= traits.stiffness <= 600.0
-    True
-    """
-
-    stiffness: tuple[float, float] = (10.0, 600.0)
-    damping_time: tuple[float, float] = (0.03, 0.08)
-    inertia: tuple[float, float] = (0.03, 0.2)
-    tremor: tuple[float, float] = (0.005, 0.03)
-    tremor_hz: tuple[float, float] = (8.0, 12.0)
-    reaction_delay: tuple[float, float] = (0.07, 0.32)
-    correction_time: tuple[float, float] = (0.25, 1.0)
-
-    def __post_init__(self) -> None:
-        for quantity in fields(self):
-            low, high = getattr(self, quantity.name)
-            if not 0.0 < low <= high < math.inf:
-                raise ParameterError(
-                    f"{quantity.name}: needs two finite values above 0 in order, "
-                    f"got {low} and {high}"
-                )
-
-    def sample(self, rng: np.random.Generator) -> HandTraits:
-        """Draw the hand of one person.
+    @classmethod
+    def sample(cls, rng: np.random.Generator) -> Self:
+        """Draw the hand of one person; ``docs/driver.md`` has the ranges.
 
         Parameters
         ----------
@@ -397,13 +358,18 @@ class HandDistribution:
         -------
         HandTraits
             The hand, with a tremor of any phase.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> 10.0 <= HandTraits.sample(np.random.default_rng(1)).stiffness <= 600.0
+        True
         """
-        ranges = {field.name: getattr(self, field.name) for field in fields(self)}
         drawn = {
             name: low * (high / low) ** rng.random()
-            for name, (low, high) in ranges.items()
+            for name, (low, high) in _PEOPLE.items()
         }
-        return HandTraits(
+        return cls(
             damping=drawn.pop("damping_time") * drawn["stiffness"],
             tremor_phase=2.0 * math.pi * rng.random(),
             **drawn,

@@ -18,7 +18,7 @@ from masrel.lab.hess import (
     Clock,
     DeviceLimits,
     EmergencyStop,
-    HandDistribution,
+    HandTraits,
     HumanHand,
     PresentationStatus,
     Presented,
@@ -282,7 +282,7 @@ def _hand(
     make: Callable[..., SimulatedHand] = SimulatedHand
     if settings.hand == "person":
         rng = np.random.default_rng(hand_seed(protocol, rater))
-        make = functools.partial(HumanHand, HandDistribution().sample(rng))
+        make = functools.partial(HumanHand, HandTraits.sample(rng))
     return make(
         start=start,
         end=end,

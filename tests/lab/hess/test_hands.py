@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from masrel.lab.elbow import STANDARD_MODELS
 from masrel.lab.hess import (
-    HandDistribution,
     HandTraits,
     HumanHand,
     Presented,
@@ -86,22 +85,28 @@ def test_it_means_to_press_against_the_end_and_may_bring_the_arm_back() -> None:
 # What people's are like
 
 
-def test_a_drawn_hand_lies_within_the_ranges() -> None:
+def test_a_drawn_hand_lies_within_the_ranges_of_the_page() -> None:
     rng = np.random.default_rng(4)
-    drawn = [HandDistribution().sample(rng) for _ in range(300)]
-    assert drawn[0] == HandDistribution().sample(np.random.default_rng(4))
-    ranges = HandDistribution()
-    names = ("stiffness", "inertia", "tremor", "tremor_hz", "reaction_delay")
-    for name in (*names, "correction_time"):
-        low, high = getattr(ranges, name)
-        values = [getattr(traits, name) for traits in drawn]
-        assert low <= min(values) <= max(values) <= high
+    drawn = [HandTraits.sample(rng) for _ in range(300)]
+    assert drawn[0] == HandTraits.sample(np.random.default_rng(4))
+    page = PAGE.read_text(encoding="utf-8").partition("| least to largest |")[2]
+    rows = [line.split("|") for line in page.splitlines()[2:9]]
+    made = {
+        "stiffness": [traits.stiffness for traits in drawn],
+        "damping / stiffness": [traits.damping / traits.stiffness for traits in drawn],
+        "inertia": [traits.inertia for traits in drawn],
+        "tremor, amplitude / torque": [traits.tremor for traits in drawn],
+        "tremor, frequency": [traits.tremor_hz for traits in drawn],
+        "reaction delay": [traits.reaction_delay for traits in drawn],
+        "correction time": [traits.correction_time for traits in drawn],
+    }
+    assert [row[1].strip() for row in rows] == list(made)
+    for (_, _, ends, *_), values in zip(rows, made.values(), strict=True):
+        low, high = (float(words.split()[0]) for words in ends.split(" to "))
+        assert low * (1 - 1e-12) <= min(values) <= max(values) <= high * (1 + 1e-12)
         # uniform in the logarithm: half of them below the geometric mean; the share
         # of 300 leaves 0.4 to 0.6 with probability 0.0005
         assert 0.4 < np.mean(np.array(values) < math.sqrt(low * high)) < 0.6
-    times = [traits.damping / traits.stiffness for traits in drawn]
-    low, high = ranges.damping_time
-    assert low * (1 - 1e-12) <= min(times) <= max(times) <= high * (1 + 1e-12)
 
 
 def test_its_mass_moves_with_the_arm_until_it_lets_go() -> None:
@@ -185,7 +190,7 @@ def people(n_hands: int, seed: int) -> Iterator[Person]:
     rng = np.random.default_rng(seed)
     for index in range(n_hands):
         yield Person(
-            traits=HandDistribution().sample(rng),
+            traits=HandTraits.sample(rng),
             model=MODELS[index % 4],
             mean_speed=radians(rng.uniform(60.0, 130.0)),
             slips=rng.random(),

@@ -10,7 +10,6 @@ from masrel.errors import ParameterError
 from masrel.lab.hess import (
     DeviceLimits,
     Friction,
-    HandDistribution,
     HandTraits,
     SimulatedHand,
     StretchRules,
@@ -128,10 +127,6 @@ def clamp(**change: object) -> SimulatedHand:
         (HandTraits, {"tremor_phase": math.inf}, "tremor_phase: needs 0 or more"),
         (HandTraits, {"reaction_delay": -0.1}, "reaction_delay: needs 0 or more"),
         (HandTraits, {"correction_time": 0.0}, "correction_time: needs more than 0"),
-        *(
-            (HandDistribution, {"stiffness": ends}, "stiffness: needs two finite val")
-            for ends in ((0.0, 1.0), (2.0, 1.0), (1.0, math.inf))
-        ),
         (PuckOptions, {"puck": 8}, "puck: needs a motor's node, 1 to 7, got 8"),
         (PuckOptions, {"gear_ratio": 0.0}, "gear_ratio: needs more than 0"),
         (PuckOptions, {"patience_s": -1.0}, "patience_s: needs more than 0"),

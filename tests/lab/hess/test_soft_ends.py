@@ -13,7 +13,7 @@ from masrel.lab.elbow import STANDARD_MODELS
 from masrel.lab.hess import (
     DeviceLimits,
     EmergencyStop,
-    HandDistribution,
+    HandTraits,
     HumanHand,
     Presented,
     SimulatedHand,
@@ -200,7 +200,7 @@ def random_hand(
     rest, back = float(rng.uniform(0.0, 0.2)), radians(rng.uniform(40.0, 130.0))
     kind = rng.random()
     if kind < 0.5 and n_stretches > 1:
-        traits = HandDistribution().sample(rng)
+        traits = HandTraits.sample(rng)
         return HumanHand(traits, **way, rest=2.0 * rest, return_speed=back)
     return SimulatedHand(
         **way,

@@ -22,7 +22,6 @@ from masrel.lab.elbow.tone import (
 )
 from masrel.lab.hess import (
     DeviceLimits,
-    HandDistribution,
     HandTraits,
     HumanHand,
     Presented,
@@ -69,7 +68,7 @@ def raters(kind: str, seeds: Iterable[int]) -> Iterator[Rater]:
     for seed in seeds:
         rng = np.random.default_rng([seed, list(KINDS).index(kind)])
         range_end = min(END, KINDS[kind].range_end)
-        traits = HandDistribution().sample(rng)
+        traits = HandTraits.sample(rng)
         speeds = rng.uniform(60.0, 130.0, N_STRETCHES)
         yield Rater(
             traits=traits,
