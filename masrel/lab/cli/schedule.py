@@ -1,16 +1,13 @@
 """``masrel schedule``: draw the schedules of a study, once."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from masrel.cli._commands import STUDY, Commands
 from masrel.cli._options import OutputOptions, output_options, write_output
 from masrel.lab.cli._study_options import of_study
-
-if TYPE_CHECKING:
-    from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.protocol import Protocol, StudyPaths
 
 
 @click.group("schedule", cls=Commands)
@@ -29,7 +26,7 @@ def schedule() -> None:
     figure="Heatmaps as .png, .svg or .pdf.",
 )
 def _show(
-    paths: "StudyPaths", protocol: "Protocol", site: str | None, output: OutputOptions
+    paths: StudyPaths, protocol: Protocol, site: str | None, output: OutputOptions
 ) -> None:
     """Print how even the drawn orders of STUDY are. Not for raters.
 
@@ -66,9 +63,7 @@ def _show(
     required=True,
     help="Folder of the copy.",
 )
-def _copy(
-    paths: "StudyPaths", protocol: "Protocol", site: str, destination: Path
-) -> None:
+def _copy(paths: StudyPaths, protocol: Protocol, site: str, destination: Path) -> None:
     """Copy STUDY for a site, with the site's secret alone."""
     from masrel.lab.schedule import copy_for_site
 
@@ -85,7 +80,7 @@ def _copy(
 )
 @click.option("--site", help="Of the raters of this site alone.")
 def _draw(
-    paths: "StudyPaths", protocol: "Protocol", redraw: bool, site: str | None
+    paths: StudyPaths, protocol: Protocol, redraw: bool, site: str | None
 ) -> None:
     """Draw each rater's schedule and blinded sheet for every session of STUDY.
 

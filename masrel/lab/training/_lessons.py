@@ -9,10 +9,10 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from masrel.errors import (
     SessionLogError,
@@ -27,9 +27,6 @@ from masrel.lab.run._state import EVENTS as SESSION_EVENTS
 from masrel.lab.run._state import LATER, of_another_type
 from masrel.lab.training._criterion import Criterion, training_criterion
 from masrel.lab.training._trainees import adaptive_weights
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 CURVE_SETS = 4
 """Sets of presentations of which a point is made: fewer say little, more blur."""
@@ -133,7 +130,7 @@ class TrainingRecord:
     passed: bool | None
     simulated: bool
 
-    def evidence(self) -> "NDArray[np.float64]":
+    def evidence(self) -> NDArray[np.float64]:
         """Return the evidence after each set of lessons.
 
         Returns
