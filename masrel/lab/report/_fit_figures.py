@@ -129,11 +129,11 @@ def _fast_trial(column: Sequence[Axes], fit: ElbowFit, place: int) -> None:
     top, middle, bottom = column
     law, last = fit.fitted_torque[place], float(after.time[-1] - start)
     # before the catch and from it on: no line joins the two
-    time = _apart([pre.time, after.time]) - start
-    measured = _apart([pre.measured, after.measured])
+    time = _separated([pre.time, after.time]) - start
+    measured = _separated([pre.measured, after.measured])
     top.plot(time, measured, linewidth=0.6, **_MEASURED)
     top.plot(
-        time, _apart(np.split(law, [pre.time.size])), color=BLACK, linewidth=1.3,
+        time, _separated(np.split(law, [pre.time.size])), color=BLACK, linewidth=1.3,
         linestyle=_DASHES, label="law, fitted",
     )  # fmt: skip
     time = np.concatenate([pre.time, after.time]) - start
@@ -152,7 +152,7 @@ def _fast_trial(column: Sequence[Axes], fit: ElbowFit, place: int) -> None:
     top.set_title(f"mean speed {number(math.degrees(catch.mean_speed), 0)} deg/s")
 
 
-def _apart(pieces: Iterable[_Floats]) -> _Floats:
+def _separated(pieces: Iterable[_Floats]) -> _Floats:
     # drawn as lines that nothing joins
     return np.concatenate([np.append(piece, math.nan) for piece in pieces])
 
@@ -350,14 +350,14 @@ def friction_figure(fit: FrictionFit) -> Figure:
     left, right = figure.subplots(1, 2, width_ratios=(1.3, 1.0), sharey=True)
     name, start = fit.strokes[0].recording, float(fit.strokes[0].part.time[0])
     first = [stroke for stroke in fit.strokes if stroke.recording == name]
-    times = _apart([stroke.part.time - start for stroke in first])
-    speeds = np.degrees(_apart([stroke.part.velocity for stroke in fit.strokes]))
+    times = _separated([stroke.part.time - start for stroke in first])
+    speeds = np.degrees(_separated([stroke.part.velocity for stroke in fit.strokes]))
     for axes, strokes, x, label, width in (
         (left, first, times, "time (s)", 1.8),
         (right, fit.strokes, speeds, "speed (deg/s)", 0.9),
     ):
-        measured = _apart([stroke.part.torque for stroke in strokes])
-        law = _apart([stroke.fitted for stroke in strokes])
+        measured = _separated([stroke.part.torque for stroke in strokes])
+        law = _separated([stroke.fitted for stroke in strokes])
         axes.plot(x, measured, linewidth=width, **_MEASURED)
         axes.plot(
             x, law, color=BLACK, linewidth=1.0, linestyle=_DASHES, label="(7), fitted"

@@ -21,6 +21,7 @@ from scipy.special import stdtrit
 from masrel._input import refuse, warn_caller
 from masrel.errors import (
     MasrelError,
+    MasrelWarning,
     ParameterError,
     RecordingError,
     RecordingWarning,
@@ -171,8 +172,8 @@ class ElbowFit:
         rise = self.arm["catch_rise"]
         values: dict[str, Any] = {} if isinstance(rise, str) else {"catch_rise": rise}
         for estimate in self.estimates:
-            name, is_told = estimate.name, not math.isnan(estimate.value)
-            if is_told and (name in QUANTITIES or name == "catch_rise"):
+            name, is_known = estimate.name, not math.isnan(estimate.value)
+            if is_known and (name in QUANTITIES or name == "catch_rise"):
                 values[name] = estimate.value
             elif name in QUANTITIES and name != "inertia":
                 raise ParameterError(f"{name}: {estimate.reason}")
@@ -362,8 +363,9 @@ def _slow_errors(slow: JointFit) -> dict[str, float]:
     # standard errors, of one trial those of its samples, of which the filter leaves one
     # in so many independent
     errors = {name: e.standard_error for name, e in slow.alone.items()}
-    told = slow.alone["damping"].value + slow.alone["stiffness"].value
-    if len(slow.trials) > 1 or math.isnan(told):
+    names = ("damping", "stiffness")
+    is_undetermined = any(math.isnan(slow.alone[name].value) for name in names)
+    if len(slow.trials) > 1 or is_undetermined:
         return errors
     (rows,), time = slow.rows(), slow.trials[0].pre_catch.time
     period = float(np.median(np.diff(time))) if time.size > 1 else 1.0
@@ -646,42 +648,42 @@ def compare_fits(
     ]
     tried = [term for term in TERMS if options.get(term, "off") == "off"]
     with warnings.catch_warnings():  # the first fit said them
-        warnings.simplefilter("ignore", RecordingWarning)
-        warnings.simplefilter("ignore", SmallSampleWarning)
+        warnings.simplefilter("ignore", MasrelWarning)
         for term in tried:
             try:
-                made = fit(movements, **{**options, term: "fitted"})
-                fits.append(((term,), made, None))
+                result = fit(movements, **{**options, term: "fitted"})
+                fits.append(((term,), result, None))
             except MasrelError as error:
                 fits.append(((term,), None, str(error)))
     squares = [
         {
             trial.stretch.name: value
-            for trial, value in zip(made.trials, made.cross_validation, strict=True)
+            for trial, value in zip(result.trials, result.cross_validation, strict=True)
             if math.isfinite(value)
         }
-        if made is not None
+        if result is not None
         else {}
-        for _, made, _ in fits
+        for _, result, _ in fits
     ]
-    order = sorted(set.intersection(*(set(each) for each in squares if each)))
-    table = np.array([[each.get(n, math.nan) for n in order] for each in squares])
-    means = table.mean(axis=1) if order else np.full(len(fits), math.nan)
-    best = int(np.nanargmin(means)) if order else 0
+    names = sorted(set.intersection(*(set(of_fit) for of_fit in squares if of_fit)))
+    rows = [[of_fit.get(name, math.nan) for name in names] for of_fit in squares]
+    table = np.array(rows)
+    means = table.mean(axis=1) if names else np.full(len(fits), math.nan)
+    best = int(np.nanargmin(means)) if names else 0
     more, ses = table - table[best], np.full(len(fits), math.nan)
-    if len(order) > 1:
-        ses = more.std(axis=1, ddof=1) / math.sqrt(len(order))
+    if len(names) > 1:
+        ses = more.std(axis=1, ddof=1) / math.sqrt(len(names))
     worse = means - means[best]
     near = np.flatnonzero(worse <= ses).tolist()  # fits with fewer terms come first
     return tuple(
         ComparedFit(
             fitted=terms,
-            fit=made,
+            fit=result,
             reason=reason,
             error=math.sqrt(means[i]) if means[i] >= 0.0 else math.nan,
             worse=float(worse[i]),
             worse_se=float(ses[i]),
             is_chosen=near[:1] == [i],
         )
-        for i, (terms, made, reason) in enumerate(fits)
+        for i, (terms, result, reason) in enumerate(fits)
     )

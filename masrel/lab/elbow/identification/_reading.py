@@ -473,8 +473,8 @@ def read_movement(
         source = "sensor" if MEASURED_TORQUE.column in table.names else "model"
         torque = MEASURED_TORQUE.column if source == "sensor" else _MODEL
         columns, units = {"torque": torque, **columns}, {"torque": "nm", **units}
-    found = _find_columns(table.names, source=str(path), columns=columns, units=units)
-    values = {quantity: table.column(name) for quantity, (name, _) in found.items()}
+    chosen = _find_columns(table.names, source=str(path), columns=columns, units=units)
+    values = {quantity: table.column(name) for quantity, (name, _) in chosen.items()}
     if of_device and source != "recorded":
         if source == "model":
             raise RecordingError(
@@ -482,13 +482,13 @@ def read_movement(
                 "does beside the torque that is sent only its sensor can tell"
             )
         values["torque"] = values["torque"] - table.column(_COMMANDED)
-    sizes = {found[key][0]: column.size for key, column in values.items()}
+    sizes = {chosen[key][0]: column.size for key, column in values.items()}
     if len(set(sizes.values())) > 1:
         words = ", ".join(f"{name} {size}" for name, size in sizes.items())
         raise RecordingError(f"{path}: columns need one length, got {words}")
     whole = np.isfinite(np.stack(list(values.values()))).all(axis=0)
     if n_rows := int((~whole).sum()):
-        empty = {found[key][0]: int(np.isnan(values[key]).sum()) for key in values}
+        empty = {chosen[key][0]: int(np.isnan(values[key]).sum()) for key in values}
         words = ", ".join(f"{name} {count}" for name, count in empty.items() if count)
         rows = f"{n_rows} rows have" if n_rows > 1 else "1 row has"
         are = "are" if n_rows > 1 else "is"
@@ -496,7 +496,7 @@ def read_movement(
             f"{path}: {rows} an empty cell ({words}) and {are} left out",
             RecordingWarning,
         )
-    si = {key: values[key][whole] * found[key][1] for key in values}
+    si = {key: values[key][whole] * chosen[key][1] for key in values}
     return Movement(
         name=str(path),
         time=si["time"],

@@ -149,13 +149,13 @@ def fit_slow(trials: Sequence[Trial], options: FitOptions) -> JointFit:
     Each trial has a constant of its own, -k·θ_rest of (1) and the sensor's zero, unless
     the offset is fixed.
     """
-    told = {
+    is_fitted = {
         "damping": True,
         "stiffness": True,
         "inertia": options.inertia == "fitted",
         "gravity": "gravity" in options.fitted,
     }
-    names = tuple(name for name, fits in told.items() if fits)
+    names = tuple(name for name, fits in is_fitted.items() if fits)
     # in front of a catch, a lag that is not known yet is none
     law = replace(options.law, lag=0.0)
     equations = [Equations(trial, names, {"torque": 1.0}, law) for trial in trials]
@@ -241,10 +241,10 @@ def _round(
     limits: dict[str, DetectionLimit] = {}
     if caught:
         # steps take what earlier ones found as known
-        told: dict[str, Any] = {
+        known: dict[str, Any] = {
             name: e.value for name, e in slow.alone.items() if name in ALWAYS
         }
-        more, lines, limits = fit_catches(caught, replace(law, **told), options.level)
+        more, lines, limits = fit_catches(caught, replace(law, **known), options.level)
         steps += more
     start = _start(steps, law)
     names = tuple(name for name, value in start.items() if not math.isnan(value))
