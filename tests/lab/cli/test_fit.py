@@ -103,28 +103,6 @@ def test_friction_is_fitted_and_drawn(masrel: Caller, tmp_path: Path) -> None:
     assert (tmp_path / "out" / "fit_friction.png").stat().st_size > 10_000
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--unit", "torque"], "--unit: needs QUANTITY=TEXT, got 'torque'"),
-        (["--unit", "torque=lb"], "torque needs one of nm, mnm, ncm, got 'lb'"),
-        (["--unit", "angle=rad"], "column angle_deg says deg, units says rad"),
-        (["--column", "torque=Moment"], "needs the column 'Moment'"),
-        (["--level", "2"], "level: needs more than 0.5"),
-        (["--gravity", "much"], "needs off, fitted or a number, got 'much'"),
-        (["--rise", "0.2"], "rise: needs 0 to ΔT_peak, 0.1 s, got 0.2 s"),
-        (["--lag", "-1"], "lag: needs 0 or more, got -1"),
-    ],
-)
-def test_a_wrong_call_is_one_sentence(
-    masrel: Caller, files: list[Path], arguments: list[str], said: str
-) -> None:
-    done = masrel("joint", "fit", *files[:2], *arguments)
-    assert done.code == 2
-    assert said in done.err
-    assert "Traceback" not in done.err
-
-
 def test_only_fast_stretches_are_refused_with_the_option(
     masrel: Caller, files: list[Path]
 ) -> None:

@@ -495,9 +495,11 @@ def _check_law(estimates: Sequence[FittedParameter]) -> None:
 def _reasons(last: JointFit, options: FitOptions) -> dict[str, str]:
     # why the steps do not determine what they do not
     if all(trial.catch is None for trial in last.fast):
-        why = "there are only slow stretches, in which nothing catches"
-        if last.fast:
-            why = "no fast stretch has a catch that can be used"
+        why = (
+            "no fast stretch has a catch that can be used"
+            if last.fast
+            else "there are only slow stretches, in which nothing catches"
+        )
         names = [name for name in QUANTITIES if name not in ALWAYS]
         names += [name for name in options.fitted if name in ("lag", "catch_rise")]
         return dict.fromkeys(names, why)
@@ -563,21 +565,22 @@ def _remarks(
     remarks += [
         f"{ALL_QUANTITIES[e.name].symbol}: {e.reason}" for e in estimates if e.reason
     ]
-    if behind:
-        remarks.append(
+    cautions = (
+        (
+            behind > 0,
             f"{behind} of {len(catches)} catches do not end within their stretch: D "
             "counts each as longer than what could be seen of it (censored), and "
-            "takes travels to be normal"
-        )
-    if behind < unended < len(catches):
-        remarks.append(
+            "takes travels to be normal",
+        ),
+        (
+            behind < unended < len(catches),
             f"{unended - behind} of {len(catches)} catches do not end within their "
             "stretch and say nothing of D: if D differs between trials, those with a "
-            "short one are left, and D is underestimated"
-        )
-    if unused:
-        remarks.append(f"{unused} of {len(last.fast)} fast stretches are not used")
-    return tuple(remarks)
+            "short one are left, and D is underestimated",
+        ),
+        (unused > 0, f"{unused} of {len(last.fast)} fast stretches are not used"),
+    )
+    return (*remarks, *(text for is_so, text in cautions if is_so))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
