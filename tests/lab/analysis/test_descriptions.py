@@ -82,6 +82,7 @@ def test_what_is_known_of_speeds_is_summarized_and_what_is_not_is_counted() -> N
     test, retest = found.by_model  # in the protocol's order, not the file's
     # mean 85, deviations 5 and -5: sd sqrt(50 / 1)
     assert (test.session, test.n, test.mean, test.sd) == ("test", 2, 85.0, 50**0.5)
+    assert (test.least, test.most) == (80.0, 90.0)
     assert (retest.session, retest.n, retest.mean) == ("retest", 1, 70.0)
     assert math.isnan(retest.sd)
     of_raters = [(s.session, s.name) for s in found.by_rater]

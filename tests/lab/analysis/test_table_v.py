@@ -63,18 +63,3 @@ def test_the_intended_grade_was_given_as_the_paper_says() -> None:
     assert found.sd == pytest.approx(math.sqrt(429.6875 / 3), abs=1e-12)
     assert round(found.sd, 2) == 11.97
     assert (found.session, found.reason) == ("test", None)
-
-
-def test_the_speeds_are_table_vs() -> None:
-    # HM4: 68, 65, 64, 72, 60, 65, 61, 60: sum 515, mean 64.375; squares of the
-    # deviations sum to 33275 - 515**2 / 8 = 121.875, over 7 the variance.
-    found = published(sections=("speeds",)).speeds
-    assert found is not None
-    (hm4,) = [summary for summary in found.by_model if summary.name == "HM4"]
-    assert (hm4.session, hm4.n, hm4.mean) == ("test", 8, 64.375)
-    assert hm4.sd == pytest.approx(math.sqrt(121.875 / 7), abs=1e-12)
-    assert (hm4.least, hm4.most) == (60.0, 72.0)
-    # R1: 122, 124, 108, 68: mean 105.5
-    (r1,) = [summary for summary in found.by_rater if summary.name == "R1"]
-    assert (r1.n, r1.mean) == (4, 105.5)
-    assert found.n_missing == 0
