@@ -297,7 +297,6 @@ def _looks(lines: Sequence[ForestRow], caption: str) -> Iterator[str]:
         yield "Dashed: what chance gives."
 
 
-_CATEGORIES = "Agreement on each grade"
 _FEW = 10  # models, below which the intervals of a grade say next to nothing
 
 
@@ -322,7 +321,7 @@ def categories_section(material: Material) -> Iterator[Content]:
     of = f"{entry.line.models} models, session {entry.line.sessions[0]}"
     yield Table(
         name="categories",
-        caption=f"{_CATEGORIES} of the scale, {of}",
+        caption=f"Agreement on each grade of the scale, {of}",
         columns=(
             Column(key="grade", heading="Grade", align="left"),
             Column(key="n_ratings", heading="Ratings"),

@@ -120,10 +120,6 @@ def study_conduct(
     )
 
 
-CONDUCT_SECTIONS = ("flow", "conduct")
-"""Sections that no protocol names: they are there where there is anything to say."""
-
-
 def flow_section(material: Material) -> Iterator[Content]:
     """Say what became of the raters, once one has begun."""
     conduct = material.conduct

@@ -19,12 +19,7 @@ from masrel.lab.analysis._results import analysis_text
 from masrel.lab.protocol import Protocol, report_sections
 from masrel.lab.ratings import InPerson, Ratings
 from masrel.lab.report._agreement import categories_section, estimates_section
-from masrel.lab.report._conduct import (
-    CONDUCT_SECTIONS,
-    StudyConduct,
-    conduct_section,
-    flow_section,
-)
+from masrel.lab.report._conduct import StudyConduct, conduct_section, flow_section
 from masrel.lab.report._design import design_section, sample_size_section
 from masrel.lab.report._grade_sections import (
     confusion_section,
@@ -257,7 +252,8 @@ def section_names(protocol: Protocol) -> list[str]:
     """Return the names of the sections that a report can have, in their order."""
     names = list(report_sections(protocol))
     place = names.index("design") + 1 if "design" in names else 0
-    names[place:place] = CONDUCT_SECTIONS
+    # no protocol names them: they are there where there is anything to say
+    names[place:place] = ("flow", "conduct")
     return names
 
 

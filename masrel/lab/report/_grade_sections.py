@@ -307,9 +307,6 @@ def _shares(
     return np.array([parts.sum(axis=1) / wholes.sum(axis=1), low, high])
 
 
-_CONFUSION = "Grades given for each intended grade"
-
-
 def confusion_section(material: Material) -> Iterator[Content]:
     """Show which grades models of each intended grade were given."""
     session, intended, by_rater = given_grades(material)
@@ -317,7 +314,7 @@ def confusion_section(material: Material) -> Iterator[Content]:
         yield lacking("no model with an intended grade has ratings")
         return
     grades, level = material.ratings.scale.grades, material.analysis.level
-    caption = f"{_CONFUSION}, session {session}"
+    caption = f"Grades given for each intended grade, session {session}"
     shares = _shares(by_rater, [grades.index(aim) for aim in intended], level)
     counts = by_rater.sum(axis=1)  # (n_intended, n_grades)
     framed = np.array([[grade == aim for grade in grades] for aim in intended])

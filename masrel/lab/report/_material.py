@@ -4,7 +4,6 @@ import math
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -132,17 +131,12 @@ def lacking(reason: str | None) -> Paragraph:
 
 
 _FILE = Path(__file__).with_name("templates") / "sentences.toml"
-
-
-@cache
-def sentences() -> dict[str, dict[str, str]]:
-    """Return every sentence by its group and name, with its words in braces."""
-    return tomllib.loads(_FILE.read_text(encoding="utf-8"))
+_SENTENCES: dict[str, dict[str, str]] = tomllib.loads(_FILE.read_text("utf-8"))
 
 
 def sentence(group: str, name: str, **words: object) -> str:
     """Return a sentence with its words in braces replaced."""
-    return sentences()[group][name].format_map(words)
+    return _SENTENCES[group][name].format_map(words)
 
 
 TARGETS = {
