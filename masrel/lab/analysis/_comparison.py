@@ -182,15 +182,17 @@ def _difference(old: str | float | None, new: str | float | None) -> float | Non
 
 def changed_inputs(old: Mapping[str, Any], new: Mapping[str, Any]) -> tuple[str, ...]:
     """Return a line for each input whose hash differs, and for another masrel."""
-    lines = []
     before, after = old.get("inputs") or {}, new.get("inputs") or {}
-    for name in dict.fromkeys([*after, *before]):
-        if before.get(name) != after.get(name):
-            what = name.removesuffix("_sha256").replace("_", " ")
-            hashes = (
-                str(d[name])[:12] if d.get(name) else "none" for d in (before, after)
-            )
-            lines.append(f"{what}: SHA-256 {' before, now '.join(hashes)}")
+    hashes = {
+        name: [str(inputs.get(name) or "none")[:12] for inputs in (before, after)]
+        for name in {**after, **before}
+        if before.get(name) != after.get(name)
+    }
+    lines = [
+        f"{name.removesuffix('_sha256').replace('_', ' ')}: SHA-256 "
+        f"{' before, now '.join(both)}"
+        for name, both in hashes.items()
+    ]
     versions = [str(d.get("masrel_version")) for d in (old, new)]
     if versions[0] != versions[1]:
         lines.append(f"masrel: {' before, now '.join(versions)}")

@@ -141,15 +141,13 @@ def _check_known(protocol: Protocol, ratings: Ratings) -> None:
         "model": [model.id for model in protocol.models],
     }
     where = "the ratings" if ratings.source_path is None else str(ratings.source_path)
-    problems = []
-    for column, ids in known.items():
-        names = (getattr(row, column) for row in ratings.rows)
-        strange = dict.fromkeys(name for name in names if name not in ids)
-        problems += [
-            f"{where}: column {column!r}: needed one of the protocol's, "
-            f"{', '.join(ids)}, got {got!r}"
-            for got in strange
-        ]
+    problems = [
+        f"{where}: column {column!r}: needed one of the protocol's, {', '.join(ids)}, "
+        f"got {got!r}"
+        for column, ids in known.items()
+        for got in dict.fromkeys(getattr(row, column) for row in ratings.rows)
+        if got not in ids
+    ]
     if problems:
         raise RatingsError("\n".join(problems))
 
@@ -163,17 +161,18 @@ def _inputs(
     # SHA-256 by name; of the file that is there, or that `masrel ratings` writes
     path = ratings.source_path
     text = ratings_csv(ratings).encode() if path is None else path.read_bytes()
-    inputs = {
-        "protocol_sha256": protocol_hash(protocol),
-        "ratings_sha256": hashlib.sha256(text).hexdigest(),
-    }
+    files = {"ratings": text}
     if in_person is not None:
-        data = in_person.source_path.read_bytes()
-        inputs["in_person_sha256"] = hashlib.sha256(data).hexdigest()
+        files["in_person"] = in_person.source_path.read_bytes()
     if answers:
-        data = answers_csv(tuple(answers)).encode()
-        inputs["answers_sha256"] = hashlib.sha256(data).hexdigest()
-    return inputs
+        files["answers"] = answers_csv(tuple(answers)).encode()
+    return {
+        "protocol_sha256": protocol_hash(protocol),
+        **{
+            f"{of}_sha256": hashlib.sha256(data).hexdigest()
+            for of, data in files.items()
+        },
+    }
 
 
 def _estimate(
