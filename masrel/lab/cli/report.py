@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from masrel._files import check_inside, refuse_record
+from masrel._input import check_option
 from masrel._interpreter import collector_off
 from masrel.cli._options import (
     STDOUT,
@@ -269,13 +270,8 @@ def _made(
     # most of what libraries and figures make stays in use
     with read_once(), collector_off():
         data = read_study(study, ratings_file)
-        known = section_names(data.protocol)
         for name in only:
-            if name not in known:
-                raise ParameterError(
-                    f"--only: needed a section of this report, {', '.join(known)}, got "
-                    f"{name!r}"
-                )
+            check_option("--only", name, section_names(data.protocol))
         if CONVERTED & {*data.protocol.report.formats, *formats}:
             pandoc_version()
         gates = gating.gates(data.protocol)
@@ -290,9 +286,13 @@ def _made(
                 answers=data.answers,
                 excluded=data.excluded,
             )
-        in_person, folder = data.in_person, data.paths.sessions
         material = gather(
-            data.protocol, data.ratings, analysis, in_person, folder, conduct
+            data.protocol,
+            data.ratings,
+            analysis,
+            data.in_person,
+            data.paths.sessions,
+            conduct,
         )
         bar = tqdm(desc="report", unit=" parts", disable=output.quiet or None)
 

@@ -300,4 +300,4 @@ def test_only_makes_a_report_of_what_is_named(masrel: Caller, study: Path) -> No
     assert "## Agreement between raters" not in text
     done = masrel("report", study, "--only", "grade")
     assert (done.code, done.err.count("\n")) == (2, 1)
-    assert "--only: needed a section of this report" in done.err
+    assert "--only: needs one of flow, conduct, agreement, grades, got" in done.err
