@@ -55,24 +55,6 @@ def read_back(analysis: Analysis, folder: Path) -> dict[str, Any]:
     return document
 
 
-def test_every_digit_survives_beside_the_line_of_the_plan(tmp_path: Path) -> None:
-    analysis = published()
-    kappa, lost = read_back(analysis, tmp_path)["estimates"]
-    estimate = analysis.estimates[0].estimate
-    assert estimate is not None
-    assert estimate.interval is not None
-    assert kappa["estimate"]["value"] == estimate.value
-    assert kappa["estimate"]["interval"]["low"] == estimate.interval.low
-    assert kappa["estimate"]["interval"]["method"] == estimate.interval.method
-    known = ("lost", "dummy", "fleiss_kappa", None)
-    names = ("id", "models", "coefficient", "estimate")
-    assert tuple(lost[name] for name in names) == known
-    assert lost["reason"] == "no dummy model has ratings in session test"
-    write_analysis(published(), tmp_path / "again.json")  # the same bytes
-    first = (tmp_path / "deep" / "analysis.json").read_bytes()
-    assert (tmp_path / "again.json").read_bytes() == first
-
-
 def test_nan_is_null_with_a_reason(tmp_path: Path) -> None:
     (line,) = read_back(undefined(), tmp_path)["estimates"]
     for part in (line["estimate"], line["estimate"]["interval"]):
