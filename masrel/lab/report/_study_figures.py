@@ -2,7 +2,6 @@
 
 import math
 import textwrap
-from collections import defaultdict
 from collections.abc import Sequence
 from typing import Any
 
@@ -106,17 +105,13 @@ def _speed_row(
     sessions: Sequence[str],
 ) -> None:
     width = 0.76 / len(sessions)
-    of_column: defaultdict[tuple[str, str], list[Speed]] = defaultdict(list)
-    for speed in speeds.values:
-        of_column[speed.session, speed.model].append(speed)
-    for column in speeds.by_model:
-        if column.name not in models:
-            continue
+    for column in (of for of in speeds.by_model if of.name in models):
         place = sessions.index(column.session)
         middle = models.index(column.name) - 0.38 + width * (place + 0.5)
         ends = [middle - 0.45 * width, middle + 0.45 * width]
         axes.plot(ends, [column.mean] * 2, color=BLACK, linewidth=1.6, zorder=2.5)
-        values = of_column[column.session, column.name]
+        key = column.session, column.name
+        values = [of for of in speeds.values if (of.session, of.model) == key]
         look = _SESSION_LOOKS[place % len(_SESSION_LOOKS)]
         _draw_speeds(axes, values, raters, (middle, 0.9 * width), look)
     names = [short_name(model) for model in models]
@@ -249,12 +244,10 @@ def learning_figure(
             textcoords="offset points", va="center", fontsize=7.5, color=GREY,
         )  # fmt: skip
     position, value, low, high = np.array(kappas, dtype=np.float64).reshape(-1, 4).T
-    has_ends = np.isfinite(low)
-    ends = position[has_ends], low[has_ends], high[has_ends]
     label = f"{percent(level)} % interval"
-    upper.vlines(*ends, color=BLUE, linewidth=1.8, label=label)
+    upper.vlines(position, low, high, color=BLUE, linewidth=1.8, label=label)
     upper.plot(position, value, "o-", color=BLACK, markersize=5, label="weighted κ")
-    lowest = min([0.0, *low[has_ends], *value[np.isfinite(value)]])
+    lowest = np.nanmin([0.0, *low, *value])
     upper.set_ylim(max(-1.0, math.floor(10.0 * lowest) / 10.0) - 0.02, 1.03)
     upper.set_ylabel("κ with the intended grades")
     upper.grid(axis="y")
