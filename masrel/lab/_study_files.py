@@ -94,6 +94,12 @@ def regular(descriptor: int, path: Path) -> int:
     raise OSError(errno.EINVAL, "not a regular file", str(path))
 
 
+def repeated(values: Sequence[str]) -> list[bool]:
+    """Return of each value whether it stands there before, in linear time."""
+    first = {value: place for place, value in reversed([*enumerate(values)])}
+    return [first[value] < place for place, value in enumerate(values)]
+
+
 def csv_format(text: str) -> object:
     """Return the version that a CSV file names at its head; 1 where it names none."""
     for line in io.StringIO(text):

@@ -10,6 +10,7 @@ import msgspec
 
 from masrel._input import listed
 from masrel.errors import ParameterError
+from masrel.lab._study_files import repeated
 from masrel.lab.protocol._decode import got, needed
 from masrel.lab.protocol._kinds import DEFAULT_KIND, kind_problem, value_problems
 from masrel.lab.protocol._values import RESERVED, field_value, needed_of
@@ -65,8 +66,8 @@ def _broken(*rules: tuple[object, str]) -> Iterator[str]:
 
 
 def _again(names: Sequence[str], where: str, needs: str) -> Iterator[str]:
-    for index, name in enumerate(names):
-        if name in names[:index]:
+    for index, (name, is_again) in enumerate(zip(names, repeated(names), strict=True)):
+        if is_again:
             yield f"{where}[{index}]: needed {needs}, got {got(name)} again"
 
 
@@ -436,10 +437,10 @@ def _session_order(session: Session, protocol: Protocol) -> Iterator[str]:
 def _questions(protocol: Protocol) -> Iterator[str]:
     # each question with the keys of its type, and its own id
     for index, questionnaire in enumerate(protocol.questionnaires):
-        ids = [question.id.casefold() for question in questionnaire.questions]
+        again = repeated([each.id.casefold() for each in questionnaire.questions])
         for place, question in enumerate(questionnaire.questions):
             where = f"questionnaires[{index}].questions[{place}]"
-            if ids[place] in ids[:place]:
+            if again[place]:
                 yield (
                     f"{where}.id: needed ids that differ by more than case, got "
                     f"{got(question.id)} again"

@@ -17,6 +17,7 @@ from masrel.lab._study_files import (
     check_format,
     csv_format,
     read_regular,
+    repeated,
 )
 from masrel.lab.ratings.table import (
     _DEFAULTS,
@@ -328,10 +329,12 @@ def _check_header(path: Path, line: int, header: tuple[str, ...]) -> None:
     if len(header) == 1:
         message = f"needed columns separated by commas, got one, {header[0]!r}"
         problems.append((line, None, message))
-    for place, name in enumerate(header):
+    for place, (name, is_again) in enumerate(
+        zip(header, repeated(header), strict=True)
+    ):
         if not name:
             problems.append((line, None, f"column {place + 1} needs a name, got none"))
-        elif name in header[:place]:
+        elif is_again:
             message = "needed different names, this one is there twice"
             problems.append((line, name, message))
     _refuse(path, problems)

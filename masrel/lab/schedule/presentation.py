@@ -17,6 +17,7 @@ from masrel.lab._study_files import (
     format_problem,
     once,
     read_regular,
+    repeated,
     table_csv,
 )
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
@@ -369,11 +370,12 @@ def _head_problems(
     lines: Sequence[str], head: Sequence[tuple[str, str]]
 ) -> Iterator[str]:
     keys = [key for key, _ in head]
+    again = repeated(keys)
     for place, (key, value) in enumerate(head):
         where = f"line {place + 1}"
         if key == "format":
             continue  # it is known
-        if key not in _HEAD or key in keys[:place]:
+        if key not in _HEAD or again[place]:
             yield (
                 f"{where}: needed '# key: value' with each of {', '.join(_HEAD)} once, "
                 f"got {lines[place]!r}"

@@ -5,8 +5,9 @@ import io
 import json
 import os
 import re
+import signal
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -169,15 +170,67 @@ def test_a_table_beside_its_logs_that_is_one_long_cell(
         assert str(ratings) in done.err.splitlines()[-1] or "broken" in done.err
 
 
-@pytest.mark.slow
-def test_wide_headers_take_linear_time(study: Path, masrel: Caller) -> None:
-    ratings = study / "ratings" / "ratings.csv"
-    ratings.parent.mkdir()
-    ratings.write_text(",".join(f"c{i}" for i in range(200_000)) + "\n")
-    done = masrel("check", study)
-    refused(done, "and 199960 more")
-    ratings.write_text(",".join(["c"] * 200_000) + "\n")
-    refused(masrel("check", study), "and 199979 more", 22)
+@pytest.fixture
+def linear() -> Iterator[None]:
+    """End what takes the square of its size, which would be a minute or more."""
+
+    def fail(*_: object) -> None:
+        raise AssertionError("not in linear time")
+
+    signal.signal(signal.SIGPROF, fail)
+    signal.setitimer(signal.ITIMER_PROF, 20.0)  # of processor time; a second will do
+    yield
+    signal.setitimer(signal.ITIMER_PROF, 0.0)
+
+
+@pytest.mark.usefixtures("linear")
+@pytest.mark.parametrize(
+    ("file", "text", "sentence", "most"),
+    [
+        (
+            "ratings/ratings.csv",
+            ",".join(f"c{i}" for i in range(200_000)) + "\n",
+            "and 199960 more",
+            2,
+        ),
+        (
+            "ratings/ratings.csv",
+            ",".join(["c"] * 200_000) + "\n",
+            "and 199979 more",
+            22,
+        ),
+        (
+            "schedules/test_R1.csv",
+            "".join(f"#{i}:\n" for i in range(120_000)),
+            "test_R1.csv: line 1: needed '# key: value'",
+            120_100,
+        ),
+    ],
+    ids=["different names of columns", "one name", "keys of a head"],
+)
+def test_names_are_compared_in_linear_time(
+    file: str,
+    text: str,
+    sentence: str,
+    most: int,
+    study: Path,
+    masrel: Caller,
+) -> None:
+    (study / file).parent.mkdir(exist_ok=True)
+    (study / file).write_text(text)
+    refused(masrel("check", study), sentence, most)
+
+
+@pytest.mark.usefixtures("linear")
+def test_raters_of_a_session_are_compared_in_linear_time(
+    study: Path, masrel: Caller
+) -> None:
+    names = ",".join(f'"{i:x}"' for i in range(60_000))
+    text = (study / "protocol.toml").read_text()
+    assert 'raters = ["R1", "R2"]' in text
+    text = text.replace('raters = ["R1", "R2"]', f"raters = [{names}]")
+    (study / "protocol.toml").write_text(text)
+    refused(masrel("check", study), "there are more problems", 202)
 
 
 def test_deep_and_long_values_of_a_log(study: Path, masrel: Caller) -> None:
