@@ -38,7 +38,7 @@ def _show(
         order_document,
         summary_table,
     )
-    from masrel.lab.schedule._balance import order_balance
+    from masrel.lab.schedule.sheets import order_balance
     from masrel.plots._drawn_values import Drawn
 
     balances = order_balance(protocol, paths, site)

@@ -18,7 +18,7 @@ from masrel.intervals._question import student_t
 from masrel.lab.protocol import Protocol
 from masrel.lab.ratings import Rating, Ratings
 from masrel.lab.report._material import Material, lacking, sentence
-from masrel.lab.schedule._balance import OrderBalance
+from masrel.lab.schedule.sheets import OrderBalance
 from masrel.pages._sections import Content, Paragraph
 from masrel.tables._tables import Column, Table, Value, percent
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from masrel.lab.analysis import Speed, Speeds
 from masrel.lab.report._material import MANY_RATERS
-from masrel.lab.schedule._balance import OrderBalance
+from masrel.lab.schedule.sheets import OrderBalance
 from masrel.plots._grades import categories_picture, counts_picture
 from masrel.plots._style import (
     BLACK,
