@@ -33,9 +33,7 @@ def demo(out: Path, template: str | None, output: OutputOptions) -> None:
     """
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise ParameterError(f"{out}: needs a new or empty folder for the demo")
-    studies = {"study": template or "hess2012"}
-    if template is None:
-        studies["tone"] = "tone"
+    studies = {"study": template} if template else {"study": "hess2012", "tone": "tone"}
     pages = []
     # Every note on an interval is in its result, and so in the report.
     with warnings.catch_warnings(action="ignore", category=MasrelWarning):
