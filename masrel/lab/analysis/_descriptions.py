@@ -30,7 +30,7 @@ from masrel.lab.ratings import (
     Ratings,
 )
 
-_Place = tuple[str, str]  # a session, and a model or a rater
+_SessionUnit = tuple[str, str]  # a session, and a model or a rater
 
 
 def intended_agreement(
@@ -183,10 +183,10 @@ def presentations(ratings: Ratings) -> Presentations | None:
 
 
 def _summaries(
-    speeds: Iterable[tuple[_Place, float]], places: Iterable[_Place]
+    speeds: Iterable[tuple[_SessionUnit, float]], places: Iterable[_SessionUnit]
 ) -> tuple[SpeedSummary, ...]:
     # places: sessions with names of models or raters, in the protocol's order
-    groups: dict[_Place, list[float]] = {}
+    groups: dict[_SessionUnit, list[float]] = {}
     for place, speed in speeds:
         groups.setdefault(place, []).append(speed)
     return tuple(

@@ -38,10 +38,10 @@ def _show(
         order_document,
         summary_table,
     )
-    from masrel.lab.schedule.sheets import order_balance
+    from masrel.lab.schedule.sheets import _order_balance
     from masrel.plots._drawn_values import Drawn
 
-    balances = order_balance(protocol, paths, site)
+    balances = _order_balance(protocol, paths, site)
     write_output(
         output,
         document=lambda: order_document(balances),

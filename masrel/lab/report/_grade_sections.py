@@ -279,12 +279,12 @@ def given_grades(material: Material) -> tuple[str, list[str], NDArray[np.int64]]
     graded = [row for row in ratings.rows if row.grade is not None]
     present = {row.session for row in graded}
     session = next((s for s in material.sessions if s in present), "")
-    given = Counter(
+    n_given = Counter(
         (aims[r.model], r.rater, r.grade) for r in graded if r.session == session
     )
-    grades, raters = ratings.scale.grades, sorted({rater for _, rater, _ in given})
-    intended = [grade for grade in grades if grade in {aim for aim, *_ in given}]
-    counts = [[[given[a, r, g] for g in grades] for r in raters] for a in intended]
+    grades, raters = ratings.scale.grades, sorted({rater for _, rater, _ in n_given})
+    intended = [grade for grade in grades if grade in {aim for aim, *_ in n_given}]
+    counts = [[[n_given[a, r, g] for g in grades] for r in raters] for a in intended]
     return session, intended, np.array(counts, dtype=np.int64)
 
 

@@ -18,7 +18,7 @@ from masrel.intervals._question import student_t
 from masrel.lab.protocol import Protocol
 from masrel.lab.ratings import Rating, Ratings
 from masrel.lab.report._material import Material, lacking, sentence
-from masrel.lab.schedule.sheets import OrderBalance
+from masrel.lab.schedule.sheets import _OrderBalance
 from masrel.pages._sections import Content, Paragraph
 from masrel.tables._tables import Column, Table, Value, percent
 
@@ -247,7 +247,7 @@ _MAX_COLUMNS = 16  # of places or models
 _N_PARTS = 8  # of a session with more places
 
 
-def summary_table(balances: Sequence[OrderBalance]) -> Table:
+def summary_table(balances: Sequence[_OrderBalance]) -> Table:
     """Return the fewest and most of each count, a row each session (and site)."""
     has_sites = any(balance.site is not None for balance in balances)
     site = (Column(key="site", heading="Site", align="left"),) if has_sites else ()
@@ -298,7 +298,7 @@ def _range(counts: Sequence[int]) -> str:
     return str(low) if low == high else f"{low} to {high}"
 
 
-def count_tables(balance: OrderBalance) -> Iterator[Table]:
+def count_tables(balance: _OrderBalance) -> Iterator[Table]:
     """Yield a table of places, and one of ordered pairs unless there are too many."""
     of_session = f"session {balance.session}" + (
         "" if balance.site is None else f", site {balance.site}"
@@ -340,6 +340,6 @@ def _part(first: int, end: int) -> str:
     return str(end) if end == first + 1 else f"{first + 1}–{end}"
 
 
-def order_document(balances: Sequence[OrderBalance]) -> dict[str, object]:
+def order_document(balances: Sequence[_OrderBalance]) -> dict[str, object]:
     """Return every count as plain values."""
     return {"note": _CONCEALED, "sessions": [asdict(balance) for balance in balances]}

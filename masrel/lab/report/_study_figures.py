@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from masrel.lab.analysis import Speed, Speeds
 from masrel.lab.report._material import MANY_RATERS
-from masrel.lab.schedule.sheets import OrderBalance
+from masrel.lab.schedule.sheets import _OrderBalance
 from masrel.plots._grades import categories_picture, counts_picture
 from masrel.plots._style import (
     BLACK,
@@ -206,7 +206,7 @@ def flow_figure(steps: Sequence[tuple[str, Sequence[str]]]) -> Figure:
     return figure
 
 
-def order_pictures(panels: Sequence[OrderBalance]) -> list[tuple[str, Picture]]:
+def order_pictures(panels: Sequence[_OrderBalance]) -> list[tuple[str, Picture]]:
     """Return two tables a session: models by places, and by what came right after."""
     pictures = []
     for panel in panels:

@@ -74,9 +74,9 @@ def scene_document(scene: Scene, quantities: Quantities) -> dict[str, object]:
 
     joint, motion, kind = scene.joint, scene.motion, {}
     if isinstance(joint, ElbowParameters):
-        found = _of_elbow(joint, motion, quantities)
+        events = _of_elbow(joint, motion, quantities)
     else:
-        kind, found = {"kind": joint.kind}, _of_tone(joint, motion, quantities)
+        kind, events = {"kind": joint.kind}, _of_tone(joint, motion, quantities)
     document: dict[str, object] = {
         "model": scene.model,
         **kind,
@@ -84,7 +84,7 @@ def scene_document(scene: Scene, quantities: Quantities) -> dict[str, object]:
         "speed_deg_s": scene.speed_deg_s,
         "from_deg": scene.start_deg,
         "to_deg": scene.end_deg,
-        **found,
+        **events,
     }
     for key, number in document.items():
         if isinstance(number, float) and not math.isfinite(number):

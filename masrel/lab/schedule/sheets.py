@@ -448,7 +448,7 @@ def _changes(protocol: Protocol, file: Path, sha256: str) -> str:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OrderBalance:
+class _OrderBalance:
     """Counts over the schedules of a session, and of a site where sites are strata."""
 
     session: str
@@ -480,9 +480,9 @@ class OrderBalance:
         )
 
 
-def order_balance(
+def _order_balance(
     protocol: Protocol, study: StudyPaths, site: str | None = None
-) -> tuple[OrderBalance, ...]:
+) -> tuple[_OrderBalance, ...]:
     """Count the drawn schedules of a study, or of one of its sites."""
     pairs = rater_sessions_at(protocol, checked_site(protocol, site))
     drawn: dict[tuple[str, str | None], list[Schedule]] = {}
@@ -499,7 +499,7 @@ def order_balance(
 
 def _balance(
     protocol: Protocol, schedules: Sequence[Schedule], session: str, site: str | None
-) -> OrderBalance:
+) -> _OrderBalance:
     orders = [[shown.model for shown in each.presentations] for each in schedules]
     models = [model.id for model in protocol.models]
     places = Counter(chain.from_iterable(map(enumerate, orders)))
@@ -513,7 +513,7 @@ def _balance(
         tuple(_longest(order, kinds) for order in orders)
         for kinds in ({model: model for model in models}, grades, standards)
     ]
-    return OrderBalance(
+    return _OrderBalance(
         session=session,
         site=site,
         models=tuple(models),
