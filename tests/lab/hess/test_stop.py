@@ -146,7 +146,7 @@ LEAST_NM = 2.0
 
 def torque_stood_ms(how: signal.Signals, path: Path) -> tuple[float, float]:
     """Send a signal to a loop at work -> torque then, N·m; how long it stood, ms."""
-    for _ in range(10):
+    for _ in range(30):
         torque, stood_ms = _signalled(how, path)
         # On busy cores a loop may be away for longer than its watchdog waits, and be
         # idled before the signal comes: then there was nothing to take back.
