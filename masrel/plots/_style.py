@@ -270,6 +270,10 @@ def lay_out(figure: Figure, stamp: str) -> None:
         )
     if (engine := figure.get_layout_engine()) is not None:
         engine.execute(figure)
+    # the last digits of the solver depend on where its variables lie in memory
+    for axes in figure.axes:
+        place = axes.get_position(original=True).bounds
+        axes.set_position(tuple(round(part, 9) for part in place))
 
 
 def _enlarge(figure: Figure) -> None:
