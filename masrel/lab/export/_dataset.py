@@ -9,6 +9,7 @@ import tomllib
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date
+from itertools import dropwhile
 from pathlib import Path
 from typing import Any
 
@@ -224,9 +225,10 @@ def _ratings_table(
 
 
 def _records(text: str) -> "csv.DictReader[str]":
-    # those of a table of masrel, without the comments above it
+    # those of a table of masrel, without the comments above it; a line of an answer may
+    # begin as they do
     lines = text.splitlines(keepends=True)
-    return csv.DictReader(line for line in lines if not line.startswith("#"))
+    return csv.DictReader(dropwhile(lambda line: line.startswith("#"), lines))
 
 
 _OF_RATERS = {

@@ -52,7 +52,7 @@ public = true
 [rater_fields.illness]
 type = "text"
 """
-ANSWERS = {"after.real": 7, "after.secret": "a private answer"}
+ANSWERS = {"after.real": 7, "after.secret": "a private answer\n# on two lines"}
 QUESTIONS = """
 [[questionnaires]]
 id = "after"
@@ -220,6 +220,13 @@ def test_tables_of_bids_are_described_and_hold_what_is_public(bids: Path) -> Non
     with (bids / "sourcedata/ratings/answers.csv").open(newline="") as file:
         answers = [(row["question"], row["answer"]) for row in csv.DictReader(file)]
     assert answers == [("real", "7")] * 6
+
+
+def test_an_answer_of_two_lines_keeps_both(rated: Study, tmp_path: Path) -> None:
+    folder = exported(rated, "bids", tmp_path / "out", include=["after.secret"])
+    with (folder / "sourcedata/ratings/answers.csv").open(newline="") as file:
+        answers = [row["answer"] for row in csv.DictReader(file)]
+    assert answers == ["7", ANSWERS["after.secret"]] * 6
 
 
 def test_a_crate_loads_with_every_file_and_its_hash(
