@@ -69,7 +69,9 @@ def test_a_kill_leaves_whole_pages_with_what_they_link_to(
             # most of its time it loads what it needs
             time.sleep(lasts_s * chance.triangular(0.2, 1.0, 1.0))
             process.kill()
-            n_killed += process.wait() == -signal.SIGKILL
+            is_killed = process.wait() == -signal.SIGKILL
+            n_killed += is_killed
+            lasts_s *= 1.0 if is_killed else 0.7  # it was timed on a busier machine
             check_links(folder)
             left = contents(folder)
             for page in ("report.html", "report.md", "analysis.json", "manifest.json"):
