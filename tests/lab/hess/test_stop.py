@@ -146,7 +146,7 @@ LEAST_NM = 2.0
 
 def torque_stood_ms(how: signal.Signals, path: Path) -> tuple[float, float]:
     """Send a signal to a loop at work -> torque then, N·m; how long it stood, ms."""
-    for _ in range(30):
+    for _ in range(10):
         torque, stood_ms = _signalled(how, path)
         # On busy cores a loop may be away for longer than its watchdog waits, and be
         # idled before the signal comes: then there was nothing to take back.
@@ -163,9 +163,10 @@ def _signalled(how: signal.Signals, path: Path) -> tuple[float, float]:
         wait_for(lambda: file.read()[0] >= LEAST_NM or loop.poll() is not None)
         if loop.poll() is not None:
             return 0.0, 0.0  # it was idled, or ended, before it had any
+        # before, as the watchdog may idle it sooner than anything else can be read
+        torque = file.read()[0]
         sent_ns = time.monotonic_ns()
         os.kill(loop.pid, how)
-        torque = file.read()[0]
         wait_for(lambda: file.read()[2] == 0)
         return torque, (file.read()[1] - sent_ns) * 1e-6
     finally:
