@@ -35,6 +35,11 @@ _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 # Where a study's primary records are, which no output replaces
 _PROTOCOL = "protocol.toml"
 _RECORD_FOLDERS = ("schedules", "sessions", "conduct", ".key")
+# What in a study says who is who, who rated what, or what was presented
+_PRIVATE = (
+    *_RECORD_FOLDERS,
+    *("conduct.jsonl", "sheets", "training", "rehearsals", "ratings", ".masrel_cache"),
+)
 _SOURCES = (
     ("ratings", "published.csv"),
     ("ratings", "in_person.csv"),
@@ -63,7 +68,8 @@ def write_files(
 ) -> None:
     """Write files that belong together: all on disk before the first has its name."""
     # They get their names in this order. Text is UTF-8 with lines as they are. mode:
-    # permissions; those of the file that is replaced, or the usual ones, unless given
+    # permissions; unless given those of the file that is replaced, or its owner's alone
+    # where a study has what is private, or the usual ones
     parts: dict[Path, Path] = {}
     try:
         for path, data in contents.items():
@@ -98,7 +104,8 @@ def new_part(
     if within is not None:
         check_inside(path.parent, within)
     replaced = _mode(path)
-    mode = replaced if mode is None else mode
+    if mode is None:
+        mode = replaced or (0o600 if _is_private(path) else None)
     make_folder(path.parent)
     part = path.with_name(f"{PART_BEGINS}{os.urandom(8).hex()}{PART_ENDS}")
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | NO_FOLLOW | BINARY
@@ -152,15 +159,27 @@ def _mode(path: Path) -> int | None:
     return stat.S_IMODE(mode)
 
 
-def make_folder(folder: Path, *, mode: int = 0o777) -> None:
-    """Make a folder, with this mode, and those above it that are missing, on disk."""
+def _is_private(path: Path) -> bool:
+    path = path.absolute()
+    return any(
+        (root / _PROTOCOL).is_file() and path.relative_to(root).parts[0] in _PRIVATE
+        for root in path.parents
+    )
+
+
+def make_folder(folder: Path, *, mode: int | None = None) -> None:
+    """Make a folder, with this mode, and those above it that are missing, on disk.
+
+    Unless the mode is given, a folder for what is private is its owner's alone.
+    """
     new: list[Path] = []
     while not folder.is_dir() and folder != folder.parent:
         new.append(folder)
         folder = folder.parent
     for path in reversed(new):
         # Another process may be as fast.
-        path.mkdir(exist_ok=True, mode=mode if path is new[0] else 0o777)
+        its = mode if path is new[0] else None
+        path.mkdir(exist_ok=True, mode=its or (0o700 if _is_private(path) else 0o777))
         sync_folder(path.parent)
 
 

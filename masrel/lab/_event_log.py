@@ -4,11 +4,13 @@ Every line carries the hash of the line before. ``docs/session_log.md`` has the 
 how to verify it without masrel, and what happens after a crash.
 """
 
+import errno
 import hashlib
 import json
 import math
 import os
 import sys
+import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -34,6 +36,8 @@ if sys.platform != "win32":
 
 # What the first line carries in place of the hash of a line before it
 _FIRST_PREVIOUS = "0" * 64
+
+_LOOK_S = 0.02  # between two looks whether a log is free
 
 _KEYS = ("event", "time_utc", "previous", "fields")
 
@@ -97,9 +101,13 @@ def events_before_torn(path: Path) -> tuple[Event, ...] | None:
 
 def _read(path: Path) -> bytes:
     try:
-        return read_regular(path, most=MAX_TABLE)
+        return read_regular(path, most=MAX_TABLE, follows=False)
     except FileNotFoundError as error:
         raise SessionLogError(f"{path}: no such session log") from error
+    except OSError as error:
+        if error.errno == errno.ELOOP:  # it would show what is not the study's
+            raise SessionLogError(f"{path}: needed a log, got a link") from error
+        raise
 
 
 def _split_lines(data: bytes) -> tuple[list[bytes], bytes]:
@@ -241,7 +249,13 @@ class SessionLog:
         self._now = now
 
     @classmethod
-    def open(cls, path: Path, *, now: Callable[[], datetime] = utc_now) -> Self:
+    def open(
+        cls,
+        path: Path,
+        *,
+        now: Callable[[], datetime] = utc_now,
+        wait_s: float = 0.0,
+    ) -> Self:
         """Open a log for appending, verify it, and recover a torn last line.
 
         A torn line goes to ``<name>.torn`` beside the log, and an event
@@ -254,6 +268,8 @@ class SessionLog:
             The log; made with its folder when missing.
         now : callable, optional
             Gives the time of day, aware.
+        wait_s : float, optional
+            How long to wait while another process has the log open, in seconds.
 
         Returns
         -------
@@ -273,7 +289,7 @@ class SessionLog:
         # It closes its descriptor once, also when the disk refuses what is recovered.
         log = cls(path, descriptor, [], _FIRST_PREVIOUS, now)
         try:
-            _lock(descriptor, path)
+            _lock(descriptor, path, wait_s)
             sync_folder(path.parent)  # also of a log that a dead process made
             log._recover(descriptor)
         except BaseException:
@@ -421,16 +437,19 @@ def _check_fact(path: Path, kind: str, name: str, fact: object) -> None:
             raise SessionLogError(f"{path}: event {kind!r}: {name} needs {needs}")
 
 
-def _lock(descriptor: int, path: Path) -> None:
+def _lock(descriptor: int, path: Path, wait_s: float) -> None:
     # Released by the system when the process ends, killed or not.
     if sys.platform == "win32":
         return
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        raise SessionLogInUseError(
-            f"{path}: another process has this log open"
-        ) from error
-    except OSError as error:
-        error.filename = str(path)  # such as a file system without locks
-        raise
+    until = time.monotonic() + wait_s
+    while True:
+        try:
+            return fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            if time.monotonic() >= until:
+                message = f"{path}: another process has this log open"
+                raise SessionLogInUseError(message) from error
+        except OSError as error:
+            error.filename = str(path)  # such as a file system without locks
+            raise
+        time.sleep(_LOOK_S)

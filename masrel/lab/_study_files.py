@@ -66,11 +66,13 @@ _CSV_FORMAT = re.compile(r"# *format: *([^\s,;]{1,18})")
 _MAX_BITS = 1024  # of a whole number: what is longer cannot always be shown
 
 
-def read_regular(path: Path, *, most: int) -> bytes:
-    """Return the bytes of a regular file of at most so many."""
+def read_regular(path: Path, *, most: int, follows: bool = True) -> bytes:
+    """Return the bytes of a regular file of at most so many, or of a link to one."""
     # A pipe without a writer would keep it waiting, and a device never ends.
-    descriptor = os.open(path, os.O_RDONLY | _NO_WAIT | BINARY)
-    regular(descriptor, path)
+    if follows:
+        descriptor = regular(os.open(path, os.O_RDONLY | _NO_WAIT | BINARY), path)
+    else:
+        descriptor = no_follow(str(path), os.O_RDONLY)
     try:
         # room for what is there, not for the most that there may be
         data = os.read(descriptor, min(os.fstat(descriptor).st_size, most) + 1)
@@ -138,7 +140,7 @@ def check_format(
 def parse_json(text: str | bytes) -> Any:
     """Return what a JSON text holds; ValueError says why it cannot be read."""
     try:
-        return json.loads(text)
+        return json.loads(text, object_pairs_hook=_distinct)
     except RecursionError:
         raise ValueError("nested too deep") from None
 
@@ -185,6 +187,14 @@ def leaves(
             yield from leaves(part, f"{place}.{name}".lstrip("."), within=within)
     else:
         yield place, json.dumps(document, ensure_ascii=False)
+
+
+def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    # of two values of one key a reader may take either
+    table = dict(pairs)
+    if len(table) < len(pairs):
+        raise ValueError("a key is there twice")
+    return table
 
 
 def parse_toml(data: bytes) -> dict[str, Any]:
