@@ -17,6 +17,7 @@ from masrel.lab.protocol.content import (
 )
 from masrel.lab.protocol.definition import (
     Analysis,
+    Blinding,
     DeviceSettings,
     ElbowConstants,
     EstimatePlan,
@@ -45,6 +46,7 @@ from masrel.lab.protocol.study import StudyPaths, copy_template, template_names
 
 __all__ = [
     "Analysis",
+    "Blinding",
     "DeviceSettings",
     "ElbowConstants",
     "EstimatePlan",

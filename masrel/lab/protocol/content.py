@@ -4,14 +4,15 @@ import hashlib
 import math
 import operator
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, get_args
 
 import msgspec
 
 from masrel._input import listed
-from masrel.errors import ParameterError
+from masrel.errors import ParameterError, ProtocolError
 from masrel.lab._study_files import once
 from masrel.lab.elbow.parameters import ElbowParameters
 from masrel.lab.elbow.tone import JointModel
@@ -70,6 +71,24 @@ def joint_model(protocol: Protocol, model_id: str) -> JointModel:
     if model.kind == DEFAULT_KIND:
         return _joint_of(model, protocol.elbow)
     return model_of_kind(model.kind, model.parameters)
+
+
+def _coefficient_problems(protocol: Protocol) -> Iterator[tuple[int, str]]:
+    """Yield lines of the plan that name no coefficient, and what they needed."""
+    from masrel.agreement import coefficient  # loads numpy
+
+    for index, line in enumerate(protocol.analysis.estimates):
+        try:
+            coefficient(line.coefficient)
+        except ParameterError as error:
+            yield index, f'analysis.estimates[{index}].{error} (id "{line.id}")'
+
+
+def _refuse_unknown_coefficients(protocol: Protocol, path: Path) -> None:
+    """Refuse a plan that could not be computed once every rating is there."""
+    problems = [f"{path}: {problem}" for _, problem in _coefficient_problems(protocol)]
+    if problems:
+        raise ProtocolError(*problems)
 
 
 def report_sections(protocol: Protocol) -> tuple[str, ...]:
@@ -168,6 +187,7 @@ _LATER: dict[str, Any] = {
         }
     ],
     "questionnaires": (),
+    "blinding": {"sealed": False},
     "study": {"language": "en"},
     "elbow": {
         "catch_rise_s": 0.0,
@@ -256,7 +276,7 @@ def protocol_hash(protocol: Protocol) -> str:
         file do not enter. Of a model file its numbers enter, its name, and whether
         it comes from simulated recordings.
     """
-    return hashlib.sha256(_canonical(protocol)).hexdigest()
+    return hashlib.sha256(_protocol_content(protocol)).hexdigest()
 
 
 @once
@@ -304,6 +324,41 @@ def presented_content(protocol: Protocol) -> bytes:
     tables["device"] = msgspec.structs.replace(protocol.device, torque_sensor=False)
     content = {"study": protocol.study.id, **tables}
     return _canonical(content, ignored=("file", "simulated"))  # numbers are felt
+
+
+def _protocol_content(protocol: Protocol) -> bytes:
+    """Return the whole content of a protocol, as JSON: what `protocol_hash` hashes."""
+    return _canonical(protocol)
+
+
+def _content_differences(
+    before: Any, after: Any, *keys: str
+) -> Iterator[tuple[str, Any, Any]]:
+    """Yield the keys at which two contents differ, and what each has there.
+
+    None where it has nothing. Entries of a list that have ids are compared by these; of
+    one that is new or gone the list of ids says all.
+    """
+    if isinstance(before, dict) and isinstance(after, dict):
+        for key in after | before:
+            yield from _content_differences(
+                before.get(key), after.get(key), *keys, str(key)
+            )
+    elif _has_ids(before) and _has_ids(after):
+        one, other = ({e["id"]: e for e in entries} for entries in (before, after))
+        if [*one] != [*other]:
+            yield ".".join(keys), [*one], [*other]
+        for name in one:
+            if name in other:
+                yield from _content_differences(one[name], other[name], *keys, name)
+    elif before != after:
+        yield ".".join(keys), before, after
+
+
+def _has_ids(value: Any) -> bool:
+    return isinstance(value, list) and all(
+        isinstance(entry, dict) and "id" in entry for entry in value
+    )
 
 
 def _canonical(content: object, ignored: tuple[str, ...] = ()) -> bytes:

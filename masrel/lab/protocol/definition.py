@@ -199,6 +199,12 @@ class Occasions(_Table, frozen=True, kw_only=True):
     resume: Literal["always", "same-day", "restart", "ask"] = "always"
 
 
+class Blinding(_Table, frozen=True, kw_only=True):
+    """``[blinding]``: what the files of a study that goes on say of its orders."""
+
+    sealed: bool = False
+
+
 # What questions are about, and so when they are asked
 _When = Literal["presentation", "session", "study"]
 
@@ -445,6 +451,7 @@ class Protocol(_Table, frozen=True, kw_only=True):
     stretch: Stretch = Stretch()
     presentation: PresentationRules = PresentationRules()
     occasions: Occasions = Occasions()
+    blinding: Blinding = Blinding()
     questionnaires: tuple[Questionnaire, ...] = ()
     device: DeviceSettings = DeviceSettings()
     simulated_raters: SimulatedRaters = SimulatedRaters()

@@ -1,12 +1,13 @@
 """Read a protocol file, or a model file, and say everything wrong with it at once."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from masrel._files import write_files
 from masrel._input import not_utf8
 from masrel.errors import ProtocolError
 from masrel.lab._study_files import (
@@ -59,7 +60,10 @@ def read_protocol(path: Path) -> Protocol:
 
     Rules across keys are applied once every key alone is right.
     """
-    content = _read_toml(path)
+    return _checked(_read_toml(path), path)
+
+
+def _checked(content: dict[str, object], path: Path) -> Protocol:
     check_format(path, content.pop("format", 1), newest=1, error=ProtocolError)
     problems = [
         *_resolve_model_files(content, path.parent),
@@ -116,6 +120,25 @@ def _resolve_model_files(raw: dict[str, object], folder: Path) -> Iterator[str]:
         for key in both:
             yield f"{where}.{key}: needed in {entry['file']} or here, got it in both"
         models[index] = {**filed, **entry, "constants": inline}
+
+
+def _write_rater(
+    path: Path, entry: Mapping[str, object], sessions: Collection[str]
+) -> None:
+    """Write a rater, and in which sessions, into a protocol; comments and layout stay.
+
+    Nothing is written where the protocol would be wrong with this rater.
+    """
+    import tomlkit  # nothing else needs it
+
+    document = tomlkit.parse(path.read_text(encoding="utf-8"))
+    document["raters"].append(dict(entry))
+    for session in document["sessions"]:
+        if session["id"] in sessions:
+            session["raters"].append(entry["id"])
+    text = tomlkit.dumps(document)
+    _checked(parse_toml(text.encode()), path)
+    write_files({path: text})
 
 
 def read_model_file(path: Path) -> ElbowParameters:

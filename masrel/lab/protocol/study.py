@@ -8,6 +8,9 @@ import masrel
 from masrel._files import is_part, write_files
 from masrel.errors import ParameterError
 
+_OPENED = "opened"
+"""Folder of schedules that were sealed, with their models."""
+
 
 @dataclass(frozen=True, slots=True)
 class _StudyFile:
@@ -115,6 +118,10 @@ class StudyPaths:
     def schedule_file(self, rater: str, session: str) -> Path:
         """Return the file of one rater's schedule; it names the models."""
         return self.schedules / f"{session}_{rater}.csv"
+
+    def opened_file(self, rater: str, session: str) -> Path:
+        """Return the file of a sealed schedule with its models, once they are known."""
+        return self.schedules / _OPENED / f"{session}_{rater}.csv"
 
     def sheet_file(self, rater: str, session: str) -> Path:
         """Return the file of one rater's blinded sheet."""
