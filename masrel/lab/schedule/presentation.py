@@ -3,7 +3,7 @@
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from masrel.lab._study_files import (
     table_csv,
 )
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
+from masrel.lab.protocol.study import _OPENED
 from masrel.lab.schedule._orders import WITH_ROWS, draw_order
 from masrel.lab.schedule._secret import Stream, StudySecret, site_of
 
@@ -79,6 +80,9 @@ class Schedule:
         The rater's site, where sites are strata.
     row : int or None
         Which row of a design the rater has, from 1; None where orders have no rows.
+    sealed : bool
+        Whether its file has no models; until the study is unsealed each is then called
+        ``sealed``, and its repeat is its position.
     """
 
     study: str
@@ -93,6 +97,12 @@ class Schedule:
     commitment: str | None = None
     site: str | None = None
     row: int | None = None
+    sealed: bool = False
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether nobody says yet which models it has."""
+        return any(shown.model == _SEALED for shown in self.presentations)
 
 
 def draw_schedule(
@@ -164,6 +174,7 @@ def draw_schedule(
         commitment=None if key is None else key.commitment,
         site=site,
         row=row,
+        sealed=protocol.blinding.sealed,
     )
 
 
@@ -237,7 +248,7 @@ def check_schedule(schedule: Schedule, protocol: Protocol) -> None:
         ),
         # Names of models would tell the rater at the console which ones are missing.
         (
-            expected != scheduled,
+            expected != scheduled and not schedule.is_closed,
             "every model of the protocol once per repeat, got rows with "
             f"{(expected - scheduled).total()} of these missing and "
             f"{(scheduled - expected).total()} others",
@@ -278,15 +289,21 @@ _HEAD = {
     "commitment": r"[0-9a-f]{64}",
     "site": r"\S+",
     "row": r"[1-9][0-9]{0,8}",
+    "sealed": r"True",
 }
 
 _WHOLE = ("seed", "row")  # those whose values are whole numbers
 
 # Those that a schedule without a secret, without strata, or without rows has not
-_OPTIONAL = ("commitment", "site", "row")
+_OPTIONAL = ("commitment", "site", "row", "sealed")
+
+_NO = (None, False)  # values of keys that a schedule has not
 
 _COLUMNS = ["position", "code", "model", "repeat"]
 _SHEET_COLUMNS = ["position", "code", "grade"]
+
+_SEALED = "(sealed)"  # no id of a model
+"""What stands for a model where nobody is to know which it is."""
 
 # A code names a recording's file, so it is letters and digits only.
 _CODE = re.compile(r"[0-9A-Za-z]{1,16}")
@@ -334,11 +351,29 @@ def read_schedule(path: Path) -> Schedule:
         for key, value in head
         if key in _HEAD
     }
-    return Schedule(
-        **values,
+    schedule = Schedule(
+        **{**values, "sealed": "sealed" in values},
         presentations=tuple(
             Presentation(position=int(p), code=code, model=model, repeat=int(repeat))
             for p, code, model, repeat in table[1:]
+        ),
+    )
+    opened_file = path.parent / _OPENED / path.name
+    if not schedule.is_closed or not opened_file.exists():
+        return schedule
+    opened = read_schedule(opened_file)
+    if _closed(opened) != schedule:
+        raise ScheduleError(f"{opened_file}: needed what is sealed in {path.name}")
+    return opened
+
+
+def _closed(schedule: Schedule) -> Schedule:
+    """Return a schedule without its models."""
+    return replace(
+        schedule,
+        presentations=tuple(
+            replace(shown, model=_SEALED, repeat=shown.position)
+            for shown in schedule.presentations
         ),
     )
 
@@ -425,7 +460,7 @@ def _row_problem(row: Sequence[str], place: int, seen: set[str]) -> str | None:
 def _schedule_text(schedule: Schedule) -> str:
     """Write a schedule as the text of its file."""
     values = {key: getattr(schedule, key) for key in _HEAD}
-    head = [f"{key}: {value}" for key, value in values.items() if value is not None]
+    head = [f"{key}: {value}" for key, value in values.items() if value not in _NO]
     rows = (
         (shown.position, shown.code, shown.model, shown.repeat)
         for shown in schedule.presentations

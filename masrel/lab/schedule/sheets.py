@@ -6,20 +6,21 @@ import os
 import shlex
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, groupby, pairwise
 from pathlib import Path
 
 from masrel._files import make_folder, write_files
 from masrel._input import listed
 from masrel.errors import ScheduleError
-from masrel.lab._study_files import MAX_SMALL, leaves, read_regular
+from masrel.lab._study_files import MAX_SMALL, read_regular
 from masrel.lab.protocol import (
     Protocol,
     StudyPaths,
     presented_content,
     presented_hash,
 )
+from masrel.lab.protocol.content import _content_differences
 from masrel.lab.schedule._orders import WITH_ROWS, order_problem
 from masrel.lab.schedule._secret import (
     StudySecret,
@@ -31,6 +32,7 @@ from masrel.lab.schedule._secret import (
 )
 from masrel.lab.schedule.presentation import (
     Schedule,
+    _closed,
     _format_problem,
     _read_drawn,
     _require_place,
@@ -55,7 +57,31 @@ def _drawn_schedule(
     schedule = read_schedule(path)
     _require_its_own(schedule, path, rater, session)
     check_schedule(schedule, protocol)
-    return schedule
+    return _open_schedule(study, protocol, schedule)
+
+
+def _open_schedule(
+    study: StudyPaths, protocol: Protocol, schedule: Schedule
+) -> Schedule:
+    """Return a schedule with its models, those of a sealed one by the secret."""
+    if not schedule.is_closed:
+        return schedule
+    secret = find_secret(study)
+    file = study.schedule_file(schedule.rater, schedule.session)
+    if secret is None or not secret.draws(schedule.site, schedule.commitment):
+        raise ScheduleError(
+            f"{file}: is sealed: needed the secret that it was drawn from in "
+            f"{study.secret_file}, got {'none' if secret is None else 'another'}"
+        )
+    place = schedule.rater, schedule.session
+    drawn = draw_schedule(protocol, *place, secret=secret, row=schedule.row)
+    # whatever the protocol says of it now, this one was sealed
+    drawn = replace(schedule, presentations=drawn.presentations)
+    if _closed(drawn) != schedule:
+        raise ScheduleError(
+            f"{file}: needed the codes that its secret draws, got others"
+        )
+    return drawn
 
 
 def _require_its_own(schedule: Schedule, file: Path, rater: str, session: str) -> None:
@@ -161,6 +187,12 @@ def _drawn_texts(
     if key is not None:
         for rater, _ in to_draw:  # refused before a row is allotted
             key.of(site_of(protocol, rater))
+        for file, drawn in _unchanged(study, protocol, to_draw):
+            if drawn.commitment not in (None, key.commitment):
+                raise ScheduleError(
+                    f"{study.secret_file}: needed the secret of {file.name}, whose "
+                    f"commitment is {drawn.commitment}, got another"
+                )
     texts: dict[Path, str | bytes] = {}
     drawn_from = _content_file(study, presented_hash(protocol))
     if not drawn_from.exists():
@@ -171,8 +203,16 @@ def _drawn_texts(
         drawn = draw_schedule(protocol, *place, secret=key, row=rows.get(place))
         # The sheet gets its name first: one without its schedule is drawn anew.
         texts[study.sheet_file(*place)] = _sheet_text(drawn)
-        texts[study.schedule_file(*place)] = _schedule_text(drawn)
+        text = _schedule_text(_closed(drawn) if drawn.sealed else drawn)
+        texts[study.schedule_file(*place)] = text
     return texts
+
+
+def _unchanged(
+    study: StudyPaths, protocol: Protocol, to_draw: Sequence[_RaterSession]
+) -> Iterator[tuple[Path, Schedule]]:
+    others = [place for place in protocol.rater_sessions if place not in to_draw]
+    return _read_drawn(study, others, skips_damaged=True)
 
 
 def schedule_problems(protocol: Protocol, study: StudyPaths) -> tuple[str, ...]:
@@ -391,6 +431,7 @@ def _draw_fault(
         return None
     place = schedule.rater, schedule.session
     drawn = draw_schedule(protocol, *place, secret=secret, row=schedule.row)
+    drawn = _closed(drawn) if schedule.is_closed else drawn
     if drawn.presentations == schedule.presentations:
         return None
     return (
@@ -428,19 +469,11 @@ def _changes(protocol: Protocol, file: Path, sha256: str) -> str:
             "a key of the study id, scale, elbow, models, schedule, stretch, "
             "presentation, occasions or device has changed"
         )
-    contents = [json.loads(text) for text in (drawn, presented_content(protocol))]
-    models = [{each["id"]: each for each in content["models"]} for content in contents]
-    # of a model that is new or gone the list of models says all
-    in_both = models[0].keys() & models[1].keys()
-    before, now = (
-        dict(leaves({name: by_id[name] for name in in_both}, "models"))
-        | dict(leaves({**content, "models": [*by_id]}))
-        for content, by_id in zip(contents, models, strict=True)
+    changed = _content_differences(
+        json.loads(drawn), json.loads(presented_content(protocol))
     )
     shown = [
-        f"{key} was {before.get(key, 'not set')} and is {now.get(key, 'not set')}"
-        for key in sorted(now | before)
-        if before.get(key) != now.get(key)
+        f"{key} was {_as_json(was)} and is {_as_json(now)}" for key, was, now in changed
     ]
     more = len(shown) - _SHOWN
     others = f", and {more} more keys differ" if more > 0 else ""
@@ -488,6 +521,12 @@ def _order_balance(
     drawn: dict[tuple[str, str | None], list[Schedule]] = {}
     for _, schedule in _read_drawn(study, pairs):
         check_schedule(schedule, protocol)
+        if schedule.is_closed:
+            raise ScheduleError(
+                f"{study.schedules}: needed schedules that say their models, got "
+                "sealed ones: masrel record unblind --all opens them once every "
+                "session is over"
+            )
         group = schedule.session, site_of(protocol, schedule.rater)
         drawn.setdefault(group, []).append(schedule)
     if not drawn:
@@ -535,3 +574,7 @@ def _longest(order: Sequence[str], kinds: Mapping[str, str | None]) -> int:
     """Return the longest run of models of one kind; those of None are of no kind."""
     runs = groupby(order, key=kinds.__getitem__)
     return max((len(list(run)) for kind, run in runs if kind is not None), default=0)
+
+
+def _as_json(value: object) -> str:
+    return "not set" if value is None else json.dumps(value, ensure_ascii=False)
