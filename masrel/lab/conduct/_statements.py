@@ -1,7 +1,9 @@
 """What somebody states of a study, with who says so: each one event of its log."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import asdict, dataclass
 from datetime import datetime
+from types import MappingProxyType
 from typing import Literal, get_args
 
 from masrel._input import listed
@@ -12,6 +14,7 @@ from masrel.lab.conduct._study_log import (
     append_event,
     check_choice,
     check_rater,
+    past_day,
     read_conduct,
     stated,
 )
@@ -22,8 +25,10 @@ from masrel.lab.protocol._values import (
     needed_of,
     parsed_value,
 )
+from masrel.lab.protocol.read import _write_rater
 from masrel.lab.schedule import Presentation, Schedule
 from masrel.lab.schedule.presentation import _read_drawn
+from masrel.lab.schedule.sheets import _open_schedule
 
 NoteKind = Literal["note", "adverse-event", "deviation"]
 """What a note is of."""
@@ -31,19 +36,69 @@ NoteKind = Literal["note", "adverse-event", "deviation"]
 Severity = Literal["mild", "moderate", "severe"]
 """How severe an adverse event is."""
 
+Seriousness = Literal["serious", "not serious"]
+"""Whether an adverse event is serious, as ICH E2A means it."""
+
+Relatedness = Literal["unrelated", "unlikely", "possible", "probable", "definite"]
+"""How likely it is that the study caused an adverse event."""
+
+# What may be said of a note, and of an adverse event alone
+_CHOICES = {
+    "kind": get_args(NoteKind),
+    "severity": get_args(Severity),
+    "seriousness": get_args(Seriousness),
+    "relatedness": get_args(Relatedness),
+}
+_ADVERSE = ("severity", "seriousness", "relatedness", "onset", "action", "outcome")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Note:
+    """A note, a deviation from the protocol, or an adverse event.
+
+    Attributes
+    ----------
+    text : str
+        What happened.
+    who : str
+        Who says so.
+    kind : {"note", "adverse-event", "deviation"}
+        What it is.
+    rater, session : str or None
+        To whom and in which session it happened; None for the study as a whole.
+    on : str or None
+        The day on which it happened, ISO 8601; None for the day of recording.
+    severity : {"mild", "moderate", "severe"} or None
+        Of an adverse event alone, as all that follows.
+    seriousness : {"serious", "not serious"} or None
+        Whether it is serious.
+    relatedness : str or None
+        Whether the study caused it: unrelated, unlikely, possible, probable, definite.
+    onset : str or None
+        The day on which it began, ISO 8601.
+    action, outcome : str or None
+        What was done, and what came of it.
+    """
+
+    text: str
+    who: str
+    kind: NoteKind = "note"
+    rater: str | None = None
+    session: str | None = None
+    on: str | None = None
+    severity: Severity | None = None
+    seriousness: Seriousness | None = None
+    relatedness: Relatedness | None = None
+    onset: str | None = None
+    action: str | None = None
+    outcome: str | None = None
+
 
 def record_note(
     study: StudyPaths,
     protocol: Protocol,
-    text: str,
+    note: Note,
     *,
-    who: str,
-    kind: NoteKind = "note",
-    rater: str | None = None,
-    session: str | None = None,
-    severity: Severity | None = None,
-    action: str | None = None,
-    outcome: str | None = None,
     now: Callable[[], datetime] = utc_now,
 ) -> None:
     """Record a note, a deviation from the protocol, or an adverse event.
@@ -54,54 +109,39 @@ def record_note(
         Where the study is.
     protocol : Protocol
         The study's protocol.
-    text : str
+    note : Note
         What happened.
-    who : str
-        Who says so.
-    kind : {"note", "adverse-event", "deviation"}, optional
-        What it is.
-    rater, session : str, optional
-        To whom and in which session it happened; to the study as a whole unless given.
-    severity : {"mild", "moderate", "severe"}, optional
-        Of an adverse event alone, as `action` and `outcome`.
-    action, outcome : str, optional
-        What was done, and what came of it.
     now : callable, optional
         Gives the time of day, aware.
 
     Raises
     ------
     ParameterError
-        If a text is blank, `kind` or `severity` is unknown, the protocol has no such
-        rater or session, or something of an adverse event is said of anything else.
+        If a text is blank, one of the choices is none, a day is none or to come, the
+        protocol has no such rater or session, or something of an adverse event is said
+        of anything else.
     SessionLogError
         If the log of the study's conduct is damaged.
     OSError
         If it cannot be written.
     """
-    check_choice("kind", kind, get_args(NoteKind))
-    if rater is not None:
-        check_rater(protocol, rater)
-    if session is not None:
-        check_choice("session", session, [each.id for each in protocol.sessions])
-    details = {"severity": severity, "action": action, "outcome": outcome}
-    for name, detail in details.items():
-        if detail is not None and kind != "adverse-event":
+    known = {key: value for key, value in asdict(note).items() if value is not None}
+    if note.rater is not None:
+        check_rater(protocol, note.rater)
+    if note.session is not None:
+        check_choice("session", note.session, [each.id for each in protocol.sessions])
+    for name in _ADVERSE:
+        if name in known and note.kind != "adverse-event":
             raise ParameterError(
-                f"{name}: needed with kind 'adverse-event' only, got it with {kind!r}"
+                f"{name}: needed with kind 'adverse-event' only, got it with "
+                f"{note.kind!r}"
             )
-    if severity is not None:
-        check_choice("severity", severity, get_args(Severity))
-    facts = {name: detail for name, detail in details.items() if detail is not None}
-    fields: dict[str, Fact] = {
-        "kind": kind,
-        **stated(text=text, who=who),
-        "rater": rater,
-        "session": session,
-        **details,
-        **stated(**facts),
-    }
-    append_event(study, protocol, "noted", fields, now=now)
+    known = stated(**known)
+    for name in _CHOICES.keys() & known.keys():
+        check_choice(name, known[name], _CHOICES[name])
+    for name in {"on", "onset"} & known.keys():
+        known[name] = past_day(name, known[name], now)
+    append_event(study, protocol, "noted", {**asdict(note), **known}, now=now)
 
 
 def rater_values(
@@ -196,6 +236,66 @@ def record_rater_values(
         append_event(study, protocol, "rater-set", fields, now=now)
 
 
+def record_new_rater(
+    study: StudyPaths,
+    protocol: Protocol,
+    rater: str,
+    sessions: Collection[str],
+    *,
+    who: str,
+    site: str | None = None,
+    values: Mapping[str, str] = MappingProxyType({}),
+    now: Callable[[], datetime] = utc_now,
+) -> None:
+    """Take another rater into a study: into its protocol, whose comments stay.
+
+    Schedules that are drawn stay as they are; ``masrel schedule`` draws the rater's.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+    rater : str
+        Who joins.
+    sessions : collection of str
+        In which sessions.
+    who : str
+        Who says so.
+    site : str, optional
+        Where the rater is.
+    values : mapping of str to str, optional
+        What is known of the rater, field to value, as text.
+    now : callable, optional
+        Gives the time of day, aware.
+
+    Raises
+    ------
+    ParameterError
+        If the protocol has no such session or field, a value is not of the field's
+        type, or `who` is blank.
+    ProtocolError
+        If the protocol would be wrong with this rater; nothing is written then.
+    SessionLogError
+        If the log of the study's conduct is damaged.
+    OSError
+        If a file cannot be written.
+    """
+    for session in sessions:
+        check_choice("session", session, [each.id for each in protocol.sessions])
+    known = {
+        name: _checked_value(study, protocol.rater_fields, name, text)
+        for name, text in values.items()
+    }
+    entry: dict[str, object] = {"id": rater}
+    entry |= {} if site is None else {"site": site}
+    entry |= {"fields": known} if known else {}
+    fields = {"rater": rater, "site": site, **stated(who=who)}
+    _write_rater(study.protocol, entry, sessions)
+    append_event(study, protocol, "rater-added", fields, now=now)
+
+
 def _checked_value(
     study: StudyPaths, fields: Mapping[str, RaterField], name: str, text: str
 ) -> FieldValue | None:
@@ -222,6 +322,7 @@ def record_standing(
     *,
     who: str,
     why: str,
+    on: str | None = None,
     now: Callable[[], datetime] = utc_now,
 ) -> None:
     """Record that a rater has left, or is excluded, or included again.
@@ -242,6 +343,8 @@ def record_standing(
         What is recorded; who was excluded is included again.
     who, why : str
         Who says so, and for what reason.
+    on : str, optional
+        The day on which a rater left, ISO 8601, where it is not that of recording.
     now : callable, optional
         Gives the time of day, aware.
 
@@ -267,7 +370,9 @@ def record_standing(
         )
     elif standing == "included" and not is_excluded:
         raise ParameterError(f"rater: needed one who is excluded, {rater} is not")
-    fields = {"rater": rater, **stated(who=who, why=why)}
+    fields: dict[str, Fact] = {"rater": rater, **stated(who=who, why=why)}
+    if standing == "withdrawn":
+        fields["on"] = None if on is None else past_day("on", on, now)
     append_event(study, protocol, standing, fields, now=now)
 
 
@@ -362,7 +467,7 @@ def record_unblinding(
     revealed = tuple(
         (schedule, shown)
         for _, schedule in _read_drawn(study, meant)
-        for shown in schedule.presentations
+        for shown in _open_schedule(study, protocol, schedule).presentations
         if code in (None, shown.code)
     )
     if not revealed:

@@ -8,7 +8,7 @@ import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from datetime import datetime
+from datetime import date, datetime
 from functools import partial
 from heapq import merge
 from itertools import accumulate
@@ -26,19 +26,26 @@ from masrel.lab._event_log import (
     utc_now,
 )
 from masrel.lab._study_files import Fact
-from masrel.lab.protocol import Protocol, StudyPaths
+from masrel.lab.protocol import Protocol, StudyPaths, protocol_hash, scale_of
 from masrel.lab.protocol._values import Answer
+from masrel.lab.protocol.content import (
+    _protocol_content,
+    _refuse_unknown_coefficients,
+)
 from masrel.lab.schedule import write_schedules
 from masrel.lab.schedule._orders import WITH_ROWS
 from masrel.lab.schedule._secret import site_of
 from masrel.lab.schedule.presentation import _read_drawn
+from masrel.scales import published_scale
 
 _FORMAT = 1
+
+_WAIT_S = 5.0  # for somebody who records something else
 
 # Every kind of event with the fields it has
 _EVENTS = {
     "conduct": ("format", "study", "masrel_version"),
-    "withdrawn": ("rater", "who", "why"),
+    "withdrawn": ("rater", "who", "why", "on"),
     "unblinded": ("rater", "session", "code", "who", "why"),
     "answered": ("rater", "questionnaire", "question", "answer"),
     "answer-correction": (
@@ -52,19 +59,32 @@ _EVENTS = {
     "excluded": ("rater", "who", "why"),
     "included": ("rater", "who", "why"),
     "rater-set": ("rater", "field", "value", "who"),
+    "rater-added": ("rater", "site", "who"),
     "noted": (
         "kind",
         "text",
         "who",
         "rater",
         "session",
+        "on",
         "severity",
+        "seriousness",
+        "relatedness",
+        "onset",
         "action",
         "outcome",
     ),
     "merged": ("name", "log", "n_lines", "sha256", "protocol_sha256"),
+    "drawn": ("site", "protocol_sha256", "protocol", "texts_sha256"),
+    "amended": ("protocol_sha256", "protocol", "texts_sha256", "who", "why"),
     "allotted": ("rater", "session", "site", "scheme", "row"),
     "recovered": ("line", "n_bytes", "sha256", "kept", "moved_to"),
+}
+
+# Fields that events had not before they had a day of their own
+_LATER: dict[str, tuple[set[str], ...]] = {
+    "withdrawn": ({"on"},),
+    "noted": ({"on", "seriousness", "relatedness", "onset"},),
 }
 
 _SHOWN = (
@@ -73,9 +93,14 @@ _SHOWN = (
     "excluded",
     "included",
     "rater-set",
+    "rater-added",
     "noted",
     "merged",
 )
+
+
+# Events that keep the protocol as it was
+VERSIONS = ("drawn", "amended")
 
 
 def read_conduct(study: StudyPaths) -> tuple[Event, ...]:
@@ -102,10 +127,20 @@ def read_conduct(study: StudyPaths) -> tuple[Event, ...]:
 
 def conduct_hash(study: StudyPaths) -> str | None:
     """Return a hash of what `read_conduct` returns; None where that is nothing."""
-    events = [(e.time_utc, e.kind, dict(e.fields)) for e in read_conduct(study)]
+    return _hash_of(read_conduct(study))
+
+
+def earlier_conduct_hashes(study: StudyPaths) -> set[str | None]:
+    """Return what `conduct_hash` returned before each of the events."""
+    events = read_conduct(study)
+    return {_hash_of(events[:n]) for n in range(len(events))}
+
+
+def _hash_of(events: Sequence[Event]) -> str | None:
     if not events:
         return None
-    return hashlib.sha256(json.dumps(events, sort_keys=True).encode()).hexdigest()
+    facts = [(e.time_utc, e.kind, dict(e.fields)) for e in events]
+    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
 
 
 def events_of_logs(study: StudyPaths) -> Iterator[tuple[Path, Event]]:
@@ -118,9 +153,13 @@ def events_of_logs(study: StudyPaths) -> Iterator[tuple[Path, Event]]:
 def _timed(log: Path) -> list[tuple[str, Path, Event]]:
     # a clock that is set back changes no order within a log
     events = read_log(log)
-    check_kinds(log, events, _EVENTS, head="conduct", newest=_FORMAT)
+    _check_events(log, events)
     latest = accumulate((event.time_utc for event in events), max)
     return [(time, log, event) for time, event in zip(latest, events, strict=True)]
+
+
+def _check_events(log: Path, events: Iterable[Event]) -> None:
+    check_kinds(log, events, _EVENTS, head="conduct", newest=_FORMAT, later=_LATER)
 
 
 def append_event(
@@ -141,8 +180,8 @@ def open_conduct(
     study: StudyPaths, protocol: Protocol, *, now: Callable[[], datetime] = utc_now
 ) -> Iterator[SessionLog]:
     """Give the log of a study, verified and with its head, to append events to."""
-    with SessionLog.open(study.conduct_file, now=now) as log:
-        check_kinds(log.path, log.events, _EVENTS, head="conduct", newest=_FORMAT)
+    with SessionLog.open(study.conduct_file, now=now, wait_s=_WAIT_S) as log:
+        _check_events(log.path, log.events)
         if not any(event.kind == "conduct" for event in log.events):
             head: dict[str, Fact] = {
                 "format": _FORMAT,
@@ -165,6 +204,20 @@ def check_choice(name: str, value: str, choices: Iterable[str]) -> None:
     """Refuse what is none of the choices."""
     if value not in (known := tuple(choices)):
         raise ParameterError(f"{name}: needed one of {listed(known)}, got {value!r}")
+
+
+def past_day(name: str, text: str, now: Callable[[], datetime]) -> str:
+    """Return a day, as ISO 8601 has it; refuse what is none, or is to come."""
+    today = now().astimezone().date()
+    try:
+        day = date.fromisoformat(text)
+    except ValueError:
+        day = date.max
+    if day > today:
+        raise ParameterError(
+            f"{name}: needed a day up to {today}, as {today} is written, got {text!r}"
+        )
+    return day.isoformat()
 
 
 def check_rater(protocol: Protocol, rater: str) -> None:
@@ -243,6 +296,8 @@ def allot_schedules(
 
     Raises
     ------
+    ProtocolError
+        If a line of the plan names no coefficient.
     ScheduleError
         As :func:`masrel.lab.schedule.write_schedules` does; no row is allotted then.
     SessionLogError
@@ -250,8 +305,8 @@ def allot_schedules(
     OSError
         If the system refuses a folder or file.
     """
-    has_rows = protocol.schedule.scheme in WITH_ROWS
-    allot = partial(_allot, study, protocol, now) if has_rows else None
+    _refuse_unknown_coefficients(protocol, study.protocol)
+    allot = partial(_allot, study, protocol, now, site)
     return write_schedules(protocol, study, redraw=redraw, site=site, allot=allot)
 
 
@@ -259,14 +314,20 @@ def _allot(
     study: StudyPaths,
     protocol: Protocol,
     now: Callable[[], datetime],
+    site: str | None,
     places: Sequence[tuple[str, str]],
 ) -> dict[tuple[str, str], int]:
-    """Return the rows of raters in sessions; those without one get the next."""
+    """Record the draw, and return the rows of raters; those without one get the next.
+
+    Of schemes without rows none.
+    """
     scheme = protocol.schedule.scheme
     with open_conduct(study, protocol, now=now) as log:  # nobody else allots meanwhile
-        rows = _Rows(events_of_logs(study))
-        allotted = {}
-        for rater, session in places:
+        if last_version(log.events) != protocol_hash(protocol):
+            log.append("drawn", {"site": site, **version_of(protocol)})
+        allotted: dict[tuple[str, str], int] = {}
+        rows = _Rows(events_of_logs(study) if scheme in WITH_ROWS else ())
+        for rater, session in places if scheme in WITH_ROWS else ():
             design = (session, site_of(protocol, rater), scheme)
             row, _ = rows.of_rater.get((rater, *design), (rows.n[design] + 1, None))
             if (rater, *design) not in rows.of_rater:
@@ -275,6 +336,23 @@ def _allot(
                 rows.add(log.path, log.append("allotted", fields))
             allotted[rater, session] = row
     return allotted
+
+
+def version_of(protocol: Protocol) -> dict[str, str]:
+    """Return the fields of an event that keeps a protocol, and the scale's texts."""
+    published = published_scale(scale_of(protocol))
+    texts = {} if published is None else dict(published.meanings)
+    return {
+        "protocol_sha256": protocol_hash(protocol),
+        "protocol": _protocol_content(protocol).decode(),
+        "texts_sha256": hashlib.sha256(json.dumps(texts).encode()).hexdigest(),
+    }
+
+
+def last_version(events: Iterable[Event]) -> str | None:
+    """Return the hash of the protocol that events kept last; None where none did."""
+    hashes = [e.fields["protocol_sha256"] for e in events if e.kind in VERSIONS]
+    return str(hashes[-1]) if hashes else None
 
 
 _Design = tuple[str, str | None, str]  # session, site, scheme
