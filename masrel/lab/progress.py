@@ -6,19 +6,22 @@ each rater, and one next step.
 
 import shlex
 from collections import Counter
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import datetime
 from operator import itemgetter
 from pathlib import Path
 from typing import Literal
 
 from masrel.errors import SessionLogError
-from masrel.lab._event_log import Event, events_before_torn
+from masrel.lab._event_log import Event, events_before_torn, utc_now
 from masrel.lab._study_files import table_csv
 from masrel.lab.conduct import excluded_raters, rater_values, read_conduct
+from masrel.lab.conduct._study_log import events_of_logs
 from masrel.lab.protocol import Protocol, StudyPaths, protocol_hash
 from masrel.lab.protocol._values import FieldValue
-from masrel.lab.run._state import SessionState, read_session, replay
+from masrel.lab.run._days import Due, due_of
+from masrel.lab.run._state import FROM_PAPER, SessionState, read_session, replay
 from masrel.lab.schedule import site_of_copy
 from masrel.lab.schedule._secret import rater_sessions_at
 from masrel.lab.schedule.presentation import _read_drawn
@@ -49,6 +52,8 @@ class SessionProgress:
         How far it came.
     n_presentations : int
         Presentations that the protocol has for a session.
+    n_presented : int
+        Of them those that were presented without a fault.
     n_graded, n_skipped, n_faults, n_corrections : int
         Of them those with a grade and those left without one; presentations that a
         fault stopped; corrections.
@@ -63,12 +68,20 @@ class SessionProgress:
         Whether grades or device are simulated.
     problem : str or None
         Why its log cannot be read, or None.
+    due_from, due_to : str or None
+        First and last day on which it may begin, ISO 8601, where the protocol has an
+        interval to the session before and that is complete.
+    is_overdue : bool
+        Whether it has not begun, and its last day is over.
+    refused : str or None
+        What it would be refused for today; None where it may begin or go on.
     """
 
     session: str
     rater: str
     stage: _SessionStage
     n_presentations: int
+    n_presented: int = 0
     n_graded: int = 0
     n_skipped: int = 0
     n_faults: int = 0
@@ -81,10 +94,14 @@ class SessionProgress:
     grades_from: str | None = None
     simulated: bool = False
     problem: str | None = None
+    due_from: str | None = None
+    due_to: str | None = None
+    is_overdue: bool = False
+    refused: str | None = None
 
 
 def session_progress(
-    study: StudyPaths, protocol: Protocol
+    study: StudyPaths, protocol: Protocol, *, now: Callable[[], datetime] = utc_now
 ) -> tuple[SessionProgress, ...]:
     """Say where every session of a study stands.
 
@@ -94,6 +111,8 @@ def session_progress(
         Where the study is.
     protocol : Protocol
         The study's protocol.
+    now : callable, optional
+        Gives the time of day, aware: what is due today.
 
     Returns
     -------
@@ -109,11 +128,15 @@ def session_progress(
         If a log that is there cannot be read.
     """
     pairs = rater_sessions_at(protocol, site_of_copy(study))
-    return tuple(_progress(study, protocol, *pair) for pair in pairs)
+    return tuple(_progress(study, protocol, *pair, now) for pair in pairs)
 
 
 def _progress(
-    study: StudyPaths, protocol: Protocol, rater: str, session: str
+    study: StudyPaths,
+    protocol: Protocol,
+    rater: str,
+    session: str,
+    now: Callable[[], datetime],
 ) -> SessionProgress:
     events, state, problem = _events(study.log_file(rater, session))
     stage: _SessionStage = "not drawn"
@@ -123,6 +146,9 @@ def _progress(
         stage = "unreadable"
     elif study.schedule_file(rater, session).exists():
         stage = "drawn"
+    due = Due()
+    if not state.header and problem is None:
+        due = due_of(study, protocol, rater, session, now)
     counts = Counter(event.kind for event in events)
     presented = [event for of_code in state.presented.values() for event in of_code]
     return SessionProgress(
@@ -130,6 +156,10 @@ def _progress(
         rater=rater,
         stage=stage,
         n_presentations=len(protocol.models) * protocol.schedule.repeats,
+        n_presented=sum(
+            bool(of_code) and of_code[-1].fields["fault"] is None
+            for of_code in state.presented.values()
+        ),
         n_graded=len(state.grades),
         n_skipped=len(state.skipped),
         n_faults=sum(event.fields["fault"] is not None for event in presented),
@@ -139,11 +169,21 @@ def _progress(
         n_answers=counts["answered"],
         last_event=events[-1].kind if events else None,
         last_time_utc=events[-1].time_utc if events else None,
-        grades_from=state.source,
+        grades_from=state.source or _typed_from(study, rater, session),
         simulated=bool(state.header.get("simulated"))
         or any(event.fields["simulated"] for event in presented),
         problem=problem,
+        due_from=None if due.first is None else due.first.isoformat(),
+        due_to=None if due.last is None else due.last.isoformat(),
+        is_overdue=due.is_overdue,
+        refused=due.refused,
     )
+
+
+def _typed_from(study: StudyPaths, rater: str, session: str) -> str | None:
+    # a sheet that was printed for it is waited for
+    is_printed = study.typed_file(rater, session).exists()
+    return FROM_PAPER if is_printed else None
 
 
 def _events(log: Path) -> tuple[tuple[Event, ...], SessionState, str | None]:
@@ -255,12 +295,17 @@ def _late_raters(study: StudyPaths, protocol: Protocol) -> set[str]:
     # what is damaged masrel check says
     for _, drawn in _read_drawn(study, protocol.rater_sessions, skips_damaged=True):
         drawn_from.setdefault(drawn.rater, drawn.protocol_sha256)
+    events = [e.fields for _, e in events_of_logs(study) if e.kind == "drawn"]
     in_force = _protocols_in_force(study, protocol)
     late = set()
     for site in {rater.site for rater in protocol.raters}:
         of_site = {rater.id for rater in protocol.raters if rater.site == site}
         draws = {rater: drawn_from[rater] for rater in drawn_from if rater in of_site}
-        first = _first_draw(draws, [pair for pair in in_force if pair[0] in draws])
+        hashes = [e["protocol_sha256"] for e in events if e["site"] in (None, site)]
+        if set(draws.values()) <= {*hashes}:
+            first = hashes[0] if hashes else None
+        else:  # drawn before the log of the study had its draws
+            first = _first_draw(draws, [pair for pair in in_force if pair[0] in draws])
         late |= {rater for rater, sha256 in draws.items() if sha256 != first}
     return late
 
@@ -378,7 +423,8 @@ def next_step(
     root = shlex.quote(str(study.root))
     absent = {r.rater for r in raters if r.status in ("withdrawn", "excluded")}
     open_ = [s for s in sessions if s.stage != "complete" and s.rater not in absent]
-    by_stage = {session.stage: session for session in reversed(open_)}
+    ready = [session for session in open_ if session.refused is None]
+    by_stage = {session.stage: session for session in reversed(ready)}
     if "unreadable" in by_stage:
         session = by_stage["unreadable"]
         why = f"the log of {session.rater} in session {session.session} is damaged"
@@ -389,19 +435,28 @@ def next_step(
         return _of_study("schedule", root, why)
     for stage in ("begun", "drawn"):
         if stage in by_stage:
-            return _to_run(root, by_stage[stage])
-    return _to_make(study, root)
+            return _to_run(root, by_stage[stage], sessions)
+    return _to_await(root, open_) or _to_make(study, root)
 
 
 def _of_study(verb: str, root: str, why: str) -> NextStep:
     return NextStep(command=f"masrel {verb} {root}", why=why, verb=verb)
 
 
-def _to_run(root: str, session: SessionProgress) -> NextStep:
+def _to_run(
+    root: str, session: SessionProgress, sessions: Sequence[SessionProgress]
+) -> NextStep:
+    # by the way of the session, or of the rater's last one
     place = f"--rater {session.rater} --session {session.session}"
+    ways = [each.grades_from for each in sessions if each.rater == session.rater]
+    way = session.grades_from or next(filter(None, reversed(ways)), None)
     verb, command = "run", f"masrel run {root} {place}"
-    if session.grades_from == "paper":
+    if way == FROM_PAPER and 0 < session.n_presented < session.n_presentations:
+        command = f"{command} --grades paper"
+    elif way == FROM_PAPER:
         verb, command = "enter", f"masrel paper enter {root} FILE {place} --who WHO"
+    elif way == "browser":
+        verb, command = "serve", f"masrel serve {root}"
     return NextStep(
         command=command,
         why=f"{session.n_graded} of {session.n_presentations} graded",
@@ -409,6 +464,16 @@ def _to_run(root: str, session: SessionProgress) -> NextStep:
         rater=session.rater,
         session=session.session,
     )
+
+
+def _to_await(root: str, open_: Sequence[SessionProgress]) -> NextStep | None:
+    # what begins on another day is asked for then; what is overdue, never
+    coming = [s for s in open_ if s.due_from is not None and not s.is_overdue]
+    if not coming:
+        return None
+    session = min(coming, key=lambda each: str(each.due_from))
+    why = f"{session.rater} begins session {session.session} from {session.due_from} on"
+    return _of_study("status", root, why)
 
 
 def _to_make(study: StudyPaths, root: str) -> NextStep:

@@ -3,10 +3,8 @@
 import hashlib
 import re
 from collections.abc import Callable, Iterator, Sequence
-from datetime import date, datetime, time
+from datetime import date, datetime
 from pathlib import Path
-
-import msgspec
 
 import masrel
 from masrel._files import check_inside
@@ -23,7 +21,7 @@ from masrel.lab.paper._form import (
     read_typed,
 )
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash, protocol_hash
-from masrel.lab.run._around import interval_fields
+from masrel.lab.run._days import log_interval
 from masrel.lab.run._presenter import check_same
 from masrel.lab.run._state import (
     FORMAT,
@@ -114,7 +112,8 @@ def enter_sheet(
         state = replay(log.path, log.events)
         _begin(study, protocol, form, device, state, log)
         if on is not None and state.held_on is None:
-            _log_day(study, protocol, form, on, log)
+            log.append("held", {"on": on.isoformat()})
+            log_interval(study, protocol, rater, session, log)
         _refuse_entered(sheet, log)
         for row in rows:
             if row.place == "study":
@@ -164,6 +163,10 @@ def _begin(
         "rehearsal": False,
     }
     if state.header:
+        if state.header.get("clock") != NO_DEVICE:  # masrel presented it
+            same["device"] = str(state.header["device"])
+            same["simulated"] = bool(state.header["simulated"])
+            _refuse_unpresented(form, state, log.path)
         check_same(log.path, state.header, same)
         return
     log.append(
@@ -177,6 +180,22 @@ def _begin(
     )
 
 
+def _refuse_unpresented(form: Form, state: SessionState, path: Path) -> None:
+    presented = [
+        code
+        for code, events in state.presented.items()
+        if events and events[-1].fields["fault"] is None
+    ]
+    if left := [
+        code for code in form.codes if code not in (*presented, *state.settled)
+    ]:
+        raise SessionLogError(
+            f"{path}: needed every model of the session presented before its sheet is "
+            f"entered, {len(left)} of {len(form.codes)} are not: masrel run --grades "
+            "paper goes on"
+        )
+
+
 def _check(on: date | None, device: str, now: Callable[[], datetime]) -> None:
     today = now().astimezone().date()
     if on is not None and on > today:
@@ -187,21 +206,6 @@ def _check(on: date | None, device: str, now: Callable[[], datetime]) -> None:
             "device: needed a name of 1 to 32 letters, digits, '.', '_' or '-' of "
             f"a device that is not simulated, got {device!r}"
         )
-
-
-def _log_day(
-    study: StudyPaths, protocol: Protocol, form: Form, on: date, log: SessionLog
-) -> None:
-    log.append("held", {"on": on.isoformat()})
-    # What has happened on paper cannot be refused any more.
-    sessions = tuple(
-        msgspec.structs.replace(each, order_policy="warn") for each in protocol.sessions
-    )
-    lenient = msgspec.structs.replace(protocol, sessions=sessions)
-    noon = datetime.combine(on, time(12))
-    interval = interval_fields(study, lenient, form.rater, form.session, lambda: noon)
-    if interval is not None:
-        log.append("interval", interval)
 
 
 def _refuse_entered(sheet: TypedSheet, log: SessionLog) -> None:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from masrel.lab.run._corrections import (
         record_answer,
         record_correction,
+        record_day,
         record_skip,
     )
     from masrel.lab.run._grade_sources import (
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     )
     from masrel.lab.run._settings import model_controller
     from masrel.lab.run._simulated_raters import SimulatedGrades
-    from masrel.lab.run.console import ConsoleGrades
+    from masrel.lab.run.console import ConsoleGrades, PaperGrades
     from masrel.lab.run.session import SessionSummary, run_session
 
 __all__ = [
@@ -33,6 +34,7 @@ __all__ = [
     "Event",
     "GradeRequest",
     "GradeSource",
+    "PaperGrades",
     "QuestionRequest",
     "ScriptGrades",
     "SessionLog",
@@ -44,6 +46,7 @@ __all__ = [
     "read_log",
     "record_answer",
     "record_correction",
+    "record_day",
     "record_skip",
     "run_session",
 ]
@@ -52,6 +55,7 @@ _HOMES = {
     "ConsoleGrades": "console",
     "GradeRequest": "_grade_sources",
     "GradeSource": "_grade_sources",
+    "PaperGrades": "console",
     "QuestionRequest": "_grade_sources",
     "ScriptGrades": "_grade_sources",
     "SessionSummary": "session",
@@ -61,6 +65,7 @@ _HOMES = {
     "model_controller": "_settings",
     "record_answer": "_corrections",
     "record_correction": "_corrections",
+    "record_day": "_corrections",
     "record_skip": "_corrections",
     "run_session": "session",
 }

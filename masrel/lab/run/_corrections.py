@@ -10,10 +10,16 @@ from pathlib import Path
 from masrel.errors import ParameterError, SessionLogError
 from masrel.lab._event_log import SessionLog, utc_now
 from masrel.lab._study_files import Fact
-from masrel.lab.conduct._study_log import append_event, check_rater, stated
+from masrel.lab.conduct._study_log import (
+    append_event,
+    check_rater,
+    past_day,
+    stated,
+)
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.protocol._values import checked_answer
-from masrel.lab.run._around import question_named
+from masrel.lab.run._days import log_interval
+from masrel.lab.run._questions import question_named
 from masrel.lab.run._state import SessionState, replay
 
 
@@ -235,6 +241,62 @@ def record_skip(
         }
         _check_code(log.path, code, faulted, "a fault stopped and is not skipped yet")
         log.append("skipped", {"code": code, "position": faulted[code], **reasons})
+
+
+def record_day(
+    study: StudyPaths,
+    protocol: Protocol,
+    rater: str,
+    session: str,
+    *,
+    on: str,
+    who: str,
+    why: str,
+    now: Callable[[], datetime] = utc_now,
+) -> None:
+    """Correct the day on which a session was held; the first one stays in its log.
+
+    The days between sessions are counted anew, those of sessions that came after it
+    too.
+
+    Parameters
+    ----------
+    study : StudyPaths
+        Where the study is.
+    protocol : Protocol
+        The study's protocol.
+    rater, session : str
+        Whose session, which has begun.
+    on : str
+        The day, ISO 8601.
+    who, why : str
+        Who corrects it, and for what reason.
+    now : callable, optional
+        Gives the time of day for the logs, aware.
+
+    Raises
+    ------
+    ParameterError
+        If `on` is no day, or one to come, or `who` or `why` is blank.
+    SessionLogError
+        If there is no such log, or it is damaged.
+    OSError
+        If a log cannot be written.
+
+    Warns
+    -----
+    MasrelWarning
+        If a session was out of the order, or the interval, of the protocol.
+    """
+    day = {"on": past_day("on", on, now), **stated(who=who, why=why)}
+    with _begun_log(study, rater, session, now) as log:
+        replay(log.path, log.events)
+        log.append("day-correction", day)
+        log_interval(study, protocol, rater, session, log)
+    for each in protocol.sessions:
+        if each.after == session and study.log_file(rater, each.id).is_file():
+            with _begun_log(study, rater, each.id, now) as log:
+                log_interval(study, protocol, rater, each.id, log)
 
 
 def _begun_log(

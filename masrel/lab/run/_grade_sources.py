@@ -126,6 +126,11 @@ class Skip:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class OnSheet:
+    """That the grade of a presentation is written on a sheet, to be entered later."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class QuestionRequest:
     """One question to a rater.
 
@@ -202,7 +207,7 @@ class GradeSource:
     def make_ready(self, request: GradeRequest) -> None:
         """Return when the rater is ready for the presentation."""
 
-    def grade(self, request: GradeRequest) -> str | StretchGrade | None:
+    def grade(self, request: GradeRequest) -> str | StretchGrade | OnSheet | None:
         """Return the grade, or None to have it presented again first."""
         raise NotImplementedError
 

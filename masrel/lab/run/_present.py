@@ -53,6 +53,8 @@ from masrel.lab.run._simulated_raters import (
     sensor_seed,
 )
 from masrel.lab.run._state import Felt
+from masrel.lab.schedule import Presentation
+from masrel.lab.schedule.presentation import _SEALED
 
 
 class StatusOfHand(PresentationStatus):
@@ -314,8 +316,7 @@ def _keep(
         "rater": request.rater,
         "session": request.session,
         "code": presentation.code,
-        "model": presentation.model,
-        "repeat": presentation.repeat,
+        **_named(protocol, presentation),
         "position": presentation.position,
         "attempt": request.attempt,
     }
@@ -325,6 +326,13 @@ def _keep(
         facts["practice"] = True
     checksum = write_recording(dataclasses.replace(recording, facts=facts), file)
     return _outcome(recording, protocol, presentation.model, file, checksum)
+
+
+def _named(protocol: Protocol, presentation: Presentation) -> dict[str, Fact]:
+    # which model it was, unless nobody is to know
+    if protocol.blinding.sealed:
+        return {"model": _SEALED, "repeat": presentation.position}
+    return {"model": presentation.model, "repeat": presentation.repeat}
 
 
 def _outcome(

@@ -22,6 +22,7 @@ from masrel.lab.protocol import Protocol, protocol_hash
 from masrel.lab.run._grade_sources import (
     GradeRequest,
     GradeSource,
+    OnSheet,
     Skip,
     StretchGrade,
     checked_grade,
@@ -95,7 +96,7 @@ class Presenter:
             self._log.append("stopped", {**self._named(), "why": str(error)})
             raise
 
-    def rate(self, first: GradeRequest) -> StretchGrade | Skip:
+    def rate(self, first: GradeRequest) -> StretchGrade | Skip | OnSheet:
         """Present until the grade comes, or nobody wants it any more.
 
         `first` is the request for the first attempt.
@@ -116,7 +117,7 @@ class Presenter:
             request = dataclasses.replace(
                 request, status=None, n_faults=n_faults, **made
             )
-            answer: StretchGrade | Skip | None
+            answer: StretchGrade | Skip | OnSheet | None
             if outcome.fault:
                 answer = self._after_fault(request, str(outcome.fault["words"]))
             else:
@@ -201,10 +202,10 @@ class Presenter:
         return None
 
     def _checked(
-        self, request: GradeRequest, answer: str | StretchGrade | None
-    ) -> StretchGrade | None:
-        if answer is None:
-            return None
+        self, request: GradeRequest, answer: str | StretchGrade | OnSheet | None
+    ) -> StretchGrade | OnSheet | None:
+        if answer is None or isinstance(answer, OnSheet):
+            return answer
         if isinstance(answer, str):
             answer = StretchGrade(grade=answer)
         grades = self._protocol.scale.grades

@@ -108,6 +108,7 @@ EVENTS: dict[str, tuple[str, ...]] = {
     "entered": ("code", "position", "grade", *_TYPED),
     "reentered": ("code", "column", "value", *_TYPED),
     "held": ("on",),
+    "day-correction": ("on", "who", "why"),
     "correction": ("code", "grade", "who", "why"),
     "skipped": ("code", "position", "who", "why"),
     "stopped": ("code", "position", "why"),
@@ -161,7 +162,10 @@ _TYPES: dict[str, object] = {
     "stretches": list[_Stretch] | None,
 }
 
-_AFTER_COMPLETE = ("correction", "answer-correction", "reentered")
+_AFTER_COMPLETE = (
+    *("correction", "answer-correction", "reentered"),
+    *("day-correction", "interval"),  # which is counted anew
+)
 
 AnswerKey = tuple[str, str, str | None]
 """Questionnaire, question, and the code that it is about, if any."""
@@ -194,8 +198,8 @@ class SessionState(CodesState):
     """Where a session stands; what was before it began anew is set aside."""
 
     # fields of the event ``session``; empty when there is none yet
-    header: Mapping[str, Facts] = field(default_factory=dict)
-    held_on: str | None = None  # day of a session on paper, ISO 8601
+    header: "Mapping[str, Facts]" = field(default_factory=dict)
+    held_on: str | None = None  # its day where that is not the log's, ISO 8601
     is_complete: bool = False  # whether the session came to its end
     practice: CodesState = field(default_factory=CodesState)
     is_instructed: bool = False  # whether the rater has read the instructions
@@ -324,6 +328,12 @@ def _contradiction(state: SessionState, event: Event) -> str | None:
             is_missing and code not in part.grades,
             f"a code that has a grade, got {code}",
         ),
+        (
+            ("complete",),
+            fields.get("n_presentations") != len(state.settled),
+            f"n_presentations {len(state.settled)}, as many as were graded or skipped, "
+            f"got {fields.get('n_presentations')}",
+        ),
     )
     broken = (needs for of, is_wrong, needs in rules if kind in of and is_wrong)
     needs = next(broken, None)
@@ -364,7 +374,7 @@ def _apply(state: SessionState, event: Event) -> None:
             state.header = fields
         case "complete":
             state.is_complete = True
-        case "held":
+        case "held" | "day-correction":
             state.held_on = str(fields["on"])
         case "instructed":
             state.is_instructed = True
@@ -400,7 +410,7 @@ def _apply_to_code(state: CodesState, kind: str, event: Event, source: str) -> N
         case "presented":
             state.presented.setdefault(code, []).append(event)
         case "entered":
-            state.presented[code] = []  # by what or whom is not known here
+            state.presented.setdefault(code, [])  # unless masrel did, nobody knows how
             if grade is not None:
                 state.first_grades[code] = str(grade)
         case "grade":

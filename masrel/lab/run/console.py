@@ -12,11 +12,13 @@ from masrel.lab.protocol._values import Answer, checked_answer
 from masrel.lab.run._grade_sources import (
     GradeRequest,
     GradeSource,
+    OnSheet,
     QuestionRequest,
     Skip,
     StretchGrade,
     remarks_on,
 )
+from masrel.lab.run._state import FROM_PAPER
 from masrel.scales import PublishedScale, Scale, published_scale
 
 if TYPE_CHECKING:
@@ -120,7 +122,7 @@ class ConsoleGrades(GradeSource):
         grade_now = None if grade == "NA" else grade
         return {"code": code, "grade": grade_now, "who": rater, "why": why}
 
-    def grade(self, request: GradeRequest) -> str | StretchGrade | None:
+    def grade(self, request: GradeRequest) -> str | StretchGrade | OnSheet | None:
         """Ask for the grade until it is one of the scale.
 
         Before, the rater is told if a limit of time ended the presentation, and if the
@@ -143,8 +145,7 @@ class ConsoleGrades(GradeSource):
             If the person stops, or the input ends.
         """
         grades, n_stretches = ", ".join(self._scale.grades), request.n_stretches
-        remarks = "".join(_REMARKS[name] for name in remarks_on(request))
-        self._say(remarks.format(limit_s=request.rules.time_limit_s))
+        self._say_remarks(request)
         meanings = "" if self._published is None else "; ? for their meanings"
         rests = ""
         if n_stretches > 1:
@@ -241,6 +242,10 @@ class ConsoleGrades(GradeSource):
             f"A break of {minutes:g} {unit}. Enter after it to go on, stop to stop: ",
         )
 
+    def _say_remarks(self, request: GradeRequest) -> None:
+        remarks = "".join(_REMARKS[name] for name in remarks_on(request))
+        self._say(remarks.format(limit_s=request.rules.time_limit_s))
+
     def _wait(self, request: GradeRequest, text: str) -> None:
         while self._ask(request, text):
             pass
@@ -327,6 +332,46 @@ class ConsoleGrades(GradeSource):
     def _say(self, text: str) -> None:
         self._questions.write(text)
         self._questions.flush()
+
+
+class PaperGrades(ConsoleGrades):
+    """A person at the console who presents models by code; grades are on a sheet.
+
+    Parameters
+    ----------
+    scale, answers, questions
+        As those of `ConsoleGrades`.
+    """
+
+    name: ClassVar[str] = FROM_PAPER
+
+    def grade(self, request: GradeRequest) -> OnSheet | None:
+        """Wait until the grade is on the sheet.
+
+        Parameters
+        ----------
+        request : GradeRequest
+            What was presented.
+
+        Returns
+        -------
+        OnSheet or None
+            None when the rater wants to feel it again.
+
+        Raises
+        ------
+        SessionStoppedError
+            If the person stops, or the input ends.
+        """
+        self._say_remarks(request)
+        while True:
+            answer = self._ask(
+                request,
+                f"Grade {request.presentation.code} on the sheet. Enter to go on "
+                "(again; stop): ",
+            )
+            if answer in ("", "again"):
+                return None if answer else OnSheet()
 
 
 def _meanings_in_words(scale: Scale, published: PublishedScale) -> str:

@@ -28,17 +28,18 @@ from masrel.lab.conduct._study_log import (
 )
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
 from masrel.lab.protocol._values import questions_of
-from masrel.lab.run._around import (
-    ask_questions,
+from masrel.lab.protocol.content import _refuse_unknown_coefficients
+from masrel.lab.run._corrections import correct_in_session
+from masrel.lab.run._days import (
     completed_at,
     days_since,
     interval_fields,
     last_time,
 )
-from masrel.lab.run._corrections import correct_in_session
-from masrel.lab.run._grade_sources import GradeRequest, GradeSource, Skip
+from masrel.lab.run._grade_sources import GradeRequest, GradeSource, OnSheet, Skip
 from masrel.lab.run._present import spool_of
 from masrel.lab.run._presenter import CLOCKS, ClockName, Presenter, check_same
+from masrel.lab.run._questions import ask_questions
 from masrel.lab.run._rehearsal import (
     RehearsalPaths,
     begin_rehearsal,
@@ -49,7 +50,13 @@ from masrel.lab.run._settings import (
     has_simulated_hand,
     torque_problems,
 )
-from masrel.lab.run._state import FORMAT, SessionState, replay
+from masrel.lab.run._state import (
+    FORMAT,
+    FROM_PAPER,
+    CodesState,
+    SessionState,
+    replay,
+)
 from masrel.lab.schedule import Presentation, Schedule
 from masrel.lab.schedule.sheets import _drawn_schedule
 
@@ -139,7 +146,8 @@ def run_session(
         another's), was left on another day and may not be gone on with, or is open
         elsewhere, or if there are recordings of the session that it does not name.
     ProtocolError
-        If a model asks for more torque than the device may send.
+        If a model asks for more torque than the device may send, or a line of the plan
+        names no coefficient.
     ParameterError
         If the device or `clock` is unknown or they do not fit each other, the rater
         was withdrawn, the session may not begin yet or any more, or the source is
@@ -163,6 +171,7 @@ def run_session(
         raise ParameterError(
             f"grades: needed a GradeSource, got {type(grades).__name__}"
         )
+    _refuse_unknown_coefficients(protocol, study.protocol)
     _check_device(clock, protocol)
     refuse_withdrawn(study, rater)
     if rehearsal:
@@ -319,15 +328,16 @@ class _Runner(Presenter):
         """Present and ask until every presentation has its grade or is skipped."""
         if not self._state.is_complete:
             self._prepare()
+        is_asked = self._grades.name != FROM_PAPER and not self._state.is_complete
         for presentation in self._scheduled:
-            if presentation.code not in self._state.settled:
+            if not self._is_over(presentation, self._state):
                 self._take_break(presentation)
                 self._rate(presentation)
-            elif not self._state.is_complete:
+            elif is_asked:
                 self._ask(presentation)  # what a process died before
             if progress is not None:
                 progress(presentation)
-        if not self._state.is_complete:
+        if is_asked:
             self._ask(None)
             self._log.append("complete", {"n_presentations": len(self._scheduled)})
         state = replay(self._log.path, self._log.events)
@@ -342,6 +352,13 @@ class _Runner(Presenter):
             log_file=self._log.path,
         )
 
+    def _is_over(self, presentation: Presentation, state: CodesState) -> bool:
+        # on paper it is once it was presented: when it is graded nobody says here
+        before = state.presented.get(presentation.code, [])
+        is_presented = bool(before) and before[-1].fields["fault"] is None
+        is_on_sheet = self._grades.name == FROM_PAPER and is_presented
+        return presentation.code in state.settled or is_on_sheet
+
     def _prepare(self) -> None:
         # instructions and practice, once
         text = self._protocol.occasions.instructions
@@ -350,7 +367,7 @@ class _Runner(Presenter):
             self._grades.instruct(self._request(first), text)
             self._log.append("instructed", {"text": text})
         for presentation in self._practice:
-            if presentation.code not in self._state.practice.settled:
+            if not self._is_over(presentation, self._state.practice):
                 self._rate(presentation)
 
     def _take_break(self, presentation: Presentation) -> None:
@@ -374,6 +391,8 @@ class _Runner(Presenter):
         is_practice = presentation in self._practice
         prefix = "practice-" if is_practice else ""
         grade = self.rate(self._request(presentation))
+        if isinstance(grade, OnSheet):
+            return
         if isinstance(grade, Skip):
             reasons = stated(who=grade.who, why=grade.why)
             self._log.append(f"{prefix}skipped", {**self._named(), **reasons})

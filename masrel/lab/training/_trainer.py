@@ -15,7 +15,7 @@ from masrel.lab._event_log import SessionLog, utc_now
 from masrel.lab._study_files import Fact
 from masrel.lab.conduct._study_log import check_rater
 from masrel.lab.protocol import Protocol, StudyPaths, presented_hash
-from masrel.lab.run._grade_sources import GradeRequest, GradeSource, Skip
+from masrel.lab.run._grade_sources import GradeRequest, GradeSource, StretchGrade
 from masrel.lab.run._presenter import ClockName, Presenter, check_same
 from masrel.lab.run.session import _check_device
 from masrel.lab.schedule import Presentation
@@ -232,10 +232,8 @@ class _Trainer(Presenter):
         )
         position = len(record.lessons) + 1
         grade = self.rate(self._request(position, model))
-        if isinstance(grade, Skip):  # no training can do without a grade
-            raise ParameterError(
-                f"grade of presentation {position}: needed one, got that it is skipped"
-            )
+        if not isinstance(grade, StretchGrade):  # no training can do without a grade
+            raise ParameterError(f"grade of presentation {position}: needed one now")
         lesson = Lesson(
             position=position,
             model=model,
