@@ -360,11 +360,8 @@ def _in_one_line(value: object) -> object:
 def _notes(facts: _StudyFacts) -> tuple[str, ...]:
     if facts.ratings is None:
         return ("No session has begun: what follows is the plan.",)
-    if not facts.ratings.simulated:
-        return ()
-    if facts.ratings.n_from_persons:
-        return ("SIMULATED DEVICE: not all of these grades were given on hardware.",)
-    return ("SIMULATED DATA: no person gave these grades.",)
+    counts = facts.ratings.simulated_counts
+    return (counts,) if counts else ()
 
 
 _HEADINGS = ("Item", "Asks for", "State", "What the record says", "Files")

@@ -286,8 +286,4 @@ def _description(protocol: Protocol, ratings: Ratings) -> str:
         sentences.append(f"Source: {protocol.study.source}.")
     grades = ", ".join(protocol.scale.grades)
     sentences.append(f"Scale {protocol.scale.name}: {grades}.")
-    if ratings.simulated and ratings.n_from_persons:
-        sentences.append("SIMULATED DEVICE: not all grades were given on hardware.")
-    elif ratings.simulated:
-        sentences.append("SIMULATED DATA: no person gave these grades.")
-    return " ".join(sentences)
+    return " ".join(filter(None, [*sentences, ratings.simulated_counts]))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from masrel.errors import MasrelError, SessionLogError
 from masrel.lab._event_log import Event
-from masrel.lab.conduct import excluded_raters, read_conduct
+from masrel.lab.conduct import excluded_raters, plan_changes, read_conduct
 from masrel.lab.conduct._study_log import study_answers
 from masrel.lab.protocol import Protocol, StudyPaths
 from masrel.lab.protocol._values import Answer
@@ -146,6 +146,7 @@ def study_remarks(
     ()
     """
     remarks = [*_of_conduct(study, include)] if has_conduct else []
+    remarks += [f"{change}." for change in plan_changes(study, protocol)]
     remarks += _of_sessions(study, protocol, include)
     if file not in (None, study.published_file) and any(study.sessions.glob("*.jsonl")):
         remarks.append(

@@ -33,6 +33,7 @@ from masrel.lab.ratings.table import (
 )
 from masrel.lab.run._state import FROM_PAPER, FROM_PERSONS, SessionState, read_session
 from masrel.lab.schedule import Schedule, check_schedule, read_schedule
+from masrel.lab.schedule.presentation import _SEALED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +68,11 @@ class StudyData:
 
 
 def read_study_data(
-    study: StudyPaths, protocol: Protocol, *, file: Path | None = None
+    study: StudyPaths,
+    protocol: Protocol,
+    *,
+    file: Path | None = None,
+    allows_sealed: bool = False,
 ) -> StudyData:
     """Read the ratings of a study.
 
@@ -80,6 +85,8 @@ def read_study_data(
     file : Path, optional
         A table to use whatever the logs say. Without one it is what the session logs
         say, where there are some, and else ``ratings.csv`` or ``published.csv``.
+    allows_sealed : bool, optional
+        Whether to return ratings that say no models, too.
 
     Returns
     -------
@@ -89,8 +96,8 @@ def read_study_data(
     Raises
     ------
     RatingsError
-        If there are no ratings, a file is not a table of ratings, a log is not of its
-        schedule, or ``ratings.csv`` is not what the logs say.
+        If there are no ratings, they are sealed, a file is not a table of ratings, a
+        log is not of its schedule, or ``ratings.csv`` is not what the logs say.
     SessionLogError
         If a log is damaged.
     ScheduleError
@@ -100,6 +107,12 @@ def read_study_data(
         ratings = ratings_from_logs(study, protocol)
         _refuse_other_table(study.ratings_file, ratings)
         read = f"{len(ratings.rows)} ratings from the logs in {study.sessions}"
+        if not allows_sealed and any(row.model == _SEALED for row in ratings.rows):
+            raise RatingsError(
+                f"{study.schedules}: who met which model is sealed until every session "
+                "is over: masrel status says how far it is, and then masrel record "
+                "unblind --all opens it"
+            )
     else:
         source = file or _file_of(study)
         ratings = read_study_ratings(source, scale_of(protocol))
@@ -303,7 +316,7 @@ def _rows(
             "code": shown.code,
             # how often a device presented it; of a sheet nobody knows
             "n_attempts": None
-            if is_on_paper
+            if is_on_paper and not state.presented.get(shown.code)
             else len(state.presented.get(shown.code, [])),
             "first_grade": state.first_grades.get(shown.code),
             "graded_at": _graded_at(state, shown.code, log),

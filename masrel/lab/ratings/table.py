@@ -149,6 +149,28 @@ class Ratings:
         return sum(row.grades_from in FROM_PERSONS for row in self.rows)
 
     @property
+    def simulated_counts(self) -> str:
+        """Of how many ratings grade or device is simulated, in words; "" of none."""
+        n, n_programs = len(self.rows), len(self.rows) - self.n_from_persons
+        n_device = sum(
+            row.grades_from in FROM_PERSONS and "simulated" in (row.device or "")
+            for row in self.rows
+        )
+        if not self.simulated:
+            return ""
+        if not self.n_from_persons:
+            return "SIMULATED DATA: no person gave these grades."
+        if not n_programs:
+            return (
+                f"SIMULATED DEVICE: persons gave these grades, {n_device} of {n} on "
+                "the simulated device."
+            )
+        by_persons = f", {n_device} by persons on the simulated device" * bool(n_device)
+        return (
+            f"SIMULATED DATA: {n_programs} of {n} grades are a program's{by_persons}."
+        )
+
+    @property
     def n_missing(self) -> int:
         """How many ratings have no grade."""
         return sum(row.grade is None for row in self.rows)

@@ -287,7 +287,7 @@ def _events_table(material: Material, conduct: StudyConduct) -> Table:
             {
                 **event.fields,
                 "who": event.fields.get("who") or None,
-                "date": event.time_utc[:10],
+                "date": event.fields.get("on") or event.time_utc[:10],
                 "event": event.fields["kind"] if event.kind == "noted" else event.kind,
                 "details": "; ".join(_details(event, _NOTES in conduct.include))
                 or None,
@@ -307,7 +307,13 @@ def _details(event: Event, has_texts: bool) -> Iterator[str]:
         yield "all codes" if fields["code"] is None else f"code {fields['code']}"
     if has_texts:
         yield from (str(fields[name]) for name in ("text", "why") if name in fields)
-    for name in ("severity", *(("action", "outcome") if has_texts else ())):
+    for name in (
+        "severity",
+        "seriousness",
+        "relatedness",
+        "onset",
+        *(("action", "outcome") if has_texts else ()),
+    ):
         if fields.get(name) is not None:
             yield f"{name}: {fields[name]}"
 

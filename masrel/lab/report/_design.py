@@ -91,7 +91,8 @@ def design_section(material: Material) -> Iterator[Content]:
     n_simulated = len(material.ratings.rows) - material.ratings.n_from_persons
     if material.ratings.simulated and n_simulated:
         yield Paragraph(
-            text="The grades are simulated: every simulated rater gives the intended "
+            text=f"{n_simulated} of {len(material.ratings.rows)} grades are simulated: "
+            "a simulated rater gives the intended "
             f"grade with probability {as_entered(settings.accuracy)} and repeats a "
             f"grade at a retest with probability "
             f"{as_entered(settings.retest_agreement)} (seed {settings.seed}). They "

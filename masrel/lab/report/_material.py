@@ -94,6 +94,7 @@ def gather(
             stamp = trace_stamp = SIMULATED_DEVICE
         elif ratings.n_from_persons:
             banner, provenance = _SIMULATED_IN_PART
+            provenance = f"{ratings.simulated_counts} {provenance}"
     elif data == "published":
         provenance = f"Published grades and speeds: {study.source}".rstrip(": ")
         stamp = f"Published data: {study.source}".rstrip(": ")

@@ -13,6 +13,7 @@ from masrel.lab.verification._log_findings import (
     write_anchors,
 )
 from masrel.lab.verification._sessions import SessionRecord
+from masrel.lab.verification._stamps import read_stamp, request_stamp
 from masrel.lab.verification.record import Verification, verify_sessions, verify_study
 
 __all__ = [
@@ -23,6 +24,8 @@ __all__ = [
     "anchor_findings",
     "anchors_of",
     "read_anchors",
+    "read_stamp",
+    "request_stamp",
     "verify_sessions",
     "verify_study",
     "write_anchors",

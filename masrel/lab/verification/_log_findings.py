@@ -7,7 +7,7 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Literal, TypeVar
@@ -27,6 +27,7 @@ from masrel.lab._study_files import (
 from masrel.lab.protocol import StudyPaths
 from masrel.lab.recording import _FORMAT as _RECORDING_FORMAT
 from masrel.lab.schedule import Presentation
+from masrel.lab.schedule.presentation import _SEALED
 
 _Checked = TypeVar("_Checked")
 
@@ -48,15 +49,16 @@ class Finding:
 
     Attributes
     ----------
-    weight : {"broken", "doubt"}
-        A doubt may have an innocent reason; a record with doubts alone is whole.
+    weight : {"broken", "stale", "doubt"}
+        What is stale was made of an earlier state of the record, by what it says
+        itself; a doubt may have an innocent reason. A record with these alone is whole.
     path : Path
         The file or folder that it is about.
     message : str
         What was needed and what is there; it begins with the path.
     """
 
-    weight: Literal["broken", "doubt"]
+    weight: Literal["broken", "stale", "doubt"]
     path: Path
     message: str
 
@@ -64,6 +66,11 @@ class Finding:
 def broken(path: Path, message: str) -> Finding:
     """Return a finding whose message does not begin with its path yet."""
     return Finding(weight="broken", path=path, message=f"{path}: {message}")
+
+
+def stale(path: Path, message: str) -> Finding:
+    """Return a finding of what was made before the record became what it is."""
+    return Finding(weight="stale", path=path, message=f"{path}: {message}")
 
 
 def doubt(path: Path, message: str) -> Finding:
@@ -171,10 +178,13 @@ def recording_findings(
     problem = format_problem(facts.get("format", 1), newest=_RECORDING_FORMAT)
     if problem is not None:
         yield broken(path, problem)
+    as_shown = shown[code]
+    if facts.get("model") == _SEALED:  # as it was recorded
+        as_shown = replace(as_shown, model=_SEALED, repeat=as_shown.position)
     needed: dict[str, object] = {
         **of,
         "sha256": event.fields["sha256"],
-        **{name: getattr(shown[code], name) for name in _FROM_SCHEDULE},
+        **{name: getattr(as_shown, name) for name in _FROM_SCHEDULE},
         **{name: event.fields[name] for name in _FROM_LOG if name in event.fields},
     }
     for name, value in needed.items():

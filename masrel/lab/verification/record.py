@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import masrel
 from masrel.errors import MasrelError, MasrelWarning, ProtocolError, SessionLogError
+from masrel.lab._event_log import read_log
 from masrel.lab._study_files import (
     MAX_RECORDING,
     MAX_TABLE,
@@ -20,15 +21,23 @@ from masrel.lab._study_files import (
     read_once,
     read_regular,
 )
-from masrel.lab.conduct import excluded_raters
+from masrel.lab.conduct import excluded_raters, plan_changes
+from masrel.lab.conduct._plan_versions import version_problems
 from masrel.lab.conduct._study_log import (
     allotment_problems,
     conduct_hash,
+    earlier_conduct_hashes,
     merged_log_problems,
 )
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
 from masrel.lab.schedule import schedule_problems
-from masrel.lab.verification._log_findings import Finding, broken, doubt
+from masrel.lab.verification._log_findings import (
+    Finding,
+    broken,
+    doubt,
+    stale,
+    time_findings,
+)
 from masrel.lab.verification._sessions import (
     CheckedLog,
     SessionRecord,
@@ -169,6 +178,16 @@ def _conduct_findings(study: StudyPaths, protocol: Protocol) -> tuple[Finding, .
         return (
             *(broken(*problem) for problem in merged_log_problems(study)),
             *(broken(*problem) for problem in allotment_problems(study, protocol)),
+            *(broken(*problem) for problem in version_problems(study)),
+            *(
+                finding
+                for log in study.conduct_logs()
+                for finding in time_findings(read_log(log), log)
+            ),
+            *(
+                doubt(study.protocol, str(change))
+                for change in plan_changes(study, protocol)
+            ),
         )
     except SessionLogError as error:
         return _of_problems(study.conduct_file, [str(error)])
@@ -235,6 +254,7 @@ def _output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]
         ratings_from_logs,
         read_study_data,
     )
+    from masrel.lab.sealing import as_far_as_known
 
     try:
         if study.logs():
@@ -250,8 +270,7 @@ def _output_findings(study: StudyPaths, protocol: Protocol) -> Iterator[Finding]
         # of statistics
         with warnings.catch_warnings(action="ignore", category=MasrelWarning):
             analysis = analyze(
-                protocol,
-                ratings,
+                *as_far_as_known(protocol, ratings),
                 in_person=in_person_of(study, ratings),
                 answers=answers_of(study, protocol),
                 excluded=excluded_raters(study),
@@ -328,6 +347,10 @@ def _analysis_findings(
     if isinstance(inputs, dict):
         analysis = _of_same_table(analysis, ratings, inputs)
     needed = as_analysis_document(analysis)
+    if isinstance(inputs, dict) and inputs != needed["inputs"]:
+        made_of = "another protocol or other ratings"
+        yield stale(path, f"was made of {made_of}; masrel analyze makes it anew")
+        return
     if document.get("masrel_version") != analysis.masrel_version:
         yield _not_rebuilt(path, document)
         document, needed = {"inputs": inputs}, {"inputs": needed["inputs"]}
@@ -374,11 +397,12 @@ def _report_findings(
     of_conduct = of.pop("conduct_sha256", None)
     of_claims = of.pop("claims_sha256", None)
     if of != _of_same_table(analysis, ratings, of).inputs:
-        yield broken(
+        yield stale(
             manifest, "the report is of another protocol or of other ratings: make anew"
         )
     if of_conduct != conduct_hash(study):
-        yield broken(
+        is_earlier = of_conduct in earlier_conduct_hashes(study)
+        yield (stale if is_earlier else broken)(
             manifest,
             "the report is not of what has happened beside the sessions, by "
             f"{study.conduct_file.name}: make anew",
