@@ -52,13 +52,17 @@ clock_option = click.option(
     type=click.Choice(["real", "simulated"]),
     help="Clock of the control loop; default: real, for simulated grades simulated.",
 )
-grades_option = click.option(
-    "--grades",
-    type=click.Choice(["console", "simulated"]),
-    default="console",
-    show_default=True,
-    help="Who gives the grades.",
-)
+
+
+def grades_option(*choices: str, words: str) -> Decorator:
+    """Return the option that says who gives the grades, the first one unless told."""
+    return click.option(
+        "--grades",
+        type=click.Choice(choices),
+        default=choices[0],
+        show_default=True,
+        help=words,
+    )
 
 
 def grading(
@@ -69,12 +73,30 @@ def grading(
 ) -> "dict[str, Any]":
     """Return the source of grades, and the clock, that a command runs with."""
     from masrel.lab.protocol import scale_of
-    from masrel.lab.run import ConsoleGrades
+    from masrel.lab.run import ConsoleGrades, PaperGrades
 
-    if grades == "console":
-        source: GradeSource = ConsoleGrades(scale_of(protocol))
+    persons = {"console": ConsoleGrades, "paper": PaperGrades}
+    if grades in persons:
+        source: GradeSource = persons[grades](scale_of(protocol))
         return {"grades": source, "clock": clock or "real"}
     return {"grades": simulated(protocol), "clock": clock or "simulated"}
+
+
+stamp_option = click.option(
+    "--stamp",
+    metavar="URL",
+    help="Have the file stamped by this service (RFC 3161), and keep its answer beside "
+    "it.",
+)
+
+
+def echo_stamp(file: Path, service: str | None) -> None:
+    """Have a file stamped if a service is named, and say when it was."""
+    from masrel.lab.verification import request_stamp
+
+    if service is not None:
+        time = request_stamp(file, service)
+        click.echo(f"{file} is stamped: {time.isoformat()}")
 
 
 ratings_option = click.option(
@@ -86,7 +108,9 @@ ratings_option = click.option(
 )
 
 
-def read_study(root: Path, ratings_file: Path | None) -> "StudyData":
+def read_study(
+    root: Path, ratings_file: Path | None, *, allows_sealed: bool = False
+) -> "StudyData":
     """Return a study's protocol and its ratings; say what must be known beside."""
     from masrel.lab.protocol import StudyPaths, read_protocol
     from masrel.lab.ratings import read_study_data, study_remarks
@@ -98,7 +122,9 @@ def read_study(root: Path, ratings_file: Path | None) -> "StudyData":
     note_inputs(*tables, *models)
     # Said first: it may be why the ratings are refused.
     echo_remarks(study_remarks(paths, protocol, file=ratings_file))
-    return read_study_data(paths, protocol, file=ratings_file)
+    return read_study_data(
+        paths, protocol, file=ratings_file, allows_sealed=allows_sealed
+    )
 
 
 def echo_remarks(remarks: Sequence[str]) -> None:

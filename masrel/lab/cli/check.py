@@ -11,6 +11,7 @@ from masrel.errors import MasrelError, ParameterError, ProtocolError, RatingsErr
 from masrel.lab._study_files import read_once
 from masrel.lab.cli._study_options import echo_remarks, study_argument
 from masrel.lab.protocol import Protocol, StudyPaths, read_protocol, scale_of
+from masrel.lab.protocol.content import _coefficient_problems
 from masrel.lab.ratings import study_remarks
 from masrel.lab.schedule import concealment_notes, schedule_problems
 from masrel.tables._tables import counted
@@ -55,20 +56,16 @@ def check(study: Path) -> None:
 
 
 def _plan_problems(protocol: Protocol, study: StudyPaths) -> Iterable[str]:
-    from masrel.agreement import coefficient  # loads numpy
     from masrel.lab.analysis._plan import unanswered  # loads pandas
 
+    unknown = dict(_coefficient_problems(protocol))
     for index, line in enumerate(protocol.analysis.estimates):
-        where = f"{study.protocol}: analysis.estimates[{index}]"
-        try:
-            coefficient(line.coefficient)
-        except ParameterError as error:
-            yield f'{where}.{error} (id "{line.id}")'
-            continue
-        if (reason := unanswered(line, protocol)) is not None:
+        if index in unknown:
+            yield f"{study.protocol}: {unknown[index]}"
+        elif (reason := unanswered(line, protocol)) is not None:
             yield (
-                f"{where}: has no estimate even once every rating is there: {reason} "
-                f'(id "{line.id}")'
+                f"{study.protocol}: analysis.estimates[{index}]: has no estimate even "
+                f'once every rating is there: {reason} (id "{line.id}")'
             )
 
 

@@ -101,19 +101,21 @@ def _simulate(study: StudyPaths, output: OutputOptions) -> None:
 
 def _record_event(study: StudyPaths, protocol: Protocol) -> None:
     # as a coordinator does; on a day that is the same each time, as the report has it
-    from masrel.lab.conduct import record_note
+    from masrel.lab.conduct import Note, record_note
 
     record_note(
         study,
         protocol,
-        "simulated: sore wrist after the session",
-        who="demo",
-        kind="adverse-event",
-        severity="mild",
-        action="rest",
-        outcome="gone the next day",
-        rater=protocol.raters[0].id,
-        session=protocol.sessions[0].id,
+        Note(
+            text="simulated: sore wrist after the session",
+            who="demo",
+            kind="adverse-event",
+            severity="mild",
+            action="rest",
+            outcome="gone the next day",
+            rater=protocol.raters[0].id,
+            session=protocol.sessions[0].id,
+        ),
         now=lambda: datetime(2012, 1, 1, tzinfo=UTC),
     )
 

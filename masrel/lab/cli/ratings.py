@@ -43,7 +43,7 @@ def ratings(paths: StudyPaths, protocol: Protocol, output: Path | None) -> None:
     write_ratings(ratings, destination, within=None if output else paths.root)
     if output is None:
         raters = raters_csv(paths, protocol)  # also with fields that are not public
-        write_file(paths.raters_file, raters, within=paths.root, mode=0o600)
+        write_file(paths.raters_file, raters, within=paths.root)
     n_rows, n_missing = len(ratings.rows), ratings.n_missing
     label = " (simulated)" if ratings.simulated else ""
     if ratings.n_from_persons == n_rows and label:

@@ -5,10 +5,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from masrel.cli._commands import Commands
+from masrel.cli._commands import STUDY, Commands
 from masrel.cli._options import Decorator
 from masrel.errors import ParameterError
-from masrel.lab.cli._study_options import id_option, of_study, session_option, several
+from masrel.lab.cli._study_options import (
+    echo_stamp,
+    id_option,
+    of_study,
+    session_option,
+    several,
+    stamp_option,
+    warnings_as_notes,
+)
 
 if TYPE_CHECKING:
     from masrel.lab.conduct._statements import NoteKind, Standing
@@ -26,12 +34,16 @@ def record() -> None:
 _who = click.option("--who", required=True, help="Who says so.")
 _why = click.option("--why", required=True, help="For what reason.")
 _code = click.option("--code", required=True, help="Code of the presentation.")
+_on = click.option(
+    "--on", metavar="DATE", help="The day it happened; today unless said."
+)
 _about = several(
     of_study,
     click.argument("text"),
     _who,
     click.option("--rater", help="To whom it happened."),
     click.option("--session", help="In which session."),
+    _on,
 )
 
 
@@ -41,9 +53,9 @@ def _of_session(*options: Decorator) -> Decorator:
 
 def _add_note(kind: "NoteKind", text: str, *options: Decorator) -> None:
     def command(study: "StudyPaths", protocol: "Protocol", **fields: Any) -> None:
-        from masrel.lab.conduct import record_note
+        from masrel.lab.conduct import Note, record_note
 
-        record_note(study, protocol, kind=kind, **fields)
+        record_note(study, protocol, Note(kind=kind, **fields))
         click.echo(f"{kind} recorded: {study.conduct_file}")
 
     record.command(kind, help=text)(several(_about, *options)(command))
@@ -64,6 +76,16 @@ _add_note(
     "adverse-event",
     "Record TEXT, an adverse event, as a note is recorded.",
     click.option("--severity", metavar="mild|moderate|severe"),
+    click.option(
+        "--seriousness", metavar="'serious'|'not serious'", help="As ICH E2A means it."
+    ),
+    click.option(
+        "--relatedness",
+        metavar="WORD",
+        help="Whether the study caused it: unrelated, unlikely, possible, probable or "
+        "definite.",
+    ),
+    click.option("--onset", metavar="DATE", help="The day it began."),
     click.option("--action", help="What was done about it."),
     click.option("--outcome", help="What came of it."),
 )
@@ -97,6 +119,31 @@ def _correct(
     )
     what = f"{code} of {rater}, session {session},"
     _say_corrected(what, _or_missing(grade), study.log_file(rater, session))
+
+
+@record.command("day")
+@_of_session(
+    click.option("--on", metavar="DATE", required=True, help="The day it was held.")
+)
+def _day(
+    study: "StudyPaths",
+    protocol: "Protocol",
+    rater: str,
+    session: str,
+    **fields: Any,
+) -> None:
+    """Correct the day of a session of STUDY; the first one stays in the log.
+
+    The days between sessions are counted anew.
+    """
+    from masrel.lab.run import record_day
+
+    with warnings_as_notes():
+        record_day(study, protocol, rater, session, **fields)
+    click.echo(
+        f"session {session} of {rater} was held on {fields['on']}, as is said in "
+        f"{study.log_file(rater, session)}"
+    )
 
 
 @record.command("skip")
@@ -156,7 +203,15 @@ def _say_corrected(what: str, now: str | None, log: Path) -> None:
     )
 
 
-@record.command("rater")
+@record.group("rater", cls=Commands)
+def _rater() -> None:
+    """Record what is known of a rater, or take another one in.
+
+    masrel record rater STUDY records fields of a rater.
+    """
+
+
+@_rater.command(STUDY)
 @of_study
 @id_option
 @click.argument("values", metavar="FIELD=VALUE...", nargs=-1, required=True)
@@ -175,6 +230,40 @@ def _set(
     """
     from masrel.lab.conduct import record_rater_values
 
+    by_field = _by_field(values)
+    record_rater_values(study, protocol, rater, by_field, who=who)
+    click.echo(f"{', '.join(by_field)} of {rater} recorded: {study.conduct_file}")
+
+
+@_rater.command("add")
+@of_study
+@id_option
+@click.option(
+    "--session", "sessions", multiple=True, required=True, help="In which; repeatable."
+)
+@click.option("--site", help="Where the rater is.")
+@click.argument("values", metavar="[FIELD=VALUE]...", nargs=-1)
+@_who
+def _add(
+    study: "StudyPaths",
+    protocol: "Protocol",
+    rater: str,
+    sessions: tuple[str, ...],
+    values: tuple[str, ...],
+    **fields: Any,
+) -> None:
+    """Take another rater into STUDY: into its protocol, whose comments stay.
+
+    Schedules that are drawn stay as they are.
+    """
+    from masrel.lab.conduct import record_new_rater
+
+    by_field = _by_field(values)
+    record_new_rater(study, protocol, rater, sessions, values=by_field, **fields)
+    click.echo(f"{rater} is in {study.protocol}. Next: masrel schedule {study.root}")
+
+
+def _by_field(values: tuple[str, ...]) -> dict[str, str]:
     by_field: dict[str, str] = {}
     for entry in values:
         name, equals, text = entry.partition("=")
@@ -184,11 +273,55 @@ def _set(
                 f"got {entry!r}"
             )
         by_field[name] = text
-    record_rater_values(study, protocol, rater, by_field, who=who)
-    click.echo(f"{', '.join(by_field)} of {rater} recorded: {study.conduct_file}")
+    return by_field
 
 
-def _add_standing(name: str, standing: "Standing", words: str, text: str) -> None:
+@record.command("amend")
+@of_study
+@_who
+@_why
+def _amend(study: "StudyPaths", protocol: "Protocol", who: str, why: str) -> None:
+    """Record that the plan of STUDY was changed since its first schedules were drawn.
+
+    Edit the protocol first: a copy of it goes into the log. What has changed, and when,
+    is named by every command that reads the study, and in its report.
+    """
+    from masrel.lab.conduct import record_amendment
+
+    for change in record_amendment(study, protocol, who=who, why=why):
+        click.echo(change)
+    click.echo(f"amendment recorded: {study.conduct_file}")
+
+
+@record.command("register")
+@of_study
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path, dir_okay=False),
+    required=True,
+    help="The file, for a registry.",
+)
+@stamp_option
+def _register(
+    study: "StudyPaths", protocol: "Protocol", output: Path, stamp: str | None
+) -> None:
+    """Write what a registry keeps of STUDY: its plan, and a commitment to its orders.
+
+    The protocol with its hash, and the hash of the secret that orders are drawn from,
+    which says nothing of them.
+    """
+    from masrel.cli._options import write_json
+    from masrel.lab.conduct import registration
+
+    write_json(registration(study, protocol), output)
+    click.echo(output)
+    echo_stamp(output, stamp)
+
+
+def _add_standing(
+    name: str, standing: "Standing", words: str, text: str, *more: Decorator
+) -> None:
     def command(
         study: "StudyPaths", protocol: "Protocol", rater: str, **reasons: Any
     ) -> None:
@@ -197,7 +330,7 @@ def _add_standing(name: str, standing: "Standing", words: str, text: str) -> Non
         record_standing(study, protocol, rater, standing, **reasons)
         click.echo(f"{rater} {words}: {study.conduct_file}")
 
-    options = several(of_study, id_option, _who, _why)
+    options = several(of_study, id_option, *more, _who, _why)
     record.command(name, help=text)(options(command))
 
 
@@ -219,6 +352,7 @@ _add_standing(
     The rater stays in the protocol, the grades given before stay in the study and are
     counted, and the report says so. No session of the rater goes on.
     """,
+    _on,
 )
 
 
@@ -239,12 +373,21 @@ def _unblind(
 ) -> None:
     """Print which model CODE of STUDY stands for, once it is recorded who asked.
 
-    It is an event of STUDY/conduct.jsonl, and the report says so.
+    It is an event of STUDY/conduct.jsonl, and the report says so. A sealed study is
+    opened by --all, once every session is over.
     """
     from masrel.lab.conduct import record_unblinding
+    from masrel.lab.protocol.study import _OPENED
+    from masrel.lab.sealing import is_sealed, unseal_study
 
     if (code is None) != every:
         raise click.UsageError("needs either a CODE or --all")
+    if every and is_sealed(study, protocol):
+        if fields.pop("rater") or fields.pop("session"):
+            raise click.UsageError("--all opens a sealed study as a whole")
+        n = unseal_study(study, protocol, **fields)
+        click.echo(f"{n} schedules are open: {study.schedules / _OPENED}")
+        return
     for schedule, shown in record_unblinding(study, protocol, code, **fields):
         click.echo(
             f"{shown.code} of {schedule.rater}, session {schedule.session}, is "

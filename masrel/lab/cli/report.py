@@ -265,35 +265,33 @@ def _made(
     from masrel.lab.report._document import make_report, section_names
     from masrel.lab.report._material import gather
     from masrel.lab.report._pages import CONVERTED, pandoc_version
+    from masrel.lab.sealing import as_far_as_known
     from masrel.lab.verification import anchors_of
 
     # most of what libraries and figures make stays in use
     with read_once(), collector_off():
-        data = read_study(study, ratings_file)
+        data = read_study(study, ratings_file, allows_sealed=True)
+        protocol, ratings = as_far_as_known(data.protocol, data.ratings)
+        if protocol is not data.protocol:  # how far it is, and no model
+            only = ("flow", "conduct")
         for name in only:
-            check_option("--only", name, section_names(data.protocol))
+            check_option("--only", name, section_names(protocol))
         if CONVERTED & {*data.protocol.report.formats, *formats}:
             pandoc_version()
-        gates = gating.gates(data.protocol)
+        gates = gating.gates(protocol)
         conduct = study_conduct(
             data.paths, data.protocol, file=ratings_file, include=include
         )
         with warnings_as_notes():
             analysis = analyze(
-                data.protocol,
-                data.ratings,
+                protocol,
+                ratings,
                 in_person=data.in_person,
                 answers=data.answers,
                 excluded=data.excluded,
             )
-        material = gather(
-            data.protocol,
-            data.ratings,
-            analysis,
-            data.in_person,
-            data.paths.sessions,
-            conduct,
-        )
+        in_person, folder = data.in_person, data.paths.sessions
+        material = gather(protocol, ratings, analysis, in_person, folder, conduct)
         bar = tqdm(desc="report", unit=" parts", disable=output.quiet or None)
 
         def progress(part: str) -> None:

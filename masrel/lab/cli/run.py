@@ -25,7 +25,11 @@ if TYPE_CHECKING:
 @of_study
 @id_option
 @session_option
-@grades_option
+@grades_option(
+    *("console", "paper", "simulated"),
+    words="Who gives the grades; with paper models are presented by their codes, and a "
+    "sheet is entered afterwards.",
+)
 @clock_option
 @output_options(quiet="No progress bar and no closing line.")
 @click.option(
@@ -38,7 +42,7 @@ def run(
     protocol: Protocol,
     rater: str,
     session: str,
-    grades: Literal["console", "simulated"],
+    grades: Literal["console", "paper", "simulated"],
     clock: Literal["real", "simulated"] | None,
     output: OutputOptions,
     rehearse: bool,
@@ -52,7 +56,7 @@ def run(
 
     n_presentations = len(protocol.models) * protocol.schedule.repeats
     # A person's prompts count the presentations themselves.
-    hidden = output.quiet or grades == "console"
+    hidden = output.quiet or grades != "simulated"
     if rehearse and not output.quiet:
         click.echo("REHEARSAL: nothing of it enters the ratings of the study", err=True)
     with (
@@ -68,11 +72,16 @@ def run(
             rehearsal=rehearse,
             progress=lambda _: bar.update(),
         )
-    if not output.quiet:
+    if not output.quiet and grades == "paper":
+        click.echo(
+            f"session {session} of {rater} is presented. Next: masrel paper enter "
+            f"{paths.root} FILE --rater {rater} --session {session} --who WHO"
+        )
+    elif not output.quiet:
         click.echo(_completed(done, grades))
 
 
-def _completed(done: "SessionSummary", grades: Literal["console", "simulated"]) -> str:
+def _completed(done: "SessionSummary", grades: str) -> str:
     made = "simulated" if grades == "simulated" else "simulated device"
     label = f" ({made})" if done.simulated else ""
     n_missing = done.n_presentations - done.n_graded

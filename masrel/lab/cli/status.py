@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -78,6 +79,8 @@ def _study(paths: "StudyPaths", protocol: "Protocol", output: OutputOptions) -> 
     )
 
 
+_MOST_SHOWN = 200  # characters of a text in the list of events
+
 # Columns that are there when any session has something in them
 _COUNTS = {
     "n_practised": "Practised",
@@ -106,6 +109,7 @@ def _sessions_table(
             **asdict(each),
             "stage": each.stage + absent.get(each.rater, ""),
             "graded": f"{each.n_graded} of {each.n_presentations}",
+            "due": _due(each),
             "last": each.last_time_utc
             and f"{_minute(each.last_time_utc)} {each.last_event}",
         }
@@ -120,6 +124,8 @@ def _sessions_table(
             Column(key="rater", heading="Rater", align="left"),
             Column(key="stage", heading="Stage", align="left"),
             Column(key="graded", heading="Graded"),
+            *[Column(key="due", heading="Due", align="left")]
+            * any(row["due"] for row in rows),
             *(
                 Column(key=key, heading=heading)
                 for key, heading in _COUNTS.items()
@@ -132,10 +138,24 @@ def _sessions_table(
     )
 
 
+def _due(session: "SessionProgress") -> str | None:
+    # the days on which it may begin
+    if session.due_from is None and session.due_to is None:
+        return None
+    first = f"from {session.due_from}" if session.due_from else ""
+    last = f"to {session.due_to}" if session.due_to else ""
+    overdue = ", overdue" if session.is_overdue else ""
+    return f"{first} {last}".strip() + overdue
+
+
 def _event_line(event: "Event") -> str:
     fields = {name: value for name, value in event.fields.items() if value is not None}
     kind = fields.pop("kind", event.kind)
-    details = ", ".join(f"{name} {value}" for name, value in fields.items())
+    # one line, whatever was written
+    details = ", ".join(
+        f"{name} {shorten(str(value), _MOST_SHOWN, placeholder=' …')}"
+        for name, value in fields.items()
+    )
     return f"{_minute(event.time_utc)} {kind}: {details}"
 
 

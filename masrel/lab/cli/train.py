@@ -36,7 +36,7 @@ def train() -> None:
 @train.command(STUDY)
 @of_study
 @id_option
-@grades_option
+@grades_option("console", "simulated", words="Who gives the grades.")
 @clock_option
 @output_options(quiet="No closing line.")
 def _train(

@@ -2,6 +2,7 @@
 
 import dataclasses
 import sys
+from collections import Counter
 from collections.abc import Iterable
 from operator import attrgetter
 from pathlib import Path
@@ -9,10 +10,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from masrel.cli._options import STDOUT, OutputOptions, output_options, write_json
+from masrel.cli._options import (
+    STDOUT,
+    OutputOptions,
+    output_options,
+    write_json,
+)
+from masrel.cli._paths import InputFile
 from masrel.errors import ParameterError
 from masrel.lab._study_files import read_once
-from masrel.lab.cli._study_options import warnings_as_notes
+from masrel.lab.cli._study_options import echo_stamp, stamp_option, warnings_as_notes
 from masrel.lab.protocol import StudyPaths
 
 if TYPE_CHECKING:
@@ -28,9 +35,21 @@ if TYPE_CHECKING:
     help="File of hashes outside the study: made when it is not there, and else what "
     "the logs are held against.",
 )
+@stamp_option
+@click.option(
+    "--authority",
+    type=InputFile(path_type=Path),
+    help="Certificate, PEM, of who stamped the file of hashes.",
+)
 @output_options(json="Write everything here as JSON; - prints it, and nothing else.")
 @read_once()
-def verify(study: Path, anchor_file: Path | None, output: OutputOptions) -> None:
+def verify(
+    study: Path,
+    anchor_file: Path | None,
+    stamp: str | None,
+    authority: Path | None,
+    output: OutputOptions,
+) -> None:
     """Verify the record of STUDY, every file against the one it was made from.
 
     Protocol, schedules, logs and recordings of sessions, trainings and rehearsals,
@@ -48,6 +67,8 @@ def verify(study: Path, anchor_file: Path | None, output: OutputOptions) -> None
         verification = verify_study(paths)
     anchors = anchors_of(paths)
     findings = (*verification.findings, *_anchored(paths, anchor_file, anchors))
+    if anchor_file is not None and anchor_file.exists():
+        _say_stamp(anchor_file, stamp, authority)
     verification = dataclasses.replace(verification, findings=findings)
     n_broken = sum(finding.weight == "broken" for finding in findings)
     if output.json_file is not None:
@@ -91,6 +112,15 @@ def _anchored(
     return ()
 
 
+def _say_stamp(file: Path, service: str | None, authority: Path | None) -> None:
+    from masrel.lab.verification import read_stamp
+
+    echo_stamp(file, service)
+    if service is None and (time := read_stamp(file, authority)) is not None:
+        by = "" if authority is None else f" by {authority}"
+        click.echo(f"{file} was stamped{by}: {time.isoformat()}", err=True)
+
+
 def _document(
     verification: "Verification", anchors: "tuple[Anchor, ...]", *, is_whole: bool
 ) -> dict[str, object]:
@@ -132,8 +162,9 @@ def _show(
         click.echo(f"anchor: {anchor}")
     for finding in verification.findings:
         click.echo(f"{finding.weight}: {finding.message}", err=True)
-    n_doubts = len(verification.findings) - n_broken
-    doubts = f", {n_doubts} in doubt" if n_doubts else ""
+    n = Counter(finding.weight for finding in verification.findings)
+    doubts = f", {n['stale']} out of date" if n["stale"] else ""
+    doubts += f", {n['doubt']} in doubt" if n["doubt"] else ""
     if n_broken:
         click.echo(f"masrel: {study}: {n_broken} broken{doubts}", err=True)
     else:

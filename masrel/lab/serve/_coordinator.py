@@ -24,6 +24,7 @@ from masrel.errors import MasrelError, ParameterError
 from masrel.lab._event_log import read_log
 from masrel.lab._study_files import read_once
 from masrel.lab.conduct import (
+    Note,
     allot_schedules,
     read_conduct,
     record_note,
@@ -32,8 +33,8 @@ from masrel.lab.conduct import (
 )
 from masrel.lab.conduct._study_log import check_choice, check_rater
 from masrel.lab.progress import next_step, rater_progress, session_progress
-from masrel.lab.protocol import StudyPaths, read_protocol
-from masrel.lab.run import record_answer, record_skip
+from masrel.lab.protocol import Protocol, StudyPaths, read_protocol
+from masrel.lab.run import record_answer, record_day, record_skip
 from masrel.lab.run._rehearsal import last_rehearsal
 from masrel.lab.run._settings import torque_problems
 from masrel.lab.serve._access import Access, qr_svg
@@ -83,6 +84,10 @@ def _unblind(*where: Any, **fields: Any) -> str:
     )
 
 
+def _note(study: StudyPaths, protocol: Protocol, **fields: Any) -> None:
+    record_note(study, protocol, Note(**fields))
+
+
 _SIGNED = ("who", "why")
 _SESSION = ("rater", "session")
 ACTIONS = {
@@ -93,11 +98,12 @@ ACTIONS = {
         "All {result} schedules are drawn.",
     ),
     "note": _Action(
-        record_note,
+        _note,
         ("text", "who"),
         {
             "kind": "note",
-            **dict.fromkeys((*_SESSION, "severity", "action", "outcome")),
+            **dict.fromkeys((*_SESSION, "on", "severity", "seriousness")),
+            **dict.fromkeys(("relatedness", "onset", "action", "outcome")),
         },
         "Recorded: {kind}.",
     ),
@@ -106,6 +112,12 @@ ACTIONS = {
         (*_SESSION, "question", *_SIGNED),
         dict.fromkeys(("answer", "code")),
         "The answer to {question} is corrected; what it was stays in the log.",
+    ),
+    "day": _Action(
+        record_day,
+        (*_SESSION, "on", *_SIGNED),
+        {},
+        "Session {session} of {rater} was held on {on}, as is logged.",
     ),
     "skip": _Action(
         record_skip,
@@ -116,7 +128,7 @@ ACTIONS = {
     "withdraw": _Action(
         partial(record_standing, standing="withdrawn"),
         ("rater", *_SIGNED),
-        {},
+        {"on": None},
         "{rater} is withdrawn; the grades given before are kept.",
     ),
     "unblind": _Action(
@@ -200,7 +212,9 @@ class CoordinatorPages(Pages):
         return []
 
     def _live(self, tail: SampleTail | None) -> tuple[str, Any]:
-        return "live", {"begins": True} if tail is None else _frame(tail)
+        return "live", {"begins": True} if tail is None else _frame(
+            tail, is_sealed=bool(self._overview.get("sealed"))
+        )
 
     async def act(self, request: Request) -> Response:
         """Do what the page asks, once however often it sends the same."""
@@ -291,7 +305,8 @@ def _shown(fields: Any) -> dict[str, Any]:
     return {name: fields[name] for name in names if fields.get(name) is not None}
 
 
-def _frame(tail: SampleTail) -> dict[str, Any] | None:
+def _frame(tail: SampleTail, *, is_sealed: bool) -> dict[str, Any] | None:
+    # of a sealed study not what is felt
     columns = ("time_s", "angle_deg", "command_torque_nm", "phase")
     rows = tail.new_rows(*columns, every=_EVERY)
     seconds, angles, torques, phases = rows.values()
@@ -300,8 +315,8 @@ def _frame(tail: SampleTail) -> dict[str, Any] | None:
     return {
         "time_s": [round(value, 3) for value in seconds],
         "angle_deg": [round(math.degrees(value), 2) for value in angles],
-        "torque_nm": [round(value, 3) for value in torques],
-        "phase": [int(value) for value in phases],
+        "torque_nm": [0.0 if is_sealed else round(value, 3) for value in torques],
+        "phase": [0 if is_sealed else int(value) for value in phases],
     }
 
 
@@ -418,6 +433,7 @@ def overview(study: StudyPaths) -> dict[str, Any]:
             for questionnaire in protocol.questionnaires
             for question in questionnaire.questions
         ],
+        "sealed": protocol.blinding.sealed,
         "device": {name: getattr(protocol.device, name) for name in _DEVICE},
         "n_torque_problems": len(tuple(torque_problems(protocol))),
         "has_report": (study.root / "report" / "report.html").is_file(),

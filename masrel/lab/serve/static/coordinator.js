@@ -295,6 +295,7 @@ const rater = ["rater", "Rater", { options: "raters" }];
 const session = ["session", "Session", { options: "sessions" }];
 const needRater = ["rater", "Rater", { options: "raters", required: true }];
 const needSession = ["session", "Session", { options: "sessions", required: true }];
+const on = ["on", "Day it happened, unless today", { type: "date" }];
 const code = ["code", "Code", { required: true }];
 
 const forms = [
@@ -308,7 +309,11 @@ const forms = [
       ["text", "What happened", { required: true, long: true }],
       rater,
       session,
+      on,
       ["severity", "Severity, of an adverse event", { values: ["mild", "moderate", "severe"] }],
+      ["seriousness", "Seriousness, of an adverse event", { values: ["serious", "not serious"] }],
+      ["relatedness", "Caused by the study?", { values: ["unrelated", "unlikely", "possible", "probable", "definite"] }],
+      ["onset", "Day it began, of an adverse event", { type: "date" }],
       ["action", "What was done, of an adverse event", {}],
       ["outcome", "What came of it, of an adverse event", {}],
       who,
@@ -321,8 +326,9 @@ const forms = [
     "Correct",
     [needRater, needSession, ["question", "Question", { options: "questions", required: true }], ["answer", "What it should have been; nothing for none", {}], ["code", "Code, of a question about a model", {}], who, why],
   ],
+  ["day", "Correct the day of a session", "Correct", [needRater, needSession, ["on", "Day it was held", { type: "date", required: true }], who, why]],
   ["skip", "Leave a model without a grade, after a fault", "Record", [needRater, needSession, code, who, why]],
-  ["withdraw", "A rater has left", "Record", [needRater, who, why]],
+  ["withdraw", "A rater has left", "Record", [needRater, on, who, why]],
   ["unblind", "Unblind a code", "Record, and show the model", [code, rater, session, who, why]],
 ];
 
@@ -333,7 +339,7 @@ const lists = {
   questions: (overview) => overview.questions,
 };
 
-function field(formName, [name, label, { required = false, options = null, values = null, long = false }]) {
+function field(formName, [name, label, { required = false, options = null, values = null, long = false, type = "text" }]) {
   const id = `${formName}-${name}`;
   let input;
   if (options || values) {
@@ -341,7 +347,7 @@ function field(formName, [name, label, { required = false, options = null, value
     input.dataset.options = options ?? "";
     fillSelect(input, values ?? [], required);
   } else if (long) input = h("textarea", { id, name, required, rows: 3, maxLength: 4000 });
-  else input = h("input", { id, name, type: "text", required, maxLength: 500, autocomplete: name === "who" ? "name" : "off" });
+  else input = h("input", { id, name, type, required, maxLength: 500, autocomplete: name === "who" ? "name" : "off" });
   return h("div", { className: "field" }, h("label", { htmlFor: id }, label), input);
 }
 
@@ -436,11 +442,12 @@ function draw() {
   const end = Math.max(live.time_s.at(-1) ?? 0, 2);
   const start = Math.max(0, end - WINDOW_S);
   const x = (t) => 48 + ((t - start) / (end - start)) * (width - 60);
-  shadePhases(g, x, height);
+  const isSealed = Boolean(state.overview?.sealed); // then nothing says what is felt
+  if (!isSealed) shadePhases(g, x, height);
   chart(g, x, { low: 0, high: 180, step: 45, top: 18, bottom: height / 2 - 12, values: live.angle_deg, label: "Angle, deg", width });
   const most = Math.max(5, ...live.torque_nm.map(Math.abs)) * 1.1;
   const step = most > 12 ? 5 : 2.5;
-  chart(g, x, { low: -most * 0.25, high: most, step, top: height / 2 + 18, bottom: height - 22, values: live.torque_nm, label: "Torque, N·m", width });
+  if (!isSealed) chart(g, x, { low: -most * 0.25, high: most, step, top: height / 2 + 18, bottom: height - 22, values: live.torque_nm, label: "Torque, N·m", width });
   g.fillStyle = css("--faint");
   g.textAlign = "right";
   g.fillText(`${end.toFixed(1)} s`, width - 12, height - 6);
@@ -448,7 +455,8 @@ function draw() {
   g.fillText(`${start.toFixed(1)} s`, 48, height - 6);
   if (live.time_s.length) {
     const phase = phases[live.phase.at(-1)] ?? "";
-    at("live-text").textContent = `Angle ${live.angle_deg.at(-1).toFixed(0)} deg, torque ${live.torque_nm.at(-1).toFixed(1)} N·m, ${phase}.`;
+    const felt = isSealed ? "" : `, torque ${live.torque_nm.at(-1).toFixed(1)} N·m, ${phase}`;
+    at("live-text").textContent = `Angle ${live.angle_deg.at(-1).toFixed(0)} deg${felt}.`;
   }
 }
 
